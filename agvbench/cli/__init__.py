@@ -1,0 +1,73 @@
+"""The command line: one file per command in this package, found by name.
+
+A command is a module with ``HELP`` (one line), ``add_arguments(parser)`` and ``run(arguments) -> int``. It
+imports nothing heavy at module level, so that ``agvbench --help`` stays instant; a module whose name starts with
+an underscore is not a command. Every user error ends as one line on standard error and exit code 2.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import pkgutil
+import sys
+from collections.abc import Sequence
+from types import ModuleType
+
+from agvbench import __version__
+from agvbench.errors import AgvbenchError
+
+_EPILOG = """\
+exit codes: 0 done; 1 the answer is "no" (a regression, not adequate); 2 bad input or set-up, with one line that says what to do.
+shell completion: eval "$(register-python-argcomplete agvbench)"
+"""
+
+
+def _commands() -> dict[str, ModuleType]:
+    names = sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_"))
+    return {name.removesuffix("_"): importlib.import_module(f"{__name__}.{name}") for name in names}
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Return the parser of ``agvbench`` with every command of this package."""
+    parser = argparse.ArgumentParser(
+        prog="agvbench",
+        description="Does the vehicle do what it is told, what does calibration buy, and what does the model not know?",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"agvbench {__version__}")
+    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for name, module in _commands().items():
+        sub = subparsers.add_parser(
+            name,
+            help=module.HELP,
+            description=module.__doc__,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        module.add_arguments(sub)
+        sub.set_defaults(run=module.run)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; return its exit code."""
+    parser = build_parser()
+    if "_ARGCOMPLETE" in os.environ:
+        import argcomplete  # noqa: PLC0415 - only while a shell asks for completions
+
+        argcomplete.autocomplete(parser)
+    arguments = parser.parse_args(argv)
+    try:
+        return int(arguments.run(arguments))
+    except AgvbenchError as error:
+        print(f"agvbench {arguments.command}: {error}", file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        print(f"agvbench {arguments.command}: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # The reader (head, less) has gone: nothing is left to say, and nobody to say it to.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0

@@ -1,0 +1,118 @@
+"""The error tree. Every error that a user can cause is one of these, and prints as one line.
+
+::
+
+    AgvbenchError                 exit code 2: bad input or set-up
+    ├── InputError                a file, flag, table or message that cannot be used
+    │   ├── FlagError             a command line option
+    │   ├── FileError             a file that is missing, unreadable or of the wrong form
+    │   └── CampaignError         a campaign whose tables contradict themselves or the schema
+    ├── VehicleError              a vehicle description or static map that cannot be used
+    ├── PlanError                 a trajectory that this vehicle cannot drive here
+    ├── FitError                  data that do not determine what is fitted
+    │   └── NotAnArcError         points that do not lie on an arc
+    ├── PlantError                a plant that breaks the plant protocol
+    └── LinkError                 bus, adapters and hardware
+        ├── MessageError          a message that cannot be decoded
+        └── AdapterGoneError      an adapter that did not answer or vanished
+
+A message names *what* is wrong, *where*, the *value*, the *limit* with its unit and the *remedy*.
+"""
+
+from __future__ import annotations
+
+
+class AgvbenchError(Exception):
+    """Bad input or set-up, told in one line.
+
+    Parameters
+    ----------
+    what
+        What is wrong, without a full stop: ``"radius is too small"``.
+    where
+        File, line, table, column, flag or key expression, as the user would write it.
+    value
+        The offending value, with its unit.
+    limit
+        The limit it breaks, with its unit.
+    remedy
+        What to do about it, as an imperative.
+
+    Examples
+    --------
+    >>> print(PlanError("turning radius is too small", where="u_turn.toml: segments[1]",
+    ...                 value="0.20 m", limit="at least 0.36 m", remedy="widen the turn"))
+    u_turn.toml: segments[1]: turning radius is too small: 0.20 m (limit: at least 0.36 m); widen the turn
+    """
+
+    exit_code = 2
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        where: object = None,
+        value: object = None,
+        limit: object = None,
+        remedy: str | None = None,
+    ) -> None:
+        self.what, self.where, self.value, self.limit, self.remedy = what, where, value, limit, remedy
+        super().__init__(self._line())
+
+    def _line(self) -> str:
+        line = self.what if self.where is None else f"{self.where}: {self.what}"
+        if self.value is not None:
+            line += f": {self.value}"
+        if self.limit is not None:
+            line += f" (limit: {self.limit})"
+        if self.remedy is not None:
+            line += f"; {self.remedy}"
+        return " ".join(line.split())
+
+
+class InputError(AgvbenchError):
+    """A file, flag, table or message that cannot be used."""
+
+
+class FlagError(InputError):
+    """A command line option with a value that cannot be used."""
+
+
+class FileError(InputError):
+    """A file that is missing, unreadable or of the wrong form."""
+
+
+class CampaignError(InputError):
+    """A campaign whose tables contradict themselves or the schema."""
+
+
+class VehicleError(AgvbenchError):
+    """A vehicle description or static map that cannot be used."""
+
+
+class PlanError(AgvbenchError):
+    """A trajectory that this vehicle cannot drive here."""
+
+
+class FitError(AgvbenchError):
+    """Data that do not determine what is fitted."""
+
+
+class NotAnArcError(FitError):
+    """Points that do not lie on an arc: too few, not finite, straight, or too short an arc."""
+
+
+class PlantError(AgvbenchError):
+    """A plant that breaks the plant protocol."""
+
+
+class LinkError(AgvbenchError):
+    """The bus, an adapter or the hardware behind it."""
+
+
+class MessageError(LinkError):
+    """A message that cannot be decoded: wrong magic, version, kind, length or count."""
+
+
+class AdapterGoneError(LinkError):
+    """An adapter that did not answer in time or whose liveliness token vanished."""
