@@ -1,1 +1,1 @@
-
+"""The Zenoh bus: keys, messages, clocks and links."""

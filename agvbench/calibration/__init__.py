@@ -1,1 +1,1 @@
-
+"""From measured runs to static maps."""

@@ -1,1 +1,1 @@
-
+"""Campaign directories: read, check, append, import."""

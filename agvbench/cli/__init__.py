@@ -19,7 +19,8 @@ from agvbench import __version__
 from agvbench.errors import AgvbenchError
 
 _EPILOG = """\
-exit codes: 0 done; 1 the answer is "no" (a regression, not adequate); 2 bad input or set-up, with one line that says what to do.
+exit codes: 0 done; 1 the answer is "no" (a regression, not adequate);
+2 bad input or set-up, with one line that says what to do.
 shell completion: eval "$(register-python-argcomplete agvbench)"
 """
 
@@ -55,7 +56,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code."""
     parser = build_parser()
     if "_ARGCOMPLETE" in os.environ:
-        import argcomplete  # noqa: PLC0415 - only while a shell asks for completions
+        import argcomplete
 
         argcomplete.autocomplete(parser)
     arguments = parser.parse_args(argv)

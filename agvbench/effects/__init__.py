@@ -1,1 +1,1 @@
-
+"""Physical effects that a vehicle model may have: one file each."""

@@ -1,1 +1,1 @@
-
+"""Maps, kinematics and effects composed into a vehicle model."""

@@ -1,1 +1,1 @@
-
+"""From a declared trajectory to timed commands."""

@@ -1,1 +1,1 @@
-
+"""Tables, figures, HTML and Rerun recordings."""

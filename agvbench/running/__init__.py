@@ -1,1 +1,1 @@
-
+"""Drive experiments, record them, and go on after an interruption."""

@@ -1,1 +1,1 @@
-
+"""Plants and sensor noise: an independent truth that shares no code with the vehicle model."""

@@ -1,1 +1,1 @@
-
+"""Errors of runs, their spread, and comparisons."""

@@ -1,1 +1,1 @@
-
+"""What each command does, in a few lines each."""
