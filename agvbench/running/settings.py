@@ -1,0 +1,103 @@
+"""What a bench session was asked to do, kept beside its campaign so that it can be resumed."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from agvbench.errors import FileError, FlagError
+
+SETTINGS_FILE = "bench.toml"
+ORDERS = ("interleaved", "blocked", "shuffled")
+MAPS = ("default", "thesis")
+_LARGEST_SEED = 2**63 - 1
+# What may differ between a session and the one that resumes it: none of these changes what is driven.
+_FREE_ON_RESUME = frozenset({"connect", "lab"})
+
+
+@dataclass(frozen=True)
+class BenchSettings:
+    """The options that decide what is driven.
+
+    ``agv``, ``mocap`` and ``plant`` name adapters and the simulated plant; ``vehicle`` and ``calibration`` are
+    vehicle files ("" for the shipped nominal vehicle, and for calibrating in this session); ``repeats`` 0 means
+    what each benchmark declares; ``order`` is one of `ORDERS`; ``full`` drives every pulse of the thesis.
+    """
+
+    agv: str = "sim"
+    mocap: str = "sim"
+    plant: str = "agvbench.simulator:make_plant"
+    vehicle: str = ""
+    calibration: str = ""
+    maps: str = "default"
+    repeats: int = 0
+    order: str = "interleaved"
+    seed: int = 1
+    full: bool = False
+    attempts: int = 3
+    connect: str = ""
+    lab: str = "lab"
+
+    def __post_init__(self) -> None:
+        _check(self.repeats >= 0, "--repeats", self.repeats, "at least 1", "give a whole number of repeats")
+        _check(self.attempts >= 1, "--attempts", self.attempts, "at least 1", "give a whole number of attempts")
+        _check(0 <= self.seed <= _LARGEST_SEED, "--seed", self.seed, f"0 to {_LARGEST_SEED}", "choose another seed")
+        _check(self.order in ORDERS, "--order", self.order, ", ".join(ORDERS), "choose one of these")
+        _check(self.maps in MAPS, "--maps", self.maps, ", ".join(MAPS), "choose one of these")
+
+    def save(self, directory: Path) -> None:
+        """Write the settings beside the campaign's tables."""
+        (directory / SETTINGS_FILE).write_text(tomli_w.dumps(asdict(self)), encoding="utf-8")
+
+    @classmethod
+    def load(cls, directory: Path) -> BenchSettings:
+        """Read the settings of the campaign in `directory`.
+
+        Raises
+        ------
+        FileError
+            If they are missing or not what agvbench wrote.
+        """
+        path = directory / SETTINGS_FILE
+        try:
+            table = tomllib.loads(path.read_text(encoding="utf-8"))
+            return cls(**table)
+        except FileNotFoundError:
+            raise FileError("no bench session to resume", where=path, remedy="start anew without --resume") from None
+        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, TypeError) as error:
+            raise FileError(
+                "not the settings of a bench session", where=path, value=error, remedy="start anew without --resume"
+            ) from None
+
+
+def settings_for_resume(saved: BenchSettings, given: dict[str, Any]) -> BenchSettings:
+    """Return the saved settings, after checking that no option `given` on the command line contradicts them.
+
+    Raises
+    ------
+    FlagError
+        If an option differs from what the session began with.
+    """
+    known = {f.name for f in fields(BenchSettings)}
+    for name, value in given.items():
+        if name not in known or name in _FREE_ON_RESUME:
+            continue
+        before = getattr(saved, name)
+        if value != before:
+            raise FlagError(
+                "a resumed session drives what it began with",
+                where=f"--{name}",
+                value=value,
+                limit=before,
+                remedy=f"leave --{name} out, or start anew without --resume",
+            )
+    return replace(saved, **{name: given[name] for name in _FREE_ON_RESUME if name in given})
+
+
+def _check(condition: bool, flag: str, value: object, limit: str, remedy: str) -> None:
+    if not condition:
+        raise FlagError("value cannot be used", where=flag, value=value, limit=limit, remedy=remedy)

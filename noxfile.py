@@ -1,0 +1,70 @@
+"""What people run: ``nox -s bench`` is the main job, ``nox -s tests`` passes the tests.
+
+Arguments after ``--`` go to the tool of the session: ``nox -s bench -- --repeats 3 --out campaigns/tonight``.
+"""
+
+from __future__ import annotations
+
+import nox
+
+nox.needs_version = ">=2024.10"
+nox.options.default_venv_backend = "uv|virtualenv"
+nox.options.reuse_existing_virtualenvs = True
+nox.options.sessions = ["lint", "tests", "docs"]
+
+LOCK = "requirements.lock"
+
+
+def install(session: nox.Session, *extras: str) -> None:
+    """Install agvbench for editing, with exactly the versions of the lock file."""
+    wanted = f".[{','.join(extras)}]" if extras else "."
+    session.install("--quiet", "-c", LOCK, "-e", wanted)
+
+
+@nox.session
+def bench(session: nox.Session) -> None:
+    """Calibrate, drive the eight trajectories under each condition, write campaign and report."""
+    install(session)
+    session.run("agvbench", "bench", *session.posargs)
+
+
+@nox.session
+def tests(session: nox.Session) -> None:
+    """Run all tests, with coverage."""
+    install(session, "test")
+    arguments = session.posargs or ["--cov", "--cov-report=term:skip-covered", "-n", "2", "--dist", "worksteal"]
+    session.run("pytest", *arguments)
+
+
+@nox.session
+def lint(session: nox.Session) -> None:
+    """Check style, types and layers."""
+    install(session, "lint", "test")
+    session.run("ruff", "check", ".")
+    session.run("ruff", "format", "--check", ".")
+    session.run("mypy")
+    session.run("lint-imports")
+
+
+@nox.session
+def docs(session: nox.Session) -> None:
+    """Run every example in docstrings and documents, and build the site."""
+    install(session, "test", "docs")
+    session.run("pytest", "--doctest-modules", "--doctest-glob=*.md", "agvbench", "docs", "README.md", "-q", "-p", "no:randomly")
+    session.run("mkdocs", "build", "--strict", "--quiet", "--site-dir", session.create_tmp())
+
+
+@nox.session
+def perf(session: nox.Session) -> None:
+    """Measure speed and accuracy against peers, in one run, and print the ratios."""
+    install(session, "test")
+    session.run("python", "benchmarks/perf/run_all.py", *session.posargs)
+
+
+@nox.session(venv_backend="none")
+def lock(session: nox.Session) -> None:
+    """Resolve the newest versions that pyproject.toml allows into the lock file."""
+    session.run(
+        "uv", "pip", "compile", "--quiet", "--universal", "--all-extras", "--upgrade", "--no-emit-index-url",
+        "--python-version", "3.11", "pyproject.toml", "-o", LOCK, external=True,
+    )  # fmt: skip
