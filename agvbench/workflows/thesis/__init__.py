@@ -1,0 +1,1 @@
+"""Everything the thesis measured, refitted and predicted, beside its own figures."""
