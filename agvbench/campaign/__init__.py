@@ -1,1 +1,7 @@
 """Campaign directories: read, check, append, import."""
+
+from agvbench.campaign.campaign import Campaign
+from agvbench.campaign.header import CampaignHeader
+from agvbench.campaign.writer import CampaignWriter
+
+__all__ = ["Campaign", "CampaignHeader", "CampaignWriter"]

@@ -1,0 +1,31 @@
+"""Files that are either whole or absent: write beside the target, force to disk, rename into place."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+TEMPORARY_PREFIX = ".tmp-"
+
+
+def write_atomically(path: Path, data: bytes | memoryview, *, durable: bool = True) -> None:
+    """Write `data` to `path` so that a reader sees the old file or the new one and never a part of it.
+
+    With `durable` the data are on the disk before the name is, so that this also holds through a power cut.
+    """
+    temporary = path.with_name(TEMPORARY_PREFIX + path.name)
+    descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
+    try:
+        view = memoryview(data)
+        while view:
+            view = view[os.write(descriptor, view) :]
+        if durable:
+            os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+    temporary.rename(path)
+
+
+def is_temporary(path: Path) -> bool:
+    """Whether `path` is what an interrupted `write_atomically` left."""
+    return path.name.startswith(TEMPORARY_PREFIX)

@@ -1,0 +1,202 @@
+"""Open a campaign directory and read its runs."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import fields
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from agvbench.campaign.checks import check_commands, check_poses, check_runs
+from agvbench.campaign.header import FILE_NAME, CampaignHeader
+from agvbench.campaign.schema import COMMANDS, POSES, RUNS, TABLES
+from agvbench.campaign.source import Source
+from agvbench.campaign.timed import TimedTable
+from agvbench.errors import CampaignError
+from agvbench.types import Commands, Frames, Pose, Run
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_KNOWN = frozenset(column.name for column in RUNS)
+_FRAME_COLUMNS = tuple(field.name for field in fields(Frames))
+
+
+class Campaign:
+    """A directory of runs, checked when opened; commands and poses are read and checked on first use.
+
+    Runs are ordered by when they started. Get one with `Campaign.open`.
+    """
+
+    def __init__(self, path: Path, header: CampaignHeader, runs: pa.Table, sources: dict[str, Source]) -> None:
+        self.path = path
+        self.header = header
+        self._runs = runs
+        self._sources = sources
+        self.run_ids: list[str] = runs["run_id"].to_pylist()
+
+    @classmethod
+    def open(cls, path: str | Path) -> Campaign:
+        """Open the campaign in directory `path`.
+
+        Raises
+        ------
+        CampaignError
+            If a file is absent or damaged, or the head or the runs table contradict the schema.
+        """
+        path = Path(path)
+        if not path.is_dir():
+            what = "is not a directory" if path.exists() else "does not exist"
+            raise CampaignError(what, where=path, remedy="give a campaign directory")
+        header = CampaignHeader.load(path / FILE_NAME)
+        sources = {name: Source.find(path, name) for name in TABLES}
+        runs = sources["runs"].read(RUNS)
+        check_runs(runs, sources["runs"].path)
+        if not runs.num_rows:
+            raise CampaignError(
+                "has no finished runs", where=sources["runs"].path, remedy="resume the campaign, or drive it again"
+            )
+        order = np.argsort(runs["started_s"].to_numpy(), kind="stable")
+        return cls(path, header, runs.take(pa.array(order)), sources)
+
+    def check(self) -> Campaign:
+        """Read and check every table now; return self.
+
+        Raises
+        ------
+        CampaignError
+            If a table is damaged, contradicts another or the schema.
+        """
+        _ = self._poses  # reads and checks the commands, too
+        return self
+
+    @cached_property
+    def _commands(self) -> TimedTable:
+        source = self._sources["commands"]
+        table = TimedTable(source, source.read(COMMANDS), self.run_ids)
+        check_commands(table, self._runs["status"].to_pylist(), self.header.command_unit)
+        return table
+
+    @cached_property
+    def _poses(self) -> TimedTable:
+        source = self._sources["poses"]
+        table = TimedTable(source, _blank_untracked(source.read(POSES)), self.run_ids)
+        last = np.zeros(len(self.run_ids))
+        has = self._commands.counts > 0
+        last[has] = self._commands.column("t_s")[self._commands.offsets[1:][has] - 1]
+        check_poses(table, self._runs["status"].to_pylist(), last)
+        return table
+
+    @cached_property
+    def runs(self) -> pd.DataFrame:
+        """The runs table, by time of start; columns that schema 1 does not know are kept."""
+        frame: pd.DataFrame = self._runs.to_pandas()
+        return frame
+
+    @cached_property
+    def commands(self) -> pd.DataFrame:
+        """The commands table, in the order of `run_ids`."""
+        frame: pd.DataFrame = self._commands.table.to_pandas()
+        return frame
+
+    @cached_property
+    def poses(self) -> pd.DataFrame:
+        """The poses table, in the order of `run_ids` and then of arrival; NaN where not tracked."""
+        frame: pd.DataFrame = self._poses.table.to_pandas()
+        return frame
+
+    def table(self, name: str) -> pd.DataFrame:
+        """Return a further table (``"events"``, ``"provenance"``, …).
+
+        Raises
+        ------
+        CampaignError
+            If there is none of that name.
+        """
+        frame: pd.DataFrame = Source.find(self.path, name).read(()).to_pandas()
+        return frame
+
+    @cached_property
+    def _rows(self) -> list[dict[str, Any]]:
+        rows: list[dict[str, Any]] = self._runs.to_pylist()
+        return rows
+
+    @cached_property
+    def _index(self) -> dict[str, int]:
+        return {run_id: index for index, run_id in enumerate(self.run_ids)}
+
+    def run(self, run_id: str) -> Run:
+        """Return one run.
+
+        Raises
+        ------
+        CampaignError
+            If there is no such run.
+        """
+        if run_id not in self._index:
+            raise CampaignError(
+                "has no such run", where=self.path, value=run_id, remedy="see the ids in its runs table"
+            )
+        return self._run(self._index[run_id])
+
+    def __iter__(self) -> Iterator[Run]:
+        return map(self._run, range(len(self.run_ids)))
+
+    def __len__(self) -> int:
+        return len(self.run_ids)
+
+    def select(
+        self,
+        *,
+        experiment: str | Collection[str] | None = None,
+        condition: str | Collection[str] | None = None,
+        trajectory: str | Collection[str] | None = None,
+        session: str | Collection[str] | None = None,
+        split: str | Collection[str] | None = None,
+        ok_only: bool = True,
+    ) -> list[Run]:
+        """Return the runs that have one of the given values in every given column; by default only those that count."""
+        wanted = {"experiment": experiment, "condition": condition, "trajectory": trajectory}
+        wanted |= {"session": session, "split": split, "status": "ok" if ok_only else None}
+        tests = {
+            name: {value} if isinstance(value, str) else set(value)
+            for name, value in wanted.items()
+            if value is not None
+        }
+        return [
+            self._run(index)
+            for index, row in enumerate(self._rows)
+            if all(row.get(name) in values for name, values in tests.items())
+        ]
+
+    def _run(self, index: int) -> Run:
+        row, commands, poses = self._rows[index], self._commands, self._poses
+        when, seen = commands.rows(index), poses.rows(index)
+        return Run(
+            **{name: row[name] for name in ("run_id", "experiment", "trajectory", "condition", "repeat")},
+            **{name: row[name] for name in ("started_s", "status", "firmware")},
+            target=Pose(row["target_x_m"], row["target_y_m"], row["target_heading_rad"]),
+            commands=Commands(**{name: commands.column(name)[when] for name in ("t_s", "drive", "front", "rear")}),
+            frames=Frames(**{name: poses.column(name)[seen] for name in _FRAME_COLUMNS}),
+            session=row.get("session") or None,
+            split=row.get("split") or None,
+            extra={name: value for name, value in row.items() if name not in _KNOWN and value is not None},
+        )
+
+
+def _blank_untracked(table: pa.Table) -> pa.Table:
+    """Give both signs of a lost frame, NaN and tracked = false, to every lost frame."""
+    names = ("x_m", "y_m", "heading_rad")
+    seen = table["tracked"]
+    for name in names:
+        seen = pc.and_(seen, pc.invert(pc.is_nan(table[name])))
+    if pc.all(seen).as_py() is not False:
+        return table
+    for name in names:
+        table = table.set_column(table.column_names.index(name), name, pc.if_else(seen, table[name], np.nan))
+    return table.set_column(table.column_names.index("tracked"), "tracked", seen)

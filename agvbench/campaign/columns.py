@@ -1,0 +1,132 @@
+"""Give a table's known columns their types; say which cell cannot have it."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from agvbench.campaign.schema import Column, Kind
+from agvbench.errors import CampaignError
+
+_TYPES: dict[Kind, pa.DataType] = {"text": pa.string(), "number": pa.float64(), "count": pa.int64(), "flag": pa.bool_()}
+_WORDS: dict[Kind, str] = {"text": "text", "number": "a number", "count": "a whole number", "flag": "true or false"}
+UNKNOWN_COUNT = -1
+
+
+def type_columns(table: pa.Table, columns: Sequence[Column], where: object) -> pa.Table:
+    """Return `table` with its known columns as text, float64, int64 or bool; unknown columns stay as they are.
+
+    A missing number is NaN, a missing optional text null, a missing optional count −1, a missing flag false.
+
+    Raises
+    ------
+    CampaignError
+        If a required column is absent or a cell cannot have the column's type.
+    """
+    names = table.column_names
+    for column in columns:
+        if column.name in names:
+            index = names.index(column.name)
+            typed = _typed(table.column(index), column, where)
+            if typed is not table.column(index):
+                table = table.set_column(index, column.name, typed)
+        elif column.required:
+            raise _absent(column.name, names, where)
+    return table
+
+
+def _absent(name: str, names: Sequence[str], where: object) -> CampaignError:
+    close = difflib.get_close_matches(name, names, 1)
+    found = f"it has {', '.join(names[:12])}{', …' if len(names) > 12 else ''}"
+    remedy = f"rename its column {close[0]}" if close else "add it (docs/reference/campaign-directory.md)"
+    return CampaignError(f"has no column {name} ({found})", where=where, remedy=remedy)
+
+
+def _typed(values: pa.ChunkedArray, column: Column, where: object) -> pa.ChunkedArray:
+    target = _TYPES[column.kind]
+    if values.type != target:
+        values = _convert(values, column, where)
+    if values.null_count:
+        values = _fill(values, column, where)
+    return values
+
+
+def _convert(values: pa.ChunkedArray, column: Column, where: object) -> pa.ChunkedArray:
+    target, kind = _TYPES[column.kind], values.type
+    if pa.types.is_null(kind):
+        return values.cast(target)
+    if column.kind == "text":
+        if pa.types.is_integer(kind) or pa.types.is_large_string(kind) or kind == pa.string_view():
+            return values.cast(target)
+        raise _wrong_type(column, where, kind)
+    if pa.types.is_large_string(kind) or pa.types.is_string(kind) or kind == pa.string_view():
+        return _parse(values.cast(pa.string()), column, where)
+    if not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)):
+        raise _wrong_type(column, where, kind)
+    if column.kind != "number" and pa.types.is_floating(kind):
+        values = pc.if_else(pc.is_nan(values), None, values)
+    try:
+        return values.cast(target, safe=column.kind == "count")
+    except pa.ArrowInvalid:
+        raise _bad_cell(values, column, where, lambda cell: float(cell).is_integer()) from None
+
+
+def _parse(values: pa.ChunkedArray, column: Column, where: object) -> pa.ChunkedArray:
+    values = pc.utf8_trim_whitespace(values)
+    values = pc.if_else(pc.equal(values, ""), None, values)
+    try:
+        return values.cast(_TYPES[column.kind])
+    except pa.ArrowInvalid:
+        raise _bad_cell(values, column, where, _PARSERS[column.kind]) from None
+
+
+def _as_flag(cell: str) -> bool:
+    return {"true": True, "false": False, "1": True, "0": False}[cell.lower()]
+
+
+_PARSERS: dict[Kind, Callable[[str], object]] = {"text": str, "number": float, "count": int, "flag": _as_flag}
+
+
+def _fill(values: pa.ChunkedArray, column: Column, where: object) -> pa.ChunkedArray:
+    if column.kind == "number":
+        return values.fill_null(float("nan"))
+    if column.kind == "flag":
+        return values.fill_null(False)
+    if not column.required:
+        return values.fill_null(UNKNOWN_COUNT) if column.kind == "count" else values
+    if column.kind == "text" and column.name != "run_id":
+        return values.fill_null("")
+    row = pc.index(pc.is_null(values), True).as_py() + 1
+    raise CampaignError(f"row {row} has no {column.name}", where=where, remedy=f"fill in {column.name}")
+
+
+def _wrong_type(column: Column, where: object, kind: pa.DataType) -> CampaignError:
+    return CampaignError(
+        f"column {column.name} has the wrong type",
+        where=where,
+        value=str(kind),
+        limit=_WORDS[column.kind],
+        remedy="convert it",
+    )
+
+
+def _bad_cell(values: Any, column: Column, where: object, accepts: Callable[[Any], object]) -> CampaignError:
+    for row, cell in enumerate(values.to_pylist(), start=1):
+        try:
+            good = cell is None or accepts(cell) is not False or cell is False
+        except (ValueError, KeyError, OverflowError):
+            good = False
+        if not good:
+            remedy = "use a decimal point" if _has_decimal_comma(cell) else "correct the cell"
+            return CampaignError(
+                f"row {row}: {column.name} is not {_WORDS[column.kind]}", where=where, value=repr(cell), remedy=remedy
+            )
+    return _wrong_type(column, where, values.type)
+
+
+def _has_decimal_comma(cell: object) -> bool:
+    return isinstance(cell, str) and cell.count(",") == 1 and cell.replace(",", "").strip("+- ").isdigit()

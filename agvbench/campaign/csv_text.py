@@ -1,0 +1,68 @@
+"""CSV in, every cell as text: the wrong delimiter or encoding is told in one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.csv as pa_csv
+
+from agvbench.errors import FileError
+
+MAX_BYTES = 4 << 30
+_DELIMITERS = {";": "semicolons", "\t": "tabs", "|": "bars"}
+
+
+def read_csv_text(path: Path, *, delimiter: str = ",", encoding: str = "utf-8", skip_rows: int = 0) -> pa.Table:
+    """Read a CSV with a header line; every column is text, empty cells are empty text.
+
+    Raises
+    ------
+    FileError
+        If the file is missing, too large, in another encoding or delimiter, ragged, or has no header.
+    """
+    names = _header(path, delimiter, encoding, skip_rows)
+    try:
+        return pa_csv.read_csv(
+            path,
+            read_options=pa_csv.ReadOptions(encoding=encoding, skip_rows=skip_rows, use_threads=False),
+            parse_options=pa_csv.ParseOptions(delimiter=delimiter),
+            convert_options=pa_csv.ConvertOptions(
+                column_types=dict.fromkeys(names, pa.string()), strings_can_be_null=False
+            ),
+        )
+    except (pa.ArrowException, UnicodeDecodeError) as error:
+        reason = str(error).splitlines()[0].removeprefix("CSV parse error: ")[:120]
+        raise FileError(f"is not CSV ({reason})", where=path, remedy="correct the line") from None
+
+
+def _header(path: Path, delimiter: str, encoding: str, skip_rows: int) -> list[str]:
+    import csv
+
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise FileError(
+                "is too large", where=path, value=f"{path.stat().st_size} bytes", limit=f"{MAX_BYTES} bytes"
+            )
+        with path.open(encoding=encoding.replace("utf-8", "utf-8-sig"), newline="") as stream:
+            for _ in range(skip_rows):
+                stream.readline()
+            line = stream.readline(1 << 20)
+    except OSError as error:
+        raise FileError(f"cannot be read ({error.strerror})", where=path, remedy="check the path") from None
+    except UnicodeError:
+        raise FileError(f"is not {encoding} text", where=path, remedy=f"save it as {encoding.upper()}") from None
+    except LookupError:
+        raise FileError("encoding is unknown", where=path, value=encoding, remedy="give utf-8 or latin-1") from None
+    if not line.strip() or "\0" in line:
+        raise FileError("has no header line", where=path, remedy="give a CSV whose first line names its columns")
+    for other, plural in _DELIMITERS.items():
+        if delimiter not in line and other != delimiter and other in line:
+            raise FileError(
+                f"is separated by {plural}", where=path, limit=repr(delimiter), remedy=f"save it with {delimiter!r}"
+            )
+    names = [name.strip() for name in next(csv.reader([line], delimiter=delimiter))]
+    for name in names:
+        if names.count(name) > 1:
+            raise FileError("two columns have one name", where=path, value=name or "(empty)", remedy="rename one")
+    return names

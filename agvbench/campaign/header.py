@@ -1,0 +1,178 @@
+"""The head of a campaign: ``campaign.toml`` (schema 1)."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+
+from agvbench.campaign.atomic import write_atomically
+from agvbench.errors import CampaignError
+from agvbench.types import CommandUnit
+
+SCHEMA = 1
+FILE_NAME = "campaign.toml"
+_MAX_BYTES = 1 << 20
+
+_Positive = Annotated[float, msgspec.Meta(gt=0.0)]
+
+
+@dataclass(frozen=True)
+class CampaignHeader:
+    """What holds for every run of a campaign.
+
+    ``front_axle_m`` and ``rear_axle_m`` [m] are the distances from the markers' centroid to the axles;
+    ``neutral`` is the command at which the vehicle stands still and steers straight, in ``command_unit``;
+    ``prediction_horizon_s`` and ``prediction_stride_s`` [s] say how to cut free driving into predictions.
+
+    Raises
+    ------
+    CampaignError
+        If a value is not finite or out of its range.
+    """
+
+    schema: int
+    name: str
+    vehicle_name: str
+    front_axle_m: float
+    rear_axle_m: float
+    command_unit: CommandUnit
+    neutral: float
+    mocap_rate_hz: float
+    prediction_horizon_s: float | None = None
+    prediction_stride_s: float | None = None
+
+    def __post_init__(self) -> None:
+        _check_schema(self.schema, FILE_NAME)
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, float) and not math.isfinite(value):
+                raise CampaignError(
+                    f"{field.name} is not a finite number", where=FILE_NAME, value=value, remedy="give a number"
+                )
+        if self.front_axle_m + self.rear_axle_m <= 0.0:
+            raise CampaignError(
+                "the wheelbase front_axle_m + rear_axle_m is not positive",
+                where=f"{FILE_NAME}: [vehicle]",
+                value=f"{self.front_axle_m + self.rear_axle_m:g} m",
+                remedy="give the distances from the markers' centroid to the axles in metres",
+            )
+
+    @classmethod
+    def load(cls, path: str | Path) -> CampaignHeader:
+        """Read ``campaign.toml``; keys that schema 1 does not know are left alone.
+
+        Raises
+        ------
+        CampaignError
+            If the file is missing, is not TOML, has another schema, or lacks or misuses a key.
+        """
+        path = Path(path)
+        table = _read_toml(path)
+        _check_schema(table.get("schema"), path)
+        try:
+            file = msgspec.convert(table, _File)
+        except msgspec.ValidationError as error:
+            raise CampaignError(
+                _explain(error), where=path, remedy="correct campaign.toml (docs/reference/campaign-directory.md)"
+            ) from None
+        vehicle, prediction = file.vehicle, file.prediction or _Prediction()
+        return cls(
+            schema=file.schema,
+            name=file.name,
+            vehicle_name=vehicle.name,
+            front_axle_m=vehicle.front_axle_m,
+            rear_axle_m=vehicle.rear_axle_m,
+            command_unit=vehicle.command_unit,
+            neutral=vehicle.neutral,
+            mocap_rate_hz=file.mocap.rate_hz,
+            prediction_horizon_s=prediction.horizon_s,
+            prediction_stride_s=prediction.stride_s or prediction.horizon_s,
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write ``campaign.toml``: renamed into place when whole."""
+        import tomli_w
+
+        table: dict[str, Any] = {
+            "schema": self.schema,
+            "name": self.name,
+            "vehicle": {
+                "name": self.vehicle_name,
+                "front_axle_m": self.front_axle_m,
+                "rear_axle_m": self.rear_axle_m,
+                "command_unit": self.command_unit,
+                "neutral": self.neutral,
+            },
+            "mocap": {"rate_hz": self.mocap_rate_hz},
+        }
+        prediction = {"horizon_s": self.prediction_horizon_s, "stride_s": self.prediction_stride_s}
+        if given := {key: value for key, value in prediction.items() if value is not None}:
+            table["prediction"] = given
+        write_atomically(Path(path), tomli_w.dumps(table).encode())
+
+
+class _Vehicle(msgspec.Struct):
+    name: str
+    front_axle_m: float
+    rear_axle_m: float
+    command_unit: CommandUnit
+    neutral: float
+
+
+class _Mocap(msgspec.Struct):
+    rate_hz: _Positive
+
+
+class _Prediction(msgspec.Struct):
+    horizon_s: _Positive | None = None
+    stride_s: _Positive | None = None
+
+
+class _File(msgspec.Struct):
+    schema: int
+    name: str
+    vehicle: _Vehicle
+    mocap: _Mocap
+    prediction: _Prediction | None = None
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            raise CampaignError("is too large for a campaign's head", where=path, limit=f"{_MAX_BYTES} bytes")
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise CampaignError(
+            f"cannot be read ({error.strerror})",
+            where=path,
+            remedy="give a campaign directory: one with campaign.toml, runs, commands and poses",
+        ) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise CampaignError(f"is not TOML ({error})", where=path, remedy="correct the line") from None
+
+
+def _check_schema(schema: object, where: object) -> None:
+    if schema is None:
+        raise CampaignError("has no schema", where=where, remedy=f"add schema = {SCHEMA} at the top")
+    if schema != SCHEMA or isinstance(schema, bool):
+        newer = isinstance(schema, int) and schema > SCHEMA
+        remedy = "install a newer agvbench" if newer else f"set schema = {SCHEMA}"
+        raise CampaignError(
+            "was written in a schema that this agvbench does not read",
+            where=where,
+            value=f"schema {schema}",
+            limit=f"schema {SCHEMA}",
+            remedy=remedy,
+        )
+
+
+def _explain(error: msgspec.ValidationError) -> str:
+    """Turn "Expected `float`, got `str` - at `$.vehicle.neutral`" into "vehicle.neutral: expected …"."""
+    what, _, place = str(error).partition(" - at `$.")
+    what = what[:1].lower() + what[1:]
+    return f"{place.rstrip('`')}: {what}" if place else what

@@ -1,0 +1,90 @@
+"""Find and read one table of a campaign: a parquet file, a CSV, or a directory of per-run parts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pyarrow as pa
+
+from agvbench.campaign.atomic import is_temporary
+from agvbench.campaign.columns import type_columns
+from agvbench.campaign.csv_text import read_csv_text
+from agvbench.campaign.parquet import MAX_ROWS, read_parquet
+from agvbench.campaign.schema import Column
+from agvbench.errors import CampaignError
+
+_SUFFIXES = (".parquet", ".csv")
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a table lies: one file, or a directory with a part for each run."""
+
+    path: Path
+    files: tuple[Path, ...]
+    in_parts: bool
+
+    @classmethod
+    def find(cls, directory: Path, name: str) -> Source:
+        """Find table `name` of the campaign in `directory`.
+
+        Raises
+        ------
+        CampaignError
+            If it is absent, or present as parquet and as CSV.
+        """
+        paths = [path for suffix in _SUFFIXES if (path := directory / f"{name}{suffix}").exists()]
+        if not paths:
+            raise CampaignError(
+                f"has no table {name}",
+                where=directory,
+                remedy=f"add {name}.parquet (a file, or a directory of parts) or {name}.csv",
+            )
+        if len(paths) > 1:
+            raise CampaignError(
+                f"has table {name} twice, as {paths[0].name} and {paths[1].name}", where=directory, remedy="delete one"
+            )
+        path = paths[0]
+        return cls(path, parts(path), True) if path.is_dir() else cls(path, (path,), False)
+
+    def read(self, columns: Sequence[Column]) -> pa.Table:
+        """Read all of it, with the types of `columns`.
+
+        Raises
+        ------
+        CampaignError
+            If a file cannot be read, lacks a column, or holds a value of the wrong type.
+        """
+        tables, room = [], MAX_ROWS
+        for file in self.files:
+            tables.append(type_columns(_read_file(file, room), columns, file))
+            room -= tables[-1].num_rows
+        if not tables:
+            return type_columns(_nothing(columns), columns, self.path)
+        try:
+            return pa.concat_tables(tables, promote_options="permissive")
+        except pa.ArrowException as error:
+            reason = str(error).splitlines()[0][:120]
+            raise CampaignError(
+                f"parts disagree on a column's type ({reason})",
+                where=self.path,
+                remedy="rename the column in some parts",
+            ) from None
+
+
+def parts(directory: Path) -> tuple[Path, ...]:
+    """Return the whole parts in `directory`, by name."""
+    files = (file for file in directory.iterdir() if file.suffix in _SUFFIXES and not is_temporary(file))
+    return tuple(sorted(files, key=lambda file: file.name))
+
+
+def _read_file(file: Path, max_rows: int) -> pa.Table:
+    if file.suffix == ".csv":
+        return read_csv_text(file)
+    return read_parquet(file, max_rows=max_rows)
+
+
+def _nothing(columns: Sequence[Column]) -> pa.Table:
+    return pa.table({column.name: pa.array([], pa.null()) for column in columns if column.required})

@@ -1,0 +1,78 @@
+"""A table of timed rows (commands or poses), grouped by run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from agvbench.campaign.columns import UNKNOWN_COUNT
+from agvbench.campaign.source import Source
+from agvbench.errors import CampaignError
+
+
+class TimedTable:
+    """The rows of `table` in the order of `run_ids`, and within a run in the order they were written.
+
+    Raises
+    ------
+    CampaignError
+        If one file holds rows of an unknown run. In a directory of parts these belong to a run that was
+        interrupted before it was finished: they are left out.
+    """
+
+    def __init__(self, source: Source, table: pa.Table, run_ids: Sequence[str]) -> None:
+        self.path: Path = source.path
+        self.run_ids = run_ids
+        codes = pc.index_in(table["run_id"], value_set=pa.array(run_ids, pa.string())).fill_null(-1).to_numpy()
+        unknown = codes < 0
+        if unknown.any() and not source.in_parts:
+            row = int(np.argmax(unknown))
+            raise CampaignError(
+                f"row {row + 1} belongs to a run that runs does not list",
+                where=source.path,
+                value=table["run_id"][row].as_py(),
+                remedy="add the run to runs, or delete its rows",
+            )
+        if unknown.any() or np.any(np.diff(codes) < 0):
+            order = np.argsort(codes, kind="stable")[np.count_nonzero(unknown) :]
+            table, codes = table.take(pa.array(order)), codes[order]
+        self.table = table
+        self.run_of_row: NDArray[np.int64] = codes
+        self.offsets: NDArray[np.int64] = np.searchsorted(codes, np.arange(len(run_ids) + 1))
+        self._columns: dict[str, NDArray[Any]] = {}
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """Rows of each run, shape (runs,)."""
+        return np.diff(self.offsets)
+
+    @cached_property
+    def starts(self) -> NDArray[np.int64]:
+        """The first row of each run that has rows."""
+        return self.offsets[:-1][self.counts > 0]
+
+    def column(self, name: str) -> NDArray[Any]:
+        """Return a column as an array, shape (rows,); an optional column that is absent is −1 or NaN throughout."""
+        if name not in self._columns:
+            known = name in self.table.column_names
+            self._columns[name] = self.table[name].to_numpy() if known else self._unknown(name)
+        return self._columns[name]
+
+    def _unknown(self, name: str) -> NDArray[Any]:
+        return np.full(self.table.num_rows, UNKNOWN_COUNT if name == "frame" else np.nan)
+
+    def rows(self, index: int) -> slice:
+        """Return the rows of run number `index`."""
+        return slice(int(self.offsets[index]), int(self.offsets[index + 1]))
+
+    def place(self, row: int) -> str:
+        """Name a row as a person would: file, run, and row within the run (the first is 1)."""
+        run = int(self.run_of_row[row])
+        return f"{self.path}: run {self.run_ids[run]}: row {row - int(self.offsets[run]) + 1}"

@@ -1,0 +1,147 @@
+"""Record a campaign run by run, so that whatever interrupts it leaves every finished run whole."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pyarrow as pa
+
+from agvbench.campaign.atomic import is_temporary, write_atomically
+from agvbench.campaign.header import FILE_NAME, CampaignHeader
+from agvbench.campaign.parquet import to_parquet
+from agvbench.campaign.parts import commands_part, part_name, poses_part, run_id_of, runs_part
+from agvbench.campaign.schema import TABLES
+from agvbench.campaign.source import parts
+from agvbench.errors import CampaignError
+from agvbench.types import Run
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class CampaignWriter:
+    """Appends runs to a campaign directory; get one with `create` or `resume`.
+
+    Each run is a part in each of three directories. The part in ``runs.parquet`` is renamed into place last:
+    a run exists if, and only if, that part exists.
+
+    Attributes
+    ----------
+    recovered
+        What `resume` removed: parts of unfinished runs and half-written files, as paths inside the campaign.
+    """
+
+    def __init__(self, path: Path, header: CampaignHeader, *, durable: bool = True) -> None:
+        self.path = path
+        self.header = header
+        self.recovered: list[str] = []
+        self._durable = durable
+        self._finished: dict[str, None] = {}
+
+    @classmethod
+    def create(cls, path: str | Path, header: CampaignHeader, *, durable: bool = True) -> CampaignWriter:
+        """Begin a campaign in `path`, which must not exist yet or be empty.
+
+        With `durable` (the default) each part is forced to disk before it counts, so that finished runs survive a
+        power cut as well as a killed process.
+
+        Raises
+        ------
+        CampaignError
+            If `path` holds something already or cannot be written.
+        """
+        path = Path(path)
+        try:
+            if path.exists() and any(path.iterdir()):
+                remedy = "resume it, or choose another directory"
+                raise CampaignError("exists already and is not empty", where=path, remedy=remedy)
+            for name in TABLES:
+                (path / f"{name}.parquet").mkdir(parents=True)
+            header.save(path / FILE_NAME)
+        except OSError as error:
+            raise CampaignError(
+                f"cannot be written ({error.strerror})", where=path, remedy="choose another directory"
+            ) from None
+        return cls(path, header, durable=durable)
+
+    @classmethod
+    def resume(cls, path: str | Path, header: CampaignHeader, *, durable: bool = True) -> CampaignWriter:
+        """Go on with the campaign in `path`; what an interruption left of unfinished runs is removed.
+
+        Raises
+        ------
+        CampaignError
+            If there is no campaign, it was begun with another header, or its tables are single files.
+        """
+        path = Path(path)
+        stored = CampaignHeader.load(path / FILE_NAME)
+        for field in fields(header):
+            old, new = getattr(stored, field.name), getattr(header, field.name)
+            if old != new:
+                remedy = "resume with the same vehicle and settings, or begin a new campaign"
+                raise CampaignError(
+                    f"was begun with another {field.name} ({old!r})", where=path, value=f"now {new!r}", remedy=remedy
+                )
+        for name in TABLES:
+            if not (directory := path / f"{name}.parquet").is_dir():
+                if directory.exists() or (path / f"{name}.csv").exists():
+                    remedy = "only a directory of parts can be appended to"
+                    raise CampaignError(f"has its table {name} in one file", where=path, remedy=remedy)
+                directory.mkdir()
+        writer = cls(path, header, durable=durable)
+        writer._recover()
+        return writer
+
+    def _recover(self) -> None:
+        self._finished = {run_id_of(part): None for part in parts(self.path / "runs.parquet")}
+        for directory in (self.path, *(self.path / f"{name}.parquet" for name in TABLES)):
+            for file in sorted(directory.iterdir()):
+                orphan = directory != self.path and run_id_of(file) not in self._finished
+                if is_temporary(file) or orphan:
+                    file.unlink()
+                    self.recovered.append(str(file.relative_to(self.path)))
+
+    @property
+    def finished_ids(self) -> list[str]:
+        """The ids of the runs that are recorded, of whatever status."""
+        return list(self._finished)
+
+    def append(self, run: Run) -> None:
+        """Record one run: all of it or, if interrupted, nothing of it.
+
+        Raises
+        ------
+        CampaignError
+            If there is a run of that id already, its id cannot name a file, or the disk refuses.
+        """
+        if run.run_id in self._finished:
+            raise CampaignError(
+                "two runs have one id", where=self.path, value=run.run_id, remedy="give the run its own id"
+            )
+        name = part_name(run.run_id)
+        tables = {"poses": poses_part(run), "commands": commands_part(run), "runs": runs_part(run)}
+        try:
+            for table, part in tables.items():
+                write_atomically(self.path / f"{table}.parquet" / name, to_parquet(part), durable=self._durable)
+        except OSError as error:
+            raise CampaignError(
+                f"cannot be written ({error.strerror})", where=self.path, remedy="free some space"
+            ) from None
+        self._finished[run.run_id] = None
+
+    def write_table(self, name: str, table: pd.DataFrame) -> None:
+        """Write (or replace) a further table, such as ``events`` or ``provenance``, beside the three.
+
+        Raises
+        ------
+        CampaignError
+            If `name` is one of the three.
+        """
+        if name in TABLES:
+            raise CampaignError(
+                "is written run by run", where=self.path, value=name, remedy="choose another table name"
+            )
+        arrow = pa.Table.from_pandas(table, preserve_index=False).replace_schema_metadata(None)
+        write_atomically(self.path / f"{name}.parquet", to_parquet(arrow), durable=self._durable)
