@@ -39,6 +39,7 @@ class BenchSettings:
     seed: int = 1
     full: bool = False
     attempts: int = 3
+    workspace: str = "circle:6.1"
     connect: str = ""
     lab: str = "lab"
 

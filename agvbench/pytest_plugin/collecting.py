@@ -1,0 +1,133 @@
+"""Find benchmarks, repeat them, and put them in order."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import cast
+
+import pytest
+
+from agvbench.errors import AgvbenchError
+from agvbench.pytest_plugin.options import settings_from
+
+REPEAT = "agvbench_repeat"
+CALIBRATION_EXPERIMENTS = frozenset({"steering_front", "steering_rear", "steering_opposite", "drive"})
+_DEFAULT_REPEATS = 10
+
+
+class BenchModule(pytest.Module):
+    """A ``bench_*.py`` file: its ``bench_*`` functions are benchmarks."""
+
+    def funcnamefilter(self, name: str) -> bool:
+        """Collect functions by the prefix that names benchmarks."""
+        return name.startswith("bench_")
+
+
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
+    """Collect ``bench_*.py`` files that speak of agvbench; other tools' files of that name stay theirs."""
+    if file_path.suffix != ".py" or not file_path.name.startswith("bench_"):
+        return None
+    if b"agvbench" not in file_path.read_bytes():
+        return None
+    return cast(pytest.Collector, BenchModule.from_parent(parent, path=file_path))
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Apply the marks ``grid`` and ``repeats``."""
+    full = bool(metafunc.config.getoption("full"))
+    for mark in metafunc.definition.iter_markers("grid"):
+        name, reduced, complete = mark.args
+        metafunc.parametrize(name, complete if full else reduced)
+    mark_ = metafunc.definition.get_closest_marker("repeats")
+    if mark_ is not None:
+        metafunc.fixturenames.append(REPEAT)
+        n = _repeats(mark_, full=full, asked=metafunc.config.getoption("repeats"))
+        metafunc.parametrize(REPEAT, range(1, n + 1), ids=[f"r{k:02d}" for k in range(1, n + 1)], indirect=True)
+
+
+def _repeats(mark: pytest.Mark, *, full: bool, asked: int | None) -> int:
+    """Return how often to drive: a fixed number, or what ``--repeats`` asks for where the mark leaves it open."""
+    fixed = mark.args[0] if mark.args else None
+    if fixed is None:
+        return _DEFAULT_REPEATS if asked is None else max(asked, 0)
+    return int(mark.kwargs.get("full") or fixed) if full else int(fixed)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Order the benchmarks, and leave out conditions that a trajectory does not know."""
+    benches = [item for item in items if is_bench(item)]
+    if not benches:
+        return
+    if config.getoption("numprocesses", None):
+        raise pytest.UsageError("one vehicle drives one run at a time: leave -n out")
+    try:
+        settings = settings_from(config)
+        undriven = [item for item in benches if not _condition_applies(item)]
+    except AgvbenchError as error:
+        raise pytest.UsageError(str(error)) from None
+    from agvbench.running.order import ordered
+
+    _check_names(benches)
+    driven = [item for item in benches if item not in set(undriven)]
+    driven = ordered(driven, settings.order, seed=settings.seed, phase=phase, repeat=repeat, name=run_name)
+    items[:] = [item for item in items if not is_bench(item)] + driven
+    if undriven:
+        config.hook.pytest_deselected(items=undriven)
+
+
+def is_bench(item: pytest.Item) -> bool:
+    """Return whether a test item is a benchmark."""
+    return isinstance(item.getparent(BenchModule), BenchModule)
+
+
+def parameters(item: pytest.Item) -> dict[str, object]:
+    """Return the values that a benchmark is parametrized with, by name."""
+    callspec = getattr(item, "callspec", None)
+    return dict(callspec.params) if callspec is not None else {}
+
+
+def repeat(item: pytest.Item) -> int:
+    """Return which repeat a benchmark is, from 1."""
+    return int(cast(int, parameters(item).get(REPEAT, 1)))
+
+
+def experiment(item: pytest.Item) -> str:
+    """Return what the campaign calls this benchmark's runs."""
+    mark = item.get_closest_marker("experiment")
+    function = getattr(item, "originalname", None) or item.name
+    return str(mark.args[0]) if mark else function.removeprefix("bench_")
+
+
+def phase(item: pytest.Item) -> int:
+    """Return 0 for calibration, which the rest builds upon, and 1 for all else."""
+    return 0 if experiment(item) in CALIBRATION_EXPERIMENTS else 1
+
+
+def run_name(item: pytest.Item) -> str:
+    """Return the run id of a benchmark: letters, digits, dots and dashes, the same in every session."""
+    return re.sub(r"[^A-Za-z0-9.]+", "-", item.name.removeprefix("bench_")).strip("-")
+
+
+def _check_names(items: Iterable[pytest.Item]) -> None:
+    seen: dict[str, str] = {}
+    for item in items:
+        name = run_name(item)
+        if name in seen:
+            raise pytest.UsageError(
+                f"two benchmarks would record the run {name!r}: {seen[name]} and {item.nodeid}; rename one"
+            )
+        seen[name] = item.nodeid
+
+
+def _condition_applies(item: pytest.Item) -> bool:
+    given = parameters(item)
+    if "trajectory" not in given or "condition" not in given:
+        return True
+    from agvbench.planning import load_trajectory
+
+    conditions = load_trajectory(str(given["trajectory"])).conditions
+    return not conditions or given["condition"] in conditions

@@ -1,0 +1,50 @@
+"""The plugin's options and marks."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from agvbench.running.options import OPTIONS, add_options, destination
+
+if TYPE_CHECKING:
+    from agvbench.running.settings import BenchSettings
+
+_MARKS = (
+    "repeats(n, full=None): drive n times (full times with --full); n=None follows --repeats",
+    "grid(name, reduced, full): parametrize by `reduced`, with --full by `full`",
+    "experiment(name): what the campaign calls the runs of this benchmark (default: the function's name)",
+)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Declare the options of a bench session."""
+    add_options(parser.getgroup("agvbench", "AGV bench").addoption)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Declare the marks."""
+    for mark in _MARKS:
+        config.addinivalue_line("markers", mark)
+
+
+def given_options(config: pytest.Config) -> dict[str, Any]:
+    """Return the bench options that were given on the command line, by name."""
+    values = {destination(flag): config.getoption(destination(flag)) for flag, _, _ in OPTIONS}
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def settings_from(config: pytest.Config) -> BenchSettings:
+    """Return the settings that the command line asks for.
+
+    Raises
+    ------
+    FlagError
+        If a value cannot be used.
+    """
+    from agvbench.running.settings import BenchSettings
+
+    known = {f.name for f in fields(BenchSettings)}
+    return BenchSettings(**{name: value for name, value in given_options(config).items() if name in known})

@@ -1,0 +1,109 @@
+"""What a bench session tells while it drives and when it is done."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from agvbench.errors import AgvbenchError
+from agvbench.pytest_plugin.collecting import is_bench
+from agvbench.pytest_plugin.fixtures import SESSION
+
+_BAR = 24
+_PROGRESS = pytest.StashKey["Progress"]()
+
+
+class Progress:
+    """Counts benchmarks; draws one line on a terminal, and one line in ten elsewhere."""
+
+    def __init__(self, reporter: pytest.TerminalReporter, total: int) -> None:
+        self._reporter, self._total, self._done = reporter, total, 0
+        self._began, self._told = time.monotonic(), 0
+
+    def begin(self, name: str) -> None:
+        """Tell what is driven now."""
+        line = self._line(name)
+        if self._reporter.isatty:
+            self._reporter.rewrite(line, erase=True)
+        elif self._done * 10 // self._total > self._told:
+            self._told = self._done * 10 // self._total
+            self._reporter.write_line(line)
+        self._done += 1
+
+    def end(self) -> None:
+        """Wipe the line."""
+        if self._reporter.isatty:
+            self._reporter.rewrite("", erase=True)
+
+    def _line(self, name: str) -> str:
+        share = self._done / self._total
+        elapsed = time.monotonic() - self._began
+        left = f"{_clock(elapsed / share - elapsed)} left" if self._done > 2 else "…"
+        bar = "█" * round(share * _BAR) + "·" * (_BAR - round(share * _BAR))
+        return f"{bar} {self._done}/{self._total} runs  {_clock(elapsed)} elapsed  {left}  {name}"
+
+
+def _clock(seconds: float) -> str:
+    """Return minutes and seconds.
+
+    >>> _clock(125.3)
+    '2:05'
+    """
+    return f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
+
+
+def _progress(session: pytest.Session) -> Progress | None:
+    config = session.config
+    if _PROGRESS not in config.stash:
+        reporter = config.pluginmanager.get_plugin("terminalreporter")
+        benches = sum(is_bench(item) for item in session.items)
+        if reporter is None or not benches:
+            return None
+        config.stash[_PROGRESS] = Progress(reporter, benches)
+    return config.stash[_PROGRESS]
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    """Draw the progress line before each benchmark."""
+    progress = _progress(item.session) if is_bench(item) else None
+    if progress is not None:
+        progress.begin(item.name.removeprefix("bench_"))
+    return (yield)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Iterator[pytest.TestReport]:
+    """Tell a user's error in one line instead of a traceback; mark reports of benchmarks."""
+    report: pytest.TestReport = yield
+    if is_bench(item):
+        report.user_properties.append(("agvbench", item.name))
+        if call.excinfo is not None and isinstance(call.excinfo.value, AgvbenchError):
+            report.longrepr = f"{item.name}: {call.excinfo.value}"
+    return report
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_report_teststatus(report: pytest.TestReport) -> tuple[str, str, str] | None:
+    """Leave the dots of passed benchmarks to the progress line."""
+    if ("agvbench") in dict(report.user_properties) and report.passed and report.when == "call":
+        return "passed", "", ""
+    return None
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """End with the summary table, and say where campaign and report are."""
+    if _PROGRESS in config.stash:
+        config.stash[_PROGRESS].end()
+    session = config.stash.get(SESSION, None)
+    if session is None:
+        return
+    if config.getoption("dry_run"):
+        terminalreporter.write(session.plan_summary())
+        return
+    from agvbench.reporting.after_bench import conclude
+
+    for line in conclude(session.directory, report=not config.getoption("no_report")):
+        terminalreporter.write_line(line)

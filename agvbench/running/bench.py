@@ -1,0 +1,134 @@
+"""A bench session: plans become runs, runs are judged, recorded, and repeated where they were rejected."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from agvbench.bus.link import VehicleLink
+from agvbench.campaign import CampaignWriter
+from agvbench.errors import LinkError
+from agvbench.model import VehicleModel
+from agvbench.running.campaign_time import CampaignTime
+from agvbench.running.drive import DEFAULT_TIMING, Drive, Timing, drive
+from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess
+from agvbench.running.records import DriveOrder, aborted_run, free_name, recorded_run
+from agvbench.running.settings import BenchSettings
+from agvbench.types import Command, Frames, Run
+
+
+class Bench:
+    """Drives orders over `link` and records them with `writer`.
+
+    ``calibrate`` is called once, when the first order asks for the calibrated model.
+    """
+
+    def __init__(
+        self,
+        settings: BenchSettings,
+        *,
+        nominal: VehicleModel,
+        link: VehicleLink,
+        writer: CampaignWriter,
+        campaign_time: CampaignTime,
+        calibrate: Callable[[], VehicleModel],
+        recorded: Mapping[str, Run],
+        timing: Timing = DEFAULT_TIMING,
+        limits: QualityLimits = DEFAULT_LIMITS,
+    ) -> None:
+        self.settings = settings
+        self.link, self.writer = link, writer
+        self.nominal, self._calibrate = nominal, calibrate
+        self._calibrated: VehicleModel | None = None
+        self._time, self._timing, self._limits = campaign_time, timing, limits
+        self._identity = link.identity()
+        self._failure: LinkError | None = None
+        self._recorded = recorded
+
+    def model(self, condition: str) -> VehicleModel:
+        """Return the vehicle model that commands are computed with under `condition`."""
+        if condition == "uncalibrated":
+            return self.nominal
+        if self._calibrated is None:
+            self._calibrated = self._calibrate()
+        return self._calibrated
+
+    def run(self, order: DriveOrder) -> Run:
+        """Drive `order` until an attempt counts; return the last attempt.
+
+        Attempts that an interrupted session recorded are not recorded again: in simulation they are driven
+        once more, so that the plant's wear and charge are what they were, and nowhere else are they driven.
+
+        Raises
+        ------
+        LinkError
+            If hardware failed, now or earlier in this session: a bench that failed once drives no more.
+        """
+        if self._failure is not None:
+            raise LinkError(
+                "the bench drives no more after the first failure",
+                value=self._failure,
+                remedy="mend it and go on with --resume",
+            )
+        run = self._attempt(order, 1)
+        for attempt in range(2, self.settings.attempts + 1):
+            if run.is_ok:
+                break
+            run = self._attempt(order, attempt)
+        return run
+
+    def _attempt(self, order: DriveOrder, attempt: int) -> Run:
+        run_id = order.run_id if attempt == 1 else f"{order.run_id}-attempt{attempt}"
+        if run_id in self._recorded:
+            return self._repeat_unseen(order, self._recorded[run_id])
+        started_s = self._time.now_s()
+        seen: list[Frames] = []
+        try:
+            driven = self._drive(order, run_id, seen)
+        except BaseException as error:
+            self._note_failure(order, run_id, started_s, seen, error)
+            raise
+        run = recorded_run(order, run_id, started_s, self._status(order, driven), driven, self._identity.firmware)
+        self.writer.append(run)
+        self._time.has_run(started_s, driven.duration_s)
+        return run
+
+    def _repeat_unseen(self, order: DriveOrder, run: Run) -> Run:
+        if self._identity.simulated:
+            driven = self._drive(order, run.run_id, [])
+            self._time.has_run(run.started_s, driven.duration_s)
+        return run
+
+    def _drive(self, order: DriveOrder, run_id: str, seen: list[Frames]) -> Drive:
+        neutral = Command(self.nominal.neutral, *order.commands.at(0)[1:])
+        return drive(
+            self.link,
+            order.commands,
+            neutral=neutral,
+            start=order.start,
+            run_key=run_id,
+            timing=self._timing,
+            seen=seen,
+        )
+
+    def _status(self, order: DriveOrder, driven: Drive) -> str:
+        begin_s = -self._timing.rest_before_s
+        quality = assess(
+            driven.frames,
+            start=order.start,
+            begin_s=begin_s,
+            end_s=begin_s + driven.duration_s,
+            rate_hz=self._identity.mocap_rate_hz,
+        )
+        return quality.status(self._limits)
+
+    def _note_failure(
+        self, order: DriveOrder, run_id: str, started_s: float, seen: list[Frames], error: BaseException
+    ) -> None:
+        """Keep what was seen of a run that failed, and remember a failure of the hardware."""
+        if isinstance(error, LinkError):
+            self._failure = error
+        why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error) or type(error).__name__
+        frames = Frames.concatenate(seen)
+        if len(frames):
+            name = free_name(f"{run_id}-aborted", self.writer.finished_ids)
+            self.writer.append(aborted_run(order, name, started_s, f"aborted: {why}", frames, self._identity.firmware))

@@ -1,0 +1,92 @@
+"""Drive one run over the bus: rest, timed commands, stop, settle. Whatever happens, the vehicle stops."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from agvbench.bus.link import VehicleLink
+from agvbench.running.rest import is_at_rest
+from agvbench.types import Command, Commands, Frames, Pose
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How long the vehicle stands still around a run [s]: before it, after it, and at most after it.
+
+    The end pose is read from frames at rest, so a run lasts until the vehicle stands still, and is judged as it
+    is if it never does.
+    """
+
+    rest_before_s: float = 0.5
+    settle_s: float = 1.5
+    settle_step_s: float = 0.5
+    settle_limit_s: float = 4.0
+
+
+DEFAULT_TIMING = Timing()
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What was sent and seen: commands in, frames out, and the time from first rest to last frame [s]."""
+
+    commands: Commands
+    frames: Frames
+    duration_s: float
+
+
+def drive(
+    link: VehicleLink,
+    commands: Commands,
+    *,
+    neutral: Command,
+    start: Pose,
+    run_key: str,
+    timing: Timing = DEFAULT_TIMING,
+    seen: list[Frames] | None = None,
+) -> Drive:
+    """Drive `commands` from `start` and return everything seen.
+
+    The last row of `commands` stops the vehicle. `run_key` names the run: in simulation all its randomness
+    follows from it. `seen` is filled batch by batch, for a caller who wants to keep what was seen of a run that
+    failed.
+
+    Raises
+    ------
+    LinkError
+        If the bus or an adapter fails; the vehicle has been told to stop.
+    """
+    batches = [] if seen is None else seen
+    try:
+        link.reset(start, run_key=run_key)
+        batches.append(link.exchange(neutral, t_s=-timing.rest_before_s, hold_s=timing.rest_before_s))
+        for i in range(len(commands) - 1):
+            hold_s = float(commands.t_s[i + 1] - commands.t_s[i])
+            batches.append(link.exchange(commands.at(i), t_s=float(commands.t_s[i]), hold_s=hold_s))
+        end_s = _settle(link, commands, batches, timing)
+        batches.append(link.flush())
+    except BaseException:
+        # Ctrl-C, a lost adapter, a bug: before anything else the vehicle stands still.
+        link.stop()
+        raise
+    frames = _until(Frames.concatenate(batches), end_s)
+    return Drive(commands, frames, timing.rest_before_s + end_s)
+
+
+def _settle(link: VehicleLink, commands: Commands, batches: list[Frames], timing: Timing) -> float:
+    """Hold the last command until the vehicle stands still; return when that was [s]."""
+    last, t_s = commands.at(len(commands) - 1), float(commands.t_s[-1])
+    limit_s = t_s + timing.settle_limit_s
+    batches.append(link.exchange(last, t_s=t_s, hold_s=timing.settle_s))
+    t_s += timing.settle_s
+    while t_s < limit_s and not is_at_rest(Frames.concatenate(batches[-3:]), until_s=t_s):
+        batches.append(link.exchange(last, t_s=t_s, hold_s=timing.settle_step_s))
+        t_s += timing.settle_step_s
+    return t_s
+
+
+def _until(frames: Frames, end_s: float) -> Frames:
+    """Leave out frames that were captured after the run's end."""
+    return frames.select(np.asarray(frames.t_s <= end_s + 1e-9))

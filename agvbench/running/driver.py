@@ -1,0 +1,100 @@
+"""What a benchmark drives with: trajectories under a condition, or commands as shares of full command."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from agvbench.errors import FlagError, PlanError
+from agvbench.planning import Plan, Trajectory, load_trajectory, place, plan
+from agvbench.planning.shapes import CommandTable
+from agvbench.running.constant import held
+from agvbench.running.records import DriveOrder
+from agvbench.types import CONDITIONS, Commands, Run
+
+if TYPE_CHECKING:
+    from agvbench.running.session import BenchSession
+
+
+class NotDrivenError(Exception):
+    """Nothing was driven, and that is no failure: a dry run, or an axle that this vehicle does not steer."""
+
+
+class RunRejectedError(PlanError):
+    """Every attempt at a run was rejected; all are recorded."""
+
+
+class Driver:
+    """Drives the runs of one benchmark; each returns the recorded run that counts.
+
+    Parameters
+    ----------
+    session
+        Where to drive.
+    run_id
+        What the campaign calls the run; in simulation all its randomness follows from this name.
+    experiment, repeat
+        Columns of the runs table.
+    """
+
+    def __init__(self, session: BenchSession, run_id: str, *, experiment: str, repeat: int) -> None:
+        self._session, self._run_id = session, run_id
+        self._experiment, self._repeat = experiment, repeat
+
+    def trajectory(self, name: str, *, condition: str) -> Run:
+        """Drive the trajectory `name` (shipped, or a TOML file) with the commands that `condition` gives.
+
+        Raises
+        ------
+        FlagError
+            If the condition is unknown.
+        PlanError
+            If this vehicle cannot drive the trajectory here; nothing moved.
+        RunRejectedError
+            If no attempt counted.
+        LinkError
+            If the bus or hardware failed.
+        """
+        if condition not in CONDITIONS:
+            raise FlagError("unknown condition", value=condition, limit=", ".join(CONDITIONS), where=self._run_id)
+        trajectory = load_trajectory(name)
+        planned = plan(trajectory, self._session.model(condition), workspace=self._session.workspace)
+        return self._drive(planned, condition)
+
+    def hold(self, *, for_s: float, drive: float = 0.0, front: float = 0.0, rear: float = 0.0) -> Run:
+        """Hold shares of full command for `for_s` seconds: drive 1 is full speed forward, steering 1 full left."""
+        return self.steps([(for_s, {"drive": drive, "front": front, "rear": rear})])
+
+    def steps(self, steps: Sequence[tuple[float, Mapping[str, float]]]) -> Run:
+        """Hold several commands one after another: (duration [s], shares of full command) each."""
+        shares = self._session.shares
+        if shares.rear == 0.0 and any(step.get("rear") for _, step in steps):
+            raise NotDrivenError("this vehicle does not steer its rear axle")
+        commands = held(shares.neutral, [(duration_s, shares.command(**step)) for duration_s, step in steps])
+        planned = plan(
+            _as_trajectory(self._experiment, commands), self._session.nominal, workspace=self._session.workspace
+        )
+        return self._drive(planned, "uncalibrated", trajectory="")
+
+    def _drive(self, planned: Plan, condition: str, *, trajectory: str | None = None) -> Run:
+        order = DriveOrder(
+            run_id=self._run_id,
+            experiment=self._experiment,
+            trajectory=planned.trajectory.name if trajectory is None else trajectory,
+            condition=condition,
+            repeat=self._repeat,
+            commands=planned.commands,
+            target=planned.target,
+            start=place(planned, self._session.workspace),
+        )
+        run = self._session.run(order, planned)
+        if not run.is_ok:
+            raise RunRejectedError(
+                "no attempt counted", where=self._run_id, value=run.status, remedy="see the campaign's rejected runs"
+            )
+        return run
+
+
+def _as_trajectory(name: str, commands: Commands) -> Trajectory:
+    columns = {key: tuple(map(float, column)) for key, column in vars(commands).items()}
+    return Trajectory(schema=1, name=name, target="none", commands=CommandTable(**columns))

@@ -1,0 +1,62 @@
+"""The options of a bench session, told once for pytest and for the command line. Imports nothing heavy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+# Not given is None everywhere, so that a resumed session can tell what was asked from what is usual.
+_FLAG: dict[str, Any] = {"action": "store_true", "default": None}
+OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
+    ("--agv", {"metavar": "ADAPTER"}, "vehicle adapter: sim (default), serial:PORT, simavr"),
+    ("--mocap", {"metavar": "ADAPTER"}, "motion capture adapter: sim (default), natnet:HOST"),
+    (
+        "--plant",
+        {"metavar": "PLANT"},
+        "simulated plant, MODULE_OR_FILE:FACTORY (default: a vehicle like the thesis')",
+    ),
+    ("--vehicle", {"metavar": "FILE"}, "vehicle.toml believed before calibration (default: nominal maps)"),
+    ("--calibration", {"metavar": "FILE"}, "calibrated vehicle.toml (default: calibrate in this session)"),
+    ("--maps", {"choices": ("default", "thesis")}, "maps to calibrate: default, or the thesis' line and cubic"),
+    ("--repeats", {"type": int, "metavar": "N"}, "repeats of each trajectory and condition (default: 10)"),
+    (
+        "--order",
+        {"choices": ("interleaved", "blocked", "shuffled")},
+        "order of runs (default: interleaved; the thesis drove blocked)",
+    ),
+    ("--seed", {"type": int, "metavar": "N"}, "seed of everything random (default: 1)"),
+    ("--full", _FLAG, "every pulse, configuration and repeat of the thesis' calibration"),
+    ("--attempts", {"type": int, "metavar": "N"}, "attempts at a run that is rejected (default: 3)"),
+    (
+        "--workspace",
+        {"metavar": "SHAPE"},
+        "floor that the cameras see [m], such as circle:6.1 (default) or rectangle:7x5",
+    ),
+    (
+        "--connect",
+        {"metavar": "ENDPOINT"},
+        "where the adapters run, such as tcp/127.0.0.1:7447 (default: in process)",
+    ),
+    ("--lab", {"metavar": "NAME"}, "name of the lab on the bus (default: lab)"),
+)
+SESSION_OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
+    ("--out", {"metavar": "DIR"}, "campaign directory (default: a new one under campaigns/)"),
+    ("--resume", _FLAG, "go on with an interrupted session: the one in --out, or the last"),
+    ("--dry-run", _FLAG, "say what would be driven, for how long and on how much floor; drive nothing"),
+    ("--no-report", _FLAG, "write the campaign only, no report"),
+)
+
+
+def add_options(add: Callable[..., Any]) -> None:
+    """Declare every option with `add`, argparse's or pytest's way."""
+    for flag, keywords, text in OPTIONS + SESSION_OPTIONS:
+        add(flag, help=text, **keywords)
+
+
+def destination(flag: str) -> str:
+    """Return the attribute that an option's value is found under.
+
+    >>> destination("--dry-run")
+    'dry_run'
+    """
+    return flag.lstrip("-").replace("-", "_")

@@ -1,0 +1,76 @@
+"""From orders and what was seen to the runs of a campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from agvbench.running.drive import Drive
+from agvbench.types import Commands, Frames, Pose, Run
+
+
+@dataclass(frozen=True)
+class DriveOrder:
+    """What is to be driven: the plan of one run, before any attempt at it."""
+
+    run_id: str
+    experiment: str
+    trajectory: str
+    condition: str
+    repeat: int
+    commands: Commands
+    target: Pose
+    start: Pose
+    extra: Mapping[str, object] = field(default_factory=dict)
+
+
+def recorded_run(order: DriveOrder, run_id: str, started_s: float, status: str, driven: Drive, firmware: str) -> Run:
+    """Return the run that `order` became."""
+    extra = {**order.extra, "duration_s": driven.duration_s}
+    return _run(order, run_id, started_s, status, driven.commands, driven.frames, firmware, extra)
+
+
+def aborted_run(order: DriveOrder, run_id: str, started_s: float, status: str, frames: Frames, firmware: str) -> Run:
+    """Return what is left of a run that was stopped: its frames, and the commands sent until the last of them."""
+    last_s = float(np.max(frames.t_s))
+    sent = np.asarray(order.commands.t_s <= max(last_s, 0.0))
+    commands = Commands(*(column[sent] for column in vars(order.commands).values()))
+    extra = {**order.extra, "duration_s": last_s - float(np.min(frames.t_s))}
+    return _run(order, run_id, started_s, status, commands, frames, firmware, extra)
+
+
+def free_name(stem: str, taken: Collection[str]) -> str:
+    """Return the first of ``stem1``, ``stem2``, … that is not taken.
+
+    >>> free_name("left-r01-aborted", {"left-r01-aborted1"})
+    'left-r01-aborted2'
+    """
+    return next(name for k in range(1, len(taken) + 2) if (name := f"{stem}{k}") not in taken)
+
+
+def _run(
+    order: DriveOrder,
+    run_id: str,
+    started_s: float,
+    status: str,
+    commands: Commands,
+    frames: Frames,
+    firmware: str,
+    extra: Mapping[str, object],
+) -> Run:
+    return Run(
+        run_id=run_id,
+        experiment=order.experiment,
+        trajectory=order.trajectory,
+        condition=order.condition,
+        repeat=order.repeat,
+        target=order.target,
+        started_s=started_s,
+        status=status,
+        firmware=firmware,
+        commands=commands,
+        frames=frames,
+        extra=extra,
+    )
