@@ -1,0 +1,116 @@
+"""What every static map promises."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from agvbench.errors import VehicleError
+from agvbench.types import Floats
+from agvbench.vehicle.tables import from_table, to_table
+
+# Rounding in a caller's arithmetic may carry an output past the end of the range by this share of it.
+_ROUNDING = 1e-9
+
+
+class StaticMap(ABC):
+    """How a command sets a steering angle or a speed once everything has settled: monotone and invertible.
+
+    The command is in the vehicle's unit (µs of pulse width, or −1…1). The output is rad,
+    counter-clockwise positive, for a steered axle and m/s, forward positive, for the drive. A map may rise or fall:
+    on the thesis' vehicle, a falling pulse turns left and drives forward. A command beyond `command_range`
+    acts as the end of that range, so every finite command has an output.
+
+    A concrete map is a frozen dataclass in a file of this package; its fields are its TOML keys.
+    """
+
+    kind: ClassVar[str]
+
+    def __call__(self, command: ArrayLike) -> Floats:
+        """Return the output, in the shape of `command`."""
+        return np.asarray(self._output(self._clip(command)))
+
+    def inverse(self, output: ArrayLike) -> Floats:
+        """Return the command that gives `output`, in the shape of `output`.
+
+        Where many commands give one output, this is the centre of the stretch (a dead band), or its inner edge if it
+        reaches the end of the range (an end stop, saturation): the command that strains the servo least.
+
+        Raises
+        ------
+        VehicleError
+            If an output is NaN or outside `output_range`.
+        """
+        wanted = np.asarray(output, dtype=np.float64)
+        low, high = self.output_range
+        slack = _ROUNDING * (high - low) if math.isfinite(high - low) else 0.0
+        reachable = (wanted >= low - slack) & (wanted <= high + slack)
+        if not np.all(reachable):
+            value = float(wanted[~reachable].flat[0])
+            raise VehicleError(
+                "output is out of the map's range", value=f"{value:.6g}", limit=f"{low:.6g} … {high:.6g}"
+            )
+        return np.asarray(self._command(np.clip(wanted, low, high)))
+
+    def derivative(self, command: ArrayLike) -> Floats:
+        """Return d output / d command, in the shape of `command`: 0 beyond the range, one-sided at a kink."""
+        asked = np.asarray(command, dtype=np.float64)
+        low, high = self.command_range
+        return np.where((asked < low) | (asked > high), 0.0, self._slope(self._clip(asked)))
+
+    @property
+    @abstractmethod
+    def command_range(self) -> tuple[float, float]:
+        """Lowest and highest command that still make a difference; may be infinite."""
+
+    @property
+    def output_range(self) -> tuple[float, float]:
+        """Lowest and highest output that can be reached; may be infinite."""
+        first, last = (float(self._output(np.asarray(end))) for end in self.command_range)
+        return min(first, last), max(first, last)
+
+    @property
+    def is_rising(self) -> bool:
+        """Whether a higher command gives a higher output."""
+        first, last = (float(self._output(np.asarray(end))) for end in self.command_range)
+        return last > first
+
+    def to_toml(self) -> dict[str, Any]:
+        """Return this map as a TOML table: its kind and its fields."""
+        return {"kind": self.kind, **to_table(self)}
+
+    @classmethod
+    def from_toml(cls, table: Mapping[str, Any], *, where: str = "map") -> Self:
+        """Build a map of this kind from a TOML table; the key ``kind`` may be there or not.
+
+        Raises
+        ------
+        VehicleError
+            If the table does not fit, naming the key.
+        """
+        return from_table(cls, {key: value for key, value in table.items() if key != "kind"}, where=where)
+
+    @classmethod
+    @abstractmethod
+    def examples(cls) -> Sequence[Self]:
+        """Return maps of this kind as they occur on vehicles, rising and falling: every test of a map runs on these."""
+
+    @abstractmethod
+    def _output(self, command: Floats) -> Floats:
+        """Return the output for commands inside the range."""
+
+    @abstractmethod
+    def _command(self, output: Floats) -> Floats:
+        """Return the command for outputs inside the range."""
+
+    @abstractmethod
+    def _slope(self, command: Floats) -> Floats:
+        """Return the derivative for commands inside the range."""
+
+    def _clip(self, command: ArrayLike) -> Floats:
+        return np.clip(np.asarray(command, dtype=np.float64), *self.command_range)
