@@ -1,0 +1,24 @@
+"""Commands take time to arrive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from agvbench.effects.base import Effect, Stage, parameter
+
+
+@dataclass(frozen=True)
+class ActuationDelay(Effect):
+    """The command used at time t is the one given at t − delay; before the first one arrives the vehicle is at rest.
+
+    Radio, buffering and the frame of servo pulses add up to one constant delay. Where runs start and end at
+    rest it cannot be told from a latency of the motion capture system.
+    """
+
+    name: ClassVar[str] = "actuation_delay"
+    stage: ClassVar[Stage] = Stage.TRANSPORT
+    relaxes: ClassVar[str] = "no variable delay in the controller (9.2)"
+    reference: ClassVar[str] = "Bentvelsen 2015, section 9.2"
+
+    delay_s: float = parameter(unit="s", low=0.0, high=2.0)

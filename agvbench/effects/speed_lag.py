@@ -1,0 +1,25 @@
+"""Speed builds up and decays gradually."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from agvbench.effects.base import Effect, Stage, parameter
+
+
+@dataclass(frozen=True)
+class SpeedLag(Effect):
+    """First-order lag of the axle speed: ``v̇ = (v_map − v) / T``.
+
+    T is ``accelerate_s`` where |v| grows and ``brake_s`` where it falls. From forward to backward the vehicle brakes to rest first and accelerates then. The thesis measured 0.29 s
+    from 0 to 0.3 m/s, and 0.59 s from 0.32 to 0.02 m/s (section 8.1).
+    """
+
+    name: ClassVar[str] = "speed_lag"
+    stage: ClassVar[Stage] = Stage.ACTUATOR
+    relaxes: ClassVar[str] = "acceleration and deceleration are negligible (3.2, assumption 5)"
+    reference: ClassVar[str] = "Bentvelsen 2015, section 8.1"
+
+    accelerate_s: float = parameter(unit="s", low=0.0, high=10.0)
+    brake_s: float = parameter(unit="s", low=0.0, high=10.0)

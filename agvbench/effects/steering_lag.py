@@ -1,0 +1,20 @@
+"""Axles turn gradually."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from agvbench.effects.base import Effect, Stage, parameter
+
+
+@dataclass(frozen=True)
+class SteeringLag(Effect):
+    """First-order lag of both axles behind their servos' static maps: ``δ̇ = (δ_map − δ) / time_constant_s``."""
+
+    name: ClassVar[str] = "steering_lag"
+    stage: ClassVar[Stage] = Stage.ACTUATOR
+    relaxes: ClassVar[str] = "axles rotate instantaneously (7.3)"
+    reference: ClassVar[str] = "Rajamani 2012, Vehicle Dynamics and Control, section 2.3 (first-order actuator)"
+
+    time_constant_s: float = parameter(unit="s", low=0.0, high=5.0)
