@@ -1,0 +1,75 @@
+"""Heading from a rigid body's quaternion, at the poles too (thesis eq. 6.1–6.4)."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from agvbench.errors import InputError
+from agvbench.types import Floats
+
+Up = Literal["y", "z"]
+
+# Within this of vertical (as the sine of the angle between the forward axis and the vertical) the forward axis has no
+# direction on the floor left that float32 noise (6e-8) would not turn by a degree or more.
+_POLE_SINE = 3e-6
+
+
+def quaternion_to_heading(
+    qx: ArrayLike, qy: ArrayLike, qz: ArrayLike, qw: ArrayLike, *, up: Up = "y"
+) -> Floats | np.float64:
+    """Return the heading [rad, counter-clockwise seen from above, in (−π, π]] of a body's forward axis (its x axis).
+
+    Heading is the direction on the floor of the rotated x axis. With y up, as Motive streams it, the floor is
+    (x, −z): the thesis mirrors z so that the figure is what one sees from above. The rotated x axis is then
+    (1 − 2qy² − 2qz², 2qy qw − 2qx qz) on the floor, which is thesis eq. 6.1. It stays right under any pitch and
+    roll: it is the projection of the forward axis, not a first-order Euler angle.
+
+    At the poles (forward axis straight up or down, eq. 6.2: qx qy + qz qw = ±½) both terms of eq. 6.1 vanish, and
+    eq. 6.3 and 6.4 take what is left, the heading before the body pitched up or down by 90°. The thesis switches at
+    ±0.499, 3.6° before the pole, where eq. 6.1 still holds and eq. 6.3 counts roll as heading; here the switch is
+    made where eq. 6.1 has lost its meaning in single precision. A vehicle on a floor never comes near.
+
+    Parameters
+    ----------
+    qx, qy, qz, qw
+        Components, broadcast against each other; need not be normalised (float32 streams are not).
+    up
+        Vertical axis of the stream: ``"y"`` (Motive's default, floor x, −z) or ``"z"`` (floor x, y).
+
+    Returns
+    -------
+    Heading [rad] with the broadcast shape; NaN where the quaternion is not finite or zero (an untracked body).
+
+    Raises
+    ------
+    InputError
+        If `up` is neither ``"y"`` nor ``"z"``.
+
+    Examples
+    --------
+    A quarter turn counter-clockwise, about y and about z:
+
+    >>> float(np.degrees(quaternion_to_heading(0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5)))).__round__(9)
+    90.0
+    >>> float(np.degrees(quaternion_to_heading(0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5), up="z"))).__round__(9)
+    90.0
+    """
+    if up not in ("y", "z"):
+        raise InputError("unknown vertical axis", where="up", value=repr(up), limit="'y' or 'z'")
+    x, y, z, w = (np.asarray(q, dtype=np.float64) for q in (qx, qy, qz, qw))
+    forward = x * x + w * w - y * y - z * z  # the form that needs no unit norm
+    if up == "y":
+        left, rise = 2.0 * (y * w - x * z), 2.0 * (x * y + z * w)
+    else:
+        left, rise = 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)
+    norm = x * x + y * y + z * z + w * w
+    at_pole = np.hypot(forward, left) <= _POLE_SINE * norm
+    pitched = np.copysign(2.0, rise) * np.arctan2(x, w)  # eq. 6.3 nose up, eq. 6.4 nose down
+    heading = np.where(at_pole, pitched, np.arctan2(left, forward))
+    wrapped = np.pi - (np.pi - heading) % (2.0 * np.pi)
+    usable = np.isfinite(norm) & (norm > 0.0)
+    result: Floats = np.where(usable, wrapped, np.nan)
+    return result[()]
