@@ -50,7 +50,9 @@ def lint(session: nox.Session) -> None:
 def docs(session: nox.Session) -> None:
     """Run every example in docstrings and documents, and build the site."""
     install(session, "test", "docs")
-    session.run("pytest", "--doctest-modules", "--doctest-glob=*.md", "agvbench", "docs", "README.md", "-q", "-p", "no:randomly")
+    session.run(
+        "pytest", "--doctest-modules", "--doctest-glob=*.md", "agvbench", "docs", "README.md", "-q", "-p", "no:randomly"
+    )
     session.run("mkdocs", "build", "--strict", "--quiet", "--site-dir", session.create_tmp())
 
 

@@ -1,8 +1,8 @@
 """Calibration (agvbench): the two procedures of the thesis, fig. 7.1 (steering) and fig. 7.2 (drive).
 
 Commands are shares of full command: drive 1 is full speed forward, steering 1 full to the left (for the thesis'
-vehicle 900 µs in both cases, 600 µs below neutral). The default grid finds slopes, end stops and the dead band; ``--full`` drives every pulse,
-configuration and repeat of the thesis.
+vehicle 900 µs in both cases, 600 µs below neutral). The default grid finds slopes, end stops and the dead band;
+``--full`` drives every pulse, configuration and repeat of the thesis.
 """
 
 import pytest

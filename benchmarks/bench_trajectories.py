@@ -8,7 +8,7 @@ import pytest
 THE_EIGHT = [str(number) for number in range(1, 9)]
 
 
-@pytest.mark.repeats()
+@pytest.mark.repeats
 @pytest.mark.experiment("trajectory")
 @pytest.mark.parametrize("condition", ["uncalibrated", "calibrated"])
 @pytest.mark.parametrize("trajectory", THE_EIGHT)

@@ -27,7 +27,7 @@ def agvbench_repeat(request: pytest.FixtureRequest) -> int:
 @pytest.fixture(scope="session")
 def bench(request: pytest.FixtureRequest) -> Iterator[BenchSession]:
     """Open the bench session: rig, campaign and models. What cannot be set up ends the session with one line."""
-    from agvbench.running.session import open_session
+    from agvbench.running.opening import open_session
 
     config = request.config
     try:

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from agvbench.errors import FlagError
-from agvbench.types import Command, CommandUnit, Commands
+from agvbench.model import VehicleModel
+from agvbench.types import Command, Commands, CommandUnit
 
 PRESTEER_S = 0.5
 _FULL_COMMAND: dict[CommandUnit, float] = {"us": 600.0, "normalised": 1.0}
@@ -28,15 +29,19 @@ class Shares:
     rear: float
 
     @classmethod
-    def of(cls, command_unit: CommandUnit, neutral: float, signs: tuple[float, float, float]) -> Shares:
-        """Return the shares of a vehicle whose outputs (drive, front, rear) rise (1) or fall (−1) with the command."""
-        full = _FULL_COMMAND[command_unit]
-        return cls(neutral, *(sign * full for sign in signs))
+    def of_model(cls, model: VehicleModel) -> Shares:
+        """Return the shares of a vehicle; which way its outputs go with the command is read from its maps."""
+        full = _FULL_COMMAND[model.command_unit]
+        outputs = [
+            static_map(np.array([model.neutral - full, model.neutral + full]))
+            for static_map in (model.drive, model.front, model.rear)
+        ]
+        return cls(model.neutral, *(float(np.sign(high - low)) * full for low, high in outputs))
 
     def command(self, drive: float = 0.0, front: float = 0.0, rear: float = 0.0) -> Command:
         """Return the command of three shares.
 
-        >>> Shares.of("us", 1500.0, (-1, -1, -1)).command(drive=1, front=0.5)
+        >>> Shares(neutral=1500.0, drive=-600.0, front=-600.0, rear=-600.0).command(drive=1, front=0.5)
         Command(drive=900.0, front=1200.0, rear=1500.0)
 
         Raises

@@ -1,0 +1,40 @@
+"""Calibrate, drive the eight test trajectories under each condition, write campaign and report.
+
+Simulated by default: no hardware, no service to start. The vehicle is driven over the bus, every run is recorded
+when it is finished, and --resume goes on after any interruption.
+
+examples:
+  agvbench bench                                  calibrate and drive 8 trajectories, 10 repeats each
+  agvbench bench --dry-run                        what would be driven, for how long, on how much floor
+  agvbench bench --repeats 3 --out tonight        fewer repeats, into the directory tonight/
+  agvbench bench --resume --out tonight           go on where it stopped
+  agvbench bench --plant my_plant.py:make_plant   your own simulated plant
+  agvbench bench endurance                        another benchmark: bench_endurance.py
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from agvbench.running.options import add_options
+
+HELP = "calibrate, drive the eight trajectories, write campaign and report"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument(
+        "benchmarks",
+        nargs="*",
+        metavar="BENCHMARK",
+        help="files bench_NAME.py, or NAME for one beside you or shipped (default: calibration trajectories)",
+    )
+    parser.add_argument("-k", dest="only", metavar="EXPRESSION", help="only benchmarks whose names match, as in pytest")
+    add_options(parser.add_argument)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the benchmarks; return the exit code."""
+    from agvbench.workflows.bench import run_benchmarks
+
+    return run_benchmarks(arguments.benchmarks, vars(arguments), only=arguments.only)

@@ -1,0 +1,130 @@
+"""Open a bench session: settings, vehicle, rig and campaign; new, resumed, or on paper only."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from agvbench.adapters import open_rig
+from agvbench.bus.link import VehicleLink
+from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
+from agvbench.model import VehicleModel, nominal_model, thesis_vehicle
+from agvbench.planning import Workspace
+from agvbench.running.bench import Bench
+from agvbench.running.calibrating import calibrate_campaign
+from agvbench.running.campaign_time import CampaignTime, SimulatedCampaignTime, WallCampaignTime
+from agvbench.running.directory import choose_directory
+from agvbench.running.provenance import provenance
+from agvbench.running.session import BenchSession
+from agvbench.running.settings import SETTINGS_FILE, BenchSettings, settings_for_resume
+from agvbench.types import Run
+
+PROVENANCE_TABLE = "provenance"
+
+
+@contextmanager
+def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry_run: bool) -> Iterator[BenchSession]:
+    """Open the session that the options `given` ask for, and close it whatever happens.
+
+    Raises
+    ------
+    AgvbenchError
+        If an option, a file, the rig or the directory cannot be used.
+    """
+    directory = choose_directory(out, resume=resume)
+    settings = _settings(given, directory, resume=resume)
+    models = _known_models(settings)
+    workspace = Workspace.parse(settings.workspace)
+    if dry_run:
+        models.setdefault("calibrated", thesis_vehicle())
+        yield BenchSession(directory, models=models, workspace=workspace, bench=None)
+        return
+    with open_rig(
+        agv=settings.agv,
+        mocap=settings.mocap,
+        plant=settings.plant,
+        seed=settings.seed,
+        connect=settings.connect or None,
+        lab=settings.lab,
+    ) as link:
+        writer = _writer(directory, settings, _header(directory.name, models["uncalibrated"], link), resume=resume)
+        bench = _bench(settings, models, link, writer)
+        yield BenchSession(directory, models=models, workspace=workspace, bench=bench)
+
+
+def _settings(given: Mapping[str, Any], directory: Path, *, resume: bool) -> BenchSettings:
+    if resume and (directory / SETTINGS_FILE).exists():
+        return settings_for_resume(BenchSettings.load(directory), given)
+    return BenchSettings(**given)
+
+
+def _known_models(settings: BenchSettings) -> dict[str, VehicleModel]:
+    models = {"uncalibrated": VehicleModel.load(settings.vehicle) if settings.vehicle else nominal_model()}
+    if settings.calibration:
+        models["calibrated"] = VehicleModel.load(settings.calibration)
+    return models
+
+
+def _header(name: str, nominal: VehicleModel, link: VehicleLink) -> CampaignHeader:
+    identity = link.identity()
+    return CampaignHeader(
+        schema=1,
+        name=name,
+        vehicle_name=identity.vehicle,
+        front_axle_m=nominal.geometry.front_axle_m,
+        rear_axle_m=nominal.geometry.rear_axle_m,
+        command_unit=nominal.command_unit,
+        neutral=nominal.neutral,
+        mocap_rate_hz=identity.mocap_rate_hz,
+    )
+
+
+def _writer(directory: Path, settings: BenchSettings, header: CampaignHeader, *, resume: bool) -> CampaignWriter:
+    if resume and (directory / "campaign.toml").exists():
+        writer = CampaignWriter.resume(directory, header)
+    else:
+        writer = CampaignWriter.create(directory, header)
+    if not (directory / SETTINGS_FILE).exists():
+        settings.save(directory)
+    if not (directory / f"{PROVENANCE_TABLE}.parquet").exists():
+        facts = provenance(Path(__file__).parent)
+        writer.write_table(PROVENANCE_TABLE, pd.DataFrame({"name": list(facts), "value": list(facts.values())}))
+    return writer
+
+
+def _bench(
+    settings: BenchSettings, models: Mapping[str, VehicleModel], link: VehicleLink, writer: CampaignWriter
+) -> Bench:
+    def calibrated() -> VehicleModel:
+        return models.get("calibrated") or calibrate_campaign(writer, maps=settings.maps)
+
+    return Bench(
+        settings,
+        nominal=models["uncalibrated"],
+        link=link,
+        writer=writer,
+        campaign_time=_campaign_time(link, writer),
+        calibrate=calibrated,
+        recorded=_recorded(writer),
+    )
+
+
+def _recorded(writer: CampaignWriter) -> dict[str, Run]:
+    if not writer.finished_ids:
+        return {}
+    campaign = Campaign.open(writer.path)
+    return {run_id: campaign.run(run_id) for run_id in writer.finished_ids}
+
+
+def _campaign_time(link: VehicleLink, writer: CampaignWriter) -> CampaignTime:
+    if link.identity().simulated:
+        return SimulatedCampaignTime()
+    table = pd.read_parquet(os.fspath(writer.path / f"{PROVENANCE_TABLE}.parquet"))
+    began = dict(zip(table["name"], table["value"], strict=True))["began"]
+    return WallCampaignTime(datetime.fromisoformat(began).timestamp())

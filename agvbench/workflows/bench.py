@@ -1,0 +1,62 @@
+"""``agvbench bench``: hand the benchmarks to pytest, and its verdict back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from agvbench.errors import FlagError
+from agvbench.resources import resource_directory
+from agvbench.running.options import OPTIONS, SESSION_OPTIONS, destination
+
+DEFAULT = ("calibration", "trajectories")
+# pytest's own exit codes that mean "bad input": usage error, and nothing collected.
+_BAD_INPUT = {pytest.ExitCode.USAGE_ERROR: 2, pytest.ExitCode.NO_TESTS_COLLECTED: 2}
+
+
+def run_benchmarks(names: Sequence[str], options: Mapping[str, Any], *, only: str | None = None) -> int:
+    """Run the benchmarks `names` with `options`; return the exit code of ``agvbench``.
+
+    Raises
+    ------
+    FlagError
+        If a benchmark does not exist.
+    """
+    files = [str(find_benchmark(name)) for name in names or DEFAULT]
+    arguments = [*files, "-q", "--strict-markers", "-p", "no:cacheprovider", "-W", "error", *_flags(options)]
+    if only:
+        arguments += ["-k", only]
+    code = pytest.main(arguments)
+    return int(_BAD_INPUT.get(pytest.ExitCode(code), code)) if code in list(pytest.ExitCode) else int(code)
+
+
+def find_benchmark(name: str) -> Path:
+    """Return the file of a benchmark: a path, or a name found in ``benchmarks/`` here, else among those shipped.
+
+    Raises
+    ------
+    FlagError
+        If there is none.
+    """
+    if Path(name.partition("::")[0]).is_file():
+        return Path(name)
+    folders = [Path("benchmarks"), resource_directory("benchmarks")]
+    for folder in folders:
+        if (path := folder / f"bench_{name}.py").is_file():
+            return path
+    known = sorted({p.stem.removeprefix("bench_") for folder in folders for p in folder.glob("bench_*.py")})
+    raise FlagError("no such benchmark", value=name, limit=", ".join(known), remedy="name one of these, or a file")
+
+
+def _flags(options: Mapping[str, Any]) -> list[str]:
+    flags: list[str] = []
+    for flag, _, _ in OPTIONS + SESSION_OPTIONS:
+        value = options.get(destination(flag))
+        if value is True:
+            flags.append(flag)
+        elif value is not None and value is not False:
+            flags.append(f"{flag}={value}")
+    return flags

@@ -1,0 +1,43 @@
+"""``agvbench init``: lay out a lab folder."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from agvbench.errors import FileError
+from agvbench.model import nominal_model
+from agvbench.resources import resource_directory
+
+_TEMPLATES = Path(__file__).parent / "lab"
+
+
+def make_lab(directory: str | Path) -> list[str]:
+    """Make the lab folder `directory`; return lines that say what to do next.
+
+    Raises
+    ------
+    FileError
+        If it exists and is not empty, or cannot be written.
+    """
+    root = Path(directory)
+    if root.exists() and (not root.is_dir() or any(root.iterdir())):
+        raise FileError("exists already and is not empty", where=root, remedy="choose another folder")
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        for folder, pattern in {"benchmarks": "bench_*.py", "trajectories": "*.toml"}.items():
+            _copy(resource_directory(folder), root / folder, pattern)
+        shutil.copy(resource_directory("benchmarks") / "pytest.ini", root / "benchmarks" / "pytest.ini")
+        nominal_model().save(root / "vehicle.toml")
+        shutil.copy(_TEMPLATES / "README.md", root / "README.md")
+        shutil.copy(_TEMPLATES / "noxfile.py.txt", root / "noxfile.py")
+        (root / ".gitignore").write_text("campaigns/\n.nox/\n", encoding="utf-8")
+    except OSError as error:
+        raise FileError(f"cannot be written ({error.strerror})", where=root, remedy="choose another folder") from None
+    return [f"made the lab folder {root}", f"next: cd {root} && agvbench bench --dry-run"]
+
+
+def _copy(source: Path, target: Path, pattern: str) -> None:
+    target.mkdir()
+    for file in sorted(source.glob(pattern)):
+        shutil.copy(file, target / file.name)

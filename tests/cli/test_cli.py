@@ -1,0 +1,75 @@
+"""The command line as people meet it: help that teaches, one line for a mistake, completion."""
+
+from __future__ import annotations
+
+import ast
+import os
+import pkgutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import agvbench.cli
+from agvbench.cli import main
+
+COMMANDS = sorted(m.name for m in pkgutil.iter_modules(agvbench.cli.__path__) if not m.name.startswith("_"))
+HEAVY = {"numpy", "pandas", "scipy", "numba", "matplotlib", "pyarrow", "zenoh", "rerun", "rich", "msgspec", "jinja2"}
+
+
+def test_help_lists_every_command(capsys):
+    with pytest.raises(SystemExit) as left:
+        main(["--help"])
+    assert left.value.code == 0
+    listed = capsys.readouterr().out
+    for name in COMMANDS:
+        assert f"\n    {name.removesuffix('_')} " in listed
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_of_a_command_teaches_with_examples(name, capsys):
+    command = name.removesuffix("_")
+    with pytest.raises(SystemExit) as left:
+        main([command, "--help"])
+    assert left.value.code == 0
+    assert f"agvbench {command}" in capsys.readouterr().out.partition("examples:")[2]
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_commands_import_nothing_heavy(name):
+    source = Path(agvbench.cli.__path__[0], f"{name}.py").read_text(encoding="utf-8")
+    imported = set()
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.Import):
+            imported |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            imported.add((node.module or "").split(".")[0])
+    assert not imported & HEAVY
+
+
+def test_help_loads_nothing_heavy():
+    program = "import sys; from agvbench.cli import build_parser; build_parser(); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert not set(done.stdout.split()) & HEAVY
+
+
+def test_completion_offers_the_commands(tmp_path):
+    answer = tmp_path / "answer"
+    environment = os.environ | {
+        "_ARGCOMPLETE": "1",
+        "_ARGCOMPLETE_STDOUT_FILENAME": str(answer),
+        "_ARGCOMPLETE_IFS": "\n",
+        "COMP_LINE": "agvbench ben",
+        "COMP_POINT": "12",
+    }
+    program = "from agvbench.cli import main; main()"
+    subprocess.run([sys.executable, "-c", program], env=environment, check=False, cwd=tmp_path, capture_output=True)
+    assert answer.read_text(encoding="utf-8").split() == ["bench"]
+
+
+def test_a_reader_that_left_is_no_error():
+    program = "import sys; from agvbench.cli import main; sys.exit(main(['bench', '--help']))"
+    command = f"'{sys.executable}' -c \"{program}\" | head -1"
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=True)
+    assert "Traceback" not in done.stderr

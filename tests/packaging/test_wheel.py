@@ -1,0 +1,74 @@
+"""The built wheel, alone in an empty folder, lays out a lab and drives in it."""
+
+from __future__ import annotations
+
+import os
+import site
+import subprocess
+import sys
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    """The wheel that people install."""
+    out = tmp_path_factory.mktemp("dist")
+    command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(out)]
+    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+    return next(out.glob("*.whl"))
+
+
+@pytest.fixture(scope="module")
+def agvbench(wheel, tmp_path_factory):
+    """The command of an environment that has the wheel and this environment's dependencies, not this checkout."""
+    root = tmp_path_factory.mktemp("environment")
+    venv.create(root, with_pip=False)
+    packages = next((root / "lib").glob("python3*")) / "site-packages"
+    zipfile.ZipFile(wheel).extractall(packages)
+    # Only third-party packages: an editable install of the checkout would hide what the wheel lacks.
+    dependencies = root / "dependencies"
+    dependencies.mkdir()
+    for entry in Path(site.getsitepackages()[0]).iterdir():
+        if not entry.name.startswith(("agvbench", "_agvbench", "__editable__")) and entry.suffix != ".pth":
+            (dependencies / entry.name).symlink_to(entry)
+    (packages / "dependencies.pth").write_text(str(dependencies))
+    python = root / "bin" / "python"
+
+    def run(*arguments, cwd):
+        environment = {k: v for k, v in os.environ.items() if not k.startswith(("COV_", "PYTEST"))}
+        command = [str(python), "-c", "import sys; from agvbench.cli import main; sys.exit(main())", *arguments]
+        return subprocess.run(
+            command, check=False, cwd=cwd, env=environment, capture_output=True, text=True, timeout=300
+        )
+
+    return run
+
+
+def test_the_wheel_carries_what_people_edit_and_no_more(wheel):
+    names = zipfile.ZipFile(wheel).namelist()
+    assert "agvbench/_lab/trajectories/1_straight_forward.toml" in names or any(
+        name.startswith("agvbench/_lab/trajectories/") and name.endswith(".toml") for name in names
+    )
+    assert "agvbench/_lab/benchmarks/bench_trajectories.py" in names
+    assert "agvbench/py.typed" in names
+    assert not [name for name in names if name.startswith("tests/") or "__pycache__" in name]
+
+
+def test_init_and_bench_work_in_an_empty_folder(agvbench, tmp_path):
+    made = agvbench("init", "lab", cwd=tmp_path)
+    assert made.returncode == 0, made.stderr
+    lab = tmp_path / "lab"
+    assert {"vehicle.toml", "benchmarks", "trajectories", "noxfile.py", "README.md"} <= {p.name for p in lab.iterdir()}
+    options = ["--repeats=1", "--out=campaign", "-k", "trajectory and (1 or 5)", "--calibration=vehicle.toml"]
+    driven = agvbench("bench", "trajectories", "--vehicle=vehicle.toml", *options, cwd=lab)
+    assert driven.returncode == 0, driven.stdout + driven.stderr
+    assert len(list((lab / "campaign" / "runs.parquet").iterdir())) >= 2
+    again = agvbench("init", "lab", cwd=tmp_path)
+    assert again.returncode == 2
+    assert again.stderr == "agvbench init: lab: exists already and is not empty; choose another folder\n"

@@ -1,0 +1,54 @@
+"""Settings of a session: checked, kept, and not to be contradicted on resume."""
+
+from __future__ import annotations
+
+import pytest
+
+from agvbench.errors import AgvbenchError, FileError, FlagError
+from agvbench.running.settings import SETTINGS_FILE, BenchSettings, settings_for_resume
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "words"),
+    [
+        ("repeats", -1, "--repeats"),
+        ("attempts", 0, "--attempts"),
+        ("seed", -3, "--seed"),
+        ("seed", 2**64, "--seed"),
+        ("order", "random", "interleaved, blocked, shuffled"),
+        ("maps", "spline", "default, thesis"),
+    ],
+)
+def test_values_that_cannot_be_used_name_flag_value_and_limit(option, value, words):
+    with pytest.raises(FlagError) as caught:
+        BenchSettings(**{option: value})
+    line = str(caught.value)
+    assert words in line
+    assert str(value) in line
+    assert "\n" not in line
+
+
+def test_settings_survive_the_file(tmp_path):
+    settings = BenchSettings(seed=7, repeats=3, plant="a b.py:make", order="shuffled", full=True)
+    settings.save(tmp_path)
+    assert BenchSettings.load(tmp_path) == settings
+
+
+@pytest.mark.parametrize("text", ["seed = ", "colour = 'red'", "seed = -1", "\xff\xfe"])
+def test_damaged_settings_are_told_in_one_line(tmp_path, text):
+    (tmp_path / SETTINGS_FILE).write_text(text, encoding="latin-1")
+    with pytest.raises(AgvbenchError) as caught:
+        BenchSettings.load(tmp_path)
+    assert "\n" not in str(caught.value)
+
+
+def test_nothing_to_resume_says_so(tmp_path):
+    with pytest.raises(FileError, match="no bench session to resume"):
+        BenchSettings.load(tmp_path)
+
+
+def test_resume_keeps_what_was_begun_and_refuses_contradictions():
+    saved = BenchSettings(seed=7, repeats=3)
+    assert settings_for_resume(saved, {"seed": 7, "connect": "tcp/127.0.0.1:1"}).connect == "tcp/127.0.0.1:1"
+    with pytest.raises(FlagError, match=r"--seed: .*: 8 \(limit: 7\)"):
+        settings_for_resume(saved, {"seed": 8})
