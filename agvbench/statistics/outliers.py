@@ -1,0 +1,56 @@
+"""Outliers classified, not dropped (Tukey's fences)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from agvbench.types import Floats
+
+FEWEST = 5
+
+
+@dataclass(frozen=True)
+class Outliers:
+    """How many values lie beyond Tukey's fences: mild beyond 1.5, severe beyond 3 interquartile ranges."""
+
+    low_severe: int
+    low_mild: int
+    high_mild: int
+    high_severe: int
+
+    @property
+    def count(self) -> int:
+        """Return how many there are of all four kinds."""
+        return self.low_severe + self.low_mild + self.high_mild + self.high_severe
+
+    def __str__(self) -> str:
+        kinds = {
+            "low severe": self.low_severe,
+            "low mild": self.low_mild,
+            "high mild": self.high_mild,
+            "high severe": self.high_severe,
+        }
+        return ", ".join(f"{count} {kind}" for kind, count in kinds.items() if count) or "none"
+
+
+def classify_outliers(values: Floats) -> Outliers:
+    """Return how many of `values`, shape (n,), are outliers, by side and severity.
+
+    Fewer than five values have no quartiles worth fencing: none is called an outlier.
+
+    >>> str(classify_outliers(np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 30.0])))
+    '1 high severe'
+    """
+    if len(values) < FEWEST:
+        return Outliers(0, 0, 0, 0)
+    q1, q3 = np.percentile(values, [25, 75])
+    mild, severe = 1.5 * (q3 - q1), 3.0 * (q3 - q1)
+    low_severe, high_severe = int(np.sum(values < q1 - severe)), int(np.sum(values > q3 + severe))
+    return Outliers(
+        low_severe,
+        int(np.sum(values < q1 - mild)) - low_severe,
+        int(np.sum(values > q3 + mild)) - high_severe,
+        high_severe,
+    )

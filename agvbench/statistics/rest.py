@@ -1,0 +1,136 @@
+"""Where the vehicle rested: poses before the first command and after the stop, from noisy frames.
+
+Frames may be untracked, doubled, late or wildly wrong. Both poses are means over a window at rest after
+outlying frames have been left out, with the standard error of that mean. The standard errors assume that the
+noise of one frame tells nothing about the next; where a camera's noise wanders slowly they are lower bounds.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.errors import FitError
+from agvbench.types import Floats, Frames, Pose, Run, wrap_angle
+
+WINDOW_S = 0.5
+SPEED_LIMIT_MPS = 0.02
+_FEWEST_FRAMES = 8
+_WILD_SCALES = 6.0
+_MAD_TO_SD = 1.4826
+# The least scatter that is believed: cameras quantise, and a scatter of zero would make every frame but one wild.
+_LEAST_M, _LEAST_RAD = 1e-4, 2e-4
+
+
+@dataclass(frozen=True)
+class RestPose:
+    """A pose at rest in the floor frame, with standard errors [m, m, rad] (NaN from a single frame)."""
+
+    pose: Pose
+    stderr_x_m: float
+    stderr_y_m: float
+    stderr_heading_rad: float
+    frames: int
+    left_out: int
+
+
+def start_pose(run: Run) -> RestPose:
+    """Return the pose at rest before the first command, from at most the last 0.5 s before it.
+
+    Raises
+    ------
+    FitError
+        If no frame was tracked before the first command.
+    """
+    frames = _tracked(run.frames)
+    window = frames.select((frames.t_s <= 0.0) & (frames.t_s > -WINDOW_S))
+    if len(window) == 0:
+        raise FitError("no tracked frame at rest before the first command", where=run.run_id)
+    return _mean_pose(window)
+
+
+def end_pose(run: Run) -> RestPose:
+    """Return the pose at rest after the stop (the last command), from at most the last 0.5 s.
+
+    The window is halved, from its older end, while the vehicle still settles in it.
+
+    Raises
+    ------
+    FitError
+        If no frame was tracked after the stop, or the vehicle still moves when the frames end.
+    """
+    stop_s = float(run.commands.t_s[-1]) if len(run.commands) else 0.0
+    frames = _tracked(run.frames)
+    after = frames.select(frames.t_s > stop_s)
+    if len(after) == 0:
+        raise FitError("no tracked frame after the stop", where=run.run_id)
+    window = _settled(after.select(after.t_s > after.t_s[-1] - WINDOW_S))
+    speed = _drift(window)[1]
+    if speed > SPEED_LIMIT_MPS:
+        raise FitError(
+            "still moving when the frames end",
+            where=run.run_id,
+            value=f"{speed:.3f} m/s",
+            limit=f"{SPEED_LIMIT_MPS} m/s",
+        )
+    return _mean_pose(window)
+
+
+def _tracked(frames: Frames) -> Frames:
+    """Return the tracked, finite frames in order of capture, each capture time once."""
+    finite = np.isfinite(frames.t_s + frames.x_m + frames.y_m + frames.heading_rad)
+    kept = frames.select(frames.tracked.astype(np.bool_) & finite)
+    return kept.select(np.unique(kept.t_s, return_index=True)[1])
+
+
+def _settled(window: Frames) -> Frames:
+    while len(window) >= 2 * _FEWEST_FRAMES:
+        moved, _, tolerance = _drift(window)
+        if moved <= tolerance:
+            break
+        window = window.select(np.arange(len(window) // 2, len(window)))
+    return window
+
+
+def _drift(window: Frames) -> tuple[float, float, float]:
+    """Return how far [m], how fast [m/s] the window's halves lie apart, and the distance [m] that noise explains."""
+    if len(window) < _FEWEST_FRAMES:
+        return 0.0, 0.0, 0.0
+    half = len(window) // 2
+    older, newer = np.arange(half), np.arange(half, len(window))
+    moved = math.hypot(*(float(np.median(v[newer]) - np.median(v[older])) for v in (window.x_m, window.y_m)))
+    apart_s = float(np.median(window.t_s[newer]) - np.median(window.t_s[older]))
+    # The scatter is read from differences of neighbours, which the motion itself hardly changes.
+    steps = np.concatenate([np.diff(window.x_m), np.diff(window.y_m)])
+    noise = _MAD_TO_SD * float(np.median(np.abs(steps))) / math.sqrt(2.0)
+    tolerance = _LEAST_M + 4.0 * 1.2533 * noise * math.sqrt(2.0 / half)
+    return moved, max(0.0, moved - tolerance) / apart_s, tolerance
+
+
+def _mean_pose(window: Frames) -> RestPose:
+    heading, turned = _unwrapped(window.heading_rad)
+    kept = ~(_wild(window.x_m, _LEAST_M) | _wild(window.y_m, _LEAST_M) | _wild(turned, _LEAST_RAD))
+    if not kept.any():
+        kept[:] = True
+    x, y, h = window.x_m[kept], window.y_m[kept], turned[kept]
+    pose = Pose(float(x.mean()), float(y.mean()), wrap_angle(heading + float(h.mean())))
+    return RestPose(pose, _stderr(x), _stderr(y), _stderr(h), len(x), len(window) - len(x))
+
+
+def _unwrapped(heading: Floats) -> tuple[float, Floats]:
+    """Return a central heading and every heading's wrapped distance from it."""
+    centre = math.atan2(float(np.median(np.sin(heading))), float(np.median(np.cos(heading))))
+    return centre, np.angle(np.exp(1j * (heading - centre)))
+
+
+def _wild(values: Floats, least: float) -> NDArray[np.bool_]:
+    away = np.abs(values - np.median(values))
+    wild: NDArray[np.bool_] = away > _WILD_SCALES * max(least, _MAD_TO_SD * float(np.median(away)))
+    return wild
+
+
+def _stderr(values: Floats) -> float:
+    return float(values.std(ddof=1) / math.sqrt(len(values))) if len(values) > 1 else math.nan

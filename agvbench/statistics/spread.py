@@ -1,0 +1,102 @@
+"""Repeatability (spread) apart from accuracy (bias)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from statistics import NormalDist
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from agvbench.statistics.bootstrap import Interval, median_interval
+from agvbench.statistics.end_poses import in_order
+from agvbench.statistics.runs import valid
+from agvbench.types import Floats
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FEWEST = 5
+COMPONENTS = {
+    "delta_s_mm": "Δs [mm]",
+    "along_mm": "along [mm]",
+    "across_mm": "across [mm]",
+    "delta_heading_deg": "Δδ [deg]",
+}
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Scatter between repeats: standard deviation with its interval, and the robust one from the MAD."""
+
+    sd: Interval
+    robust_sd: float
+
+
+def spread(values: Floats, *, confidence: float = 0.95) -> Spread:
+    """Return the scatter of `values`, shape (n,), with Bonett's (2006) interval of the standard deviation.
+
+    Bonett's interval uses the sample's own kurtosis where the chi-square interval assumes a normal distribution.
+    Fewer than five values give NaN bounds.
+
+    >>> scatter = spread(np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0]))
+    >>> round(scatter.sd.estimate, 3), round(scatter.robust_sd, 3)
+    (1.871, 2.224)
+    """
+    sd = float(np.std(values, ddof=1)) if len(values) > 1 else math.nan
+    robust = 1.4826 * float(np.median(np.abs(values - np.median(values))))
+    return Spread(Interval(sd, *_bonett(values, sd, confidence)), robust)
+
+
+def bias_and_spread(errors: pd.DataFrame) -> pd.DataFrame:
+    """Return accuracy and repeatability per trajectory, condition and component of the signed errors.
+
+    Columns ``trajectory``, ``condition``, ``component``, ``repeats``, ``bias`` (median of the signed error) with
+    ``bias_low`` and ``bias_high``, ``sd`` with ``sd_low`` and ``sd_high``, ``robust_sd``; 95 % intervals.
+    """
+    import pandas as pd
+
+    rows = []
+    counted = valid(errors)
+    for trajectory in dict.fromkeys(counted["trajectory"]):
+        of_trajectory = counted[counted["trajectory"] == trajectory]
+        for condition in in_order(of_trajectory["condition"]):
+            group = of_trajectory[of_trajectory["condition"] == condition]
+            rows += [
+                {"trajectory": trajectory, "condition": condition, **_component(group, column)} for column in COMPONENTS
+            ]
+    return pd.DataFrame(rows)
+
+
+def _component(group: pd.DataFrame, column: str) -> dict[str, object]:
+    values = group[column].to_numpy(dtype=float)
+    bias, scatter = median_interval(values), spread(values)
+    return {
+        "component": COMPONENTS[column],
+        "repeats": len(values),
+        **dict(zip(("bias", "bias_low", "bias_high"), bias, strict=True)),
+        **dict(zip(("sd", "sd_low", "sd_high"), scatter.sd, strict=True)),
+        "robust_sd": scatter.robust_sd,
+    }
+
+
+def _bonett(values: Floats, sd: float, confidence: float) -> tuple[float, float]:
+    n = len(values)
+    if n < FEWEST or sd == 0.0:
+        return math.nan, math.nan
+    z = NormalDist().inv_cdf(0.5 + confidence / 2.0)
+    middle = _trimmed_mean(values, 1.0 / (2.0 * math.sqrt(n - 4.0)))
+    squares = float(np.sum((values - values.mean()) ** 2))
+    kurtosis = n * float(np.sum((values - middle) ** 4)) / squares**2
+    c = n / (n - z)
+    stderr = c * math.sqrt(max(0.0, kurtosis - (n - 3.0) / n) / (n - 1.0))
+    return (
+        math.exp(0.5 * (math.log(c * sd**2) - z * stderr)),
+        math.exp(0.5 * (math.log(c * sd**2) + z * stderr)),
+    )
+
+
+def _trimmed_mean(values: Floats, share: float) -> float:
+    cut = min(int(share * len(values)), (len(values) - 1) // 2)
+    return float(np.sort(values)[cut : len(values) - cut].mean())

@@ -1,0 +1,54 @@
+"""A comparison in plain words."""
+
+from __future__ import annotations
+
+import math
+
+from agvbench.statistics.comparison import Comparison, Difference
+from agvbench.statistics.power import fewest_repeats
+from agvbench.statistics.verdict import Verdict
+
+
+def describe(difference: Difference, comparison: Comparison) -> str:
+    """Return what one difference of `comparison` amounts to, as a clause."""
+    if difference.verdict in (Verdict.WORSE, Verdict.BETTER):
+        return f"{_amount(difference, abs(difference.interval.estimate))} {difference.verdict}"
+    if difference.verdict is Verdict.SAME:
+        return f"the same to within {_amount(difference, difference.margin)}"
+    if not difference.able:
+        return _too_few(difference, comparison)
+    return _undecided(difference, comparison.alpha)
+
+
+def headline(comparison: Comparison) -> str:
+    """Return the comparison's answer in one sentence."""
+    worse, better = len(comparison.of(Verdict.WORSE)), len(comparison.of(Verdict.BETTER))
+    same, unknown = len(comparison.of(Verdict.SAME)), len(comparison.of(Verdict.UNKNOWN))
+    if not comparison.could_compare:
+        return f"Could not compare: {describe(comparison.differences[0], comparison)}."
+    counts = [f"{worse} worse", f"{better} better", f"{same} the same within the margin", f"{unknown} undecided"]
+    answer = "Regression" if worse else "No regression shown"
+    return f"{answer}: of {len(comparison.differences)} comparisons {', '.join(counts)}."
+
+
+def _amount(difference: Difference, value: float) -> str:
+    quantity = difference.quantity
+    return f"{value:.{quantity.digits}f} {quantity.unit}"
+
+
+def _too_few(difference: Difference, comparison: Comparison) -> str:
+    a, b = difference.a.repeats, difference.b.repeats
+    repeats = f"{a} repeats" if a == b else f"{a} against {b} repeats"
+    needed = fewest_repeats(comparison.alpha / len(comparison.differences))
+    return f"{repeats} cannot show any difference here, however large; {needed} of each could"
+
+
+def _undecided(difference: Difference, alpha: float) -> str:
+    significant = min(difference.p_worse, difference.p_better) <= alpha
+    if significant:
+        way = Verdict.WORSE if difference.p_worse <= alpha else Verdict.BETTER
+        return f"{way}, but perhaps by no more than the margin of {_amount(difference, difference.margin)}"
+    if not math.isfinite(difference.visible):
+        return "no scatter to judge by"
+    fewest = min(difference.a.repeats, difference.b.repeats)
+    return f"{fewest} repeats cannot show a difference smaller than about {_amount(difference, difference.visible)}"
