@@ -78,18 +78,16 @@ class Campaign:
     @cached_property
     def _commands(self) -> TimedTable:
         source = self._sources["commands"]
-        table = TimedTable(source, source.read(COMMANDS), self.run_ids)
+        table = TimedTable(source.path, source.read(COMMANDS), self.run_ids, in_parts=source.in_parts)
         check_commands(table, self._runs["status"].to_pylist(), self.header.command_unit)
         return table
 
     @cached_property
     def _poses(self) -> TimedTable:
         source = self._sources["poses"]
-        table = TimedTable(source, _blank_untracked(source.read(POSES)), self.run_ids)
-        last = np.zeros(len(self.run_ids))
-        has = self._commands.counts > 0
-        last[has] = self._commands.column("t_s")[self._commands.offsets[1:][has] - 1]
-        check_poses(table, self._runs["status"].to_pylist(), last)
+        rows = _blank_untracked(source.read(POSES))
+        table = TimedTable(source.path, rows, self.run_ids, in_parts=source.in_parts)
+        check_poses(table, self._runs["status"].to_pylist(), self._commands.last("t_s"))
         return table
 
     @cached_property

@@ -73,7 +73,7 @@ def commands_part(run: Run) -> pa.Table:
     """Return the run's rows of the commands table."""
     commands = run.commands
     columns = {name: _floats(getattr(commands, name)) for name in ("t_s", "drive", "front", "rear")}
-    return pa.table({"run_id": _repeated(run.run_id, len(commands)), **columns})
+    return pa.table({"run_id": pa.repeat(run.run_id, len(commands)), **columns})
 
 
 def poses_part(run: Run) -> pa.Table:
@@ -81,7 +81,7 @@ def poses_part(run: Run) -> pa.Table:
     frames = run.frames
     return pa.table(
         {
-            "run_id": _repeated(run.run_id, len(frames)),
+            "run_id": pa.repeat(run.run_id, len(frames)),
             **{name: _floats(getattr(frames, name)) for name in ("t_s", "x_m", "y_m", "heading_rad")},
             "tracked": pa.array(np.asarray(frames.tracked, np.bool_)),
             "frame": pa.array(np.asarray(frames.frame, np.int64)),
@@ -92,7 +92,3 @@ def poses_part(run: Run) -> pa.Table:
 
 def _floats(values: object) -> pa.Array:
     return pa.array(np.ascontiguousarray(values, np.float64), from_pandas=False)
-
-
-def _repeated(text: str, count: int) -> pa.DictionaryArray:
-    return pa.DictionaryArray.from_arrays(pa.array(np.zeros(count, np.int32)), pa.array([text], pa.string()))

@@ -13,8 +13,8 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from agvbench.campaign.columns import UNKNOWN_COUNT
-from agvbench.campaign.source import Source
 from agvbench.errors import CampaignError
+from agvbench.types import Floats
 
 
 class TimedTable:
@@ -27,16 +27,16 @@ class TimedTable:
         interrupted before it was finished: they are left out.
     """
 
-    def __init__(self, source: Source, table: pa.Table, run_ids: Sequence[str]) -> None:
-        self.path: Path = source.path
+    def __init__(self, path: Path, table: pa.Table, run_ids: Sequence[str], *, in_parts: bool) -> None:
+        self.path = path
         self.run_ids = run_ids
         codes = pc.index_in(table["run_id"], value_set=pa.array(run_ids, pa.string())).fill_null(-1).to_numpy()
         unknown = codes < 0
-        if unknown.any() and not source.in_parts:
+        if unknown.any() and not in_parts:
             row = int(np.argmax(unknown))
             raise CampaignError(
                 f"row {row + 1} belongs to a run that runs does not list",
-                where=source.path,
+                where=path,
                 value=table["run_id"][row].as_py(),
                 remedy="add the run to runs, or delete its rows",
             )
@@ -67,6 +67,13 @@ class TimedTable:
 
     def _unknown(self, name: str) -> NDArray[Any]:
         return np.full(self.table.num_rows, UNKNOWN_COUNT if name == "frame" else np.nan)
+
+    def last(self, name: str) -> Floats:
+        """Return the last value of a column in each run, shape (runs,); 0 for a run without rows."""
+        last = np.zeros(len(self.run_ids))
+        has = self.counts > 0
+        last[has] = self.column(name)[self.offsets[1:][has] - 1]
+        return last
 
     def rows(self, index: int) -> slice:
         """Return the rows of run number `index`."""

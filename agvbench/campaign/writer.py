@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING
 import pyarrow as pa
 
 from agvbench.campaign.atomic import is_temporary, write_atomically
+from agvbench.campaign.checks import check_commands, check_poses, check_runs
 from agvbench.campaign.header import FILE_NAME, CampaignHeader
 from agvbench.campaign.parquet import to_parquet
 from agvbench.campaign.parts import commands_part, part_name, poses_part, run_id_of, runs_part
 from agvbench.campaign.schema import TABLES
 from agvbench.campaign.source import parts
+from agvbench.campaign.timed import TimedTable
 from agvbench.errors import CampaignError
 from agvbench.types import Run
 
@@ -114,7 +116,8 @@ class CampaignWriter:
         Raises
         ------
         CampaignError
-            If there is a run of that id already, its id cannot name a file, or the disk refuses.
+            If there is a run of that id already, its id cannot name a file, it contradicts the schema (nothing is
+            written then), or the disk refuses.
         """
         if run.run_id in self._finished:
             raise CampaignError(
@@ -122,6 +125,7 @@ class CampaignWriter:
             )
         name = part_name(run.run_id)
         tables = {"poses": poses_part(run), "commands": commands_part(run), "runs": runs_part(run)}
+        self._check(run, tables)
         try:
             for table, part in tables.items():
                 write_atomically(self.path / f"{table}.parquet" / name, to_parquet(part), durable=self._durable)
@@ -130,6 +134,16 @@ class CampaignWriter:
                 f"cannot be written ({error.strerror})", where=self.path, remedy="free some space"
             ) from None
         self._finished[run.run_id] = None
+
+    def _check(self, run: Run, tables: dict[str, pa.Table]) -> None:
+        """Refuse now what would make the whole campaign unreadable later."""
+        check_runs(tables["runs"], self.path / "runs.parquet")
+        timed = {
+            name: TimedTable(self.path / f"{name}.parquet", tables[name], [run.run_id], in_parts=True)
+            for name in ("commands", "poses")
+        }
+        check_commands(timed["commands"], [run.status], self.header.command_unit)
+        check_poses(timed["poses"], [run.status], timed["commands"].last("t_s"))
 
     def write_table(self, name: str, table: pd.DataFrame) -> None:
         """Write (or replace) a further table, such as ``events`` or ``provenance``, beside the three.

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import pandas as pd
+from rich import box
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
@@ -22,7 +23,7 @@ _COLUMNS = {
     "too_short": "too short",
     "used": "used",
     "runs": "runs",
-    "seconds": "seconds",
+    "seconds": "time s",
 }
 
 
@@ -47,9 +48,16 @@ def run_import(mapping: str, files: Sequence[str], out: str) -> None:
 
 
 def _table(accounts: pd.DataFrame) -> Table:
-    table = Table(title="what became of the rows")
+    table = Table(
+        title="what became of the rows",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+        padding=(0, 1),
+        collapse_padding=True,
+        show_edge=False,
+    )
     for title in _COLUMNS.values():
-        table.add_column(title, justify="left" if title == "file" else "right")
+        table.add_column(title, justify="left" if title == "file" else "right", no_wrap=title == "file")
     for row in accounts.to_dict("records"):
         table.add_row(*(str(row[name]) for name in _COLUMNS))
     if len(accounts) > 1:

@@ -1,0 +1,78 @@
+"""Find the frames in which a tracker jumped: to a wrong marker, to another object, or by a flipped fit."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.campaign.mapping import Gate
+from agvbench.types import Floats
+
+Indices = NDArray[np.int64]
+
+_STEP_S = 0.25
+_FRAME_WORTH_M = 1e-9  # decides between chains that drive equally far: a vehicle that stands still
+
+
+def jumped(t_s: Floats, x_m: Floats, y_m: Floats, heading_rad: Floats, gate: Gate) -> NDArray[np.bool_]:
+    """Return which frames are not the vehicle's; every array has shape (n,) and all values are finite.
+
+    The track is cut wherever the vehicle cannot have moved as far as two neighbouring frames say. Of the pieces,
+    the chain that the vehicle can have driven through and that drives farthest is the vehicle's. Comparing with the
+    last good frame alone would, once its reach has grown, follow another object that the tracker holds for seconds;
+    and counting frames would prefer such an object if it held it longer than the vehicle.
+
+    Parameters
+    ----------
+    t_s
+        Capture time [s], not decreasing.
+    x_m, y_m, heading_rad
+        Poses [m, m, rad] in the floor frame.
+    gate
+        The largest speed and yaw rate, and the slack that noise needs.
+    """
+    if len(t_s) == 0:
+        return np.zeros(0, np.bool_)
+    poses = np.column_stack((t_s, x_m, y_m, heading_rad))
+    first = np.flatnonzero(np.r_[True, ~_reachable(poses[:-1], poses[1:], gate)])
+    last = np.r_[first[1:], len(t_s)] - 1
+    score = _driven(poses, first, last, gate.slack_m) + _FRAME_WORTH_M * (last - first + 1)
+    return np.repeat(~_best_chain(poses[first], poses[last], score, gate), last - first + 1)
+
+
+def _driven(poses: Floats, first: Indices, last: Indices, slack_m: float) -> Floats:
+    """Return how far each piece drives [m], in steps long enough to drown noise."""
+    step = np.floor(poses[:, 0] / _STEP_S)
+    corner = np.r_[True, np.diff(step) > 0.0]
+    corner[first] = corner[last] = True
+    rows = np.flatnonzero(corner)
+    distance = np.hypot(*np.diff(poses[rows, 1:3], axis=0).T)
+    piece = np.searchsorted(first, rows, side="right") - 1
+    inside = np.diff(piece) == 0
+    lengths = np.maximum(distance[inside] - slack_m, 0.0)
+    return np.bincount(piece[1:][inside], weights=lengths, minlength=len(first)).astype(np.float64)
+
+
+def _reachable(before: Floats, after: Floats, gate: Gate) -> NDArray[np.bool_]:
+    elapsed = after[:, 0] - before[:, 0]
+    distance = np.hypot(after[:, 1] - before[:, 1], after[:, 2] - before[:, 2])
+    turn = np.abs((after[:, 3] - before[:, 3] + np.pi) % (2.0 * np.pi) - np.pi)
+    near = distance <= gate.max_speed_m_per_s * elapsed + gate.slack_m
+    return near & (turn <= gate.max_yaw_rate_rad_per_s * elapsed + gate.slack_rad)
+
+
+def _best_chain(starts: Floats, ends: Floats, score: Floats, gate: Gate) -> NDArray[np.bool_]:
+    """Return which pieces lie on the reachable chain of the highest score (dynamic programming over pieces)."""
+    best = score.copy()
+    before = np.full(len(score), -1)
+    for piece in range(1, len(score)):
+        so_far = np.where(_reachable(ends[:piece], starts[piece][None], gate), best[:piece], 0.0)
+        if so_far.max() > 0.0:
+            before[piece] = so_far.argmax()
+            best[piece] += so_far.max()
+    chain = np.zeros(len(score), np.bool_)
+    piece = int(best.argmax())
+    while piece >= 0:
+        chain[piece] = True
+        piece = int(before[piece])
+    return chain

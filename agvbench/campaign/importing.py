@@ -1,0 +1,223 @@
+"""Turn foreign recordings into a campaign, and account for every row that was left out."""
+
+from __future__ import annotations
+
+import datetime
+import fnmatch
+import hashlib
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from agvbench import __version__
+from agvbench.campaign.campaign import Campaign
+from agvbench.campaign.cutting import cut
+from agvbench.campaign.mapping import FileRule, Mapping, find_mapping, load_mapping
+from agvbench.campaign.recording import Recording, read_recording
+from agvbench.campaign.writer import CampaignWriter
+from agvbench.errors import FileError
+from agvbench.types import NO_TARGET, RUN_OK, Commands, Floats, Frames, Run
+
+IMPORT_TABLE = "import"
+_YEAR_2000_S = 946_684_800.0
+
+
+def import_recordings(
+    mapping_path: str | Path,
+    files: Sequence[str | Path],
+    out: str | Path,
+    *,
+    progress: Callable[[Iterable[Path]], Iterable[Path]] = iter,
+) -> Campaign:
+    """Import `files` into a new campaign directory `out`.
+
+    The campaign has a further table ``import``: per file its rows, how many of them were not driven, not seen,
+    jumped, or in pieces too short for a run, and the hashes of file and mapping.
+
+    Parameters
+    ----------
+    mapping_path
+        A mapping file, or the name of one that ships with agvbench (``"dart"``).
+    files
+        CSV files; their names become the runs' ids.
+    out
+        A directory that does not exist yet or is empty.
+    progress
+        Wraps the iteration over the files, to show how far it is.
+
+    Raises
+    ------
+    FileError
+        If a file or the mapping cannot be used, or no run comes of them.
+    CampaignError
+        If `out` is not empty or the recordings contradict the campaign's schema.
+    """
+    mapping = load_mapping(mapping_path)
+    paths = _distinct(files)
+    header = mapping.header()
+    runs: list[Run] = []
+    accounts: list[dict[str, Any]] = []
+    clock = _Clock(absolute=mapping.columns.time.clock == "absolute")
+    for path in progress(paths):
+        recording = read_recording(path, mapping)
+        pieces = cut(recording, mapping.runs)
+        begin_s = clock.begin(recording)
+        rule = _rule_for(path, mapping)
+        runs += [_run(recording, rows, number, begin_s, mapping, rule) for number, rows in enumerate(pieces, start=1)]
+        accounts.append(_account(recording, pieces))
+    if not runs:
+        raise FileError(_why_nothing(accounts), where=", ".join(path.name for path in paths), remedy=_REMEDY_NOTHING)
+    return _write(Path(out), header, clock.from_zero(runs), accounts, find_mapping(mapping_path))
+
+
+_REMEDY_NOTHING = "check the mapping's columns.driven, columns.tracked, [gate] and [runs]"
+
+
+class _Clock:
+    """Places recordings in the campaign's time: as they are, or one after another."""
+
+    def __init__(self, *, absolute: bool) -> None:
+        self._absolute = absolute
+        self._next_s = 0.0
+
+    def begin(self, recording: Recording) -> float:
+        """Return what to add to the recording's time."""
+        if self._absolute or not len(recording):
+            return 0.0
+        offset = self._next_s - float(recording.t_s[0])
+        self._next_s += float(recording.t_s[-1] - recording.t_s[0])
+        return offset
+
+    @staticmethod
+    def from_zero(runs: list[Run]) -> list[Run]:
+        """Return the runs in order of time, the first beginning at 0."""
+        from dataclasses import replace
+
+        first_s = min(run.started_s for run in runs)
+        ordered = sorted(runs, key=lambda run: run.started_s)
+        return [replace(run, started_s=round(run.started_s - first_s, 6)) for run in ordered]
+
+
+def _distinct(files: Sequence[str | Path]) -> list[Path]:
+    paths = [Path(file) for file in files]
+    if not paths:
+        raise FileError("no recordings were given", remedy="name one CSV file or more")
+    stems = [path.stem for path in paths]
+    for path in paths:
+        if stems.count(path.stem) > 1:
+            raise FileError("two recordings have one name", where=path, value=path.stem, remedy="rename one")
+    return paths
+
+
+def _rule_for(path: Path, mapping: Mapping) -> FileRule:
+    rules = (rule for rule in mapping.files if fnmatch.fnmatch(path.name, rule.match))
+    return next(rules, FileRule(match="*"))
+
+
+def _run(recording: Recording, rows: slice, number: int, begin_s: float, mapping: Mapping, rule: FileRule) -> Run:
+    defaults = mapping.runs
+    start_s = float(recording.t_s[rows.start])
+    extra: dict[str, object] = {"source": recording.path.name, "source_row": rows.start + 1}
+    if defaults.command_hold_s is not None:
+        extra["command_hold_s"] = defaults.command_hold_s
+    return Run(
+        run_id=f"{recording.path.stem}-{number:03d}",
+        experiment=rule.experiment or defaults.experiment,
+        trajectory=rule.trajectory or defaults.trajectory,
+        condition=rule.condition or defaults.condition,
+        repeat=0,  # pieces of one recording repeat nothing
+        target=NO_TARGET,
+        started_s=begin_s + start_s,
+        status=RUN_OK,
+        firmware=rule.firmware or defaults.firmware,
+        commands=_commands(recording, rows, start_s),
+        frames=_frames(recording, rows, start_s),
+        session=rule.session or _session(recording, start_s, mapping),
+        extra=extra,
+    )
+
+
+def _session(recording: Recording, start_s: float, mapping: Mapping) -> str:
+    if mapping.runs.session == "file":
+        return recording.path.stem
+    if mapping.runs.session == "campaign":
+        return mapping.name
+    if start_s < _YEAR_2000_S:
+        remedy = 'set runs.session to "file" or "campaign"'
+        raise FileError("time does not count from 1970, so its day is unknown", where=recording.path, remedy=remedy)
+    return datetime.datetime.fromtimestamp(start_s, datetime.UTC).date().isoformat()
+
+
+def _commands(recording: Recording, rows: slice, start_s: float) -> Commands:
+    """Return the commands of these rows, one row for each change."""
+    values = np.column_stack([getattr(recording, name)[rows] for name in ("drive", "front", "rear")])
+    changed = np.flatnonzero(np.r_[True, np.any(np.diff(values, axis=0) != 0.0, axis=1)])
+    t_s = recording.t_s[rows][changed] - start_s
+    last_of_its_time = np.r_[np.diff(t_s) > 0.0, True]
+    return Commands(t_s[last_of_its_time], *values[changed[last_of_its_time]].T)
+
+
+def _frames(recording: Recording, rows: slice, start_s: float) -> Frames:
+    tracked = (recording.seen & ~recording.jumped)[rows]
+
+    def blank(values: Floats) -> Floats:
+        return np.where(tracked, values[rows], np.nan)
+
+    return Frames(
+        t_s=recording.t_s[rows] - start_s,
+        x_m=blank(recording.x_m),
+        y_m=blank(recording.y_m),
+        heading_rad=blank(recording.heading_rad),
+        tracked=tracked,
+        frame=recording.frame[rows],
+        mean_error_m=recording.mean_error_m[rows],
+        received_s=np.full(len(tracked), np.nan),
+    )
+
+
+def _account(recording: Recording, pieces: list[slice]) -> dict[str, Any]:
+    """Count each row once: used, or why not."""
+    used = np.zeros(len(recording), np.bool_)
+    for rows in pieces:
+        used[rows] = recording.usable[rows]
+    driven, seen = recording.driven, recording.seen
+    return {
+        "file": recording.path.name,
+        "rows": len(recording),
+        "not_driven": int(np.count_nonzero(~driven)),
+        "not_seen": int(np.count_nonzero(driven & ~seen)),
+        "jumped": int(np.count_nonzero(driven & recording.jumped)),
+        "too_short": int(np.count_nonzero(recording.usable & ~used)),
+        "used": int(np.count_nonzero(used)),
+        "runs": len(pieces),
+        "seconds": round(sum(float(recording.t_s[rows.stop - 1] - recording.t_s[rows.start]) for rows in pieces), 2),
+        "sha256": _sha256(recording.path),
+    }
+
+
+def _why_nothing(accounts: list[dict[str, Any]]) -> str:
+    reasons = ("not_driven", "not_seen", "jumped", "too_short")
+    totals = {reason: sum(account[reason] for account in accounts) for reason in reasons}
+    counted = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in totals.items())
+    return f"no run is left of {sum(account['rows'] for account in accounts)} rows ({counted})"
+
+
+def _write(out: Path, header: Any, runs: list[Run], accounts: list[dict[str, Any]], mapping_path: Path) -> Campaign:
+    import pandas as pd
+
+    writer = CampaignWriter.create(out, header)
+    for run in runs:
+        writer.append(run)
+    table = pd.DataFrame(accounts)
+    table["mapping"] = mapping_path.name
+    table["mapping_sha256"] = _sha256(mapping_path)
+    table["agvbench"] = __version__
+    writer.write_table(IMPORT_TABLE, table)
+    return Campaign.open(out).check()
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

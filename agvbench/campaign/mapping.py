@@ -1,0 +1,281 @@
+"""What a foreign recording's columns mean: the mapping of ``agvbench import``, in TOML (schema 1)."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+
+from agvbench.campaign import units
+from agvbench.campaign.header import SCHEMA, CampaignHeader
+from agvbench.errors import FileError
+from agvbench.types import CommandUnit
+
+Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
+ISO_8601 = "iso8601"
+
+_SHIPPED = Path(__file__).parent / "mappings"
+_Positive = Annotated[float, msgspec.Meta(gt=0.0)]
+_NotNegative = Annotated[float, msgspec.Meta(ge=0.0)]
+
+
+class _Strict(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
+    """A table in which a misspelt key is an error."""
+
+
+class Vehicle(_Strict, frozen=True):
+    """As ``[vehicle]`` of ``campaign.toml``."""
+
+    name: str
+    front_axle_m: float
+    rear_axle_m: float
+    command_unit: CommandUnit
+    neutral: float
+
+
+class Mocap(_Strict, frozen=True):
+    """As ``[mocap]`` of ``campaign.toml``."""
+
+    rate_hz: _Positive
+
+
+class Prediction(_Strict, frozen=True):
+    """As ``[prediction]`` of ``campaign.toml``."""
+
+    horizon_s: _Positive
+    stride_s: _Positive | None = None
+
+
+class Csv(_Strict, frozen=True):
+    """How the text is written."""
+
+    delimiter: Annotated[str, msgspec.Meta(min_length=1, max_length=1)] = ","
+    decimal: Literal[".", ","] = "."
+    encoding: str = "utf-8"
+    skip_rows: Annotated[int, msgspec.Meta(ge=0)] = 0
+
+
+class Time(_Strict, frozen=True):
+    """The capture time: ``clock`` "absolute" runs through all files, "file" starts anew in each."""
+
+    column: str
+    unit: str
+    clock: Literal["file", "absolute"] = "file"
+
+
+class Quantity(_Strict, frozen=True):
+    """A measured column: SI value = cell · unit · scale + offset; a scale of −1 mirrors."""
+
+    column: str
+    unit: str
+    scale: float = 1.0
+    offset: float = 0.0
+
+
+class Signal(_Strict, frozen=True):
+    """A command column: command = cell · scale + offset, in the vehicle's command unit."""
+
+    column: str
+    scale: float = 1.0
+    offset: float = 0.0
+
+
+class Quaternion(_Strict, frozen=True):
+    """Orientation columns; the body axis that points forward, and the floor's axes among the tracker's."""
+
+    x: str
+    y: str
+    z: str
+    w: str
+    forward: Axis = "x"
+    floor_x: Axis = "x"
+    floor_y: Axis = "y"
+
+
+class Flag(_Strict, frozen=True):
+    """True on the rows whose cell equals a value."""
+
+    column: str
+    equals: bool | int | float | str
+
+
+class Columns(_Strict, frozen=True):
+    """Which column is what."""
+
+    time: Time
+    x: Quantity
+    y: Quantity
+    drive: Signal
+    front: Signal
+    rear: Signal | None = None
+    heading: Quantity | None = None
+    quaternion: Quaternion | None = None
+    mean_error: Quantity | None = None
+    frame: str | None = None
+    tracked: Flag | None = None
+    driven: Flag | None = None
+    cut: str | None = None
+
+
+class Gate(_Strict, frozen=True):
+    """What the vehicle cannot do between two frames, and how far noise may seem to carry it."""
+
+    max_speed_m_per_s: _Positive
+    max_yaw_rate_rad_per_s: _Positive
+    slack_m: _NotNegative = 0.02
+    slack_rad: _NotNegative = 0.1
+
+
+class Runs(_Strict, frozen=True):
+    """What the runs are called and where recordings are cut into them."""
+
+    experiment: str = "free"
+    trajectory: str = ""
+    condition: str = ""
+    firmware: str = ""
+    session: Literal["file", "day", "campaign"] = "file"
+    gap_s: _Positive = 0.5
+    shortest_s: _NotNegative = 1.0
+    longest_s: _Positive | None = None
+    command_hold_s: _NotNegative | None = None
+
+
+class FileRule(_Strict, frozen=True):
+    """What differs for the files whose name matches; the first that matches counts."""
+
+    match: str
+    experiment: str | None = None
+    trajectory: str | None = None
+    condition: str | None = None
+    firmware: str | None = None
+    session: str | None = None
+
+
+class Mapping(_Strict, frozen=True):
+    """A whole mapping file."""
+
+    schema: int
+    name: str
+    vehicle: Vehicle
+    mocap: Mocap
+    columns: Columns
+    prediction: Prediction | None = None
+    csv: Csv = Csv()
+    gate: Gate | None = None
+    runs: Runs = Runs()
+    files: list[FileRule] = []
+
+    def header(self) -> CampaignHeader:
+        """Return the head of the campaign that this mapping makes.
+
+        Raises
+        ------
+        CampaignError
+            If the vehicle's geometry is impossible.
+        """
+        prediction = self.prediction
+        return CampaignHeader(
+            schema=SCHEMA,
+            name=self.name,
+            vehicle_name=self.vehicle.name,
+            front_axle_m=self.vehicle.front_axle_m,
+            rear_axle_m=self.vehicle.rear_axle_m,
+            command_unit=self.vehicle.command_unit,
+            neutral=self.vehicle.neutral,
+            mocap_rate_hz=self.mocap.rate_hz,
+            prediction_horizon_s=prediction.horizon_s if prediction else None,
+            prediction_stride_s=prediction.stride_s or prediction.horizon_s if prediction else None,
+        )
+
+
+def find_mapping(name: str | Path) -> Path:
+    """Return the path of a mapping: a file, or the name of one that ships with agvbench.
+
+    >>> find_mapping("dart").name
+    'dart.toml'
+
+    Raises
+    ------
+    FileError
+        If there is neither.
+    """
+    path = Path(name)
+    if path.is_file():
+        return path
+    shipped = _SHIPPED / f"{str(name).removesuffix('.toml')}.toml"
+    if path.name == str(name) and shipped.is_file():
+        return shipped
+    names = ", ".join(sorted(file.stem for file in _SHIPPED.glob("*.toml")))
+    raise FileError("is neither a file nor a mapping that ships", where=name, remedy=f"give a path, or one of: {names}")
+
+
+def load_mapping(name: str | Path) -> Mapping:
+    """Load and check a mapping, by path or shipped name.
+
+    Raises
+    ------
+    FileError
+        If it does not exist, is not TOML, has an unknown or missing key, or a value that cannot be used.
+    """
+    path = find_mapping(name)
+    try:
+        mapping = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Mapping)
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise FileError(f"is not TOML ({error})", where=path, remedy="correct the line") from None
+    except OSError as error:
+        raise FileError(f"cannot be read ({error.strerror})", where=path, remedy="check its permissions") from None
+    except msgspec.ValidationError as error:
+        raise FileError(_explain(error), where=path, remedy="see docs/how-to/import-your-csv.md") from None
+    _check(mapping, path)
+    return mapping
+
+
+def quantities(mapping: Mapping) -> Iterator[tuple[str, Quantity, dict[str, float]]]:
+    """Yield each measured column that is mapped: its name, its declaration and the units it may have."""
+    columns = mapping.columns
+    yield "x", columns.x, units.LENGTH
+    yield "y", columns.y, units.LENGTH
+    if columns.heading:
+        yield "heading", columns.heading, units.ANGLE
+    if columns.mean_error:
+        yield "mean_error", columns.mean_error, units.LENGTH
+
+
+def _check(mapping: Mapping, path: Path) -> None:
+    columns = mapping.columns
+    if mapping.schema != SCHEMA:
+        remedy = "install a newer agvbench" if mapping.schema > SCHEMA else f"set schema = {SCHEMA}"
+        raise FileError("schema is unknown", where=path, value=mapping.schema, limit=str(SCHEMA), remedy=remedy)
+    if (columns.heading is None) == (columns.quaternion is None):
+        remedy = "give one of columns.heading and columns.quaternion"
+        raise FileError("heading is given twice or not at all", where=path, remedy=remedy)
+    for name, quantity, known in quantities(mapping):
+        units.factor(quantity.unit, known, f"{path}: columns.{name}.unit")
+    if columns.time.unit != ISO_8601:
+        units.factor(columns.time.unit, {**units.TIME, ISO_8601: 1.0}, f"{path}: columns.time.unit")
+    if columns.quaternion and columns.quaternion.floor_x[-1] == columns.quaternion.floor_y[-1]:
+        where = f"{path}: columns.quaternion"
+        raise FileError("floor_x and floor_y are one axis", where=where, remedy="give two of x, y, z")
+    mapping.header()
+
+
+def _explain(error: msgspec.ValidationError) -> str:
+    """Say where in the file, and what may have been meant by an unknown key."""
+    what, _, place = str(error).partition(" - at `$.")
+    what = what.removeprefix("Object contains ").removeprefix("Object ").replace("unknown field", "unknown key")
+    what = what.replace("missing required field", "lacks key").replace("field", "key")
+    what = f"{place.rstrip('`')}: {what}" if place else what
+    if "unknown key" in what:
+        wrong = what.split("`")[1]
+        if close := difflib.get_close_matches(wrong, _known_keys(Mapping), 1):
+            what += f" (did you mean {close[0]}?)"
+    return what
+
+
+def _known_keys(struct: Any) -> set[str]:
+    tables = (Vehicle, Mocap, Prediction, Csv, Time, Quantity, Signal, Quaternion, Flag, Columns, Gate, Runs, FileRule)
+    return set().union(*(table.__struct_fields__ for table in (struct, *tables)))

@@ -1,0 +1,35 @@
+"""Turn CSV recordings of any lab into a campaign.
+
+A mapping in TOML says which column is what, in which unit and axis, which rows were driven, what jumps are
+impossible, and where a recording is cut into runs. "dart" ships with agvbench; docs/how-to/import-your-csv.md shows
+how to write one. Every row that is left out is counted, on the console and in the campaign's import.parquet.
+
+examples:
+  agvbench import --mapping dart.toml recordings/*.csv --out campaigns/dart
+  agvbench import --mapping lab.toml monday.csv tuesday.csv --out campaigns/lab
+"""
+
+from __future__ import annotations
+
+import argparse
+
+HELP = "turn CSV recordings into a campaign"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument("files", nargs="+", metavar="FILE", help="CSV recordings; their names become the runs' ids")
+    parser.add_argument(
+        "--mapping", required=True, metavar="M.toml", help="a mapping file, or the name of a shipped one"
+    )
+    parser.add_argument(
+        "--out", required=True, metavar="DIR", help="the campaign directory to make; must be empty or new"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Import; return the exit code."""
+    from agvbench.workflows.import_recordings import run_import
+
+    run_import(arguments.mapping, arguments.files, arguments.out)
+    return 0
