@@ -12,8 +12,9 @@ from agvbench.effects.base import Effect, Stage, parameter
 class SpeedLag(Effect):
     """First-order lag of the axle speed: ``v̇ = (v_map − v) / T``.
 
-    T is ``accelerate_s`` where |v| grows and ``brake_s`` where it falls. From forward to backward the vehicle brakes to rest first and accelerates then. The thesis measured 0.29 s
-    from 0 to 0.3 m/s, and 0.59 s from 0.32 to 0.02 m/s (section 8.1).
+    T is ``accelerate_s`` where |v| grows and ``brake_s`` where it falls. From forward to backward the vehicle brakes to
+    rest first and accelerates then. The thesis measured 0.29 s from 0 to 0.3 m/s, and 0.59 s from 0.32 to 0.02 m/s
+    (section 8.1).
     """
 
     name: ClassVar[str] = "speed_lag"

@@ -1,1 +1,14 @@
 """Maps, kinematics and effects composed into a vehicle model."""
+
+from agvbench.model.examples import example_names, example_path, example_vehicle, thesis_vehicle
+from agvbench.model.nominal import nominal_model
+from agvbench.model.vehicle_model import VehicleModel
+
+__all__ = [
+    "VehicleModel",
+    "example_names",
+    "example_path",
+    "example_vehicle",
+    "nominal_model",
+    "thesis_vehicle",
+]

@@ -1,0 +1,160 @@
+"""What the bench believes about a vehicle: static maps, kinematics, and the effects it has been given."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from agvbench.effects import Effect
+from agvbench.errors import VehicleError
+from agvbench.types import Command, Commands, CommandUnit, Floats
+from agvbench.vehicle.checks import coerce_float
+from agvbench.vehicle.geometry import Geometry
+from agvbench.vehicle.maps import StaticMap
+
+# Beyond this an axle has no sensible tangent, and no vehicle gets there.
+_LARGEST_ANGLE_RAD = math.radians(89.0)
+
+
+@dataclass(frozen=True)
+class VehicleModel:
+    """Static maps, kinematics and effects of one vehicle.
+
+    Parameters
+    ----------
+    name
+        The vehicle's name.
+    geometry
+        Where its axles are.
+    command_unit
+        ``"us"`` or ``"normalised"``.
+    neutral
+        The command at which it stands and points (about) straight ahead, in command units.
+    front, rear
+        Command → axle angle [rad], counter-clockwise positive; `Fixed` for an axle that is not steered.
+    drive
+        Command → speed of the axles along their wheels [m/s].
+    effects
+        What else is known of it, each effect at most once; they act in the order of their stages.
+    provenance
+        Where all this comes from; not part of the physics.
+
+    Raises
+    ------
+    VehicleError
+        If the parts do not make a vehicle.
+    """
+
+    name: str
+    geometry: Geometry
+    command_unit: CommandUnit
+    neutral: float
+    front: StaticMap
+    rear: StaticMap
+    drive: StaticMap
+    effects: tuple[Effect, ...] = ()
+    provenance: Mapping[str, str | float | int] = field(default_factory=dict, hash=False)
+
+    def __post_init__(self) -> None:
+        coerce_float(self, "neutral")
+        object.__setattr__(self, "effects", tuple(self.effects))
+        object.__setattr__(self, "provenance", dict(self.provenance))
+        if self.command_unit not in get_args(CommandUnit):
+            limit = " or ".join(get_args(CommandUnit))
+            raise VehicleError("unknown unit", where="command_unit", value=repr(self.command_unit), limit=limit)
+        self._check_angles()
+        names = [effect.name for effect in self.effects]
+        for name in names:
+            if names.count(name) > 1:
+                raise VehicleError("an effect may be given once", where="effects", value=name)
+
+    def _check_angles(self) -> None:
+        for axle in ("front", "rear"):
+            ends = [end for end in getattr(self, axle).output_range if math.isfinite(end)]
+            for end in ends:
+                if abs(end) > _LARGEST_ANGLE_RAD:
+                    value, limit = f"{math.degrees(end):.1f}°", f"±{math.degrees(_LARGEST_ANGLE_RAD):.0f}°"
+                    raise VehicleError("axle angle is too large", where=f"maps.{axle}", value=value, limit=limit)
+
+    def axle_angles(self, front_command: ArrayLike, rear_command: ArrayLike) -> tuple[Floats, Floats]:
+        """Return the settled angles of both axles [rad] for commands of any shape."""
+        return self.front(front_command), self.rear(rear_command)
+
+    def speed(self, drive_command: ArrayLike) -> Floats:
+        """Return the settled speed of the axles [m/s] for commands of any shape."""
+        return self.drive(drive_command)
+
+    def command_for(self, front_rad: float, rear_rad: float, speed_mps: float) -> Command:
+        """Return the command that settles at these axle angles [rad] and this speed of the axles [m/s].
+
+        Where neutral already does it (standing still, an axle that is not steered), the command is neutral.
+
+        Raises
+        ------
+        VehicleError
+            If an axle cannot turn that far or the drive cannot go that fast, with the limit.
+        """
+        return Command(
+            drive=self._inverse("drive", speed_mps, "speed", 1.0, "m/s"),
+            front=self._inverse("front", front_rad, "angle", math.degrees(1.0), "°"),
+            rear=self._inverse("rear", rear_rad, "angle", math.degrees(1.0), "°"),
+        )
+
+    def _inverse(self, role: str, output: float, what: str, scale: float, unit: str) -> float:
+        static_map: StaticMap = getattr(self, role)
+        if float(static_map(self.neutral)) == output:
+            return self.neutral
+        try:
+            return float(static_map.inverse(output))
+        except VehicleError as error:
+            low, high = static_map.output_range
+            inside = low <= output <= high
+            raise VehicleError(
+                error.what if inside else f"{role} {what} is out of reach",
+                where=f"vehicle {self.name}",
+                value=f"{scale * output:.4g} {unit}",
+                limit=error.limit if inside else f"{scale * low:.4g} … {scale * high:.4g} {unit}",
+                remedy=error.remedy,
+            ) from None
+
+    def effect(self, name: str) -> Effect | None:
+        """Return the effect called `name`, if this model has it."""
+        return next((effect for effect in self.effects if effect.name == name), None)
+
+    def with_effects(self, *effects: Effect) -> VehicleModel:
+        """Return this model with `effects` added, each in place of one of the same name."""
+        names = {effect.name for effect in effects}
+        kept = tuple(effect for effect in self.effects if effect.name not in names)
+        return replace(self, effects=kept + effects)
+
+    @property
+    def calibration_hash(self) -> str:
+        """Sixteen hexadecimal digits that change if and only if the physics does (not the name or provenance)."""
+        from agvbench.model.toml import physics_digest
+
+        return physics_digest(self)
+
+    @classmethod
+    def load(cls, path: Path | str) -> VehicleModel:
+        """Read a vehicle file; see `agvbench.model.toml.load_vehicle`."""
+        from agvbench.model.toml import load_vehicle
+
+        return load_vehicle(Path(path))
+
+    def save(self, path: Path | str) -> None:
+        """Write a vehicle file that `load` reads back as an equal model."""
+        from agvbench.model.toml import save_vehicle
+
+        save_vehicle(self, Path(path))
+
+    def rollout(self, commands: Sequence[Commands], initial: ArrayLike, t_s: Sequence[ArrayLike]) -> list[Floats]:
+        """Simulate a batch of runs; see `agvbench.model.rollout.rollout`."""
+        from agvbench.model.rollout import rollout
+
+        return rollout(self, commands, initial, [np.asarray(t, dtype=np.float64) for t in t_s])
