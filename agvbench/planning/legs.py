@@ -1,0 +1,170 @@
+"""Legs: segments as this vehicle drives them, each with constant axle angles and one speed, for a time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from agvbench.errors import PlanError
+from agvbench.model import VehicleModel
+from agvbench.planning.segments import Arc, Pause, Segment, Steering, Straight
+from agvbench.planning.speeds import axle_speed
+from agvbench.planning.steering import axle_angles, radius_of, smallest_radius
+from agvbench.planning.trajectory import Trajectory
+from agvbench.vehicle.kinematics import body_motion
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A stretch of time in which nothing about the vehicle's motion changes.
+
+    Parameters
+    ----------
+    where
+        How messages call it.
+    front_rad, rear_rad
+        Axle angles [rad].
+    speed_mps
+        Speed of both axles [m/s], signed; 0 at rest.
+    duration_s
+        Duration [s].
+    """
+
+    where: str
+    front_rad: float
+    rear_rad: float
+    speed_mps: float
+    duration_s: float
+
+    @property
+    def is_rest(self) -> bool:
+        """Whether the vehicle stands still."""
+        return self.speed_mps == 0.0
+
+
+def legs_of(trajectory: Trajectory, model: VehicleModel) -> list[Leg]:
+    """Return the legs of a trajectory, with the rests in which the steering is set.
+
+    Raises
+    ------
+    PlanError
+        If an axle angle is beyond its end stops or a speed beyond what the drive reaches.
+    """
+    segments = trajectory.expand()
+    driven = [_leg(segment, trajectory, model, where=trajectory.segment_name(i)) for i, segment in enumerate(segments)]
+    return _with_rests(driven, trajectory.steer_first_s, at_every_change=trajectory.steer_at_rest)
+
+
+def _leg(segment: Segment, trajectory: Trajectory, model: VehicleModel, *, where: str) -> Leg | float:
+    """Return the leg that drives a segment, or the duration of a pause."""
+    if isinstance(segment, Pause):
+        return segment.duration_s
+    front, rear = _angles(segment, segment.steering or trajectory.steering, model, where=where)
+    speed = axle_speed(
+        trajectory.speed if segment.speed is None else segment.speed,
+        _full_speed(model, segment.direction == "backward", where=where),
+        where=where,
+    )
+    signed = -speed if segment.direction == "backward" else speed
+    centroid, _, yaw_rate = (abs(float(x)) for x in body_motion(front, rear, signed, signed, model.geometry))
+    if segment.duration_s is not None:
+        duration = segment.duration_s
+    elif segment.length_m is not None:
+        duration = segment.length_m / centroid
+    else:
+        assert isinstance(segment, Arc)  # noqa: S101 - a straight has a length or a duration
+        assert segment.angle_deg is not None  # noqa: S101 - an arc has one of the three
+        duration = math.radians(segment.angle_deg) / yaw_rate
+    return Leg(where, front, rear, signed, duration)
+
+
+def _full_speed(model: VehicleModel, backward: bool, *, where: str) -> float:
+    low, high = model.drive.output_range
+    full = -low if backward else high
+    direction = "backward" if backward else "forward"
+    if not full > 0.0:
+        raise PlanError(f"this vehicle does not drive {direction}", where=where)
+    return full
+
+
+def _angles(segment: Straight | Arc, mode: Steering, model: VehicleModel, *, where: str) -> tuple[float, float]:
+    if isinstance(segment, Straight):
+        return _straight_angles(segment, mode, model, where=where)
+    if mode == "crab":
+        raise PlanError("crab steering cannot turn", where=where, remedy="use a straight with crab_deg")
+    if segment.radius_m is not None:
+        radius = segment.radius_m
+    else:
+        assert segment.axle_angle_deg is not None  # noqa: S101 - an arc has one of the two
+        radius = radius_of(mode, math.radians(segment.axle_angle_deg), model.geometry)
+    side = 1.0 if segment.turn == "left" else -1.0
+    front, rear = (side * angle for angle in axle_angles(mode, radius, model.geometry, where=where))
+    for axle, angle in (("front", front), ("rear", rear)):
+        _check_end_stop(f"turn radius {radius:.2f} m", axle, angle, model, where, _widen(mode, model))
+    return front, rear
+
+
+def _straight_angles(segment: Straight, mode: Steering, model: VehicleModel, *, where: str) -> tuple[float, float]:
+    crab = math.radians(segment.crab_deg)
+    if crab and mode != "crab":
+        raise PlanError("crab_deg needs crab steering", where=where, value=mode, remedy='say steering = "crab"')
+    for axle in ("front", "rear"):
+        what = f"moving at {segment.crab_deg:.1f}° to the heading" if crab else "a straight"
+        _check_end_stop(
+            what, axle, crab, model, where, "calibrate the steering" if not crab else "choose a smaller angle"
+        )
+    return crab, crab
+
+
+def _check_end_stop(what: str, axle: str, angle_rad: float, model: VehicleModel, where: str, remedy: str) -> None:
+    low, high = (model.front if axle == "front" else model.rear).output_range
+    if low - 1e-9 <= angle_rad <= high + 1e-9:
+        return
+    if low == high:
+        raise PlanError(
+            f"{what} needs {math.degrees(angle_rad):.1f}° at the {axle} axle, which does not steer",
+            where=where,
+            remedy=f'say steering = "{"front" if axle == "rear" else "rear"}"',
+        )
+    limit = high if angle_rad > high else low
+    raise PlanError(
+        f"{what} needs {math.degrees(angle_rad):.1f}° at the {axle} axle",
+        where=where,
+        limit=f"{math.degrees(limit):.1f}°",
+        remedy=remedy,
+    )
+
+
+def _widen(mode: Steering, model: VehicleModel) -> str:
+    limits = [min(abs(low), abs(high)) for low, high in (model.front.output_range, model.rear.output_range)]
+    smallest = smallest_radius(mode, limits[0], limits[1], model.geometry)
+    # Rounded up, so that the advice holds.
+    return f"widen it to at least {math.ceil(smallest * 100.0) / 100.0:.2f} m" if math.isfinite(smallest) else ""
+
+
+def _with_rests(driven: list[Leg | float], steer_first_s: float, *, at_every_change: bool) -> list[Leg]:
+    """Put a rest before the start, wherever the gear changes, and, if asked, wherever the steering does."""
+    moving = [item for item in driven if isinstance(item, Leg)]
+    if not moving:
+        raise PlanError("nothing is driven: there are only pauses", remedy="add a straight or an arc")
+    legs = [_rest(moving[0], steer_first_s)]
+    for item in driven:
+        if not isinstance(item, Leg):
+            legs.append(_rest(legs[-1], item))
+            continue
+        before = legs[-1]
+        if _needs_rest(before, item, at_every_change=at_every_change):
+            legs.append(_rest(item, steer_first_s))
+        legs.append(item)
+    return [leg for leg in legs if leg.duration_s > 0.0]
+
+
+def _needs_rest(before: Leg, after: Leg, *, at_every_change: bool) -> bool:
+    steers = (before.front_rad, before.rear_rad) != (after.front_rad, after.rear_rad)
+    if before.is_rest:
+        return steers
+    return before.speed_mps * after.speed_mps < 0.0 or (at_every_change and steers)
+
+
+def _rest(leg: Leg, duration_s: float) -> Leg:
+    return Leg(leg.where, leg.front_rad, leg.rear_rad, 0.0, duration_s)

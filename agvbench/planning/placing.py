@@ -1,0 +1,116 @@
+"""Where on the floor to start, so that a path stays inside the workspace."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from agvbench.errors import PlanError
+from agvbench.planning.workspace import Workspace
+from agvbench.types import Floats, Pose
+
+_HEADINGS = 24
+_NEARLY_M = 0.01
+
+
+def best_start(points: Floats, workspace: Workspace) -> tuple[Pose, float]:
+    """Return the start pose that keeps a path farthest from the edge, and that distance [m].
+
+    Parameters
+    ----------
+    points
+        Points that the vehicle passes, in the start frame, shape (n, 2).
+    workspace
+        The region to stay in.
+
+    Notes
+    -----
+    For one heading, the largest distance is a linear programme in the start's x, y and the distance. Headings are
+    tried every 15°; the first of equals is kept, so that a circle is entered at heading 0. Of the starts within a
+    centimetre of the best, the most central is taken: in a long hall, the middle of it.
+    """
+    best, distance = Pose(0.0, 0.0, 0.0), -math.inf
+    for heading in np.arange(1 if workspace.is_round else _HEADINGS) * (2.0 * math.pi / _HEADINGS):
+        x, y, found = _best_translation(points, float(heading), workspace)
+        if found > distance + 1e-6:
+            best, distance = Pose(x, y, float(heading)), found
+    x, y = _most_central(points, best.heading_rad, workspace, distance)
+    return Pose(x, y, best.heading_rad), distance
+
+
+def _best_translation(points: Floats, heading: float, workspace: Workspace) -> tuple[float, float, float]:
+    room = workspace.offsets - (_rotated(points, heading) @ workspace.normals.T).max(axis=0)
+    # normals · start + distance <= room; the objective is the distance.
+    constraints = np.column_stack([workspace.normals, np.ones(len(room))])
+    x, y, distance = _solve(np.array([0.0, 0.0, -1.0]), constraints, room)
+    return x, y, distance
+
+
+def _most_central(points: Floats, heading: float, workspace: Workspace, distance: float) -> tuple[float, float]:
+    """Return the start nearest to where the path's box is centred, among those not more than `_NEARLY_M` worse."""
+    turned = _rotated(points, heading)
+    room = workspace.offsets - (turned @ workspace.normals.T).max(axis=0) - (distance - _NEARLY_M)
+    wanted = workspace.centre - 0.5 * (turned.max(axis=0) + turned.min(axis=0))
+    # x, y and their distances from what is wanted, the sum of which is the objective.
+    eye, none = np.eye(2), np.zeros((len(room), 2))
+    constraints = np.block([[workspace.normals, none], [eye, -eye], [-eye, -eye]])
+    x, y, *_ = _solve(np.array([0.0, 0.0, 1.0, 1.0]), constraints, np.concatenate([room, wanted, -wanted]))
+    return x, y
+
+
+def _solve(objective: Floats, constraints: Floats, limits: Floats) -> list[float]:
+    from scipy.optimize import linprog
+
+    solution = linprog(objective, A_ub=constraints, b_ub=limits, bounds=(None, None)).x
+    # A bounded region that is not empty always has an answer: the distance may be negative.
+    assert solution is not None  # noqa: S101
+    return [float(value) for value in solution]
+
+
+def _rotated(points: Floats, heading: float) -> Floats:
+    c, s = math.cos(heading), math.sin(heading)
+    return np.asarray(points @ np.array([[c, s], [-s, c]]))
+
+
+def check_fits(points: Floats, t_s: Floats, start: Pose, workspace: Workspace, *, where: str) -> None:
+    """Raise unless every point of a path that begins at `start` keeps the workspace's margin.
+
+    Parameters
+    ----------
+    points, t_s
+        Points that the vehicle passes, in the start frame, shape (n, 2), and when, shape (n,).
+
+    Raises
+    ------
+    PlanError
+        Saying when and where the path comes too close to the edge.
+    """
+    placed = _rotated(points, start.heading_rad) + np.array([start.x_m, start.y_m])
+    clearances = workspace.clearances(placed)
+    if clearances.min() >= workspace.margin_m - 1e-6:
+        return
+    first = int(np.argmax(clearances < workspace.margin_m - 1e-6))
+    x, y = placed[first]
+    raise PlanError(
+        f"path leaves the workspace {workspace.name} after {t_s[first]:.1f} s at ({x:.2f}, {y:.2f}) m",
+        where=where,
+        value=f"at worst {_edge(clearances.min())}",
+        limit=f"{workspace.margin_m:.2f} m inside",
+        remedy="choose another start or a larger workspace",
+    )
+
+
+def does_not_fit(distance_m: float, workspace: Workspace, *, where: str) -> PlanError:
+    """Return the error that a path fits nowhere in the workspace."""
+    return PlanError(
+        f"path does not fit into the workspace {workspace.name}",
+        where=where,
+        value=f"best placed, it comes to {_edge(distance_m)}",
+        limit=f"{workspace.margin_m:.2f} m inside",
+        remedy="shorten the trajectory or enlarge the workspace",
+    )
+
+
+def _edge(distance_m: float) -> str:
+    return f"{abs(distance_m):.2f} m {'inside' if distance_m >= 0.0 else 'outside'} the edge"

@@ -1,0 +1,164 @@
+"""From a trajectory and a vehicle model to timed commands, before anything moves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from agvbench.errors import PlanError, VehicleError
+from agvbench.model import VehicleModel
+from agvbench.planning import raw
+from agvbench.planning.legs import Leg, legs_of
+from agvbench.planning.motion import end_pose, sample, swept_points
+from agvbench.planning.placing import best_start, check_fits, does_not_fit
+from agvbench.planning.trajectory import Trajectory
+from agvbench.planning.workspace import Workspace
+from agvbench.types import Command, Commands, Floats, Pose
+from agvbench.vehicle.geometry import Geometry
+
+_STEP_S = 0.02
+_MOST_ROWS = 20_000
+_ORIGIN = Pose(0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What will be commanded, and what should come of it.
+
+    Parameters
+    ----------
+    trajectory
+        What was planned.
+    commands
+        Timed commands; the last row, at `duration_s`, is the stop: the drive at neutral, the steering held, so that
+        the vehicle coasts along its path.
+    duration_s
+        From the first command to the stop [s].
+    target
+        Target pose in the start frame (`NO_TARGET` where there is none).
+    expected
+        Expected path in the start frame, shape (n, 4): t [s], x [m], y [m], heading [rad, unwrapped].
+    floor_m
+        Width and height [m] of the box, in the start frame, that both axles' centres sweep.
+    start
+        Start pose in the floor frame.
+    geometry
+        Where the vehicle's axles are.
+    """
+
+    trajectory: Trajectory
+    commands: Commands
+    duration_s: float
+    target: Pose
+    expected: Floats
+    floor_m: tuple[float, float]
+    start: Pose
+    geometry: Geometry
+
+
+def plan(
+    trajectory: Trajectory,
+    model: VehicleModel,
+    *,
+    workspace: Workspace | None = None,
+    start: Pose | None = None,
+) -> Plan:
+    """Return the timed commands that drive `trajectory` if `model` is right.
+
+    The inverse of the model's static maps gives the commands, and its kinematics (thesis eq. 5.6, corrected, with
+    equal axle speeds) the time that each segment takes. That holds under every condition: the kinematics are
+    geometry, not calibration.
+
+    Parameters
+    ----------
+    trajectory
+        What to drive.
+    model
+        What is believed of the vehicle: nominal maps under the condition ``uncalibrated``, measured ones otherwise.
+    workspace
+        The floor to stay on; not checked if not given.
+    start
+        Start pose in the floor frame. If not given, the one that keeps the path farthest from the edge of the
+        workspace, or the floor's origin without a workspace.
+
+    Raises
+    ------
+    PlanError
+        If the vehicle cannot drive the trajectory, or not inside the workspace.
+    """
+    if trajectory.commands is not None:
+        commands, legs = raw.commands_and_legs(trajectory, model)
+    else:
+        legs = legs_of(trajectory, model)
+        commands = commands_of(legs, model)
+    duration = float(commands.t_s[-1])
+    expected = sample(legs, model.geometry, max(_STEP_S, duration / _MOST_ROWS))
+    stated = trajectory.stated_target
+    swept = swept_points(expected, model.geometry)
+    width, height = np.ptp(swept, axis=0).tolist()
+    made = Plan(
+        trajectory=trajectory,
+        commands=commands,
+        duration_s=duration,
+        target=end_pose(expected) if stated is None else stated,
+        expected=expected,
+        floor_m=(width, height),
+        start=_ORIGIN if start is None else start,
+        geometry=model.geometry,
+    )
+    if workspace is None:
+        return made
+    if start is None:
+        return replace(made, start=place(made, workspace))
+    check_fits(swept, np.tile(expected[:, 0], 2), start, workspace, where=trajectory.name)
+    return made
+
+
+def place(made: Plan, workspace: Workspace) -> Pose:
+    """Return the start pose in the floor frame that keeps a plan's path farthest from the workspace's edge.
+
+    Raises
+    ------
+    PlanError
+        If the path does not fit, wherever it starts.
+    """
+    start, distance = best_start(swept_points(made.expected, made.geometry), workspace)
+    if distance < workspace.margin_m - 1e-6:
+        raise does_not_fit(distance, workspace, where=made.trajectory.name)
+    return start
+
+
+def commands_of(legs: Sequence[Leg], model: VehicleModel) -> Commands:
+    """Return the commands that drive `legs`, followed by the stop.
+
+    Raises
+    ------
+    PlanError
+        If the model knows no command for a leg.
+    """
+    rows: list[tuple[float, Command]] = []
+    t = 0.0
+    for leg in legs:
+        command = _command(leg, model)
+        if not rows or command != rows[-1][1]:
+            rows.append((t, command))
+        t += leg.duration_s
+    rows.append((t, rows[-1][1]._replace(drive=model.neutral)))
+    return raw.from_rows([(at, *command) for at, command in rows])
+
+
+def _command(leg: Leg, model: VehicleModel) -> Command:
+    try:
+        command = model.command_for(leg.front_rad, leg.rear_rad, leg.speed_mps)
+    except (VehicleError, PlanError) as error:
+        raise PlanError(
+            f"{abs(leg.speed_mps):.3f} m/s cannot be commanded: {error.what}",
+            where=leg.where,
+            value=error.value,
+            limit=error.limit,
+            remedy=error.remedy,
+        ) from None
+    # Neutral is what the drive's electronics take for a stop; a fitted map need not be zero there.
+    return command._replace(drive=model.neutral) if leg.is_rest else command

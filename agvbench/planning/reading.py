@@ -1,0 +1,110 @@
+"""Trajectories from TOML files: those that ship with agvbench, a lab's own, and tables from elsewhere."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+
+from agvbench.errors import FileError
+from agvbench.planning.trajectory import Trajectory
+from agvbench.planning.validation import convert
+from agvbench.resources import resource_directory
+
+
+def load_trajectory(name_or_path: str | Path, *, directory: Path | None = None) -> Trajectory:
+    """Return the trajectory in a TOML file, or the one of that name or file name in `directory`.
+
+    Parameters
+    ----------
+    name_or_path
+        A path ending in ``.toml``, or a name: ``"5"`` or ``"5_forward_left"``.
+    directory
+        Where names are looked for; those that ship with agvbench if not given.
+
+    Raises
+    ------
+    FileError
+        If there is no such trajectory, or its file cannot be used.
+
+    Examples
+    --------
+    >>> load_trajectory("5").description
+    'quarter turn forward to the left, radius 1 m, full speed'
+    """
+    if isinstance(name_or_path, Path) or name_or_path.endswith(".toml"):
+        return _read(Path(name_or_path))
+    files = trajectory_files(directory)
+    for file in files:
+        # The eight are called by number: reading one file is enough for them.
+        if file.stem == name_or_path or file.stem.split("_")[0] == name_or_path:
+            return _read(file)
+    for file in files:
+        trajectory = _read(file)
+        if trajectory.name == name_or_path:
+            return trajectory
+    raise FileError(
+        f"there is no trajectory '{name_or_path}'",
+        remedy=f"name a .toml file or one of {', '.join(file.stem for file in files)}",
+    )
+
+
+def list_trajectories(directory: Path | None = None) -> list[Trajectory]:
+    """Return the trajectories of `directory` (those that ship with agvbench if not given), the eight first.
+
+    Raises
+    ------
+    FileError
+        If one of the files cannot be used, or two have one name.
+    """
+    found: dict[str, Path] = {}
+    trajectories = []
+    for file in trajectory_files(directory):
+        trajectory = _read(file)
+        if trajectory.name in found:
+            raise FileError(
+                f"trajectory name '{trajectory.name}' is taken", where=file, remedy=f"see {found[trajectory.name].name}"
+            )
+        found[trajectory.name] = file
+        trajectories.append(trajectory)
+    return trajectories
+
+
+def trajectory_files(directory: Path | None = None) -> list[Path]:
+    """Return the TOML files of `directory` in order of their names (numbers come first)."""
+    return sorted((directory or resource_directory("trajectories")).glob("*.toml"))
+
+
+def trajectory_from_table(table: Mapping[str, object], *, where: str = "trajectory") -> Trajectory:
+    """Return a trajectory from a table as TOML or JSON holds it; `where` begins error messages.
+
+    Raises
+    ------
+    FileError
+        If the table does not fit the schema: unknown or missing keys, wrong values, two shapes.
+    """
+    schema = table.get("schema")
+    if schema != 1 or isinstance(schema, bool):
+        raise FileError(
+            "schema is not one this version reads",
+            where=where,
+            value="none given" if schema is None else repr(schema),
+            limit="schema = 1",
+        )
+    return convert(table, Trajectory, where=where)
+
+
+def _read(path: Path) -> Trajectory:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise FileError("no such file", where=path) from None
+    except OSError as error:
+        raise FileError(f"cannot be read: {error.strerror}", where=path) from None
+    except UnicodeDecodeError as error:
+        raise FileError(f"is not UTF-8 text: byte {error.start}", where=path) from None
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise FileError(f"is not TOML: {error}", where=path) from None
+    return trajectory_from_table(table, where=str(path))

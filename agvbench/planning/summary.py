@@ -1,0 +1,97 @@
+"""What a campaign would drive: how long, on how much floor, and what cannot be driven (a dry run)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from agvbench.errors import PlanError
+from agvbench.model import VehicleModel
+from agvbench.planning.planner import Plan, plan
+from agvbench.planning.trajectory import Trajectory
+from agvbench.planning.workspace import Workspace
+from agvbench.types import Pose
+
+BETWEEN_RUNS_S = 20.0
+"""Time at rest before and after a run, and to bring the vehicle back to its start [s]."""
+
+
+@dataclass(frozen=True)
+class DryRunRow:
+    """One trajectory under one condition; `plan` is None where it cannot be driven, and `problem` says why."""
+
+    trajectory: Trajectory
+    condition: str
+    plan: Plan | None
+    problem: PlanError | None
+
+
+@dataclass(frozen=True)
+class DryRun:
+    """What would be driven, `repeats` times each, with `between_runs_s` between two runs."""
+
+    rows: tuple[DryRunRow, ...]
+    repeats: int
+    between_runs_s: float
+
+    @property
+    def plans(self) -> list[Plan]:
+        """The plans that can be driven."""
+        return [row.plan for row in self.rows if row.plan is not None]
+
+    @property
+    def problems(self) -> list[PlanError]:
+        """Why the others cannot."""
+        return [row.problem for row in self.rows if row.problem is not None]
+
+    @property
+    def runs(self) -> int:
+        """How many runs there are."""
+        return self.repeats * len(self.plans)
+
+    @property
+    def driving_s(self) -> float:
+        """Time under commands, all repeats together [s]."""
+        return self.repeats * sum(plan.duration_s for plan in self.plans)
+
+    @property
+    def total_s(self) -> float:
+        """Time for the campaign, with what passes between runs [s]."""
+        return self.driving_s + self.runs * self.between_runs_s
+
+    @property
+    def floor_m(self) -> tuple[float, float]:
+        """Width and height [m] of the largest box that a trajectory sweeps, in its start frame."""
+        widths, heights = zip(*(plan.floor_m for plan in self.plans), strict=True) if self.plans else ([0.0], [0.0])
+        return max(widths), max(heights)
+
+
+def dry_run(
+    trajectories: Sequence[Trajectory],
+    models: Mapping[str, VehicleModel],
+    *,
+    repeats: int = 1,
+    workspace: Workspace | None = None,
+    start: Pose | None = None,
+    between_runs_s: float = BETWEEN_RUNS_S,
+) -> DryRun:
+    """Plan every trajectory under every condition that it and `models` (by condition) have, and drive nothing.
+
+    `workspace` and `start` are those of `plan`.
+    """
+    rows = [
+        _row(trajectory, condition, model, workspace, start)
+        for trajectory in trajectories
+        for condition, model in models.items()
+        if condition in trajectory.conditions
+    ]
+    return DryRun(tuple(rows), repeats, between_runs_s)
+
+
+def _row(
+    trajectory: Trajectory, condition: str, model: VehicleModel, workspace: Workspace | None, start: Pose | None
+) -> DryRunRow:
+    try:
+        return DryRunRow(trajectory, condition, plan(trajectory, model, workspace=workspace, start=start), None)
+    except PlanError as problem:
+        return DryRunRow(trajectory, condition, None, problem)

@@ -1,0 +1,126 @@
+"""What a trajectory is: a name, how to steer and how fast, and one shape (schema 1)."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, cast
+
+import msgspec
+from msgspec import Meta, Struct
+
+from agvbench.planning.segments import Segment, Steering
+from agvbench.planning.shapes import (
+    CommandTable,
+    DubinsShape,
+    Endurance,
+    PoseTable,
+    SCurve,
+    Shape,
+    Slalom,
+    SpeedSteps,
+    StepSteer,
+)
+from agvbench.planning.speeds import Speed, check_speed
+from agvbench.types import NO_TARGET, Pose
+
+SHAPES = ("segments", "dubins", "s_curve", "slalom", "step_steer", "speed_steps", "endurance", "commands")
+Condition = Literal["uncalibrated", "calibrated", "corrected"]
+
+
+class Trajectory(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """A trajectory as it stands in TOML; exactly one of the eight shapes is given.
+
+    Parameters
+    ----------
+    schema
+        1.
+    name
+        What tables and run ids call it.
+    description
+        One line.
+    conditions
+        The conditions under which it can be driven.
+    speed
+        ``"full"``, ``"half"``, a share such as ``"75%"``, or the axles' speed in m/s; a segment may have its own.
+    steering
+        Which axles steer: ``"abeam"`` (both, centre of rotation abeam of the centroid), ``"front"``, ``"rear"``,
+        ``"opposite"`` (both, equal angles) or ``"crab"``; a segment may have its own.
+    steer_first_s
+        How long the steering is set before the drive starts [s], so that its lag does not count.
+    steer_at_rest
+        Stop for `steer_first_s` wherever the steering changes; otherwise it changes while driving.
+    target
+        The target in the start frame, ``"none"``, or left out: where the kinematics lead.
+    """
+
+    schema: Literal[1]
+    name: Annotated[str, Meta(pattern="^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+    description: str = ""
+    conditions: Annotated[tuple[Condition, ...], Meta(min_length=1)] = ("uncalibrated", "calibrated", "corrected")
+    speed: Speed = "full"
+    steering: Steering = "abeam"
+    steer_first_s: Annotated[float, Meta(ge=0.0, le=60.0)] = 0.5
+    steer_at_rest: bool = False
+    target: PoseTable | Literal["none"] | None = None
+    segments: Annotated[tuple[Segment, ...], Meta(min_length=1)] | None = None
+    dubins: DubinsShape | None = None
+    s_curve: SCurve | None = None
+    slalom: Slalom | None = None
+    step_steer: StepSteer | None = None
+    speed_steps: SpeedSteps | None = None
+    endurance: Endurance | None = None
+    commands: CommandTable | None = None
+
+    def __post_init__(self) -> None:
+        check_speed(self.speed)
+        given = [shape for shape in SHAPES if getattr(self, shape) is not None]
+        if len(given) != 1:
+            raise ValueError(
+                f"exactly one shape is needed: {', '.join(given) or 'none'} given (limit: one of {', '.join(SHAPES)})"
+            )
+
+    @property
+    def shape(self) -> str:
+        """The name of the shape that is given."""
+        return next(shape for shape in SHAPES if getattr(self, shape) is not None)
+
+    @property
+    def experiment(self) -> str:
+        """The kind of experiment that a run of it is: ``"trajectory"``, ``"step"``, ``"endurance"`` or ``"free"``."""
+        kinds = {"step_steer": "step", "speed_steps": "step", "endurance": "endurance", "commands": "free"}
+        return kinds.get(self.shape, "trajectory")
+
+    @property
+    def stated_target(self) -> Pose | None:
+        """The target that the trajectory states, `NO_TARGET` for none, or None where the kinematics decide."""
+        if isinstance(self.target, PoseTable):
+            return self.target.pose
+        # Circles for hours and raw commands aim at no pose.
+        aims_at_none = self.target == "none" or self.shape in ("endurance", "commands")
+        return NO_TARGET if aims_at_none else None
+
+    def expand(self) -> tuple[Segment, ...]:
+        """Return the segments of its shape (none for raw commands, which are no path)."""
+        if self.segments is not None:
+            return self.segments
+        shape: Shape | CommandTable = getattr(self, self.shape)
+        return () if isinstance(shape, CommandTable) else shape.segments()
+
+    def segment_name(self, index: int) -> str:
+        """Return how messages call segment `index`: ``"u_turn: dubins[2]"``."""
+        return f"{self.name}: {self.shape}[{index}]"
+
+    def with_steering(self, steering: Steering) -> Trajectory:
+        """Return the same trajectory steered in another mode."""
+        return msgspec.structs.replace(self, steering=steering)
+
+    def to_table(self) -> dict[str, object]:
+        """Return the trajectory as it would stand in TOML or JSON, without what is left at its default."""
+        return cast(dict[str, object], _without_none(msgspec.to_builtins(self)))
+
+
+def _without_none(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: _without_none(item) for key, item in value.items() if item is not None}
+    if isinstance(value, (list, tuple)):
+        return [_without_none(item) for item in value]
+    return value
