@@ -22,6 +22,7 @@ from agvbench.pytest_plugin.collecting import (
 from agvbench.pytest_plugin.fixtures import agvbench_repeat, bench, drive
 from agvbench.pytest_plugin.options import pytest_addoption, pytest_configure
 from agvbench.pytest_plugin.telling import (
+    pytest_pyfunc_call,
     pytest_report_teststatus,
     pytest_runtest_makereport,
     pytest_runtest_protocol,
@@ -37,6 +38,7 @@ __all__ = [
     "pytest_collection_modifyitems",
     "pytest_configure",
     "pytest_generate_tests",
+    "pytest_pyfunc_call",
     "pytest_report_teststatus",
     "pytest_runtest_makereport",
     "pytest_runtest_protocol",

@@ -62,8 +62,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     benches = [item for item in items if is_bench(item)]
     if not benches:
         return
-    if config.getoption("numprocesses", None):
-        raise pytest.UsageError("one vehicle drives one run at a time: leave -n out")
     try:
         settings = settings_from(config)
         undriven = [item for item in benches if not _condition_applies(item)]

@@ -30,6 +30,8 @@ def bench(request: pytest.FixtureRequest) -> Iterator[BenchSession]:
     from agvbench.running.opening import open_session
 
     config = request.config
+    if hasattr(config, "workerinput"):
+        pytest.fail("one vehicle drives one run at a time: leave -n out", pytrace=False)
     try:
         with open_session(
             given_options(config),

@@ -75,6 +75,19 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
 
 
 @pytest.hookimpl(wrapper=True)
+def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Iterator[object]:
+    """Count what was not driven, for a reason that is no failure, as skipped."""
+    if not is_bench(pyfuncitem):
+        return (yield)
+    from agvbench.running.driver import NotDrivenError
+
+    try:
+        return (yield)
+    except NotDrivenError as reason:
+        pytest.skip(str(reason))
+
+
+@pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Iterator[pytest.TestReport]:
     """Tell a user's error in one line instead of a traceback; mark reports of benchmarks."""
     report: pytest.TestReport = yield
@@ -88,8 +101,8 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) ->
 @pytest.hookimpl(tryfirst=True)
 def pytest_report_teststatus(report: pytest.TestReport) -> tuple[str, str, str] | None:
     """Leave the dots of passed benchmarks to the progress line."""
-    if ("agvbench") in dict(report.user_properties) and report.passed and report.when == "call":
-        return "passed", "", ""
+    if "agvbench" in dict(report.user_properties) and report.when == "call" and not report.failed:
+        return report.outcome, "", ""
     return None
 
 
@@ -100,10 +113,9 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
     session = config.stash.get(SESSION, None)
     if session is None:
         return
-    if config.getoption("dry_run"):
-        terminalreporter.write(session.plan_summary())
-        return
-    from agvbench.reporting.after_bench import conclude
+    from agvbench.reporting.after_bench import conclude, dry_run_table
 
-    for line in conclude(session.directory, report=not config.getoption("no_report")):
-        terminalreporter.write_line(line)
+    if session.is_dry:
+        terminalreporter.write_line(dry_run_table(session.planned))
+        return
+    terminalreporter.write_line(conclude(session.directory, report=not config.getoption("no_report")))

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from agvbench.errors import FlagError, PlanError
-from agvbench.planning import Plan, Trajectory, load_trajectory, place, plan
+from agvbench.planning import Plan, Trajectory, load_trajectory
 from agvbench.planning.shapes import CommandTable
 from agvbench.running.constant import held
 from agvbench.running.records import DriveOrder
-from agvbench.types import CONDITIONS, Commands, Run
+from agvbench.types import CONDITIONS, Commands, CommandUnit, Run
 
 if TYPE_CHECKING:
     from agvbench.running.session import BenchSession
@@ -57,9 +57,7 @@ class Driver:
         """
         if condition not in CONDITIONS:
             raise FlagError("unknown condition", value=condition, limit=", ".join(CONDITIONS), where=self._run_id)
-        trajectory = load_trajectory(name)
-        planned = plan(trajectory, self._session.model(condition), workspace=self._session.workspace)
-        return self._drive(planned, condition)
+        return self._drive(self._session.plan(load_trajectory(name), condition), condition)
 
     def hold(self, *, for_s: float, drive: float = 0.0, front: float = 0.0, rear: float = 0.0) -> Run:
         """Hold shares of full command for `for_s` seconds: drive 1 is full speed forward, steering 1 full left."""
@@ -71,10 +69,8 @@ class Driver:
         if shares.rear == 0.0 and any(step.get("rear") for _, step in steps):
             raise NotDrivenError("this vehicle does not steer its rear axle")
         commands = held(shares.neutral, [(duration_s, shares.command(**step)) for duration_s, step in steps])
-        planned = plan(
-            _as_trajectory(self._experiment, commands), self._session.nominal, workspace=self._session.workspace
-        )
-        return self._drive(planned, "uncalibrated", trajectory="")
+        trajectory = _as_trajectory(self._experiment, commands, self._session.nominal.command_unit)
+        return self._drive(self._session.plan(trajectory, "uncalibrated"), "uncalibrated", trajectory="")
 
     def _drive(self, planned: Plan, condition: str, *, trajectory: str | None = None) -> Run:
         order = DriveOrder(
@@ -85,7 +81,7 @@ class Driver:
             repeat=self._repeat,
             commands=planned.commands,
             target=planned.target,
-            start=place(planned, self._session.workspace),
+            start=planned.start,
         )
         run = self._session.run(order, planned)
         if not run.is_ok:
@@ -95,6 +91,7 @@ class Driver:
         return run
 
 
-def _as_trajectory(name: str, commands: Commands) -> Trajectory:
-    columns = {key: tuple(map(float, column)) for key, column in vars(commands).items()}
-    return Trajectory(schema=1, name=name, target="none", commands=CommandTable(**columns))
+def _as_trajectory(name: str, commands: Commands, unit: CommandUnit) -> Trajectory:
+    *rows, stop = zip(*(column.tolist() for column in vars(commands).values()), strict=True)
+    table = CommandTable(unit=unit, rows=tuple(rows), duration_s=stop[0])
+    return Trajectory(schema=1, name=name, target="none", commands=table)

@@ -14,7 +14,7 @@ import pandas as pd
 from agvbench.adapters import open_rig
 from agvbench.bus.link import VehicleLink
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
-from agvbench.model import VehicleModel, nominal_model, thesis_vehicle
+from agvbench.model import VehicleModel, thesis_vehicle
 from agvbench.planning import Workspace
 from agvbench.running.bench import Bench
 from agvbench.running.calibrating import calibrate_campaign
@@ -23,6 +23,7 @@ from agvbench.running.directory import choose_directory
 from agvbench.running.provenance import provenance
 from agvbench.running.session import BenchSession
 from agvbench.running.settings import SETTINGS_FILE, BenchSettings, settings_for_resume
+from agvbench.running.vehicles import uncalibrated_vehicle
 from agvbench.types import Run
 
 PROVENANCE_TABLE = "provenance"
@@ -65,7 +66,7 @@ def _settings(given: Mapping[str, Any], directory: Path, *, resume: bool) -> Ben
 
 
 def _known_models(settings: BenchSettings) -> dict[str, VehicleModel]:
-    models = {"uncalibrated": VehicleModel.load(settings.vehicle) if settings.vehicle else nominal_model()}
+    models = {"uncalibrated": uncalibrated_vehicle(settings.vehicle)}
     if settings.calibration:
         models["calibrated"] = VehicleModel.load(settings.calibration)
     return models

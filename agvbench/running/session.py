@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from agvbench.model import VehicleModel
-from agvbench.planning import Plan, Workspace
+from agvbench.planning import Plan, Trajectory, Workspace, plan
 from agvbench.running.bench import Bench
 from agvbench.running.constant import Shares
 from agvbench.running.driver import Driver, NotDrivenError
@@ -28,6 +28,7 @@ class BenchSession:
         self.shares = Shares.of_model(self.nominal)
         self.planned: list[tuple[DriveOrder, Plan]] = []
         self._models, self._bench = models, bench
+        self._plans: dict[tuple[Trajectory, str], Plan] = {}
 
     @property
     def is_dry(self) -> bool:
@@ -37,6 +38,19 @@ class BenchSession:
     def model(self, condition: str) -> VehicleModel:
         """Return the vehicle model that commands are computed with under `condition`."""
         return self._models[condition] if self._bench is None else self._bench.model(condition)
+
+    def plan(self, trajectory: Trajectory, condition: str) -> Plan:
+        """Return the plan of `trajectory` under `condition`: made once, driven in every repeat.
+
+        Raises
+        ------
+        PlanError
+            If the vehicle cannot drive it, or not inside the workspace.
+        """
+        key = (trajectory, condition)
+        if key not in self._plans:
+            self._plans[key] = plan(trajectory, self.model(condition), workspace=self.workspace)
+        return self._plans[key]
 
     def driver(self, run_id: str, *, experiment: str, repeat: int) -> Driver:
         """Return what drives the run `run_id`."""

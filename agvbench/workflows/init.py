@@ -6,8 +6,8 @@ import shutil
 from pathlib import Path
 
 from agvbench.errors import FileError
-from agvbench.model import nominal_model
 from agvbench.resources import resource_directory
+from agvbench.running.vehicles import uncalibrated_vehicle
 
 _TEMPLATES = Path(__file__).parent / "lab"
 
@@ -28,7 +28,7 @@ def make_lab(directory: str | Path) -> list[str]:
         for folder, pattern in {"benchmarks": "bench_*.py", "trajectories": "*.toml"}.items():
             _copy(resource_directory(folder), root / folder, pattern)
         shutil.copy(resource_directory("benchmarks") / "pytest.ini", root / "benchmarks" / "pytest.ini")
-        nominal_model().save(root / "vehicle.toml")
+        uncalibrated_vehicle().save(root / "vehicle.toml")
         shutil.copy(_TEMPLATES / "README.md", root / "README.md")
         shutil.copy(_TEMPLATES / "noxfile.py.txt", root / "noxfile.py")
         (root / ".gitignore").write_text("campaigns/\n.nox/\n", encoding="utf-8")

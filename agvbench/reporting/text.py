@@ -1,0 +1,20 @@
+"""Rich tables as plain text, for terminals that are written to by somebody else (pytest, a log)."""
+
+from __future__ import annotations
+
+import io
+import shutil
+
+from rich.console import Console, RenderableType
+
+_NARROWEST = 100
+
+
+def as_text(renderable: RenderableType) -> str:
+    """Return `renderable` as lines without colours, as wide as the terminal and at least 100 columns."""
+    width = max(_NARROWEST, shutil.get_terminal_size((_NARROWEST, 24)).columns)
+    console = Console(file=io.StringIO(), width=width, no_color=True)
+    console.print(renderable)
+    file = console.file
+    assert isinstance(file, io.StringIO)  # noqa: S101 - it is the one made above
+    return file.getvalue().rstrip("\n")

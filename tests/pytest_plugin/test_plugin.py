@@ -1,0 +1,102 @@
+"""The plugin in a pytest of its own: what is collected, in which order, and what stays untouched."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest_plugins = ["pytester"]
+
+BENCHMARK = """
+    '''Benchmarks of agvbench.'''
+    import pytest
+
+    @pytest.mark.repeats(2, full=3)
+    @pytest.mark.grid("share", [0.5], [0.25, 0.5])
+    def bench_steering_front(drive, share):
+        drive.hold(drive=1.0, front=share, for_s=1.0)
+
+    @pytest.mark.repeats
+    @pytest.mark.experiment("trajectory")
+    @pytest.mark.parametrize("condition", ["uncalibrated", "calibrated"])
+    @pytest.mark.parametrize("trajectory", ["3", "5"])
+    def bench_trajectory(drive, trajectory, condition):
+        drive.trajectory(trajectory, condition=condition)
+
+    def test_not_a_benchmark():
+        raise AssertionError
+"""
+
+
+@pytest.fixture
+def bench_file(pytester):
+    return pytester.makepyfile(bench_mine=BENCHMARK)
+
+
+def collected(pytester, *options):
+    # In a process of its own: the bench options must not leak into this session.
+    result = pytester.runpytest_subprocess("--collect-only", "-q", "-p", "no:cacheprovider", *options)
+    assert result.ret == 0, result.stdout.str() + result.stderr.str()
+    return [line.partition("::bench_")[2] for line in result.stdout.lines if "::bench_" in line]
+
+
+@pytest.mark.usefixtures("bench_file")
+def test_calibration_first_repeats_interleaved_and_no_uncalibrated_half_speed(pytester):
+    assert collected(pytester, "--repeats=2") == [
+        "steering_front[0.5-r01]",
+        "steering_front[0.5-r02]",
+        "trajectory[3-calibrated-r01]",
+        "trajectory[5-uncalibrated-r01]",
+        "trajectory[5-calibrated-r01]",
+        "trajectory[3-calibrated-r02]",
+        "trajectory[5-uncalibrated-r02]",
+        "trajectory[5-calibrated-r02]",
+    ]
+
+
+@pytest.mark.usefixtures("bench_file")
+def test_full_takes_the_whole_grid_and_every_repeat(pytester):
+    names = collected(pytester, "--full", "--repeats=1", "--order=blocked")
+    assert names[:6] == [f"steering_front[{share}-r0{k}]" for share in (0.25, 0.5) for k in (1, 2, 3)]
+
+
+@pytest.mark.usefixtures("bench_file")
+def test_ten_repeats_by_default(pytester):
+    assert sum("trajectory[5-calibrated" in name for name in collected(pytester)) == 10
+
+
+def test_bench_files_of_other_tools_stay_theirs(pytester):
+    pytester.makepyfile(bench_other="def bench_a():\n    raise AssertionError\n")
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider")
+    assert result.ret == pytest.ExitCode.NO_TESTS_COLLECTED
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        (["--repeats=-1"], "--repeats: value cannot be used: -1 (limit: at least 1)"),
+        (["--order=random"], "argument --order: invalid choice: 'random'"),
+        (["--seed=-4"], "--seed: value cannot be used: -4"),
+        (["--attempts=0"], "--attempts: value cannot be used: 0"),
+    ],
+)
+@pytest.mark.usefixtures("bench_file")
+def test_options_that_cannot_be_used_are_told_in_one_line(pytester, options, line):
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider", *options)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    assert line in result.stderr.str() + result.stdout.str()
+    assert "Traceback" not in result.stderr.str()
+
+
+@pytest.mark.usefixtures("bench_file")
+def test_parallel_workers_are_refused_since_there_is_one_vehicle(pytester):
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "-n1", "-k", "steering", "--repeats=1")
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    result.stdout.fnmatch_lines(["*one vehicle drives one run at a time: leave -n out*"])
+
+
+def test_two_benchmarks_of_one_run_name_are_refused(pytester):
+    source = "# agvbench\ndef bench_a(drive):\n    drive.hold(drive=1.0, for_s=1.0)\n"
+    pytester.makepyfile(bench_one=source, bench_two=source)
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    assert "two benchmarks would record the run 'a'" in result.stderr.str() + result.stdout.str()

@@ -1,0 +1,93 @@
+"""Killed at random moments and resumed, a campaign ends up equal to one that nobody interrupted."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agvbench.campaign import Campaign
+
+KILLS = 30
+PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
+# Calibration and the eight trajectories, so that resuming in the middle of either is met.
+OPTIONS = ["--repeats=1", "--seed=11", "--no-report"]
+
+
+def start(directory: Path, *more: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-c", PROGRAM, "bench", *OPTIONS, f"--out={directory}", *more]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=directory.parent)
+
+
+def finish(process: subprocess.Popen[str]) -> str:
+    output, _ = process.communicate(timeout=300)
+    assert process.returncode == 0, output
+    return output
+
+
+def parts(directory: Path) -> dict[str, bytes]:
+    return {
+        f"{table}/{path.name}": path.read_bytes()
+        for table in ("runs", "commands", "poses")
+        for path in sorted((directory / f"{table}.parquet").iterdir())
+    }
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("whole") / "campaign"
+    finish(start(directory))
+    return parts(directory)
+
+
+@pytest.mark.slow
+def test_killed_thirty_times_nothing_finished_is_lost_and_the_end_is_the_same(uninterrupted, tmp_path):
+    rng = np.random.default_rng(20150621)
+    directory = tmp_path / "campaign"
+    finished: set[str] = set()
+    for _ in range(KILLS):
+        process = start(directory, "--resume")
+        time.sleep(rng.uniform(0.2, 4.5))
+        process.kill()
+        process.communicate()
+        if (directory / "runs.parquet").is_dir():
+            now = {path.name for path in (directory / "runs.parquet").glob("*.parquet")}
+            assert finished <= now
+            finished = now
+        if finished:
+            campaign = Campaign.open(directory).check()
+            assert len(campaign) == len(finished)
+    assert finished, "no run was finished between two kills: the test would show nothing"
+    finish(start(directory, "--resume"))
+    assert parts(directory) == uninterrupted
+
+
+@pytest.mark.slow
+def test_interrupt_stops_the_vehicle_keeps_the_run_as_aborted_and_can_be_resumed(uninterrupted, tmp_path):
+    directory = tmp_path / "campaign"
+    process = start(directory)
+    while not (directory / "runs.parquet").is_dir() or len(list((directory / "runs.parquet").iterdir())) < 5:
+        time.sleep(0.02)
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert "Traceback" not in output
+    finish(start(directory, "--resume"))
+    successful = {name: data for name, data in parts(directory).items() if "-aborted" not in name}
+    assert successful == uninterrupted
+
+
+def test_resuming_with_another_seed_is_refused_in_one_line(tmp_path):
+    directory = tmp_path / "campaign"
+    first = start(directory, "-k", "bench_drive and r01 and 0.0")
+    finish(first)
+    second = start(directory, "--resume", "--seed=12")
+    output, _ = second.communicate(timeout=60)
+    assert second.returncode == 2
+    assert "--seed: a resumed session drives what it began with: 12 (limit: 11); leave --seed out" in output
