@@ -1,0 +1,1 @@
+"""AGV adapters: one file each."""

@@ -1,0 +1,127 @@
+"""The host of an AGV adapter: commands in, and a vehicle that stops when nobody commands it any more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from agvbench.adapters.contract import AgvAdapter
+from agvbench.adapters.hosting import Host
+from agvbench.bus.clock import Clock
+from agvbench.bus.command_message import CommandFlags, CommandMessage, decode_command
+from agvbench.bus.event_message import Level
+from agvbench.bus.identity_message import encode_agv_identity
+from agvbench.bus.keys import AGV, REPLAY, RESET, Keys
+from agvbench.bus.request_message import decode_replay, decode_reset
+from agvbench.bus.sequence import LossCounter, Sequence
+from agvbench.bus.truth_message import Truth, TruthFlags
+from agvbench.errors import MessageError
+from agvbench.types import Floats
+
+SILENCE_LIMIT_S = 0.5
+_COMMANDS_WAITING = 256
+
+
+class AgvHost(Host):
+    """An AGV adapter on the bus.
+
+    Parameters
+    ----------
+    session, keys, clock
+        As for `Host`.
+    adapter
+        Driven by this host alone; closed with it.
+    show
+        Where true poses go: to the camera in the same process, or onto the bus.
+    """
+
+    def __init__(
+        self, session: Any, keys: Keys, adapter: AgvAdapter, clock: Clock, show: Callable[[Truth], None]
+    ) -> None:
+        import zenoh
+
+        super().__init__(session, keys, AGV, clock)
+        self._adapter, self._show = adapter, show
+        self._truths = Sequence()
+        self.loss = LossCounter()
+        self._heard_s: float | None = None
+        self._identity_bytes = encode_agv_identity(adapter.identity())
+        self._lock_step = adapter.identity().lock_step
+        self._answers |= {RESET: self._reset, REPLAY: self._replay}
+        self._subscriber = session.declare_subscriber(keys.command, zenoh.handlers.FifoChannel(_COMMANDS_WAITING))
+        adapter.start(self)
+        self._closed = False
+        self._run("commands", self._serve_commands)
+        if not self._lock_step:
+            self._run("watchdog", self._watch)
+        self._announce()
+
+    def _identity(self) -> bytes:
+        return self._identity_bytes
+
+    def _reset(self, payload: bytes) -> bytes:
+        with self._lock:
+            self._adapter.reset(decode_reset(payload))
+        return b""
+
+    def _replay(self, payload: bytes) -> bytes:
+        with self._lock:
+            self._adapter.replay(decode_replay(payload))
+        return b""
+
+    def _serve_commands(self) -> None:
+        handler = self._subscriber.handler
+        while True:
+            try:
+                payload = bytes(handler.recv().payload.to_bytes())
+            except self._zenoh_error:
+                return
+            try:
+                message = decode_command(payload)
+            except MessageError as error:
+                self._fail(error)
+                continue
+            self._carry_out(message)
+
+    def _carry_out(self, message: CommandMessage) -> None:
+        lost = self.loss.saw(message.source, message.sequence)
+        if lost:
+            self.event(Level.WARNING, "commands_lost", f"{lost} commands were lost before {message.sequence}")
+        try:
+            with self._lock:
+                if message.flags & CommandFlags.STOP:
+                    self._heard_s = None
+                    self._adapter.stop()
+                else:
+                    self._heard_s = self._clock.now()
+                    self._adapter.apply(message)
+        except Exception as error:  # noqa: BLE001  (whatever the adapter raises, the runner must hear of it)
+            self._fail(error, message.sequence)
+
+    def _watch(self) -> None:
+        """Stop a vehicle whose runner has fallen silent."""
+        while not self._closed:
+            self._clock.sleep(SILENCE_LIMIT_S / 5.0)
+            heard_s = self._heard_s
+            if heard_s is not None and self._clock.now() - heard_s > SILENCE_LIMIT_S:
+                self._heard_s = None
+                with self._lock:
+                    self._adapter.stop()
+                self.event(Level.WARNING, "runner_silent", f"no command for {SILENCE_LIMIT_S} s: vehicle stopped")
+
+    def truth(
+        self, t_s: Floats, poses: Floats, *, end_s: float, acknowledged: int = 0, flags: TruthFlags = TruthFlags.LAST
+    ) -> None:
+        """Show true poses to the camera."""
+        source = self._truths.source
+        self._show(Truth(self._truths.take(), acknowledged, end_s, t_s, poses, flags, source))
+
+    def close(self) -> None:
+        """Stop the vehicle, leave the bus, release the adapter."""
+        self._closed = True
+        try:
+            self._adapter.stop()
+        finally:
+            self._subscriber.undeclare()
+            super().close()
+            self._adapter.close()

@@ -1,0 +1,170 @@
+"""The adapter contract: what stands between the bus and a vehicle or a motion capture system.
+
+An adapter knows nothing of the bus: a host (`agvbench.adapters.hosting`) calls its few methods, one at a time, and
+gives it an object to report to. A new adapter is one file in ``agvbench/adapters/agv/`` or ``agvbench/adapters/mocap/``
+with one subclass and its ``scheme``; it is found by name and inherits the tests.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar, Protocol, Self
+
+import numpy as np
+
+from agvbench.bus.clock import Clock, WallClock
+from agvbench.bus.command_message import CommandMessage
+from agvbench.bus.event_message import Level
+from agvbench.bus.frames_message import FrameClock
+from agvbench.bus.identity_message import AgvIdentity, MocapIdentity
+from agvbench.bus.request_message import Replay, Reset, Sampling
+from agvbench.bus.truth_message import Truth, TruthFlags
+from agvbench.errors import LinkError
+from agvbench.types import CommandUnit, Floats, Frames
+
+DEFAULT_PLANT = "agvbench.simulator:make_plant"
+
+
+@dataclass(frozen=True)
+class AdapterOptions:
+    """What the user said about the rig; each adapter takes what concerns it.
+
+    Parameters
+    ----------
+    vehicle
+        The vehicle's name.
+    plant
+        ``MODULE:FACTORY`` or ``FILE.py:FACTORY`` of a simulated vehicle.
+    seed
+        Of the campaign: with a run's key it seeds all that is random in that run.
+    command_unit, neutral
+        What the vehicle understands, where the adapter cannot know: a plant does not say. ``neutral`` defaults to
+        1500 µs or 0.
+    calibration_hash
+        Of the vehicle model that the bench believes, for provenance.
+    camera
+        Options of a simulated camera by name (`agvbench.simulator.Camera.from_options`).
+    clock
+        Real time, for whatever waits.
+    """
+
+    vehicle: str = "agv1"
+    plant: str = DEFAULT_PLANT
+    seed: int = 0
+    command_unit: CommandUnit = "us"
+    neutral: float | None = None
+    calibration_hash: str = ""
+    camera: Mapping[str, str | float] = field(default_factory=dict)
+    clock: Clock = field(default_factory=WallClock)
+
+    @property
+    def neutral_command(self) -> float:
+        """The command at which nothing moves."""
+        if self.neutral is not None:
+            return self.neutral
+        return 1500.0 if self.command_unit == "us" else 0.0
+
+
+class AgvReports(Protocol):
+    """What an AGV adapter can tell the bus. All methods may be called in any thread."""
+
+    def truth(
+        self, t_s: Floats, poses: Floats, *, end_s: float, acknowledged: int = 0, flags: TruthFlags = TruthFlags.LAST
+    ) -> None:
+        """Show a simulated camera where the vehicle truly was: poses (n, 3) [m, m, rad] at `t_s` (n,) [s]."""
+
+    def event(self, level: Level, kind: str, text: str, *, acknowledged: int = 0) -> None:
+        """Say something to whoever listens: one word for programs and a line for people."""
+
+
+class MocapReports(Protocol):
+    """What a mocap adapter can tell the bus. All methods may be called in any thread."""
+
+    def frames(self, frames: Frames, *, clock: FrameClock, acknowledged: int = 0) -> None:
+        """Publish frames whose times are in `clock`; `acknowledged` is the command they complete (lock step)."""
+
+    def event(self, level: Level, kind: str, text: str, *, acknowledged: int = 0) -> None:
+        """Say something to whoever listens: one word for programs and a line for people."""
+
+
+class AgvAdapter(ABC):
+    """Drives one vehicle.
+
+    The host calls one method at a time. A method that fails raises an `agvbench.errors.AgvbenchError`, which the
+    runner gets as its own.
+    """
+
+    scheme: ClassVar[str]
+    """What users write before the colon: ``serial:/dev/ttyACM0`` is scheme ``serial``, address ``/dev/ttyACM0``."""
+
+    @classmethod
+    @abstractmethod
+    def open(cls, address: str, options: AdapterOptions) -> Self:
+        """Connect to what is at `address` (``""`` if the user gave none)."""
+
+    @abstractmethod
+    def identity(self) -> AgvIdentity:
+        """Return who this is; it does not change while the adapter is open."""
+
+    def start(self, reports: AgvReports) -> None:  # noqa: B027  (many adapters have nothing to report)
+        """Keep `reports` for later; called once, before anything else."""
+
+    @abstractmethod
+    def apply(self, message: CommandMessage) -> None:
+        """Carry out a command, and return without waiting for its end.
+
+        In lock step: let time pass until ``t_s + hold_s`` and show the camera the poses of that interval.
+        """
+
+    @abstractmethod
+    def stop(self) -> None:
+        """Go to neutral at once. Called on every way out: it must not depend on anything having worked before."""
+
+    def reset(self, request: Reset) -> None:
+        """Place a simulated vehicle; the default refuses."""
+        raise LinkError("this vehicle cannot be placed by software", where=self.scheme, value=request.run_key)
+
+    def replay(self, request: Replay) -> None:
+        """Drive a simulated vehicle through a recorded run without frames; the default refuses."""
+        raise LinkError("this vehicle cannot replay a run", where=self.scheme, value=request.reset.run_key)
+
+    @abstractmethod
+    def close(self) -> None:
+        """Release what was opened; called once, after `stop`."""
+
+
+class MocapAdapter(ABC):
+    """Sees one vehicle."""
+
+    scheme: ClassVar[str]
+    """What users write before the colon: ``natnet:192.168.0.2`` is scheme ``natnet``, address ``192.168.0.2``."""
+
+    @classmethod
+    @abstractmethod
+    def open(cls, address: str, options: AdapterOptions) -> Self:
+        """Connect to what is at `address` (``""`` if the user gave none)."""
+
+    @abstractmethod
+    def identity(self) -> MocapIdentity:
+        """Return who this is; it does not change while the adapter is open."""
+
+    @abstractmethod
+    def start(self, reports: MocapReports) -> None:
+        """Keep `reports`; a real system publishes every frame from now on, in a thread of its own."""
+
+    def reset(self, request: Reset) -> Sampling:
+        """Begin a simulated run and say when frames are taken; the default refuses."""
+        raise LinkError("this motion capture system is not simulated", where=self.scheme, value=request.run_key)
+
+    def see(self, truth: Truth) -> None:
+        """Look at a simulated vehicle; the default refuses."""
+        raise LinkError("this motion capture system cannot see a simulated vehicle", where=self.scheme)
+
+    @abstractmethod
+    def close(self) -> None:
+        """Release what was opened; called once."""
+
+
+NO_POSES = np.empty((0, 3))

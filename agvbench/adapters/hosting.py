@@ -1,0 +1,126 @@
+"""Hosts: they put an adapter on the bus. What both kinds share: questions, events, the token, and one lock.
+
+The lock is what lets adapters be written without any: whatever a host calls, it calls one at a time.
+"""
+
+from __future__ import annotations
+
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any
+
+from agvbench.bus.clock import Clock
+from agvbench.bus.event_message import Event, Level, encode_event
+from agvbench.bus.keys import IDENTITY, TIME, Keys
+from agvbench.bus.questions import refusal
+from agvbench.bus.request_message import encode_time
+from agvbench.bus.sequence import Sequence
+from agvbench.errors import AgvbenchError, LinkError
+
+_QUESTIONS_WAITING = 64
+
+
+def as_agvbench_error(error: Exception, role: str) -> AgvbenchError:
+    """Return `error` if a user can have caused it, else a `LinkError` that names the fault in the adapter."""
+    if isinstance(error, AgvbenchError):
+        return error
+    return LinkError(f"the {role} adapter failed", value=f"{type(error).__name__}: {error}")
+
+
+class Host(ABC):
+    """An adapter on the bus, until `close`.
+
+    Parameters
+    ----------
+    session
+        An open Zenoh session.
+    keys
+        The vehicle's keys.
+    role
+        ``"agv"`` or ``"mocap"``.
+    clock
+        The clock that `time` questions are answered in.
+    """
+
+    def __init__(self, session: Any, keys: Keys, role: str, clock: Clock) -> None:
+        import zenoh
+
+        self._session, self._keys, self._role, self._clock = session, keys, role, clock
+        self._zenoh_error = zenoh.ZError
+        self._lock = threading.RLock()
+        self._events = Sequence()
+        self._threads: list[threading.Thread] = []
+        self._questions = session.declare_queryable(
+            keys.question(role, "*"), zenoh.handlers.FifoChannel(_QUESTIONS_WAITING)
+        )
+        self._answers: dict[str, Callable[[bytes], bytes]] = {
+            IDENTITY: lambda _: self._identity(),
+            TIME: lambda _: encode_time(self._clock.now()),
+        }
+
+    @abstractmethod
+    def _identity(self) -> bytes:
+        """Return the identity message."""
+
+    def _announce(self) -> None:
+        """Answer questions, then declare the token: who sees it may rely on everything declared before."""
+        self._run("questions", self._serve_questions)
+        self._token = self._session.liveliness().declare_token(self._keys.alive(self._role))
+
+    def _run(self, name: str, target: Callable[[], None]) -> None:
+        thread = threading.Thread(target=target, name=f"agvbench-{self._role}-{name}", daemon=True)
+        self._threads.append(thread)
+        thread.start()
+
+    def _serve_questions(self) -> None:
+        # The queryable itself is locked while a thread waits in it; its handler is not.
+        handler = self._questions.handler
+        while True:
+            try:
+                query = handler.recv()
+            except self._zenoh_error:
+                return
+            with query:
+                self._answer(query)
+
+    def _answer(self, query: Any) -> None:
+        question = str(query.key_expr).rpartition("/")[2]
+        try:
+            answer = self._answers.get(question)
+            if answer is None:
+                raise LinkError("no such question", where=self._role, value=question, limit=" ".join(self._answers))
+            payload = b"" if query.payload is None else bytes(query.payload.to_bytes())
+            query.reply(query.key_expr, answer(payload))
+        except self._zenoh_error:
+            return
+        except Exception as error:  # noqa: BLE001  (whatever the adapter raises, the asker must hear of it)
+            query.reply_err(refusal(self._role, as_agvbench_error(error, self._role)))
+
+    def event(self, level: Level, kind: str, text: str, *, acknowledged: int = 0) -> None:
+        """Publish an event."""
+        with self._lock:
+            sequence = self._events.take()
+            event = Event(sequence, self._role, level, kind, text, acknowledged, self._clock.now(), self._events.source)
+            self._put(self._keys.event, encode_event(event))
+
+    def _put(self, key: str, payload: bytes) -> None:
+        import zenoh
+
+        try:
+            self._session.put(key, payload, congestion_control=zenoh.CongestionControl.BLOCK)
+        except self._zenoh_error:
+            return
+
+    def _fail(self, error: Exception, acknowledged: int = 0) -> None:
+        """Tell the runner that a command could not be carried out."""
+        told = as_agvbench_error(error, self._role)
+        self.event(Level.ERROR, type(told).__name__, str(told), acknowledged=acknowledged)
+
+    def close(self) -> None:
+        """Leave the bus."""
+        self._token.undeclare()
+        self._questions.undeclare()
+        for thread in self._threads:
+            if thread is not threading.current_thread():
+                thread.join(timeout=2.0)

@@ -1,0 +1,1 @@
+"""Mocap adapters: one file each."""

@@ -1,0 +1,118 @@
+"""The host of a mocap adapter: frames out, numbered, in batches that fit a message."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from agvbench.adapters.contract import MocapAdapter
+from agvbench.adapters.hosting import Host
+from agvbench.bus.clock import Clock
+from agvbench.bus.frames_message import FrameClock, FramesFlags, FramesMessage, encode_frames
+from agvbench.bus.identity_message import encode_mocap_identity
+from agvbench.bus.keys import MOCAP, RESET, Keys
+from agvbench.bus.request_message import decode_reset, encode_sampling
+from agvbench.bus.sequence import LossCounter, Sequence
+from agvbench.bus.truth_message import Truth, decode_truth
+from agvbench.bus.wire import MAX_ROWS
+from agvbench.errors import LinkError, MessageError
+from agvbench.types import Frames
+
+_TRUTHS_WAITING = 64
+
+
+class MocapHost(Host):
+    """A mocap adapter on the bus.
+
+    Parameters
+    ----------
+    session, keys, clock
+        As for `Host`.
+    adapter
+        Driven by this host alone; closed with it.
+    listens_for_truth
+        Whether true poses come over the bus; otherwise `see` is called in this process, or nothing is simulated.
+    """
+
+    def __init__(
+        self, session: Any, keys: Keys, adapter: MocapAdapter, clock: Clock, *, listens_for_truth: bool
+    ) -> None:
+        import zenoh
+
+        super().__init__(session, keys, MOCAP, clock)
+        self._adapter = adapter
+        self._sequence = Sequence()
+        self._truth_loss = LossCounter()
+        self._identity_bytes = encode_mocap_identity(adapter.identity())
+        self._answers |= {RESET: self._reset}
+        self._publisher = session.declare_publisher(
+            keys.frames,
+            congestion_control=zenoh.CongestionControl.BLOCK,
+            priority=zenoh.Priority.REAL_TIME,
+            express=True,
+        )
+        self._subscriber = None
+        if listens_for_truth:
+            self._subscriber = session.declare_subscriber(keys.truth, zenoh.handlers.FifoChannel(_TRUTHS_WAITING))
+            self._run("truth", self._serve_truth)
+        adapter.start(self)
+        self._announce()
+
+    def _identity(self) -> bytes:
+        return self._identity_bytes
+
+    def _reset(self, payload: bytes) -> bytes:
+        with self._lock:
+            return encode_sampling(self._adapter.reset(decode_reset(payload)))
+
+    def _serve_truth(self) -> None:
+        assert self._subscriber is not None  # noqa: S101  (for the type checker)
+        handler = self._subscriber.handler
+        while True:
+            try:
+                payload = bytes(handler.recv().payload.to_bytes())
+            except self._zenoh_error:
+                return
+            try:
+                self.see(decode_truth(payload))
+            except MessageError as error:
+                self._fail(error)
+
+    def see(self, truth: Truth) -> None:
+        """Let the adapter look at a simulated vehicle."""
+        try:
+            if lost := self._truth_loss.saw(truth.source, truth.sequence):
+                raise LinkError("true poses were lost on the bus", where=self._keys.truth, value=f"{lost} messages")
+            with self._lock:
+                self._adapter.see(truth)
+        except Exception as error:  # noqa: BLE001  (whatever the adapter raises, the runner must hear of it)
+            self._fail(error, truth.acknowledged)
+
+    def frames(self, frames: Frames, *, clock: FrameClock, acknowledged: int = 0) -> None:
+        """Publish frames, in as many messages as they need."""
+        if len(frames) <= MAX_ROWS:
+            self._publish(frames, clock, acknowledged, FramesFlags.LAST)
+            return
+        starts = range(0, len(frames), MAX_ROWS)
+        for start in starts:
+            part = frames.select(np.arange(start, min(start + MAX_ROWS, len(frames))))
+            flags = FramesFlags.LAST if start == starts[-1] else FramesFlags.NONE
+            self._publish(part, clock, acknowledged, flags)
+
+    def _publish(self, frames: Frames, clock: FrameClock, acknowledged: int, flags: FramesFlags) -> None:
+        with self._lock:
+            message = FramesMessage(
+                self._sequence.take(), frames, acknowledged, clock, self._clock.now(), flags, self._sequence.source
+            )
+            try:
+                self._publisher.put(encode_frames(message))
+            except self._zenoh_error:
+                return
+
+    def close(self) -> None:
+        """Leave the bus, release the adapter."""
+        if self._subscriber is not None:
+            self._subscriber.undeclare()
+        super().close()
+        self._adapter.close()

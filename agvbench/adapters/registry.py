@@ -1,0 +1,74 @@
+"""Adapters by scheme: a file in ``adapters/agv/`` or ``adapters/mocap/`` is an adapter, found by name.
+
+``sim`` and ``serial:/dev/ttyACM0`` are adapter specifications: scheme, then an address behind a colon.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import pkgutil
+from functools import cache
+from typing import TypeVar
+
+from agvbench.adapters import agv, mocap
+from agvbench.adapters.contract import AdapterOptions, AgvAdapter, MocapAdapter
+from agvbench.errors import LinkError
+
+_Adapter = TypeVar("_Adapter", AgvAdapter, MocapAdapter)
+
+
+@cache
+def agv_adapters() -> dict[str, type[AgvAdapter]]:
+    """Return the AGV adapters by scheme."""
+    return _find(agv.__name__, list(agv.__path__), AgvAdapter)  # type: ignore[type-abstract]
+
+
+@cache
+def mocap_adapters() -> dict[str, type[MocapAdapter]]:
+    """Return the mocap adapters by scheme."""
+    return _find(mocap.__name__, list(mocap.__path__), MocapAdapter)  # type: ignore[type-abstract]
+
+
+def _find(package: str, path: list[str], base: type[_Adapter]) -> dict[str, type[_Adapter]]:
+    found: dict[str, type[_Adapter]] = {}
+    for info in pkgutil.iter_modules(path):
+        module = importlib.import_module(f"{package}.{info.name}")
+        for value in vars(module).values():
+            if isinstance(value, type) and issubclass(value, base) and value.__module__ == module.__name__:
+                found[value.scheme] = value
+    return dict(sorted(found.items()))
+
+
+def parse_spec(spec: str) -> tuple[str, str]:
+    """Return scheme and address of an adapter specification.
+
+    >>> parse_spec("serial:/dev/ttyACM0"), parse_spec("sim")
+    (('serial', '/dev/ttyACM0'), ('sim', ''))
+    """
+    scheme, _, address = spec.partition(":")
+    return scheme, address
+
+
+def open_agv(spec: str, options: AdapterOptions) -> AgvAdapter:
+    """Open the AGV adapter that `spec` names, or raise `LinkError`."""
+    scheme, address = parse_spec(spec)
+    return _choose("agv", scheme, agv_adapters()).open(address, options)
+
+
+def open_mocap(spec: str, options: AdapterOptions) -> MocapAdapter:
+    """Open the mocap adapter that `spec` names, or raise `LinkError`."""
+    scheme, address = parse_spec(spec)
+    return _choose("mocap", scheme, mocap_adapters()).open(address, options)
+
+
+def _choose(role: str, scheme: str, known: dict[str, type[_Adapter]]) -> type[_Adapter]:
+    if scheme in known:
+        return known[scheme]
+    close = difflib.get_close_matches(scheme, known, n=1)
+    raise LinkError(
+        f"no such {role} adapter",
+        value=repr(scheme),
+        limit=" ".join(known),
+        remedy=f"did you mean '{close[0]}'?" if close else "write SCHEME or SCHEME:ADDRESS",
+    )

@@ -1,0 +1,65 @@
+"""Clocks: whatever waits or times out is given one, so that waiting can be simulated."""
+
+from __future__ import annotations
+
+import time
+from typing import Protocol, runtime_checkable
+
+
+@runtime_checkable
+class Clock(Protocol):
+    """Tells the time in seconds since some fixed moment, and waits in it."""
+
+    def now(self) -> float:
+        """Return the time [s]; it never goes back."""
+        ...
+
+    def sleep(self, duration_s: float) -> None:
+        """Wait for `duration_s` [s]; at once if that is not positive."""
+        ...
+
+
+def wait_until(clock: Clock, deadline_s: float) -> float:
+    """Wait until `clock` shows `deadline_s` [s]; return by how much [s] the deadline is past.
+
+    >>> wait_until(SimulatedClock(2.0), 5.0)
+    0.0
+    """
+    while (left_s := deadline_s - clock.now()) > 0.0:
+        clock.sleep(left_s)
+    return -left_s
+
+
+class WallClock:
+    """Real time, of the machine's monotonic clock: all processes of one machine share it."""
+
+    def now(self) -> float:
+        """Return the time [s] since the machine started."""
+        return time.monotonic()
+
+    def sleep(self, duration_s: float) -> None:
+        """Wait for `duration_s` [s]."""
+        if duration_s > 0.0:
+            time.sleep(duration_s)
+
+
+class SimulatedClock:
+    """A clock that only moves when somebody waits for it: waiting takes no time.
+
+    >>> clock = SimulatedClock()
+    >>> clock.sleep(3600.0)
+    >>> clock.now()
+    3600.0
+    """
+
+    def __init__(self, start_s: float = 0.0) -> None:
+        self._now_s = start_s
+
+    def now(self) -> float:
+        """Return the simulated time [s]."""
+        return self._now_s
+
+    def sleep(self, duration_s: float) -> None:
+        """Let `duration_s` [s] pass."""
+        if duration_s > 0.0:
+            self._now_s += duration_s

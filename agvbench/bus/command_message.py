@@ -1,0 +1,89 @@
+"""The command message: what the vehicle is told, when, and for how long.
+
+Body after the header: ``t_s``, ``drive``, ``front``, ``rear``, ``hold_s`` (f64 each).
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass
+from enum import IntFlag
+
+from agvbench.bus.wire import Kind, Reader, pack_header, unpack_header
+from agvbench.errors import MessageError
+from agvbench.types import Command
+
+MAX_HOLD_S = 3600.0
+
+_BODY = struct.Struct("<5d")
+
+
+class CommandFlags(IntFlag):
+    """What else a command asks for."""
+
+    NONE = 0
+    STOP = 1
+    """Neutral at once, whatever the numbers say; in lock step, nobody waits for frames."""
+    FLUSH = 2
+    """Send the frames that are still under way; no time passes."""
+    KEEP_ALIVE = 4
+    """The command that holds already, said again: the runner lives."""
+
+
+_KNOWN = int(CommandFlags.STOP | CommandFlags.FLUSH | CommandFlags.KEEP_ALIVE)
+
+
+@dataclass(frozen=True, slots=True)
+class CommandMessage:
+    """A command with its place in the run.
+
+    ``t_s`` [s] is the run clock when it takes effect (0: the run's first command), ``hold_s`` [s] how long it
+    is meant to hold: a vehicle that hears nothing after that stops by itself.
+    """
+
+    sequence: int
+    t_s: float
+    command: Command
+    hold_s: float
+    flags: CommandFlags = CommandFlags.NONE
+    source: int = 0
+
+
+def encode_command(message: CommandMessage) -> bytes:
+    """Return the message's 64 bytes.
+
+    Raises
+    ------
+    MessageError
+        If a number is not finite, or `hold_s` is out of range.
+    """
+    _check(message.t_s, message.command, message.hold_s)
+    header = pack_header(Kind.COMMAND, flags=message.flags, source=message.source, count=1, sequence=message.sequence)
+    return header + _BODY.pack(message.t_s, *message.command, message.hold_s)
+
+
+def decode_command(payload: bytes) -> CommandMessage:
+    """Return the message that `payload` holds.
+
+    Raises
+    ------
+    MessageError
+        If it is not a command message that this version writes.
+    """
+    header = unpack_header(payload, Kind.COMMAND, _KNOWN)
+    if header.count != 1:
+        raise MessageError("command message with another count", value=header.count, limit=1)
+    reader = Reader(payload)
+    t_s, drive, front, rear, hold_s = reader.fields(_BODY)
+    reader.finish()
+    command = Command(drive, front, rear)
+    _check(t_s, command, hold_s)
+    return CommandMessage(header.sequence, t_s, command, hold_s, CommandFlags(header.flags), header.source)
+
+
+def _check(t_s: float, command: Command, hold_s: float) -> None:
+    if not (math.isfinite(t_s) and all(map(math.isfinite, command))):
+        raise MessageError("command is not finite", value=f"t_s={t_s}, {tuple(command)}")
+    if not 0.0 <= hold_s <= MAX_HOLD_S:
+        raise MessageError("command's hold is out of range", value=f"{hold_s} s", limit=f"0 to {MAX_HOLD_S:g} s")

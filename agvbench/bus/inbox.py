@@ -1,0 +1,92 @@
+"""What arrives for a runner: frames and events of one vehicle, in order, by `recv()`.
+
+`recv()` beats callbacks by a thread switch, but has no time limit: whoever must end a wait calls `Inbox.wake`.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+from agvbench.bus.event_message import Event, Level, decode_event
+from agvbench.bus.frames_message import FramesMessage, decode_frames
+from agvbench.bus.keys import Keys
+from agvbench.bus.sequence import LossCounter
+from agvbench.bus.wire import HEADER_BYTES, Kind
+from agvbench.errors import LinkError, MessageError
+
+_CAPACITY = 4096
+_EVENTS_KEPT = 1000
+_KIND_AT = 5
+
+
+class Inbox:
+    """Receives the reports of one vehicle, decoded; counts what is missing.
+
+    Attributes
+    ----------
+    frames_loss
+        What was lost of the frames messages.
+    events
+        The last thousand events, oldest first; whoever reads them may clear them.
+    """
+
+    def __init__(self, session: Any, keys: Keys) -> None:
+        import zenoh
+
+        self.frames_loss = LossCounter()
+        self.event_losses: dict[str, LossCounter] = {}
+        self.events: deque[Event] = deque(maxlen=_EVENTS_KEPT)
+        self._keys = keys
+        self._subscriber = session.declare_subscriber(keys.reports, zenoh.handlers.FifoChannel(_CAPACITY))
+        # The subscriber itself is locked while a thread waits in it; its handler is not.
+        self._handler = self._subscriber.handler
+        self._closed_error = zenoh.ZError
+        self._waker = session.declare_publisher(
+            keys.wake,
+            congestion_control=zenoh.CongestionControl.DROP,
+            allowed_destination=zenoh.Locality.SESSION_LOCAL,
+        )
+
+    def wake(self) -> None:
+        """Make `receive` return None once; safe in any thread."""
+        try:
+            self._waker.put(b"")
+        except self._closed_error:
+            return
+
+    def receive(self) -> FramesMessage | Event | None:
+        """Wait for the next report; None if somebody called `wake`.
+
+        Raises
+        ------
+        MessageError
+            If it cannot be decoded.
+        LinkError
+            If the session was closed.
+        """
+        try:
+            payload = bytes(self._handler.recv().payload.to_bytes())
+        except self._closed_error:
+            raise LinkError("the bus was closed", where=self._keys.root) from None
+        if not payload:
+            return None
+        if len(payload) >= HEADER_BYTES and payload[_KIND_AT] == Kind.EVENT:
+            return self._note(decode_event(payload))
+        message = decode_frames(payload)
+        self.frames_loss.saw(message.source, message.sequence)
+        return message
+
+    def _note(self, event: Event) -> Event:
+        self.event_losses.setdefault(event.role, LossCounter()).saw(event.source, event.sequence)
+        self.events.append(event)
+        return event
+
+    def note_malformed(self, error: MessageError) -> None:
+        """Keep an event of a message that could not be decoded."""
+        self.events.append(Event(0, "runner", Level.WARNING, "MessageError", str(error)))
+
+    def close(self) -> None:
+        """Receive no more; a thread that waits in `receive` gets its `LinkError`."""
+        self._subscriber.undeclare()
+        self._waker.undeclare()

@@ -1,0 +1,106 @@
+"""Key expressions: where on the bus each message travels.
+
+::
+
+    agvbench/v1/<lab>/<vehicle>/agv/command      commands, to the AGV adapter
+                               /agv/<question>   queryables: identity, reset, replay, time
+                               /mocap/<question> queryables: identity, reset, time
+                               /report/frames    frames, from the mocap adapter
+                               /report/event     what an adapter has to say, from either
+                               /truth            true poses, from a simulated AGV to a simulated camera
+                               /alive/<role>     liveliness tokens: agv, mocap, runner
+
+``v1`` is the version of this layout; the messages carry the version of their own encoding.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from agvbench.errors import LinkError
+
+AGV, MOCAP, RUNNER = "agv", "mocap", "runner"
+IDENTITY, RESET, REPLAY, TIME = "identity", "reset", "replay", "time"
+
+_NAME = re.compile(r"[A-Za-z0-9_.-]{1,64}", re.ASCII)
+
+
+def check_name(what: str, name: str) -> str:
+    """Return `name` if it can be one chunk of a key expression.
+
+    >>> check_name("vehicle", "agv1")
+    'agv1'
+    >>> check_name("vehicle", "a/b")
+    Traceback (most recent call last):
+    agvbench.errors.LinkError: vehicle: name cannot be used on the bus: 'a/b' (limit: 1 to 64 of A-Z a-z 0-9 _ . -)
+    """
+    if not _NAME.fullmatch(name):
+        raise LinkError(
+            "name cannot be used on the bus", where=what, value=repr(name), limit="1 to 64 of A-Z a-z 0-9 _ . -"
+        )
+    return name
+
+
+@dataclass(frozen=True)
+class Keys:
+    """The key expressions of one vehicle in one lab.
+
+    >>> Keys("lab", "agv1").command
+    'agvbench/v1/lab/agv1/agv/command'
+
+    Raises
+    ------
+    LinkError
+        If a name holds anything but letters, digits, ``_``, ``.`` and ``-``.
+    """
+
+    lab: str
+    vehicle: str
+
+    def __post_init__(self) -> None:
+        check_name("lab", self.lab)
+        check_name("vehicle", self.vehicle)
+
+    @property
+    def root(self) -> str:
+        """What every key of this vehicle begins with."""
+        return f"agvbench/v1/{self.lab}/{self.vehicle}"
+
+    @property
+    def command(self) -> str:
+        """Commands, to the AGV adapter."""
+        return f"{self.root}/agv/command"
+
+    @property
+    def frames(self) -> str:
+        """Frames, from the mocap adapter."""
+        return f"{self.root}/report/frames"
+
+    @property
+    def event(self) -> str:
+        """What an adapter has to say, from either."""
+        return f"{self.root}/report/event"
+
+    @property
+    def wake(self) -> str:
+        """Never leaves its session: ends a wait for reports that will not come."""
+        return f"{self.root}/report/wake"
+
+    @property
+    def reports(self) -> str:
+        """Everything that travels to the runner."""
+        return f"{self.root}/report/*"
+
+    @property
+    def truth(self) -> str:
+        """True poses, from a simulated AGV to a simulated camera."""
+        return f"{self.root}/truth"
+
+    def question(self, role: str, question: str) -> str:
+        """Return the queryable of an adapter (``"*"``: all of them)."""
+        return f"{self.root}/{role}/{question}"
+
+    def alive(self, role: str) -> str:
+        """Return the liveliness token of an adapter or runner (``"*"``: all of them)."""
+        return f"{self.root}/alive/{role}"

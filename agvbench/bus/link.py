@@ -1,0 +1,223 @@
+"""What a runner talks to: one vehicle, seen by one motion capture system, over the bus."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+from agvbench.bus.clock import Clock, SimulatedClock, WallClock
+from agvbench.bus.event_message import Event
+from agvbench.bus.identity_message import Identity, decode_agv_identity, decode_mocap_identity
+from agvbench.bus.inbox import Inbox
+from agvbench.bus.keys import AGV, IDENTITY, MOCAP, REPLAY, RESET, RUNNER, Keys
+from agvbench.bus.lock_step import LockStep
+from agvbench.bus.outbox import CommandOutbox
+from agvbench.bus.presence import Presence
+from agvbench.bus.questions import ask
+from agvbench.bus.real_time import RealTime
+from agvbench.bus.request_message import (
+    Replay,
+    Reset,
+    Sampling,
+    decode_sampling,
+    encode_replay,
+    encode_reset,
+)
+from agvbench.bus.sequence import LossCounter
+from agvbench.bus.watchdog import Watchdog
+from agvbench.errors import LinkError
+from agvbench.types import Command, Commands, Frames, Pose
+
+_ANYWHERE = Sampling(rate_hz=1.0, phase_s=0.0)
+
+
+class VehicleLink:
+    """A runner's end of the bus: commands out, frames in.
+
+    Parameters
+    ----------
+    session
+        An open Zenoh session (`agvbench.bus.session.open_session`); it stays open when the link closes.
+    lab, vehicle
+        Names on the bus.
+    clock
+        What the run's time is measured in; by default simulated time if the adapters work in lock step, else
+        real time.
+    wall
+        Real time, in which adapters are waited for.
+    answer_limit_s
+        How long [s] of `wall` an exchange in lock step, a reset or a replay may take.
+    discovery_limit_s
+        How long [s] of `wall` to wait for the adapters to turn up.
+
+    Raises
+    ------
+    AdapterGoneError
+        If an adapter does not turn up or does not say who it is.
+    """
+
+    def __init__(
+        self,
+        session: Any,
+        lab: str,
+        vehicle: str,
+        clock: Clock | None = None,
+        *,
+        wall: Clock | None = None,
+        answer_limit_s: float = 60.0,
+        discovery_limit_s: float = 5.0,
+    ) -> None:
+        self.keys = Keys(lab, vehicle)
+        self._session, self._wall, self._limit_s = session, wall or WallClock(), answer_limit_s
+        self._inbox = Inbox(session, self.keys)
+        self._outbox = CommandOutbox(session, self.keys)
+        self._presence = Presence(session, self.keys, self._wall, self._inbox.wake)
+        self._watchdog = Watchdog(self._wall, answer_limit_s, self._inbox.wake)
+        self._closed = False
+        try:
+            self._identity = self._meet(discovery_limit_s)
+        except BaseException:
+            self._release()
+            raise
+        self.clock = clock or (SimulatedClock() if self._identity.lock_step else WallClock())
+        self._driver = self._make_driver()
+        self._token = session.liveliness().declare_token(self.keys.alive(RUNNER))
+
+    def _meet(self, limit_s: float) -> Identity:
+        for role in (AGV, MOCAP):
+            self._presence.wait_for(role, limit_s)
+        agv = decode_agv_identity(ask(self._session, self.keys.question(AGV, IDENTITY), b"", limit_s))
+        mocap = decode_mocap_identity(ask(self._session, self.keys.question(MOCAP, IDENTITY), b"", limit_s))
+        return Identity.of(agv, mocap)
+
+    def _make_driver(self) -> LockStep | RealTime:
+        neutral = self._identity.neutral
+        if self._identity.lock_step:
+            return LockStep(
+                self._inbox,
+                self._outbox,
+                self._presence,
+                self._watchdog,
+                keys=self.keys,
+                neutral=neutral,
+                clock=self.clock,
+            )
+        return RealTime(
+            self._inbox,
+            self._outbox,
+            self._presence,
+            session=self._session,
+            keys=self.keys,
+            neutral=neutral,
+            clock=self.clock,
+        )
+
+    def identity(self) -> Identity:
+        """Return who drives and who sees."""
+        return self._identity
+
+    def reset(self, pose: Pose, *, run_key: str) -> None:
+        """Place a simulated vehicle at rest at `pose`; `run_key` seeds what is random in the run to come.
+
+        Raises
+        ------
+        LinkError
+            If the vehicle is not simulated.
+        AdapterGoneError
+            If an adapter vanished or does not answer.
+        """
+        sampling = self._prepare(run_key)
+        payload = encode_reset(Reset(run_key, pose, sampling))
+        ask(self._session, self.keys.question(AGV, RESET), payload, self._limit_s)
+        self._driver.start()
+
+    def exchange(self, command: Command, *, t_s: float, hold_s: float) -> Frames:
+        """Publish `command` at `t_s` [s] of the run's clock; return the frames that arrive until `t_s` + `hold_s`.
+
+        The run's clock shows 0 at its first command; before, while the vehicle is watched at rest, it is negative.
+
+        Raises
+        ------
+        AdapterGoneError
+            If an adapter vanished or, in lock step, does not answer.
+        LinkError
+            If frames were lost in lock step, or time goes back.
+        PlantError
+            If a simulated vehicle broke the plant protocol.
+        """
+        return self._driver.exchange(command, t_s, hold_s)
+
+    def flush(self) -> Frames:
+        """Return the frames that were late."""
+        return self._driver.flush()
+
+    def stop(self) -> None:
+        """Command neutral at once; safe after any failure."""
+        if not self._closed:
+            self._driver.stop()
+
+    def replay(
+        self, run_key: str, commands: Commands, *, pose: Pose = Pose(0.0, 0.0, 0.0), until_s: float | None = None
+    ) -> None:
+        """Let a simulated vehicle drive a recorded run again, without frames: what wears or drains is as it was.
+
+        Parameters
+        ----------
+        run_key
+            The one that the run was reset with.
+        commands
+            What was exchanged, beginning with the watch at rest if there was one (negative ``t_s``).
+        pose
+            The one that the run was reset to.
+        until_s
+            When the last exchange ended [s]; the last command's ``t_s`` if None.
+        """
+        sampling = self._prepare(run_key)
+        until_s = float(commands.t_s[-1]) if until_s is None else until_s
+        payload = encode_replay(Replay(Reset(run_key, pose, sampling), commands, until_s))
+        ask(self._session, self.keys.question(AGV, REPLAY), payload, self._limit_s)
+
+    def _prepare(self, run_key: str) -> Sampling:
+        if not self._identity.simulated:
+            raise LinkError(
+                "a real vehicle cannot be placed by software",
+                where=self.keys.root,
+                remedy="place it by hand, or drive it back",
+            )
+        self._presence.check(AGV, MOCAP)
+        payload = encode_reset(Reset(run_key, Pose(0.0, 0.0, 0.0), _ANYWHERE))
+        return decode_sampling(ask(self._session, self.keys.question(MOCAP, RESET), payload, self._limit_s))
+
+    @property
+    def loss(self) -> LossCounter:
+        """What was received and lost of the frames messages since the link was opened."""
+        return self._inbox.frames_loss
+
+    @property
+    def events(self) -> deque[Event]:
+        """What the adapters had to say, oldest first, the last thousand; whoever reads them may clear them."""
+        return self._inbox.events
+
+    def close(self) -> None:
+        """Stop the vehicle and leave the bus; again does nothing."""
+        if self._closed:
+            return
+        try:
+            self.stop()
+        finally:
+            self._closed = True
+            self._driver.close()
+            self._token.undeclare()
+            self._release()
+
+    def _release(self) -> None:
+        self._watchdog.close()
+        self._presence.close()
+        self._outbox.close()
+        self._inbox.close()
+
+    def __enter__(self) -> VehicleLink:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

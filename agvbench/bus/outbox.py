@@ -1,0 +1,50 @@
+"""What a runner sends: numbered commands."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from agvbench.bus.command_message import CommandFlags, CommandMessage, encode_command
+from agvbench.bus.keys import Keys
+from agvbench.bus.sequence import Sequence
+from agvbench.errors import LinkError
+from agvbench.types import Command
+
+
+class CommandOutbox:
+    """Publishes commands to one vehicle: never dropped, never batched with others."""
+
+    def __init__(self, session: Any, keys: Keys) -> None:
+        import zenoh
+
+        self._sequence = Sequence()
+        self._keys = keys
+        self._error = zenoh.ZError
+        self._publisher = session.declare_publisher(
+            keys.command,
+            congestion_control=zenoh.CongestionControl.BLOCK,
+            priority=zenoh.Priority.REAL_TIME,
+            express=True,
+        )
+
+    def send(self, command: Command, t_s: float, hold_s: float, flags: CommandFlags = CommandFlags.NONE) -> int:
+        """Publish a command; return its sequence number.
+
+        Raises
+        ------
+        MessageError
+            If a number is not finite, or the hold is out of range.
+        LinkError
+            If the session was closed.
+        """
+        sequence = self._sequence.take()
+        message = CommandMessage(sequence, t_s, command, hold_s, flags, self._sequence.source)
+        try:
+            self._publisher.put(encode_command(message))
+        except self._error:
+            raise LinkError("the bus was closed", where=self._keys.root) from None
+        return sequence
+
+    def close(self) -> None:
+        """Publish no more."""
+        self._publisher.undeclare()

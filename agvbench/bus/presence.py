@@ -1,0 +1,82 @@
+"""Who is there: liveliness tokens, so that an adapter that vanishes is noticed without waiting for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from agvbench.bus.clock import Clock
+from agvbench.bus.keys import Keys
+from agvbench.errors import AdapterGoneError
+
+
+class Presence:
+    """Watches the liveliness tokens of a vehicle's adapters.
+
+    Parameters
+    ----------
+    session
+        The Zenoh session.
+    keys
+        The vehicle's keys.
+    clock
+        Real time: adapters vanish in it, simulated or not.
+    on_gone
+        Called, in a thread of Zenoh, whenever a token vanishes.
+    """
+
+    def __init__(self, session: Any, keys: Keys, clock: Clock, on_gone: Callable[[], None] = lambda: None) -> None:
+        self._keys, self._clock, self._on_gone = keys, clock, on_gone
+        self._present: dict[str, bool] = {}
+        self._gone_since_s: dict[str, float] = {}
+        self._subscriber = session.liveliness().declare_subscriber(keys.alive("*"), self._changed, history=True)
+
+    def _changed(self, sample: Any) -> None:
+        import zenoh
+
+        role = str(sample.key_expr).rpartition("/")[2]
+        if sample.kind == zenoh.SampleKind.PUT:
+            self._present[role] = True
+            return
+        self._present[role] = False
+        self._gone_since_s[role] = self._clock.now()
+        self._on_gone()
+
+    def has(self, role: str) -> bool:
+        """Whether the adapter in this role is there now."""
+        return self._present.get(role, False)
+
+    def wait_for(self, role: str, limit_s: float) -> None:
+        """Wait until the adapter in this role is there.
+
+        Raises
+        ------
+        AdapterGoneError
+            If it does not turn up within `limit_s` [s].
+        """
+        deadline_s = self._clock.now() + limit_s
+        while not self.has(role):
+            if self._clock.now() >= deadline_s:
+                raise AdapterGoneError(
+                    f"no {role} adapter on the bus",
+                    where=self._keys.root,
+                    value=f"waited {limit_s:g} s",
+                    remedy=f"start 'agvbench {role}' or 'agvbench sim' for this lab and vehicle, or check the names",
+                )
+            self._clock.sleep(0.01)
+
+    def check(self, *roles: str) -> None:
+        """Raise `AdapterGoneError`, with its name and since when, if an adapter in one of these roles vanished."""
+        for role in roles:
+            if not self.has(role) and role in self._gone_since_s:
+                gone_s = self._clock.now() - self._gone_since_s[role]
+                raise AdapterGoneError(
+                    f"the {role} adapter vanished",
+                    where=self._keys.root,
+                    value=f"{gone_s:.1f} s ago",
+                    remedy="start it again; the run that was being driven does not count",
+                )
+
+    def close(self) -> None:
+        """Stop watching."""
+        self._subscriber.undeclare()

@@ -1,0 +1,42 @@
+"""Questions to adapters: one query, one answer, or an error that says what came instead."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from agvbench.bus.event_message import Event, Level, decode_event, encode_event
+from agvbench.errors import AdapterGoneError, AgvbenchError, LinkError
+
+
+def ask(session: Any, key: str, payload: bytes, limit_s: float) -> bytes:
+    """Return what the queryable at `key` answers to `payload`.
+
+    Raises
+    ------
+    AdapterGoneError
+        If nothing answers within `limit_s` [s].
+    AgvbenchError
+        What the adapter answered instead, of the class that it was there.
+    """
+    import zenoh
+
+    try:
+        replies = list(
+            session.get(key, payload=payload, timeout=limit_s, congestion_control=zenoh.CongestionControl.BLOCK)
+        )
+    except zenoh.ZError as error:
+        raise LinkError("the bus cannot be used", where=key, value=str(error).split(" at /")[0]) from None
+    for reply in replies:
+        if reply.ok is not None:
+            return bytes(reply.ok.payload.to_bytes())
+        refusal = bytes(reply.err.payload.to_bytes())
+        if refusal.startswith(b"AGVB"):
+            raise decode_event(refusal).as_error()
+    raise AdapterGoneError(
+        "no answer", where=key, value=f"waited {limit_s:g} s", remedy="see whether the adapter's process still runs"
+    )
+
+
+def refusal(role: str, error: AgvbenchError) -> bytes:
+    """Return the bytes of an error reply that `ask` turns into `error` again."""
+    return encode_event(Event(0, role, Level.ERROR, type(error).__name__, str(error)))

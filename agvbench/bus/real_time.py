@@ -1,0 +1,128 @@
+"""Exchanges with what moves in real time: publish, then collect frames until the command has been held."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from agvbench.bus.clock import Clock, wait_until
+from agvbench.bus.clock_offset import measure_offset
+from agvbench.bus.command_message import CommandFlags
+from agvbench.bus.event_message import Event, Level
+from agvbench.bus.frames_message import FramesMessage
+from agvbench.bus.inbox import Inbox
+from agvbench.bus.keys import AGV, MOCAP, TIME, Keys
+from agvbench.bus.outbox import CommandOutbox
+from agvbench.bus.presence import Presence
+from agvbench.errors import AgvbenchError, LinkError, MessageError
+from agvbench.types import Command, Frames
+
+KEEP_ALIVE_S = 0.1
+LATE_FRAMES_S = 0.1
+_BATCHES_KEPT = 100_000
+
+
+class RealTime:
+    """One command out at its time, kept alive while it holds, and the frames that arrived meanwhile.
+
+    A thread empties the inbox all the time, so that frames carry the time they arrived and a motion capture
+    system is never held up by a runner that thinks.
+    """
+
+    def __init__(
+        self,
+        inbox: Inbox,
+        outbox: CommandOutbox,
+        presence: Presence,
+        *,
+        session: Any,
+        keys: Keys,
+        neutral: float,
+        clock: Clock,
+    ) -> None:
+        self._inbox, self._outbox, self._presence = inbox, outbox, presence
+        self._session, self._keys, self._clock = session, keys, clock
+        self._neutral = Command(neutral, neutral, neutral)
+        self._arrived: deque[tuple[float, FramesMessage]] = deque(maxlen=_BATCHES_KEPT)
+        self._failure: AgvbenchError | None = None
+        self._start_s: float | None = None
+        self._last_t_s = -np.inf
+        self._offset_s = 0.0
+        self._thread = threading.Thread(target=self._receive, name="agvbench-inbox", daemon=True)
+        self._thread.start()
+
+    def _receive(self) -> None:
+        while True:
+            try:
+                report = self._inbox.receive()
+            except MessageError as error:
+                self._inbox.note_malformed(error)
+                continue
+            except LinkError:
+                return
+            if isinstance(report, FramesMessage):
+                self._arrived.append((self._clock.now(), report))
+            elif isinstance(report, Event) and report.level == Level.ERROR:
+                self._failure = report.as_error()
+
+    def start(self) -> None:
+        """Forget the last run's clock and what went wrong in it."""
+        self._start_s, self._last_t_s, self._failure = None, -np.inf, None
+
+    def exchange(self, command: Command, t_s: float, hold_s: float) -> Frames:
+        """Publish at `t_s`; return the frames that arrived until `t_s + hold_s`."""
+        if self._start_s is None or t_s < self._last_t_s:
+            self._begin(t_s)
+        assert self._start_s is not None  # noqa: S101  (for the type checker: _begin set it)
+        self._last_t_s = t_s
+        wait_until(self._clock, self._start_s + t_s)
+        self._check()
+        self._outbox.send(command, t_s, hold_s)
+        end_s = self._start_s + t_s + hold_s
+        while (left_s := end_s - self._clock.now()) > KEEP_ALIVE_S:
+            self._clock.sleep(min(left_s, KEEP_ALIVE_S))
+            self._check()
+            self._outbox.send(command, t_s, max(0.0, end_s - self._clock.now()), CommandFlags.KEEP_ALIVE)
+        wait_until(self._clock, end_s)
+        return self._take()
+
+    def _begin(self, t_s: float) -> None:
+        self._offset_s = measure_offset(self._session, self._keys.question(MOCAP, TIME), self._clock)
+        self._arrived.clear()
+        self._start_s = self._clock.now() - t_s
+
+    def flush(self) -> Frames:
+        """Return the frames that arrive within a tenth of a second from now."""
+        self._clock.sleep(LATE_FRAMES_S)
+        return self._take()
+
+    def stop(self) -> None:
+        """Command neutral, and wait for nothing."""
+        self._outbox.send(self._neutral, 0.0, 0.0, CommandFlags.STOP)
+
+    def close(self) -> None:
+        """Nothing to release: the thread ends with its inbox."""
+
+    def _check(self) -> None:
+        self._presence.check(AGV, MOCAP)
+        if self._failure is not None:
+            raise self._failure
+
+    def _take(self) -> Frames:
+        start_s = self._start_s or 0.0
+        batches = []
+        while self._arrived:
+            arrived_s, message = self._arrived.popleft()
+            frames = message.frames
+            batches.append(
+                replace(
+                    frames,
+                    t_s=frames.t_s + (self._offset_s - start_s),
+                    received_s=np.full(len(frames), arrived_s - start_s),
+                )
+            )
+        return Frames.concatenate(batches)
