@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import msgspec
 
 from agvbench.campaign.atomic import write_atomically
+from agvbench.campaign.explain import explain
 from agvbench.errors import CampaignError
 from agvbench.types import CommandUnit
 
@@ -78,10 +79,13 @@ class CampaignHeader:
             file = msgspec.convert(table, _File)
         except msgspec.ValidationError as error:
             raise CampaignError(
-                _explain(error), where=path, remedy="correct campaign.toml (docs/reference/campaign-directory.md)"
+                explain(error, (_File, _Vehicle, _Mocap, _Prediction)),
+                where=path,
+                remedy="correct campaign.toml (docs/reference/campaign-directory.md)",
             ) from None
         vehicle, prediction = file.vehicle, file.prediction or _Prediction()
-        return cls(
+        return cls.made_for(
+            path,
             schema=file.schema,
             name=file.name,
             vehicle_name=vehicle.name,
@@ -93,6 +97,23 @@ class CampaignHeader:
             prediction_horizon_s=prediction.horizon_s,
             prediction_stride_s=prediction.stride_s or prediction.horizon_s,
         )
+
+    @classmethod
+    def made_for(cls, where: object, **values: Any) -> CampaignHeader:
+        """Return a header; an impossible value is told as one of file `where`.
+
+        Raises
+        ------
+        CampaignError
+            As the constructor.
+        """
+        try:
+            return cls(**values)
+        except CampaignError as error:
+            place = str(error.where).replace(FILE_NAME, str(where), 1)
+            raise CampaignError(
+                error.what, where=place, value=error.value, limit=error.limit, remedy=error.remedy
+            ) from None
 
     def save(self, path: str | Path) -> None:
         """Write ``campaign.toml``: renamed into place when whole."""
@@ -169,10 +190,3 @@ def _check_schema(schema: object, where: object) -> None:
             limit=f"schema {SCHEMA}",
             remedy=remedy,
         )
-
-
-def _explain(error: msgspec.ValidationError) -> str:
-    """Turn "Expected `float`, got `str` - at `$.vehicle.neutral`" into "vehicle.neutral: expected …"."""
-    what, _, place = str(error).partition(" - at `$.")
-    what = what[:1].lower() + what[1:]
-    return f"{place.rstrip('`')}: {what}" if place else what

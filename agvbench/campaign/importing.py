@@ -14,9 +14,11 @@ import numpy as np
 from agvbench import __version__
 from agvbench.campaign.campaign import Campaign
 from agvbench.campaign.cutting import cut
+from agvbench.campaign.header import CampaignHeader
 from agvbench.campaign.mapping import FileRule, Mapping, find_mapping, load_mapping
+from agvbench.campaign.parts import parts_of
 from agvbench.campaign.recording import Recording, read_recording
-from agvbench.campaign.writer import CampaignWriter
+from agvbench.campaign.writer import CampaignWriter, check_parts, refuse_occupied
 from agvbench.errors import FileError
 from agvbench.types import NO_TARGET, RUN_OK, Commands, Floats, Frames, Run
 
@@ -54,9 +56,10 @@ def import_recordings(
     CampaignError
         If `out` is not empty or the recordings contradict the campaign's schema.
     """
+    mapping_path = find_mapping(mapping_path)
     mapping = load_mapping(mapping_path)
     paths = _distinct(files)
-    header = mapping.header()
+    refuse_occupied(Path(out), "choose another directory")
     runs: list[Run] = []
     accounts: list[dict[str, Any]] = []
     clock = _Clock(absolute=mapping.columns.time.clock == "absolute")
@@ -69,7 +72,9 @@ def import_recordings(
         accounts.append(_account(recording, pieces))
     if not runs:
         raise FileError(_why_nothing(accounts), where=", ".join(path.name for path in paths), remedy=_REMEDY_NOTHING)
-    return _write(Path(out), header, clock.from_zero(runs), accounts, find_mapping(mapping_path))
+    for run in runs:
+        check_parts(parts_of(run), Path(str(run.extra["source"])), mapping.vehicle.command_unit)
+    return _write(Path(out), mapping.header(mapping_path), clock.from_zero(runs), accounts, mapping_path)
 
 
 _REMEDY_NOTHING = "check the mapping's columns.driven, columns.tracked, [gate] and [runs]"
@@ -204,7 +209,9 @@ def _why_nothing(accounts: list[dict[str, Any]]) -> str:
     return f"no run is left of {sum(account['rows'] for account in accounts)} rows ({counted})"
 
 
-def _write(out: Path, header: Any, runs: list[Run], accounts: list[dict[str, Any]], mapping_path: Path) -> Campaign:
+def _write(
+    out: Path, header: CampaignHeader, runs: list[Run], accounts: list[dict[str, Any]], mapping_path: Path
+) -> Campaign:
     import pandas as pd
 
     writer = CampaignWriter.create(out, header)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import msgspec
 
 from agvbench.campaign import units
+from agvbench.campaign.explain import explain
 from agvbench.campaign.header import SCHEMA, CampaignHeader
 from agvbench.errors import FileError
 from agvbench.types import CommandUnit
@@ -169,8 +169,8 @@ class Mapping(_Strict, frozen=True):
     runs: Runs = Runs()
     files: list[FileRule] = []
 
-    def header(self) -> CampaignHeader:
-        """Return the head of the campaign that this mapping makes.
+    def header(self, path: Path) -> CampaignHeader:
+        """Return the head of the campaign that this mapping, read from `path`, makes.
 
         Raises
         ------
@@ -178,7 +178,8 @@ class Mapping(_Strict, frozen=True):
             If the vehicle's geometry is impossible.
         """
         prediction = self.prediction
-        return CampaignHeader(
+        return CampaignHeader.made_for(
+            path,
             schema=SCHEMA,
             name=self.name,
             vehicle_name=self.vehicle.name,
@@ -229,7 +230,7 @@ def load_mapping(name: str | Path) -> Mapping:
     except OSError as error:
         raise FileError(f"cannot be read ({error.strerror})", where=path, remedy="check its permissions") from None
     except msgspec.ValidationError as error:
-        raise FileError(_explain(error), where=path, remedy="see docs/how-to/import-your-csv.md") from None
+        raise FileError(explain(error, _TABLES), where=path, remedy="see docs/how-to/import-your-csv.md") from None
     _check(mapping, path)
     return mapping
 
@@ -260,22 +261,22 @@ def _check(mapping: Mapping, path: Path) -> None:
     if columns.quaternion and columns.quaternion.floor_x[-1] == columns.quaternion.floor_y[-1]:
         where = f"{path}: columns.quaternion"
         raise FileError("floor_x and floor_y are one axis", where=where, remedy="give two of x, y, z")
-    mapping.header()
+    mapping.header(path)
 
 
-def _explain(error: msgspec.ValidationError) -> str:
-    """Say where in the file, and what may have been meant by an unknown key."""
-    what, _, place = str(error).partition(" - at `$.")
-    what = what.removeprefix("Object contains ").removeprefix("Object ").replace("unknown field", "unknown key")
-    what = what.replace("missing required field", "lacks key").replace("field", "key")
-    what = f"{place.rstrip('`')}: {what}" if place else what
-    if "unknown key" in what:
-        wrong = what.split("`")[1]
-        if close := difflib.get_close_matches(wrong, _known_keys(Mapping), 1):
-            what += f" (did you mean {close[0]}?)"
-    return what
-
-
-def _known_keys(struct: Any) -> set[str]:
-    tables = (Vehicle, Mocap, Prediction, Csv, Time, Quantity, Signal, Quaternion, Flag, Columns, Gate, Runs, FileRule)
-    return set().union(*(table.__struct_fields__ for table in (struct, *tables)))
+_TABLES = (
+    Mapping,
+    Vehicle,
+    Mocap,
+    Prediction,
+    Csv,
+    Time,
+    Quantity,
+    Signal,
+    Quaternion,
+    Flag,
+    Columns,
+    Gate,
+    Runs,
+    FileRule,
+)

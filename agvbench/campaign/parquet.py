@@ -90,4 +90,4 @@ def _what_is_wrong(path: Path, error: Any) -> str:
         return "is not a parquet file"
     if tail != _MAGIC:
         return "is cut off: the parquet footer is missing"
-    return f"is damaged ({str(error).splitlines()[0][:120].rstrip('.')})"
+    return "is damaged and cannot be decoded"

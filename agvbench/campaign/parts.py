@@ -44,7 +44,18 @@ def run_id_of(part: Path) -> str:
     return unquote(part.name.removesuffix(_SUFFIX))
 
 
-def runs_part(run: Run) -> pa.Table:
+def parts_of(run: Run) -> dict[str, pa.Table]:
+    """Return the run's parts in the order in which they are to be written: the row of ``runs`` makes it exist.
+
+    Raises
+    ------
+    CampaignError
+        If an extra column has the name of a known one.
+    """
+    return {"poses": _poses_part(run), "commands": _commands_part(run), "runs": _runs_part(run)}
+
+
+def _runs_part(run: Run) -> pa.Table:
     """Return the run's row of the runs table; columns without a value are left out."""
     row: dict[str, object] = {
         "run_id": run.run_id,
@@ -69,14 +80,14 @@ def runs_part(run: Run) -> pa.Table:
     return pa.table({name: pa.array([value]) for name, value in row.items() if value is not None})
 
 
-def commands_part(run: Run) -> pa.Table:
+def _commands_part(run: Run) -> pa.Table:
     """Return the run's rows of the commands table."""
     commands = run.commands
     columns = {name: _floats(getattr(commands, name)) for name in ("t_s", "drive", "front", "rear")}
     return pa.table({"run_id": pa.repeat(run.run_id, len(commands)), **columns})
 
 
-def poses_part(run: Run) -> pa.Table:
+def _poses_part(run: Run) -> pa.Table:
     """Return the run's rows of the poses table."""
     frames = run.frames
     return pa.table(

@@ -177,15 +177,15 @@ def _time(cells: _Cells) -> Floats:
 
 def _seconds_since_1970(text: pa.ChunkedArray, path: Path) -> Floats:
     try:
-        stamps = pc.if_else(pc.equal(text, ""), None, text).cast(pa.timestamp("us", "UTC" if _has_zone(text) else None))
+        stamps = pc.if_else(pc.equal(text, ""), None, text).cast(pa.timestamp("ns", "UTC" if _has_zone(text) else None))
     except pa.ArrowException as error:
         remedy = "write times as 2024-09-25T07:50:18.28Z"
         raise FileError(f"time is not ISO 8601 ({str(error)[:100]})", where=path, remedy=remedy) from None
-    return np.where(pc.is_null(stamps), np.nan, stamps.cast(pa.int64()).fill_null(0).to_numpy() * 1e-6)
+    return np.where(pc.is_null(stamps), np.nan, stamps.cast(pa.int64()).fill_null(0).to_numpy() * 1e-9)
 
 
 def _has_zone(text: pa.ChunkedArray) -> bool:
-    first = next((cell for cell in text.to_pylist() if cell), "")
+    first = next((str(cell) for cell in text if cell.as_py()), "")
     return first.endswith("Z") or "+" in first or first.count("-") > 2
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,12 +13,12 @@ from agvbench.campaign.atomic import is_temporary, write_atomically
 from agvbench.campaign.checks import check_commands, check_poses, check_runs
 from agvbench.campaign.header import FILE_NAME, CampaignHeader
 from agvbench.campaign.parquet import to_parquet
-from agvbench.campaign.parts import commands_part, part_name, poses_part, run_id_of, runs_part
+from agvbench.campaign.parts import part_name, parts_of, run_id_of
 from agvbench.campaign.schema import TABLES
 from agvbench.campaign.source import parts
 from agvbench.campaign.timed import TimedTable
 from agvbench.errors import CampaignError
-from agvbench.types import Run
+from agvbench.types import CommandUnit, Run
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,9 +57,7 @@ class CampaignWriter:
         """
         path = Path(path)
         try:
-            if path.exists() and any(path.iterdir()):
-                remedy = "resume it, or choose another directory"
-                raise CampaignError("exists already and is not empty", where=path, remedy=remedy)
+            refuse_occupied(path, "resume it, or choose another directory")
             for name in TABLES:
                 (path / f"{name}.parquet").mkdir(parents=True)
             header.save(path / FILE_NAME)
@@ -124,8 +123,8 @@ class CampaignWriter:
                 "two runs have one id", where=self.path, value=run.run_id, remedy="give the run its own id"
             )
         name = part_name(run.run_id)
-        tables = {"poses": poses_part(run), "commands": commands_part(run), "runs": runs_part(run)}
-        self._check(run, tables)
+        tables = parts_of(run)
+        check_parts(tables, self.path, self.header.command_unit)
         try:
             for table, part in tables.items():
                 write_atomically(self.path / f"{table}.parquet" / name, to_parquet(part), durable=self._durable)
@@ -134,16 +133,6 @@ class CampaignWriter:
                 f"cannot be written ({error.strerror})", where=self.path, remedy="free some space"
             ) from None
         self._finished[run.run_id] = None
-
-    def _check(self, run: Run, tables: dict[str, pa.Table]) -> None:
-        """Refuse now what would make the whole campaign unreadable later."""
-        check_runs(tables["runs"], self.path / "runs.parquet")
-        timed = {
-            name: TimedTable(self.path / f"{name}.parquet", tables[name], [run.run_id], in_parts=True)
-            for name in ("commands", "poses")
-        }
-        check_commands(timed["commands"], [run.status], self.header.command_unit)
-        check_poses(timed["poses"], [run.status], timed["commands"].last("t_s"))
 
     def write_table(self, name: str, table: pd.DataFrame) -> None:
         """Write (or replace) a further table, such as ``events`` or ``provenance``, beside the three.
@@ -159,3 +148,33 @@ class CampaignWriter:
             )
         arrow = pa.Table.from_pandas(table, preserve_index=False).replace_schema_metadata(None)
         write_atomically(self.path / f"{name}.parquet", to_parquet(arrow), durable=self._durable)
+
+
+def check_parts(tables: Mapping[str, pa.Table], where: Path, unit: CommandUnit) -> None:
+    """Refuse now a run that would make a whole campaign unreadable later.
+
+    Raises
+    ------
+    CampaignError
+        If the parts contradict the schema; the message begins with `where`.
+    """
+    run_ids, status = (tables["runs"][name].to_pylist() for name in ("run_id", "status"))
+    check_runs(tables["runs"], where)
+    commands = TimedTable(where, tables["commands"], run_ids, in_parts=True)
+    poses = TimedTable(where, tables["poses"], run_ids, in_parts=True)
+    check_commands(commands, status, unit)
+    check_poses(poses, status, commands.last("t_s"))
+
+
+def refuse_occupied(path: Path, remedy: str) -> None:
+    """Refuse a path that is not a directory or has something in it.
+
+    Raises
+    ------
+    CampaignError
+        Then.
+    """
+    if path.exists() and not path.is_dir():
+        raise CampaignError("is not a directory", where=path, remedy="choose another directory")
+    if path.exists() and any(path.iterdir()):
+        raise CampaignError("exists already and is not empty", where=path, remedy=remedy)
