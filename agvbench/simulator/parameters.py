@@ -42,8 +42,8 @@ class Steering:
 class DriveSide:
     """The drive motors in one direction.
 
-    Steady speed on a straight: ``min(full, unloaded y / (y + knee))``, y = \\|command − neutral\\| − dead band: a
-    chopped motor in discontinuous conduction.
+    Steady speed on a straight: ``min(full, unloaded y / (y + knee))``, y = distance of the command from neutral less
+    the dead band: a chopped motor in discontinuous conduction.
     """
 
     dead_band: float
@@ -71,7 +71,7 @@ class Drive:
     """Rear wheels' speed over the front wheels' (thesis 9.2 doubts that it is 1)."""
     scrub: float
     scrub_dry_mps: float
-    """Scrub: braking by (scrub U + dry) (\\|tan δf\\| + \\|tan δr\\|), as an equivalent loss of speed [m/s]."""
+    """Scrub brakes as if speed fell short by (scrub U + dry) times the sum of both axles' absolute tan δ [m/s]."""
     brake_per_s: float
     brake_dry_mps2: float
     windup_per_s2: float

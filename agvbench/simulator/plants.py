@@ -1,6 +1,6 @@
 """The plants that ship: the thesis' vehicle, vehicles drawn at random, and a small front-steered one.
 
-Every constant of the thesis' vehicle says where it comes from. What the thesis does not say is chosen freely, and said to be.
+Every constant of the thesis' vehicle says where it comes from; what the thesis does not say is "free".
 """
 
 from __future__ import annotations
@@ -142,7 +142,7 @@ def random_vehicle(seed: int) -> SimulatedVehicle:
     Uniform: servo slopes −0.068…−0.098 °/µs, offsets ±4°, end stops ±35…45°, servo bandwidth 15…40 rad/s; full speed
     0.27…0.38 m/s (backward within 5 % of forward), dead bands 15…60 µs, knee 100…220 µs, acceleration 0.8…1.5 m/s²,
     rear against front wheels ±3 %; braking rate 2…4 /s; overrun 1…3.5, scrub 0…0.04; marker centroid ±5 mm along
-    and across; relief in reverse 0…0.08; battery droop 0.04…0.12; play 0.05…0.25° and 0.1…0.6 %; delay 0…3 frames.
+    and across; relief in reverse 0…0.05; battery droop 0.04…0.12; play 0.05…0.25° and 0.1…0.6 %; delay 0…3 frames.
     """
     rng = np.random.default_rng([0xA6F, seed % 2**64])
 
@@ -164,7 +164,7 @@ def random_vehicle(seed: int) -> SimulatedVehicle:
         ),
         body=replace(
             base.body, front_axle_m=0.181 - lever, rear_axle_m=0.121 + lever, marker_left_m=draw(-0.005, 0.005),
-            reverse_relief=draw(0.0, 0.08),
+            reverse_relief=draw(0.0, 0.05),
         ),
         battery=replace(base.battery, droop=draw(0.04, 0.12)),
         play=Play(draw(0.05, 0.25) * _DEG, draw(0.05, 0.25) * _DEG, draw(0.001, 0.006)),

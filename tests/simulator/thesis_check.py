@@ -9,7 +9,7 @@ the vehicle's file. Run as a script, it prints the table of `docs/reference/simu
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -108,6 +108,9 @@ def medians(plant: Plant, maps: Maps, full_mps: tuple[float, float], repeats: in
 def main() -> None:
     """Print simulated beside measured medians."""
     from agvbench.simulator import make_plant
+    from agvbench.simulator.parameters import Play
+    from agvbench.simulator.plants import THESIS_VEHICLE
+    from agvbench.simulator.vehicle import VehiclePlant
 
     measured = {
         1: (83.03, 5.1, 5.9, 1.9), 2: (18.34, 3.4, 14.6, 2.3), 3: (math.nan, math.nan, 10.3, 2.2),
@@ -115,13 +118,15 @@ def main() -> None:
         7: (136.15, -9.5, 9.6, -4.2), 8: (68.29, -7.2, 62.9, -3.1),
     }  # fmt: skip
     plant = make_plant(0)
-    maps = ideal_maps(plant)
+    maps = ideal_maps(VehiclePlant(replace(THESIS_VEHICLE, play=Play(0.0, 0.0, 0.0)), 0))
     nominal = medians(plant, NOMINAL, (FULL_SPEED_MPS, FULL_SPEED_MPS), 20)
     ideal = medians(plant, maps, (float(maps.speed[0]), float(-maps.speed[-1])), 20)
     print("| trajectory | uncal. Δs [mm] | thesis \\|Δs\\| | uncal. Δδ [deg] | thesis | ideal Δs [mm] | thesis \\|Δs\\| | ideal Δδ [deg] | thesis |")  # fmt: skip  # noqa: E501
     print("|---|---|---|---|---|---|---|---|---|")
     for number, (s0, h0, s1, h1) in measured.items():
         a, b = nominal[number], ideal[number]
+        if math.isnan(s0):
+            a = (math.nan, math.nan)  # no half speed is known without calibration
         cells = (a[0], s0, a[1], h0, b[0], s1, b[1], h1)
         print(f"| {number} | " + " | ".join("–" if math.isnan(c) else f"{c:.1f}" for c in cells) + " |")
 
