@@ -7,8 +7,8 @@
   agvbench plan --workspace rectangle:4x3    what fits on a smaller floor, and where to start
   agvbench plan --repeats 10                 how many hours ten repeats of each take
 
-TRAJECTORY is a name ("5", "slalom") or a .toml file; names are looked for in ./trajectories if there is such a
-directory, else among those that ship with agvbench. A trajectory that cannot be driven is shown with the
+TRAJECTORY is a name ("5", "slalom") or a .toml file; names are looked for in ./trajectories first, then among those
+that ship with agvbench. A trajectory that cannot be driven is shown with the
 reason, and the exit code is 2.
 """
 
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
         workspace=Workspace.parse(args.workspace, DEFAULT_MARGIN_M if args.margin is None else args.margin),
         start=_start(args.start),
         steering=args.steering,
-        directory=args.directory or _local_trajectories(),
+        directory=args.directory,
         repeats=args.repeats,
     )
     _print(made, args)
@@ -83,11 +83,6 @@ def _print(made: DryRun, args: argparse.Namespace) -> None:
         print(plan.commands_csv(made))
     else:
         plan.print_dry_run(made, Console())
-
-
-def _local_trajectories() -> Path | None:
-    local = Path("trajectories")
-    return local if any(local.glob("*.toml")) else None
 
 
 def _start(text: str | None) -> Pose | None:

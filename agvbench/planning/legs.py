@@ -52,7 +52,9 @@ def legs_of(trajectory: Trajectory, model: VehicleModel) -> list[Leg]:
     """
     segments = trajectory.expand()
     driven = [_leg(segment, trajectory, model, where=trajectory.segment_name(i)) for i, segment in enumerate(segments)]
-    return _with_rests(driven, trajectory.steer_first_s, at_every_change=trajectory.steer_at_rest)
+    return _with_rests(
+        driven, trajectory.steer_first_s, at_every_change=trajectory.steer_at_rest, where=trajectory.name
+    )
 
 
 def _leg(segment: Segment, trajectory: Trajectory, model: VehicleModel, *, where: str) -> Leg | float:
@@ -142,11 +144,11 @@ def _widen(mode: Steering, model: VehicleModel) -> str:
     return f"widen it to at least {math.ceil(smallest * 100.0) / 100.0:.2f} m" if math.isfinite(smallest) else ""
 
 
-def _with_rests(driven: list[Leg | float], steer_first_s: float, *, at_every_change: bool) -> list[Leg]:
+def _with_rests(driven: list[Leg | float], steer_first_s: float, *, at_every_change: bool, where: str) -> list[Leg]:
     """Put a rest before the start, wherever the gear changes, and, if asked, wherever the steering does."""
     moving = [item for item in driven if isinstance(item, Leg)]
     if not moving:
-        raise PlanError("nothing is driven: there are only pauses", remedy="add a straight or an arc")
+        raise PlanError("nothing is driven: there are only pauses", where=where, remedy="add a straight or an arc")
     legs = [_rest(moving[0], steer_first_s)]
     for item in driven:
         if not isinstance(item, Leg):

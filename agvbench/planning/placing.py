@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -10,7 +11,8 @@ from agvbench.errors import PlanError
 from agvbench.planning.workspace import Workspace
 from agvbench.types import Floats, Pose
 
-_HEADINGS = 24
+_STRAIGHT_HEADINGS_DEG = (0, 90, 180, -90)
+_HEADINGS_DEG = range(-180, 180, 15)
 _NEARLY_M = 0.01
 
 
@@ -26,25 +28,34 @@ def best_start(points: Floats, workspace: Workspace) -> tuple[Pose, float]:
 
     Notes
     -----
-    For one heading, the largest distance is a linear programme in the start's x, y and the distance. Headings are
-    tried every 15°; the first of equals is kept, so that a circle is entered at heading 0. Of the starts within a
-    centimetre of the best, the most central is taken: in a long hall, the middle of it.
+    For one heading, the largest distance is a linear programme in the start's x, y and the distance. Headings along
+    and across the floor come first, because a vehicle is set down along a line more easily than askew; others, every
+    15°, are tried only where none of these fits. Of equal headings the first is kept. Of the starts within a centimetre
+    of the best, the most central is taken: in a long hall, the middle of it.
     """
-    best, distance = Pose(0.0, 0.0, 0.0), -math.inf
-    for heading in np.arange(1 if workspace.is_round else _HEADINGS) * (2.0 * math.pi / _HEADINGS):
-        x, y, found = _best_translation(points, float(heading), workspace)
+    heading, distance = _best_heading(points, workspace, _STRAIGHT_HEADINGS_DEG)
+    if distance < workspace.margin_m and not workspace.is_round:
+        heading, distance = _best_heading(points, workspace, _HEADINGS_DEG)
+    x, y = _most_central(points, heading, workspace, distance)
+    return Pose(x, y, heading), distance
+
+
+def _best_heading(points: Floats, workspace: Workspace, headings_deg: Iterable[int]) -> tuple[float, float]:
+    best, distance = 0.0, -math.inf
+    for heading in map(math.radians, headings_deg):
+        found = _largest_distance(points, heading, workspace)
         if found > distance + 1e-6:
-            best, distance = Pose(x, y, float(heading)), found
-    x, y = _most_central(points, best.heading_rad, workspace, distance)
-    return Pose(x, y, best.heading_rad), distance
+            best, distance = heading, found
+        if workspace.is_round:
+            break
+    return best, distance
 
 
-def _best_translation(points: Floats, heading: float, workspace: Workspace) -> tuple[float, float, float]:
+def _largest_distance(points: Floats, heading: float, workspace: Workspace) -> float:
     room = workspace.offsets - (_rotated(points, heading) @ workspace.normals.T).max(axis=0)
     # normals · start + distance <= room; the objective is the distance.
     constraints = np.column_stack([workspace.normals, np.ones(len(room))])
-    x, y, distance = _solve(np.array([0.0, 0.0, -1.0]), constraints, room)
-    return x, y, distance
+    return _solve(np.array([0.0, 0.0, -1.0]), constraints, room)[2]
 
 
 def _most_central(points: Floats, heading: float, workspace: Workspace, distance: float) -> tuple[float, float]:

@@ -154,9 +154,8 @@ def _command(leg: Leg, model: VehicleModel) -> Command:
         command = model.command_for(leg.front_rad, leg.rear_rad, leg.speed_mps)
     except (VehicleError, PlanError) as error:
         raise PlanError(
-            f"{abs(leg.speed_mps):.3f} m/s cannot be commanded: {error.what}",
+            f"speed {abs(leg.speed_mps):.3f} m/s cannot be commanded: {error.what}",
             where=leg.where,
-            value=error.value,
             limit=error.limit,
             remedy=error.remedy,
         ) from None

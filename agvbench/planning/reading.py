@@ -1,4 +1,8 @@
-"""Trajectories from TOML files: those that ship with agvbench, a lab's own, and tables from elsewhere."""
+"""Trajectories from TOML files: a lab's own, those that ship with agvbench, and tables from elsewhere.
+
+A name is looked for in the directory ``trajectories`` under the current one, which is where a lab keeps its own, and
+then among those that ship.
+"""
 
 from __future__ import annotations
 
@@ -8,19 +12,19 @@ from pathlib import Path
 
 from agvbench.errors import FileError
 from agvbench.planning.trajectory import Trajectory
-from agvbench.planning.validation import convert
+from agvbench.planning.validation import convert, suggest
 from agvbench.resources import resource_directory
 
 
 def load_trajectory(name_or_path: str | Path, *, directory: Path | None = None) -> Trajectory:
-    """Return the trajectory in a TOML file, or the one of that name or file name in `directory`.
+    """Return the trajectory in a TOML file, or the one of that name or file name.
 
     Parameters
     ----------
     name_or_path
         A path ending in ``.toml``, or a name: ``"5"`` or ``"5_forward_left"``.
     directory
-        Where names are looked for; those that ship with agvbench if not given.
+        The only place where names are looked for; the lab's own and then those that ship if not given.
 
     Raises
     ------
@@ -34,7 +38,7 @@ def load_trajectory(name_or_path: str | Path, *, directory: Path | None = None) 
     """
     if isinstance(name_or_path, Path) or name_or_path.endswith(".toml"):
         return _read(Path(name_or_path))
-    files = trajectory_files(directory)
+    files = trajectory_files(directory) if directory else [*_local_files(), *_shipped_files()]
     for file in files:
         # The eight are called by number: reading one file is enough for them.
         if file.stem == name_or_path or file.stem.split("_")[0] == name_or_path:
@@ -45,12 +49,14 @@ def load_trajectory(name_or_path: str | Path, *, directory: Path | None = None) 
             return trajectory
     raise FileError(
         f"there is no trajectory '{name_or_path}'",
-        remedy=f"name a .toml file or one of {', '.join(file.stem for file in files)}",
+        remedy=suggest(name_or_path, list(dict.fromkeys(file.stem for file in files))),
     )
 
 
 def list_trajectories(directory: Path | None = None) -> list[Trajectory]:
-    """Return the trajectories of `directory` (those that ship with agvbench if not given), the eight first.
+    """Return the trajectories of `directory`, the eight first.
+
+    If it is not given, the lab's own are listed, or, where there are none, those that ship.
 
     Raises
     ------
@@ -71,8 +77,18 @@ def list_trajectories(directory: Path | None = None) -> list[Trajectory]:
 
 
 def trajectory_files(directory: Path | None = None) -> list[Path]:
-    """Return the TOML files of `directory` in order of their names (numbers come first)."""
-    return sorted((directory or resource_directory("trajectories")).glob("*.toml"))
+    """Return the TOML files that `list_trajectories` reads, in order of their names (numbers come first)."""
+    if directory is not None:
+        return sorted(directory.glob("*.toml"))
+    return _local_files() or _shipped_files()
+
+
+def _local_files() -> list[Path]:
+    return sorted(Path("trajectories").glob("*.toml"))
+
+
+def _shipped_files() -> list[Path]:
+    return sorted(resource_directory("trajectories").glob("*.toml"))
 
 
 def trajectory_from_table(table: Mapping[str, object], *, where: str = "trajectory") -> Trajectory:

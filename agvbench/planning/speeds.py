@@ -45,9 +45,13 @@ def axle_speed(speed: Speed, full_mps: float, *, where: str) -> float:
     Raises
     ------
     PlanError
-        If the vehicle does not go so fast.
+        If the vehicle does not go so fast, or no one knows how fast it goes.
     """
     if isinstance(speed, str):
+        if not math.isfinite(full_mps):
+            raise PlanError(
+                f"what {speed} speed is is not known: the drive's map has no end", where=where, remedy="say it in m/s"
+            )
         share = share_of(speed)
         assert share is not None  # noqa: S101 - checked when the trajectory was read
         return share * full_mps

@@ -24,6 +24,9 @@ from agvbench.errors import PlanError
 from agvbench.planning.segments import Steering
 from agvbench.vehicle.geometry import Geometry
 
+_SQUARE = math.radians(89.0)
+"""An axle without end stops may turn so far."""
+
 
 def centre_ahead(mode: Steering, geometry: Geometry) -> float:
     """Return x_c [m], how far the centre of rotation lies ahead of the centroid."""
@@ -74,5 +77,5 @@ def smallest_radius(mode: Steering, front_limit_rad: float, rear_limit_rad: floa
     beside = 0.0
     for lever, limit in zip(levers, (front_limit_rad, rear_limit_rad), strict=True):
         if lever > 0.0:
-            beside = max(beside, lever / math.tan(limit) if limit > 0.0 else math.inf)
+            beside = max(beside, lever / math.tan(min(limit, _SQUARE)) if limit > 0.0 else math.inf)
     return math.hypot(ahead, beside)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Literal, cast
 
 import msgspec
@@ -23,6 +24,7 @@ from agvbench.planning.speeds import Speed, check_speed
 from agvbench.types import NO_TARGET, Pose
 
 SHAPES = ("segments", "dubins", "s_curve", "slalom", "step_steer", "speed_steps", "endurance", "commands")
+_NAME = re.compile("[A-Za-z0-9][A-Za-z0-9_.-]*")
 Condition = Literal["uncalibrated", "calibrated", "corrected"]
 
 
@@ -34,7 +36,7 @@ class Trajectory(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, 
     schema
         1.
     name
-        What tables and run ids call it.
+        What tables and run ids call it: letters, digits, ``_``, ``.`` and ``-``.
     description
         One line.
     conditions
@@ -53,7 +55,7 @@ class Trajectory(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, 
     """
 
     schema: Literal[1]
-    name: Annotated[str, Meta(pattern="^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+    name: str
     description: str = ""
     conditions: Annotated[tuple[Condition, ...], Meta(min_length=1)] = ("uncalibrated", "calibrated", "corrected")
     speed: Speed = "full"
@@ -71,6 +73,8 @@ class Trajectory(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, 
     commands: CommandTable | None = None
 
     def __post_init__(self) -> None:
+        if not _NAME.fullmatch(self.name):
+            raise ValueError(f"name is not made of letters, digits, '_', '.' and '-': {self.name!r}")
         check_speed(self.speed)
         given = [shape for shape in SHAPES if getattr(self, shape) is not None]
         if len(given) != 1:
@@ -110,8 +114,13 @@ class Trajectory(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, 
         return f"{self.name}: {self.shape}[{index}]"
 
     def with_steering(self, steering: Steering) -> Trajectory:
-        """Return the same trajectory steered in another mode."""
-        return msgspec.structs.replace(self, steering=steering)
+        """Return the same trajectory steered in another mode; its target is then where the kinematics lead.
+
+        A target that was stated for one mode is not that of another: steered by the front axle alone, a quarter turn
+        has the same chord in another direction.
+        """
+        stated = isinstance(self.target, PoseTable) and steering != self.steering
+        return msgspec.structs.replace(self, steering=steering, target=None if stated else self.target)
 
     def to_table(self) -> dict[str, object]:
         """Return the trajectory as it would stand in TOML or JSON, without what is left at its default."""

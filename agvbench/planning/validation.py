@@ -45,7 +45,7 @@ def _explained(message: str, table: object, kind: type, where: str) -> FileError
     place = ": ".join(part for part in (where, path.removeprefix(".")) if part)
     value, types = _descend(table, inspect.type_info(kind), steps)
     if found := _UNKNOWN.fullmatch(what):
-        return FileError(f"unknown key '{found[1]}'", where=place, remedy=_suggest(found[1], _keys(types)))
+        return FileError(f"unknown key '{found[1]}'", where=place, remedy=suggest(found[1], _keys(types)))
     if found := _MISSING.fullmatch(what):
         return FileError(f"key '{found[1]}' is missing", where=place)
     if found := _VALUE.fullmatch(what):
@@ -101,9 +101,10 @@ def _values(types: Iterable[inspect.Type], steps: Sequence[str | int]) -> list[s
     return values or (["straight", "arc", "pause"] if steps and steps[-1] == "kind" else [])
 
 
-def _suggest(key: str, known: list[str]) -> str:
+def suggest(key: str, known: list[str]) -> str:
+    """Return a remedy for a misspelt `key`: the one that was probably meant, and all that are known."""
     near = difflib.get_close_matches(key, known, n=1)
-    return (f"did you mean '{near[0]}'? " if near else "") + f"known keys: {', '.join(known)}"
+    return (f"did you mean '{near[0]}'? " if near else "") + f"known: {', '.join(known)}"
 
 
 def _either(values: list[str]) -> str:
@@ -112,9 +113,9 @@ def _either(values: list[str]) -> str:
 
 def _expected(kind: str, rest: str) -> str:
     """Return "a number > 0" from "Expected `float` > 0.0" and "a number" from "Expected `float`, got `str`"."""
-    names = [_PLAIN.get(name, name) for name in kind.split(" | ")]
+    names = [_PLAIN.get(name, name) for name in kind.split(" | ") if name != "null"]
     bound = "" if rest.startswith(", got") else rest.replace(".0", "")
-    bound = bound.replace(" of length >= 1", " of at least one").replace("matching regex", "of the form")
+    bound = bound.replace(" of length >= 1", " of at least one")
     return " or ".join(dict.fromkeys(names)) + bound
 
 

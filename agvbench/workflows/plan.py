@@ -62,16 +62,27 @@ def plan_trajectories(
     repeats: int = 1,
 ) -> DryRun:
     """Return the dry run of the named trajectories (all of them if none are named) under `conditions`."""
+    chosen = chosen_trajectories(names, directory, steering)
     made = dry_run(
-        chosen_trajectories(names, directory, steering),
+        chosen,
         models_for(vehicle, conditions),
         repeats=repeats,
         workspace=workspace,
         start=start,
     )
     if not made.rows:
-        raise FlagError("none of the trajectories has one of these conditions", value=", ".join(conditions))
+        raise _no_condition(chosen, conditions)
     return made
+
+
+def _no_condition(trajectories: Sequence[Trajectory], conditions: Sequence[str]) -> FlagError:
+    has = dict.fromkeys(condition for trajectory in trajectories for condition in trajectory.conditions)
+    return FlagError(
+        f"trajectory {', '.join(t.name for t in trajectories)} is not driven under this condition",
+        where="--condition",
+        value=", ".join(conditions),
+        limit=", ".join(has),
+    )
 
 
 def print_dry_run(made: DryRun, console: Console) -> None:
