@@ -72,8 +72,8 @@ def decode_command(payload: bytes) -> CommandMessage:
         If it is not a command message that this version writes.
     """
     header = unpack_header(payload, Kind.COMMAND, _KNOWN)
-    if header.count != 1:
-        raise MessageError("command message with another count", value=header.count, limit=1)
+    if header.rows != 1:
+        raise MessageError("command message with another count", value=header.rows, limit=1)
     reader = Reader(payload)
     t_s, drive, front, rear, hold_s = reader.fields(_BODY)
     reader.finish()

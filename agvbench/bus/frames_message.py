@@ -95,7 +95,7 @@ def decode_frames(payload: bytes) -> FramesMessage:
         If it is not a frames message that this version writes.
     """
     header = unpack_header(payload, Kind.FRAMES, FramesFlags.LAST)
-    reader, count = Reader(payload), header.count
+    reader, count = Reader(payload), header.rows
     acknowledged, clock, now_s = reader.fields(_BODY)
     columns = reader.column(6 * count, "<f8").reshape(6, count)
     frame = reader.column(count, "<i8")

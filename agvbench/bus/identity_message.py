@@ -105,7 +105,7 @@ def decode_agv_identity(payload: bytes) -> AgvIdentity:
     reader = Reader(payload)
     neutral, simulated, lock_step = reader.fields(_AGV)
     vehicle, adapter, firmware, calibration_hash, unit = (reader.text() for _ in range(5))
-    extra = _read_extra(reader, header.count)
+    extra = _read_extra(reader, header.rows)
     if unit not in ("us", "normalised"):
         raise MessageError("unknown command unit", value=repr(unit), limit="us or normalised")
     return AgvIdentity(
@@ -140,7 +140,7 @@ def decode_mocap_identity(payload: bytes) -> MocapIdentity:
     reader = Reader(payload)
     rate_hz, simulated = reader.fields(_MOCAP)
     adapter = reader.text()
-    extra = _read_extra(reader, header.count)
+    extra = _read_extra(reader, header.rows)
     if not 0.0 < rate_hz < float("inf"):
         raise MessageError("frame rate is out of range", value=f"{rate_hz} Hz", limit="above 0 Hz")
     return MocapIdentity(adapter, rate_hz, simulated, extra)

@@ -28,6 +28,7 @@ from agvbench.bus.watchdog import Watchdog
 from agvbench.errors import LinkError
 from agvbench.types import Command, Commands, Frames, Pose
 
+_ORIGIN = Pose(0.0, 0.0, 0.0)
 _ANYWHERE = Sampling(rate_hz=1.0, phase_s=0.0)
 
 
@@ -156,9 +157,7 @@ class VehicleLink:
         if not self._closed:
             self._driver.stop()
 
-    def replay(
-        self, run_key: str, commands: Commands, *, pose: Pose = Pose(0.0, 0.0, 0.0), until_s: float | None = None
-    ) -> None:
+    def replay(self, run_key: str, commands: Commands, *, pose: Pose = _ORIGIN, until_s: float | None = None) -> None:
         """Let a simulated vehicle drive a recorded run again, without frames: what wears or drains is as it was.
 
         Parameters
@@ -185,7 +184,7 @@ class VehicleLink:
                 remedy="place it by hand, or drive it back",
             )
         self._presence.check(AGV, MOCAP)
-        payload = encode_reset(Reset(run_key, Pose(0.0, 0.0, 0.0), _ANYWHERE))
+        payload = encode_reset(Reset(run_key, _ORIGIN, _ANYWHERE))
         return decode_sampling(ask(self._session, self.keys.question(MOCAP, RESET), payload, self._limit_s))
 
     @property

@@ -97,7 +97,7 @@ def decode_replay(payload: bytes) -> Replay:
     reader = Reader(payload)
     reset = _read_reset(reader)
     (until_s,) = reader.fields(_NUMBER)
-    columns = reader.column(4 * header.count, "<f8").reshape(4, header.count)
+    columns = reader.column(4 * header.rows, "<f8").reshape(4, header.rows)
     reader.finish()
     if not (math.isfinite(until_s) and np.isfinite(columns).all()):
         raise MessageError("commands to replay are not finite", where=reset.run_key)

@@ -62,8 +62,8 @@ def decode_truth(payload: bytes) -> Truth:
     header = unpack_header(payload, Kind.TRUTH, TruthFlags.LAST | TruthFlags.FLUSH)
     reader = Reader(payload)
     acknowledged, end_s = reader.fields(_BODY)
-    t_s = reader.column(header.count, "<f8")
-    poses = reader.column(3 * header.count, "<f8").reshape(3, header.count).T
+    t_s = reader.column(header.rows, "<f8")
+    poses = reader.column(3 * header.rows, "<f8").reshape(3, header.rows).T
     reader.finish()
     if not (np.isfinite(t_s).all() and np.isfinite(poses).all() and np.isfinite(end_s)):
         raise MessageError("true poses are not finite")

@@ -56,7 +56,7 @@ class Header(NamedTuple):
     kind: int
     flags: int
     source: int
-    count: int
+    rows: int
     sequence: int
 
 

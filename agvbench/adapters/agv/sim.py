@@ -64,7 +64,8 @@ class SimAgv(AgvAdapter):
 
     def reset(self, request: Reset) -> None:
         """Place the plant at rest."""
-        self._plant.reset(tuple(request.pose), seed=run_seed(self._options.seed, request.run_key, "plant"))
+        x_m, y_m, heading_rad = request.pose
+        self._plant.reset((x_m, y_m, heading_rad), seed=run_seed(self._options.seed, request.run_key, "plant"))
         self._sampling, self._held = request.sampling, self._neutral
         self._plant_s = self._end_s = math.nan
 

@@ -1,0 +1,101 @@
+"""What the commands that run adapters have in common."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from typing import Any
+
+from agvbench.errors import FlagError
+
+AGV_ENDPOINT = "tcp/127.0.0.1:7447"
+MOCAP_ENDPOINT = "tcp/127.0.0.1:7448"
+
+
+def add_bus_arguments(parser: argparse.ArgumentParser, default_listen: str) -> None:
+    """Declare where on the bus the adapters are."""
+    group = parser.add_argument_group("bus")
+    group.add_argument(
+        "--listen",
+        action="append",
+        metavar="ENDPOINT",
+        help=f"wait for others here (default: {default_listen} unless --connect is given); "
+        "tcp/0.0.0.0:PORT lets other machines in, and nobody asks them who they are",
+    )
+    group.add_argument("--connect", action="append", metavar="ENDPOINT", help="connect to a process that listens there")
+    group.add_argument("--lab", default="lab", help="name of the lab on the bus (default: %(default)s)")
+    group.add_argument("--vehicle", default="agv1", help="name of the vehicle on the bus (default: %(default)s)")
+
+
+def add_vehicle_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what a simulated vehicle needs."""
+    group = parser.add_argument_group("vehicle")
+    group.add_argument(
+        "--plant",
+        default="agvbench.simulator:make_plant",
+        metavar="MODULE_OR_FILE:FACTORY",
+        help="what drives in the simulation (default: %(default)s)",
+    )
+    group.add_argument(
+        "--command-unit", choices=("us", "normalised"), default="us", help="what it understands (default: %(default)s)"
+    )
+    group.add_argument("--neutral", type=float, metavar="COMMAND", help="where it stands still (default: 1500 or 0)")
+
+
+def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what a simulated camera needs."""
+    parser.add_argument(
+        "--camera",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="set a parameter of the simulated camera, such as rate_hz=240 or lost=0 (repeatable)",
+    )
+
+
+def add_seed_argument(parser: argparse.ArgumentParser) -> None:
+    """Declare the seed."""
+    parser.add_argument("--seed", type=int, default=0, help="of the simulation; the same as the bench's (default: 0)")
+
+
+def camera_options(pairs: list[str]) -> dict[str, str]:
+    """Return the camera's parameters by name.
+
+    >>> camera_options(["lost=0.01"])
+    {'lost': '0.01'}
+
+    Raises
+    ------
+    FlagError
+        If a pair has no ``=``.
+    """
+    options: dict[str, str] = {}
+    for pair in pairs:
+        name, equals, value = pair.partition("=")
+        if not (name and equals and value):
+            raise FlagError(
+                "not a parameter and its value", where="--camera", value=repr(pair), remedy="write NAME=VALUE"
+            )
+        options[name] = value
+    return options
+
+
+def endpoints(arguments: argparse.Namespace, default_listen: str) -> dict[str, list[str]]:
+    """Return where to listen and connect."""
+    connect = arguments.connect or []
+    listen = arguments.listen or ([] if connect else [default_listen])
+    return {"listen": listen, "connect": connect}
+
+
+def run_with(arguments: argparse.Namespace, default_listen: str, agv: str | None, mocap: str | None) -> int:
+    """Run adapters as the arguments say."""
+    from agvbench.adapters.contract import AdapterOptions
+    from agvbench.workflows.adapter_process import run_adapters
+
+    given: dict[str, Any] = {"vehicle": arguments.vehicle, "seed": arguments.seed}
+    readers: dict[str, Callable[[Any], Any]] = {"plant": str, "command_unit": str, "camera": camera_options}
+    given |= {name: read(getattr(arguments, name)) for name, read in readers.items() if hasattr(arguments, name)}
+    given["neutral"] = getattr(arguments, "neutral", None)
+    return run_adapters(
+        AdapterOptions(**given), agv=agv, mocap=mocap, lab=arguments.lab, **endpoints(arguments, default_listen)
+    )

@@ -1,0 +1,31 @@
+"""Run one AGV adapter as its own process on the bus.
+
+The vehicle is stopped when the process ends, and when nobody has commanded it for half a second.
+
+examples:
+  agvbench agv sim                                     a simulated vehicle, on tcp/127.0.0.1:7447
+  agvbench mocap sim --connect tcp/127.0.0.1:7447      a camera that sees it, in another terminal
+  agvbench bench --connect tcp/127.0.0.1:7447          drive it, in a third
+  agvbench agv sim:my_plant.py:make_plant --vehicle small_one
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from agvbench.cli import _adapter_arguments as shared
+
+HELP = "run an AGV adapter as its own process"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument("adapter", metavar="ADAPTER", help="SCHEME or SCHEME:ADDRESS, such as sim")
+    shared.add_seed_argument(parser)
+    shared.add_vehicle_arguments(parser)
+    shared.add_bus_arguments(parser, shared.AGV_ENDPOINT)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run until a signal ends it; return the exit code."""
+    return shared.run_with(arguments, shared.AGV_ENDPOINT, agv=arguments.adapter, mocap=None)

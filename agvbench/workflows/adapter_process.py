@@ -1,0 +1,66 @@
+"""``agvbench sim``, ``agv`` and ``mocap``: adapters as their own process, until a signal ends it."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+from agvbench.adapters.contract import AdapterOptions
+from agvbench.adapters.node import host_adapters
+from agvbench.bus.session import is_loopback, open_session, parse_endpoint
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+def run_adapters(
+    options: AdapterOptions,
+    *,
+    agv: str | None,
+    mocap: str | None,
+    lab: str,
+    listen: Sequence[str],
+    connect: Sequence[str],
+) -> int:
+    """Host adapters until SIGINT or SIGTERM; stop the vehicle first, then leave the bus.
+
+    Raises
+    ------
+    AgvbenchError
+        If an endpoint, a name, an adapter or its plant cannot be used.
+    """
+    _warn_of_remote_access(listen)
+    with (
+        _stop_signal() as stopped,
+        open_session(listen=listen, connect=connect, allow_remote=True) as session,
+        host_adapters(session, lab, options, agv=agv, mocap=mocap),
+    ):
+        what = " and ".join(f"{role} {spec}" for role, spec in (("agv", agv), ("mocap", mocap)) if spec is not None)
+        where = " ".join([*(f"listens on {e}" for e in listen), *(f"connected to {e}" for e in connect)])
+        print(f"ready: {what} of {lab}/{options.vehicle}, {where}; stop with Ctrl-C", flush=True)
+        stopped.wait()
+    print("stopped", flush=True)
+    return 0
+
+
+def _warn_of_remote_access(listen: Sequence[str]) -> None:
+    for endpoint in listen:
+        _, host, _ = parse_endpoint(endpoint, "--listen")
+        if not is_loopback(host):
+            print(
+                f"warning: whoever reaches {endpoint} can drive the vehicle; nobody is asked who they are",
+                file=sys.stderr,
+            )
+
+
+@contextmanager
+def _stop_signal() -> Iterator[threading.Event]:
+    stopped = threading.Event()
+    before = {number: signal.signal(number, lambda *_: stopped.set()) for number in _SIGNALS}
+    try:
+        yield stopped
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
