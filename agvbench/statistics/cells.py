@@ -1,16 +1,17 @@
-"""What two sets of runs have in common: cells of the same trajectory (and condition), split by session where shared."""
+"""What two sets of runs have in common: cells of one trajectory (and condition), split by session where shared."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agvbench.errors import InputError
-from agvbench.statistics.quantities import Quantity
+from agvbench.statistics.quantities import QUANTITIES, Quantity
 from agvbench.statistics.runs import valid
 from agvbench.types import Floats
 
@@ -18,8 +19,28 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Strata = list[tuple[Floats, Floats]]
+_Key = tuple[str, ...]
 _TARGET = ["target_x_m", "target_y_m", "target_heading_rad"]
 _TARGET_TOLERANCE = np.array([1e-3, 1e-3, math.radians(0.1)])
+
+
+@dataclass(frozen=True)
+class Side:
+    """The runs of one side of a cell: absolute errors by column, sessions, and the target; arrays of shape (n,)."""
+
+    absolute: dict[str, Floats]
+    session: NDArray[np.object_]
+    target: Floats
+
+    def values(self, quantity: Quantity, session: str | None = None) -> Floats:
+        """Return the absolute errors, of all runs or of one session."""
+        values = self.absolute[quantity.column]
+        return values if session is None else values[self.session == session]
+
+    @property
+    def sessions(self) -> list[str]:
+        """Return the distinct sessions, in order of appearance."""
+        return list(dict.fromkeys(self.session))
 
 
 @dataclass(frozen=True)
@@ -28,23 +49,20 @@ class Cell:
 
     trajectory: str
     condition: str
-    a: pd.DataFrame
-    b: pd.DataFrame
+    a: Side
+    b: Side
     by_session: bool
 
     def values(self, quantity: Quantity) -> tuple[Floats, Floats]:
         """Return the absolute errors of both sides."""
-        return _absolute(self.a, quantity), _absolute(self.b, quantity)
+        return self.a.values(quantity), self.b.values(quantity)
 
     def strata(self, quantity: Quantity) -> Strata:
         """Return the absolute errors of both sides, one pair per session that both sides share."""
         if not self.by_session:
             return [self.values(quantity)]
-        shared = [s for s in dict.fromkeys(self.a["session"]) if s in set(self.b["session"])]
-        return [
-            (_absolute(self.a[self.a["session"] == s], quantity), _absolute(self.b[self.b["session"] == s], quantity))
-            for s in shared
-        ]
+        shared = [s for s in self.a.sessions if s in self.b.sessions]
+        return [(self.a.values(quantity, s), self.b.values(quantity, s)) for s in shared]
 
 
 def match_cells(
@@ -61,34 +79,33 @@ def match_cells(
     if conditions is not None:
         a, b = _of_condition(a, conditions[0], "A"), _of_condition(b, conditions[1], "B")
     keys = ["trajectory"] if conditions is not None else ["trajectory", "condition"]
-    groups_a, groups_b = (_grouped(side, keys) for side in (a, b))
-    cells, left_out = [], []
+    sides_a, sides_b = _sides(a, keys), _sides(b, keys)
     label = None if conditions is None else " → ".join(conditions)
-    for key, rows in groups_a.items():
-        name = " ".join(key)
-        if key not in groups_b:
-            left_out.append(f"{name}: only in A")
-        elif not _same_target(rows, groups_b[key]):
-            left_out.append(f"{name}: the targets differ")
+    cells, left_out = [], []
+    for key, side in sides_a.items():
+        other = sides_b.get(key)
+        if other is None:
+            left_out.append(f"{' '.join(key)}: only in A")
+        elif not _same_target(side, other):
+            left_out.append(f"{' '.join(key)}: the targets differ")
         else:
-            by_session = same_campaign and _share_sessions(rows, groups_b[key])
-            cells.append(Cell(key[0], label or key[-1], rows, groups_b[key], by_session))
-    left_out += [f"{' '.join(key)}: only in B" for key in groups_b if key not in groups_a]
+            by_session = same_campaign and _share_sessions(side, other)
+            cells.append(Cell(key[0], label or key[-1], side, other, by_session))
+    left_out += [f"{' '.join(key)}: only in B" for key in sides_b if key not in sides_a]
     if not cells:
-        raise InputError(
-            "nothing to compare: no trajectory under the same condition with the same target in both",
-            value="; ".join(_have(a, b)),
-            remedy="name the conditions with --conditions, or compare campaigns that drove the same trajectories",
-        )
+        raise _nothing_in_common(a, b)
     return cells, left_out
 
 
-def _grouped(side: pd.DataFrame, keys: list[str]) -> dict[tuple[str, ...], pd.DataFrame]:
-    return {tuple(map(str, key)): rows for key, rows in side.groupby(keys, sort=False)}
-
-
-def _absolute(rows: pd.DataFrame, quantity: Quantity) -> Floats:
-    return np.asarray(rows[quantity.column].abs().to_numpy(dtype=float))
+def _sides(errors: pd.DataFrame, keys: list[str]) -> dict[_Key, Side]:
+    named = list(zip(*(errors[key].astype(str) for key in keys), strict=True))
+    absolute = {q.column: np.abs(errors[q.column].to_numpy(dtype=float)) for q in QUANTITIES}
+    session, target = errors["session"].to_numpy(dtype=object), errors[_TARGET].to_numpy(dtype=float)
+    sides = {}
+    for key in dict.fromkeys(named):
+        at = np.array([name == key for name in named])
+        sides[key] = Side({column: values[at] for column, values in absolute.items()}, session[at], target[at][0])
+    return sides
 
 
 def _counted(errors: pd.DataFrame, side: str) -> pd.DataFrame:
@@ -111,18 +128,26 @@ def _of_condition(errors: pd.DataFrame, condition: str, side: str) -> pd.DataFra
     return chosen
 
 
-def _same_target(a: pd.DataFrame, b: pd.DataFrame) -> bool:
-    apart = a[_TARGET].to_numpy(dtype=float)[0] - b[_TARGET].to_numpy(dtype=float)[0]
+def _same_target(a: Side, b: Side) -> bool:
+    apart = a.target - b.target
     apart[2] = np.angle(np.exp(1j * apart[2]))
     return bool(np.all(np.abs(apart) <= _TARGET_TOLERANCE))
 
 
-def _share_sessions(a: pd.DataFrame, b: pd.DataFrame) -> bool:
-    return bool(set(a["session"]) & set(b["session"])) and len(set(a["session"]) | set(b["session"])) > 1
+def _share_sessions(a: Side, b: Side) -> bool:
+    return bool(set(a.sessions) & set(b.sessions)) and len(set(a.sessions) | set(b.sessions)) > 1
+
+
+def _nothing_in_common(a: pd.DataFrame, b: pd.DataFrame) -> InputError:
+    return InputError(
+        "nothing to compare: no trajectory under the same condition with the same target in both",
+        value="; ".join(_have(a, b)),
+        remedy="name the conditions with --conditions, or compare campaigns that drove the same trajectories",
+    )
 
 
 def _have(a: pd.DataFrame, b: pd.DataFrame) -> Iterator[str]:
     for side, rows in (("A", a), ("B", b)):
-        pairs = rows[["trajectory", "condition"]].drop_duplicates()
-        shown = [f"{t} {c}" for t, c in pairs.itertuples(index=False)]
+        pairs: list[Any] = list(dict.fromkeys(zip(rows["trajectory"], rows["condition"], strict=True)))
+        shown = [f"{trajectory} {condition}" for trajectory, condition in pairs]
         yield f"{side} has {', '.join(shown[:4])}{', …' if len(shown) > 4 else ''}"

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from statistics import NormalDist
 
+import numpy as np
+
+from agvbench.statistics.rank_test import critical_pairs
+
 POWER = 0.9
-# The rank-sum test needs π/3 times the repeats of a t test on normal noise.
-_RANK_COST = math.pi / 3.0
+_DRAWS = 2000
+_MOST_SIMULATED = 100
 
 
 def smallest_visible_difference(sd: float, n_a: int, n_b: int, *, alpha: float, power: float = POWER) -> float:
-    """Return about which shift a one-sided rank-sum test of n_a against n_b repeats finds with probability `power`.
+    """Return which shift a one-sided rank-sum test of n_a against n_b repeats finds with probability `power`.
 
-    Infinite where even full separation would not be significant. Uses Student's t with the degrees of freedom of the
-    two samples, in its Cornish–Fisher expansion; within 15 % of simulation for 5 to 30 repeats of normal noise.
+    Infinite where even full separation would not be significant. For normal noise; about the same for heavier tails.
 
     Parameters
     ----------
@@ -27,9 +31,7 @@ def smallest_visible_difference(sd: float, n_a: int, n_b: int, *, alpha: float, 
     """
     if smallest_p(n_a, n_b) > alpha:
         return math.inf
-    normal = NormalDist()
-    quantile = _student_quantile(1.0 - alpha, n_a + n_b - 2) + normal.inv_cdf(power)
-    return sd * quantile * math.sqrt(_RANK_COST * (1.0 / n_a + 1.0 / n_b))
+    return sd * (_simulated if n_a + n_b <= _MOST_SIMULATED else _approximated)(n_a, n_b, alpha, power)
 
 
 def smallest_p(n_a: int, n_b: int) -> float:
@@ -50,9 +52,21 @@ def fewest_repeats(alpha: float) -> int:
     return next(n for n in range(1, 1000) if smallest_p(n, n) <= alpha)
 
 
-def _student_quantile(probability: float, freedom: int) -> float:
-    z = NormalDist().inv_cdf(probability)
-    first = (z**3 + z) / 4.0
-    second = (5.0 * z**5 + 16.0 * z**3 + 3.0 * z) / 96.0
-    third = (3.0 * z**7 + 19.0 * z**5 + 17.0 * z**3 - 15.0 * z) / 384.0
-    return z + first / freedom + second / freedom**2 + third / freedom**3
+@lru_cache(maxsize=256)
+def _simulated(n_a: int, n_b: int, alpha: float, power: float) -> float:
+    """Return the shift in standard deviations, over seeded draws of the two samples.
+
+    A shift is found where it exceeds as many of the differences a − b as the test demands, so that every draw has
+    one least shift that is found, and the share `power` of the draws has it below the result.
+    """
+    rng = np.random.default_rng(0)
+    a, b = rng.standard_normal((_DRAWS, n_a, 1)), rng.standard_normal((_DRAWS, 1, n_b))
+    apart = (a - b).reshape(_DRAWS, n_a * n_b)
+    demanded = critical_pairs(n_a, n_b, alpha) - 1
+    return float(np.quantile(np.partition(apart, demanded, axis=1)[:, demanded], power))
+
+
+def _approximated(n_a: int, n_b: int, alpha: float, power: float) -> float:
+    # The rank-sum test needs π/3 times the repeats of a t test on normal noise.
+    quantile = NormalDist().inv_cdf(1.0 - alpha) + NormalDist().inv_cdf(power)
+    return quantile * math.sqrt(math.pi / 3.0 * (1.0 / n_a + 1.0 / n_b))

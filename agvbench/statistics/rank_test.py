@@ -61,6 +61,21 @@ def rank_test(strata: Sequence[tuple[Floats, Floats]]) -> RankTest:
     return RankTest(p_greater, p_less, least, statistic / (2 * pairs))
 
 
+def critical_pairs(n_a: int, n_b: int, alpha: float) -> int:
+    """Return in how many of the n_a n_b pairs b must be larger to be significant at one-sided `alpha`, without ties.
+
+    One more than there are pairs where no outcome is significant.
+
+    >>> critical_pairs(5, 5, 0.01), critical_pairs(5, 5, 0.001)
+    (24, 26)
+    """
+    twice_ranks = tuple(range(2, 2 * (n_a + n_b) + 1, 2))
+    probability = _distribution(twice_ranks, n_b)[::2]
+    upper = np.cumsum(probability[::-1])[::-1]
+    significant = np.flatnonzero(upper <= alpha * (1.0 + 1e-9))
+    return int(significant[0]) if len(significant) else n_a * n_b + 1
+
+
 class _Stratum:
     """Twice Mann–Whitney's U of one stratum (an integer even with ties) and what its null distribution needs."""
 

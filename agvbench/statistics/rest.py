@@ -38,7 +38,7 @@ class RestPose:
 
 
 def start_pose(run: Run) -> RestPose:
-    """Return the pose at rest before the first command, from at most the last 0.5 s before it.
+    """Return the pose at rest before the first command, from the last 0.5 s in which it was seen.
 
     Raises
     ------
@@ -46,10 +46,10 @@ def start_pose(run: Run) -> RestPose:
         If no frame was tracked before the first command.
     """
     frames = _tracked(run.frames)
-    window = frames.select((frames.t_s <= 0.0) & (frames.t_s > -WINDOW_S))
-    if len(window) == 0:
+    before = frames.select(frames.t_s <= 0.0)
+    if len(before) == 0:
         raise FitError("no tracked frame at rest before the first command", where=run.run_id)
-    return _mean_pose(window)
+    return _mean_pose(before.select(before.t_s > before.t_s[-1] - WINDOW_S))
 
 
 def end_pose(run: Run) -> RestPose:
@@ -103,9 +103,9 @@ def _drift(window: Frames) -> tuple[float, float, float]:
     older, newer = np.arange(half), np.arange(half, len(window))
     moved = math.hypot(*(float(np.median(v[newer]) - np.median(v[older])) for v in (window.x_m, window.y_m)))
     apart_s = float(np.median(window.t_s[newer]) - np.median(window.t_s[older]))
-    # The scatter is read from differences of neighbours, which the motion itself hardly changes.
-    steps = np.concatenate([np.diff(window.x_m), np.diff(window.y_m)])
-    noise = _MAD_TO_SD * float(np.median(np.abs(steps))) / math.sqrt(2.0)
+    # The scatter is read from second differences, which steady motion does not change.
+    bends = np.concatenate([np.diff(window.x_m, 2), np.diff(window.y_m, 2)])
+    noise = _MAD_TO_SD * float(np.median(np.abs(bends))) / math.sqrt(6.0)
     tolerance = _LEAST_M + 4.0 * 1.2533 * noise * math.sqrt(2.0 / half)
     return moved, max(0.0, moved - tolerance) / apart_s, tolerance
 

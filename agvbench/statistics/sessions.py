@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from agvbench.statistics.cells import Cell
+from agvbench.statistics.cells import Cell, Side
 from agvbench.statistics.quantities import QUANTITIES, Quantity
-
-if TYPE_CHECKING:
-    import pandas as pd
+from agvbench.types import Floats
 
 _WITHIN = "the intervals cover the scatter between runs of a session, not what changes from one session to the next"
 _CAUSES = "re-mounted markers, battery, floor, a new calibration of the cameras"
@@ -40,12 +37,13 @@ def between_sessions_sd(cells: Sequence[Cell], quantity: Quantity) -> float:
     squares, freedom = 0.0, 0
     for cell in cells:
         for side in (cell.a, cell.b):
+            if len(side.sessions) == 1:
+                continue
             medians = _session_medians(side, quantity)
             squares += float(np.sum((medians - medians.mean()) ** 2))
             freedom += len(medians) - 1
     return math.sqrt(squares / freedom) if freedom else math.nan
 
 
-def _session_medians(side: pd.DataFrame, quantity: Quantity) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    medians = side[quantity.column].abs().groupby(side["session"]).median()
-    return np.asarray(medians.to_numpy(dtype=float))
+def _session_medians(side: Side, quantity: Quantity) -> Floats:
+    return np.array([float(np.median(side.values(quantity, session))) for session in side.sessions])

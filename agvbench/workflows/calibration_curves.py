@@ -1,0 +1,122 @@
+"""Calibration curves of a campaign: what was measured, and the maps that were fitted to it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from agvbench.campaign import Campaign
+from agvbench.errors import AgvbenchError
+from agvbench.types import Floats
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from agvbench.model import VehicleModel
+
+TABLE, VEHICLE = "calibration", "vehicle.toml"
+AXLES = {"front": ("front axle", "deg"), "rear": ("rear axle", "deg"), "drive": ("drive", "m/s")}
+_REQUIRED = ("axle", "command", "value")
+_TRUE = {"true", "1", "1.0", "yes"}
+_CURVE_POINTS = 240
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One axle: measured points, arrays of shape (n,), and the fitted map sampled, shape (m,) (empty: no model)."""
+
+    axle: str
+    unit: str
+    command: Floats
+    value: Floats
+    stderr: Floats
+    left_out: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    fitted: Floats
+    map_command: Floats
+    map_value: Floats
+
+
+@dataclass(frozen=True)
+class CalibrationCurves:
+    """All curves, what the maps are, and a sentence where something is absent."""
+
+    curves: list[Curve] = field(default_factory=list)
+    kinds: dict[str, str] = field(default_factory=dict)
+    why_absent: str = ""
+    model_name: str = ""
+    model_hash: str = ""
+
+
+def read_calibration_curves(campaign: Campaign) -> CalibrationCurves:
+    """Return the calibration curves of `campaign`, as far as its directory holds them; never raises for their absence.
+
+    The measurements are the table ``calibration`` (``axle`` front, rear or drive; ``command`` in vehicle units; ``value``
+    in deg or m/s; optional ``stderr``, ``run_id``, ``left_out``), the maps are those of ``vehicle.toml``.
+    """
+    if not any((campaign.path / f"{TABLE}{suffix}").exists() for suffix in (".parquet", ".csv")):
+        return CalibrationCurves(why_absent="The campaign holds no calibration measurements (table calibration).")
+    try:
+        table = campaign.table(TABLE)
+    except AgvbenchError as error:
+        return CalibrationCurves(why_absent=f"The calibration measurements cannot be read: {error}.")
+    missing = [name for name in _REQUIRED if name not in table.columns]
+    if missing:
+        return CalibrationCurves(why_absent=f"The calibration measurements lack the column {missing[0]}.")
+    model, why = _model(campaign)
+    curves = [curve for axle in AXLES if (curve := _curve(table, axle, model)) is not None]
+    kinds = {axle: getattr(model, axle).kind.replace("_", " ") for axle in AXLES} if model else {}
+    if not curves:
+        why = "The calibration measurements name no axle of front, rear and drive."
+    name, hashed = (model.name, model.calibration_hash) if model else ("", "")
+    return CalibrationCurves(curves, kinds, why, name, hashed)
+
+
+def _model(campaign: Campaign) -> tuple[VehicleModel | None, str]:
+    from agvbench.model import VehicleModel
+
+    path = campaign.path / VEHICLE
+    if not path.exists():
+        return None, f"The campaign holds no {VEHICLE}, so that no fitted curve is drawn."
+    try:
+        return VehicleModel.load(path), ""
+    except AgvbenchError as error:
+        return None, f"No fitted curve is drawn: {error}."
+
+
+def _curve(table: pd.DataFrame, axle: str, model: VehicleModel | None) -> Curve | None:
+    rows = table[table["axle"].astype(str) == axle]
+    command, value = _numbers(rows, "command"), _numbers(rows, "value")
+    usable = np.isfinite(command) & np.isfinite(value)
+    if not usable.any():
+        return None
+    left_out = np.array([str(v).lower() in _TRUE for v in rows.get("left_out", [False] * len(rows))], dtype=np.bool_)
+    none = np.empty(0)
+    fitted, map_command, map_value = none, none, none
+    if model is not None:
+        scale = 1.0 if axle == "drive" else 180.0 / math.pi
+        static_map = getattr(model, axle)
+        low, high = float(command[usable].min()), float(command[usable].max())
+        map_command = np.linspace(low, high, _CURVE_POINTS)
+        fitted, map_value = scale * static_map(command[usable]), scale * static_map(map_command)
+    return Curve(
+        axle,
+        AXLES[axle][1],
+        command[usable],
+        value[usable],
+        _numbers(rows, "stderr")[usable],
+        left_out[usable],
+        fitted,
+        map_command,
+        map_value,
+    )
+
+
+def _numbers(rows: pd.DataFrame, column: str) -> Floats:
+    import pandas as pd
+
+    if column not in rows.columns:
+        return np.full(len(rows), np.nan)
+    return np.asarray(pd.to_numeric(rows[column], errors="coerce").to_numpy(dtype=float, na_value=np.nan))

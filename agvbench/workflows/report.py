@@ -1,0 +1,123 @@
+"""``agvbench report``: everything a report says about a campaign, as numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from agvbench.campaign import Campaign, CampaignHeader
+from agvbench.errors import InputError
+from agvbench.statistics import Comparison, bias_and_spread, compare, end_pose_table, pose_errors, valid
+from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
+from agvbench.statistics.end_poses import in_order
+from agvbench.types import Run
+from agvbench.workflows.calibration_curves import CalibrationCurves, read_calibration_curves
+from agvbench.workflows.run_quality import run_quality
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Tracker = Callable[[Iterable[Run], int], Iterator[Run]]
+
+
+@dataclass(frozen=True)
+class ReportData:
+    """A campaign and all that was computed from it.
+
+    ``errors`` is what `pose_errors` returns, ``end_poses`` the table of tables 8.3–8.10, ``spread`` accuracy apart from
+    repeatability, ``comparisons`` every condition against the next one, ``quality`` one row per run. ``problems`` are
+    sentences about what could not be read or compared.
+    """
+
+    path: Path
+    header: CampaignHeader
+    runs: list[Run]
+    errors: pd.DataFrame
+    end_poses: pd.DataFrame
+    spread: pd.DataFrame
+    comparisons: list[Comparison]
+    quality: pd.DataFrame
+    curves: CalibrationCurves
+    provenance: dict[str, str] = field(default_factory=dict)
+    problems: list[str] = field(default_factory=list)
+
+    @property
+    def conditions(self) -> list[str]:
+        """Return the conditions of runs with a target, in their usual order."""
+        return in_order(self.errors["condition"])
+
+
+def gather(
+    path: str | Path, *, margin_mm: float = MARGIN_MM, margin_deg: float = MARGIN_DEG, track: Tracker | None = None
+) -> ReportData:
+    """Read the campaign in directory `path` and compute what a report says about it.
+
+    Parameters
+    ----------
+    path
+        A campaign directory.
+    margin_mm, margin_deg
+        The noise band of comparisons between conditions.
+    track
+        Wraps the runs while they are read, to show progress: called with the runs and their number.
+
+    Raises
+    ------
+    CampaignError
+        If the campaign cannot be read.
+    """
+    campaign = Campaign.open(path)
+    tracked = track(campaign, len(campaign)) if track else iter(campaign)
+    runs = list(tracked)
+    errors = pose_errors(runs)
+    problems: list[str] = []
+    return ReportData(
+        path=campaign.path,
+        header=campaign.header,
+        runs=runs,
+        errors=errors,
+        end_poses=end_pose_table(errors),
+        spread=bias_and_spread(errors),
+        comparisons=_between_conditions(errors, margin_mm, margin_deg, problems),
+        quality=run_quality(runs, rate_hz=campaign.header.mocap_rate_hz),
+        curves=read_calibration_curves(campaign),
+        provenance=_provenance(campaign, problems),
+        problems=problems,
+    )
+
+
+def _between_conditions(
+    errors: pd.DataFrame, margin_mm: float, margin_deg: float, problems: list[str]
+) -> list[Comparison]:
+    comparisons = []
+    for pair in pairwise(in_order(valid(errors)["condition"])):
+        try:
+            comparisons.append(
+                compare(
+                    errors,
+                    errors,
+                    margin_mm=margin_mm,
+                    margin_deg=margin_deg,
+                    conditions=pair,
+                    same_campaign=True,
+                    names=pair,
+                )
+            )
+        except InputError:
+            problems.append(f"{pair[0]} and {pair[1]} cannot be compared: no trajectory was driven under both.")
+    return comparisons
+
+
+def _provenance(campaign: Campaign, problems: list[str]) -> dict[str, str]:
+    """Return the provenance table, if there is one, as names and values."""
+    if not any((campaign.path / f"provenance{suffix}").exists() for suffix in (".parquet", ".csv")):
+        return {}
+    try:
+        table = campaign.table("provenance")
+        return {str(row["name"]): str(row["value"]) for row in table.to_dict("records")}
+    except (InputError, KeyError) as error:
+        problems.append(f"The provenance table cannot be read: {error}.")
+        return {}

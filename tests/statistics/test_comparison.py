@@ -1,0 +1,231 @@
+"""What compare promises: hardly a false alarm, and no real shift of three standard deviations missed."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from statistics_samples import TARGETS, error_table
+
+from agvbench.errors import FlagError, InputError
+from agvbench.statistics import Verdict, compare
+from agvbench.statistics.comparison import ALL
+from agvbench.statistics.comparison_json import comparison_to_json
+from agvbench.statistics.words import describe, headline
+
+PAIRS = 200
+
+
+def normal(rng, sd=5.0):
+    return lambda n: rng.normal(0.0, sd, n)
+
+
+def heavy_tailed(rng, sd=5.0):
+    return lambda n: sd * rng.standard_t(3, n) / math.sqrt(3.0)
+
+
+def with_outliers(rng, sd=5.0):
+    return lambda n: np.where(rng.random(n) < 0.1, 20.0, 1.0) * rng.normal(0.0, sd, n)
+
+
+def find(comparison, trajectory, quantity="delta_s_mm", condition=None):
+    return next(
+        d
+        for d in comparison.differences
+        if d.trajectory == trajectory and d.quantity.column == quantity and condition in (None, d.condition)
+    )
+
+
+@pytest.mark.parametrize(
+    ("noise", "repeats"),
+    [
+        (heavy_tailed, 5),
+        (heavy_tailed, 10),
+        pytest.param(normal, 5, marks=pytest.mark.slow),
+        pytest.param(normal, 10, marks=pytest.mark.slow),
+        pytest.param(with_outliers, 10, marks=pytest.mark.slow),
+    ],
+)
+def test_two_campaigns_of_the_same_vehicle_report_a_regression_in_at_most_two_percent(noise, repeats):
+    draw = noise(np.random.default_rng(20 + repeats))
+    bias = {(t, c): (12.0, 1.0) for t in TARGETS for c in ("uncalibrated", "calibrated")}
+    alarms = 0
+    for _ in range(PAIRS):
+        a, b = (error_table(draw, repeats=repeats, shift=bias) for _ in range(2))
+        alarms += compare(a, b, margin_mm=0.0, margin_deg=0.0, resamples=2).is_regression
+    assert alarms <= 0.02 * PAIRS
+
+
+@pytest.mark.parametrize(("noise", "least"), [(normal, 0.9), pytest.param(heavy_tailed, 0.85, marks=pytest.mark.slow)])
+def test_a_shift_of_three_sd_in_one_of_twenty_eight_comparisons_is_found(noise, least):
+    draw = noise(np.random.default_rng(31))
+    base = {(t, c): (20.0, 2.0) for t in TARGETS for c in ("uncalibrated", "calibrated")}
+    worse = base | {("6_forward_right", "calibrated"): (35.0, 2.0)}
+    found = 0
+    for _ in range(PAIRS // 2):
+        comparison = compare(
+            error_table(draw, repeats=10, shift=base), error_table(draw, repeats=10, shift=worse), resamples=2
+        )
+        found += find(comparison, "6_forward_right", condition="calibrated").verdict is Verdict.WORSE
+    assert found >= least * PAIRS / 2
+
+
+@pytest.mark.parametrize("repeats", [5, 10])
+def test_a_shift_of_three_sd_everywhere_is_always_found(repeats):
+    draw = heavy_tailed(np.random.default_rng(32))
+    base = {(t, "calibrated"): (20.0, 2.0) for t in TARGETS}
+    worse = {(t, "calibrated"): (35.0, 2.0) for t in TARGETS}
+    make = {"repeats": repeats, "conditions": ("calibrated",)}
+    found = sum(
+        compare(
+            error_table(draw, shift=base, **make), error_table(draw, shift=worse, **make), resamples=2
+        ).is_regression
+        for _ in range(20)
+    )
+    assert found >= 19
+
+
+def test_the_four_verdicts_and_their_words():
+    rng = np.random.default_rng(33)
+    base = {("1_forward", "calibrated"): (50.0, 5.0)}
+    make = {"repeats": 10, "trajectories": ("1_forward", "2_backward"), "conditions": ("calibrated",)}
+    a = error_table(normal(rng, 2.0), shift=base, **make)
+
+    def against(mm, **options):
+        b = error_table(normal(rng, 2.0), shift={("1_forward", "calibrated"): (50.0 + mm, 5.0)}, **make)
+        comparison = compare(a, b, **options)
+        d = find(comparison, "1_forward")
+        return d.verdict, describe(d, comparison)
+
+    verdict, words = against(20.0)
+    assert verdict is Verdict.WORSE
+    assert words.endswith(" mm worse")
+    assert against(-20.0)[0] is Verdict.BETTER
+    assert against(0.0, margin_mm=5.0) == (Verdict.SAME, "the same to within 5.0 mm")
+    verdict, words = against(0.0, margin_mm=0.0)
+    assert verdict is Verdict.UNKNOWN
+    assert words.startswith("10 repeats cannot show a difference smaller than about ")
+    # Significant, but its estimate lies inside the noise band, and repeats do not prove it to be inside either.
+    verdict, words = against(6.0, margin_mm=8.0)
+    assert verdict in (Verdict.SAME, Verdict.UNKNOWN)
+
+
+def test_too_few_repeats_are_said_aloud():
+    rng = np.random.default_rng(34)
+    make = {"repeats": 3, "trajectories": ("1_forward",), "conditions": ("calibrated",)}
+    a = error_table(normal(rng), **make)
+    b = error_table(normal(rng), shift={("1_forward", "calibrated"): (500.0, 0.0)}, **make)
+    comparison = compare(a, b)
+    assert not comparison.could_compare
+    assert not comparison.is_regression
+    assert headline(comparison) == (
+        "Could not compare: 3 repeats cannot show any difference here, however large; 5 of each could."
+    )
+
+
+def test_a_difference_within_the_margin_is_no_regression_however_significant():
+    rng = np.random.default_rng(35)
+    make = {"repeats": 60, "trajectories": ("1_forward",), "conditions": ("calibrated",)}
+    a = error_table(normal(rng, 1.0), shift={("1_forward", "calibrated"): (50.0, 5.0)}, **make)
+    b = error_table(normal(rng, 1.0), shift={("1_forward", "calibrated"): (53.0, 5.0)}, **make)
+    assert compare(a, b, margin_mm=1.0).is_regression
+    wide = compare(a, b, margin_mm=6.0)
+    assert not wide.is_regression
+    assert find(wide, "1_forward").verdict is Verdict.SAME
+
+
+def test_a_small_change_everywhere_shows_in_all_trajectories_together():
+    rng = np.random.default_rng(36)
+    conditions = ("calibrated",)
+    base = {(t, "calibrated"): (30.0, 3.0) for t in TARGETS}
+    worse = {(t, "calibrated"): (34.0, 3.0) for t in TARGETS}
+    comparison = compare(
+        error_table(normal(rng), repeats=10, conditions=conditions, shift=base),
+        error_table(normal(rng), repeats=10, conditions=conditions, shift=worse),
+    )
+    assert find(comparison, ALL).verdict is Verdict.WORSE
+
+
+def test_outliers_are_named_and_not_dropped():
+    rng = np.random.default_rng(37)
+    make = {"repeats": 10, "trajectories": ("1_forward",), "conditions": ("calibrated",)}
+    a = error_table(normal(rng), **make)
+    b = a.copy()
+    b.loc[0, "delta_s_mm"] = 400.0
+    d = find(compare(a, b), "1_forward")
+    assert d.b.outliers == "1 high severe"
+    assert d.b.repeats == 10
+    assert d.a.outliers == "none"
+
+
+def test_conditions_are_compared_within_the_sessions_that_they_share():
+    # Sessions differ by far more than the conditions do: only within a session can the difference be seen.
+    rng = np.random.default_rng(38)
+    make = {"repeats": 30, "trajectories": ("1_forward",)}
+    table = error_table(normal(rng, 1.0), shift={("1_forward", "calibrated"): (6.0, 0.0)}, **make)
+    table["session"] = [f"s{repeat % 3}" for repeat in table["repeat"]]
+    table["delta_s_mm"] += 200.0 + 100.0 * (table["repeat"] % 3)
+    blind = compare(table, table, conditions=("uncalibrated", "calibrated"))
+    assert find(blind, "1_forward").verdict is Verdict.UNKNOWN
+    seen = compare(table, table, conditions=("uncalibrated", "calibrated"), same_campaign=True)
+    assert find(seen, "1_forward").verdict is Verdict.WORSE
+    assert find(seen, "1_forward").condition == "uncalibrated → calibrated"
+
+
+def test_notes_say_what_the_interval_means():
+    rng = np.random.default_rng(39)
+    a, b = (error_table(normal(rng), repeats=6) for _ in range(2))
+    assert "Each side is one session" in compare(a, b, resamples=2).notes[0]
+    assert "in the same campaign" in compare(a, b, same_campaign=True, resamples=2).notes[0]
+    a["session"] = [f"s{repeat % 2}" for repeat in a["repeat"]]
+    a.loc[a["repeat"] % 2 == 1, "delta_s_mm"] += 1000.0
+    assert "standard deviation of 70" in compare(a, b, resamples=2).notes[0]
+
+
+def test_what_only_one_side_has_is_left_out_and_said():
+    rng = np.random.default_rng(40)
+    a = error_table(normal(rng), repeats=6, trajectories=("1_forward", "2_backward"), conditions=("calibrated",))
+    b = error_table(normal(rng), repeats=6, trajectories=("1_forward", "5_forward_left"), conditions=("calibrated",))
+    comparison = compare(a, b)
+    assert comparison.left_out == ("2_backward calibrated: only in A", "5_forward_left calibrated: only in B")
+    assert {d.trajectory for d in comparison.differences} == {"1_forward"}
+
+
+def test_nothing_in_common_is_an_error_and_no_verdict():
+    rng = np.random.default_rng(41)
+    a = error_table(normal(rng), repeats=6, trajectories=("1_forward",), conditions=("calibrated",))
+    b = error_table(normal(rng), repeats=6, trajectories=("1_forward",), conditions=("corrected",))
+    with pytest.raises(InputError, match=r"nothing to compare.*A has 1_forward calibrated; B has 1_forward corrected"):
+        compare(a, b)
+    assert compare(a, b, conditions=("calibrated", "corrected")).differences
+    with pytest.raises(InputError, match="--conditions: B has no run under this condition: nominal"):
+        compare(a, b, conditions=("calibrated", "nominal"))
+    moved = a.assign(target_x_m=2.5)
+    with pytest.raises(InputError, match="nothing to compare"):
+        compare(a, moved)
+    with pytest.raises(InputError, match="B has no run that counts: none of 6 runs with a target is ok"):
+        compare(a, a.assign(status="rejected: gap"))
+
+
+@pytest.mark.parametrize("margin", [-1.0, math.nan, math.inf])
+def test_margins_that_cannot_be_used(margin):
+    rng = np.random.default_rng(42)
+    a = error_table(normal(rng), repeats=3)
+    with pytest.raises(FlagError, match="--margin-mm: margin cannot be used"):
+        compare(a, a, margin_mm=margin)
+
+
+def test_json_has_no_number_that_json_lacks():
+    rng = np.random.default_rng(43)
+    a, b = (error_table(normal(rng), repeats=2) for _ in range(2))
+    made = json.loads(json.dumps(comparison_to_json(compare(a, b)), allow_nan=False))
+    assert made["schema"] == 1
+    assert made["could_compare"] in (True, False)
+    assert made["differences"][0]["interval"]["low"] is None
+    assert {"trajectory", "condition", "verdict", "words", "p_worse"} <= set(made["differences"][0])
+
+
+def test_the_same_inputs_give_the_same_comparison():
+    rng = np.random.default_rng(44)
+    a, b = (error_table(heavy_tailed(rng), repeats=7) for _ in range(2))
+    assert comparison_to_json(compare(a, b)) == comparison_to_json(compare(a, b))
