@@ -138,7 +138,7 @@ def fit_circles(batch: ArrayLike | Sequence[ArrayLike], method: CircleMethod = "
     rows = kernel.fit_batch(*_flatten(batch), method == "landau_smith")
     reason = tuple(_complaints(rows))
     fits = rows[:, : kernel.ARC + 1].copy()
-    fits[[bool(text) for text in reason]] = np.nan
+    fits[np.array([text != "" for text in reason], dtype=np.bool_)] = np.nan
     return CircleFits(
         center=fits[:, kernel.CENTER_X : kernel.CENTER_Y + 1],
         radius=fits[:, kernel.RADIUS],
@@ -157,7 +157,10 @@ def _complaints(rows: Floats) -> list[str]:
         bow = (1.0 - np.cos(np.minimum(arc, 2.0 * np.pi) / 2.0)) / np.abs(curvature)
         certain = np.abs(curvature) >= MIN_CURVATURE_SIGMAS * rows[:, kernel.SE_CURVATURE]
         good = (points >= MIN_POINTS) & (arc >= MIN_ARC_RAD) & (bow >= MIN_BOW_SIGMAS * rms) & certain
-    return ["" if ok else _complaint(row, b) for ok, row, b in zip(good.tolist(), rows, bow.tolist(), strict=True)]
+    reasons = [""] * len(rows)
+    for k in np.flatnonzero(~good):
+        reasons[k] = _complaint(rows[k], float(bow[k]))
+    return reasons
 
 
 def _complaint(row: Floats, bow: float) -> str:

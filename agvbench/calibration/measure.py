@@ -1,0 +1,193 @@
+"""Axle angles and speed of one run."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from agvbench.calibration.axles import axle_angle_stderrs, axle_angles_from_curvature
+from agvbench.calibration.frames import FrameQuality, inspect_frames
+from agvbench.calibration.path import correlation_factor, fit_path, robust_slope, slope_stderr
+from agvbench.calibration.steady import MIN_FRAMES, Segment, driven_segment, steady_frames
+from agvbench.errors import FitError
+from agvbench.types import Command, Floats, Frames, Run
+from agvbench.vehicle.geometry import Geometry
+
+_STANDS_M = 0.01
+_STANDS_SIGMAS = 10.0
+_MAX_RMS_SHARE = 0.01
+_MAX_RMS_SIGMAS = 4.0
+
+
+@dataclass(frozen=True)
+class RunMeasurement:
+    """What a run at one command says about the vehicle.
+
+    ``front_rad``, ``rear_rad`` (counter-clockwise positive) and ``speed_mps`` of the marker centroid (backward
+    negative), each with its standard error; ``curvature_per_m`` (heading change per metre driven forward) and
+    ``sideslip_rad`` (direction of travel against heading) that the angles follow from; ``arc_rad`` turned and
+    ``rms_m`` about the path; ``begin_s``, ``end_s`` of the steady part and the ``frames_used`` of it. A vehicle that
+    stands still has no axle angles: they are NaN, and the speed is what its frames drift.
+    """
+
+    run_id: str
+    command: Command
+    front_rad: float
+    rear_rad: float
+    speed_mps: float
+    front_stderr_rad: float
+    rear_stderr_rad: float
+    speed_stderr_mps: float
+    curvature_per_m: float
+    curvature_stderr_per_m: float
+    sideslip_rad: float
+    sideslip_stderr_rad: float
+    arc_rad: float
+    rms_m: float
+    begin_s: float
+    end_s: float
+    frames_used: int
+    quality: FrameQuality
+
+    @property
+    def moves(self) -> bool:
+        """Whether the vehicle moved, so that its axle angles are known."""
+        return math.isfinite(self.front_rad)
+
+
+def measure_run(run: Run, geometry: Geometry, *, neutral: float | None = None) -> RunMeasurement:
+    """Measure both axle angles and the speed of a run in which one command was held (thesis fig. 7.1 and 7.2).
+
+    Frames are cleaned; from the steady part of the longest stretch of one command the path is fitted as a circle
+    that may be a line. The sideslip is the mean over all frames, without outliers, of the path's tangent against the
+    heading: the thesis takes the last frame's heading alone, √n times as noisy. Both axle angles follow from
+    curvature and sideslip (`axle_angles_from_curvature`), and the speed is the robust slope of arc length over time
+    (`robust_slope`). Standard errors are propagated, and widened where neighbouring frames share their error.
+
+    Parameters
+    ----------
+    run
+        Commands and frames; frames at rest before and after do no harm.
+    geometry
+        Where the axles are.
+    neutral
+        Command at which the vehicle stands; by default the drive command of the run's last row.
+
+    Raises
+    ------
+    FitError
+        If the run has no usable frames, held no command long enough, or did not follow one arc.
+    """
+    where = f"run {run.run_id}"
+    frames, quality = inspect_frames(run.frames)
+    if len(frames) < MIN_FRAMES or not len(run.commands):
+        raise FitError(
+            "too few frames to measure",
+            where=where,
+            value=f"{len(frames)} of {quality.frames} usable",
+            limit=f"at least {MIN_FRAMES}",
+        )
+    segment = driven_segment(run.commands, float(frames.t_s[-1]), neutral)
+    steady = steady_frames(frames, segment, where=where)
+    measure = _stands if _stands_still(steady) else _moves
+    return measure(run.run_id, segment, steady, geometry, quality)
+
+
+def _noise(points: Floats) -> float:
+    """Return the standard deviation of white noise on each axis, from second differences: motion hardly shows there."""
+    return float(np.median(np.abs(np.diff(points, n=2, axis=0)))) / (0.6745 * math.sqrt(6.0))
+
+
+def _stands_still(frames: Frames) -> bool:
+    """Return whether nothing in these frames is farther from the start than noise explains."""
+    points = np.column_stack([frames.x_m, frames.y_m])
+    blocks = np.array([block.mean(axis=0) for block in np.array_split(points, 8)])
+    farthest = float(np.max(np.hypot(*(blocks - blocks[0]).T)))
+    return farthest < max(_STANDS_M, _STANDS_SIGMAS * _noise(points) / math.sqrt(len(points) / 8.0))
+
+
+def _stands(run_id: str, segment: Segment, frames: Frames, geometry: Geometry, quality: FrameQuality) -> RunMeasurement:
+    heading, _ = _robust_mean_angle(frames.heading_rad)
+    forward = math.cos(heading) * frames.x_m + math.sin(heading) * frames.y_m
+    speed = robust_slope(frames.t_s, forward)
+    nan = math.nan
+    return RunMeasurement(
+        run_id=run_id,
+        command=segment.command,
+        front_rad=nan,
+        rear_rad=nan,
+        speed_mps=speed,
+        front_stderr_rad=nan,
+        rear_stderr_rad=nan,
+        speed_stderr_mps=slope_stderr(frames.t_s, forward, speed),
+        curvature_per_m=nan,
+        curvature_stderr_per_m=nan,
+        sideslip_rad=nan,
+        sideslip_stderr_rad=nan,
+        arc_rad=0.0,
+        rms_m=float(np.std(forward)),
+        begin_s=float(frames.t_s[0]),
+        end_s=float(frames.t_s[-1]),
+        frames_used=len(frames),
+        quality=quality,
+    )
+
+
+def _moves(run_id: str, segment: Segment, frames: Frames, geometry: Geometry, quality: FrameQuality) -> RunMeasurement:
+    points = np.column_stack([frames.x_m, frames.y_m])
+    path = fit_path(frames.t_s, points, where=f"run {run_id}")
+    length = float(np.ptp(path.along_m[path.used]))
+    limit_m = max(_MAX_RMS_SHARE * length, _MAX_RMS_SIGMAS * _noise(points))
+    if path.rms_m > limit_m:
+        raise FitError(
+            "the vehicle did not drive one arc",
+            where=f"run {run_id}",
+            value=f"{1e3 * path.rms_m:.1f} mm about a path of {1e3 * length:.0f} mm",
+            limit=f"{1e3 * limit_m:.1f} mm: {_MAX_RMS_SHARE:.0%} of the path, or {_MAX_RMS_SIGMAS:g} times the noise",
+            remedy="hold one command, on a level floor, in view of the cameras",
+        )
+    sideslip, sideslip_stderr = _robust_mean_angle((path.tangent_rad - frames.heading_rad)[path.used])
+    speed = robust_slope(frames.t_s[path.used], path.along_m[path.used])
+    curvature = path.curvature_per_m
+    # Over a full turn a wrong radius is a wrong way; over a short arc its angle makes up for it.
+    share = min(1.0, path.arc_rad**2 / 12.0) * path.curvature_stderr_per_m / max(abs(curvature), 1e-9)
+    speed_stderr = math.hypot(slope_stderr(frames.t_s[path.used], path.along_m[path.used], speed), speed * share)
+    if math.cos(sideslip) < 0.0:  # it looks away from where it goes: it drives backward
+        sideslip, speed, curvature = math.remainder(sideslip + math.pi, 2.0 * math.pi), -speed, -curvature
+    front, rear = axle_angles_from_curvature(curvature, sideslip, geometry)
+    front_stderr, rear_stderr = axle_angle_stderrs(
+        curvature, path.curvature_stderr_per_m, sideslip, sideslip_stderr, geometry
+    )
+    return RunMeasurement(
+        run_id=run_id,
+        command=segment.command,
+        front_rad=float(front),
+        rear_rad=float(rear),
+        speed_mps=speed,
+        front_stderr_rad=front_stderr,
+        rear_stderr_rad=rear_stderr,
+        speed_stderr_mps=speed_stderr,
+        curvature_per_m=curvature,
+        curvature_stderr_per_m=path.curvature_stderr_per_m,
+        sideslip_rad=sideslip,
+        sideslip_stderr_rad=sideslip_stderr,
+        arc_rad=path.arc_rad,
+        rms_m=path.rms_m,
+        begin_s=float(frames.t_s[0]),
+        end_s=float(frames.t_s[-1]),
+        frames_used=int(np.count_nonzero(path.used)),
+        quality=quality,
+    )
+
+
+def _robust_mean_angle(angle_rad: Floats) -> tuple[float, float]:
+    """Return the mean of angles in (−π, π] without those far off, and its standard error."""
+    first = math.atan2(float(np.mean(np.sin(angle_rad))), float(np.mean(np.cos(angle_rad))))
+    off = (angle_rad - first + math.pi) % (2.0 * math.pi) - math.pi
+    off = off - np.median(off) if len(off) else off
+    middle = float(np.median((angle_rad - first + math.pi) % (2.0 * math.pi) - math.pi))
+    near = off[np.abs(off) <= 5.0 * 1.4826 * max(float(np.median(np.abs(off))), 1e-12)]
+    stderr = float(np.std(near)) / math.sqrt(len(near)) * correlation_factor(near)
+    return math.remainder(first + middle + float(np.mean(near)), 2.0 * math.pi), stderr
