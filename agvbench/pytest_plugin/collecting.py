@@ -107,7 +107,7 @@ def phase(item: pytest.Item) -> int:
 
 def run_name(item: pytest.Item) -> str:
     """Return the run id of a benchmark: letters, digits, dots and dashes, the same in every session."""
-    return re.sub(r"[^A-Za-z0-9.]+", "-", item.name.removeprefix("bench_")).strip("-")
+    return re.sub(r"[^A-Za-z0-9.-]+", "-", item.name.removeprefix("bench_")).strip("-")
 
 
 def _check_names(items: Iterable[pytest.Item]) -> None:

@@ -27,11 +27,11 @@ def agvbench_repeat(request: pytest.FixtureRequest) -> int:
 @pytest.fixture(scope="session")
 def bench(request: pytest.FixtureRequest) -> Iterator[BenchSession]:
     """Open the bench session: rig, campaign and models. What cannot be set up ends the session with one line."""
-    from agvbench.running.opening import open_session
-
     config = request.config
     if hasattr(config, "workerinput"):
         pytest.fail("one vehicle drives one run at a time: leave -n out", pytrace=False)
+    from agvbench.running.opening import open_session
+
     try:
         with open_session(
             given_options(config),

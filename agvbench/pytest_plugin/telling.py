@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Generator
 
 import pytest
 
@@ -66,7 +66,7 @@ def _progress(session: pytest.Session) -> Progress | None:
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
-def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
     """Draw the progress line before each benchmark."""
     progress = _progress(item.session) if is_bench(item) else None
     if progress is not None:
@@ -75,7 +75,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
 
 
 @pytest.hookimpl(wrapper=True)
-def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Iterator[object]:
+def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, object, object]:
     """Count what was not driven, for a reason that is no failure, as skipped."""
     if not is_bench(pyfuncitem):
         return (yield)
@@ -88,9 +88,11 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Iterator[object]:
 
 
 @pytest.hookimpl(wrapper=True)
-def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Iterator[pytest.TestReport]:
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """Tell a user's error in one line instead of a traceback; mark reports of benchmarks."""
-    report: pytest.TestReport = yield
+    report = yield
     if is_bench(item):
         report.user_properties.append(("agvbench", item.name))
         if call.excinfo is not None and isinstance(call.excinfo.value, AgvbenchError):

@@ -9,7 +9,7 @@ from agvbench.campaign import CampaignWriter
 from agvbench.errors import LinkError
 from agvbench.model import VehicleModel
 from agvbench.running.campaign_time import CampaignTime
-from agvbench.running.drive import DEFAULT_TIMING, Drive, Timing, drive
+from agvbench.running.drive import DEFAULT_TIMING, Drive, Timing, drive, exchanged
 from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess
 from agvbench.running.records import DriveOrder, aborted_run, free_name, recorded_run
 from agvbench.running.settings import BenchSettings
@@ -55,8 +55,8 @@ class Bench:
     def run(self, order: DriveOrder) -> Run:
         """Drive `order` until an attempt counts; return the last attempt.
 
-        Attempts that an interrupted session recorded are not recorded again: in simulation they are driven
-        once more, so that the plant's wear and charge are what they were, and nowhere else are they driven.
+        Attempts that an interrupted session recorded are not driven again; a simulated plant repeats them unseen,
+        so that what wears or drains is as it was.
 
         Raises
         ------
@@ -94,18 +94,23 @@ class Bench:
 
     def _repeat_unseen(self, order: DriveOrder, run: Run) -> Run:
         if self._identity.simulated:
-            driven = self._drive(order, run.run_id, [])
-            self._time.has_run(run.started_s, driven.duration_s)
+            duration_s = float(str(run.extra["duration_s"]))
+            commands, until_s = exchanged(run.commands, self._neutral(order), duration_s, self._timing)
+            self.link.replay(run.run_id, commands, pose=order.start, until_s=until_s)
+            self._time.has_run(run.started_s, duration_s)
         return run
 
+    def _neutral(self, order: DriveOrder) -> Command:
+        """Return the command before a run: no drive, and the wheels as the run's first command has them."""
+        return order.commands.at(0)._replace(drive=self.nominal.neutral)
+
     def _drive(self, order: DriveOrder, run_id: str, seen: list[Frames]) -> Drive:
-        neutral = Command(self.nominal.neutral, *order.commands.at(0)[1:])
         return drive(
             self.link,
             order.commands,
-            neutral=neutral,
+            neutral=self._neutral(order),
             start=order.start,
-            run_key=run_id,
+            run_key=run_id if self._identity.simulated else None,
             timing=self._timing,
             seen=seen,
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from agvbench.calibration import calibrate
 from agvbench.campaign import Campaign, CampaignWriter
 from agvbench.errors import AgvbenchError, FitError
 from agvbench.model import VehicleModel
@@ -19,6 +18,8 @@ def calibrate_campaign(writer: CampaignWriter, *, maps: str) -> VehicleModel:
     FitError
         If the campaign's calibration runs do not determine the maps.
     """
+    from agvbench.calibration import calibrate
+
     try:
         calibration = calibrate(Campaign.open(writer.path), maps=maps)
     except AgvbenchError as error:

@@ -43,15 +43,15 @@ def drive(
     *,
     neutral: Command,
     start: Pose,
-    run_key: str,
+    run_key: str | None,
     timing: Timing = DEFAULT_TIMING,
     seen: list[Frames] | None = None,
 ) -> Drive:
     """Drive `commands` from `start` and return everything seen.
 
-    The last row of `commands` stops the vehicle. `run_key` names the run: in simulation all its randomness
-    follows from it. `seen` is filled batch by batch, for a caller who wants to keep what was seen of a run that
-    failed.
+    The last row of `commands` stops the vehicle. `run_key` names a simulated run, whose randomness follows from it;
+    None is for real vehicles, which stand at `start` already. `seen` is filled batch by batch, for a caller who wants
+    to keep what was seen of a run that failed.
 
     Raises
     ------
@@ -60,7 +60,8 @@ def drive(
     """
     batches = [] if seen is None else seen
     try:
-        link.reset(start, run_key=run_key)
+        if run_key is not None:
+            link.reset(start, run_key=run_key)
         batches.append(link.exchange(neutral, t_s=-timing.rest_before_s, hold_s=timing.rest_before_s))
         for i in range(len(commands) - 1):
             hold_s = float(commands.t_s[i + 1] - commands.t_s[i])
@@ -90,3 +91,17 @@ def _settle(link: VehicleLink, commands: Commands, batches: list[Frames], timing
 def _until(frames: Frames, end_s: float) -> Frames:
     """Leave out frames that were captured after the run's end."""
     return frames.select(np.asarray(frames.t_s <= end_s + 1e-9))
+
+
+def exchanged(
+    commands: Commands, neutral: Command, duration_s: float, timing: Timing = DEFAULT_TIMING
+) -> tuple[Commands, float]:
+    """Return every exchange that `drive` made for a run of `duration_s`, and when the last ended [s]."""
+    end_s = duration_s - timing.rest_before_s
+    settled_s = float(commands.t_s[-1]) + timing.settle_s
+    extra = max(0, round((end_s - settled_s) / timing.settle_step_s))
+    t_s = [-timing.rest_before_s, *commands.t_s, *(settled_s + k * timing.settle_step_s for k in range(extra))]
+    last = commands.at(len(commands) - 1)
+    rows = [neutral, *(commands.at(i) for i in range(len(commands))), *[last] * extra]
+    drive_, front, rear = np.array(rows, dtype=float).T
+    return Commands(np.array(t_s, dtype=float), drive_, front, rear), end_s

@@ -14,6 +14,7 @@ import pandas as pd
 from agvbench.adapters import open_rig
 from agvbench.bus.link import VehicleLink
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
+from agvbench.errors import VehicleError
 from agvbench.model import VehicleModel, thesis_vehicle
 from agvbench.planning import Workspace
 from agvbench.running.bench import Bench
@@ -53,7 +54,10 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
         seed=settings.seed,
         connect=settings.connect or None,
         lab=settings.lab,
+        command_unit=models["uncalibrated"].command_unit,
+        neutral=models["uncalibrated"].neutral,
     ) as link:
+        _check_unit(models["uncalibrated"], link)
         writer = _writer(directory, settings, _header(directory.name, models["uncalibrated"], link), resume=resume)
         bench = _bench(settings, models, link, writer)
         yield BenchSession(directory, models=models, workspace=workspace, bench=bench)
@@ -70,6 +74,18 @@ def _known_models(settings: BenchSettings) -> dict[str, VehicleModel]:
     if settings.calibration:
         models["calibrated"] = VehicleModel.load(settings.calibration)
     return models
+
+
+def _check_unit(nominal: VehicleModel, link: VehicleLink) -> None:
+    identity = link.identity()
+    if identity.command_unit != nominal.command_unit:
+        raise VehicleError(
+            "the vehicle takes commands in another unit than its file says",
+            where=nominal.name,
+            value=nominal.command_unit,
+            limit=identity.command_unit,
+            remedy="give the right file with --vehicle",
+        )
 
 
 def _header(name: str, nominal: VehicleModel, link: VehicleLink) -> CampaignHeader:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -75,7 +76,7 @@ class BenchSettings:
             ) from None
 
 
-def settings_for_resume(saved: BenchSettings, given: dict[str, Any]) -> BenchSettings:
+def settings_for_resume(saved: BenchSettings, given: Mapping[str, Any]) -> BenchSettings:
     """Return the saved settings, after checking that no option `given` on the command line contradicts them.
 
     Raises

