@@ -11,18 +11,23 @@ from agvbench.types import Floats, Pose, wrap_angle
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.kinematics import body_motion
 
+_SWEPT_STEP_M = 0.005
+
 
 def advance(leg: Leg, pose: tuple[float, float, float], after_s: Floats, geometry: Geometry) -> Floats:
     """Return the poses `after_s` seconds (n,) into a leg that begins at `pose`, shape (n, 3); heading unwrapped."""
-    speed, sideslip, yaw_rate = (
-        float(x) for x in body_motion(leg.front_rad, leg.rear_rad, leg.speed_mps, leg.speed_mps, geometry)
-    )
+    speed, sideslip, yaw_rate = _motion(leg, geometry)
     x, y, heading = pose
     turn = yaw_rate * after_s
     # The chord of an arc of angle 2a is its length times sin(a)/a, which is 1 on a straight.
     chord = speed * after_s * np.sinc(turn / (2.0 * np.pi))
     direction = heading + sideslip + 0.5 * turn
     return np.column_stack([x + chord * np.cos(direction), y + chord * np.sin(direction), heading + turn])
+
+
+def _motion(leg: Leg, geometry: Geometry) -> tuple[float, float, float]:
+    speed, sideslip, yaw_rate = body_motion(leg.front_rad, leg.rear_rad, leg.speed_mps, leg.speed_mps, geometry)
+    return float(speed), float(sideslip), float(yaw_rate)
 
 
 def sample(legs: Sequence[Leg], geometry: Geometry, step_s: float) -> Floats:
@@ -45,7 +50,27 @@ def end_pose(path: Floats) -> Pose:
     return Pose(x, y, wrap_angle(heading))
 
 
-def swept_points(path: Floats, geometry: Geometry) -> Floats:
-    """Return where the centres of both axles pass, shape (2n, 2): the floor that the vehicle's length needs."""
-    along = np.column_stack([np.cos(path[:, 3]), np.sin(path[:, 3])])
-    return np.concatenate([path[:, 1:3] + geometry.front_axle_m * along, path[:, 1:3] - geometry.rear_axle_m * along])
+def swept(legs: Sequence[Leg], geometry: Geometry) -> Floats:
+    """Return when and where the centres of both axles pass: the floor that the vehicle's length needs.
+
+    Returns
+    -------
+    t [s], x [m], y [m] in the start frame, shape (n, 3), a row of each axle every 5 mm of the centroid's path or less. Of circles driven over and over
+    only the first is there, so that hours need no more rows than minutes.
+    """
+    t, pose = 0.0, (0.0, 0.0, 0.0)
+    rows = [_axles(np.zeros(1), np.zeros((1, 3)), geometry)]
+    for leg in legs:
+        speed, _, yaw_rate = _motion(leg, geometry)
+        once_s = min(leg.duration_s, 2.0 * np.pi / abs(yaw_rate)) if yaw_rate else leg.duration_s
+        after = np.linspace(0.0, once_s, 2 + int(abs(speed) * once_s / _SWEPT_STEP_M))[1:]
+        rows.append(_axles(t + after, advance(leg, pose, after, geometry), geometry))
+        x, y, heading = advance(leg, pose, np.array([leg.duration_s]), geometry)[0].tolist()
+        t, pose = t + leg.duration_s, (x, y, heading)
+    return np.concatenate(rows)
+
+
+def _axles(t_s: Floats, poses: Floats, geometry: Geometry) -> Floats:
+    along = np.column_stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])])
+    front, rear = poses[:, :2] + geometry.front_axle_m * along, poses[:, :2] - geometry.rear_axle_m * along
+    return np.column_stack([np.repeat(t_s, 2), np.stack([front, rear], axis=1).reshape(-1, 2)])

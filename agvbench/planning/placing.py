@@ -84,27 +84,27 @@ def _rotated(points: Floats, heading: float) -> Floats:
     return np.asarray(points @ np.array([[c, s], [-s, c]]))
 
 
-def check_fits(points: Floats, t_s: Floats, start: Pose, workspace: Workspace, *, where: str) -> None:
+def check_fits(swept: Floats, start: Pose, workspace: Workspace, *, where: str) -> None:
     """Raise unless every point of a path that begins at `start` keeps the workspace's margin.
 
     Parameters
     ----------
-    points, t_s
-        Points that the vehicle passes, in the start frame, shape (n, 2), and when, shape (n,).
+    swept
+        When and where the vehicle passes, in the start frame, shape (n, 3): t [s], x [m], y [m].
 
     Raises
     ------
     PlanError
         Saying when and where the path comes too close to the edge.
     """
-    placed = _rotated(points, start.heading_rad) + np.array([start.x_m, start.y_m])
+    placed = _rotated(swept[:, 1:], start.heading_rad) + np.array([start.x_m, start.y_m])
     clearances = workspace.clearances(placed)
     if clearances.min() >= workspace.margin_m - 1e-6:
         return
     first = int(np.argmax(clearances < workspace.margin_m - 1e-6))
     x, y = placed[first]
     raise PlanError(
-        f"path leaves the workspace {workspace.name} after {t_s[first]:.1f} s at ({x:.2f}, {y:.2f}) m",
+        f"path leaves the workspace {workspace.name} after {swept[first, 0]:.1f} s at ({x:.2f}, {y:.2f}) m",
         where=where,
         value=f"at worst {_edge(clearances.min())}",
         limit=f"{workspace.margin_m:.2f} m inside",

@@ -11,7 +11,7 @@ from agvbench.errors import PlanError, VehicleError
 from agvbench.model import VehicleModel
 from agvbench.planning import raw
 from agvbench.planning.legs import Leg, legs_of
-from agvbench.planning.motion import end_pose, sample, swept_points
+from agvbench.planning.motion import end_pose, sample, swept
 from agvbench.planning.placing import best_start, check_fits, does_not_fit
 from agvbench.planning.trajectory import Trajectory
 from agvbench.planning.workspace import Workspace
@@ -46,6 +46,9 @@ class Plan:
         Start pose in the floor frame.
     geometry
         Where the vehicle's axles are.
+    swept
+        When and where the axles' centres pass in the start frame, shape (m, 3): t [s], x [m], y [m]; of circles driven
+        over and over only the first.
     """
 
     trajectory: Trajectory
@@ -56,6 +59,7 @@ class Plan:
     floor_m: tuple[float, float]
     start: Pose
     geometry: Geometry
+    swept: Floats
 
 
 def plan(
@@ -96,8 +100,8 @@ def plan(
     duration = float(commands.t_s[-1])
     expected = sample(legs, model.geometry, max(_STEP_S, duration / _MOST_ROWS))
     stated = trajectory.stated_target
-    swept = swept_points(expected, model.geometry)
-    width, height = np.ptp(swept, axis=0).tolist()
+    passed = swept(legs, model.geometry)
+    width, height = np.ptp(passed[:, 1:], axis=0).tolist()
     made = Plan(
         trajectory=trajectory,
         commands=commands,
@@ -107,12 +111,13 @@ def plan(
         floor_m=(width, height),
         start=_ORIGIN if start is None else start,
         geometry=model.geometry,
+        swept=passed,
     )
     if workspace is None:
         return made
     if start is None:
         return replace(made, start=place(made, workspace))
-    check_fits(swept, np.tile(expected[:, 0], 2), start, workspace, where=trajectory.name)
+    check_fits(passed, start, workspace, where=trajectory.name)
     return made
 
 
@@ -124,7 +129,7 @@ def place(made: Plan, workspace: Workspace) -> Pose:
     PlanError
         If the path does not fit, wherever it starts.
     """
-    start, distance = best_start(swept_points(made.expected, made.geometry), workspace)
+    start, distance = best_start(made.swept[:, 1:], workspace)
     if distance < workspace.margin_m - 1e-6:
         raise does_not_fit(distance, workspace, where=made.trajectory.name)
     return start

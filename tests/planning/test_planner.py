@@ -287,3 +287,29 @@ def test_a_slalom_comes_back_to_its_line(make, arcs, first):
     assert end[3] == pytest.approx(0.0 if arcs % 2 == 0 else end[3])
     assert end[1] == pytest.approx(chord * (arcs - 1), abs=1e-9)
     assert end[2] == pytest.approx(drop if arcs % 2 == 0 else 0.0, abs=1e-9)
+
+
+def test_floor_of_circles_does_not_depend_on_how_often_they_are_driven(make):
+    short, long = (
+        plan(make(endurance={"turn": "left", "radius_m": 1.0, "duration_s": hours * 3600.0}), NOMINAL)
+        for hours in (0.1, 50.0)
+    )
+    assert short.floor_m == long.floor_m
+    outer = math.hypot(1.0, FRONT_M)
+    assert long.floor_m == pytest.approx((2.0 * outer, 2.0 * outer), abs=1e-3)
+    assert len(long.expected) <= 20_002
+    assert len(long.swept) == len(short.swept)
+
+
+@quick
+@given(segments=some_segments)
+def test_swept_floor_holds_the_axles_of_the_expected_path(segments):
+    made = plan(from_segments(segments), NOMINAL)
+    _, x, y, heading = made.expected.T
+    for ahead in (FRONT_M, -REAR_M):
+        for path, swept in (
+            (x + ahead * np.cos(heading), made.swept[:, 1]),
+            (y + ahead * np.sin(heading), made.swept[:, 2]),
+        ):
+            assert swept.min() - 1e-3 <= path.min()
+            assert path.max() <= swept.max() + 1e-3
