@@ -55,8 +55,8 @@ def swept(legs: Sequence[Leg], geometry: Geometry) -> Floats:
 
     Returns
     -------
-    t [s], x [m], y [m] in the start frame, shape (n, 3), a row of each axle every 5 mm of the centroid's path or less. Of circles driven over and over
-    only the first is there, so that hours need no more rows than minutes.
+    t [s], x [m], y [m] in the start frame, shape (n, 3), a row of each axle every 5 mm of the centroid's path or
+    less. Of circles driven over and over only the first is there, so that hours need no more rows than minutes.
     """
     t, pose = 0.0, (0.0, 0.0, 0.0)
     rows = [_axles(np.zeros(1), np.zeros((1, 3)), geometry)]

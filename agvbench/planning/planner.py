@@ -92,6 +92,17 @@ def plan(
     PlanError
         If the vehicle cannot drive the trajectory, or not inside the workspace.
     """
+    made = _made(trajectory, model)
+    if workspace is None:
+        return made if start is None else replace(made, start=start)
+    if start is None:
+        return replace(made, start=place(made, workspace))
+    check_fits(made.swept, start, workspace, where=trajectory.name)
+    return replace(made, start=start)
+
+
+def _made(trajectory: Trajectory, model: VehicleModel) -> Plan:
+    """Return the plan that starts at the floor's origin."""
     if trajectory.commands is not None:
         commands, legs = raw.commands_and_legs(trajectory, model)
     else:
@@ -102,23 +113,17 @@ def plan(
     stated = trajectory.stated_target
     passed = swept(legs, model.geometry)
     width, height = np.ptp(passed[:, 1:], axis=0).tolist()
-    made = Plan(
+    return Plan(
         trajectory=trajectory,
         commands=commands,
         duration_s=duration,
         target=end_pose(expected) if stated is None else stated,
         expected=expected,
         floor_m=(width, height),
-        start=_ORIGIN if start is None else start,
+        start=_ORIGIN,
         geometry=model.geometry,
         swept=passed,
     )
-    if workspace is None:
-        return made
-    if start is None:
-        return replace(made, start=place(made, workspace))
-    check_fits(passed, start, workspace, where=trajectory.name)
-    return made
 
 
 def place(made: Plan, workspace: Workspace) -> Pose:

@@ -313,3 +313,12 @@ def test_swept_floor_holds_the_axles_of_the_expected_path(segments):
         ):
             assert swept.min() - 1e-3 <= path.min()
             assert path.max() <= swept.max() + 1e-3
+
+
+def test_after_a_pause_other_steering_is_set_before_the_drive_starts(make):
+    left, right = ({"kind": "arc", "turn": turn, "radius_m": 1.0, "angle_deg": 30.0} for turn in ("left", "right"))
+    commands = plan(make(segments=[left, {"kind": "pause", "duration_s": 2.0}, right]), NOMINAL).commands
+    # Rest, left, pause, steering to the right at rest, right, stop.
+    assert commands.drive.tolist() == [1500.0, 900.0, 1500.0, 1500.0, 900.0, 1500.0]
+    assert np.allclose(np.diff(commands.t_s)[[0, 2, 3]], [0.5, 2.0, 0.5])
+    assert commands.front[2] < 1500.0 < commands.front[3] == commands.front[4]
