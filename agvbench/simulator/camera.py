@@ -22,7 +22,10 @@ FIVE_MARKERS = ((0.150, 0.040), (0.110, -0.055), (0.010, 0.070), (-0.115, 0.030)
 tracker can tell them apart (thesis 6.1); the places themselves are free."""
 
 _SHARES = ("lost", "untracked", "doubled", "late", "wrong")
-_UNIFORMS = 12  # random numbers per frame, drawn whether needed or not: a frame's luck hangs on its number alone
+_OPTIONS = (  # in the order of `_camera_kernel`
+    *("rate_hz", "latency_s", "lost", "untracked", "burst_frames"),
+    *("doubled", "late", "late_s", "wrong", "wrong_m"),
+)
 
 
 @dataclass(frozen=True)
@@ -144,7 +147,7 @@ class Camera:
     def heading_noise_rad(self) -> float:
         """Standard deviation of a measured heading [rad]."""
         places = _centred(self.markers)
-        squares = np.abs(places) ** 2
+        squares = np.sum(places**2, axis=1)
         noise = np.broadcast_to(self.marker_noise_m, len(places))
         return float(math.sqrt(np.sum(squares * noise**2)) / np.sum(squares))
 
@@ -169,14 +172,16 @@ class Tracker:
     """
 
     def __init__(self, camera: Camera, rng: np.random.Generator, first_frame: int = 0) -> None:
+        from agvbench.simulator import _camera_kernel  # loads numba
+
         self.camera = camera
+        self._kernel = _camera_kernel
         self._noise, self._luck = (np.random.default_rng(int(seed)) for seed in rng.integers(2**63, size=2))
         self._next_frame = first_frame
         self._burst_left = 0
-        markers = _centred(camera.markers)
-        self._scale = np.repeat(np.broadcast_to(camera.marker_noise_m, len(markers)), 2)
-        self._spread = float(np.sum(np.abs(markers) ** 2))
-        self._fit = _fit_matrix(markers)
+        self._markers = _centred(camera.markers)
+        self._scale = np.broadcast_to(np.reshape(camera.marker_noise_m, (-1, 1)), self._markers.shape)
+        self._options = np.array([float(getattr(camera, name)) for name in _OPTIONS])
 
     def observe(self, t_s: Floats, poses: Floats) -> Frames:
         """Return what arrives of the frames captured at `t_s`, in order of arrival.
@@ -193,113 +198,28 @@ class Tracker:
         InputError
             If the shapes do not fit.
         """
-        t_s, poses = np.asarray(t_s, dtype=np.float64), np.asarray(poses, dtype=np.float64)
+        t_s = np.ascontiguousarray(t_s, dtype=np.float64)
+        poses = np.ascontiguousarray(poses, dtype=np.float64)
         if t_s.ndim != 1 or poses.shape != (len(t_s), 3):
             raise InputError(
                 "camera: times and poses do not fit", value=f"shapes {t_s.shape} and {poses.shape}",
                 limit="(n,) and (n, 3)",
             )  # fmt: skip
-        luck = self._luck.random((len(t_s), _UNIFORMS)).T
-        x, y, heading, residual = self._fit_bodies(poses)
-        self._misplace(luck, x, y, heading)
-        tracked = self._tracked(luck)
-        if not tracked.all():
-            for values in (x, y, heading, residual):
-                values[~tracked] = math.nan
-        numbers = np.arange(self._next_frame, self._next_frame + len(t_s))
-        self._next_frame += len(t_s)
-        frames = Frames(t_s, x, y, heading, tracked, numbers, residual, self._received(luck, t_s))
-        return self._deliver(frames, luck)
-
-    def _fit_bodies(self, poses: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        """Return x, y, heading and rms residual of the rigid body fitted to noisy markers.
-
-        Noise is drawn in the vehicle's frame, where it is as isotropic as in the floor's.
-        """
-        noise = self._noise.standard_normal((len(poses), len(self._scale))) * self._scale
-        ahead, left, cosine, sine = self._fit @ noise.T
-        cosine += self._spread
-        c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-        heading = poses[:, 2] + np.arctan2(sine, cosine)
-        count = len(self._scale) // 2
-        squares = 2.0 * (cosine - np.hypot(cosine, sine)) - count * (ahead**2 + left**2)
-        squares += np.einsum("ij,ij->i", noise, noise)
-        residual = np.sqrt(np.maximum(squares, 0.0) / count)
-        return poses[:, 0] + c * ahead - s * left, poses[:, 1] + s * ahead + c * left, _wrapped(heading), residual
-
-    def _misplace(self, luck: Floats, x: Floats, y: Floats, heading: Floats) -> None:
-        """Throw the wrong frames metres off, in place."""
-        wrong = np.flatnonzero(luck[0] < self.camera.wrong)
-        if len(wrong):
-            jump, angle = 2.0 * self.camera.wrong_m * luck[1, wrong], 2.0 * math.pi * luck[2, wrong]
-            x[wrong] += jump * np.cos(angle)
-            y[wrong] += jump * np.sin(angle)
-            heading[wrong] = 2.0 * math.pi * luck[3, wrong] - math.pi
-
-    def _tracked(self, luck: Floats) -> np.ndarray:
-        """Return which frames are tracked, and keep what is left of a burst."""
-        index = np.arange(luck.shape[1])
-        until = np.zeros(len(index))
-        begins = np.flatnonzero(luck[4] < self.camera.untracked)
-        if len(begins):
-            until[begins] = begins + _geometric(luck[5, begins], self.camera.burst_frames)
-            until = np.maximum.accumulate(until)
-        last = max(self._burst_left, int(until[-1]) if len(until) else 0)
-        tracked: np.ndarray = index >= np.maximum(until, self._burst_left)
-        self._burst_left = max(0, last - len(index))
-        return tracked
-
-    def _received(self, luck: Floats, t_s: Floats) -> Floats:
-        received: Floats = t_s + self.camera.latency_s
-        late = np.flatnonzero(luck[6] < self.camera.late)
-        if len(late):
-            received[late] -= self.camera.late_s * np.log1p(-luck[7, late])
-        return received
-
-    def _deliver(self, frames: Frames, luck: Floats) -> Frames:
-        """Return the frames as they arrive: some never, some twice, by the time received."""
-        arriving = np.flatnonzero(luck[8] >= self.camera.lost)
-        twice = arriving[luck[9, arriving] < self.camera.doubled]
-        received = frames.received_s[arriving]
-        if len(arriving) == len(frames) and not len(twice) and np.all(received[1:] >= received[:-1]):
-            return frames
-        if len(twice):
-            again = frames.received_s[twice] + luck[10, twice] / self.camera.rate_hz
-            arriving, received = np.concatenate((arriving, twice)), np.concatenate((received, again))
-        order = np.argsort(received, kind="stable")
-        delivered = frames.select(arriving[order])
-        delivered.received_s[:] = received[order]
-        return delivered
+        noise = self._noise.standard_normal((len(t_s), *self._scale.shape)) * self._scale
+        luck = self._luck.random((len(t_s), self._kernel.LUCK))
+        seen, tracked, received_s, order, self._burst_left = self._kernel.observe(
+            t_s, poses, noise, luck, self._markers, self._options, self._burst_left
+        )
+        numbers, self._next_frame = self._next_frame + order, self._next_frame + len(t_s)
+        x, y, heading, residual = seen[order].T.copy()
+        return Frames(t_s[order], x, y, heading, tracked[order], numbers, residual, received_s)
 
 
-def _centred(markers: tuple[tuple[float, float], ...]) -> np.ndarray:
-    """Return the markers about their centroid as complex numbers, forward + i left."""
+def _centred(markers: tuple[tuple[float, float], ...]) -> Floats:
+    """Return the markers about their centroid, shape (markers, 2)."""
     places = np.asarray(markers, dtype=np.float64)
-    centred: np.ndarray = (places - places.mean(axis=0)) @ np.array([1.0, 1.0j])
+    centred: Floats = places - places.mean(axis=0)
     return centred
-
-
-def _fit_matrix(markers: np.ndarray) -> Floats:
-    """Return the rows that turn marker noise (x0, y0, x1, …) into centroid x, y and Re, Im of Σ conj(m_j) n_j."""
-    count = len(markers)
-    rows = np.zeros((4, 2 * count))
-    rows[0, 0::2] = rows[1, 1::2] = 1.0 / count
-    rows[2, 0::2], rows[2, 1::2] = markers.real, markers.imag
-    rows[3, 0::2], rows[3, 1::2] = -markers.imag, markers.real
-    return rows
-
-
-def _geometric(uniform: Floats, mean: float) -> Floats:
-    """Return whole numbers from 1, geometric with the given mean."""
-    if mean <= 1.0:
-        return np.ones(len(uniform))
-    lengths: Floats = 1.0 + np.floor(np.log1p(-uniform) / math.log1p(-1.0 / mean))
-    return lengths
-
-
-def _wrapped(angle: Floats) -> Floats:
-    wrapped: Floats = math.pi - np.remainder(math.pi - angle, 2.0 * math.pi)
-    return wrapped
 
 
 def _in_range(name: str, value: float, low: float, high: float, unit: str) -> None:

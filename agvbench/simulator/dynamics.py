@@ -24,10 +24,10 @@ FRAME_STEPS = 24
 
 # The state: pose of the marker centroid, body, servos, charge; then the commands on their way.
 STATE_NAMES = (
-    *("x_m", "y_m", "heading_rad", "speed_mps", "windup_m"),
+    *("x_m", "y_m", "heading_rad", "speed_mps", "windup_m", "slack_m"),
     *("front_rad", "front_rate_rad_per_s", "rear_rad", "rear_rate_rad_per_s", "charge_ah"),
 )
-X, Y, HEADING, SPEED, WINDUP, FRONT_ANGLE, FRONT_RATE, REAR_ANGLE, REAR_RATE, CHARGE = range(10)
+X, Y, HEADING, SPEED, WINDUP, SLACK, FRONT_ANGLE, FRONT_RATE, REAR_ANGLE, REAR_RATE, CHARGE = range(11)
 MOVING = len(STATE_NAMES)
 AIMS = MOVING  # wheel speed, front and rear servo: what the latched command asks for
 QUEUE = AIMS + 3  # ring of pulse frames of 3 commands
@@ -42,14 +42,16 @@ STEPS, RING_HEAD = 0, 1
 FRONT, REAR, FORWARD, BACKWARD = 0, 9, 18, 23
 SLOPE, CUBIC, OFFSET, STOP_LOW, STOP_HIGH, COMPLIANCE, FREQUENCY, DAMPING, RATE_LIMIT = range(9)
 DEAD_BAND, KNEE, UNLOADED, FULL, ACCELERATION = range(5)
-SENSE, STIFFNESS, OVERRUN, REAR_RATIO, SCRUB, SCRUB_DRY, BRAKE, BRAKE_DRY, WINDUP_RATE, WINDUP_RELAXES = range(28, 38)
-FRONT_AXLE, REAR_AXLE, MARKER_LEFT, RELIEF, UNDERSTEER = range(38, 43)
-CAPACITY, RUNNING, DROOP, SHAPE = range(43, 47)
-NEUTRAL, COMMAND_LOW, COMMAND_HIGH, DELAY_FRAMES = range(50, 54)
+SENSE, STIFFNESS, OVERRUN, REAR_RATIO, SCRUB, SCRUB_DRY = range(28, 34)
+BRAKE, BRAKE_DRY, WINDUP_RATE, WINDUP_RELAXES, DRIVE_PLAY = range(34, 39)
+FRONT_AXLE, REAR_AXLE, MARKER_LEFT, RELIEF, UNDERSTEER = range(39, 44)
+CAPACITY, RUNNING, DROOP, SHAPE = range(44, 48)
+NEUTRAL, COMMAND_LOW, COMMAND_HIGH, DELAY_FRAMES = range(51, 55)
 
 _RELIEF_SPEED = 0.02  # m/s: reversing wheels have taken up the linkage's play above it
 _CREEP = 0.004  # m/s: dry friction is smooth below it
 _SECONDS_PER_HOUR = 3600.0
+_SLACK_OPENS = 0.05  # s: without power the drive train comes off its flanks within this
 _ROUNDING = 1e-9  # of a step: a call that ends this close to a grid point ends on it
 
 
@@ -119,8 +121,11 @@ def _derivative(p: Floats, play: Floats, state: Floats, at: Floats, out: Floats)
     spring = -p[WINDUP_RATE] * at[WINDUP]
     out[WINDUP] = -at[WINDUP] / p[WINDUP_RELAXES]
     if wheel != 0.0:
-        out[SPEED] = _powered(p, wheel, tan_front, tan_rear, speed) + spring
+        taken_up = min(1.0, at[SLACK] / p[DRIVE_PLAY]) if p[DRIVE_PLAY] > 0.0 else 1.0
+        out[SLACK] = abs(wheel) if taken_up < 1.0 else 0.0
+        out[SPEED] = taken_up**3 * _powered(p, wheel, tan_front, tan_rear, speed) + spring
     else:
+        out[SLACK] = -at[SLACK] / _SLACK_OPENS
         out[WINDUP] += speed
         out[SPEED] = spring - p[BRAKE] * speed - p[BRAKE_DRY] * math.tanh(speed / _CREEP)
     out[FRONT_ANGLE], out[REAR_ANGLE] = at[FRONT_RATE], at[REAR_RATE]

@@ -76,6 +76,8 @@ class Drive:
     brake_dry_mps2: float
     windup_per_s2: float
     windup_relaxes_s: float
+    play_m: float
+    """Slack of the drive train, taken up at every start before the wheels pull."""
 
 
 @dataclass(frozen=True, slots=True)

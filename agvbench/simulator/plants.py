@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _DEG = math.pi / 180.0
 Draw = Callable[[float, float], float]
 
-_SERVO_FREQUENCY = 25.0  # rad/s, free: with the rate limit 60° take about 0.3 s, as a quarter-scale servo's do
+_SERVO_FREQUENCY = 16.0  # rad/s, free: with the rate limit 60° take about 0.3 s, as a quarter-scale servo's do
 _SERVO_DAMPING = 0.85  # free: hardly any overshoot
 _SERVO_RATE = 5.0  # rad/s, free: about 60° in 0.2 s
 
@@ -51,11 +51,11 @@ THESIS_VEHICLE = SimulatedVehicle(
     ),
     # Table 7.4: each half fitted by least squares; within 3.3 mm/s forward and 6 mm/s backward.
     forward=DriveSide(
-        dead_band=28.8, knee=152.0, unloaded_mps=0.4958, full_mps=0.3227,
+        dead_band=28.8, knee=152.0, unloaded_mps=0.4978, full_mps=0.3240,
         acceleration_mps2=1.04,  # 8.1: 0 to 0.3 m/s in 0.294 s
     ),
     backward=DriveSide(
-        dead_band=53.7, knee=144.6, unloaded_mps=0.4797, full_mps=0.3230,
+        dead_band=53.7, knee=144.6, unloaded_mps=0.4816, full_mps=0.3243,
         acceleration_mps2=0.94,  # free: a little less than forward
     ),
     drive=Drive(
@@ -63,8 +63,9 @@ THESIS_VEHICLE = SimulatedVehicle(
         stiffness_per_s=30.0,  # free: full speed is reached within 0.1 s of the end of the constant acceleration
         overrun=3.0, scrub=0.017, scrub_dry_mps=0.0027,  # appendix B, least squares over its 336 speeds
         rear_speed_ratio=1.01,  # free (thesis 9.2)
-        # 8.1: 0.32 to 0.02 m/s in 0.588 s, then a short movement backward (here 11 mm/s, 6 mm).
-        brake_per_s=2.0, brake_dry_mps2=0.02, windup_per_s2=6.45, windup_relaxes_s=0.3,
+        # 8.1: 0.32 to 0.02 m/s in 0.588 s, then a short movement backward (here 3 mm).
+        brake_per_s=3.2, brake_dry_mps2=0.02, windup_per_s2=2.35, windup_relaxes_s=0.5,
+        play_m=0.012,  # free (thesis 9.2: insufficiently tightened parts)
     ),
     body=Body(
         # Table 5.1 (0.181, 0.121 m), the centroid 4 mm further back: the angle of the axle that is not steered drifts
@@ -101,7 +102,7 @@ SMALL_VEHICLE = SimulatedVehicle(
     backward=DriveSide(dead_band=0.10, knee=0.9, unloaded_mps=4.5, full_mps=2.0, acceleration_mps2=2.0),
     drive=Drive(
         sense=1.0, stiffness_per_s=4.0, overrun=1.5, rear_speed_ratio=1.0, scrub=0.05, scrub_dry_mps=0.0,
-        brake_per_s=2.5, brake_dry_mps2=0.3, windup_per_s2=0.0, windup_relaxes_s=0.3,
+        brake_per_s=2.5, brake_dry_mps2=0.3, windup_per_s2=0.0, windup_relaxes_s=0.3, play_m=0.0,
     ),
     body=Body(
         front_axle_m=0.060, rear_axle_m=0.115, marker_left_m=0.002, reverse_relief=0.0, understeer_s2_per_m2=0.06,
@@ -160,7 +161,8 @@ def random_vehicle(seed: int) -> SimulatedVehicle:
         backward=_random_side(full * draw(0.95, 1.05), draw),
         drive=replace(
             base.drive, rear_speed_ratio=draw(0.97, 1.03), overrun=draw(1.0, 3.5), scrub=draw(0.0, 0.04),
-            scrub_dry_mps=draw(0.0, 0.004), brake_per_s=draw(2.0, 4.0), windup_per_s2=draw(0.0, 6.0),
+            scrub_dry_mps=draw(0.0, 0.004), brake_per_s=draw(2.0, 4.0), windup_per_s2=draw(0.0, 3.0),
+            play_m=draw(0.0, 0.02),
         ),
         body=replace(
             base.body, front_axle_m=0.181 - lever, rear_axle_m=0.121 + lever, marker_left_m=draw(-0.005, 0.005),

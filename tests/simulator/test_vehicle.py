@@ -49,7 +49,8 @@ def test_the_integrator_reads_the_constants_where_they_are_packed():
     assert names[dynamics.FORWARD + dynamics.DEAD_BAND] == "forward.dead_band"
     assert names[dynamics.BACKWARD + dynamics.ACCELERATION] == "backward.acceleration_mps2"
     for group, constants in {
-        "drive": "SENSE STIFFNESS OVERRUN REAR_RATIO SCRUB SCRUB_DRY BRAKE BRAKE_DRY WINDUP_RATE WINDUP_RELAXES",
+        "drive": "SENSE STIFFNESS OVERRUN REAR_RATIO SCRUB SCRUB_DRY "
+        "BRAKE BRAKE_DRY WINDUP_RATE WINDUP_RELAXES DRIVE_PLAY",
         "body": "FRONT_AXLE REAR_AXLE MARKER_LEFT RELIEF UNDERSTEER",
         "battery": "CAPACITY RUNNING DROOP SHAPE",
     }.items():
