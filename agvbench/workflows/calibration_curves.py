@@ -51,10 +51,10 @@ class CalibrationCurves:
 
 
 def read_calibration_curves(campaign: Campaign) -> CalibrationCurves:
-    """Return the calibration curves of `campaign`, as far as its directory holds them; never raises for their absence.
+    """Return the calibration curves of `campaign`, as far as its directory holds them; their absence is no error.
 
-    The measurements are the table ``calibration`` (``axle`` front, rear or drive; ``command`` in vehicle units; ``value``
-    in deg or m/s; optional ``stderr``, ``run_id``, ``left_out``), the maps are those of ``vehicle.toml``.
+    The measurements are the table ``calibration`` (``axle`` front, rear or drive; ``command`` in vehicle units;
+    ``value`` in deg or m/s; optional ``stderr``, ``run_id``, ``left_out``), the maps are those of ``vehicle.toml``.
     """
     if not any((campaign.path / f"{TABLE}{suffix}").exists() for suffix in (".parquet", ".csv")):
         return CalibrationCurves(why_absent="The campaign holds no calibration measurements (table calibration).")

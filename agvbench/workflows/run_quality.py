@@ -16,9 +16,10 @@ if TYPE_CHECKING:
 def run_quality(runs: Sequence[Run], *, rate_hz: float) -> pd.DataFrame:
     """Return one row per run: what it is, its status, and how many frames were tracked, doubled and lost.
 
-    Columns ``run_id``, ``experiment``, ``trajectory``, ``condition``, ``status``, ``frames`` (that arrived), ``expected``
-    (between the first and the last capture time at `rate_hz`), ``tracked`` (distinct capture times with a pose),
-    ``doubled``, ``lost_share`` (of the expected frames, no pose came), ``longest_gap_s`` (NaN below two tracked frames).
+    Columns ``run_id``, ``experiment``, ``trajectory``, ``condition``, ``status``, ``frames`` (that arrived),
+    ``expected`` (between the first and the last capture time at `rate_hz`), ``tracked`` (distinct capture times
+    with a pose), ``doubled``, ``lost_share`` (the share of expected frames that brought no pose) and ``longest_gap_s``
+    (NaN below two tracked frames).
     """
     import pandas as pd
 

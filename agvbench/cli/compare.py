@@ -1,0 +1,56 @@
+"""Compare two campaigns (firmware, nights, vehicles), or two conditions of one.
+
+Says per trajectory and condition whether |Δs| and |Δδ| are better, the same within a margin, worse, or whether the
+repeats cannot say. Two campaigns that do not differ report a regression with a chance of at most 1 %.
+
+examples:
+  agvbench compare campaigns/last-night campaigns/tonight
+  agvbench compare A B --margin-mm 5 --margin-deg 0.5 --json comparison.json
+  agvbench compare A --conditions uncalibrated calibrated
+  agvbench compare A B --conditions calibrated corrected     calibrated of A, corrected of B
+
+exit codes: 0 no regression; 1 regression (with --fail-on any: any difference); 2 could not compare.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+HELP = "compare two campaigns, or two conditions: better, same, worse, or cannot say"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``agvbench compare``."""
+    parser.add_argument("a", metavar="A", type=Path, help="campaign directory to compare with")
+    parser.add_argument("b", metavar="B", type=Path, nargs="?", help="campaign directory that is judged")
+    parser.add_argument(
+        "--conditions", metavar=("OF_A", "OF_B"), nargs=2, help="compare this condition of A with that of B (or of A)"
+    )
+    parser.add_argument(
+        "--fail-on", choices=("regression", "any", "never"), default="regression", help="when to exit with 1"
+    )
+    parser.add_argument("--margin-mm", metavar="MM", type=float, help="noise band of distances (default: 2)")
+    parser.add_argument("--margin-deg", metavar="DEG", type=float, help="noise band of headings (default: 0.2)")
+    parser.add_argument("--json", metavar="F", type=Path, help="write the comparison as JSON, too")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Compare, print the comparison, and return its exit code."""
+    from rich.console import Console
+
+    from agvbench.reporting.console import print_comparison
+    from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
+    from agvbench.workflows.compare import compare_campaigns, exit_code, write_json
+
+    comparison = compare_campaigns(
+        arguments.a,
+        arguments.b,
+        conditions=tuple(arguments.conditions) if arguments.conditions else None,
+        margin_mm=MARGIN_MM if arguments.margin_mm is None else arguments.margin_mm,
+        margin_deg=MARGIN_DEG if arguments.margin_deg is None else arguments.margin_deg,
+    )
+    if arguments.json:
+        write_json(comparison, arguments.json)
+    print_comparison(Console(), comparison)
+    return exit_code(comparison, arguments.fail_on)

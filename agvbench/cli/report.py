@@ -1,0 +1,45 @@
+"""Report on a campaign: what calibration bought, and how sure that is.
+
+Writes report.html (one file, works offline, prints), report.md, tables/*.csv and *.tex, and campaign.rrd for
+the Rerun viewer, and prints a summary.
+
+examples:
+  agvbench report campaigns/tonight
+  agvbench report campaigns/tonight --out /tmp/report
+  rerun campaigns/tonight/report/campaign.rrd
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+HELP = "write the report of a campaign: HTML, tables, figures, Rerun recording"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``agvbench report``."""
+    parser.add_argument("campaign", metavar="DIR", type=Path, help="campaign directory")
+    parser.add_argument("--out", metavar="DIR", type=Path, help="where to write (default: report/ in the campaign)")
+    parser.add_argument("--margin-mm", metavar="MM", type=float, help="noise band of distances (default: 2)")
+    parser.add_argument("--margin-deg", metavar="DEG", type=float, help="noise band of headings (default: 0.2)")
+    parser.add_argument("--no-recording", action="store_true", help="leave out campaign.rrd")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the report and print its summary."""
+    from rich.console import Console
+
+    from agvbench.reporting import write_report
+    from agvbench.reporting.console import print_report
+    from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
+
+    report = write_report(
+        arguments.campaign,
+        arguments.out,
+        margin_mm=MARGIN_MM if arguments.margin_mm is None else arguments.margin_mm,
+        margin_deg=MARGIN_DEG if arguments.margin_deg is None else arguments.margin_deg,
+        recording=not arguments.no_recording,
+    )
+    print_report(Console(), report)
+    return 0

@@ -1,0 +1,50 @@
+"""A comparison as a table: the same in reports and on the console."""
+
+from __future__ import annotations
+
+from agvbench.reporting.content import Column, Table, Value
+from agvbench.statistics import Comparison, Difference
+from agvbench.statistics.verdict import ALPHA_SAME
+from agvbench.statistics.words import describe
+
+
+def comparison_table(comparison: Comparison, slug: str) -> Table:
+    """Return `comparison` with one row per trajectory, condition and quantity."""
+    a, b = comparison.name_a, comparison.name_b
+    columns = (
+        Column("trajectory", "trajectory"),
+        Column("condition", "condition"),
+        Column("quantity", "error"),
+        Column("repeats_a", "n", 0, group=a),
+        Column("median_a", "median", 2, group=a),
+        Column("repeats_b", "n", 0, group=b),
+        Column("median_b", "median", 2, group=b),
+        Column("difference", "median", 2, group="difference"),
+        Column("low", "95 % from", 2, group="difference"),
+        Column("high", "to", 2, group="difference"),
+        Column("p_corrected", "p (Holm)", 4),
+        Column("cliffs_delta", "Cliff's δ", 2),
+        Column("verdict", "verdict"),
+        Column("words", "in words"),
+    )
+    rows = [_row(d, comparison) for d in comparison.differences]
+    note = (
+        f"Rank-sum tests, one-sided, exact for small samples, corrected after Holm for {comparison.tests} comparisons "
+        f"that could reach significance; {comparison.alpha:.0%} for any false alarm, "
+        f"{ALPHA_SAME:.0%} for each “same within margin”. Intervals are each for itself."
+    )
+    return Table(slug, f"{b} against {a}: smaller errors are better.", columns, rows, note=note)
+
+
+def _row(d: Difference, comparison: Comparison) -> list[Value]:
+    return [
+        d.trajectory,
+        d.condition,
+        f"|{d.quantity.symbol}| [{d.quantity.unit}]",
+        *(d.a.repeats, d.a.median, d.b.repeats, d.b.median),
+        *d.interval,
+        d.p_worse if d.interval.estimate > 0.0 else d.p_better,
+        d.cliffs_delta,
+        str(d.verdict),
+        describe(d, comparison),
+    ]

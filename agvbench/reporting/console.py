@@ -1,0 +1,94 @@
+"""The summary that a report prints on the console."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from agvbench.reporting.content import Column, Paragraph, Table, plain
+from agvbench.statistics.words import headline
+
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
+
+    from agvbench.reporting.write import WrittenReport
+    from agvbench.statistics import Comparison
+    from agvbench.workflows.report import ReportData
+
+_VERDICT_STYLES = {"better": "green", "worse": "bold red", "same": "cyan", "cannot": "dim"}
+_SHOWN = ("trajectory", "condition", "quantity", "median_a", "median_b", "difference", "low", "high", "verdict")
+
+
+def console_table(table: Table) -> RenderableType:
+    """Return `table` for rich; names are shown as they are, never read as markup or control codes."""
+    from rich import box
+    from rich.table import Table as RichTable
+    from rich.text import Text
+
+    shown = RichTable(title=Text(plain(table.caption)), box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
+    for column in table.columns:
+        heading = f"{column.group}\n{column.title}" if column.group else column.title
+        shown.add_column(Text(plain(heading)), justify="left" if column.digits is None else "right")
+    for row in table.shown_rows():
+        shown.add_row(*(_styled(cell, column) for cell, column in zip(row, table.columns, strict=True)))
+    return shown
+
+
+def comparison_summary(comparison: Comparison, slug: str = "comparison") -> RenderableType:
+    """Return the columns of a comparison that fit a console."""
+    from agvbench.reporting.comparison_table import comparison_table
+
+    whole = comparison_table(comparison, slug)
+    kept = [index for index, column in enumerate(whole.columns) if column.name in _SHOWN]
+    if len({d.condition for d in comparison.differences} - {"all"}) == 1:
+        kept.remove(1)
+    columns = [whole.columns[index] for index in kept]
+    return console_table(Table(slug, whole.caption, columns, [[row[i] for i in kept] for row in whole.rows]))
+
+
+def end_pose_summary(data: ReportData) -> RenderableType:
+    """Return medians and quartiles per trajectory and condition, with the thesis' medians."""
+    columns = (
+        Column("trajectory", "trajectory"),
+        Column("reading", "error"),
+        Column("condition", "condition"),
+        Column("repeats", "n", 0),
+        Column("q1", "Q1", 2),
+        Column("median", "MED", 2),
+        Column("q3", "Q3", 2),
+        Column("published_median", "MED", 2, group="thesis"),
+    )
+    rows = [[row[c.name] for c in columns] for row in data.end_poses.to_dict("records")]
+    return console_table(Table("end_poses", "End poses [mm, deg]", columns, rows))
+
+
+def print_report(console: Console, report: WrittenReport) -> None:
+    """Print what a report says in short, and where it is."""
+    from rich.text import Text
+
+    for comparison in report.data.comparisons:
+        console.print(comparison_summary(comparison))
+    if not report.data.comparisons:
+        console.print(end_pose_summary(report.data))
+    for block in report.sections[0].blocks:
+        if isinstance(block, Paragraph):
+            console.print(Text(block.text))
+    console.print(Text(f"wrote {report.files[0]} and {len(report.files) - 1} more files"), soft_wrap=True)
+
+
+def print_comparison(console: Console, comparison: Comparison) -> None:
+    """Print a comparison: table, what was left out, what intervals mean, and the answer last."""
+    from rich.text import Text
+
+    console.print(comparison_summary(comparison))
+    for line in comparison.left_out:
+        console.print(Text(f"left out: {plain(line)}", style="dim"))
+    for note in comparison.notes:
+        console.print(Text(note, style="dim"))
+    console.print(Text(headline(comparison), style="bold"))
+
+
+def _styled(cell: str, column: Column) -> RenderableType:
+    from rich.text import Text
+
+    style = _VERDICT_STYLES.get(cell.split(" ", maxsplit=1)[0], "") if column.name == "verdict" else ""
+    return Text(cell, style=style)

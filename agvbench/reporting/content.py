@@ -1,0 +1,126 @@
+"""What a section is made of, before it becomes HTML, Markdown, LaTeX, CSV or a console table."""
+
+from __future__ import annotations
+
+import math
+import unicodedata
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+Value = str | float | int | None
+_LONGEST = 120
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: its name in CSV, its title for people, decimals of its numbers (None: text), and a group of columns."""
+
+    name: str
+    title: str
+    digits: int | None = None
+    group: str = ""
+
+    def shown(self, value: Value) -> str:
+        """Return `value` as people read it: rounded, with a real minus sign, empty where there is none."""
+        if value is None or (isinstance(value, float) and math.isnan(value)):
+            return ""
+        if self.digits is None or isinstance(value, str):
+            return plain(str(value))
+        if math.isinf(value):
+            return "∞" if value > 0 else "−∞"
+        text = f"{value:.{self.digits}f}"
+        return text.removeprefix("-") if float(text) == 0.0 else text.replace("-", "−")
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows under columns. The first column's value heads a group of rows where ``grouped``."""
+
+    slug: str
+    caption: str
+    columns: Sequence[Column]
+    rows: Sequence[Sequence[Value]]
+    grouped: bool = False
+    note: str = ""
+
+    def shown_rows(self) -> list[list[str]]:
+        """Return every cell as people read it."""
+        return [[c.shown(v) for c, v in zip(self.columns, row, strict=True)] for row in self.rows]
+
+    def groups(self) -> list[tuple[str, list[list[str]]]]:
+        """Return the shown rows by their heading; one group without heading where the table is not grouped."""
+        if not self.grouped:
+            return [("", self.shown_rows())]
+        groups: dict[str, list[list[str]]] = {}
+        for row in self.shown_rows():
+            groups.setdefault(row[0], []).append(row[1:])
+        return list(groups.items())
+
+    @property
+    def body_columns(self) -> Sequence[Column]:
+        """Return the columns that stand beside each other: without the one that heads groups."""
+        return self.columns[1:] if self.grouped else self.columns
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One drawing of a figure: an SVG element made by this package, and a title."""
+
+    title: str
+    svg: str
+
+
+@dataclass(frozen=True)
+class FigureBlock:
+    """Panels beside each other, as many as fit; ``legend`` pairs names with the number of a condition's colour."""
+
+    slug: str
+    caption: str
+    panels: Sequence[Panel]
+    legend: Sequence[tuple[str, int]] = ()
+    wide: bool = False
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """A sentence or a few; ``lead`` is the one to read if only one is read."""
+
+    text: str
+    lead: bool = False
+
+
+@dataclass(frozen=True)
+class Bullets:
+    """Sentences of equal standing."""
+
+    items: Sequence[str]
+
+
+Block = Paragraph | Bullets | Table | FigureBlock
+
+
+@dataclass(frozen=True)
+class Content:
+    """A section ready to be rendered."""
+
+    slug: str
+    title: str
+    blocks: Sequence[Block] = field(default_factory=tuple)
+
+    @property
+    def tables(self) -> list[Table]:
+        """Return the section's tables."""
+        return [block for block in self.blocks if isinstance(block, Table)]
+
+
+def plain(text: str) -> str:
+    r"""Return `text` on one line, without control characters, and not longer than a line.
+
+    Names come from campaigns, which anyone may have written.
+
+    >>> plain("slalom\x1b\n 2") == "slalom\ufffd 2"
+    True
+    """
+    kept = "".join("\ufffd" if unicodedata.category(c) in {"Cc", "Cf", "Cs"} and not c.isspace() else c for c in text)
+    line = " ".join(kept.split())
+    return line if len(line) <= _LONGEST else f"{line[: _LONGEST - 1]}…"

@@ -1,0 +1,83 @@
+r"""Tables as LaTeX (booktabs), ready to be read by ``\input``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+
+from agvbench.reporting.content import Column, Table
+
+_SYMBOLS = {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "|": r"\textbar{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    '"': r"\textquotedbl{}",
+    "Δ": r"$\Delta$",
+    "δ": r"$\delta$",
+    "°": r"\textdegree{}",
+    "−": "$-$",
+    "→": r"$\to$",
+    "±": r"$\pm$",
+    "×": r"$\times$",
+    "∞": r"$\infty$",
+    "µ": r"\textmu{}",
+    "·": r"\textperiodcentered{}",
+    "…": r"\dots{}",
+    "–": "--",
+    "\u201c": "``",
+    "\u201d": "''",
+    "\ufffd": "?",
+}
+_SPECIAL = {c: f"\\{c}" for c in "&%$#_{}"} | _SYMBOLS
+
+
+def to_latex(table: Table) -> str:
+    r"""Return `table` as a ``table`` environment that needs the packages booktabs and textcomp."""
+    lines = [
+        "% needs \\usepackage{booktabs,textcomp}",
+        "\\begin{table}",
+        "\\centering\\footnotesize",
+        f"\\caption{{{escape(table.caption)}}}",
+        f"\\label{{tab:{table.slug}}}",
+        f"\\begin{{tabular}}{{{''.join('l' if c.digits is None else 'r' for c in table.body_columns)}}}",
+        "\\toprule",
+        *_head(table.body_columns),
+        "\\midrule",
+        *_body(table),
+        "\\bottomrule",
+        "\\end{tabular}",
+        "\\end{table}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def escape(text: str) -> str:
+    r"""Return `text` so that LaTeX sets it as it is.
+
+    >>> escape("50 % of {a_b}")
+    '50 \\% of \\{a\\_b\\}'
+    """
+    return "".join(_SPECIAL.get(c, c) for c in text)
+
+
+def _head(columns: Sequence[Column]) -> Iterator[str]:
+    if any(column.group for column in columns):
+        spans = [(group, len(list(members))) for group, members in groupby(columns, key=lambda c: c.group)]
+        yield _line(
+            [f"\\multicolumn{{{n}}}{{c}}{{{escape(group)}}}" if group else " & " * (n - 1) for group, n in spans]
+        )
+    yield _line([escape(column.title) for column in columns])
+
+
+def _body(table: Table) -> Iterator[str]:
+    for heading, rows in table.groups():
+        if heading:
+            yield _line([f"\\multicolumn{{{len(table.body_columns)}}}{{l}}{{\\textbf{{{escape(heading)}}}}}"])
+        yield from (_line([escape(cell) for cell in row]) for row in rows)
+
+
+def _line(cells: Sequence[str]) -> str:
+    return " & ".join(cells) + r" \\"

@@ -1,0 +1,40 @@
+"""What every report section promises."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import ClassVar
+
+from agvbench.reporting.content import Block, Content
+from agvbench.workflows.report import ReportData
+
+
+class Section(ABC):
+    """One section of a report, in its own file of this package.
+
+    A section turns numbers that are already there into blocks: it reads no files and computes no statistics. It never
+    raises for what a campaign lacks, but says in one sentence what is absent. Names that it shows come from
+    campaigns: blocks hold them as they are, renderers escape them.
+
+    Attributes
+    ----------
+    slug
+        Names the section in links; letters and hyphens.
+    title
+        Heads it.
+    order
+        Where it stands: sections come in ascending order.
+    """
+
+    slug: ClassVar[str]
+    title: ClassVar[str]
+    order: ClassVar[int]
+
+    @abstractmethod
+    def blocks(self, data: ReportData) -> Sequence[Block]:
+        """Return what the section says about `data`; at least one block."""
+
+    def content(self, data: ReportData) -> Content:
+        """Return the section ready to be rendered."""
+        return Content(self.slug, self.title, tuple(self.blocks(data)))

@@ -1,0 +1,64 @@
+"""Calibration curves with their residuals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from agvbench.reporting.content import Block, Column, FigureBlock, Panel, Paragraph, Table, Value
+from agvbench.reporting.figures.curves import draw_curve
+from agvbench.reporting.sections.base import Section
+from agvbench.workflows.calibration_curves import AXLES, Curve
+from agvbench.workflows.report import ReportData
+
+_COLUMNS = (
+    Column("axle", "axle"),
+    Column("map", "map"),
+    Column("points", "points", 0),
+    Column("left_out", "left out", 0),
+    Column("unit", "unit"),
+    Column("residual_sd", "residual sd", 3),
+    Column("largest_residual", "largest", 3),
+)
+_CAPTION = (
+    "Measured points with their standard errors and the fitted map; below, what the map leaves. "
+    "Crosses were left out of the fit."
+)
+
+
+class Calibration(Section):
+    """A panel and a row per axle."""
+
+    slug, title, order = "calibration", "Calibration", 80
+
+    def blocks(self, data: ReportData) -> Sequence[Block]:
+        """Return figure and table, or why there are none."""
+        curves, absent = data.curves.curves, data.curves.why_absent
+        blocks: list[Block] = [Paragraph(absent)] if absent else []
+        if not curves:
+            return blocks or [Paragraph("The campaign holds no calibration measurements.")]
+        unit = "µs" if data.header.command_unit == "us" else "–"
+        panels = [
+            Panel(AXLES[c.axle][0], draw_curve(c, f"curve-{c.axle}", command_label=f"command [{unit}]")) for c in curves
+        ]
+        blocks.append(FigureBlock("calibration-curves", _CAPTION, panels))
+        rows = [_row(curve, data.curves.kinds.get(curve.axle, "")) for curve in curves]
+        blocks.append(
+            Table("calibration_fits", "How well the maps fit the points they were fitted to.", _COLUMNS, rows)
+        )
+        return blocks
+
+
+def _row(curve: Curve, kind: str) -> list[Value]:
+    kept = ~curve.left_out
+    residuals = (curve.value - curve.fitted)[kept] if len(curve.fitted) else np.empty(0)
+    return [
+        AXLES[curve.axle][0],
+        kind,
+        len(curve.value),
+        int(curve.left_out.sum()),
+        curve.unit,
+        float(np.std(residuals)) if len(residuals) else None,
+        float(np.abs(residuals).max()) if len(residuals) else None,
+    ]

@@ -1,0 +1,54 @@
+"""End poses in the target frame, trajectory by trajectory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from agvbench.reporting.conditions import condition_numbers
+from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph, plain
+from agvbench.reporting.figures.end_pose import draw_end_poses
+from agvbench.reporting.sections.base import Section
+from agvbench.statistics import valid
+from agvbench.types import Floats, Pose
+from agvbench.workflows.report import ReportData
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_POSE = ("x_m", "y_m", "heading_rad")
+_CAPTION = (
+    "Where runs ended, seen from the target: ahead to the right, left upwards. Each line points along the heading "
+    "reached (horizontal is right); large outlined markers are medians."
+)
+
+
+class EndPoseFigure(Section):
+    """A panel per trajectory."""
+
+    slug, title, order = "end-pose-figure", "End poses seen from the target", 40
+
+    def blocks(self, data: ReportData) -> Sequence[Block]:
+        """Return the figure, or why there is none."""
+        counted, numbers = valid(data.errors), condition_numbers(data.conditions)
+        if counted.empty:
+            return [Paragraph("No end pose to draw.")]
+        legend = [(plain(c), n) for c, n in numbers.items() if c in set(counted["condition"])]
+        return [FigureBlock("end-pose-figure", _CAPTION, list(_panels(counted, numbers)), legend)]
+
+
+def _panels(counted: pd.DataFrame, numbers: dict[str, int]) -> Iterator[Panel]:
+    for index, name in enumerate(dict.fromkeys(counted["trajectory"])):
+        rows = counted[counted["trajectory"] == name]
+        ends = {n: _in_target_frame(rows[rows["condition"] == c]) for c, n in numbers.items()}
+        drawn = {n: points for n, points in ends.items() if len(points)}
+        yield Panel(plain(name), draw_end_poses(drawn, f"end-pose-{index}"))
+
+
+def _in_target_frame(rows: pd.DataFrame) -> Floats:
+    """Return mm ahead of the target, mm to its left and the heading error [rad], shape (n, 3)."""
+    ends, targets = (rows[[f"{side}_{axis}" for axis in _POSE]].to_numpy(dtype=float) for side in ("end", "target"))
+    seen = [Pose(*end).relative_to(Pose(*target)) for end, target in zip(ends, targets, strict=True)]
+    return np.array([[1e3 * x, 1e3 * y, heading] for x, y, heading in seen]).reshape(-1, 3)

@@ -1,0 +1,97 @@
+"""What calibration bought, in plain words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from agvbench.reporting.content import Block, Bullets, Paragraph, plain
+from agvbench.reporting.sections.base import Section
+from agvbench.statistics import Comparison, Difference, Verdict, valid
+from agvbench.statistics.comparison import ALL
+from agvbench.statistics.quantities import QUANTITIES
+from agvbench.statistics.words import describe
+from agvbench.workflows.report import ReportData
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_BOUGHT = {
+    ("uncalibrated", "calibrated"): "Calibration",
+    ("calibrated", "corrected"): "The correction",
+    ("uncalibrated", "corrected"): "Calibration and correction",
+}
+_MOST_NAMED = 6
+
+
+class Headline(Section):
+    """One sentence per pair of conditions, then what got worse and what the repeats could not say."""
+
+    slug, title, order = "headline", "In short", 10
+
+    def blocks(self, data: ReportData) -> Sequence[Block]:
+        """Return the sentences."""
+        lead = [Paragraph(sentence, lead=True) for sentence in _lead(data)]
+        details = [item for comparison in data.comparisons for item in _details(comparison)]
+        details += list(data.problems)
+        return [*lead, Bullets(details)] if details else lead
+
+
+def _lead(data: ReportData) -> list[str]:
+    if data.comparisons:
+        return [_bought(comparison) for comparison in data.comparisons]
+    counted = valid(data.errors)
+    if counted.empty:
+        return [f"None of the {len(data.runs)} runs has both a target and a measured end pose: no errors to report."]
+    return [
+        _reached(counted[counted["condition"] == c], plain(c))
+        for c in data.conditions
+        if c in set(counted["condition"])
+    ]
+
+
+def _bought(comparison: Comparison) -> str:
+    who = _BOUGHT.get((comparison.name_a, comparison.name_b), f"Going from {comparison.name_a} to {comparison.name_b}")
+    counted = [d for d in comparison.differences if d.trajectory != ALL]
+    trajectories = len({d.trajectory for d in counted})
+    where = f"on average over {trajectories} trajectories" if trajectories > 1 else f"on {counted[0].trajectory}"
+    moved = " and ".join(_moved(d) for d in _summary(comparison))
+    better, worse = (sum(d.verdict is v for d in counted) for v in (Verdict.BETTER, Verdict.WORSE))
+    score = f"Of {len(counted)} medians {better} improved beyond doubt, {worse} got worse"
+    return plain_sentences(f"{who} changed {moved}, {where}. {score}.")
+
+
+def _summary(comparison: Comparison) -> list[Difference]:
+    together = [d for d in comparison.differences if d.trajectory == ALL]
+    return together or list(comparison.differences)
+
+
+def _moved(d: Difference) -> str:
+    digits, unit = d.quantity.digits, d.quantity.unit
+    numbers = f"from {d.a.median:.{digits}f} to {d.b.median:.{digits}f} {unit}"
+    return f"the median |{d.quantity.symbol}| {numbers} ({d.verdict})"
+
+
+def _reached(rows: pd.DataFrame, condition: str) -> str:
+    medians = (f"|{q.symbol}| {np.median(rows[q.column].abs()):.{q.digits}f} {q.unit}" for q in QUANTITIES)
+    return f"Under the condition {condition}, {len(rows)} runs ended with median errors of {' and '.join(medians)}."
+
+
+def _details(comparison: Comparison) -> Iterator[str]:
+    pair = f"{comparison.name_a} → {comparison.name_b}"
+    for verdict, lead in ((Verdict.WORSE, "Worse"), (Verdict.UNKNOWN, "Cannot say")):
+        found = [d for d in comparison.of(verdict) if d.trajectory != ALL]
+        if found:
+            named = "; ".join(
+                f"{plain(d.trajectory)} |{d.quantity.symbol}| ({describe(d, comparison)})" for d in found[:_MOST_NAMED]
+            )
+            more = f"; and {len(found) - _MOST_NAMED} more" if len(found) > _MOST_NAMED else ""
+            yield f"{lead}, {pair}: {named}{more}."
+    yield from comparison.notes
+
+
+def plain_sentences(text: str) -> str:
+    """Return `text` on one line without control characters, of whatever length."""
+    return " ".join(plain(word) for word in text.split())

@@ -1,0 +1,44 @@
+"""Where the numbers come from: vehicle, firmware, model, program versions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from agvbench import __version__
+from agvbench.reporting.content import Block, Column, Table
+from agvbench.reporting.sections.base import Section
+from agvbench.workflows.report import ReportData
+
+_COLUMNS = (Column("name", "what"), Column("value", "value"))
+
+
+class Provenance(Section):
+    """One table."""
+
+    slug, title, order = "provenance", "Provenance", 100
+
+    def blocks(self, data: ReportData) -> Sequence[Block]:
+        """Return the table."""
+        rows = [[name, value] for name, value in _facts(data) if value]
+        return [Table("provenance", "Where these numbers come from.", _COLUMNS, rows)]
+
+
+def _facts(data: ReportData) -> Iterator[tuple[str, str]]:
+    header = data.header
+    yield "campaign", header.name
+    yield "directory", str(data.path)
+    yield "vehicle", header.vehicle_name
+    yield "axles before and behind the markers' centroid", f"{header.front_axle_m} m, {header.rear_axle_m} m"
+    yield "commands", f"{header.command_unit}, neutral {header.neutral:g}"
+    yield "motion capture", f"{header.mocap_rate_hz:g} Hz"
+    yield "firmware", _distinct(run.firmware for run in data.runs)
+    yield "sessions", _distinct(run.session or "" for run in data.runs)
+    yield "runs", f"{len(data.runs)}, over {max(run.started_s for run in data.runs) / 60.0:.0f} minutes"
+    yield "vehicle model", " ".join(filter(None, [data.curves.model_name, data.curves.model_hash]))
+    for name, value in data.provenance.items():
+        yield name.replace("_", " "), value
+    yield "report made by", f"agvbench {__version__}"
+
+
+def _distinct(names: Iterator[str]) -> str:
+    return ", ".join(dict.fromkeys(name for name in names if name))

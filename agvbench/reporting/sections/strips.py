@@ -1,0 +1,69 @@
+"""Every run's Δs and Δδ, by trajectory and condition."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from agvbench.reporting.conditions import condition_numbers
+from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph, plain
+from agvbench.reporting.figures.strips import Strip, draw_strips
+from agvbench.reporting.sections.base import Section
+from agvbench.statistics import valid
+from agvbench.statistics.published import CASES
+from agvbench.statistics.quantities import QUANTITIES, Quantity
+from agvbench.workflows.report import ReportData
+
+_CAPTION = (
+    "One point per run, signed; the bar is the median. Hollow diamonds are the thesis' medians, which were published "
+    "without sign for distances and straight drives: both readings are drawn."
+)
+
+
+class Strips(Section):
+    """One figure per quantity."""
+
+    slug, title, order = "strips", "Every run", 50
+
+    def blocks(self, data: ReportData) -> Sequence[Block]:
+        """Return the figures, or why there are none."""
+        if valid(data.errors).empty:
+            return [Paragraph("No errors to draw.")]
+        numbers = condition_numbers(data.conditions)
+        panels = [
+            Panel(
+                f"{q.symbol} [{q.unit}]",
+                draw_strips(_strips(data, q, numbers), f"strips-{q.column}", label=f"{q.symbol} [{q.unit}]"),
+            )
+            for q in QUANTITIES
+        ]
+        legend = [(plain(condition), number) for condition, number in numbers.items()]
+        return [FigureBlock("strips", _CAPTION, panels, legend, wide=True)]
+
+
+def _strips(data: ReportData, quantity: Quantity, numbers: dict[str, int]) -> list[Strip]:
+    counted = valid(data.errors)
+    published = data.end_poses[data.end_poses["quantity"] == quantity.column]
+    medians = {
+        (row["trajectory"], row["condition"]): _both_readings(row["published_median"], row["reading"], row["case"])
+        for row in published.to_dict("records")
+    }
+    strips = []
+    for name in dict.fromkeys(counted["trajectory"]):
+        for condition, number in numbers.items():
+            rows = counted[(counted["trajectory"] == name) & (counted["condition"] == condition)]
+            if len(rows):
+                values = rows[quantity.column].to_numpy(dtype=float)
+                strips.append(Strip(str(name), number, values, medians.get((name, condition), ())))
+    return strips
+
+
+def _both_readings(median: float, reading: str, case: float) -> Sequence[float]:
+    """Return the signed errors that a published median may mean."""
+    if not np.isfinite(median):
+        return ()
+    if reading == "rotation":
+        target = CASES[int(case)].heading_rad
+        return (float(np.sign(target)) * (median - abs(np.degrees(target))),)
+    return (-median, median)

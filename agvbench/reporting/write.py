@@ -1,0 +1,96 @@
+"""Write a report: HTML, Markdown, tables as CSV and LaTeX, and a recording for the Rerun viewer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from agvbench.errors import FileError
+from agvbench.reporting.content import Content, plain
+from agvbench.reporting.csv_table import frame_to_csv, to_csv
+from agvbench.reporting.html import to_html
+from agvbench.reporting.latex import to_latex
+from agvbench.reporting.markdown import to_markdown
+from agvbench.reporting.progress import track
+from agvbench.reporting.recording import write_recording
+from agvbench.reporting.sections import all_sections
+from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
+from agvbench.workflows.report import ReportData, gather
+
+HTML, MARKDOWN, RECORDING, TABLES = "report.html", "report.md", "campaign.rrd", "tables"
+
+
+@dataclass(frozen=True)
+class WrittenReport:
+    """What a report says, and the files that say it."""
+
+    data: ReportData
+    sections: Sequence[Content]
+    files: Sequence[Path]
+
+
+def write_report(
+    campaign_path: str | Path,
+    out: str | Path | None = None,
+    *,
+    margin_mm: float = MARGIN_MM,
+    margin_deg: float = MARGIN_DEG,
+    recording: bool = True,
+) -> WrittenReport:
+    """Write the report of the campaign in `campaign_path` into the directory `out`.
+
+    Parameters
+    ----------
+    campaign_path
+        A campaign directory.
+    out
+        Made if it is not there; without it, ``report`` in the campaign directory. Files of an earlier report are
+        replaced.
+    margin_mm, margin_deg
+        The noise band of comparisons between conditions.
+    recording
+        Whether to write the ``.rrd``, which takes most of the disk space.
+
+    Raises
+    ------
+    CampaignError
+        If the campaign cannot be read.
+    FileError
+        If `out` cannot be written.
+    """
+    data = gather(
+        campaign_path,
+        margin_mm=margin_mm,
+        margin_deg=margin_deg,
+        track=lambda runs, total: track(runs, total, what="reading runs"),
+    )
+    registry = all_sections()
+    sections = [s.content(data) for s in track(registry, len(registry), what="drawing")]
+    out = data.path / "report" if out is None else Path(out)
+    try:
+        files = [_write(out / name, text) for name, text in _texts(data, sections)]
+        if recording:
+            write_recording(data, out / RECORDING)
+            files.append(out / RECORDING)
+    except OSError as error:
+        why = error.strerror or str(error)
+        raise FileError(f"cannot be written ({why})", where=out, remedy="choose another directory with --out") from None
+    return WrittenReport(data, sections, files)
+
+
+def _texts(data: ReportData, sections: Sequence[Content]) -> Iterator[tuple[str, str]]:
+    title = plain(data.header.name)
+    subtitle = f"{plain(data.header.vehicle_name)} · {len(data.runs)} runs"
+    yield HTML, to_html(title, subtitle, sections)
+    yield MARKDOWN, to_markdown(title, sections)
+    yield f"{TABLES}/pose_errors.csv", frame_to_csv(data.errors)
+    for table in (table for section in sections for table in section.tables):
+        yield f"{TABLES}/{table.slug}.csv", to_csv(table)
+        yield f"{TABLES}/{table.slug}.tex", to_latex(table)
+
+
+def _write(path: Path, text: str) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    return path
