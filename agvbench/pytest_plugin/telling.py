@@ -115,7 +115,8 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
     session = config.stash.get(SESSION, None)
     if session is None:
         return
-    from agvbench.reporting.after_bench import conclude, dry_run_table
+    from agvbench.reporting.after_bench import conclude
+    from agvbench.reporting.dry_run import dry_run_table
 
     if session.is_dry:
         terminalreporter.write_line(dry_run_table(session.planned))

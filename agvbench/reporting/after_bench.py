@@ -4,11 +4,28 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from agvbench.reporting.dry_run import dry_run_table
+from rich.console import Group
+from rich.text import Text
 
-__all__ = ["conclude", "dry_run_table"]
+from agvbench.errors import AgvbenchError
+from agvbench.reporting.console import end_pose_summary
+from agvbench.reporting.content import Paragraph
+from agvbench.reporting.text import as_text
+from agvbench.reporting.write import write_report
+from agvbench.workflows.report import gather
 
 
 def conclude(directory: Path, *, report: bool) -> str:
-    """Return the summary of the campaign in `directory`, after writing its report where that is wanted."""
-    return f"campaign: {directory}"
+    """Return the summary of the campaign in `directory`, after writing its report where that is wanted.
+
+    What cannot be reported is said, not raised: the campaign is recorded all the same.
+    """
+    try:
+        if not report:
+            return as_text(Group(end_pose_summary(gather(directory)), Text(f"campaign: {directory}")))
+        written = write_report(directory)
+    except AgvbenchError as error:
+        return f"no report: {error}\ncampaign: {directory}"
+    said = [Text(block.text) for block in written.sections[0].blocks if isinstance(block, Paragraph)]
+    where = [Text(f"campaign: {directory}"), Text(f"report:   {written.files[0]}")]
+    return as_text(Group(end_pose_summary(written.data), *said, Text(""), *where))

@@ -24,7 +24,7 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
         {"choices": ("interleaved", "blocked", "shuffled")},
         "order of runs (default: interleaved; the thesis drove blocked)",
     ),
-    ("--seed", {"type": int, "metavar": "N"}, "seed of everything random (default: 1)"),
+    ("--seed", {"type": int, "metavar": "N"}, "seed of everything random (default: 0)"),
     ("--full", _FLAG, "every pulse, configuration and repeat of the thesis' calibration"),
     ("--attempts", {"type": int, "metavar": "N"}, "attempts at a run that is rejected (default: 3)"),
     (

@@ -37,7 +37,7 @@ class BenchSettings:
     maps: str = "default"
     repeats: int = 0
     order: str = "interleaved"
-    seed: int = 1
+    seed: int = 0
     full: bool = False
     attempts: int = 3
     workspace: str = "circle:6.1"
