@@ -20,8 +20,6 @@ UNKNOWN_COUNT = -1
 def type_columns(table: pa.Table, columns: Sequence[Column], where: object) -> pa.Table:
     """Return `table` with its known columns as text, float64, int64 or bool; unknown columns stay as they are.
 
-    A missing number is NaN, a missing optional text null, a missing optional count −1, a missing flag false.
-
     Raises
     ------
     CampaignError
@@ -31,11 +29,30 @@ def type_columns(table: pa.Table, columns: Sequence[Column], where: object) -> p
     for column in columns:
         if column.name in names:
             index = names.index(column.name)
-            typed = _typed(table.column(index), column, where)
-            if typed is not table.column(index):
-                table = table.set_column(index, column.name, typed)
+            values = table.column(index)
+            if values.type != _TYPES[column.kind]:
+                table = table.set_column(index, column.name, _convert(values, column, where))
         elif column.required:
             raise _absent(column.name, names, where)
+    return table
+
+
+def fill_columns(table: pa.Table, columns: Sequence[Column], where: object) -> pa.Table:
+    """Return `table` without nulls in its known columns, but for optional text.
+
+    A missing number is NaN, a missing text empty, a missing optional count −1, a missing flag false.
+
+    Raises
+    ------
+    CampaignError
+        If a run_id or a required count is missing.
+    """
+    names = table.column_names
+    for column in columns:
+        if column.name in names:
+            index = names.index(column.name)
+            if table.column(index).null_count:
+                table = table.set_column(index, column.name, _fill(table.column(index), column, where))
     return table
 
 
@@ -44,15 +61,6 @@ def _absent(name: str, names: Sequence[str], where: object) -> CampaignError:
     found = f"it has {', '.join(names[:12])}{', …' if len(names) > 12 else ''}"
     remedy = f"rename its column {close[0]}" if close else "add it (docs/reference/campaign-directory.md)"
     return CampaignError(f"has no column {name} ({found})", where=where, remedy=remedy)
-
-
-def _typed(values: pa.ChunkedArray, column: Column, where: object) -> pa.ChunkedArray:
-    target = _TYPES[column.kind]
-    if values.type != target:
-        values = _convert(values, column, where)
-    if values.null_count:
-        values = _fill(values, column, where)
-    return values
 
 
 def _convert(values: pa.ChunkedArray, column: Column, where: object) -> pa.ChunkedArray:

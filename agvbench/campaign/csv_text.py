@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 
 import pyarrow as pa
@@ -13,8 +14,25 @@ MAX_BYTES = 4 << 30
 _DELIMITERS = {";": "semicolons", "\t": "tabs", "|": "bars"}
 
 
-def read_csv_text(path: Path, *, delimiter: str = ",", encoding: str = "utf-8", skip_rows: int = 0) -> pa.Table:
-    """Read a CSV with a header line; every column is text, empty cells are empty text.
+def read_csv_text(
+    path: Path,
+    *,
+    columns: Collection[str] | None = None,
+    delimiter: str = ",",
+    encoding: str = "utf-8",
+    skip_rows: int = 0,
+) -> pa.Table:
+    """Read a CSV with a header line; an empty cell of text is empty text.
+
+    Parameters
+    ----------
+    path
+        The file.
+    columns
+        The columns that stay text, for the caller to convert and to say which cell cannot be; by default all. The
+        others get the type that all their cells have.
+    delimiter, encoding, skip_rows
+        How it is written, and how many lines come before the header.
 
     Raises
     ------
@@ -23,13 +41,15 @@ def read_csv_text(path: Path, *, delimiter: str = ",", encoding: str = "utf-8", 
     """
     names = _header(path, delimiter, encoding, skip_rows)
     try:
+        text = dict.fromkeys(names if columns is None else columns, pa.string())
         return pa_csv.read_csv(
             path,
-            read_options=pa_csv.ReadOptions(encoding=encoding, skip_rows=skip_rows, use_threads=False),
-            parse_options=pa_csv.ParseOptions(delimiter=delimiter),
-            convert_options=pa_csv.ConvertOptions(
-                column_types=dict.fromkeys(names, pa.string()), strings_can_be_null=False
+            # The names come from here, not from the file, where spaces may surround them.
+            read_options=pa_csv.ReadOptions(
+                encoding=encoding, column_names=names, skip_rows=skip_rows + 1, use_threads=False
             ),
+            parse_options=pa_csv.ParseOptions(delimiter=delimiter),
+            convert_options=pa_csv.ConvertOptions(column_types=text, strings_can_be_null=False),
         )
     except (pa.ArrowException, UnicodeDecodeError) as error:
         reason = str(error).splitlines()[0].removeprefix("CSV parse error: ")[:120]
@@ -56,6 +76,8 @@ def _header(path: Path, delimiter: str, encoding: str, skip_rows: int) -> list[s
         raise FileError("encoding is unknown", where=path, value=encoding, remedy="give utf-8 or latin-1") from None
     if not line.strip() or "\0" in line:
         raise FileError("has no header line", where=path, remedy="give a CSV whose first line names its columns")
+    if not line.endswith(("\n", "\r")):
+        raise FileError("has a header and nothing else", where=path, remedy="give a CSV with rows")
     for other, plural in _DELIMITERS.items():
         if delimiter not in line and other != delimiter and other in line:
             raise FileError(

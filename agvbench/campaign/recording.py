@@ -12,7 +12,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from agvbench.campaign import units
-from agvbench.campaign.columns import UNKNOWN_COUNT, type_columns
+from agvbench.campaign.columns import UNKNOWN_COUNT, fill_columns, type_columns
 from agvbench.campaign.csv_text import read_csv_text
 from agvbench.campaign.gate import jumped
 from agvbench.campaign.mapping import ISO_8601, Flag, Mapping, quantities
@@ -120,7 +120,8 @@ class _Cells:
         text = self.text(column)
         if self.mapping.csv.decimal == ",":
             text = pc.replace_substring(text, ",", ".")
-        typed = type_columns(pa.table({column: text}), [Column(column, kind, required=False)], self.path)
+        known = [Column(column, kind, required=False)]
+        typed = fill_columns(type_columns(pa.table({column: text}), known, self.path), known, self.path)
         values: NDArray[Any] = typed[column].to_numpy()
         return values
 

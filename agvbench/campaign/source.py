@@ -9,7 +9,7 @@ from pathlib import Path
 import pyarrow as pa
 
 from agvbench.campaign.atomic import is_temporary
-from agvbench.campaign.columns import type_columns
+from agvbench.campaign.columns import fill_columns, type_columns
 from agvbench.campaign.csv_text import read_csv_text
 from agvbench.campaign.parquet import MAX_ROWS, read_parquet
 from agvbench.campaign.schema import Column
@@ -59,12 +59,12 @@ class Source:
         """
         tables, room = [], MAX_ROWS
         for file in self.files:
-            tables.append(type_columns(_read_file(file, room), columns, file))
+            tables.append(type_columns(_read_file(file, columns, room), columns, file))
             room -= tables[-1].num_rows
         if not tables:
             return type_columns(_nothing(columns), columns, self.path)
         try:
-            return pa.concat_tables(tables, promote_options="permissive")
+            whole = pa.concat_tables(tables, promote_options="permissive")
         except pa.ArrowException as error:
             reason = str(error).splitlines()[0][:120]
             raise CampaignError(
@@ -72,6 +72,7 @@ class Source:
                 where=self.path,
                 remedy="rename the column in some parts",
             ) from None
+        return fill_columns(whole, columns, self.path)
 
 
 def parts(directory: Path) -> tuple[Path, ...]:
@@ -80,9 +81,9 @@ def parts(directory: Path) -> tuple[Path, ...]:
     return tuple(sorted(files, key=lambda file: file.name))
 
 
-def _read_file(file: Path, max_rows: int) -> pa.Table:
+def _read_file(file: Path, columns: Sequence[Column], max_rows: int) -> pa.Table:
     if file.suffix == ".csv":
-        return read_csv_text(file)
+        return read_csv_text(file, columns=[column.name for column in columns])
     return read_parquet(file, max_rows=max_rows)
 
 

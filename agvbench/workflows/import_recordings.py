@@ -44,7 +44,7 @@ def run_import(mapping: str, files: Sequence[str], out: str) -> None:
     console = Console()
     console.print(_table(campaign.table(IMPORT_TABLE)))
     sessions = campaign.runs["session"].nunique()
-    console.print(f"{len(campaign)} runs in {sessions} sessions: {campaign.path}", soft_wrap=True)
+    console.print(f"runs: {len(campaign)}, sessions: {sessions}, campaign: {campaign.path}", soft_wrap=True)
 
 
 def _table(accounts: pd.DataFrame) -> Table:

@@ -97,6 +97,7 @@ CASES: Cases = {
     "recording-not-driven": ("no row that was driven", lambda: _import(armed=[0] * 60)),
     "recording-too-short": ("nothing long enough for a run", _mapping("shortest_s = 0.2", "shortest_s = 5.0")),
     "recording-no-rows": ("a header and nothing else", _text(lambda b: b.splitlines()[0] + b"\n")),
+    "recording-no-end": ("a header without even the end of its line", _text(lambda b: b.splitlines()[0])),
     "recording-unit": ("commands of −1…1 where µs are declared", lambda: _import(throttle=[0.5] * 60)),
     "out-not-empty": ("an output directory with something in it", _over_something),
 }

@@ -165,4 +165,4 @@ def test_the_command_tells_what_became_of_the_rows(tmp_path: Path, capsys: pytes
     out = capsys.readouterr().out
     assert "one.csv" in out
     assert "120" in out
-    assert "2 runs in 2 sessions" in out
+    assert "runs: 2, sessions: 2" in out
