@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from agvbench.reporting.content import Column, Table, Value
 from agvbench.statistics import Comparison, Difference
+from agvbench.statistics.comparison import ALL
 from agvbench.statistics.verdict import ALPHA_SAME
 from agvbench.statistics.words import describe
 
 
 def comparison_table(comparison: Comparison, slug: str) -> Table:
-    """Return `comparison` with one row per trajectory, condition and quantity."""
+    """Return `comparison` with one row per trajectory, condition (where there are several) and quantity."""
     a, b = comparison.name_a, comparison.name_b
-    columns = (
+    columns = [
         Column("trajectory", "trajectory"),
         Column("condition", "condition"),
         Column("quantity", "error"),
@@ -22,18 +23,21 @@ def comparison_table(comparison: Comparison, slug: str) -> Table:
         Column("difference", "median", 2, group="difference"),
         Column("low", "95 % from", 2, group="difference"),
         Column("high", "to", 2, group="difference"),
-        Column("p_corrected", "p (Holm)", 4),
-        Column("cliffs_delta", "Cliff's δ", 2),
         Column("verdict", "verdict"),
+        Column("p_corrected", "p (Holm)", 4, least=1e-4),
+        Column("cliffs_delta", "Cliff's δ", 2),
         Column("words", "in words"),
-    )
+    ]
     rows = [_row(d, comparison) for d in comparison.differences]
+    if len({d.condition for d in comparison.differences if d.trajectory != ALL}) == 1:
+        # Named in the headings of both sides already.
+        columns, rows = columns[:1] + columns[2:], [row[:1] + row[2:] for row in rows]
     note = (
         f"Rank-sum tests, one-sided, exact for small samples, corrected after Holm for {comparison.tests} comparisons "
         f"that could reach significance; {comparison.alpha:.0%} for any false alarm, "
         f"{ALPHA_SAME:.0%} for each “same within margin”. Intervals are each for itself."
     )
-    return Table(slug, f"{b} against {a}: smaller errors are better.", columns, rows, note=note)
+    return Table(slug, f"{b} against {a}: smaller errors are better.", columns, rows, grouped=True, note=note)
 
 
 def _row(d: Difference, comparison: Comparison) -> list[Value]:
@@ -43,8 +47,8 @@ def _row(d: Difference, comparison: Comparison) -> list[Value]:
         f"|{d.quantity.symbol}| [{d.quantity.unit}]",
         *(d.a.repeats, d.a.median, d.b.repeats, d.b.median),
         *d.interval,
+        str(d.verdict),
         d.p_worse if d.interval.estimate > 0.0 else d.p_better,
         d.cliffs_delta,
-        str(d.verdict),
         describe(d, comparison),
     ]

@@ -39,8 +39,6 @@ def comparison_summary(comparison: Comparison, slug: str = "comparison") -> Rend
 
     whole = comparison_table(comparison, slug)
     kept = [index for index, column in enumerate(whole.columns) if column.name in _SHOWN]
-    if len({d.condition for d in comparison.differences} - {"all"}) == 1:
-        kept.remove(1)
     columns = [whole.columns[index] for index in kept]
     return console_table(Table(slug, whole.caption, columns, [[row[i] for i in kept] for row in whole.rows]))
 

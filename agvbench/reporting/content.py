@@ -13,12 +13,16 @@ _LONGEST = 120
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its name in CSV, its title for people, decimals of its numbers (None: text), and a group of columns."""
+    """A column: its name in CSV, its title for people, decimals of its numbers (None: text), and a group of columns.
+
+    Numbers below ``least`` are shown as less than it (p-values).
+    """
 
     name: str
     title: str
     digits: int | None = None
     group: str = ""
+    least: float = -math.inf
 
     def shown(self, value: Value) -> str:
         """Return `value` as people read it: rounded, with a real minus sign, empty where there is none."""
@@ -28,6 +32,8 @@ class Column:
             return plain(str(value))
         if math.isinf(value):
             return "∞" if value > 0 else "−∞"
+        if value < self.least:
+            return f"<{self.least:.{self.digits}f}"
         text = f"{value:.{self.digits}f}"
         return text.removeprefix("-") if float(text) == 0.0 else text.replace("-", "−")
 

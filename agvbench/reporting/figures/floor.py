@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _ARROW_M = 0.22
+_FLATTEST, _TALLEST = 0.45, 1.1
 
 
 def draw_paths(paths: Mapping[int, Sequence[Floats]], name: str, *, target: Pose | None = None, size_in: float) -> str:
@@ -21,18 +23,37 @@ def draw_paths(paths: Mapping[int, Sequence[Floats]], name: str, *, target: Pose
 
     With `target` the paths start at the origin, and the start and the target are marked with their headings.
     """
-    figure = new_figure(size_in, size_in * 0.85)
+    low, high = _extent([path for group in paths.values() for path in group], target)
+    width, height = high - low
+    figure = new_figure(size_in, 0.55 + (size_in - 0.65) * height / width)
     axes = figure.add_subplot()
-    dress(axes, x="x [m]", y="y [m]")
+    dress(axes, x="x [m]", y="y [m]", size=10.0 if target else 9.0)
     for index, group in paths.items():
         line = _joined(group)
         axes.plot(line[:, 0], line[:, 1], color=colour(index), linewidth=0.9, alpha=0.75, solid_capstyle="round")
     if target is not None:
         _mark(axes, Pose(0.0, 0.0, 0.0), filled=False)
         _mark(axes, target, filled=True)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.margins(0.08)
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    axes.set_aspect("equal", adjustable="box")
+    axes.locator_params(nbins=6)
     return to_svg(figure, name)
+
+
+def _extent(paths: Sequence[Floats], target: Pose | None) -> tuple[Floats, Floats]:
+    """Return the corners of what is to be drawn: all paths and marks with a margin, neither too flat nor too tall."""
+    marks = [] if target is None else [(0.0, 0.0), target[:2], _tip(target)]
+    points = np.concatenate([*(path[:, :2] for path in paths), np.reshape(marks, (-1, 2))])
+    low, high = points.min(axis=0), points.max(axis=0)
+    width, height = high - low
+    least = np.array([max(width, height / _TALLEST, 0.1), max(height, _FLATTEST * width, 0.1)])
+    middle, half = (low + high) / 2.0, 0.54 * least
+    return middle - half, middle + half
+
+
+def _tip(pose: Pose) -> tuple[float, float]:
+    return pose.x_m + _ARROW_M * math.cos(pose.heading_rad), pose.y_m + _ARROW_M * math.sin(pose.heading_rad)
 
 
 def _joined(group: Sequence[Floats]) -> Floats:
@@ -42,7 +63,8 @@ def _joined(group: Sequence[Floats]) -> Floats:
 
 
 def _mark(axes: Axes, pose: Pose, *, filled: bool) -> None:
-    tip = pose.x_m + _ARROW_M * np.cos(pose.heading_rad), pose.y_m + _ARROW_M * np.sin(pose.heading_rad)
     ink = INK if filled else MUTED
-    axes.annotate("", tip, pose[:2], arrowprops={"arrowstyle": "->", "color": ink, "linewidth": 1.1, "shrinkA": 0})
+    axes.annotate(
+        "", _tip(pose), pose[:2], arrowprops={"arrowstyle": "->", "color": ink, "linewidth": 1.1, "shrinkA": 0}
+    )
     axes.plot(*pose[:2], marker="o", markersize=5, color=ink, markerfacecolor=ink if filled else PAPER, zorder=5)

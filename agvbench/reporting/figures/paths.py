@@ -42,7 +42,7 @@ def _smooth(poses: Floats) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     if len(poses) < _NEIGHBOURS:
         return np.ones(len(poses), dtype=np.bool_)
     half = _NEIGHBOURS // 2
-    padded = np.pad(poses[:, 1:3], ((half, half), (0, 0)), mode="edge")
+    padded = np.pad(poses[:, 1:3], ((half, half), (0, 0)), mode="reflect")
     windows = np.lib.stride_tricks.sliding_window_view(padded, _NEIGHBOURS, axis=0)
     away = np.hypot(*(poses[:, 1:3] - np.median(windows, axis=2)).T)
     smooth: np.ndarray[tuple[int], np.dtype[np.bool_]] = away <= _JUMP_M

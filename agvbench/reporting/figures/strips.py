@@ -35,9 +35,9 @@ def draw_strips(strips: Sequence[Strip], name: str, *, label: str) -> str:
     The thesis' medians, published without sign, are hollow diamonds on every side they may belong to.
     """
     heights, ticks = _layout(strips)
-    figure = new_figure(7.2, 0.75 + _ROW_IN * (max(heights, default=0.0) + 1.0))
+    figure = new_figure(6.4, 0.75 + _ROW_IN * (max(heights, default=0.0) + 1.0))
     axes = figure.add_subplot()
-    dress(axes, x=label, y="")
+    dress(axes, x=label, y="", size=9.0)
     axes.axvline(0.0, color=INK, linewidth=0.8)
     for strip, height in zip(strips, heights, strict=True):
         _draw(axes, strip, height)

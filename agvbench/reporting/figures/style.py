@@ -39,12 +39,12 @@ def new_figure(width_in: float, height_in: float) -> Figure:
     return Figure(figsize=(width_in, height_in), layout="constrained", facecolor="none")
 
 
-def dress(axes: Axes, *, x: str, y: str) -> None:
-    """Give `axes` the report's look and its labels."""
+def dress(axes: Axes, *, x: str, y: str, size: float = 10.0) -> None:
+    """Give `axes` the report's look and its labels, in type of `size` points."""
     axes.set_facecolor("none")
-    axes.set_xlabel(x, color=MUTED, fontsize=8)
-    axes.set_ylabel(y, color=MUTED, fontsize=8)
-    axes.tick_params(colors=MUTED, labelsize=8, length=2.5, width=0.6)
+    axes.set_xlabel(x, color=MUTED, fontsize=size)
+    axes.set_ylabel(y, color=MUTED, fontsize=size)
+    axes.tick_params(colors=MUTED, labelsize=size, length=2.5, width=0.6)
     axes.grid(color=GRID, linewidth=0.6)
     axes.set_axisbelow(True)
     for name, spine in axes.spines.items():

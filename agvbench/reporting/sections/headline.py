@@ -59,7 +59,7 @@ def _bought(comparison: Comparison) -> str:
     where = f"on average over {trajectories} trajectories" if trajectories > 1 else f"on {counted[0].trajectory}"
     moved = " and ".join(_moved(d) for d in _summary(comparison))
     better, worse = (sum(d.verdict is v for d in counted) for v in (Verdict.BETTER, Verdict.WORSE))
-    score = f"Of {len(counted)} medians {better} improved beyond doubt, {worse} got worse"
+    score = f"Of {len(counted)} medians {better or 'none'} improved beyond doubt, {worse or 'none'} got worse"
     return plain_sentences(f"{who} changed {moved}, {where}. {score}.")
 
 
