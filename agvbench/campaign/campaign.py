@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from agvbench.campaign.checks import check_commands, check_poses, check_runs
 from agvbench.campaign.header import FILE_NAME, CampaignHeader
 from agvbench.campaign.schema import COMMANDS, POSES, RUNS, TABLES
 from agvbench.campaign.source import Source
-from agvbench.campaign.timed import TimedTable
+from agvbench.campaign.timed import TimedTable, blank_untracked
 from agvbench.errors import CampaignError
 from agvbench.types import Commands, Frames, Pose, Run
 
@@ -85,7 +84,7 @@ class Campaign:
     @cached_property
     def _poses(self) -> TimedTable:
         source = self._sources["poses"]
-        rows = _blank_untracked(source.read(POSES))
+        rows = blank_untracked(source.read(POSES))
         table = TimedTable(source.path, rows, self.run_ids, in_parts=source.in_parts)
         check_poses(table, self._runs["status"].to_pylist(), self._commands.last("t_s"))
         return table
@@ -185,16 +184,3 @@ class Campaign:
             split=row.get("split") or None,
             extra={name: value for name, value in row.items() if name not in _KNOWN and value is not None},
         )
-
-
-def _blank_untracked(table: pa.Table) -> pa.Table:
-    """Give both signs of a lost frame, NaN and tracked = false, to every lost frame."""
-    names = ("x_m", "y_m", "heading_rad")
-    seen = table["tracked"]
-    for name in names:
-        seen = pc.and_(seen, pc.invert(pc.is_nan(table[name])))
-    if pc.all(seen).as_py() is not False:
-        return table
-    for name in names:
-        table = table.set_column(table.column_names.index(name), name, pc.if_else(seen, table[name], np.nan))
-    return table.set_column(table.column_names.index("tracked"), "tracked", seen)

@@ -128,7 +128,7 @@ def check_commands(commands: TimedTable, status: list[str], unit: CommandUnit) -
 
 
 def check_poses(poses: TimedTable, status: list[str], last_command_s: Floats) -> None:
-    """Check the poses table against the runs; `last_command_s` [s] has shape (runs,).
+    """Check the poses table, NaN where not tracked, against the runs; `last_command_s` [s] has shape (runs,).
 
     Raises
     ------
@@ -151,12 +151,14 @@ def check_poses(poses: TimedTable, status: list[str], last_command_s: Floats) ->
         values = poses.column(name)
         _refuse(poses, tracked & np.isinf(values), f"{name} is infinite", values, remedy="set tracked to false there")
     for name in ("x_m", "y_m"):
-        values = poses.column(name)
-        if tracked.any() and np.nanmedian(np.abs(values[tracked])) > FARTHEST_M:
-            where, limit = poses.path, f"a median within {FARTHEST_M:g} m"
-            value = f"median |{name}| {np.nanmedian(np.abs(values[tracked])):.6g}"
+        seen = np.abs(poses.column(name)[tracked])
+        if len(seen) and (median := float(np.median(seen))) > FARTHEST_M:
             raise CampaignError(
-                f"{name} is not in metres", where=where, value=value, limit=limit, remedy="convert from mm"
+                f"{name} is not in metres",
+                where=poses.path,
+                value=f"median |{name}| {median:.6g}",
+                limit=f"a median within {FARTHEST_M:g} m",
+                remedy="convert from mm",
             )
     _refuse(
         poses,

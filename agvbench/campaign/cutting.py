@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.campaign.mapping import Runs
+from agvbench.campaign.mapping_schema import Runs
 from agvbench.campaign.recording import Recording
 from agvbench.types import Floats
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.campaign.mapping import Gate
+from agvbench.campaign.mapping_schema import Gate
 from agvbench.types import Floats
 
 Indices = NDArray[np.int64]

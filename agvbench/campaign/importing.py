@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import datetime
 import fnmatch
-import hashlib
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from agvbench import __version__
+from agvbench.campaign.accounts import Account, account_for, sha256, why_nothing
 from agvbench.campaign.campaign import Campaign
 from agvbench.campaign.cutting import cut
 from agvbench.campaign.header import CampaignHeader
-from agvbench.campaign.mapping import FileRule, Mapping, find_mapping, load_mapping
+from agvbench.campaign.mapping import find_mapping, load_mapping
+from agvbench.campaign.mapping_schema import FileRule, Mapping
 from agvbench.campaign.parts import parts_of
 from agvbench.campaign.recording import Recording, read_recording
 from agvbench.campaign.writer import CampaignWriter, check_parts, refuse_occupied
@@ -61,7 +61,7 @@ def import_recordings(
     paths = _distinct(files)
     refuse_occupied(Path(out), "choose another directory")
     runs: list[Run] = []
-    accounts: list[dict[str, Any]] = []
+    accounts: list[Account] = []
     clock = _Clock(absolute=mapping.columns.time.clock == "absolute")
     for path in progress(paths):
         recording = read_recording(path, mapping)
@@ -69,9 +69,9 @@ def import_recordings(
         begin_s = clock.begin(recording)
         rule = _rule_for(path, mapping)
         runs += [_run(recording, rows, number, begin_s, mapping, rule) for number, rows in enumerate(pieces, start=1)]
-        accounts.append(_account(recording, pieces))
+        accounts.append(account_for(recording, pieces))
     if not runs:
-        raise FileError(_why_nothing(accounts), where=", ".join(path.name for path in paths), remedy=_REMEDY_NOTHING)
+        raise FileError(why_nothing(accounts), where=", ".join(path.name for path in paths), remedy=_REMEDY_NOTHING)
     for run in runs:
         check_parts(parts_of(run), Path(str(run.extra["source"])), mapping.vehicle.command_unit)
     return _write(Path(out), mapping.header(mapping_path), clock.from_zero(runs), accounts, mapping_path)
@@ -182,36 +182,7 @@ def _frames(recording: Recording, rows: slice, start_s: float) -> Frames:
     )
 
 
-def _account(recording: Recording, pieces: list[slice]) -> dict[str, Any]:
-    """Count each row once: used, or why not."""
-    used = np.zeros(len(recording), np.bool_)
-    for rows in pieces:
-        used[rows] = recording.usable[rows]
-    driven, seen = recording.driven, recording.seen
-    return {
-        "file": recording.path.name,
-        "rows": len(recording),
-        "not_driven": int(np.count_nonzero(~driven)),
-        "not_seen": int(np.count_nonzero(driven & ~seen)),
-        "jumped": int(np.count_nonzero(driven & recording.jumped)),
-        "too_short": int(np.count_nonzero(recording.usable & ~used)),
-        "used": int(np.count_nonzero(used)),
-        "runs": len(pieces),
-        "seconds": round(sum(float(recording.t_s[rows.stop - 1] - recording.t_s[rows.start]) for rows in pieces), 2),
-        "sha256": _sha256(recording.path),
-    }
-
-
-def _why_nothing(accounts: list[dict[str, Any]]) -> str:
-    reasons = ("not_driven", "not_seen", "jumped", "too_short")
-    totals = {reason: sum(account[reason] for account in accounts) for reason in reasons}
-    counted = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in totals.items())
-    return f"no run is left of {sum(account['rows'] for account in accounts)} rows ({counted})"
-
-
-def _write(
-    out: Path, header: CampaignHeader, runs: list[Run], accounts: list[dict[str, Any]], mapping_path: Path
-) -> Campaign:
+def _write(out: Path, header: CampaignHeader, runs: list[Run], accounts: list[Account], mapping_path: Path) -> Campaign:
     import pandas as pd
 
     writer = CampaignWriter.create(out, header)
@@ -219,12 +190,7 @@ def _write(
         writer.append(run)
     table = pd.DataFrame(accounts)
     table["mapping"] = mapping_path.name
-    table["mapping_sha256"] = _sha256(mapping_path)
+    table["mappingsha256"] = sha256(mapping_path)
     table["agvbench"] = __version__
     writer.write_table(IMPORT_TABLE, table)
     return Campaign.open(out).check()
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -1,196 +1,20 @@
-"""What a foreign recording's columns mean: the mapping of ``agvbench import``, in TOML (schema 1)."""
+"""Find, load and check the mapping of ``agvbench import``."""
 
 from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Literal
 
 import msgspec
 
 from agvbench.campaign import units
 from agvbench.campaign.explain import explain
-from agvbench.campaign.header import SCHEMA, CampaignHeader
+from agvbench.campaign.header import SCHEMA
+from agvbench.campaign.mapping_schema import ISO_8601, TABLES, Mapping, Quantity
 from agvbench.errors import FileError
-from agvbench.types import CommandUnit
-
-Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
-ISO_8601 = "iso8601"
 
 _SHIPPED = Path(__file__).parent / "mappings"
-_Positive = Annotated[float, msgspec.Meta(gt=0.0)]
-_NotNegative = Annotated[float, msgspec.Meta(ge=0.0)]
-
-
-class _Strict(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
-    """A table in which a misspelt key is an error."""
-
-
-class Vehicle(_Strict, frozen=True):
-    """As ``[vehicle]`` of ``campaign.toml``."""
-
-    name: str
-    front_axle_m: float
-    rear_axle_m: float
-    command_unit: CommandUnit
-    neutral: float
-
-
-class Mocap(_Strict, frozen=True):
-    """As ``[mocap]`` of ``campaign.toml``."""
-
-    rate_hz: _Positive
-
-
-class Prediction(_Strict, frozen=True):
-    """As ``[prediction]`` of ``campaign.toml``."""
-
-    horizon_s: _Positive
-    stride_s: _Positive | None = None
-
-
-class Csv(_Strict, frozen=True):
-    """How the text is written."""
-
-    delimiter: Annotated[str, msgspec.Meta(min_length=1, max_length=1)] = ","
-    decimal: Literal[".", ","] = "."
-    encoding: str = "utf-8"
-    skip_rows: Annotated[int, msgspec.Meta(ge=0)] = 0
-
-
-class Time(_Strict, frozen=True):
-    """The capture time: ``clock`` "absolute" runs through all files, "file" starts anew in each."""
-
-    column: str
-    unit: str
-    clock: Literal["file", "absolute"] = "file"
-
-
-class Quantity(_Strict, frozen=True):
-    """A measured column: SI value = cell · unit · scale + offset; a scale of −1 mirrors."""
-
-    column: str
-    unit: str
-    scale: float = 1.0
-    offset: float = 0.0
-
-
-class Signal(_Strict, frozen=True):
-    """A command column: command = cell · scale + offset, in the vehicle's command unit."""
-
-    column: str
-    scale: float = 1.0
-    offset: float = 0.0
-
-
-class Quaternion(_Strict, frozen=True):
-    """Orientation columns; the body axis that points forward, and the floor's axes among the tracker's."""
-
-    x: str
-    y: str
-    z: str
-    w: str
-    forward: Axis = "x"
-    floor_x: Axis = "x"
-    floor_y: Axis = "y"
-
-
-class Flag(_Strict, frozen=True):
-    """True on the rows whose cell equals a value."""
-
-    column: str
-    equals: bool | int | float | str
-
-
-class Columns(_Strict, frozen=True):
-    """Which column is what."""
-
-    time: Time
-    x: Quantity
-    y: Quantity
-    drive: Signal
-    front: Signal
-    rear: Signal | None = None
-    heading: Quantity | None = None
-    quaternion: Quaternion | None = None
-    mean_error: Quantity | None = None
-    frame: str | None = None
-    tracked: Flag | None = None
-    driven: Flag | None = None
-    cut: str | None = None
-
-
-class Gate(_Strict, frozen=True):
-    """What the vehicle cannot do between two frames, and how far noise may seem to carry it."""
-
-    max_speed_m_per_s: _Positive
-    max_yaw_rate_rad_per_s: _Positive
-    slack_m: _NotNegative = 0.02
-    slack_rad: _NotNegative = 0.1
-
-
-class Runs(_Strict, frozen=True):
-    """What the runs are called and where recordings are cut into them."""
-
-    experiment: str = "free"
-    trajectory: str = ""
-    condition: str = ""
-    firmware: str = ""
-    session: Literal["file", "day", "campaign"] = "file"
-    gap_s: _Positive = 0.5
-    shortest_s: _NotNegative = 1.0
-    longest_s: _Positive | None = None
-    command_hold_s: _NotNegative | None = None
-
-
-class FileRule(_Strict, frozen=True):
-    """What differs for the files whose name matches; the first that matches counts."""
-
-    match: str
-    experiment: str | None = None
-    trajectory: str | None = None
-    condition: str | None = None
-    firmware: str | None = None
-    session: str | None = None
-
-
-class Mapping(_Strict, frozen=True):
-    """A whole mapping file."""
-
-    schema: int
-    name: str
-    vehicle: Vehicle
-    mocap: Mocap
-    columns: Columns
-    prediction: Prediction | None = None
-    csv: Csv = Csv()
-    gate: Gate | None = None
-    runs: Runs = Runs()
-    files: list[FileRule] = []
-
-    def header(self, path: Path) -> CampaignHeader:
-        """Return the head of the campaign that this mapping, read from `path`, makes.
-
-        Raises
-        ------
-        CampaignError
-            If the vehicle's geometry is impossible.
-        """
-        prediction = self.prediction
-        return CampaignHeader.made_for(
-            path,
-            schema=SCHEMA,
-            name=self.name,
-            vehicle_name=self.vehicle.name,
-            front_axle_m=self.vehicle.front_axle_m,
-            rear_axle_m=self.vehicle.rear_axle_m,
-            command_unit=self.vehicle.command_unit,
-            neutral=self.vehicle.neutral,
-            mocap_rate_hz=self.mocap.rate_hz,
-            prediction_horizon_s=prediction.horizon_s if prediction else None,
-            prediction_stride_s=prediction.stride_s or prediction.horizon_s if prediction else None,
-        )
 
 
 def find_mapping(name: str | Path) -> Path:
@@ -230,7 +54,7 @@ def load_mapping(name: str | Path) -> Mapping:
     except OSError as error:
         raise FileError(f"cannot be read ({error.strerror})", where=path, remedy="check its permissions") from None
     except msgspec.ValidationError as error:
-        raise FileError(explain(error, _TABLES), where=path, remedy="see docs/how-to/import-your-csv.md") from None
+        raise FileError(explain(error, TABLES), where=path, remedy="see docs/how-to/import-your-csv.md") from None
     _check(mapping, path)
     return mapping
 
@@ -262,21 +86,3 @@ def _check(mapping: Mapping, path: Path) -> None:
         where = f"{path}: columns.quaternion"
         raise FileError("floor_x and floor_y are one axis", where=where, remedy="give two of x, y, z")
     mapping.header(path)
-
-
-_TABLES = (
-    Mapping,
-    Vehicle,
-    Mocap,
-    Prediction,
-    Csv,
-    Time,
-    Quantity,
-    Signal,
-    Quaternion,
-    Flag,
-    Columns,
-    Gate,
-    Runs,
-    FileRule,
-)

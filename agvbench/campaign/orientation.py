@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from agvbench.campaign.mapping import Axis
+from agvbench.campaign.mapping_schema import Axis
 from agvbench.types import Floats
 
 _VERTICAL = 1e-3

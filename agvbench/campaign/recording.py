@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -12,16 +11,13 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from agvbench.campaign import units
-from agvbench.campaign.columns import UNKNOWN_COUNT, fill_columns, type_columns
-from agvbench.campaign.csv_text import read_csv_text
+from agvbench.campaign.cells import Cells, Mask
 from agvbench.campaign.gate import jumped
-from agvbench.campaign.mapping import ISO_8601, Flag, Mapping, quantities
+from agvbench.campaign.mapping import quantities
+from agvbench.campaign.mapping_schema import ISO_8601, Mapping
 from agvbench.campaign.orientation import heading_of
-from agvbench.campaign.schema import Column, Kind
 from agvbench.errors import FileError
 from agvbench.types import Floats
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -67,7 +63,7 @@ def read_recording(path: Path, mapping: Mapping) -> Recording:
     CampaignError
         If a cell is not a number.
     """
-    cells = _Cells(path, mapping)
+    cells = Cells(path, mapping)
     columns = mapping.columns
     t_s = _time(cells)
     measured = {
@@ -98,64 +94,7 @@ def read_recording(path: Path, mapping: Mapping) -> Recording:
     )
 
 
-class _Cells:
-    """The text of a CSV, column by column, with errors that name the mapping's key."""
-
-    def __init__(self, path: Path, mapping: Mapping) -> None:
-        csv = mapping.csv
-        self.path, self.mapping = path, mapping
-        self.table: pa.Table = read_csv_text(
-            path, delimiter=csv.delimiter, encoding=csv.encoding, skip_rows=csv.skip_rows
-        )
-
-    def text(self, column: str) -> pa.ChunkedArray:
-        if column not in self.table.column_names:
-            names = ", ".join(self.table.column_names[:20])
-            raise FileError(
-                f"has no column {column!r} (it has {names})", where=self.path, remedy="correct the mapping's columns"
-            )
-        return self.table[column]
-
-    def _typed(self, column: str, kind: Kind) -> NDArray[Any]:
-        text = self.text(column)
-        if self.mapping.csv.decimal == ",":
-            text = pc.replace_substring(text, ",", ".")
-        known = [Column(column, kind, required=False)]
-        typed = fill_columns(type_columns(pa.table({column: text}), known, self.path), known, self.path)
-        values: NDArray[Any] = typed[column].to_numpy()
-        return values
-
-    def number(self, column: str, scale: float = 1.0, offset: float = 0.0) -> Floats:
-        """Return a column as numbers, NaN where empty."""
-        values = self._typed(column, "number")
-        if np.isinf(values).any():
-            row = int(np.argmax(np.isinf(values)))
-            raise FileError(f"row {row + 1}: {column} is infinite", where=self.path, remedy="leave the cell empty")
-        return values * scale + offset if (scale, offset) != (1.0, 0.0) else values
-
-    def count(self, column: str | None) -> NDArray[np.int64]:
-        """Return a column as whole numbers, −1 where empty."""
-        return np.full(len(self.table), UNKNOWN_COUNT) if column is None else self._typed(column, "count")
-
-    def flag(self, flag: Flag | None) -> Mask:
-        """Return on which rows the flag's column equals its value: as numbers if both are, else as text."""
-        if flag is None:
-            return np.ones(len(self.table), np.bool_)
-        if isinstance(flag.equals, bool | str):
-            text = pc.utf8_lower(pc.utf8_trim_whitespace(self.text(flag.column)))
-            equal: Mask = pc.equal(text, str(flag.equals).lower()).to_numpy()
-            return equal
-        return np.equal(self.number(flag.column), float(flag.equals))
-
-    def stretches(self, column: str | None) -> NDArray[np.int64]:
-        """Return for each row the number of the stretch in which a column keeps its value."""
-        if column is None or not len(self.table):
-            return np.zeros(len(self.table), np.int64)
-        codes = self.text(column).combine_chunks().dictionary_encode().indices.to_numpy()
-        return np.cumsum(np.diff(codes, prepend=codes[:1]) != 0)
-
-
-def _time(cells: _Cells) -> Floats:
+def _time(cells: Cells) -> Floats:
     time = cells.mapping.columns.time
     if time.unit == ISO_8601:
         t_s = _seconds_since_1970(cells.text(time.column), cells.path)
@@ -190,14 +129,14 @@ def _has_zone(text: pa.ChunkedArray) -> bool:
     return first.endswith("Z") or "+" in first or first.count("-") > 2
 
 
-def _heading(cells: _Cells) -> Floats:
+def _heading(cells: Cells) -> Floats:
     quaternion = cells.mapping.columns.quaternion
     assert quaternion is not None  # noqa: S101 - load_mapping makes sure that one of heading and quaternion is there
     parts = [cells.number(getattr(quaternion, part)) for part in "xyzw"]
     return heading_of(np.column_stack(parts), quaternion.forward, quaternion.floor_x, quaternion.floor_y)
 
 
-def _held(cells: _Cells, name: str) -> Floats:
+def _held(cells: Cells, name: str) -> Floats:
     """Return a command column in which an empty cell repeats the one before; neutral if it is not mapped."""
     signal = getattr(cells.mapping.columns, name)
     if signal is None:

@@ -76,8 +76,17 @@ class Source:
 
 
 def parts(directory: Path) -> tuple[Path, ...]:
-    """Return the whole parts in `directory`, by name."""
-    files = (file for file in directory.iterdir() if file.suffix in _SUFFIXES and not is_temporary(file))
+    """Return the whole parts in `directory`, by name.
+
+    Raises
+    ------
+    CampaignError
+        If it cannot be listed.
+    """
+    try:
+        files = [file for file in directory.iterdir() if file.suffix in _SUFFIXES and not is_temporary(file)]
+    except OSError as error:
+        raise CampaignError(f"cannot be read ({error.strerror})", where=directory, remedy="check permissions") from None
     return tuple(sorted(files, key=lambda file: file.name))
 
 

@@ -83,3 +83,16 @@ class TimedTable:
         """Name a row as a person would: file, run, and row within the run (the first is 1)."""
         run = int(self.run_of_row[row])
         return f"{self.path}: run {self.run_ids[run]}: row {row - int(self.offsets[run]) + 1}"
+
+
+def blank_untracked(table: pa.Table) -> pa.Table:
+    """Give both signs of a lost frame, NaN and tracked = false, to every lost frame."""
+    names = ("x_m", "y_m", "heading_rad")
+    seen = table["tracked"]
+    for name in names:
+        seen = pc.and_(seen, pc.invert(pc.is_nan(table[name])))
+    if pc.all(seen).as_py() is not False:
+        return table
+    for name in names:
+        table = table.set_column(table.column_names.index(name), name, pc.if_else(seen, table[name], np.nan))
+    return table.set_column(table.column_names.index("tracked"), "tracked", seen)

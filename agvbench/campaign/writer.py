@@ -16,7 +16,7 @@ from agvbench.campaign.parquet import to_parquet
 from agvbench.campaign.parts import part_name, parts_of, run_id_of
 from agvbench.campaign.schema import TABLES
 from agvbench.campaign.source import parts
-from agvbench.campaign.timed import TimedTable
+from agvbench.campaign.timed import TimedTable, blank_untracked
 from agvbench.errors import CampaignError
 from agvbench.types import CommandUnit, Run
 
@@ -161,7 +161,7 @@ def check_parts(tables: Mapping[str, pa.Table], where: Path, unit: CommandUnit) 
     run_ids, status = (tables["runs"][name].to_pylist() for name in ("run_id", "status"))
     check_runs(tables["runs"], where)
     commands = TimedTable(where, tables["commands"], run_ids, in_parts=True)
-    poses = TimedTable(where, tables["poses"], run_ids, in_parts=True)
+    poses = TimedTable(where, blank_untracked(tables["poses"]), run_ids, in_parts=True)
     check_commands(commands, status, unit)
     check_poses(poses, status, commands.last("t_s"))
 

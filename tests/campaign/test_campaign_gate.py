@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agvbench.campaign.gate import jumped
-from agvbench.campaign.mapping import Gate
+from agvbench.campaign.mapping_schema import Gate
 
 GATE = Gate(max_speed_m_per_s=2.0, max_yaw_rate_rad_per_s=6.0)
 

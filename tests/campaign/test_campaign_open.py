@@ -10,6 +10,7 @@ import pytest
 from campaign_samples import head, tables, write_campaign, write_csv, write_head
 
 from agvbench.campaign import Campaign
+from agvbench.campaign.schema import TABLES
 
 
 def test_csv_reads_as_parquet_does(tmp_path: Path) -> None:
@@ -137,3 +138,25 @@ def test_the_head_survives(tmp_path: Path, prediction: dict[str, float] | None) 
 def _with_head(directory: Path, table: dict[str, object]) -> Path:
     write_campaign(directory)
     return write_head(directory, table)
+
+
+def test_a_campaign_of_nothing_but_aborted_runs_opens(tmp_path: Path) -> None:
+    columns = tables()
+    columns["runs"]["status"] = ["aborted: no vehicle"] * 2
+    columns |= {name: {column: [] for column in columns[name]} for name in ("commands", "poses")}
+    campaign = Campaign.open(write_campaign(tmp_path / "c", columns)).check()
+    assert [len(run.frames) for run in campaign] == [0, 0]
+    assert campaign.select() == []
+
+
+_PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "campaign-directory.md"
+
+
+def test_the_reference_shows_a_head_that_loads_and_names_every_column(tmp_path: Path) -> None:
+    page = _PAGE.read_text(encoding="utf-8")
+    block = page.split("```toml\n")[1].split("```")[0]
+    write_campaign(tmp_path)
+    (tmp_path / "campaign.toml").write_text(block, encoding="utf-8")
+    assert Campaign.open(tmp_path).header.prediction_stride_s == 0.5
+    missing = [c.name for table in TABLES.values() for c in table if f"`{c.name}`" not in page]
+    assert missing == []

@@ -140,3 +140,12 @@ def test_a_further_table_is_replaced_and_read(tmp_path: Path) -> None:
         writer.write_table("events", pd.DataFrame({"t_s": np.arange(count) * 1.0, "what": ["stop"] * count}))
     events = Campaign.open(tmp_path).table("events")
     assert events["what"].to_list() == ["stop", "stop"]
+
+
+def test_nonsense_in_lost_frames_is_no_obstacle(tmp_path: Path) -> None:
+    run = make_run("a", frames=4)
+    wild = np.array([0.0, np.inf, -np.inf, np.nan])
+    seen = np.array([True, False, False, True])
+    frames = dataclasses.replace(run.frames, x_m=wild, y_m=wild, heading_rad=wild, tracked=seen)
+    CampaignWriter.create(tmp_path, HEADER).append(dataclasses.replace(run, frames=frames))
+    assert Campaign.open(tmp_path).run("a").frames.tracked.tolist() == [True, False, False, False]
