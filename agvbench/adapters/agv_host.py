@@ -20,6 +20,7 @@ from agvbench.types import Floats
 
 SILENCE_LIMIT_S = 0.5
 _COMMANDS_WAITING = 256
+_STOP_PATIENCE_S = 0.5
 
 
 class AgvHost(Host):
@@ -49,8 +50,9 @@ class AgvHost(Host):
         self._lock_step = adapter.identity().lock_step
         self._answers |= {RESET: self._reset, REPLAY: self._replay}
         self._subscriber = session.declare_subscriber(keys.command, zenoh.handlers.FifoChannel(_COMMANDS_WAITING))
-        adapter.start(self)
         self._closed = False
+        self._outdated = (0, 0)
+        adapter.start(self)
         self._run("commands", self._serve_commands)
         if not self._lock_step:
             self._run("watchdog", self._watch)
@@ -60,13 +62,17 @@ class AgvHost(Host):
         return self._identity_bytes
 
     def _reset(self, payload: bytes) -> bytes:
+        request = decode_reset(payload)
         with self._lock:
-            self._adapter.reset(decode_reset(payload))
+            self._outdated = (request.source, request.after)
+            self._adapter.reset(request)
         return b""
 
     def _replay(self, payload: bytes) -> bytes:
+        request = decode_replay(payload)
         with self._lock:
-            self._adapter.replay(decode_replay(payload))
+            self._outdated = (request.reset.source, request.reset.after)
+            self._adapter.replay(request)
         return b""
 
     def _serve_commands(self) -> None:
@@ -89,6 +95,8 @@ class AgvHost(Host):
             self.event(Level.WARNING, "commands_lost", f"{lost} commands were lost before {message.sequence}")
         try:
             with self._lock:
+                if self._closed or self._is_outdated(message):
+                    return
                 if message.flags & CommandFlags.STOP:
                     self._heard_s = None
                     self._adapter.stop()
@@ -97,6 +105,11 @@ class AgvHost(Host):
                     self._adapter.apply(message)
         except Exception as error:  # noqa: BLE001  (whatever the adapter raises, the runner must hear of it)
             self._fail(error, message.sequence)
+
+    def _is_outdated(self, message: CommandMessage) -> bool:
+        """Whether the vehicle was placed anew after this command was sent: a runner was interrupted in between."""
+        source, after = self._outdated
+        return message.source == source and message.sequence <= after
 
     def _watch(self) -> None:
         """Stop a vehicle whose runner has fallen silent."""
@@ -119,9 +132,13 @@ class AgvHost(Host):
     def close(self) -> None:
         """Stop the vehicle, leave the bus, release the adapter."""
         self._closed = True
+        # An adapter that hangs in a command must not keep the vehicle from being stopped.
+        locked = self._lock.acquire(timeout=_STOP_PATIENCE_S)
         try:
             self._adapter.stop()
         finally:
+            if locked:
+                self._lock.release()
             self._subscriber.undeclare()
             super().close()
             self._adapter.close()

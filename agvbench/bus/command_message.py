@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 import struct
-from dataclasses import dataclass
 from enum import IntFlag
+from typing import NamedTuple
 
-from agvbench.bus.wire import Kind, Reader, pack_header, unpack_header
+from agvbench.bus.wire import HEADER_BYTES, Kind, check_length, pack_header, unpack_header
 from agvbench.errors import MessageError
 from agvbench.types import Command
 
@@ -32,10 +32,11 @@ class CommandFlags(IntFlag):
 
 
 _KNOWN = int(CommandFlags.STOP | CommandFlags.FLUSH | CommandFlags.KEEP_ALIVE)
+# A table, since making flags of a number takes longer than everything else here.
+_FLAGS = [CommandFlags(number) for number in range(_KNOWN + 1)]
 
 
-@dataclass(frozen=True, slots=True)
-class CommandMessage:
+class CommandMessage(NamedTuple):
     """A command with its place in the run.
 
     ``t_s`` [s] is the run clock when it takes effect (0: the run's first command), ``hold_s`` [s] how long it
@@ -59,7 +60,9 @@ def encode_command(message: CommandMessage) -> bytes:
         If a number is not finite, or `hold_s` is out of range.
     """
     _check(message.t_s, message.command, message.hold_s)
-    header = pack_header(Kind.COMMAND, flags=message.flags, source=message.source, count=1, sequence=message.sequence)
+    header = pack_header(
+        Kind.COMMAND, flags=int(message.flags), source=message.source, count=1, sequence=message.sequence
+    )
     return header + _BODY.pack(message.t_s, *message.command, message.hold_s)
 
 
@@ -74,12 +77,11 @@ def decode_command(payload: bytes) -> CommandMessage:
     header = unpack_header(payload, Kind.COMMAND, _KNOWN)
     if header.rows != 1:
         raise MessageError("command message with another count", value=header.rows, limit=1)
-    reader = Reader(payload)
-    t_s, drive, front, rear, hold_s = reader.fields(_BODY)
-    reader.finish()
+    check_length(payload, HEADER_BYTES + _BODY.size)
+    t_s, drive, front, rear, hold_s = _BODY.unpack_from(payload, HEADER_BYTES)
     command = Command(drive, front, rear)
     _check(t_s, command, hold_s)
-    return CommandMessage(header.sequence, t_s, command, hold_s, CommandFlags(header.flags), header.source)
+    return CommandMessage(header.sequence, t_s, command, hold_s, _FLAGS[header.flags], header.source)
 
 
 def _check(t_s: float, command: Command, hold_s: float) -> None:

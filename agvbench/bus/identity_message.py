@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import cast
 
 from agvbench.bus.wire import MAX_TEXT_BYTES, Kind, Reader, pack_header, pack_text, unpack_header
-from agvbench.errors import MessageError
+from agvbench.errors import LinkError, MessageError
 from agvbench.types import CommandUnit
 
 _AGV = struct.Struct("<d??")
@@ -65,7 +65,22 @@ class Identity:
 
     @classmethod
     def of(cls, agv: AgvIdentity, mocap: MocapIdentity) -> Identity:
-        """Return the identity of a vehicle that `agv` drives and `mocap` sees."""
+        """Return the identity of a vehicle that `agv` drives and `mocap` sees.
+
+        Raises
+        ------
+        LinkError
+            If one is simulated and the other is not.
+        """
+        if agv.simulated != mocap.simulated:
+            what = "simulated {} and a real {} cannot work together"
+            names = ("vehicle", "motion capture system")
+            raise LinkError(
+                "a " + what.format(*(names if agv.simulated else names[::-1])),
+                where=agv.vehicle,
+                value=f"agv {agv.adapter}, mocap {mocap.adapter}",
+                remedy="simulate both or neither",
+            )
         return cls(
             vehicle=agv.vehicle,
             firmware=agv.firmware,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 from typing import Any
 
 from agvbench.bus.clock import Clock, SimulatedClock, WallClock
@@ -127,8 +128,7 @@ class VehicleLink:
         AdapterGoneError
             If an adapter vanished or does not answer.
         """
-        sampling = self._prepare(run_key)
-        payload = encode_reset(Reset(run_key, pose, sampling))
+        payload = encode_reset(self._prepare(run_key, pose))
         ask(self._session, self.keys.question(AGV, RESET), payload, self._limit_s)
         self._driver.start()
 
@@ -171,12 +171,14 @@ class VehicleLink:
         until_s
             When the last exchange ended [s]; the last command's ``t_s`` if None.
         """
-        sampling = self._prepare(run_key)
-        until_s = float(commands.t_s[-1]) if until_s is None else until_s
-        payload = encode_replay(Replay(Reset(run_key, pose, sampling), commands, until_s))
+        reset = self._prepare(run_key, pose)
+        if until_s is None:
+            until_s = float(commands.t_s[-1]) if len(commands) else 0.0
+        payload = encode_replay(Replay(reset, commands, until_s))
         ask(self._session, self.keys.question(AGV, REPLAY), payload, self._limit_s)
 
-    def _prepare(self, run_key: str) -> Sampling:
+    def _prepare(self, run_key: str, pose: Pose) -> Reset:
+        """Let the camera begin a run; return what the vehicle is to be told."""
         if not self._identity.simulated:
             raise LinkError(
                 "a real vehicle cannot be placed by software",
@@ -184,8 +186,9 @@ class VehicleLink:
                 remedy="place it by hand, or drive it back",
             )
         self._presence.check(AGV, MOCAP)
-        payload = encode_reset(Reset(run_key, _ORIGIN, _ANYWHERE))
-        return decode_sampling(ask(self._session, self.keys.question(MOCAP, RESET), payload, self._limit_s))
+        request = Reset(run_key, pose, _ANYWHERE, self._outbox.source, self._outbox.last)
+        answer = ask(self._session, self.keys.question(MOCAP, RESET), encode_reset(request), self._limit_s)
+        return replace(request, sampling=decode_sampling(answer))
 
     @property
     def loss(self) -> LossCounter:

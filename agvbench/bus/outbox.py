@@ -45,6 +45,16 @@ class CommandOutbox:
             raise LinkError("the bus was closed", where=self._keys.root) from None
         return sequence
 
+    @property
+    def source(self) -> int:
+        """What tells this sender from others."""
+        return self._sequence.source
+
+    @property
+    def last(self) -> int:
+        """The sequence number of the last command (0: none)."""
+        return self._sequence.last
+
     def close(self) -> None:
         """Publish no more."""
         self._publisher.undeclare()

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agvbench.bus.wire import MAX_ROWS, Kind, Reader, pack_column, pack_header, pack_text, unpack_header
+from agvbench.bus.wire import MAX_ROWS, Header, Kind, Reader, pack_column, pack_header, pack_text, unpack_header
 from agvbench.errors import MessageError
 from agvbench.types import Commands, Pose
 
@@ -31,11 +31,17 @@ class Sampling:
 
 @dataclass(frozen=True)
 class Reset:
-    """Place a simulated vehicle at rest at `pose`; ``run_key`` seeds all that is random in the run to come."""
+    """Place a simulated vehicle at rest at `pose`; ``run_key`` seeds all that is random in the run to come.
+
+    Commands from ``source`` up to number ``after`` belong to what was before: a host that finds one still waiting
+    drops it.
+    """
 
     run_key: str
     pose: Pose
     sampling: Sampling
+    source: int = 0
+    after: int = 0
 
 
 @dataclass(frozen=True)
@@ -63,14 +69,14 @@ def decode_sampling(payload: bytes) -> Sampling:
 
 def encode_reset(reset: Reset) -> bytes:
     """Return the request's bytes."""
-    return pack_header(Kind.RESET, count=1) + _pack_reset(reset)
+    return pack_header(Kind.RESET, count=1, source=reset.source, sequence=reset.after) + _pack_reset(reset)
 
 
 def decode_reset(payload: bytes) -> Reset:
     """Return the request that `payload` holds, or raise `MessageError`."""
-    unpack_header(payload, Kind.RESET)
+    header = unpack_header(payload, Kind.RESET)
     reader = Reader(payload)
-    reset = _read_reset(reader)
+    reset = _read_reset(reader, header)
     reader.finish()
     return reset
 
@@ -83,7 +89,7 @@ def encode_replay(replay: Replay) -> bytes:
     columns = (commands.t_s, commands.drive, commands.front, commands.rear)
     return b"".join(
         (
-            pack_header(Kind.REPLAY, count=len(commands)),
+            pack_header(Kind.REPLAY, count=len(commands), source=replay.reset.source, sequence=replay.reset.after),
             _pack_reset(replay.reset),
             _NUMBER.pack(replay.until_s),
             *(pack_column(column, "<f8") for column in columns),
@@ -95,7 +101,7 @@ def decode_replay(payload: bytes) -> Replay:
     """Return the request that `payload` holds, or raise `MessageError`."""
     header = unpack_header(payload, Kind.REPLAY)
     reader = Reader(payload)
-    reset = _read_reset(reader)
+    reset = _read_reset(reader, header)
     (until_s,) = reader.fields(_NUMBER)
     columns = reader.column(4 * header.rows, "<f8").reshape(4, header.rows)
     reader.finish()
@@ -126,13 +132,13 @@ def _pack_reset(reset: Reset) -> bytes:
     return _RESET.pack(*reset.pose, reset.sampling.rate_hz, reset.sampling.phase_s) + pack_text(reset.run_key)
 
 
-def _read_reset(reader: Reader) -> Reset:
+def _read_reset(reader: Reader, header: Header) -> Reset:
     x_m, y_m, heading_rad, rate_hz, phase_s = reader.fields(_RESET)
     run_key = reader.text()
     pose = Pose(x_m, y_m, heading_rad)
     if not pose.is_finite:
         raise MessageError("pose to reset to is not finite", where=run_key, value=tuple(pose))
-    return Reset(run_key, pose, _sampling(rate_hz, phase_s))
+    return Reset(run_key, pose, _sampling(rate_hz, phase_s), header.source, header.sequence)
 
 
 def _sampling(rate_hz: float, phase_s: float) -> Sampling:

@@ -27,6 +27,11 @@ class TruthFlags(IntFlag):
     """The exchange is complete: answer it."""
     FLUSH = 2
     """Let go of every frame that is still under way."""
+    LIVE = 4
+    """Times are in the clock that all adapters of this machine share, not in the run's."""
+
+
+_KNOWN = 7
 
 
 @dataclass(frozen=True)
@@ -49,7 +54,7 @@ def encode_truth(truth: Truth) -> bytes:
         raise MessageError("too many poses for one message", value=count, limit=f"at most {MAX_ROWS}")
     return b"".join(
         (
-            pack_header(Kind.TRUTH, flags=truth.flags, source=truth.source, count=count, sequence=truth.sequence),
+            pack_header(Kind.TRUTH, flags=int(truth.flags), source=truth.source, count=count, sequence=truth.sequence),
             _BODY.pack(truth.acknowledged, truth.end_s),
             pack_column(truth.t_s, "<f8"),
             pack_column(truth.poses.T, "<f8"),
@@ -59,7 +64,7 @@ def encode_truth(truth: Truth) -> bytes:
 
 def decode_truth(payload: bytes) -> Truth:
     """Return the message that `payload` holds, or raise `MessageError`."""
-    header = unpack_header(payload, Kind.TRUTH, TruthFlags.LAST | TruthFlags.FLUSH)
+    header = unpack_header(payload, Kind.TRUTH, _KNOWN)
     reader = Reader(payload)
     acknowledged, end_s = reader.fields(_BODY)
     t_s = reader.column(header.rows, "<f8")

@@ -93,6 +93,14 @@ def unpack_header(payload: bytes, kind: Kind, known_flags: int = 0) -> Header:
     return Header(found, flags, source, count, sequence)
 
 
+def check_length(payload: bytes, expected: int) -> None:
+    """Raise `MessageError` unless the message is exactly `expected` bytes long."""
+    if len(payload) < expected:
+        raise MessageError("message is cut off", value=f"{len(payload)} B", limit=f"{expected} B")
+    if len(payload) > expected:
+        raise MessageError("message is longer than its count says", value=f"{len(payload)} B", limit=f"{expected} B")
+
+
 def pack_text(text: str) -> bytes:
     """Return a text as UTF-8 behind its length (u16).
 
@@ -122,7 +130,7 @@ class Reader:
     def _skip(self, size: int) -> int:
         start, self._at = self._at, self._at + size
         if self._at > len(self._payload):
-            raise MessageError("message is cut off", value=f"{len(self._payload)} B", limit=f"at least {self._at} B")
+            check_length(self._payload, self._at)
         return start
 
     def fields(self, layout: struct.Struct) -> tuple[Any, ...]:
@@ -147,5 +155,4 @@ class Reader:
 
     def finish(self) -> None:
         """Complain if anything is left."""
-        if self._at != len(self._payload):
-            raise MessageError("message is longer than its count says", value=f"{len(self._payload)} B", limit=self._at)
+        check_length(self._payload, self._at)

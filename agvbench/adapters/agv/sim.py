@@ -71,8 +71,6 @@ class SimAgv(AgvAdapter):
 
     def apply(self, message: CommandMessage) -> None:
         """Let the command's interval pass, and show the camera its poses."""
-        if message.flags & CommandFlags.STOP:
-            return self.stop()
         if message.flags & CommandFlags.FLUSH:
             flags = TruthFlags.LAST | TruthFlags.FLUSH
             end_s = 0.0 if math.isnan(self._end_s) else self._end_s
@@ -89,8 +87,7 @@ class SimAgv(AgvAdapter):
             self._drive(request.commands.at(index), start_s, max(start_s, end_s))
 
     def stop(self) -> None:
-        """Hold neutral from where the plant stands."""
-        self._hold(self._neutral, self._end_s)
+        """Do nothing: no time passes unless a command is exchanged, and the next one brings its own."""
 
     def close(self) -> None:
         """Nothing to release."""

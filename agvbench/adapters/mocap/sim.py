@@ -61,7 +61,8 @@ class SimMocap(MocapAdapter):
             np.concatenate([part.t_s for part in parts]), np.concatenate([part.poses for part in parts])
         )
         until_s = np.inf if truth.flags & TruthFlags.FLUSH else truth.end_s
-        self._reports.frames(self._arrived(frames, until_s), clock=FrameClock.RUN, acknowledged=truth.acknowledged)
+        clock = FrameClock.ADAPTER if truth.flags & TruthFlags.LIVE else FrameClock.RUN
+        self._reports.frames(self._arrived(frames, until_s), clock=clock, acknowledged=truth.acknowledged)
 
     def _arrived(self, frames: Frames, until_s: float) -> Frames:
         """Return what is received before `until_s`, in order; the rest stays under way."""

@@ -1,0 +1,127 @@
+"""``live``: a simulated vehicle that moves in real time, to rehearse with what hardware will be like."""
+
+from __future__ import annotations
+
+import math
+import threading
+
+import numpy as np
+
+from agvbench.adapters.contract import AdapterOptions, AgvAdapter, AgvReports
+from agvbench.adapters.seeding import run_seed
+from agvbench.bus.clock import wait_until
+from agvbench.bus.command_message import CommandFlags, CommandMessage
+from agvbench.bus.event_message import Level
+from agvbench.bus.identity_message import AgvIdentity
+from agvbench.bus.request_message import Replay, Reset, Sampling
+from agvbench.bus.truth_message import TruthFlags
+from agvbench.errors import AgvbenchError
+from agvbench.simulator import load_plant
+from agvbench.types import Command, Plant
+
+
+class LiveAgv(AgvAdapter):
+    """A plant behind the bus that nobody waits for.
+
+    A thread advances the plant from one of the camera's instants to the next, as they come in `AdapterOptions.clock`;
+    a command takes effect when it arrives. Runs are not reproducible, as with hardware.
+    """
+
+    scheme = "live"
+
+    def __init__(self, plant: Plant, options: AdapterOptions) -> None:
+        self._plant, self._options, self._clock = plant, options, options.clock
+        neutral = options.neutral_command
+        self._neutral = Command(neutral, neutral, neutral)
+        self._held = self._neutral
+        self._sampling: Sampling | None = None
+        self._plant_s = math.nan
+        self._lock = threading.Lock()
+        self._closed = False
+
+    @classmethod
+    def open(cls, address: str, options: AdapterOptions) -> LiveAgv:
+        """Make the plant that `address`, else the options, name."""
+        return cls(load_plant(address or options.plant)(options.seed), options)
+
+    def identity(self) -> AgvIdentity:
+        """Return who this is."""
+        return AgvIdentity(
+            vehicle=self._options.vehicle,
+            adapter=self.scheme,
+            firmware="simulated",
+            calibration_hash=self._options.calibration_hash,
+            command_unit=self._options.command_unit,
+            neutral=self._options.neutral_command,
+            simulated=True,
+            lock_step=False,
+            extra={"seed": str(self._options.seed), "plant": self._options.plant},
+        )
+
+    def start(self, reports: AgvReports) -> None:
+        """Begin to move."""
+        self._reports = reports
+        threading.Thread(target=self._move, name="agvbench-live", daemon=True).start()
+
+    def reset(self, request: Reset) -> None:
+        """Place the plant at rest."""
+        with self._lock:
+            x_m, y_m, heading_rad = request.pose
+            self._plant.reset((x_m, y_m, heading_rad), seed=run_seed(self._options.seed, request.run_key, "plant"))
+            self._held, self._sampling = self._neutral, request.sampling
+            self._plant_s = self._clock.now()
+
+    def apply(self, message: CommandMessage) -> None:
+        """Hold another command from now on."""
+        if not message.flags & (CommandFlags.FLUSH | CommandFlags.KEEP_ALIVE):
+            self._hold(message.command)
+
+    def replay(self, request: Replay) -> None:
+        """Drive a recorded run again, as fast as the plant can."""
+        self.reset(request.reset)
+        with self._lock:
+            durations = np.diff(np.append(request.commands.t_s, request.until_s))
+            for index, duration_s in enumerate(durations.tolist()):
+                self._plant.advance(*request.commands.at(index), max(0.0, duration_s))
+            self._plant_s = self._clock.now()
+
+    def stop(self) -> None:
+        """Hold neutral from now on."""
+        self._hold(self._neutral)
+
+    def close(self) -> None:
+        """Move no more."""
+        self._closed = True
+
+    def _hold(self, command: Command) -> None:
+        with self._lock:
+            self._advance_to(self._clock.now())
+            self._held = command
+
+    def _advance_to(self, now_s: float) -> tuple[float, float, float] | None:
+        if self._sampling is None:
+            return None
+        duration_s, self._plant_s = max(0.0, now_s - self._plant_s), max(self._plant_s, now_s)
+        return self._plant.advance(*self._held, duration_s)
+
+    def _move(self) -> None:
+        while not self._closed:
+            sampling = self._sampling
+            if sampling is None:
+                self._clock.sleep(0.005)
+                continue
+            number = math.floor((self._clock.now() - sampling.phase_s) * sampling.rate_hz) + 1
+            instant_s = sampling.phase_s + number / sampling.rate_hz
+            wait_until(self._clock, instant_s)
+            try:
+                self._show(instant_s)
+            except AgvbenchError as error:
+                self._sampling = None
+                self._reports.event(Level.ERROR, type(error).__name__, str(error))
+
+    def _show(self, instant_s: float) -> None:
+        with self._lock:
+            pose = self._advance_to(instant_s)
+        if pose is not None:
+            flags = TruthFlags.LAST | TruthFlags.LIVE
+            self._reports.truth(np.array([instant_s]), np.array([pose]), end_s=self._clock.now(), flags=flags)

@@ -1,0 +1,114 @@
+"""The same frames in process, over TCP and from separate processes; and what happens when one vanishes."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import subprocess
+import sys
+
+import pytest
+from rig_driving import HANGING, NEUTRAL, START, TINY, digest, drive_run, process
+
+from agvbench.adapters import AdapterOptions, host_adapters, open_rig
+from agvbench.bus.link import VehicleLink
+from agvbench.bus.session import open_session
+from agvbench.errors import AdapterGoneError, LinkError
+
+KEYS = ("a", "b")
+SEED = ("--seed", "11")
+
+
+@pytest.fixture(scope="module")
+def expected() -> list[str]:
+    with open_rig(plant=TINY, seed=11) as link:
+        return [digest(drive_run(link, key)) for key in KEYS]
+
+
+@pytest.fixture
+def endpoint() -> str:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+def test_same_frames_over_tcp_between_two_sessions(expected: list[str], endpoint: str) -> None:
+    options = AdapterOptions(plant=TINY, seed=11)
+    with (
+        open_session(listen=[endpoint]) as session,
+        host_adapters(session, "lab", options, agv="sim", mocap="sim"),
+        open_rig(connect=endpoint, seed=11) as link,
+    ):
+        assert [digest(drive_run(link, key)) for key in KEYS] == expected
+        assert link.loss.lost == 0
+
+
+def test_same_frames_from_one_simulator_process(expected: list[str], endpoint: str) -> None:
+    with process("sim", *SEED, "--plant", TINY, "--listen", endpoint), open_rig(connect=endpoint, seed=11) as link:
+        assert [digest(drive_run(link, key)) for key in KEYS] == expected
+
+
+def test_same_frames_from_a_vehicle_and_a_camera_process(expected: list[str], endpoint: str) -> None:
+    with (
+        process("agv", "sim", *SEED, "--plant", TINY, "--listen", endpoint),
+        process("mocap", "sim", *SEED, "--connect", endpoint),
+        open_rig(connect=endpoint, seed=11) as link,
+    ):
+        assert [digest(drive_run(link, key)) for key in KEYS] == expected
+
+
+def test_a_simulator_that_is_killed_ends_the_exchange(endpoint: str) -> None:
+    with process("sim", "--plant", HANGING, "--listen", endpoint) as child, open_rig(connect=endpoint) as link:
+        link.reset(START, run_key="a")
+        link.exchange(NEUTRAL, t_s=0.0, hold_s=0.1)
+        killer = subprocess.Popen(
+            [sys.executable, "-c", f"import os, time; time.sleep(0.3); os.kill({child.pid}, {int(signal.SIGKILL)})"]
+        )
+        with pytest.raises(AdapterGoneError, match=r"the (agv|mocap) adapter vanished: .* ago"):
+            link.exchange(NEUTRAL._replace(drive=1700.0), t_s=0.1, hold_s=0.1)
+        killer.wait()
+        with pytest.raises(AdapterGoneError, match="vanished"):
+            link.exchange(NEUTRAL, t_s=0.2, hold_s=0.1)
+
+
+def test_a_simulator_with_another_seed_is_refused(endpoint: str) -> None:
+    options = AdapterOptions(plant=TINY, seed=1)
+    with (
+        open_session(listen=[endpoint]) as session,
+        host_adapters(session, "lab", options, agv="sim", mocap="sim"),
+        pytest.raises(LinkError, match="runs with another seed: 1"),
+        open_rig(connect=endpoint, seed=2),
+    ):
+        pass
+
+
+def test_an_adapter_that_is_not_there_is_missed(endpoint: str) -> None:
+    with (
+        open_session(listen=[endpoint]) as session,
+        host_adapters(session, "lab", AdapterOptions(plant=TINY), agv="sim", mocap=None),
+        pytest.raises(AdapterGoneError, match="no mocap adapter on the bus"),
+        open_rig(connect=endpoint, discovery_limit_s=0.3),
+    ):
+        pass
+
+
+def test_a_vehicle_without_a_camera_says_so(endpoint: str) -> None:
+    """The camera's process is on the bus of the runner, but the vehicle's process does not see it."""
+    options = AdapterOptions(plant=TINY)
+    with (
+        open_session(listen=[endpoint]) as session,
+        host_adapters(session, "lab", options, agv="sim", mocap=None),
+        open_session(connect=[endpoint]) as other,
+        host_adapters(other, "lab", options, agv=None, mocap="sim"),
+    ):
+        link = VehicleLink(session, "lab", "agv1")
+        with link:
+            assert len(drive_run(link, "a")) > 0
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_signals_end_a_process_cleanly(how: signal.Signals, endpoint: str) -> None:
+    with process("sim", "--plant", TINY, "--listen", endpoint) as child:
+        child.send_signal(how)
+        assert child.communicate(timeout=20) == ("stopped\n", "")
+        assert child.returncode == 0

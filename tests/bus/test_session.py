@@ -1,0 +1,62 @@
+"""Sessions: explicit endpoints, loopback unless said otherwise, one line for what does not work."""
+
+from __future__ import annotations
+
+import socket
+
+import pytest
+
+from agvbench.bus.session import is_loopback, open_session, parse_endpoint
+from agvbench.errors import LinkError
+
+
+@pytest.mark.parametrize(
+    "endpoint",
+    ["", "localhost", "127.0.0.1:7447", "tcp/127.0.0.1", "tcp/:7447", "tcp/1.2.3.4:70000", "tcp/1.2.3.4:0",
+     "tcp/127.0.0.1:7447#iface=eth0", "tcp/a b:1", "udp/127.0.0.1:7447", "TCP/127.0.0.1:7447", "tcp/127.0.0.1:7447\n"],
+)  # fmt: skip
+def test_endpoints_that_cannot_be_used_are_refused(endpoint: str) -> None:
+    with pytest.raises(LinkError):
+        parse_endpoint(endpoint)
+    with pytest.raises(LinkError):
+        open_session(connect=[endpoint])
+
+
+def test_endpoints_that_can_be_used() -> None:
+    assert parse_endpoint("tcp/[::1]:7447") == ("tcp", "::1", 7447)
+    assert parse_endpoint("tcp/mocap-pc.lab:7448") == ("tcp", "mocap-pc.lab", 7448)
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.2", "[::]", "lab-pc"])  # noqa: S104
+def test_other_machines_are_kept_out_unless_asked_in(host: str) -> None:
+    with pytest.raises(LinkError, match="let other machines drive the vehicle"):
+        open_session(listen=[f"tcp/{host}:7447"])
+    assert not is_loopback(host.strip("[]"))
+
+
+def test_a_session_without_endpoints_opens_no_socket() -> None:
+    with open_session() as session:
+        assert list(session.info.links()) == []
+        assert list(session.info.transports()) == []
+
+
+def test_nobody_answers() -> None:
+    port = free_port()
+    with pytest.raises(LinkError, match=f"connect tcp/127.0.0.1:{port}: nobody answers"):
+        open_session(connect=[f"tcp/127.0.0.1:{port}"], timeout_s=0.2)
+
+
+def test_a_port_that_is_taken() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        with pytest.raises(LinkError, match="endpoint cannot be used") as caught:
+            open_session(listen=[f"tcp/127.0.0.1:{taken.getsockname()[1]}"])
+    assert ".rs" not in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
