@@ -7,9 +7,9 @@ vehicle 900 µs in both cases, 600 µs below neutral). The default grid finds sl
 
 import pytest
 
-STEPS_OF_13 = [round(k / 6, 4) for k in range(-6, 7)]
-STEPS_OF_25 = [round(k / 12, 4) for k in range(-12, 13)]
-STEPS_OF_7 = [round(k / 3, 4) for k in range(-3, 4)]
+STEPS_OF_13 = [k / 6 for k in range(-6, 7)]
+STEPS_OF_25 = [k / 12 for k in range(-12, 13)]
+STEPS_OF_7 = [k / 3 for k in range(-3, 4)]
 STEPS_OF_5 = [-1.0, -0.5, 0.0, 0.5, 1.0]
 
 

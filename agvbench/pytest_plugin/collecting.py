@@ -40,7 +40,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     full = bool(metafunc.config.getoption("full"))
     for mark in metafunc.definition.iter_markers("grid"):
         name, reduced, complete = mark.args
-        metafunc.parametrize(name, complete if full else reduced)
+        values = complete if full else reduced
+        metafunc.parametrize(name, values, ids=[f"{v:.3g}" if isinstance(v, float) else str(v) for v in values])
     mark_ = metafunc.definition.get_closest_marker("repeats")
     if mark_ is not None:
         metafunc.fixturenames.append(REPEAT)
