@@ -1,22 +1,42 @@
 """From measured runs to static maps."""
 
 from agvbench.calibration.axles import axle_angles_from_arc, axle_angles_from_curvature
+from agvbench.calibration.calibrate import Calibration, calibrate
 from agvbench.calibration.circle import CircleFit, CircleFits, fit_circle, fit_circles
 from agvbench.calibration.frames import FrameQuality, clean_frames, inspect_frames
+from agvbench.calibration.map_fit import LeftOut, MapFit
+from agvbench.calibration.map_fits import (
+    compare_maps,
+    drive_fitters,
+    fit_drive_map,
+    fit_steering_map,
+    steering_fitters,
+)
 from agvbench.calibration.measure import RunMeasurement, measure_run
+from agvbench.calibration.points import CurvePoints
 from agvbench.calibration.quaternion import quaternion_to_heading
 
 __all__ = [
+    "Calibration",
     "CircleFit",
     "CircleFits",
+    "CurvePoints",
     "FrameQuality",
+    "LeftOut",
+    "MapFit",
     "RunMeasurement",
     "axle_angles_from_arc",
     "axle_angles_from_curvature",
+    "calibrate",
     "clean_frames",
+    "compare_maps",
+    "drive_fitters",
     "fit_circle",
     "fit_circles",
+    "fit_drive_map",
+    "fit_steering_map",
     "inspect_frames",
     "measure_run",
     "quaternion_to_heading",
+    "steering_fitters",
 ]

@@ -1,0 +1,95 @@
+"""Samples from runs that held one command each: the calibration drives of fig. 7.1 and 7.2."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+
+from agvbench.calibration.measure import RunMeasurement, measure_run
+from agvbench.calibration.samples import Role, Sample
+from agvbench.errors import FitError
+from agvbench.types import Run
+from agvbench.vehicle.geometry import Geometry
+
+CALIBRATION_EXPERIMENTS = ("steering_front", "steering_rear", "steering_opposite", "drive")
+# Whose runs say most about a role; the next are asked where these vary its command too little.
+_OWN: dict[Role, tuple[str, ...]] = {
+    "front": ("steering_front", "steering_opposite"),
+    "rear": ("steering_rear", "steering_opposite"),
+    "drive": ("drive",),
+}
+_MIN_COMMANDS = 4
+_STRAIGHT_RAD = math.radians(6.0)
+
+
+def measure_runs(
+    runs: Iterable[Run], geometry: Geometry, neutral: float
+) -> tuple[dict[str, RunMeasurement], dict[str, str]]:
+    """Return the measurement of each run by its id, and for the others why there is none."""
+    measured: dict[str, RunMeasurement] = {}
+    refused: dict[str, str] = {}
+    for run in runs:
+        if not run.is_ok:
+            refused[run.run_id] = run.status
+            continue
+        try:
+            measured[run.run_id] = measure_run(run, geometry, neutral=neutral)
+        except FitError as error:
+            refused[run.run_id] = str(error).removeprefix(f"run {run.run_id}: ")
+    return measured, refused
+
+
+def arc_samples(runs: Sequence[Run], measured: dict[str, RunMeasurement], geometry: Geometry) -> list[Sample]:
+    """Return what each run says about each role that its experiment was driven for.
+
+    An axle's curve is read from the runs that vary this axle alone (tables 7.1, 7.2), so that the other axle's coupling
+    stays out of it. The drive's is read from straight runs: what speed is lost in turns is an effect, not
+    the map (appendix B). Its unit is speed along the wheels: v · 2 cos β / (cos δf + cos δr), by eq. 5.6.
+    """
+    samples: list[Sample] = []
+    for role, experiments in _OWN.items():
+        chosen = _chosen(role, experiments, runs, measured)
+        samples += [_sample(role, measured[run.run_id]) for run in chosen]
+    return samples
+
+
+def _chosen(
+    role: Role, experiments: tuple[str, ...], runs: Sequence[Run], measured: dict[str, RunMeasurement]
+) -> list[Run]:
+    """Return the runs of the first experiments that vary the role's command enough, else all of them."""
+    usable = [run for run in runs if run.run_id in measured]
+    for count in range(1, len(experiments) + 1):
+        among = [run for run in usable if run.experiment in experiments[:count]]
+        if len({getattr(measured[run.run_id].command, role) for run in among}) >= _MIN_COMMANDS:
+            return among
+    return usable
+
+
+def _sample(role: Role, m: RunMeasurement) -> Sample:
+    command = float(getattr(m.command, role))
+    if role == "drive":
+        return _drive_sample(command, m)
+    value, stderr = getattr(m, f"{role}_rad"), getattr(m, f"{role}_stderr_rad")
+    sample = Sample(role, command, value, stderr, m.run_id)
+    return sample if m.moves else sample.without("the vehicle stood still: no angle to be seen")
+
+
+def _drive_sample(command: float, m: RunMeasurement) -> Sample:
+    if not m.moves:
+        return Sample("drive", command, m.speed_mps, m.speed_stderr_mps, m.run_id)
+    along = 2.0 * math.cos(m.sideslip_rad) / (math.cos(m.front_rad) + math.cos(m.rear_rad))
+    sample = Sample("drive", command, along * m.speed_mps, along * m.speed_stderr_mps, m.run_id)
+    if max(abs(m.front_rad), abs(m.rear_rad)) <= _STRAIGHT_RAD:
+        return sample
+    return sample.without("driven in a turn: what turning costs is an effect, not the map")
+
+
+def described(refused: dict[str, str]) -> list[str]:
+    """Return one sentence for each reason, with the runs it holds for."""
+    reasons = Counter(refused.values())
+    sentences = []
+    for reason, count in reasons.items():
+        first = next(run_id for run_id, why in refused.items() if why == reason)
+        sentences.append(f"run {first} left out: {reason}" if count == 1 else f"{count} runs left out: {reason}")
+    return sentences

@@ -1,0 +1,241 @@
+"""From a campaign to the static maps of its vehicle."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Literal
+
+from agvbench.calibration.arc_samples import CALIBRATION_EXPERIMENTS, arc_samples, described, measure_runs
+from agvbench.calibration.end_stops_fit import saturated
+from agvbench.calibration.free_driving import FreeDriving, read_free_driving
+from agvbench.calibration.map_fit import MapFit, judge, rounded
+from agvbench.calibration.map_fits import (
+    DRIVE_KINDS,
+    STEERING_KINDS,
+    compare_maps,
+    drive_fitters,
+    preferred,
+    steering_fitters,
+)
+from agvbench.calibration.points import CurvePoints
+from agvbench.calibration.samples import ROLES, Role, Sample, points_of
+from agvbench.calibration.source import CampaignLike, HeaderLike
+from agvbench.errors import FitError, InputError
+from agvbench.model import VehicleModel
+from agvbench.types import Run
+from agvbench.vehicle.geometry import Geometry
+from agvbench.vehicle.maps import Fixed, StaticMap
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Maps = Literal["default", "thesis"]
+Fits = dict[Role, dict[str, MapFit | FitError]]
+MIN_COMMANDS = 4
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A calibrated vehicle and how it came about.
+
+    ``model`` with its provenance; ``fits`` by role (``"front"``, ``"rear"``, ``"drive"``) and kind, the refused kinds
+    with their error; ``chosen`` the kind of the model's map by role (``"fixed"`` for an axle whose command never
+    varied); ``measurements`` one row per sample (axle, command, value in deg or m/s, stderr, run_id, left_out, why);
+    ``warnings`` in plain words, what was left out among them.
+    """
+
+    model: VehicleModel
+    fits: Mapping[Role, Mapping[str, MapFit | FitError]]
+    chosen: Mapping[Role, str]
+    measurements: pd.DataFrame
+    warnings: list[str] = field(default_factory=list)
+
+
+def calibrate(campaign: CampaignLike, *, maps: Maps | str = "default", session: str | None = None) -> Calibration:
+    """Fit the static maps of a vehicle from its calibration runs.
+
+    Runs of the experiments ``steering_front``, ``steering_rear``, ``steering_opposite`` and ``drive`` hold one
+    command each and are measured one by one (`measure_run`). A campaign without any, such as an imported recording
+    of free driving, is read by windows instead (`read_free_driving`). Runs that are not ``ok`` or set aside
+    (``split`` = ``held_out``) are left alone.
+
+    Parameters
+    ----------
+    campaign
+        Header and runs.
+    maps
+        ``"thesis"``: lines without the outermost pulse, a cubic up to saturation. ``"default"``: for each role the kind
+        that predicts left-out commands best.
+    session
+        Use the runs of this session only.
+
+    Raises
+    ------
+    FitError
+        If there are no runs to calibrate from, none can be measured, or they vary a command too little.
+    InputError
+        If `maps` is unknown or no run belongs to `session`.
+    VehicleError
+        If the header describes no vehicle.
+    """
+    if maps not in ("default", "thesis"):
+        raise InputError("unknown maps", where="maps", value=repr(maps), limit="default, thesis")
+    header = campaign.header
+    geometry = Geometry(header.front_axle_m, header.rear_axle_m)
+    runs = [run for run in campaign if run.split != "held_out" and session in (None, run.session)]
+    if session is not None and not runs:
+        raise InputError("no run belongs to this session", where=f"campaign {header.name}", value=repr(session))
+    dedicated = [run for run in runs if run.experiment in CALIBRATION_EXPERIMENTS]
+    free = None
+    if dedicated:
+        samples, warnings, used = _from_arcs(dedicated, geometry, header)
+    else:
+        free = read_free_driving(runs, geometry, header)
+        samples, warnings, used = free.samples, free.words, free.runs_used
+    fits, chosen = _fit_roles(samples, header, maps, free)
+    warnings = [*warnings, *_tell(fits, chosen, samples)]
+    front, rear, drive = (_chosen_map(role, fits, chosen, samples) for role in ROLES)
+    method = "windows of free driving" if free else "arcs and straights"
+    model = VehicleModel(
+        name=header.vehicle_name,
+        geometry=geometry,
+        command_unit=header.command_unit,
+        neutral=header.neutral,
+        front=front,
+        rear=rear,
+        drive=drive,
+        provenance=_provenance(header, method, used, maps, fits, chosen, session),
+    )
+    return Calibration(model, fits, chosen, _table(samples, fits, chosen), warnings)
+
+
+def _from_arcs(runs: list[Run], geometry: Geometry, header: HeaderLike) -> tuple[list[Sample], list[str], int]:
+    measured, refused = measure_runs(runs, geometry, header.neutral)
+    words = described(refused)
+    if not measured:
+        raise FitError(
+            "no calibration run can be measured",
+            where=f"campaign {header.name}",
+            value=f"0 of {len(runs)} runs; {words[0]}",
+        )
+    return arc_samples(runs, measured, geometry), words, len(measured)
+
+
+def _fit_roles(
+    samples: list[Sample], header: HeaderLike, maps: str, free: FreeDriving | None
+) -> tuple[Fits, dict[Role, str]]:
+    fits: Fits = {}
+    chosen: dict[Role, str] = {}
+    for role in ROLES:
+        points = points_of(samples, role)
+        if role != "drive" and len(points) == 1:
+            fits[role], chosen[role] = {}, "fixed"
+        elif role == "drive" and free is not None:
+            ramp = judge("ramp", free.drive.map, points, parameters=2, stderr=free.drive.stderr)
+            fits[role], chosen[role] = {"ramp": replace(ramp, r_squared=free.drive.r_squared)}, "ramp"
+        else:
+            fits[role], chosen[role] = _fit_role(role, points, header, maps)
+    return fits, chosen
+
+
+def _fit_role(
+    role: Role, points: CurvePoints, header: HeaderLike, maps: str
+) -> tuple[dict[str, MapFit | FitError], str]:
+    where = f"campaign {header.name}: {role}"
+    if len(points) < MIN_COMMANDS:
+        raise FitError(
+            "too few different commands to calibrate",
+            where=where,
+            value=len(points),
+            limit=f"at least {MIN_COMMANDS}",
+            remedy="drive bench_calibration.py with its whole grid",
+        )
+    fitters = drive_fitters(header.neutral) if role == "drive" else steering_fitters()
+    order = DRIVE_KINDS if role == "drive" else STEERING_KINDS
+    fits = compare_maps(points, fitters)
+    try:
+        return fits, preferred(fits, ("thesis",) if maps == "thesis" else order).name
+    except FitError as error:
+        raise FitError(error.what, where=where, value=error.value, limit=error.limit, remedy=error.remedy) from None
+
+
+def _chosen_map(role: Role, fits: Fits, chosen: dict[Role, str], samples: list[Sample]) -> StaticMap:
+    fit = fits[role].get(chosen[role])
+    if isinstance(fit, MapFit):
+        return fit.map
+    points = points_of(samples, role)
+    return Fixed(output=rounded(float(points.value[0])), command=float(points.command[0]))
+
+
+def _tell(fits: Fits, chosen: dict[Role, str], samples: list[Sample]) -> list[str]:
+    """Return in words what was left out of the chosen fits, and what looks odd."""
+    words = []
+    for role in ROLES:
+        scale, unit = (1.0, " m/s") if role == "drive" else (math.degrees(1.0), "°")
+        aside = [s for s in samples if s.role == role and s.why_left_out]
+        reasons = Counter(s.why_left_out for s in aside)
+        words += [f"{role}: {count} samples left out: {why}" for why, count in reasons.items()]
+        fit = fits[role].get(chosen[role])
+        if not isinstance(fit, MapFit):
+            value = scale * float(points_of(samples, role).value[0])
+            words.append(f"{role}: its command never varied; taken as fixed at {value:.2f}{unit}")
+            continue
+        words += [
+            f"{role}: {out.command:g} ({scale * out.value:.3g}{unit}) left out: {out.why}" for out in fit.left_out
+        ]
+        if fit.name == "line_with_end_stops":
+            words += [
+                f"{role}: {out.command:g} ({scale * out.value:.3g}{unit}) not on the line: {out.why}"
+                for out in saturated(fit)
+            ]
+        words += [f"{role}: {note}" for note in fit.notes]
+    return words
+
+
+def _provenance(
+    header: HeaderLike,
+    method: str,
+    used: int,
+    maps: str,
+    fits: Fits,
+    chosen: dict[Role, str],
+    session: str | None,
+) -> dict[str, str | float | int]:
+    """Return where the maps come from; nothing in it depends on when or where the calibration is made."""
+    provenance: dict[str, str | float | int] = {
+        "campaign": header.name,
+        "method": method,
+        "maps": maps,
+        "runs_used": used,
+    }
+    if session is not None:
+        provenance["session"] = session
+    for role in ROLES:
+        provenance[f"{role}_fit"] = chosen[role]
+        fit = fits[role].get(chosen[role])
+        if not isinstance(fit, MapFit):
+            continue
+        provenance[f"{role}_r_squared"] = round(fit.r_squared, 6)
+        provenance[f"{role}_commands"] = len(fit.points)
+        if fit.left_out:
+            provenance[f"{role}_left_out"] = ", ".join(f"{out.command:g}" for out in fit.left_out)
+    return provenance
+
+
+def _table(samples: list[Sample], fits: Fits, chosen: dict[Role, str]) -> pd.DataFrame:
+    import pandas as pd
+
+    reasons: dict[tuple[Role, float], str] = {}
+    for role in ROLES:
+        if isinstance(fit := fits[role].get(chosen[role]), MapFit):
+            reasons |= {(role, out.command): out.why for out in fit.left_out}
+    rows = []
+    for s in samples:
+        scale = 1.0 if s.role == "drive" else math.degrees(1.0)
+        why = s.why_left_out or reasons.get((s.role, s.command), "")
+        rows.append((s.role, s.command, scale * s.value, scale * s.stderr, s.run_id, bool(why), why))
+    columns = ["axle", "command", "value", "stderr", "run_id", "left_out", "why"]
+    return pd.DataFrame(rows, columns=columns).sort_values(["axle", "command"], kind="stable", ignore_index=True)

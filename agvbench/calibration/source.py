@@ -1,0 +1,55 @@
+"""What calibration asks of a campaign: its header and its runs, wherever they are kept."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Protocol
+
+from agvbench.types import CommandUnit, Run
+
+
+class HeaderLike(Protocol):
+    """What holds for all runs; `agvbench.campaign.CampaignHeader` is one."""
+
+    @property
+    def name(self) -> str:
+        """Name of the campaign."""
+        ...
+
+    @property
+    def vehicle_name(self) -> str:
+        """Name of the vehicle."""
+        ...
+
+    @property
+    def front_axle_m(self) -> float:
+        """From the marker centroid forward to the front axle [m]."""
+        ...
+
+    @property
+    def rear_axle_m(self) -> float:
+        """From the marker centroid backward to the rear axle [m]."""
+        ...
+
+    @property
+    def command_unit(self) -> CommandUnit:
+        """Unit of the commands."""
+        ...
+
+    @property
+    def neutral(self) -> float:
+        """Command at which the vehicle stands and steers straight."""
+        ...
+
+
+class CampaignLike(Protocol):
+    """A header and runs in order; `agvbench.campaign.Campaign` is one."""
+
+    @property
+    def header(self) -> HeaderLike:
+        """What holds for all runs."""
+        ...
+
+    def __iter__(self) -> Iterator[Run]:
+        """Iterate over all runs, by time of start."""
+        ...
