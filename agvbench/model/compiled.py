@@ -1,0 +1,30 @@
+"""The one way in which this package compiles functions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from numba import njit
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+#: Sums may be reordered and fused, but NaN and infinity keep their meaning.
+FAST = frozenset({"contract", "nsz", "arcp", "reassoc"})
+
+
+def compiled(*, fast: bool = False, inner: bool = False) -> Callable[[F], F]:
+    """Return numba's decorator for a function at module level: cached on disk, without the interpreter's lock.
+
+    An `inner` function is called from compiled functions only, which saves compiling its wrapper.
+    Division by zero gives an infinity as in NumPy: a check for it would keep loops from being vectorised.
+    """
+    decorator: Callable[[F], F] = njit(
+        cache=True,
+        nogil=True,
+        error_model="numpy",
+        fastmath=set(FAST) if fast else False,
+        no_cpython_wrapper=inner,
+        no_cfunc_wrapper=inner,
+    )
+    return decorator
