@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from agvbench.reporting.content import Column, Paragraph, Table, plain
+from agvbench.reporting.content import Column, Paragraph, Table, Value, plain
 from agvbench.statistics.words import headline
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
     from agvbench.reporting.write import WrittenReport
-    from agvbench.statistics import Comparison
+    from agvbench.statistics import Comparison, Difference
     from agvbench.workflows.report import ReportData
 
 _VERDICT_STYLES = {"better": "green", "worse": "bold red", "same": "cyan", "cannot": "dim"}
-_SHOWN = ("trajectory", "condition", "quantity", "median_a", "median_b", "difference", "low", "high", "verdict")
+_LONGEST_HEADING = 14
 
 
 def console_table(table: Table) -> RenderableType:
@@ -27,20 +27,46 @@ def console_table(table: Table) -> RenderableType:
     shown = RichTable(title=Text(plain(table.caption)), box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
     for column in table.columns:
         heading = f"{column.group}\n{column.title}" if column.group else column.title
-        shown.add_column(Text(plain(heading)), justify="left" if column.digits is None else "right")
+        shown.add_column(Text(plain(heading)), justify="left" if column.digits is None else "right", overflow="fold")
     for row in table.shown_rows():
         shown.add_row(*(_styled(cell, column) for cell, column in zip(row, table.columns, strict=True)))
     return shown
 
 
-def comparison_summary(comparison: Comparison, slug: str = "comparison") -> RenderableType:
-    """Return the columns of a comparison that fit a console."""
-    from agvbench.reporting.comparison_table import comparison_table
+def comparison_summary(comparison: Comparison) -> RenderableType:
+    """Return a comparison as a table that fits a console: medians, difference with its interval, verdict."""
+    heading_a, heading_b = _headings(comparison)
+    columns = [
+        Column("trajectory", "trajectory"),
+        Column("condition", "condition"),
+        Column("quantity", "error"),
+        Column("median_a", heading_a, 2),
+        Column("median_b", heading_b, 2),
+        Column("difference", "difference", 2),
+        Column("interval", "95 % interval"),
+        Column("verdict", "verdict"),
+    ]
+    rows = [_console_row(d, columns[5]) for d in comparison.differences]
+    if len({d.condition for d in comparison.differences} - {"all"}) == 1:
+        columns, rows = columns[:1] + columns[2:], [row[:1] + row[2:] for row in rows]
+    caption = f"{heading_b} against {heading_a} (medians; smaller is better)"
+    return console_table(Table("comparison", caption, columns, rows))
 
-    whole = comparison_table(comparison, slug)
-    kept = [index for index, column in enumerate(whole.columns) if column.name in _SHOWN]
-    columns = [whole.columns[index] for index in kept]
-    return console_table(Table(slug, whole.caption, columns, [[row[i] for i in kept] for row in whole.rows]))
+
+def _headings(comparison: Comparison) -> tuple[str, str]:
+    names = plain(comparison.name_a), plain(comparison.name_b)
+    return names if max(map(len, names)) <= _LONGEST_HEADING else ("A", "B")
+
+
+def _console_row(d: Difference, difference: Column) -> list[Value]:
+    error = f"|{d.quantity.symbol}| {d.quantity.unit}"
+    medians = d.a.median, d.b.median, d.interval.estimate
+    return [d.trajectory, d.condition, error, *medians, _interval(d, difference), str(d.verdict)]
+
+
+def _interval(d: Difference, column: Column) -> str:
+    low, high = column.shown(d.interval.low), column.shown(d.interval.high)
+    return f"{low} … {high}" if low else ""
 
 
 def end_pose_summary(data: ReportData) -> RenderableType:
@@ -77,6 +103,8 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
     """Print a comparison: table, what was left out, what intervals mean, and the answer last."""
     from rich.text import Text
 
+    if _headings(comparison) == ("A", "B"):
+        console.print(Text(f"A: {plain(comparison.name_a)}\nB: {plain(comparison.name_b)}"))
     console.print(comparison_summary(comparison))
     for line in comparison.left_out:
         console.print(Text(f"left out: {plain(line)}", style="dim"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -59,17 +58,12 @@ def _send_run(recording: rr.RecordingStream, run: Run, shown: str) -> None:
     turn = np.column_stack([np.zeros((len(poses), 2)), np.sin(poses[:, 3] / 2), np.cos(poses[:, 3] / 2)])
     moved = rr.Transform3D.columns(translation=flat, quaternion=turn)
     recording.send_columns(f"{entity}/vehicle", indexes=[_time(poses[:, 0])], columns=moved)
-    for name, columns in _commands(run):
-        index = [_time(run.commands.t_s)]
-        recording.send_columns(f"{entity}/commands/{name}", indexes=index, columns=columns)
-
-
-def _commands(run: Run) -> Iterator[tuple[str, Any]]:
-    import rerun as rr
-
     if len(run.commands):
-        for name in ("drive", "front", "rear"):
-            yield name, rr.Scalars.columns(scalars=getattr(run.commands, name))
+        told = np.column_stack([run.commands.drive, run.commands.front, run.commands.rear])
+        names = rr.SeriesLines(names=["drive", "front", "rear"])
+        recording.log(f"{entity}/commands", names, static=True)
+        index = [_time(run.commands.t_s)]
+        recording.send_columns(f"{entity}/commands", indexes=index, columns=rr.Scalars.columns(scalars=told))
 
 
 def _time(t_s: Floats) -> rr.TimeColumn:
@@ -90,7 +84,7 @@ def _blueprint() -> Any:
     return rrb.Blueprint(
         rrb.Vertical(
             rrb.Spatial3DView(origin="/", contents=["/runs/**"], name="Floor"),
-            rrb.TimeSeriesView(origin="/runs", contents=["/runs/**/commands/**"], name="Commands"),
+            rrb.TimeSeriesView(origin="/runs", contents=["/runs/**"], name="Commands"),
             row_shares=[4, 1],
         ),
         collapse_panels=True,

@@ -65,10 +65,11 @@ def write_report(
         margin_deg=margin_deg,
         track=lambda runs, total: track(runs, total, what="reading runs"),
     )
-    registry = all_sections()
-    sections = [s.content(data) for s in track(registry, len(registry), what="drawing")]
     out = data.path / "report" if out is None else Path(out)
     try:
+        out.mkdir(parents=True, exist_ok=True)
+        registry = all_sections()
+        sections = [s.content(data) for s in track(registry, len(registry), what="drawing")]
         files = [_write(out / name, text) for name, text in _texts(data, sections)]
         if recording:
             write_recording(data, out / RECORDING)

@@ -142,7 +142,7 @@ def compare(
     FlagError
         If a margin is negative or not finite.
     """
-    margins = {q: _margin(m, q) for q, m in zip(QUANTITIES, (margin_mm, margin_deg), strict=True)}
+    margins = checked_margins(margin_mm, margin_deg)
     cells, left_out = match_cells(a, b, conditions=conditions, same_campaign=same_campaign)
     raw = [_of_cell(cell, q, margins[q], resamples, seed) for cell in cells for q in QUANTITIES]
     if len(cells) > 1:
@@ -158,6 +158,17 @@ class _Raw:
 
     difference: Difference
     least_p: float
+
+
+def checked_margins(margin_mm: float, margin_deg: float) -> dict[Quantity, float]:
+    """Return the margin of every quantity.
+
+    Raises
+    ------
+    FlagError
+        If one is negative or not finite.
+    """
+    return {q: _margin(m, q) for q, m in zip(QUANTITIES, (margin_mm, margin_deg), strict=True)}
 
 
 def _margin(value: float, quantity: Quantity) -> float:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from agvbench.campaign import Campaign, CampaignHeader
 from agvbench.errors import InputError
 from agvbench.statistics import Comparison, bias_and_spread, compare, end_pose_table, pose_errors, valid
-from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
+from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM, checked_margins
 from agvbench.statistics.end_poses import in_order
 from agvbench.types import Run
 from agvbench.workflows.calibration_curves import CalibrationCurves, read_calibration_curves
@@ -68,7 +68,10 @@ def gather(
     ------
     CampaignError
         If the campaign cannot be read.
+    FlagError
+        If a margin is negative or not finite.
     """
+    checked_margins(margin_mm, margin_deg)
     campaign = Campaign.open(path)
     tracked = track(campaign, len(campaign)) if track else iter(campaign)
     runs = list(tracked)

@@ -1,0 +1,39 @@
+"""Every line of docs/reference/errors-reports.md, word for word."""
+
+import re
+from pathlib import Path
+
+import pytest
+from report_samples import make_campaign, make_free_campaign
+
+from agvbench.cli import main
+
+DOCUMENT = Path(__file__).parents[2] / "docs" / "reference" / "errors-reports.md"
+CASES = re.findall(r"^\| `([a-z0-9-]+)` \| `([^`]*)` \| `([^`]*)` \|$", DOCUMENT.read_text(encoding="utf-8"), re.M)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("lab")
+    make = {"repeats": 1, "rate_hz": 30.0, "conditions": ("calibrated",), "calibration": False}
+    make_campaign(path / "c", trajectories=("1_forward", "6_forward_right"), **make)
+    make_campaign(path / "other", trajectories=("2_backward",), **make)
+    make_campaign(path / "rejected", trajectories=("5_forward_left",), **make)
+    make_free_campaign(path / "free")
+    (path / "empty").mkdir()
+    (path / "a_file").write_text("", encoding="utf-8")
+    return path
+
+
+def test_the_table_is_read():
+    assert len(CASES) >= 12
+    assert len({name for name, _, _ in CASES}) == len(CASES)
+
+
+@pytest.mark.parametrize(("arguments", "line"), [case[1:] for case in CASES], ids=[case[0] for case in CASES])
+def test_bad_input_is_one_line(arguments, line, folder, capsys, monkeypatch):
+    monkeypatch.chdir(folder)
+    command, *rest = arguments.split()
+    assert main([command, *rest]) == 2
+    said = capsys.readouterr()
+    assert said.err == f"agvbench {command}: {line}\n"

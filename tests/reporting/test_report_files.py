@@ -1,0 +1,160 @@
+"""The files of a report: complete, offline, equal to the numbers they come from."""
+
+import csv
+import math
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pandas as pd
+import pytest
+from report_samples import HOSTILE
+
+from agvbench.reporting import write_report
+from agvbench.reporting.content import Column, plain
+from agvbench.reporting.csv_table import frame_to_csv
+
+VOID = {"meta", "link", "br", "img", "hr", "input", "path", "use", "rect"}
+
+
+class Page(HTMLParser):
+    """Collects tags, links and text, and whether every tag that is opened is closed."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.links, self.open, self.ids, self.text = [], [], [], [], []
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.links += [value for name, value in attrs if name in {"src", "href", "xlink:href", "srcset", "action"}]
+        self.ids += [value for name, value in attrs if name == "id"]
+        assert not [name for name, _ in attrs if name.startswith("on")]
+        if tag not in {"meta"}:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.handle_starttag(tag, attrs)
+        self.open.pop()
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+@pytest.fixture(scope="module")
+def report(campaigns, tmp_path_factory):
+    return write_report(campaigns("eight trajectories"), tmp_path_factory.mktemp("out"))
+
+
+def read(report, name):
+    return next(path for path in report.files if path.name == name).read_text(encoding="utf-8")
+
+
+def test_all_files_are_there(report):
+    names = {path.name for path in report.files}
+    assert {"report.html", "report.md", "campaign.rrd", "pose_errors.csv", "end_poses.csv", "end_poses.tex"} <= names
+    assert all(path.stat().st_size > 100 for path in report.files)
+
+
+def test_the_page_is_whole_and_needs_nothing_from_elsewhere(report):
+    text = read(report, "report.html")
+    page = Page(text)
+    assert not {"script", "link", "iframe", "img", "object", "embed"} & set(page.tags)
+    assert all(link.startswith("#") for link in page.links)
+    assert not re.search(r"@import|url\((?!#)|https?://(?!www\.w3\.org)", text)
+    assert page.tags.count("svg") == 8 + 2 + 1 + 8 + 3
+    targets = {link[1:] for link in page.links}
+    assert targets <= set(page.ids)
+    assert len(page.ids) == len(set(page.ids))
+
+
+def test_the_page_says_what_calibration_bought(report):
+    said = " ".join("".join(Page(read(report, "report.html")).text).split())
+    assert re.search(r"Calibration changed the median \|Δs\| from [\d.]+ to [\d.]+ mm \(better\)", said)
+    assert "thesis, tables 8.3–8.10" in said
+    assert "rejected: gap of 0.40 s without pose" in said
+    assert "sim 1.0" in said
+
+
+def test_light_dark_and_print_are_provided_for(report):
+    text = read(report, "report.html")
+    assert "prefers-color-scheme: dark" in text
+    assert "@media print" in text
+    assert 'name="viewport"' in text
+    used = set(re.findall(r"var\(--([a-z0-9]+)\)", text))
+    assert used <= set(re.findall(r"--([a-z0-9]+):", text))
+
+
+def test_the_same_campaign_gives_the_same_bytes(campaigns, report, tmp_path):
+    again = write_report(campaigns("eight trajectories"), tmp_path, recording=False)
+    for path in again.files:
+        assert path.read_text(encoding="utf-8") == read(report, path.name)
+
+
+def test_tables_hold_the_errors_of_the_runs(report):
+    errors = pd.read_csv(next(p for p in report.files if p.name == "pose_errors.csv"))
+    table = pd.read_csv(next(p for p in report.files if p.name == "end_poses.csv"))
+    row = table[table.trajectory.str.startswith("6_") & (table.condition == "calibrated") & (table.unit == "mm")].iloc[
+        0
+    ]
+    runs = errors[(errors.trajectory == "6_forward_right") & (errors.condition == "calibrated")]
+    expected = np.percentile(runs.delta_s_mm.abs(), [0, 25, 50, 75, 100])
+    assert list(row[["min", "q1", "median", "q3", "max"]]) == pytest.approx(list(expected))
+    # Thesis table 8.8, third number of the second row.
+    assert row.published_median == 55.5
+
+
+def test_figures_draw_every_condition_in_its_own_colour(report):
+    text = read(report, "report.html")
+    drawings = text[text.index('id="figure-end-pose-figure"') : text.index('id="figure-strips"')]
+    assert "var(--c0)" in drawings
+    assert "var(--c1)" in drawings
+    assert "var(--c2)" not in drawings
+
+
+def test_spreadsheets_take_no_name_for_a_formula():
+    frame = pd.DataFrame({"name": ["=1+1", "@x", "-2", HOSTILE], "value": [1.0, math.nan, -3.0, 4.0]})
+    rows = list(csv.reader(frame_to_csv(frame).splitlines()))
+    assert [row[0][:2] for row in rows[1:]] == ["'=", "'@", "'-", "<s"]
+    assert [row[1] for row in rows[1:]] == ["1.0", "", "-3.0", "4.0"]
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [
+        (-0.004, "0.00"),
+        (-1.5, "−1.50"),
+        (None, ""),
+        (math.nan, ""),
+        (math.inf, "∞"),
+        (1e-9, "<0.01"),
+        (12.345, "12.35"),
+    ],
+)
+def test_numbers_as_people_read_them(value, shown):
+    least = 0.01 if value == 1e-9 else -math.inf
+    assert Column("x", "x", 2, least=least).shown(value) == shown
+
+
+def test_plain_text_has_no_control_characters_and_fits_a_line():
+    assert "\x1b" not in plain(HOSTILE)
+    assert len(plain("x" * 1000)) == 120
+
+
+def test_recording_holds_every_run_in_columns(report):
+    chunks = pytest.importorskip("rerun.chunk", reason="this Rerun SDK cannot read recordings")
+    path = next(p for p in report.files if p.name == "campaign.rrd")
+    moving, runs = 0, set()
+    for chunk in chunks.RrdReader(str(path)).stream().to_chunks():
+        if str(chunk.entity_path).endswith("/vehicle") and not chunk.is_static:
+            runs.add(str(chunk.entity_path))
+            moving += chunk.num_rows
+            assert "run_time" in chunk.timeline_names
+    counted = int((report.data.errors.status == "ok").sum())
+    assert len(runs) == counted
+    # 7.2 s at 30 Hz, of which about 1 % were not tracked.
+    assert 200 * counted < moving <= 217 * counted
