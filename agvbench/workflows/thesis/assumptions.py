@@ -84,7 +84,7 @@ MEANING: dict[tuple[str, str], str] = {
     ("uncalibrated_steering", "table_6_1"): "the axles answer as in table 6.1, measured before chapter 7",
     ("calibrated_drive", "cubic"): "pulse and time from the refitted cubic at ±0.32 and ±0.16 m/s",
     ("calibrated_drive", "end_of_range"): "pulse at the cubic's ends (1200, 1850 µs) and at table 7.4's half speed",
-    ("calibrated_drive", "table_7_4"): "time from table 7.4's own speed at the cubic's pulse",
+    ("calibrated_drive", "table_7_4"): "time from the speed that table 7.4 shows at the cubic's pulse",
     ("calibrated_steering", "published"): "pulses from eq. 7.1, 7.2 as printed",
     ("calibrated_steering", "unrounded"): "pulses from the same lines before rounding",
 }

@@ -1,0 +1,95 @@
+"""What the vehicle was told in chapter 8: pulses and driving time, assumed where the thesis does not say."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import NamedTuple
+
+from agvbench.model import thesis_vehicle
+from agvbench.vehicle.kinematics import body_motion
+from agvbench.workflows.thesis.assumptions import Assumptions, CalibratedDrive, CalibratedSteering, WholeDegrees
+from agvbench.workflows.thesis.drive import PARTIAL_US, cubic_map
+from agvbench.workflows.thesis.eight import Trajectory, wanted_angles
+from agvbench.workflows.thesis.steering import published_lines, unrounded_lines
+from agvbench.workflows.thesis.tables import GEOMETRY
+from agvbench.workflows.thesis.vehicle import true_speed
+
+NEUTRAL_US = 1500.0
+FULL_SPEED_MPS = 0.32
+NOMINAL_US_PER_DEG = 600.0 / 45.0
+
+
+class Told(NamedTuple):
+    """One drive's command: three pulses [µs], held for `duration_s`, then stop."""
+
+    drive_us: float
+    front_us: float
+    rear_us: float
+    duration_s: float
+
+
+def told(trajectory: Trajectory, condition: str, assumed: Assumptions) -> Told:
+    """Return what the vehicle was told on `trajectory` under `condition`."""
+    angles = wanted_angles(trajectory.side, assumed.steering, GEOMETRY)
+    if condition == "uncalibrated":
+        drive_us, speed = _uncalibrated_drive(trajectory.drive, assumed.nominal_speed)
+        front_us, rear_us = (_nominal_pulse(a, assumed.whole_degrees) for a in angles)
+    else:
+        drive_us, speed = _calibrated_drive(trajectory.drive, trajectory.half_speed, assumed.calibrated_drive)
+        front_us, rear_us = _calibrated_pulses(angles, assumed.calibrated_steering)
+    return Told(drive_us, front_us, rear_us, _duration(trajectory, angles, abs(speed), assumed.duration))
+
+
+def _duration(trajectory: Trajectory, angles: tuple[float, float], speed_mps: float, duration: str) -> float:
+    if duration == "path" or not trajectory.is_turn:
+        return trajectory.path_m / speed_mps
+    _, _, yaw_rate = body_motion(*angles, speed_mps, speed_mps, GEOMETRY)
+    return abs(trajectory.heading_rad / float(yaw_rate))
+
+
+def _uncalibrated_drive(direction: int, nominal_speed: str) -> tuple[float, float]:
+    """Return full command and the speed that is believed: ±0.32 m/s (table 6.2), or table 7.4's."""
+    drive_us = NEUTRAL_US - direction * 600.0
+    return drive_us, FULL_SPEED_MPS if nominal_speed == "0.32" else true_speed(drive_us)
+
+
+def _nominal_pulse(angle_rad: float, whole_degrees: WholeDegrees) -> float:
+    """Return the nominal map's pulse: 45° per 600 µs about 1500, falling for a left turn."""
+    return NEUTRAL_US - NOMINAL_US_PER_DEG * cut_to_degrees(math.degrees(angle_rad), whole_degrees)
+
+
+def cut_to_degrees(angle_deg: float, how: WholeDegrees) -> float:
+    """Return the steering angle that survives a command in whole degrees.
+
+    >>> [cut_to_degrees(10.6, how) for how in ("none", "rounded", "toward_straight", "servo_floor")]
+    [10.6, 11.0, 10.0, 11.0]
+    >>> cut_to_degrees(-10.6, "servo_floor")
+    -10.0
+    """
+    if how == "none":
+        return angle_deg
+    if how == "rounded":
+        return math.copysign(math.floor(abs(angle_deg) + 0.5), angle_deg)
+    if how == "toward_straight":
+        return float(math.trunc(angle_deg))
+    # The servo's own degrees count from 45 (left) over 90 (straight) to 135 (right), and lose their fraction.
+    return 90.0 - math.floor(90.0 - angle_deg)
+
+
+def _calibrated_pulses(angles: tuple[float, float], how: CalibratedSteering) -> tuple[float, float]:
+    front, rear = published_lines() if how == "published" else unrounded_lines()
+    return float(front.inverse(angles[0])), float(rear.inverse(angles[1]))
+
+
+@cache
+def _calibrated_drive(direction: int, half_speed: bool, how: CalibratedDrive) -> tuple[float, float]:
+    """Return the drive pulse and the speed from which the driving time was computed."""
+    wanted = direction * FULL_SPEED_MPS * (0.5 if half_speed else 1.0)
+    cubic = cubic_map()
+    if how == "end_of_range":
+        end_us = PARTIAL_US[0] if direction > 0 else PARTIAL_US[1]
+        drive_us = float(thesis_vehicle().drive.inverse(wanted)) if half_speed else end_us
+        return drive_us, float(cubic(drive_us))
+    drive_us = float(cubic.inverse(wanted))
+    return drive_us, wanted if how == "cubic" else true_speed(drive_us)

@@ -1,0 +1,78 @@
+"""Predict an end pose of chapter 8 from the vehicle of chapters 6, 7, 8.1 and appendix B.
+
+A command holds both axles and the drive constant, so the markers move on an arc whose shape depends on the
+angles and whose length depends on the distance driven. That is a closed form: no integration in time is needed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from agvbench.types import Pose
+from agvbench.workflows.thesis.assumptions import Assumptions, Condition
+from agvbench.workflows.thesis.commands import Told, told
+from agvbench.workflows.thesis.eight import EIGHT, Trajectory
+from agvbench.workflows.thesis.ramps import driven_distance
+from agvbench.workflows.thesis.vehicle import steady_motion, true_speed
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Where one drive ends: `end` in the start frame, Δs [mm] and heading change [deg], both signed."""
+
+    trajectory: Trajectory
+    condition: Condition
+    command: Told
+    end: Pose
+    turned_deg: float
+    delta_s_mm: float
+
+    @property
+    def delta_heading_deg(self) -> float:
+        """Heading change minus its target [deg], signed."""
+        return self.turned_deg - math.degrees(self.trajectory.heading_rad)
+
+
+def predict(trajectory: Trajectory, condition: Condition, assumed: Assumptions) -> Prediction:
+    """Return the predicted end of `trajectory` driven under `condition`."""
+    command = told(trajectory, condition, assumed)
+    motion = steady_motion(command.front_us, command.rear_us, condition, assumed)
+    distance = driven_distance(true_speed(command.drive_us), command.duration_s, assumed.ramps)
+    end, turned = arc_end(distance * motion.speed, motion.sideslip_rad, distance * motion.yaw_per_m)
+    delta_s = math.hypot(end.x_m, end.y_m) - trajectory.distance_m(assumed.turn_target)
+    return Prediction(trajectory, condition, command, end, math.degrees(turned), 1000.0 * delta_s)
+
+
+def arc_end(length_m: float, sideslip_rad: float, turned_rad: float) -> tuple[Pose, float]:
+    """Return where an arc ends that starts at the origin with heading 0, and its heading change (not wrapped).
+
+    Parameters
+    ----------
+    length_m
+        Length of the path of the markers, negative backward.
+    sideslip_rad
+        Angle between heading and velocity (β of eq. 5.7).
+    turned_rad
+        Heading change over the whole arc.
+
+    Examples
+    --------
+    >>> end, turned = arc_end(math.pi / 2, 0.0, math.pi / 2)
+    >>> round(end.x_m, 12), round(end.y_m, 12)
+    (1.0, 1.0)
+    """
+    half = 0.5 * turned_rad
+    chord = length_m * (math.sin(half) / half if half else 1.0)
+    direction = sideslip_rad + half
+    return Pose(chord * math.cos(direction), chord * math.sin(direction), turned_rad), turned_rad
+
+
+def driven(condition: Condition) -> tuple[Trajectory, ...]:
+    """Return the trajectories that were driven under `condition`: uncalibrated knows no half speed."""
+    return tuple(t for t in EIGHT if not (t.half_speed and condition == "uncalibrated"))
+
+
+def predict_all(assumed: Assumptions, condition: Condition) -> list[Prediction]:
+    """Return a prediction for every trajectory driven under `condition`, in order."""
+    return [predict(trajectory, condition, assumed) for trajectory in driven(condition)]

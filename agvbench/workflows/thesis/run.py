@@ -1,0 +1,80 @@
+"""Compute the sections of `agvbench thesis` and write them to files."""
+
+from __future__ import annotations
+
+import importlib
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from agvbench.errors import FileError, FlagError
+from agvbench.workflows.thesis.layout import Section
+
+SCHEMA = 1
+
+#: Name of a section and the module that makes it, in reading order.
+_MODULES = {
+    "steering": "steering",
+    "drive": "drive",
+    "maps": "better_maps",
+    "cornering": "cornering",
+    "battery": "battery",
+    "lever_arm": "lever_arm",
+    "errata": "errata",
+    "prediction": "prediction_section",
+    "sensitivity": "sensitivity",
+    "turns": "turns",
+}
+
+
+def section_names() -> tuple[str, ...]:
+    """Return the names of all sections, in reading order."""
+    return tuple(_MODULES)
+
+
+def thesis_sections(names: Sequence[str] = ()) -> Iterator[Section]:
+    """Yield the sections of these names in reading order, each as soon as it is computed; all if none is named.
+
+    Raises
+    ------
+    FlagError
+        If a section is unknown.
+    """
+    for name in names:
+        if name not in _MODULES:
+            raise FlagError("unknown section", where="--section", value=name, limit=", ".join(_MODULES))
+    return (_section(name) for name in _MODULES if not names or name in names)
+
+
+def _section(name: str) -> Section:
+    module = importlib.import_module(f"{__package__}.{_MODULES[name]}")
+    section: Section = getattr(module, f"{name}_section")()
+    return section
+
+
+def write_json(sections: Sequence[Section], path: Path) -> None:
+    """Write all sections as one JSON file (``schema``, ``sections``)."""
+    document = {"schema": SCHEMA, "sections": {s.name: s.as_json() for s in sections}}
+    _write(path, json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def write_tables(sections: Sequence[Section], directory: Path) -> list[Path]:
+    """Write one CSV per table and ``thesis.md`` with everything; return the paths."""
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError("cannot make the directory", where=directory, value=error.strerror) from None
+    files = {f"{table.name}.csv": table.csv() for section in sections for table in section.tables}
+    files["thesis.md"] = "\n".join(["# The thesis, refitted and predicted", "", *(s.markdown() for s in sections)])
+    for name, text in files.items():
+        _write(directory / name, text)
+    return [directory / name for name in files]
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise FileError(
+            "cannot write the file", where=path, value=error.strerror, remedy="choose a writable place"
+        ) from None

@@ -1,0 +1,56 @@
+"""The vehicle of chapters 6, 7 and appendix B: what its axles and its drive really do with a pulse."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import NamedTuple
+
+from agvbench.model import thesis_vehicle
+from agvbench.vehicle.kinematics import body_motion
+from agvbench.workflows.thesis.assumptions import Assumptions
+from agvbench.workflows.thesis.cornering import NEUTRAL_US, cornering_share, fitted_loss
+from agvbench.workflows.thesis.steering import true_maps, verification_maps
+from agvbench.workflows.thesis.tables import GEOMETRY
+
+
+class SteadyMotion(NamedTuple):
+    """How the markers move per metre that the same drive goes at 1500 µs of steering."""
+
+    speed: float
+    sideslip_rad: float
+    yaw_per_m: float
+
+
+@cache
+def true_speed(drive_us: float) -> float:
+    """Return the shipped vehicle's speed [m/s] at a drive pulse and 1500 µs of steering (table 7.4)."""
+    return float(thesis_vehicle().speed(drive_us))
+
+
+def steady_motion(front_us: float, rear_us: float, condition: str, assumed: Assumptions) -> SteadyMotion:
+    """Return the motion at two steering pulses."""
+    before = condition == "uncalibrated" and assumed.uncalibrated_steering == "table_6_1"
+    kind = "table_6_1" if before else assumed.true_steering
+    return _steady_motion(front_us, rear_us, kind, assumed.cornering_loss == "appendix_b")
+
+
+@cache
+def _steady_motion(front_us: float, rear_us: float, kind: str, with_loss: bool) -> SteadyMotion:
+    loss = fitted_loss() if with_loss else 0.0
+    front, rear = _angles(kind, front_us, rear_us)
+    speed, sideslip, yaw_rate = (float(x) for x in body_motion(front, rear, 1.0, 1.0, GEOMETRY))
+    # Table 7.4 was driven at 1500 µs, so that is where the drive goes exactly as far as the table says.
+    kept = float(cornering_share(front, rear, loss)) / _neutral_share(kind, loss)
+    return SteadyMotion(kept * speed, sideslip, kept * yaw_rate)
+
+
+def _angles(kind: str, front_us: float, rear_us: float) -> tuple[float, float]:
+    front, rear = verification_maps() if kind == "table_6_1" else true_maps(kind)
+    return float(front(front_us)), float(rear(rear_us))
+
+
+@cache
+def _neutral_share(kind: str, loss: float) -> float:
+    front, rear = _angles(kind, NEUTRAL_US, NEUTRAL_US)
+    speed, _, _ = body_motion(front, rear, 1.0, 1.0, GEOMETRY)
+    return float(speed) * float(cornering_share(front, rear, loss))
