@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -50,7 +51,7 @@ class AgvHost(Host):
         self._lock_step = adapter.identity().lock_step
         self._answers |= {RESET: self._reset, REPLAY: self._replay}
         self._subscriber = session.declare_subscriber(keys.command, zenoh.handlers.FifoChannel(_COMMANDS_WAITING))
-        self._closed = False
+        self._closed = threading.Event()
         self._outdated = (0, 0)
         adapter.start(self)
         self._run("commands", self._serve_commands)
@@ -95,7 +96,7 @@ class AgvHost(Host):
             self.event(Level.WARNING, "commands_lost", f"{lost} commands were lost before {message.sequence}")
         try:
             with self._lock:
-                if self._closed or self._is_outdated(message):
+                if self._closed.is_set() or self._is_outdated(message):
                     return
                 if message.flags & CommandFlags.STOP:
                     self._heard_s = None
@@ -113,8 +114,7 @@ class AgvHost(Host):
 
     def _watch(self) -> None:
         """Stop a vehicle whose runner has fallen silent."""
-        while not self._closed:
-            self._clock.sleep(SILENCE_LIMIT_S / 5.0)
+        while not self._clock.wait(self._closed, SILENCE_LIMIT_S / 5.0):
             heard_s = self._heard_s
             if heard_s is not None and self._clock.now() - heard_s > SILENCE_LIMIT_S:
                 self._heard_s = None
@@ -131,7 +131,7 @@ class AgvHost(Host):
 
     def close(self) -> None:
         """Stop the vehicle, leave the bus, release the adapter."""
-        self._closed = True
+        self._closed.set()
         # An adapter that hangs in a command must not keep the vehicle from being stopped.
         locked = self._lock.acquire(timeout=_STOP_PATIENCE_S)
         try:

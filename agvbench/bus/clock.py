@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from typing import Protocol, runtime_checkable
 
@@ -16,6 +17,10 @@ class Clock(Protocol):
 
     def sleep(self, duration_s: float) -> None:
         """Wait for `duration_s` [s]; at once if that is not positive."""
+        ...
+
+    def wait(self, event: threading.Event, limit_s: float) -> bool:
+        """Wait until `event` is set, but no longer than `limit_s` [s]; return whether it is."""
         ...
 
 
@@ -42,6 +47,10 @@ class WallClock:
         if duration_s > 0.0:
             time.sleep(duration_s)
 
+    def wait(self, event: threading.Event, limit_s: float) -> bool:
+        """Wait until `event` is set, but no longer than `limit_s` [s]; return whether it is."""
+        return event.wait(max(0.0, limit_s))
+
 
 class SimulatedClock:
     """A clock that only moves when somebody waits for it: waiting takes no time.
@@ -63,3 +72,9 @@ class SimulatedClock:
         """Let `duration_s` [s] pass."""
         if duration_s > 0.0:
             self._now_s += duration_s
+
+    def wait(self, event: threading.Event, limit_s: float) -> bool:
+        """Let `limit_s` [s] pass unless `event` is set already; return whether it is."""
+        if not event.is_set():
+            self.sleep(limit_s)
+        return event.is_set()

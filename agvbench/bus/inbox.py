@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import deque
 from typing import Any
 
@@ -42,7 +43,8 @@ class Inbox:
         # The subscriber itself is locked while a thread waits in it; its handler is not.
         self._handler = self._subscriber.handler
         self._closed_error = zenoh.ZError
-        self._waker = session.declare_publisher(
+        self._wake_lock = threading.Lock()
+        self._waker: Any = session.declare_publisher(
             keys.wake,
             congestion_control=zenoh.CongestionControl.DROP,
             allowed_destination=zenoh.Locality.SESSION_LOCAL,
@@ -50,10 +52,9 @@ class Inbox:
 
     def wake(self) -> None:
         """Make `receive` return None once; safe in any thread."""
-        try:
-            self._waker.put(b"")
-        except self._closed_error:
-            return
+        with self._wake_lock:
+            if self._waker is not None:
+                self._waker.put(b"")
 
     def receive(self) -> FramesMessage | Event | None:
         """Wait for the next report; None if somebody called `wake`.
@@ -89,4 +90,6 @@ class Inbox:
     def close(self) -> None:
         """Receive no more; a thread that waits in `receive` gets its `LinkError`."""
         self._subscriber.undeclare()
-        self._waker.undeclare()
+        with self._wake_lock:
+            self._waker.undeclare()
+            self._waker = None

@@ -208,9 +208,9 @@ class VehicleLink:
             self.stop()
         finally:
             self._closed = True
-            self._driver.close()
             self._token.undeclare()
             self._release()
+            self._driver.close()
 
     def _release(self) -> None:
         self._watchdog.close()

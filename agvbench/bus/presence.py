@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import Any
 
 from agvbench.bus.clock import Clock
-from agvbench.bus.keys import Keys
+from agvbench.bus.keys import RUNNER, Keys
 from agvbench.errors import AdapterGoneError
 
 
@@ -29,14 +30,18 @@ class Presence:
         self._keys, self._clock, self._on_gone = keys, clock, on_gone
         self._present: dict[str, bool] = {}
         self._gone_since_s: dict[str, float] = {}
+        self._arrived = threading.Event()
         self._subscriber = session.liveliness().declare_subscriber(keys.alive("*"), self._changed, history=True)
 
     def _changed(self, sample: Any) -> None:
         import zenoh
 
         role = str(sample.key_expr).rpartition("/")[2]
+        if role == RUNNER:
+            return
         if sample.kind == zenoh.SampleKind.PUT:
             self._present[role] = True
+            self._arrived.set()
             return
         self._present[role] = False
         self._gone_since_s[role] = self._clock.now()
@@ -56,14 +61,15 @@ class Presence:
         """
         deadline_s = self._clock.now() + limit_s
         while not self.has(role):
-            if self._clock.now() >= deadline_s:
+            self._arrived.clear()
+            left_s = deadline_s - self._clock.now()
+            if not (self.has(role) or (left_s > 0.0 and self._clock.wait(self._arrived, left_s))):
                 raise AdapterGoneError(
                     f"no {role} adapter on the bus",
                     where=self._keys.root,
                     value=f"waited {limit_s:g} s",
                     remedy=f"start 'agvbench {role}' or 'agvbench sim' for this lab and vehicle, or check the names",
                 )
-            self._clock.sleep(0.01)
 
     def check(self, *roles: str) -> None:
         """Raise `AdapterGoneError`, with its name and since when, if an adapter in one of these roles vanished."""

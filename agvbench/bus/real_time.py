@@ -105,7 +105,8 @@ class RealTime:
         self._outbox.send(self._neutral, 0.0, 0.0, CommandFlags.STOP)
 
     def close(self) -> None:
-        """Nothing to release: the thread ends with its inbox."""
+        """Wait for the thread, which ends with its inbox."""
+        self._thread.join(timeout=2.0)
 
     def _check(self) -> None:
         self._presence.check(AGV, MOCAP)

@@ -18,8 +18,9 @@ class Watchdog:
         self.limit_s = limit_s
         self._clock, self._bark, self._period_s = clock, bark, period_s
         self._armed_s: float | None = None
-        self._closed = False
-        threading.Thread(target=self._watch, name="agvbench-watchdog", daemon=True).start()
+        self._closed = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="agvbench-watchdog", daemon=True)
+        self._thread.start()
 
     def arm(self) -> None:
         """Begin to count."""
@@ -41,12 +42,12 @@ class Watchdog:
         return self.waited_s > self.limit_s
 
     def _watch(self) -> None:
-        while not self._closed:
-            self._clock.sleep(self._period_s)
+        while not self._clock.wait(self._closed, self._period_s):
             if self.expired:
                 self._bark()
 
     def close(self) -> None:
-        """Let the thread end."""
-        self._closed = True
+        """End the thread."""
         self._armed_s = None
+        self._closed.set()
+        self._thread.join()

@@ -37,7 +37,8 @@ class LiveAgv(AgvAdapter):
         self._sampling: Sampling | None = None
         self._plant_s = math.nan
         self._lock = threading.Lock()
-        self._closed = False
+        self._closed = threading.Event()
+        self._thread = threading.Thread(target=self._move, name="agvbench-live", daemon=True)
 
     @classmethod
     def open(cls, address: str, options: AdapterOptions) -> LiveAgv:
@@ -61,7 +62,7 @@ class LiveAgv(AgvAdapter):
     def start(self, reports: AgvReports) -> None:
         """Begin to move."""
         self._reports = reports
-        threading.Thread(target=self._move, name="agvbench-live", daemon=True).start()
+        self._thread.start()
 
     def reset(self, request: Reset) -> None:
         """Place the plant at rest."""
@@ -91,7 +92,8 @@ class LiveAgv(AgvAdapter):
 
     def close(self) -> None:
         """Move no more."""
-        self._closed = True
+        self._closed.set()
+        self._thread.join()
 
     def _hold(self, command: Command) -> None:
         with self._lock:
@@ -105,10 +107,10 @@ class LiveAgv(AgvAdapter):
         return self._plant.advance(*self._held, duration_s)
 
     def _move(self) -> None:
-        while not self._closed:
+        while not self._closed.is_set():
             sampling = self._sampling
             if sampling is None:
-                self._clock.sleep(0.005)
+                self._clock.wait(self._closed, 0.005)
                 continue
             number = math.floor((self._clock.now() - sampling.phase_s) * sampling.rate_hz) + 1
             instant_s = sampling.phase_s + number / sampling.rate_hz

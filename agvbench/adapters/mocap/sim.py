@@ -28,10 +28,12 @@ class SimMocap(MocapAdapter):
 
     @classmethod
     def open(cls, address: str, options: AdapterOptions) -> SimMocap:
-        """Make the camera that the options describe."""
+        """Make the camera that the options describe, ready to look: the first frame waits for nothing."""
         if address:
             raise LinkError("a simulated camera has no address", where=f"sim:{address}", remedy="write sim")
-        return cls(Camera.from_options(options.camera), options)
+        camera = Camera.from_options(options.camera)
+        camera.observe(np.zeros(1), np.zeros((1, 3)), np.random.default_rng(0))
+        return cls(camera, options)
 
     def identity(self) -> MocapIdentity:
         """Return who this is."""
