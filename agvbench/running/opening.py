@@ -58,7 +58,8 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
         neutral=models["uncalibrated"].neutral,
     ) as link:
         _check_unit(models["uncalibrated"], link)
-        writer = _writer(directory, settings, _header(directory.name, models["uncalibrated"], link), resume=resume)
+        header = _header(directory.name, models["uncalibrated"], link)
+        writer = _writer(directory, settings, header, resume=resume, simulated=link.identity().simulated)
         bench = _bench(settings, models, link, writer)
         yield BenchSession(directory, models=models, workspace=workspace, bench=bench)
 
@@ -102,11 +103,12 @@ def _header(name: str, nominal: VehicleModel, link: VehicleLink) -> CampaignHead
     )
 
 
-def _writer(directory: Path, settings: BenchSettings, header: CampaignHeader, *, resume: bool) -> CampaignWriter:
-    if resume and (directory / "campaign.toml").exists():
-        writer = CampaignWriter.resume(directory, header)
-    else:
-        writer = CampaignWriter.create(directory, header)
+def _writer(
+    directory: Path, settings: BenchSettings, header: CampaignHeader, *, resume: bool, simulated: bool
+) -> CampaignWriter:
+    open_writer = CampaignWriter.resume if resume and (directory / "campaign.toml").exists() else CampaignWriter.create
+    # What a power cut takes of a simulation is simulated again; what it takes of a laboratory's day is gone.
+    writer = open_writer(directory, header, durable=not simulated)
     if not (directory / SETTINGS_FILE).exists():
         settings.save(directory)
     if not (directory / f"{PROVENANCE_TABLE}.parquet").exists():
