@@ -76,8 +76,8 @@ def _sample(role: Role, m: RunMeasurement) -> Sample:
 
 
 def _drive_sample(command: float, m: RunMeasurement) -> Sample:
-    if not m.moves:
-        return Sample("drive", command, m.speed_mps, m.speed_stderr_mps, m.run_id)
+    if not m.moves:  # what its frames drift is noise: a vehicle that stands has no speed
+        return Sample("drive", command, 0.0, m.speed_stderr_mps, m.run_id)
     along = 2.0 * math.cos(m.sideslip_rad) / (math.cos(m.front_rad) + math.cos(m.rear_rad))
     sample = Sample("drive", command, along * m.speed_mps, along * m.speed_stderr_mps, m.run_id)
     if max(abs(m.front_rad), abs(m.rear_rad)) <= _STRAIGHT_RAD:

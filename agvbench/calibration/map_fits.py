@@ -13,15 +13,17 @@ from agvbench.calibration.end_stops_fit import fit_line_with_end_stops
 from agvbench.calibration.map_fit import MapFit
 from agvbench.calibration.points import CurvePoints
 from agvbench.calibration.polynomial_fits import fit_cubic, fit_line
+from agvbench.calibration.refined_fit import fit_refined
 from agvbench.calibration.table_fit import fit_monotone_table
 from agvbench.errors import FitError, InputError
 
 Fitter = Callable[[CurvePoints], MapFit]
 
 # In order of preference: a kind further down has to predict clearly better than all before it.
-STEERING_KINDS = ("line_with_end_stops", "line", "monotone_table")
-DRIVE_KINDS = ("dead_band_with_saturation", "monotone_table", "cubic", "line")
-_CLEARLY = 1.25
+STEERING_KINDS = ("line_with_end_stops", "line_with_end_stops_refined", "line", "monotone_table")
+DRIVE_KINDS = ("dead_band_with_saturation_refined", "dead_band_with_saturation", "monotone_table", "cubic", "line")
+_CLEARLY = 1.5
+_NOTHING = 1e-6  # of the range of outputs: errors so small are equal
 _SATURATED_SHARE = 0.02
 
 
@@ -35,8 +37,9 @@ def fit_steering_map(command: ArrayLike, value: ArrayLike, kind: str = "default"
     value
         Shape (n,), axle angle [rad].
     kind
-        ``"line_with_end_stops"``, ``"line"`` (all points), ``"monotone_table"``; ``"thesis"`` for eq. 7.1 and 7.2: a
-        line without the outermost point at each end; ``"default"`` for the one that predicts best (`compare_maps`).
+        ``"line_with_end_stops"``, ``"line"`` (all points), ``"monotone_table"``, ``"line_with_end_stops_refined"``
+        (`fit_refined`); ``"thesis"`` for eq. 7.1 and 7.2: a line without the outermost point at each end;
+        ``"default"`` for the first of `STEERING_KINDS` that none predicts clearly better than (`compare_maps`).
 
     Raises
     ------
@@ -52,9 +55,9 @@ def fit_steering_map(command: ArrayLike, value: ArrayLike, kind: str = "default"
 def fit_drive_map(command: ArrayLike, value: ArrayLike, kind: str = "default", *, neutral: float) -> MapFit:
     """Fit command → speed of the axles [m/s].
 
-    Parameters and errors are those of `fit_steering_map`, with the kinds ``"dead_band_with_saturation"``,
-    ``"monotone_table"``, ``"cubic"``, ``"line"``, and ``"thesis"`` for eq. 7.3: a cubic through the points up to
-    saturation. `neutral` is the command at which the vehicle stands.
+    Parameters and errors are those of `fit_steering_map`, with the kinds ``"dead_band_with_saturation"`` and its
+    ``…_refined``, ``"monotone_table"``, ``"cubic"``, ``"line"``, and ``"thesis"`` for eq. 7.3: a cubic through the
+    points up to saturation. `neutral` is the command at which the vehicle stands.
     """
     points = CurvePoints.from_measurements(command, value)
     return _fit(points, kind, drive_fitters(neutral))
@@ -64,6 +67,7 @@ def steering_fitters() -> dict[str, Fitter]:
     """Return how each kind of steering map is fitted."""
     return {
         "line_with_end_stops": fit_line_with_end_stops,
+        "line_with_end_stops_refined": lambda points: fit_refined(points, fit_line_with_end_stops),
         "line": fit_line,
         "monotone_table": fit_monotone_table,
         "thesis": lambda points: fit_line(points, name="thesis", reasons=_outermost(points)),
@@ -72,8 +76,13 @@ def steering_fitters() -> dict[str, Fitter]:
 
 def drive_fitters(neutral: float) -> dict[str, Fitter]:
     """Return how each kind of drive map is fitted."""
+
+    def dead_band(points: CurvePoints) -> MapFit:
+        return fit_dead_band(points, neutral=neutral)
+
     return {
-        "dead_band_with_saturation": lambda points: fit_dead_band(points, neutral=neutral),
+        "dead_band_with_saturation": dead_band,
+        "dead_band_with_saturation_refined": lambda points: fit_refined(points, dead_band),
         "monotone_table": fit_monotone_table,
         "cubic": fit_cubic,
         "line": fit_line,
@@ -97,7 +106,7 @@ def compare_maps(points: CurvePoints, fitters: dict[str, Fitter]) -> dict[str, M
 
 
 def preferred(fits: dict[str, MapFit | FitError], order: tuple[str, ...]) -> MapFit:
-    """Return the first fit in `order` that no other predicts better than by a quarter.
+    """Return the first fit in `order` that no other predicts clearly better (by half as much again).
 
     Raises
     ------
@@ -108,8 +117,8 @@ def preferred(fits: dict[str, MapFit | FitError], order: tuple[str, ...]) -> Map
     if not good:
         raise next(error for name in order if isinstance(error := fits.get(name), FitError))
     known = [fit.cross_validated_rms for fit in good if np.isfinite(fit.cross_validated_rms)]
-    best = min(known, default=np.inf)
-    return next((fit for fit in good if fit.cross_validated_rms <= _CLEARLY * best), good[0])
+    limit = _CLEARLY * min(known, default=np.inf) + _NOTHING * float(np.ptp(good[0].points.value))
+    return next((fit for fit in good if fit.cross_validated_rms <= limit), good[0])
 
 
 def _fit(points: CurvePoints, kind: str, fitters: dict[str, Fitter]) -> MapFit:

@@ -11,6 +11,7 @@ from agvbench.types import NO_TARGET, RUN_OK, Commands, Frames, Run
 
 FRONT_M, REAR_M = 0.181, 0.121
 RATE_HZ = 120.0
+DT = 2e-3
 
 
 def turning_point(front, rear, front_m=FRONT_M, rear_m=REAR_M):
@@ -68,7 +69,7 @@ def held(drive, front, rear, for_s=6.0, neutral=1500.0, presteer_s=0.5):
 
 
 class Vehicle:
-    """A vehicle with static maps and first-order lags, integrated in steps of 1 ms."""
+    """A vehicle with static maps and first-order lags, integrated in steps of 2 ms."""
 
     def __init__(
         self,
@@ -89,20 +90,44 @@ class Vehicle:
         self.noise = {"noise_m": noise_m, "noise_rad": noise_rad}
 
     def frames(self, commands, rng, until_s, rest_s=0.3, rate_hz=RATE_HZ):
-        front_map, rear_map, speed_map = self.maps
-        state = [front_map(commands.front[0]), rear_map(commands.rear[0]), 0.0]
-        pose, poses, times = (0.0, 0.0, 0.4), [], []
-        dt, t, due = 1e-3, -rest_s, -rest_s
-        while t < until_s:
-            if t >= due - 1e-9:
-                poses.append(pose)
-                times.append(t)
-                due += 1.0 / rate_hz
-            row = max(int(np.searchsorted(commands.t_s, t + 1e-9, side="right")) - 1, 0)
-            aims = front_map(commands.front[row]), rear_map(commands.rear[row]), speed_map(commands.drive[row])
-            if t < 0:
-                aims = (*aims[:2], 0.0)
-            state = [s + (a - s) * (dt / lag) for s, a, lag in zip(state, aims, self.lags, strict=True)]
-            pose = step(pose, state[0], state[1], state[2] * dt, **self.geometry)
-            t += dt
-        return frames_of(np.array(times), poses, rng, **self.noise)
+        """Return the frames of a drive, from `rest_s` before its first command until `until_s`."""
+        t = np.arange(-rest_s, until_s, DT)
+        row = np.maximum(np.searchsorted(commands.t_s, t + 1e-9, side="right") - 1, 0)
+        columns = (commands.front, commands.rear, commands.drive)
+        aims = [np.array([f(c) for c in column])[row] for f, column in zip(self.maps, columns, strict=True)]
+        aims[2][t < 0] = 0.0
+        front, rear, speed = (
+            lagged(aim, lag, start)
+            for aim, lag, start in zip(aims, self.lags, (aims[0][0], aims[1][0], 0.0), strict=True)
+        )
+        poses = integrate(front, rear, speed * DT, **self.geometry)
+        seen = np.searchsorted(t, np.arange(-rest_s, until_s - DT, 1.0 / rate_hz))
+        return frames_of(t[seen], poses[seen], rng, **self.noise)
+
+
+def lagged(aim, lag_s, start):
+    """Return what follows `aim` with a first-order lag."""
+    out, state, share = np.empty(len(aim)), start, 1.0 - math.exp(-DT / lag_s)
+    for k, target in enumerate(aim.tolist()):
+        out[k] = state
+        state += share * (target - state)
+    return out
+
+
+def integrate(front, rear, way, front_m, rear_m, heading=0.4):
+    """Return poses (n, 3) of a body that turns about where its wheels' normals meet, step by step."""
+    normals = np.stack([np.cos([front, rear]), np.sin([front, rear])], axis=-1).transpose(1, 0, 2)
+    right = np.stack([front_m * np.cos(front), -rear_m * np.cos(rear)], axis=-1)
+    bent = np.abs(np.linalg.det(normals)) > 1e-7
+    centre = np.zeros_like(right)
+    centre[bent] = np.linalg.solve(normals[bent], right[bent][..., None])[..., 0]
+    turn = np.zeros(len(way))
+    turn[bent] = way[bent] / np.hypot(*centre[bent].T) * np.sign(centre[bent, 1])
+    # Turning the origin about the centre by an angle moves it by centre − R(angle) centre.
+    c, s = np.cos(turn), np.sin(turn)
+    ahead = np.where(bent, centre[:, 0] - c * centre[:, 0] + s * centre[:, 1], way * np.cos(front))
+    left = np.where(bent, centre[:, 1] - s * centre[:, 0] - c * centre[:, 1], way * np.sin(front))
+    before = heading + np.concatenate([[0.0], np.cumsum(turn)[:-1]])
+    x = np.cumsum(np.cos(before) * ahead - np.sin(before) * left)
+    y = np.cumsum(np.sin(before) * ahead + np.cos(before) * left)
+    return np.column_stack([np.r_[0.0, x[:-1]], np.r_[0.0, y[:-1]], before])

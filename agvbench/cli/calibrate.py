@@ -1,0 +1,40 @@
+"""Fit the static maps of a vehicle from a campaign's calibration runs.
+
+Runs of the experiments steering_front, steering_rear, steering_opposite and drive hold one command each; from the arc
+that each drove follow both axle angles and the speed. A campaign without any, such as imported free driving, is
+read by short windows instead. Every fit is printed: the thesis' line and cubic with their R², and the maps that
+predict better, with what was left out and why.
+
+examples:
+  agvbench calibrate campaigns/tonight                        look only
+  agvbench calibrate campaigns/tonight --out vehicle.toml     keep the vehicle
+  agvbench calibrate campaigns/tonight --maps thesis          the maps of the thesis, for comparison
+  agvbench calibrate campaigns/dart --session 2024-09-16      one day of several
+"""
+
+from __future__ import annotations
+
+import argparse
+
+HELP = "fit the static maps from a campaign's calibration runs"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument("directory", metavar="DIR", help="a campaign directory")
+    parser.add_argument("--out", metavar="vehicle.toml", help="write the calibrated vehicle there")
+    parser.add_argument(
+        "--maps",
+        choices=("default", "thesis"),
+        default="default",
+        help="default: what predicts left-out commands best; thesis: lines and a cubic",
+    )
+    parser.add_argument("--session", metavar="NAME", help="use the runs of one session only")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Calibrate; return the exit code."""
+    from agvbench.workflows.calibrate import run_calibrate
+
+    run_calibrate(arguments.directory, maps=arguments.maps, session=arguments.session, out=arguments.out)
+    return 0
