@@ -32,7 +32,7 @@ def wait_until(clock: Clock, deadline_s: float) -> float:
     """
     while (left_s := deadline_s - clock.now()) > 0.0:
         clock.sleep(left_s)
-    return -left_s
+    return 0.0 - left_s
 
 
 class WallClock:

@@ -72,9 +72,14 @@ class Inbox:
             raise LinkError("the bus was closed", where=self._keys.root) from None
         if not payload:
             return None
-        if len(payload) >= HEADER_BYTES and payload[_KIND_AT] == Kind.EVENT:
-            return self._note(decode_event(payload))
-        message = decode_frames(payload)
+        try:
+            if len(payload) >= HEADER_BYTES and payload[_KIND_AT] == Kind.EVENT:
+                return self._note(decode_event(payload))
+            message = decode_frames(payload)
+        except MessageError as error:
+            raise MessageError(
+                error.what, where=self._keys.reports, value=error.value, limit=error.limit, remedy=error.remedy
+            ) from None
         self.frames_loss.saw(message.source, message.sequence)
         return message
 

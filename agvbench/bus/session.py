@@ -92,9 +92,15 @@ def open_session(
                 where=f"listen {endpoint}",
                 value=host,
                 limit="127.0.0.1, ::1 or localhost unless remote access is allowed",
-                remedy="say so explicitly, on a network that you trust",
+                remedy="pass allow_remote=True, on a network that you trust",
             )
     return _open(_config(listen, connect, timeout_s), listen, connect, timeout_s)
+
+
+def _reason(text: str) -> str:
+    """Return what a person can use of Zenoh's message: the system's own words, else what stands before the path."""
+    system = re.search(r"([^:\[\]]+) \(os error \d+\)", text)
+    return (system[1] if system else text.partition(" at /")[0]).strip()
 
 
 def _config(listen: Sequence[str], connect: Sequence[str], timeout_s: float) -> dict[str, Any]:
@@ -125,7 +131,7 @@ def _open(config: dict[str, Any], listen: Sequence[str], connect: Sequence[str],
     try:
         return zenoh.open(settings)
     except zenoh.ZError as error:
-        reason = str(error).split(" at /")[0]
+        reason = _reason(str(error))
         if connect and "connect" in reason.lower():
             raise LinkError(
                 "nobody answers",

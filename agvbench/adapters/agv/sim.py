@@ -82,7 +82,7 @@ class SimAgv(AgvAdapter):
         """Drive a recorded run again."""
         self.reset(request.reset)
         times = request.commands.t_s
-        ends = np.append(times[1:], request.until_s)
+        ends = np.append(times, request.until_s)[1:]
         for index, (start_s, end_s) in enumerate(zip(times.tolist(), ends.tolist(), strict=True)):
             self._drive(request.commands.at(index), start_s, max(start_s, end_s))
 

@@ -1,0 +1,132 @@
+"""Every mistake in docs/reference/errors-bus.md ends in exactly the line that stands there."""
+
+from __future__ import annotations
+
+import re
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rig_driving import FAILING, NEUTRAL, START, TINY
+
+from agvbench.adapters import AdapterOptions, host_adapters, open_rig
+from agvbench.bus.command_message import CommandMessage, decode_command, encode_command
+from agvbench.bus.frames_message import FramesMessage, decode_frames, encode_frames
+from agvbench.bus.identity_message import AgvIdentity, Identity, MocapIdentity
+from agvbench.bus.link import VehicleLink
+from agvbench.bus.session import open_session
+from agvbench.cli import main
+from agvbench.errors import AgvbenchError
+from agvbench.types import Command, Frames
+
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "errors-bus.md"
+LINES = dict(re.findall(r"^\| ([^|]+) \| `(.+)` \|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE))
+
+
+def command_line(*arguments: str) -> Callable[[], int]:
+    return lambda: main(list(arguments))
+
+
+@contextmanager
+def placed(**options: Any) -> Iterator[VehicleLink]:
+    with open_rig(**({"plant": TINY} | options)) as link:
+        link.reset(START, run_key="a")
+        link.exchange(NEUTRAL, t_s=0.0, hold_s=0.5)
+        yield link
+
+
+def rig(**options: Any) -> Callable[[], None]:
+    def open_it() -> None:
+        with open_rig(**({"plant": TINY} | options)):
+            pass
+
+    return open_it
+
+
+def exchange(command: Command = NEUTRAL, t_s: float = 0.5, hold_s: float = 0.5, **options: Any) -> Callable[[], object]:
+    def exchange_once() -> object:
+        with placed(**options) as link:
+            return link.exchange(command, t_s=t_s, hold_s=hold_s)
+
+    return exchange_once
+
+
+def real_and_simulated(agv_simulated: bool) -> Callable[[], Identity]:
+    agv = AgvIdentity("blue", "serial", "1.0", "", "us", 1500.0, simulated=agv_simulated, lock_step=False)
+    return lambda: Identity.of(agv, MocapIdentity("sim", 120.0, simulated=not agv_simulated))
+
+
+def without_a_camera() -> None:
+    with open_session() as session, host_adapters(session, "lab", AdapterOptions(plant=TINY), agv="sim", mocap=None):
+        VehicleLink(session, "lab", "agv1", discovery_limit_s=0.1)
+
+
+def another_seed() -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    options = AdapterOptions(plant=TINY, seed=1)
+    with open_session(listen=[endpoint]) as session, host_adapters(session, "lab", options, agv="sim", mocap="sim"):
+        rig(connect=endpoint, seed=2)()
+
+
+def damaged(payload: bytes, decode: Callable[[bytes], object]) -> Callable[[], object]:
+    return lambda: decode(payload)
+
+
+COMMAND = encode_command(CommandMessage(1, 0.0, NEUTRAL, 0.1))
+FRAMES = encode_frames(FramesMessage(1, Frames.empty()))
+NAN_TIME = encode_frames(FramesMessage(7, Frames(*(np.full(1, np.nan),) * 4, np.ones(1, bool), *(np.zeros(1),) * 3)))
+
+MISTAKES: dict[str, Callable[[], object]] = {
+    "no endpoint": command_line("sim", "--listen", "localhost"),
+    "protocol that loses messages": command_line("sim", "--connect", "udp/127.0.0.1:7447"),
+    "port out of range": command_line("sim", "--listen", "tcp/127.0.0.1:70000"),
+    "nobody listens there": lambda: open_session(connect=["tcp/127.0.0.1:9"], timeout_s=0.1),
+    "address of another machine": command_line("mocap", "sim", "--listen", "tcp/192.0.2.1:7448"),
+    "open to others unasked": lambda: open_session(listen=["tcp/0.0.0.0:7447"]),
+    "vehicle's name with a slash": command_line("sim", "--vehicle", "blue/one"),
+    "lab's name is empty": command_line("agv", "sim", "--lab", ""),
+    "no such adapter": command_line("agv", "simm"),
+    "no such mocap adapter": command_line("mocap", "optitrak:192.0.2.7"),
+    "address for a simulated camera": command_line("mocap", "sim:192.0.2.7"),
+    "camera option without value": command_line("sim", "--camera", "lost"),
+    "unknown plant": command_line("sim", "--plant", "my_plant.py"),
+    "no camera on the bus": without_a_camera,
+    "another seed": another_seed,
+    "real vehicle, simulated camera": real_and_simulated(False),
+    "simulated vehicle, real camera": real_and_simulated(True),
+    "command is NaN": exchange(Command(float("nan"), 1500.0, 1500.0)),
+    "hold is negative": exchange(hold_s=-1.0),
+    "time goes back": exchange(t_s=0.25),
+    "time leaps ahead": exchange(t_s=9.0),
+    "plant raises": exchange(Command(1700.0, 1500.0, 1500.0), plant=FAILING),
+    "message of another program": damaged(b"\x00" * 64, decode_command),
+    "message of another version": damaged(COMMAND[:4] + b"\x02" + COMMAND[5:], decode_command),
+    "message of another kind": damaged(COMMAND, decode_frames),
+    "message is cut off": damaged(COMMAND[:-1], decode_command),
+    "message is too long": damaged(COMMAND + b"\x00", decode_command),
+    "message claims too many rows": damaged(FRAMES[:12] + b"\xff" * 4 + FRAMES[16:], decode_frames),
+    "message with unknown flags": damaged(COMMAND[:6] + b"\x80\x00" + COMMAND[8:], decode_command),
+    "frames without a time": damaged(NAN_TIME, decode_frames),
+}
+
+
+def test_the_page_and_the_mistakes_are_the_same() -> None:
+    assert set(MISTAKES) == set(LINES)
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_message(mistake: str, capsys: pytest.CaptureFixture[str]) -> None:
+    try:
+        code = MISTAKES[mistake]()
+    except AgvbenchError as error:
+        line = str(error)
+    else:
+        assert code == 2
+        line = capsys.readouterr().err.removesuffix("\n").splitlines()[-1]
+    assert re.sub(r"/\S*/", "", line) == LINES.get(mistake) or line == LINES.get(mistake)

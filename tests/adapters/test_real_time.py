@@ -1,0 +1,137 @@
+"""Real time: a simulated vehicle that nobody waits for, on the wall clock. Nothing here asserts how fast it is."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+from rig_driving import NEUTRAL, START, TINY
+
+from agvbench.adapters import AdapterOptions, open_rig
+from agvbench.adapters.agv_host import AgvHost
+from agvbench.adapters.contract import AgvAdapter
+from agvbench.bus.clock import SimulatedClock, WallClock
+from agvbench.bus.clock_offset import measure_offset
+from agvbench.bus.command_message import CommandMessage, encode_command
+from agvbench.bus.identity_message import AgvIdentity
+from agvbench.bus.keys import Keys
+from agvbench.bus.request_message import encode_time
+from agvbench.bus.session import open_session
+from agvbench.types import Command, Frames
+
+
+def test_frames_carry_the_runs_clock_and_show_the_drive() -> None:
+    perfect = dict.fromkeys(("lost", "doubled", "late", "wrong", "untracked", "marker_noise_m"), 0.0)
+    with open_rig("live", plant=TINY, camera=perfect) as link:
+        assert link.identity().simulated
+        assert not link.identity().lock_step
+        link.reset(START, run_key="a")
+        parts = [link.exchange(NEUTRAL, t_s=-0.3, hold_s=0.3)]
+        parts.append(link.exchange(Command(1900.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.4))
+        parts.append(link.exchange(NEUTRAL, t_s=0.4, hold_s=0.2))
+        parts.append(link.flush())
+        assert link.loss.lost == 0
+    frames = Frames.concatenate(parts)
+    along_m = np.hypot(frames.x_m - START.x_m, frames.y_m - START.y_m)
+    rest = frames.t_s < 0.0
+    assert rest.any()
+    assert np.allclose(along_m[rest], 0.0, atol=1e-9)
+    assert along_m[-1] > 0.05
+    assert np.all(np.diff(along_m) >= -1e-9)
+    assert np.all(frames.received_s >= frames.t_s)
+    # The plant drives at most 0.41 m/s: however late a command is, no frame is ahead of its own time stamp.
+    assert np.all(along_m <= 0.42 * np.maximum(0.0, frames.t_s + 0.05))
+
+
+def test_a_second_run_begins_at_its_own_zero() -> None:
+    with open_rig("live", plant=TINY) as link:
+        for run_key in ("a", "b"):
+            link.reset(START, run_key=run_key)
+            frames = link.exchange(NEUTRAL, t_s=-0.2, hold_s=0.2)
+            assert np.all(frames.t_s < 0.1)
+
+
+class Silent(AgvAdapter):
+    """Notes when it is stopped."""
+
+    scheme = "silent"
+
+    def __init__(self) -> None:
+        self.applied: list[CommandMessage] = []
+        self.stopped = threading.Event()
+
+    @classmethod
+    def open(cls, address: str, options: AdapterOptions) -> Silent:
+        return cls()
+
+    def identity(self) -> AgvIdentity:
+        return AgvIdentity("agv1", "silent", "1", "", "us", 1500.0, simulated=False, lock_step=False)
+
+    def apply(self, message: CommandMessage) -> None:
+        self.applied.append(message)
+
+    def stop(self) -> None:
+        self.stopped.set()
+
+    def close(self) -> None:
+        pass
+
+
+def test_a_vehicle_whose_runner_falls_silent_is_stopped() -> None:
+    adapter, keys = Silent(), Keys("lab", "agv1")
+    with open_session() as session:
+        events = session.declare_subscriber(keys.event)
+        host = AgvHost(session, keys, adapter, WallClock(), show=lambda _: None)
+        session.put(keys.command, encode_command(CommandMessage(1, 0.0, NEUTRAL, 10.0)))
+        assert adapter.stopped.wait(10.0)
+        assert b"runner_silent" in events.recv().payload.to_bytes()
+        assert len(adapter.applied) == 1
+        adapter.stopped.clear()
+        host.close()
+        assert adapter.stopped.is_set()
+
+
+def test_lost_commands_and_nonsense_are_told_and_do_not_stop_the_host() -> None:
+    adapter, keys = Silent(), Keys("lab", "agv1")
+    with open_session() as session:
+        events = session.declare_subscriber(keys.event)
+        host = AgvHost(session, keys, adapter, WallClock(), show=lambda _: None)
+        session.put(keys.command, b"nonsense")
+        assert b"message is cut off" in events.recv().payload.to_bytes()
+        for number in (1, 4):
+            session.put(keys.command, encode_command(CommandMessage(number, 0.0, NEUTRAL, 10.0)))
+        assert b"2 commands were lost before 4" in events.recv().payload.to_bytes()
+        host.close()
+        assert host.loss.lost == 2
+        assert [message.sequence for message in adapter.applied] == [1, 4]
+
+
+def test_the_offset_of_another_clock_is_found() -> None:
+    here, ahead_s = SimulatedClock(50.0), 1234.5
+    with open_session() as session:
+        clock = session.declare_queryable("agvbench/v1/lab/agv1/mocap/time")
+
+        def answer() -> None:
+            for _ in range(8):
+                with clock.handler.recv() as query:
+                    here.sleep(0.010)  # half of the way there takes time, the way back takes none
+                    query.reply(query.key_expr, encode_time(here.now() + ahead_s))
+
+        thread = threading.Thread(target=answer)
+        thread.start()
+        offset_s = measure_offset(session, "agvbench/v1/lab/agv1/mocap/time", here)
+        thread.join()
+    assert abs(offset_s + ahead_s) <= 0.005 + 1e-9
+
+
+def test_a_real_runner_that_thinks_between_runs_does_not_hold_up_the_camera() -> None:
+    with open_rig("live", plant=TINY, camera={"rate_hz": 1000.0}) as link:
+        link.reset(START, run_key="a")
+        link.exchange(NEUTRAL, t_s=0.0, hold_s=0.05)
+        time.sleep(0.5)
+        before = link.loss.received
+        assert before > 100
+        frames = link.exchange(NEUTRAL, t_s=0.6, hold_s=0.05)
+        assert len(frames) > 100
+        assert link.loss.lost == 0
