@@ -156,13 +156,23 @@ def _arc(x: Floats, y: Floats, n: int, px: float, py: float, direction: float, c
     """Return the angle [rad] that the points span about the centre, seen from the middle of the arc."""
     cos, sin = math.cos(direction), math.sin(direction)
     ahead = behind = 1.0  # cosines of the farthest points on either side
+    farthest = nearest = 0.0  # and their distances along the tangent
     for i in range(n):
         dx, dy = x[i] - px, y[i] - py
         c = 1.0 - curvature * (cos * dy - sin * dx)
         a = cos * dx + sin * dy
         ahead = min(ahead, c if a > 0.0 else 1.0)
         behind = min(behind, 1.0 if a > 0.0 else c)
-    return math.acos(max(ahead, -1.0)) + math.acos(max(behind, -1.0))
+        farthest = max(farthest, a)
+        nearest = min(nearest, a)
+    arc: float = _side(ahead, abs(curvature) * farthest) + _side(behind, -abs(curvature) * nearest)
+    return arc
+
+
+@njit(cache=True, error_model="numpy")
+def _side(cosine: float, sine: float) -> float:
+    """Return the angle of the farthest point on one side, from whichever of its functions noise disturbs less."""
+    return math.asin(min(sine, 1.0)) if cosine > 0.5 else math.acos(max(cosine, -1.0))
 
 
 @njit(cache=True, error_model="numpy")
