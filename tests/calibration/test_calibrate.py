@@ -278,6 +278,7 @@ def test_a_simulated_plant_is_calibrated_to_the_thesis_tables_it_was_built_from(
 MEASURED = Path(os.environ.get("AGVBENCH_MEASURED", Path(__file__).parents[3] / "shared" / "measured")) / "dart"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not MEASURED.is_dir(), reason="no measured recordings (AGVBENCH_MEASURED)")
 def test_measured_free_driving_gives_a_vehicle_like_the_real_one(tmp_path):
     from agvbench.campaign import import_recordings
