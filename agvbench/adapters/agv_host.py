@@ -123,7 +123,7 @@ class AgvHost(Host):
                 self.event(Level.WARNING, "runner_silent", f"no command for {SILENCE_LIMIT_S} s: vehicle stopped")
 
     def truth(
-        self, t_s: Floats, poses: Floats, *, end_s: float, acknowledged: int = 0, flags: TruthFlags = TruthFlags.LAST
+        self, t_s: Floats, poses: Floats, *, end_s: float, acknowledged: int = 0, flags: int = TruthFlags.LAST
     ) -> None:
         """Show true poses to the camera."""
         source = self._truths.source

@@ -71,7 +71,7 @@ class AgvReports(Protocol):
     """What an AGV adapter can tell the bus. All methods may be called in any thread."""
 
     def truth(
-        self, t_s: Floats, poses: Floats, *, end_s: float, acknowledged: int = 0, flags: TruthFlags = TruthFlags.LAST
+        self, t_s: Floats, poses: Floats, *, end_s: float, acknowledged: int = 0, flags: int = TruthFlags.LAST
     ) -> None:
         """Show a simulated camera where the vehicle truly was: poses (n, 3) [m, m, rad] at `t_s` (n,) [s]."""
 

@@ -9,7 +9,7 @@ import numpy as np
 from agvbench.adapters.contract import MocapAdapter
 from agvbench.adapters.hosting import Host
 from agvbench.bus.clock import Clock
-from agvbench.bus.frames_message import FrameClock, FramesFlags, FramesMessage, encode_frames
+from agvbench.bus.frames_message import FrameClock, FramesFlags, FramesMessage, encode_frames, pack_rows
 from agvbench.bus.identity_message import encode_mocap_identity
 from agvbench.bus.keys import MOCAP, RESET, Keys
 from agvbench.bus.request_message import decode_reset, encode_sampling
@@ -100,10 +100,11 @@ class MocapHost(Host):
             flags = FramesFlags.LAST if start == starts[-1] else FramesFlags.NONE
             self._publish(part, clock, acknowledged, flags)
 
-    def _publish(self, frames: Frames, clock: FrameClock, acknowledged: int, flags: FramesFlags) -> None:
+    def _publish(self, frames: Frames, clock: FrameClock, acknowledged: int, flags: int) -> None:
+        rows = pack_rows(frames)
         with self._lock:
             message = FramesMessage(
-                self._sequence.take(), frames, acknowledged, clock, self._clock.now(), flags, self._sequence.source
+                self._sequence.take(), rows, acknowledged, clock, self._clock.now(), flags, self._sequence.source
             )
             try:
                 self._publisher.put(encode_frames(message))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 from agvbench.bus.clock import Clock
@@ -42,8 +41,7 @@ class TruthPublisher:
         for start in range(0, max(1, len(truth.t_s)), MAX_ROWS):
             rows = slice(start, start + MAX_ROWS)
             is_last = start + MAX_ROWS >= len(truth.t_s)
-            part = replace(
-                truth,
+            part = truth._replace(
                 sequence=self._sequence.take(),
                 source=self._sequence.source,
                 t_s=truth.t_s[rows],

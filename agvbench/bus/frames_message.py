@@ -1,25 +1,29 @@
-"""The frames message: a batch of motion capture frames in columns.
+"""The frames message: a batch of motion capture frames, a row each.
 
-Body after the header: acknowledged (u64), clock (u8 and 7 bytes of zero), now_s (f64), then the columns
-``t_s``, ``x_m``, ``y_m``, ``heading_rad``, ``mean_error_m``, ``received_s`` (f64), ``frame`` (i64),
-``tracked`` (u8): 48 bytes and 57 a frame.
+Body after the header: acknowledged (u64), clock (u8 and 7 bytes of zero), now_s (f64), then rows of ``t_s``, ``x_m``,
+``y_m``, ``heading_rad``, ``mean_error_m``, ``received_s`` (f64), ``frame`` (i64), ``tracked`` (u8): 48 bytes and 57 a
+frame. Rows of many messages lie one behind another when joined, and become columns at once: in real time, a recorder
+has one frame in each of thousands of messages.
 """
 
 from __future__ import annotations
 
 import struct
-from enum import IntEnum, IntFlag
-from typing import NamedTuple
+from collections.abc import Sequence
+from enum import IntEnum
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from agvbench.bus.wire import HEADER_BYTES, MAX_ROWS, Kind, check_length, pack_column, pack_header, unpack_header
+from agvbench.bus.wire import HEADER_BYTES, MAX_ROWS, Kind, check_length, pack_header, unpack_header
 from agvbench.errors import MessageError
 from agvbench.types import Frames
 
 _BODY = struct.Struct("<QB7xd")
-_COLUMNS_AT = HEADER_BYTES + _BODY.size
-_ROW_BYTES = 57
+_ROWS_AT = HEADER_BYTES + _BODY.size
+_ROW = struct.Struct("<6dq?")
+_FIELDS = ("t_s", "x_m", "y_m", "heading_rad", "mean_error_m", "received_s")
+_ROWS = np.dtype([*((name, "<f8") for name in _FIELDS), ("frame", "<i8"), ("tracked", "u1")])
 
 
 class FrameClock(IntEnum):
@@ -31,34 +35,82 @@ class FrameClock(IntEnum):
     """The mocap adapter's own; the link brings it into the run's."""
 
 
-class FramesFlags(IntFlag):
-    """What else a frames message says."""
+class FramesFlags:
+    """What else a frames message says; bits as plain integers."""
 
-    NONE = 0
-    LAST = 1
+    NONE: Final = 0
+    LAST: Final = 1
     """The last message that answers the acknowledged command."""
 
 
-# Plain tables, since arithmetic with flags takes longer than everything else here.
 _CLOCKS = {int(clock): clock for clock in FrameClock}
-_FLAGS = {0: FramesFlags.NONE, 1: FramesFlags.LAST}
-_KNOWN = 1
 
 
 class FramesMessage(NamedTuple):
     """Frames, and which command had been carried out when they were published.
 
-    ``acknowledged`` is the sequence number of that command (0 in real time), ``now_s`` [s] the publisher's
-    clock when it published.
+    ``rows`` are the frames as they travel (`pack_rows`, `unpack_rows`); ``acknowledged`` is the sequence number of
+    the command (0 in real time), ``now_s`` [s] the publisher's clock when it published.
     """
 
     sequence: int
-    frames: Frames
+    rows: bytes
     acknowledged: int = 0
     clock: FrameClock = FrameClock.RUN
     now_s: float = 0.0
-    flags: FramesFlags = FramesFlags.NONE
+    flags: int = FramesFlags.NONE
     source: int = 0
+
+    @property
+    def frame_count(self) -> int:
+        """How many frames there are."""
+        return len(self.rows) // _ROW.size
+
+    def frames(self) -> Frames:
+        """Return the frames, or raise `MessageError` if their numbers cannot be."""
+        return unpack_rows([self.rows])
+
+
+def pack_rows(frames: Frames) -> bytes:
+    """Return frames as they travel.
+
+    Raises
+    ------
+    MessageError
+        If columns differ in length.
+    """
+    count = len(frames)
+    columns = (
+        frames.t_s, frames.x_m, frames.y_m, frames.heading_rad, frames.mean_error_m, frames.received_s, frames.frame,
+        frames.tracked,
+    )  # fmt: skip
+    if any(len(column) != count for column in columns):
+        raise MessageError("columns of frames differ in length", value=[len(column) for column in columns])
+    if count == 1:
+        return _ROW.pack(*(column[0] for column in columns))
+    rows = np.empty(count, _ROWS)
+    for name, column in zip(_ROWS.names or (), columns, strict=True):
+        rows[name] = column
+    return rows.tobytes()
+
+
+def unpack_rows(parts: Sequence[bytes]) -> Frames:
+    """Return the frames of several messages, one behind another.
+
+    Raises
+    ------
+    MessageError
+        If a capture time is not finite, or ``tracked`` neither 0 nor 1.
+    """
+    rows = np.frombuffer(b"".join(parts), _ROWS)
+    t_s, tracked = np.ascontiguousarray(rows["t_s"]), np.ascontiguousarray(rows["tracked"])
+    if not np.isfinite(t_s).all():
+        raise MessageError("frames without a finite capture time", value=float(t_s[~np.isfinite(t_s)][0]))
+    if (tracked > 1).any():
+        raise MessageError("tracked is neither 0 nor 1", value=int(tracked.max()))
+    x_m, y_m, heading_rad, mean_error_m, received_s = (np.ascontiguousarray(rows[name]) for name in _FIELDS[1:])
+    frame = np.ascontiguousarray(rows["frame"])
+    return Frames(t_s, x_m, y_m, heading_rad, tracked.view(np.bool_), frame, mean_error_m, received_s)
 
 
 def encode_frames(message: FramesMessage) -> bytes:
@@ -67,64 +119,28 @@ def encode_frames(message: FramesMessage) -> bytes:
     Raises
     ------
     MessageError
-        If there are more than `MAX_ROWS` frames, or columns differ in length.
+        If there are more than `MAX_ROWS` frames.
     """
-    frames, count = message.frames, len(message.frames)
+    count = message.frame_count
     if count > MAX_ROWS:
         raise MessageError("too many frames for one message", value=count, limit=f"at most {MAX_ROWS}")
-    flags = int(message.flags)
-    data = b"".join(
-        (
-            pack_header(Kind.FRAMES, flags=flags, source=message.source, count=count, sequence=message.sequence),
-            _BODY.pack(message.acknowledged, message.clock, message.now_s),
-            pack_column(frames.t_s, "<f8"),
-            pack_column(frames.x_m, "<f8"),
-            pack_column(frames.y_m, "<f8"),
-            pack_column(frames.heading_rad, "<f8"),
-            pack_column(frames.mean_error_m, "<f8"),
-            pack_column(frames.received_s, "<f8"),
-            pack_column(frames.frame, "<i8"),
-            pack_column(frames.tracked, "u1"),
-        )
-    )
-    if len(data) != _COLUMNS_AT + _ROW_BYTES * count:
-        raise MessageError("columns of frames differ in length", where=f"message of {count} frames")
-    return data
+    flags, source, sequence = message.flags, message.source, message.sequence
+    header = pack_header(Kind.FRAMES, flags=flags, source=source, count=count, sequence=sequence)
+    return header + _BODY.pack(message.acknowledged, message.clock, message.now_s) + message.rows
 
 
 def decode_frames(payload: bytes) -> FramesMessage:
-    """Return the message that `payload` holds; its arrays are read-only views.
+    """Return the message that `payload` holds; its rows are looked at by `unpack_rows`.
 
     Raises
     ------
     MessageError
         If it is not a frames message that this version writes.
     """
-    # This runs for every frame of every vehicle in real time: no reader, no enum arithmetic, one pass per check.
-    header = unpack_header(payload, Kind.FRAMES, _KNOWN)
-    count = header.rows
-    check_length(payload, _COLUMNS_AT + _ROW_BYTES * count)
+    header = unpack_header(payload, Kind.FRAMES, FramesFlags.LAST)
+    check_length(payload, _ROWS_AT + _ROW.size * header.rows)
     acknowledged, clock, now_s = _BODY.unpack_from(payload, HEADER_BYTES)
     if clock not in _CLOCKS:
         raise MessageError("frames in an unknown clock", value=clock, limit="0 (run) or 1 (adapter)")
-    tracked_at = _COLUMNS_AT + 56 * count
-    if payload[tracked_at:].translate(None, b"\0\1"):
-        raise MessageError("tracked is neither 0 nor 1", value=max(payload[tracked_at:]))
-    t_s, x_m, y_m, heading_rad, mean_error_m, received_s = np.frombuffer(
-        payload, "<f8", 6 * count, _COLUMNS_AT
-    ).reshape(6, count)
-    if not np.isfinite(t_s).all():
-        raise MessageError("frames without a finite capture time", where=f"message {header.sequence}")
-    frames = Frames(
-        t_s,
-        x_m,
-        y_m,
-        heading_rad,
-        np.frombuffer(payload, np.bool_, count, tracked_at),
-        np.frombuffer(payload, "<i8", count, _COLUMNS_AT + 48 * count),
-        mean_error_m,
-        received_s,
-    )
-    return FramesMessage(
-        header.sequence, frames, acknowledged, _CLOCKS[clock], now_s, _FLAGS[header.flags], header.source
-    )
+    rows = payload[_ROWS_AT:]
+    return FramesMessage(header.sequence, rows, acknowledged, _CLOCKS[clock], now_s, header.flags, header.source)

@@ -58,7 +58,7 @@ class LockStep:
     def close(self) -> None:
         """Nothing to release."""
 
-    def _exchange(self, command: Command, t_s: float, hold_s: float, flags: CommandFlags) -> Frames:
+    def _exchange(self, command: Command, t_s: float, hold_s: float, flags: int) -> Frames:
         if self._hung is not None:
             raise self._hung
         self._presence.check(AGV, MOCAP)
@@ -77,7 +77,7 @@ class LockStep:
             if isinstance(report, FramesMessage):
                 # A wait that was interrupted leaves its answer behind: it belongs to no run any more.
                 if report.acknowledged == sequence:
-                    batches.append(report.frames)
+                    batches.append(report.frames())
                     if report.flags & FramesFlags.LAST:
                         break
             elif isinstance(report, Event):

@@ -27,7 +27,7 @@ class CommandOutbox:
             express=True,
         )
 
-    def send(self, command: Command, t_s: float, hold_s: float, flags: CommandFlags = CommandFlags.NONE) -> int:
+    def send(self, command: Command, t_s: float, hold_s: float, flags: int = CommandFlags.NONE) -> int:
         """Publish a command; return its sequence number.
 
         Raises

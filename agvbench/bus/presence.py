@@ -41,6 +41,7 @@ class Presence:
             return
         if sample.kind == zenoh.SampleKind.PUT:
             self._present[role] = True
+            self._gone_since_s.pop(role, None)
             self._arrived.set()
             return
         self._present[role] = False
@@ -73,8 +74,10 @@ class Presence:
 
     def check(self, *roles: str) -> None:
         """Raise `AdapterGoneError`, with its name and since when, if an adapter in one of these roles vanished."""
+        if not self._gone_since_s:
+            return
         for role in roles:
-            if not self.has(role) and role in self._gone_since_s:
+            if role in self._gone_since_s:
                 gone_s = self._clock.now() - self._gone_since_s[role]
                 raise AdapterGoneError(
                     f"the {role} adapter vanished",

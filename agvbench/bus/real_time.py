@@ -13,7 +13,7 @@ from agvbench.bus.clock import Clock, wait_until
 from agvbench.bus.clock_offset import measure_offset
 from agvbench.bus.command_message import CommandFlags
 from agvbench.bus.event_message import Event, Level
-from agvbench.bus.frames_message import FramesMessage
+from agvbench.bus.frames_message import FramesMessage, unpack_rows
 from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import AGV, MOCAP, TIME, Keys
 from agvbench.bus.outbox import CommandOutbox
@@ -114,16 +114,15 @@ class RealTime:
             raise self._failure
 
     def _take(self) -> Frames:
-        start_s = self._start_s or 0.0
-        batches = []
+        """Return what has arrived, with its times in the run's clock."""
+        start_s, arrived_s, messages = self._start_s or 0.0, [], []
         while self._arrived:
-            arrived_s, message = self._arrived.popleft()
-            frames = message.frames
-            batches.append(
-                replace(
-                    frames,
-                    t_s=frames.t_s + (self._offset_s - start_s),
-                    received_s=np.full(len(frames), arrived_s - start_s),
-                )
-            )
-        return Frames.concatenate(batches)
+            at_s, message = self._arrived.popleft()
+            arrived_s.append(at_s)
+            messages.append(message)
+        frames = unpack_rows([message.rows for message in messages])
+        return replace(
+            frames,
+            t_s=frames.t_s + (self._offset_s - start_s),
+            received_s=np.repeat(arrived_s, [message.frame_count for message in messages]) - start_s,
+        )

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agvbench.bus.wire import MAX_ROWS, Header, Kind, Reader, pack_column, pack_header, pack_text, unpack_header
+from agvbench.bus.wire import FLOAT, MAX_ROWS, Header, Kind, Reader, pack_column, pack_header, pack_text, unpack_header
 from agvbench.errors import MessageError
 from agvbench.types import Commands, Pose
 
@@ -92,7 +92,7 @@ def encode_replay(replay: Replay) -> bytes:
             pack_header(Kind.REPLAY, count=len(commands), source=replay.reset.source, sequence=replay.reset.after),
             _pack_reset(replay.reset),
             _NUMBER.pack(replay.until_s),
-            *(pack_column(column, "<f8") for column in columns),
+            *(pack_column(column, FLOAT) for column in columns),
         )
     )
 
@@ -103,7 +103,7 @@ def decode_replay(payload: bytes) -> Replay:
     reader = Reader(payload)
     reset = _read_reset(reader, header)
     (until_s,) = reader.fields(_NUMBER)
-    columns = reader.column(4 * header.rows, "<f8").reshape(4, header.rows)
+    columns = reader.column(4 * header.rows, FLOAT).reshape(4, header.rows)
     reader.finish()
     if not (math.isfinite(until_s) and np.isfinite(columns).all()):
         raise MessageError("commands to replay are not finite", where=reset.run_key)

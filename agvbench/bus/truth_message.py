@@ -7,35 +7,33 @@ Body after the header: acknowledged (u64), ``end_s`` (f64), then columns ``t_s``
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
-from enum import IntFlag
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from agvbench.bus.wire import MAX_ROWS, Kind, Reader, pack_column, pack_header, unpack_header
+from agvbench.bus.wire import FLOAT, MAX_ROWS, Kind, Reader, pack_column, pack_header, unpack_header
 from agvbench.errors import MessageError
 from agvbench.types import Floats
 
 _BODY = struct.Struct("<Qd")
 
 
-class TruthFlags(IntFlag):
-    """What the camera should do with the poses."""
+class TruthFlags:
+    """What the camera should do with the poses; bits as plain integers."""
 
-    NONE = 0
-    LAST = 1
+    NONE: Final = 0
+    LAST: Final = 1
     """The exchange is complete: answer it."""
-    FLUSH = 2
+    FLUSH: Final = 2
     """Let go of every frame that is still under way."""
-    LIVE = 4
+    LIVE: Final = 4
     """Times are in the clock that all adapters of this machine share, not in the run's."""
 
 
-_KNOWN = 7
+_KNOWN = TruthFlags.LAST | TruthFlags.FLUSH | TruthFlags.LIVE
 
 
-@dataclass(frozen=True)
-class Truth:
+class Truth(NamedTuple):
     """True poses, shape (n, 3), at the camera's instants `t_s`, shape (n,), up to ``end_s`` [s] in the run's clock."""
 
     sequence: int
@@ -43,7 +41,7 @@ class Truth:
     end_s: float
     t_s: Floats
     poses: Floats
-    flags: TruthFlags = TruthFlags.LAST
+    flags: int = TruthFlags.LAST
     source: int = 0
 
 
@@ -54,10 +52,10 @@ def encode_truth(truth: Truth) -> bytes:
         raise MessageError("too many poses for one message", value=count, limit=f"at most {MAX_ROWS}")
     return b"".join(
         (
-            pack_header(Kind.TRUTH, flags=int(truth.flags), source=truth.source, count=count, sequence=truth.sequence),
+            pack_header(Kind.TRUTH, flags=truth.flags, source=truth.source, count=count, sequence=truth.sequence),
             _BODY.pack(truth.acknowledged, truth.end_s),
-            pack_column(truth.t_s, "<f8"),
-            pack_column(truth.poses.T, "<f8"),
+            pack_column(truth.t_s, FLOAT),
+            pack_column(truth.poses.T, FLOAT),
         )
     )
 
@@ -67,10 +65,9 @@ def decode_truth(payload: bytes) -> Truth:
     header = unpack_header(payload, Kind.TRUTH, _KNOWN)
     reader = Reader(payload)
     acknowledged, end_s = reader.fields(_BODY)
-    t_s = reader.column(header.rows, "<f8")
-    poses = reader.column(3 * header.rows, "<f8").reshape(3, header.rows).T
+    t_s = reader.column(header.rows, FLOAT)
+    poses = reader.column(3 * header.rows, FLOAT).reshape(3, header.rows).T
     reader.finish()
     if not (np.isfinite(t_s).all() and np.isfinite(poses).all() and np.isfinite(end_s)):
         raise MessageError("true poses are not finite")
-    flags = TruthFlags(header.flags)
-    return Truth(header.sequence, acknowledged, end_s, t_s, poses, flags, header.source)
+    return Truth(header.sequence, acknowledged, end_s, t_s, poses, header.flags, header.source)

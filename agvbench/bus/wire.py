@@ -30,6 +30,9 @@ MAX_ROWS = 8192
 MAX_TEXT_BYTES = 4096
 MAX_MESSAGE_BYTES = 1 << 20
 
+FLOAT, INTEGER, BOOLEAN = np.dtype("<f8"), np.dtype("<i8"), np.dtype(np.bool_)
+"""What columns are made of."""
+
 _HEADER = struct.Struct("<4sBBHIIQ")
 HEADER_BYTES = _HEADER.size
 _LENGTH = struct.Struct("<H")
@@ -115,9 +118,9 @@ def pack_text(text: str) -> bytes:
     return _LENGTH.pack(len(data)) + data
 
 
-def pack_column(values: NDArray[Any], dtype: str) -> bytes:
+def pack_column(values: NDArray[Any], dtype: np.dtype[Any]) -> bytes:
     """Return one column as little-endian bytes."""
-    return np.ascontiguousarray(values, dtype).tobytes()
+    return values.tobytes() if values.dtype is dtype else np.asarray(values, dtype).tobytes()
 
 
 class Reader:
@@ -148,9 +151,9 @@ class Reader:
         except UnicodeDecodeError as error:
             raise MessageError("text is not UTF-8", value=error.reason) from None
 
-    def column(self, count: int, dtype: str) -> NDArray[Any]:
+    def column(self, count: int, dtype: np.dtype[Any]) -> NDArray[Any]:
         """Return `count` values, read-only, without a copy."""
-        start = self._skip(count * np.dtype(dtype).itemsize)
+        start = self._skip(count * dtype.itemsize)
         return np.frombuffer(self._payload, dtype, count, start)
 
     def finish(self) -> None:

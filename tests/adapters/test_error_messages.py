@@ -15,7 +15,7 @@ from rig_driving import FAILING, NEUTRAL, START, TINY
 
 from agvbench.adapters import AdapterOptions, host_adapters, open_rig
 from agvbench.bus.command_message import CommandMessage, decode_command, encode_command
-from agvbench.bus.frames_message import FramesMessage, decode_frames, encode_frames
+from agvbench.bus.frames_message import FramesMessage, decode_frames, encode_frames, pack_rows, unpack_rows
 from agvbench.bus.identity_message import AgvIdentity, Identity, MocapIdentity
 from agvbench.bus.link import VehicleLink
 from agvbench.bus.session import open_session
@@ -79,8 +79,8 @@ def damaged(payload: bytes, decode: Callable[[bytes], object]) -> Callable[[], o
 
 
 COMMAND = encode_command(CommandMessage(1, 0.0, NEUTRAL, 0.1))
-FRAMES = encode_frames(FramesMessage(1, Frames.empty()))
-NAN_TIME = encode_frames(FramesMessage(7, Frames(*(np.full(1, np.nan),) * 4, np.ones(1, bool), *(np.zeros(1),) * 3)))
+FRAMES = encode_frames(FramesMessage(1, b""))
+NAN_TIME = pack_rows(Frames(*(np.full(1, np.nan),) * 4, np.ones(1, bool), np.zeros(1, int), *(np.zeros(1),) * 2))
 
 MISTAKES: dict[str, Callable[[], object]] = {
     "no endpoint": command_line("sim", "--listen", "localhost"),
@@ -112,7 +112,7 @@ MISTAKES: dict[str, Callable[[], object]] = {
     "message is too long": damaged(COMMAND + b"\x00", decode_command),
     "message claims too many rows": damaged(FRAMES[:12] + b"\xff" * 4 + FRAMES[16:], decode_frames),
     "message with unknown flags": damaged(COMMAND[:6] + b"\x80\x00" + COMMAND[8:], decode_command),
-    "frames without a time": damaged(NAN_TIME, decode_frames),
+    "frames without a time": lambda: unpack_rows([NAN_TIME]),
 }
 
 

@@ -14,9 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from agvbench.bus.command_message import CommandFlags, CommandMessage, decode_command, encode_command
+from agvbench.bus.command_message import CommandMessage, decode_command, encode_command
 from agvbench.bus.event_message import Event, Level, decode_event, encode_event
-from agvbench.bus.frames_message import FrameClock, FramesFlags, FramesMessage, decode_frames, encode_frames
+from agvbench.bus.frames_message import FrameClock, FramesMessage, decode_frames, encode_frames, pack_rows, unpack_rows
 from agvbench.bus.identity_message import (
     AgvIdentity,
     MocapIdentity,
@@ -38,7 +38,7 @@ from agvbench.bus.request_message import (
     encode_sampling,
     encode_time,
 )
-from agvbench.bus.truth_message import Truth, TruthFlags, decode_truth, encode_truth
+from agvbench.bus.truth_message import Truth, decode_truth, encode_truth
 from agvbench.bus.wire import MAX_MESSAGE_BYTES, MAX_ROWS
 from agvbench.errors import MessageError
 from agvbench.types import Command, Commands, Frames, Pose
@@ -72,7 +72,7 @@ def frame_batches(draw: st.DrawFn) -> Frames:
 def truths(draw: st.DrawFn) -> Truth:
     n = draw(st.integers(0, 20))
     t_s, poses = draw(arrays(np.float64, n, elements=finite)), draw(arrays(np.float64, (n, 3), elements=finite))
-    return Truth(draw(u64), draw(u64), draw(finite), t_s, poses, TruthFlags(draw(st.integers(0, 7))), draw(u32))
+    return Truth(draw(u64), draw(u64), draw(finite), t_s, poses, draw(st.integers(0, 7)), draw(u32))
 
 
 @st.composite
@@ -88,11 +88,11 @@ commands = st.builds(
     finite,
     st.builds(Command, finite, finite, finite),
     st.floats(0.0, 3600.0),
-    st.builds(CommandFlags, st.integers(0, 7)),
+    st.integers(0, 7),
     u32,
 )
 frame_messages = st.builds(
-    FramesMessage, u64, frame_batches(), u64, st.sampled_from(FrameClock), finite, st.sampled_from(FramesFlags), u32
+    FramesMessage, u64, frame_batches().map(pack_rows), u64, st.sampled_from(FrameClock), finite, st.integers(0, 1), u32
 )
 events = st.builds(Event, u64, text, st.sampled_from(Level), text, text, u64, finite, u32)
 agv_identities = st.builds(
@@ -140,6 +140,27 @@ def test_what_is_encoded_is_decoded(codec: Any, data: st.DataObject) -> None:
     strategy, encode, decode = codec
     message = data.draw(strategy)
     assert same(decode(encode(message)), message)
+
+
+@few
+@given(st.lists(frame_batches(), max_size=4))
+def test_rows_of_many_messages_become_columns_bit_by_bit(batches: list[Frames]) -> None:
+    assert same(unpack_rows([pack_rows(frames) for frames in batches]), Frames.concatenate(batches))
+
+
+@few
+@given(frame_batches(), st.integers(0, 7), st.sampled_from([np.nan, np.inf, -np.inf]))
+def test_rows_whose_numbers_cannot_be_are_refused(frames: Frames, which: int, time_s: float) -> None:
+    if len(frames):
+        row = which % len(frames)
+        rows = bytearray(pack_rows(frames))
+        rows[57 * row : 57 * row + 8] = np.float64(time_s).tobytes()
+        with pytest.raises(MessageError, match="finite capture time"):
+            unpack_rows([bytes(rows)])
+        rows = bytearray(pack_rows(frames))
+        rows[57 * row + 56] = 2 + which
+        with pytest.raises(MessageError, match="tracked is neither 0 nor 1"):
+            unpack_rows([bytes(rows)])
 
 
 @every_codec
@@ -196,7 +217,7 @@ def _one(codec: Any) -> Any:
     none = np.empty(0)
     return {
         "command": CommandMessage(1, 0.0, Command(0.0, 0.0, 0.0), 0.1),
-        "frames": FramesMessage(1, Frames.empty()),
+        "frames": FramesMessage(1, pack_rows(Frames.empty())),
         "event": Event(1, "agv", Level.INFO, "kind", "text"),
         "agv_identity": AgvIdentity("a", "b", "c", "d", "us", 1500.0, True, True),
         "mocap_identity": MocapIdentity("a", 120.0, True),
@@ -234,15 +255,15 @@ def test_more_frames_than_a_message_holds_are_refused() -> None:
     many = np.zeros(MAX_ROWS + 1)
     frames = Frames(many, many, many, many, many.astype(bool), many.astype(int), many, many)
     with pytest.raises(MessageError, match="too many frames"):
-        encode_frames(FramesMessage(1, frames))
-    encode_frames(FramesMessage(1, frames.select(np.arange(MAX_ROWS))))
+        encode_frames(FramesMessage(1, pack_rows(frames)))
+    encode_frames(FramesMessage(1, pack_rows(frames.select(np.arange(MAX_ROWS)))))
 
 
 def test_columns_that_differ_in_length_are_refused() -> None:
     two, three = np.zeros(2), np.zeros(3)
     frames = Frames(two, three, two, two, two.astype(bool), two.astype(int), two, two)
     with pytest.raises(MessageError, match="differ in length"):
-        encode_frames(FramesMessage(1, frames))
+        encode_frames(FramesMessage(1, pack_rows(frames)))
 
 
 @pytest.mark.parametrize("hold_s", [-0.1, math.nan, math.inf, 3600.1])
@@ -255,4 +276,4 @@ def test_a_command_takes_64_bytes_and_a_frame_57() -> None:
     assert len(encode_command(CommandMessage(1, 0.0, Command(0.0, 0.0, 0.0), 0.1))) == 64
     one = np.zeros(1)
     frames = Frames(one, one, one, one, one.astype(bool), one.astype(int), one, one)
-    assert len(encode_frames(FramesMessage(1, frames))) == 48 + 57
+    assert len(encode_frames(FramesMessage(1, pack_rows(frames)))) == 48 + 57

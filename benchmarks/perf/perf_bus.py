@@ -1,0 +1,389 @@
+"""What the bus costs beside bare Zenoh on the same endpoints with messages of the same size, and what it can carry.
+
+Round trip: a command from the runner's link to an AGV adapter, frames from a mocap adapter back; against two bare
+publishers and subscribers that pass the same bytes. The adapters answer at once, so that nothing but the bus is timed.
+Ours and the peer take turns in blocks; the ratio is the median of the blocks' ratios of medians.
+
+Load: 25 mocap adapters in one process, each publishing a frame when it comes (all that have come, if it falls behind), and
+one recorder with a thread for each vehicle.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import socket
+import statistics
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Any, NamedTuple
+
+import numpy as np
+import zenoh
+
+from agvbench.adapters.agv_host import AgvHost
+from agvbench.adapters.contract import AdapterOptions, AgvAdapter, MocapAdapter
+from agvbench.adapters.mocap_host import MocapHost
+from agvbench.bus.clock import WallClock
+from agvbench.bus.command_message import CommandMessage
+from agvbench.bus.frames_message import FrameClock, FramesMessage
+from agvbench.bus.identity_message import AgvIdentity, MocapIdentity
+from agvbench.bus.inbox import Inbox
+from agvbench.bus.keys import Keys
+from agvbench.bus.link import VehicleLink
+from agvbench.bus.outbox import CommandOutbox
+from agvbench.bus.request_message import Reset, Sampling
+from agvbench.bus.session import open_session
+from agvbench.errors import LinkError
+from agvbench.types import Command, Frames, Pose
+
+COMMAND_BYTES = 64
+BOUND = 1.2
+QOS = {
+    "congestion_control": zenoh.CongestionControl.BLOCK,
+    "priority": zenoh.Priority.REAL_TIME,
+    "express": True,
+}
+VEHICLES = 25
+
+
+def frames_of(count: int) -> Frames:
+    """Return `count` plausible frames."""
+    column = np.arange(count) / 120.0
+    return Frames(
+        column, column, column, column, np.ones(count, np.bool_), np.arange(count), column, np.full(count, np.nan)
+    )
+
+
+def frames_bytes(count: int) -> int:
+    """Return the size of a message with `count` frames."""
+    return 48 + 57 * count
+
+
+class EchoAgv(AgvAdapter):
+    """Answers a command at once: its ``front`` says how many frames the camera is to return."""
+
+    scheme = "echo"
+
+    def __init__(self, answer: Callable[[int, int], None]) -> None:
+        self._answer = answer
+
+    @classmethod
+    def open(cls, address: str, options: AdapterOptions) -> EchoAgv:
+        """Return one that answers nothing."""
+        return cls(lambda *_: None)
+
+    def identity(self) -> AgvIdentity:
+        """Return who this is."""
+        return AgvIdentity("agv1", "echo", "", "", "us", 0.0, simulated=True, lock_step=True)
+
+    def apply(self, message: CommandMessage) -> None:
+        """Have the camera publish."""
+        self._answer(int(message.command.front), message.sequence)
+
+    def reset(self, request: Reset) -> None:
+        """Do nothing."""
+
+    def stop(self) -> None:
+        """Do nothing."""
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+class EchoMocap(MocapAdapter):
+    """Publishes frames that were made before."""
+
+    scheme = "echo"
+
+    def __init__(self) -> None:
+        self._ready = {count: frames_of(count) for count in (1, 96)}
+
+    @classmethod
+    def open(cls, address: str, options: AdapterOptions) -> EchoMocap:
+        """Return one."""
+        return cls()
+
+    def identity(self) -> MocapIdentity:
+        """Return who this is."""
+        return MocapIdentity("echo", 120.0, simulated=True)
+
+    def start(self, reports: Any) -> None:
+        """Keep what publishes."""
+        self.reports = reports
+
+    def reset(self, request: Reset) -> Sampling:
+        """Begin a run."""
+        return Sampling(120.0, 0.0)
+
+    def publish(self, count: int, acknowledged: int) -> None:
+        """Publish some of them."""
+        self.reports.frames(self._ready[count], clock=FrameClock.RUN, acknowledged=acknowledged)
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+@contextmanager
+def echo_node(session: zenoh.Session) -> Iterator[None]:
+    """Host the echoing adapters, and the bare peer that does the same with bytes."""
+    keys, clock = Keys("perf", "agv1"), WallClock()
+    camera = EchoMocap()
+    camera_host = MocapHost(session, keys, camera, clock, listens_for_truth=False)
+    vehicle_host = AgvHost(session, keys, EchoAgv(camera.publish), clock, camera_host.see)
+    subscriber = session.declare_subscriber("bare/command", zenoh.handlers.FifoChannel(256))
+    publisher = session.declare_publisher("bare/frames", **QOS)
+    answers = {count: bytes(frames_bytes(count)) for count in (1, 96)}
+
+    def echo() -> None:
+        handler = subscriber.handler
+        while True:
+            try:
+                command = handler.recv().payload.to_bytes()
+            except zenoh.ZError:
+                return
+            publisher.put(answers[command[0]])
+
+    thread = threading.Thread(target=echo, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        subscriber.undeclare()
+        thread.join()
+        publisher.undeclare()
+        vehicle_host.close()
+        camera_host.close()
+
+
+class Plan(NamedTuple):
+    """How often to measure, and how long to pause in between."""
+
+    name: str
+    blocks: int
+    times: int
+    pause_s: float
+
+
+def median_s(call: Callable[[], object], plan: Plan) -> float:
+    """Return the median time of a call."""
+    taken = []
+    for _ in range(plan.times):
+        time.sleep(plan.pause_s)
+        began = time.perf_counter()
+        call()
+        taken.append(time.perf_counter() - began)
+    return statistics.median(taken)
+
+
+def compare(what: str, ours: Callable[[], object], bare: Callable[[], object], plan: Plan, bound: float | None) -> None:
+    """Let ours and the peer take turns in blocks; print the medians and the median ratio."""
+    rows = [(median_s(ours, plan), median_s(bare, plan)) for _ in range(plan.blocks)]
+    mine, peer = (statistics.median(column) * 1e6 for column in zip(*rows, strict=True))
+    ratio = statistics.median(own / other for own, other in rows)
+    verdict = "" if bound is None else f"≤ {bound}  {'yes' if ratio <= bound else 'no'}"
+    print(f"{what:56s} {mine:8.1f} µs {peer:8.1f} µs {ratio:7.2f}  {verdict}", flush=True)
+
+
+def round_trips(session: zenoh.Session, where: str, plans: list[Plan]) -> None:
+    """Print the codec's and numbering's round trip beside bare Zenoh's, for one frame and for 0.8 s at 120 Hz."""
+    keys = Keys("perf", "agv1")
+    inbox, outbox = Inbox(session, keys), CommandOutbox(session, keys)
+    with bare_peer(session) as bare:
+        for plan, count in itertools.product(plans, (1, 96)):
+            command = Command(0.0, float(count), 0.0)
+
+            def ours(command: Command = command) -> object:
+                outbox.send(command, 0.0, 0.8)
+                return inbox.receive()
+
+            compare(label("round trip", where, plan, count), ours, bare(count), plan, BOUND)
+    inbox.close()
+    outbox.close()
+
+
+def lock_steps(session: zenoh.Session, where: str, plans: list[Plan]) -> None:
+    """Print whole exchanges, with their clocks, watchdog and checks, beside bare Zenoh's round trip."""
+    with VehicleLink(session, "perf", "agv1") as link, bare_peer(session) as bare:
+        link.reset(Pose(0.0, 0.0, 0.0), run_key="a")
+        for plan, count in itertools.product(plans, (1, 96)):
+            command = Command(0.0, float(count), 0.0)
+
+            def ours(command: Command = command) -> object:
+                return link.exchange(command, t_s=0.0, hold_s=0.8)
+
+            compare(label("exchange", where, plan, count), ours, bare(count), plan, None)
+
+
+def label(what: str, where: str, plan: Plan, count: int) -> str:
+    """Return what a row is about."""
+    return f"{what}, {where}, {plan.name}, {count} frame{'s' * (count > 1)}"
+
+
+@contextmanager
+def bare_peer(session: zenoh.Session) -> Iterator[Callable[[int], Callable[[], object]]]:
+    """Give what makes the peer's round trip for a number of frames."""
+    subscriber = session.declare_subscriber("bare/frames", zenoh.handlers.FifoChannel(256))
+    publisher = session.declare_publisher("bare/command", **QOS)
+    handler = subscriber.handler
+
+    def for_count(count: int) -> Callable[[], object]:
+        payload = bytes([count]) * COMMAND_BYTES
+
+        def bare() -> bytes:
+            publisher.put(payload)
+            return bytes(handler.recv().payload.to_bytes())
+
+        while not publisher.matching_status.matching:
+            time.sleep(0.01)
+        assert len(bare()) == frames_bytes(count)
+        return bare
+
+    yield for_count
+    subscriber.undeclare()
+    publisher.undeclare()
+
+
+def publish_load(endpoint: str, rate_hz: float, duration_s: float) -> None:
+    """Publish for each of 25 vehicles what frames have come since the last time; say how many and how long it took."""
+    with ExitStack() as stack:
+        session = stack.enter_context(open_session(connect=[endpoint]))
+        clock, hosts = WallClock(), []
+        for number in range(VEHICLES):
+            keys, adapter = Keys("perf", f"agv{number}"), EchoMocap()
+            hosts.append(MocapHost(session, keys, adapter, clock, listens_for_truth=False))
+            stack.callback(hosts[-1].close)
+        print("ready", flush=True)
+        sys.stdin.readline()
+        everything, ticks, done, messages = frames_of(1000), round(rate_hz * duration_s), 0, 0
+        began = time.perf_counter()
+        while done < ticks:
+            due = min(ticks, done + len(everything), int((time.perf_counter() - began) * rate_hz) + 1)
+            if due == done:
+                time.sleep(max(0.0, began + done / rate_hz - time.perf_counter()))
+                continue
+            frames = everything.select(np.arange(due - done))
+            for host in hosts:
+                host.frames(frames, clock=FrameClock.ADAPTER)
+            done, messages = due, messages + VEHICLES
+        print(ticks * VEHICLES, messages, time.perf_counter() - began, flush=True)
+        sys.stdin.readline()
+
+
+class Recorder:
+    """Receives the frames of all vehicles, a thread each, and counts."""
+
+    def __init__(self, session: zenoh.Session) -> None:
+        self.inboxes = [Inbox(session, Keys("perf", f"agv{number}")) for number in range(VEHICLES)]
+        self.frames = [0] * VEHICLES
+        self._threads = [threading.Thread(target=self._record, args=(n,), daemon=True) for n in range(VEHICLES)]
+        for thread in self._threads:
+            thread.start()
+
+    def _record(self, number: int) -> None:
+        while True:
+            try:
+                report = self.inboxes[number].receive()
+            except LinkError:
+                return
+            if isinstance(report, FramesMessage):
+                self.frames[number] += report.frame_count
+
+    @property
+    def lost(self) -> int:
+        """How many messages the sequence numbers say are missing."""
+        return sum(inbox.frames_loss.lost for inbox in self.inboxes)
+
+    def close(self) -> None:
+        """Stop."""
+        for inbox in self.inboxes:
+            inbox.close()
+        for thread in self._threads:
+            thread.join()
+
+
+def child(*arguments: str) -> subprocess.Popen[str]:
+    """Start this script as another process; return when it is ready."""
+    process = subprocess.Popen(  # noqa: S603
+        [sys.executable, __file__, *arguments], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    return process
+
+
+def load(endpoint: str, rate_hz: float, duration_s: float) -> None:
+    """Print what arrived of the load, and whether anything was lost without being counted."""
+    with open_session(listen=[endpoint]) as session:
+        recorder = Recorder(session)
+        process = child("--load", endpoint, str(rate_hz), str(duration_s))
+        assert process.stdin is not None
+        assert process.stdout is not None
+        print(file=process.stdin, flush=True)
+        sent, messages, taken_s = process.stdout.readline().split()
+        deadline = time.perf_counter() + 10.0
+        while sum(recorder.frames) + recorder.lost < int(sent) and time.perf_counter() < deadline:
+            time.sleep(0.01)
+        print(file=process.stdin, flush=True)
+        process.wait()
+        received, lost = sum(recorder.frames), recorder.lost
+        recorder.close()
+    rate = int(sent) / float(taken_s)
+    silent = int(sent) - received - lost
+    met = "yes" if silent == 0 and (lost == 0 or rate_hz > 240.0) else "no"
+    what = f"{VEHICLES} vehicles at {rate_hz:g} Hz for {duration_s:g} s"
+    share = rate / (VEHICLES * rate_hz)
+    print(
+        f"{what:30s} {received} of {sent} frames, {lost} lost and counted, {silent} silently; "
+        f"{int(messages)} messages, {rate:.0f} frames/s, {share:.0%} of the rate; none silent: {met}",
+        flush=True,
+    )
+
+
+def free_endpoint() -> str:
+    """Return a loopback endpoint that nobody uses."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--full", action="store_true", help="load for 60 s instead of 5 s, and more round trips")
+    parser.add_argument("--quick", action="store_true", help="fewer round trips, load for 1 s")
+    parser.add_argument("--echo", metavar="ENDPOINT", help=argparse.SUPPRESS)
+    parser.add_argument("--load", nargs=3, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.echo:
+        with open_session(listen=[arguments.echo]) as session, echo_node(session):
+            print("ready", flush=True)
+            sys.stdin.readline()
+        return
+    if arguments.load:
+        endpoint, rate_hz, duration_s = arguments.load
+        publish_load(endpoint, float(rate_hz), float(duration_s))
+        return
+    more = 1 if arguments.quick else 9 if arguments.full else 4
+    plans = [Plan("back to back", 5 * more, 100, 0.0), Plan("at 240 Hz", 3 * more, 40, 1 / 240.0)]
+    print(f"{'what':56s} {'ours':>11s} {'bare Zenoh':>11s} {'ratio':>7s}  bound  met?")
+    with open_session() as session, echo_node(session):
+        round_trips(session, "one session", plans)
+        lock_steps(session, "one session", plans)
+    endpoint = free_endpoint()
+    process = child("--echo", endpoint)
+    with open_session(connect=[endpoint]) as session:
+        round_trips(session, "two processes", plans)
+        lock_steps(session, "two processes", plans)
+    process.communicate("\n")
+    duration_s = 60.0 if arguments.full else 1.0 if arguments.quick else 5.0
+    load(free_endpoint(), 240.0, duration_s)
+    load(free_endpoint(), 2400.0, duration_s)
+
+
+if __name__ == "__main__":
+    main()
