@@ -30,19 +30,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Compute, show and write."""
-    from rich.console import Console
-
     from agvbench.workflows.thesis import thesis_sections, write_json, write_tables
-    from agvbench.workflows.thesis.console import print_section
+    from agvbench.workflows.thesis.console import print_section, wide_console, with_progress
 
-    console = Console()
-    sections = []
-    for section in thesis_sections(arguments.section):
+    console = wide_console()
+    sections = with_progress(thesis_sections(arguments.section))
+    if arguments.json is not None or arguments.out is not None:
+        # Files first: a reader that closes the pipe early must not cost them.
+        computed = list(sections)
+        if arguments.json is not None:
+            write_json(computed, arguments.json)
+        if arguments.out is not None:
+            write_tables(computed, arguments.out)
+        sections = iter(computed)
+    for section in sections:
         print_section(section, console)
-        sections.append(section)
-    if arguments.json is not None:
-        write_json(sections, arguments.json)
-    if arguments.out is not None:
-        written = write_tables(sections, arguments.out)
-        console.print(f"{len(written)} files in {arguments.out}", highlight=False)
     return 0

@@ -23,6 +23,7 @@ Ramps = Literal["none", "accelerate_and_brake", "with_rebound"]
 Duration = Literal["path", "kinematic"]
 CorneringLoss = Literal["appendix_b", "none"]
 TrueSteering = Literal["end_stops", "monotone"]
+TrueDrive = Literal["measured", "dead_band"]
 TurnTarget = Literal["sqrt_2", "1.41"]
 NominalSpeed = Literal["0.32", "table_7_4"]
 WholeDegrees = Literal["none", "rounded", "toward_straight", "servo_floor"]
@@ -44,6 +45,7 @@ class Assumptions:
     nominal_speed: NominalSpeed = "0.32"
     whole_degrees: WholeDegrees = "none"
     uncalibrated_steering: UncalibratedSteering = "chapter_7"
+    true_drive: TrueDrive = "measured"
     calibrated_drive: CalibratedDrive = "cubic"
     calibrated_steering: CalibratedSteering = "published"
 
@@ -53,6 +55,7 @@ ONLY: dict[str, Condition] = {
     "nominal_speed": "uncalibrated",
     "whole_degrees": "uncalibrated",
     "uncalibrated_steering": "uncalibrated",
+    "true_drive": "calibrated",
     "calibrated_drive": "calibrated",
     "calibrated_steering": "calibrated",
 }
@@ -82,6 +85,8 @@ MEANING: dict[tuple[str, str], str] = {
     ("whole_degrees", "servo_floor"): "servo degrees (90 = straight) truncated: left more, right less",
     ("uncalibrated_steering", "chapter_7"): "the axles answer as in tables 7.1, 7.2",
     ("uncalibrated_steering", "table_6_1"): "the axles answer as in table 6.1, measured before chapter 7",
+    ("true_drive", "measured"): "what the drive does: table 7.4, interpolated smoothly",
+    ("true_drive", "dead_band"): "what the drive does: a dead band with saturation through table 7.4",
     ("calibrated_drive", "cubic"): "pulse and time from the refitted cubic at ±0.32 and ±0.16 m/s",
     ("calibrated_drive", "end_of_range"): "pulse at the cubic's ends (1200, 1850 µs) and at table 7.4's half speed",
     ("calibrated_drive", "table_7_4"): "time from the speed that table 7.4 shows at the cubic's pulse",

@@ -55,7 +55,7 @@ def battery_section() -> Section:
         Figure("length of the test [h] (8 h 18 min)", "8.1", "8.3", ENDURANCE_S / 3600.0),
         Figure("positions at 10 Hz", "8.1", "298770", 10.0 * ENDURANCE_S),
         Figure(
-            "start of the eleventh interval [s]",
+            "end of the test [s], after the eleventh interval's start",
             "table 8.2",
             "29877",
             float(start_s[-1]),
@@ -77,11 +77,13 @@ def battery_section() -> Section:
     )
     findings = (
         (
-            f"The battery costs {percent:.2f} % of speed per hour: a line through table 8.2 predicts a left-out interval "
+            f"The battery costs {percent:.2f} % of speed per hour: a line through table 8.2 predicts a left-out "
+            "interval "
             f"to {line:.1f} mm/s, a constant to {constant:.1f}."
         ),
         (
-            f"Within one drive of {TRAJECTORY_RUN_S:.0f} s that is {20.0 * percent * TRAJECTORY_RUN_S / 3600.0:.2f} mm of 2 m, "
+            f"Within one drive of {TRAJECTORY_RUN_S:.0f} s that is {20.0 * percent * TRAJECTORY_RUN_S / 3600.0:.2f} "
+            "mm of 2 m, "
             f"but {20.0 * percent:.0f} mm between drives an hour apart: harmless only if conditions are interleaved."
         ),
     )

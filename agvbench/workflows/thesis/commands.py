@@ -8,7 +8,13 @@ from typing import NamedTuple
 
 from agvbench.model import thesis_vehicle
 from agvbench.vehicle.kinematics import body_motion
-from agvbench.workflows.thesis.assumptions import Assumptions, CalibratedDrive, CalibratedSteering, WholeDegrees
+from agvbench.workflows.thesis.assumptions import (
+    Assumptions,
+    CalibratedDrive,
+    CalibratedSteering,
+    TrueDrive,
+    WholeDegrees,
+)
 from agvbench.workflows.thesis.drive import PARTIAL_US, cubic_map
 from agvbench.workflows.thesis.eight import Trajectory, wanted_angles
 from agvbench.workflows.thesis.steering import published_lines, unrounded_lines
@@ -36,11 +42,14 @@ def told(trajectory: Trajectory, condition: str, assumed: Assumptions) -> Told:
         drive_us, speed = _uncalibrated_drive(trajectory.drive, assumed.nominal_speed)
         front_us, rear_us = (_nominal_pulse(a, assumed.whole_degrees) for a in angles)
     else:
-        drive_us, speed = _calibrated_drive(trajectory.drive, trajectory.half_speed, assumed.calibrated_drive)
+        drive_us, speed = _calibrated_drive(
+            trajectory.drive, trajectory.half_speed, assumed.calibrated_drive, assumed.true_drive
+        )
         front_us, rear_us = _calibrated_pulses(angles, assumed.calibrated_steering)
     return Told(drive_us, front_us, rear_us, _duration(trajectory, angles, abs(speed), assumed.duration))
 
 
+@cache
 def _duration(trajectory: Trajectory, angles: tuple[float, float], speed_mps: float, duration: str) -> float:
     if duration == "path" or not trajectory.is_turn:
         return trajectory.path_m / speed_mps
@@ -77,13 +86,16 @@ def cut_to_degrees(angle_deg: float, how: WholeDegrees) -> float:
     return 90.0 - math.floor(90.0 - angle_deg)
 
 
+@cache
 def _calibrated_pulses(angles: tuple[float, float], how: CalibratedSteering) -> tuple[float, float]:
     front, rear = published_lines() if how == "published" else unrounded_lines()
     return float(front.inverse(angles[0])), float(rear.inverse(angles[1]))
 
 
 @cache
-def _calibrated_drive(direction: int, half_speed: bool, how: CalibratedDrive) -> tuple[float, float]:
+def _calibrated_drive(
+    direction: int, half_speed: bool, how: CalibratedDrive, true_drive: TrueDrive
+) -> tuple[float, float]:
     """Return the drive pulse and the speed from which the driving time was computed."""
     wanted = direction * FULL_SPEED_MPS * (0.5 if half_speed else 1.0)
     cubic = cubic_map()
@@ -92,4 +104,4 @@ def _calibrated_drive(direction: int, half_speed: bool, how: CalibratedDrive) ->
         drive_us = float(thesis_vehicle().drive.inverse(wanted)) if half_speed else end_us
         return drive_us, float(cubic(drive_us))
     drive_us = float(cubic.inverse(wanted))
-    return drive_us, wanted if how == "cubic" else true_speed(drive_us)
+    return drive_us, wanted if how == "cubic" else true_speed(drive_us, true_drive)

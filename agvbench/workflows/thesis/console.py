@@ -2,13 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from agvbench.workflows.thesis.layout import Cell, Section, Table, show
 
 if TYPE_CHECKING:
     import rich.table
+    from rich.console import Console, JustifyMethod
+
+# Longer words (names of choices) may break at the edge of a column.
+_LONG_WORD = 13
+_MIN_WIDTH = 100
+
+
+def wide_console() -> Console:
+    """Return the terminal, or 100 columns where it has fewer: a wrapped line is better than a lost column."""
     from rich.console import Console
+
+    console = Console()
+    return console if console.width >= _MIN_WIDTH else Console(width=_MIN_WIDTH)
+
+
+def with_progress(sections: Iterator[Section]) -> Iterator[Section]:
+    """Yield the sections; while one is computed, a terminal shows on standard error that something goes on."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    while True:
+        if console.is_terminal:
+            with console.status("refitting and predicting …"):
+                section = next(sections, None)
+        else:
+            section = next(sections, None)
+        if section is None:
+            return
+        yield section
 
 
 def print_section(section: Section, console: Console) -> None:
@@ -22,20 +51,39 @@ def print_section(section: Section, console: Console) -> None:
     for table in section.tables:
         console.print()
         console.print(_rich_table(table))
+        if table.note:
+            console.print(Padding(escape(table.note), (0, 0, 0, 1)), style="dim", highlight=False)
     console.print()
 
 
 def _rich_table(table: Table) -> rich.table.Table:
+    import rich.box
     import rich.table
     from rich.markup import escape
 
-    shown = rich.table.Table(title=escape(table.title), caption=escape(table.note) or None, title_justify="left")
-    for index, column in enumerate(table.columns):
+    shown = rich.table.Table(
+        title=escape(table.title),
+        title_justify="left",
+        box=rich.box.SIMPLE_HEAD,
+        padding=0,
+    )
+    headings = table.narrow_columns or table.columns
+    kept = [index for index, heading in enumerate(headings) if heading]
+    for index in kept:
         numbers = any(_is_number(row[index]) for row in table.rows)
-        shown.add_column(escape(column), justify="right" if numbers else "left", overflow="fold")
+        justify: JustifyMethod = "right" if numbers else "left"
+        shown.add_column(escape(headings[index]), justify=justify, overflow="fold", min_width=_width(table, index))
     for row in table.rows:
-        shown.add_row(*(escape(show(cell)) for cell in row))
+        shown.add_row(*(escape(show(row[index], table.digits)) for index in kept))
     return shown
+
+
+def _width(table: Table, index: int) -> int:
+    """Return the width below which a column's numbers, or its words of usual length, would break."""
+    cells = [row[index] for row in table.rows]
+    words = [len(word) for cell in cells for word in show(cell).split() if isinstance(cell, str)]
+    numbers = [len(show(cell, table.digits)) for cell in cells if _is_number(cell)]
+    return max([1, *numbers, *(length for length in words if length <= _LONG_WORD)])
 
 
 def _is_number(cell: Cell) -> bool:

@@ -80,7 +80,7 @@ def cornering_share(front_rad: ArrayLike, rear_rad: ArrayLike, loss: float) -> F
 
 def _curvature(front_rad: Floats, rear_rad: Floats) -> Floats:
     _, sideslip, _ = body_motion(front_rad, rear_rad, 1.0, 1.0, GEOMETRY)
-    return np.abs(np.cos(sideslip) * (np.tan(front_rad) - np.tan(rear_rad))) / GEOMETRY.wheelbase_m
+    return np.asarray(np.abs(np.cos(sideslip) * (np.tan(front_rad) - np.tan(rear_rad))) / GEOMETRY.wheelbase_m)
 
 
 FORMS: dict[str, Form] = {
@@ -152,7 +152,7 @@ def _would_differ() -> float:
     """Return how many mirrored pairs our own model, with asymmetric servos, would print differently."""
     table = cornering_table()
     predicted = {}
-    for mode in table.speed_mps.keys():
+    for mode in table.speed_mps:
         front, rear = _angles(mode, table.steering_us)
         straight = np.abs(np.interp(table.drive_us, *drive_table()))[:, None]
         speed, _, _ = body_motion(front, rear, straight, straight, GEOMETRY)
@@ -167,25 +167,31 @@ def cornering_section() -> Section:
     measured = sum(grid.size for grid in cornering_table().speed_mps.values())
     findings = (
         (
-            f"{count.identical} of {count.pairs} mirrored pairs print the same speed ({count.at_rest} of them at rest); "
-            f"the other is {'; '.join(count.differing)}. The servos are not symmetric (±40.2/42.1°, zero at 1488 and 1474 µs): "
-            f"driven twice, about {_would_differ():.0f} pairs would differ in print. The halves were mirrored or averaged: "
+            f"{count.identical} of {count.pairs} mirrored pairs print the same speed ({count.at_rest} of them at "
+            "rest); "
+            f"the other is {'; '.join(count.differing)}. The servos are not symmetric (±40.2/42.1°, zero at 1488 "
+            "and 1474 µs): "
+            f"driven twice, about {_would_differ():.0f} pairs would differ in print. The halves were mirrored or "
+            "averaged: "
             "they count, and are split, as one."
         ),
         (
-            f"The straight column is the same in all three modes for {straight_speeds_repeated()} of 16 drive pulses, and the "
-            f"blocks {', '.join(f'{a:.0f} and {b:.0f} µs' for a, b in blocks)} are equal in all 21 cells: 336 printed medians "
+            f"The straight column is the same in all three modes for {straight_speeds_repeated()} of 16 drive "
+            "pulses, and the "
+            f"blocks {', '.join(f'{a:.0f} and {b:.0f} µs' for a, b in blocks)} are equal in all 21 cells: 336 "
+            "printed medians "
             "are at most 160 different measurements."
         ),
         (
-            f"Eq. 5.6 misses appendix B by {rows[0][3]:.1f} mm/s rms; a loss of {fitted_loss():.4f} per |tan δf| + |tan δr| "
-            f"leaves {rows[1][3]:.1f} held out (the printed step of 10 mm/s alone gives 2.9). Forms in curvature do worse: crab, "
+            f"Eq. 5.6 misses appendix B by {rows[0][3]:.1f} mm/s rms; a loss of {fitted_loss():.4f} per |tan δf| + "
+            "|tan δr| "
+            f"leaves {rows[1][3]:.1f} held out (the printed step of 10 mm/s alone gives 2.9). Forms in curvature do "
+            "worse: crab, "
             "which does not turn, loses speed too."
         ),
     )
     figures = [
         Figure("median velocities", "7.2", "336", float(measured)),
-        Figure("mirrored pairs that agree", "appendix B", "144", float(count.identical), "; ".join(count.differing)),
     ]
     columns = ("model", "loss", "rms [mm/s]", "held-out rms [mm/s]")
     tables = (

@@ -6,7 +6,8 @@ from functools import cache
 
 import numpy as np
 
-from agvbench.vehicle.maps import Cubic
+from agvbench.calibration import fit_drive_map
+from agvbench.vehicle.maps import Cubic, StaticMap
 from agvbench.workflows.thesis.layout import Section, Table
 from agvbench.workflows.thesis.polynomial import Polynomial, fit_polynomial
 from agvbench.workflows.thesis.published import Figure, figures_table
@@ -38,10 +39,16 @@ def printed_cubic(pulse_us: float) -> float:
 
 @cache
 def cubic_map() -> Cubic:
-    """Return the refitted eq. 7.3 on the branch that falls: a little wider than 1200…1850 µs, so that ±0.32 m/s is on it."""
+    """Return the refitted eq. 7.3 on all of its falling branch, so that ±0.32 m/s is on it."""
     a, b, c, d = refit_drive(3, PARTIAL_US).coefficients
     turns = sorted(np.roots([3.0 * a, 2.0 * b, c]).real)
     return Cubic(a, b, c, d, float(np.ceil(turns[0])), float(np.floor(turns[1])))
+
+
+@cache
+def dead_band_map() -> StaticMap:
+    """Return the dead band with saturation fitted to table 7.4 [m/s]."""
+    return fit_drive_map(*drive_table(), kind="dead_band_with_saturation", neutral=1500.0).map
 
 
 def table_speed(pulse_us: float) -> float:

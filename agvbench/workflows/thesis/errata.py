@@ -126,7 +126,10 @@ def _measurements() -> list[tuple[str, str, str, str]]:
         (
             "appendix B",
             "1700 µs, single",
-            f"{single[1]:.2f} at 1100, {single[2]:.2f} at 1300, {single[3]:.2f} at 1500 µs: not monotone, in both halves",
+            (
+                f"{single[1]:.2f} at 1100, {single[2]:.2f} at 1300, {single[3]:.2f} at 1500 µs: not monotone, in both "
+                "halves"
+            ),
             "0.23 was meant?",
         ),
         (
@@ -185,9 +188,13 @@ def errata_section() -> Section:
         figures_table("text_figures", "Figures in the text", _figures()),
     )
     findings = (
-        f"{len(rows)} places where the thesis contradicts its own tables, text or geometry, each with the number that shows it.",
         (
-            "Two change results: the signs and speeds of eq. 5.6 and 5.8 (the thesis' own code has them right), and the fits of "
+            f"{len(rows)} places where the thesis contradicts its own tables, text or geometry, each with the number "
+            "that shows it."
+        ),
+        (
+            "Two change results: the signs and speeds of eq. 5.6 and 5.8 (the thesis' own code has them right), and "
+            "the fits of "
             "eq. 7.1 to 7.3."
         ),
     )

@@ -13,13 +13,18 @@ Cell = str | float | int | bool | None
 
 @dataclass(frozen=True)
 class Table:
-    """A table: `columns` are headings, ``rows[i][j]`` the cells; `name` is a file name without its ending."""
+    """A table: `columns` are headings, ``rows[i][j]`` the cells; `name` is a file name without its ending.
+
+    `narrow_columns` are shorter headings for a terminal, explained by the note; an empty one is not shown there.
+    """
 
     name: str
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
     note: str = ""
+    narrow_columns: tuple[str, ...] = ()
+    digits: int = 4
 
     def __post_init__(self) -> None:
         for row in self.rows:
@@ -43,7 +48,7 @@ class Table:
         """Return the table as Markdown, cells rounded for reading."""
         head = "| " + " | ".join(_escape(c) for c in self.columns) + " |"
         rule = "|" + "---|" * len(self.columns)
-        body = ["| " + " | ".join(_escape(show(c)) for c in row) + " |" for row in self.rows]
+        body = ["| " + " | ".join(_escape(show(c, self.digits)) for c in row) + " |" for row in self.rows]
         note = ["", self.note] if self.note else []
         return "\n".join([f"**{self.title}**", "", head, rule, *body, *note, ""])
 
@@ -86,8 +91,8 @@ def key_of(heading: str) -> str:
     return re.sub(r"[^0-9a-z]+", "_", text).strip("_")
 
 
-def show(cell: Cell) -> str:
-    """Return a cell for reading: four significant digits, yes and no for truth values.
+def show(cell: Cell, digits: int = 4) -> str:
+    """Return a cell for reading: so many significant digits, yes and no for truth values.
 
     >>> show(0.9990961), show(True), show(None), show(298770.0), show(3.7419443e-09)
     ('0.9991', 'yes', '–', '298770', '3.742e-09')
@@ -98,7 +103,7 @@ def show(cell: Cell) -> str:
         return "yes" if cell else "no"
     if not isinstance(cell, float):
         return str(cell)
-    return f"{cell:.0f}" if abs(cell) >= 1000.0 else f"{cell:.4g}"
+    return f"{cell:.0f}" if abs(cell) >= 1000.0 else f"{cell:.{digits}g}"
 
 
 def _json_cell(cell: Cell) -> Cell:

@@ -1,4 +1,4 @@
-"""Why the axle that stands still seems to turn (tables 7.1 and 7.2): a lever arm, or coupling?
+"""Why the axle that stands still seems to turn (tables 7.1 and 7.2): a lever arm, or coupling.
 
 If the markers' centroid lies e further forward than the vehicle file says, every axle angle is measured with the wrong
 lever: tan δ is off by e·κ on *both* axles, κ being the curvature driven. A coupling of the servos instead gives
@@ -81,13 +81,15 @@ def lever_arm_section() -> Section:
     table = Table("lever_arm", "The axle that stands still", columns, tuple(rows))
     findings = (
         (
-            f"One lever arm explains the drift of both tables: {rows[0][2]:.1f} ± {rows[0][3]:.1f} mm from the rear axle of "
+            f"One lever arm explains the drift of both tables: {rows[0][2]:.1f} ± {rows[0][3]:.1f} mm from the rear "
+            "axle of "
             f"table 7.1 and {rows[1][2]:.1f} ± {rows[1][3]:.1f} mm from the front axle of table 7.2, "
             f"{1e3 * arm:.1f} ± {1e3 * error:.1f} mm together. Coupling needs two shares of opposite sign "
             f"({rows[0][5]:+.4f} and {rows[1][5]:+.4f}) and fits as well: the lever arm is the simpler of the two."
         ),
         (
-            f"A negative arm means: the markers' centroid lies {-1e3 * arm:.1f} mm further back than table 5.1 says. Both axles "
+            f"A negative arm means: the markers' centroid lies {-1e3 * arm:.1f} mm further back than table 5.1 "
+            "says. Both axles "
             "shift alike, so the yaw rate does not change, and chapter 8 is not affected."
         ),
     )

@@ -1,4 +1,4 @@
-"""Are the left and the right half of appendix B two measurements?"""
+"""Whether the left and the right half of appendix B are two measurements."""
 
 from __future__ import annotations
 

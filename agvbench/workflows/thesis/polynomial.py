@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 
+from agvbench.calibration import CurvePoints
+from agvbench.calibration.polynomial_fits import fit_cubic, fit_line
 from agvbench.types import Floats
+from agvbench.vehicle.maps import Cubic, Line
 
 
 @dataclass(frozen=True)
@@ -22,13 +25,14 @@ class Polynomial:
 
 
 def fit_polynomial(x: Floats, y: Floats, order: int) -> Polynomial:
-    """Return the least squares polynomial of `order`, solved in a centred and scaled variable.
+    """Return the least squares polynomial of `order` 1 or 3, as `agvbench.calibration` fits it.
 
     >>> line = fit_polynomial(np.array([0.0, 1.0, 2.0]), np.array([1.0, 3.0, 5.0]), 1)
     >>> [round(c, 9) for c in line.coefficients], round(line.r_squared, 9)
     ([2.0, 1.0], 1.0)
     """
-    fitted = np.polynomial.Polynomial.fit(x, y, order)
-    residual = float(np.sum((y - fitted(x)) ** 2))
-    total = float(np.sum((y - y.mean()) ** 2))
-    return Polynomial(tuple(float(c) for c in fitted.convert().coef[::-1]), 1.0 - residual / total)
+    points = CurvePoints.from_measurements(x, y)
+    fit = fit_line(points) if order == 1 else fit_cubic(points)
+    if not isinstance(fit.map, (Line, Cubic)):
+        raise TypeError(type(fit.map))
+    return Polynomial(astuple(fit.map)[: order + 1], fit.r_squared)

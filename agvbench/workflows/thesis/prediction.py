@@ -37,8 +37,9 @@ class Prediction:
 def predict(trajectory: Trajectory, condition: Condition, assumed: Assumptions) -> Prediction:
     """Return the predicted end of `trajectory` driven under `condition`."""
     command = told(trajectory, condition, assumed)
+    drive = assumed.true_drive if condition == "calibrated" else "measured"
     motion = steady_motion(command.front_us, command.rear_us, condition, assumed)
-    distance = driven_distance(true_speed(command.drive_us), command.duration_s, assumed.ramps)
+    distance = driven_distance(true_speed(command.drive_us, drive), command.duration_s, assumed.ramps)
     end, turned = arc_end(distance * motion.speed, motion.sideslip_rad, distance * motion.yaw_per_m)
     delta_s = math.hypot(end.x_m, end.y_m) - trajectory.distance_m(assumed.turn_target)
     return Prediction(trajectory, condition, command, end, math.degrees(turned), 1000.0 * delta_s)

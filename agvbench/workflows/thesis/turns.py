@@ -61,7 +61,7 @@ def backward_factors(assumed: Assumptions) -> dict[str, float]:
 
 
 def carried_over(assumed: Assumptions) -> list[tuple[Cell, ...]]:
-    """Return, per condition, the backward heading errors [deg]: as predicted, with the other's factor, and the null's."""
+    """Return per condition the backward heading errors [deg]: as predicted, with the other's factor, of the null."""
     factors, predicted = backward_factors(assumed), _predicted_turns(assumed)
     rows: list[tuple[Cell, ...]] = []
     for condition, other in zip(CONDITIONS, reversed(CONDITIONS), strict=True):
@@ -90,7 +90,7 @@ def turns_section() -> Section:
         "radius if + [mm]",
         "length if + [mm]",
     )
-    columns += ("radius if − [mm]", "length if − [mm]", "turned, measured / predicted")
+    columns += ("radius if − [mm]", "length if − [mm]", "measured / predicted")
     carried = carried_over(assumed)
     carried_columns: tuple[str, ...] = ("condition", "own factor", "factor from", "factor", "error as predicted [deg]")
     carried_columns += ("error with that factor [deg]", "null [deg]")
@@ -106,17 +106,22 @@ def _findings(ratios: dict[tuple[int, str], float], factors: dict[str, float]) -
     forward = {c: mean(ratios[n, c] for n in (5, 6)) for c in CONDITIONS}
     return (
         (
-            "Chapter 8 calls case 6 'backward movement'; it is the forward right turn. What stands out is not the direction "
-            "but the side: calibrated right turns (6, 8) miss by 55.5 and 62.9 mm, left turns (5, 7) by 8.0 and 9.6 mm, forward "
+            "Chapter 8 calls case 6 'backward movement'; it is the forward right turn. What stands out is not the "
+            "direction "
+            "but the side: calibrated right turns (6, 8) miss by 55.5 and 62.9 mm, left turns (5, 7) by 8.0 and 9.6 "
+            "mm, forward "
             "and backward alike."
         ),
         (
-            "Δs has two readings per turn. If + a right turn's arc is wider and longer than asked, if − tighter and shorter; "
+            "Δs has two readings per turn. If + a right turn's arc is wider and longer than asked, if − tighter and "
+            "shorter; "
             "the medians alone do not tell which."
         ),
         (
             f"Headings turned, measured over predicted: forward {forward['uncalibrated']:.2f} uncalibrated and "
-            f"{forward['calibrated']:.2f} calibrated, backward {factors['uncalibrated']:.2f} and {factors['calibrated']:.2f}. "
-            "No single factor for driving backward serves both conditions; lag, gain and play cannot be told apart here."
+            f"{forward['calibrated']:.2f} calibrated, backward {factors['uncalibrated']:.2f} and "
+            f"{factors['calibrated']:.2f}. "
+            "No single factor for driving backward serves both conditions; lag, gain and play cannot be told apart "
+            "here."
         ),
     )

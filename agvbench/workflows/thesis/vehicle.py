@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 from agvbench.model import thesis_vehicle
 from agvbench.vehicle.kinematics import body_motion
-from agvbench.workflows.thesis.assumptions import Assumptions
+from agvbench.workflows.thesis.assumptions import Assumptions, TrueDrive
 from agvbench.workflows.thesis.cornering import NEUTRAL_US, cornering_share, fitted_loss
+from agvbench.workflows.thesis.drive import dead_band_map
 from agvbench.workflows.thesis.steering import true_maps, verification_maps
 from agvbench.workflows.thesis.tables import GEOMETRY
 
@@ -22,9 +23,12 @@ class SteadyMotion(NamedTuple):
 
 
 @cache
-def true_speed(drive_us: float) -> float:
-    """Return the shipped vehicle's speed [m/s] at a drive pulse and 1500 µs of steering (table 7.4)."""
-    return float(thesis_vehicle().speed(drive_us))
+def true_speed(drive_us: float, kind: TrueDrive = "measured") -> float:
+    """Return the speed [m/s] at a drive pulse and 1500 µs of steering: the shipped vehicle's, from table 7.4.
+
+    ``"dead_band"`` takes the dead band with saturation fitted to the same table; at full command the two agree.
+    """
+    return float(thesis_vehicle().speed(drive_us) if kind == "measured" else dead_band_map()(drive_us))
 
 
 def steady_motion(front_us: float, rear_us: float, condition: str, assumed: Assumptions) -> SteadyMotion:

@@ -56,9 +56,9 @@ def test_expected_differing_against_random_drives():
     left, right, noise = 0.2132, 0.2168, 0.002
     grid = np.array([[left, 0.3, right]])
     rng = np.random.default_rng(1)
-    printed = np.round(np.array([[left], [right]]) + noise * rng.standard_normal((2, 400_000)), 2)
+    printed = np.round(np.array([[left], [right]]) + noise * rng.standard_normal((2, 100_000)), 2)
     share = np.mean(printed[0] != printed[1])
-    assert expected_differing({"single": grid}, noise) == pytest.approx(share, abs=0.005)
+    assert expected_differing({"single": grid}, noise) == pytest.approx(share, abs=0.01)
 
 
 def test_identical_halves_far_from_a_rounding_edge_never_differ():
@@ -78,7 +78,9 @@ def test_loss_is_the_least_squares_one():
 
         neutral_f, neutral_r = math.radians(-1.59), math.radians(-2.27)
         neutral = abs(math.tan(neutral_f)) + abs(math.tan(neutral_r))
-        share = eq_5_6(s.front_rad, s.rear_rad) / eq_5_6(neutral_f, neutral_r) * (1 - loss * form) / (1 - loss * neutral)
+        share = (
+            eq_5_6(s.front_rad, s.rear_rad) / eq_5_6(neutral_f, neutral_r) * (1 - loss * form) / (1 - loss * neutral)
+        )
         return float(np.sqrt(np.mean((s.speed_mps - s.straight_mps * share) ** 2)))
 
     grid = np.linspace(0.0, 0.1, 1001)
@@ -103,7 +105,7 @@ def test_share_of_straight_driving_is_one():
 
 def test_lever_arm_from_rigid_body_geometry():
     """A vehicle whose markers sit 4 mm further back than its file says, turning about known centres."""
-    lf, lr, shift = 0.181, 0.121, -0.004
+    lr, shift = 0.121, -0.004
     curvature = np.linspace(-2.8, 2.8, 13)
     ahead_of_centre = 0.03 * curvature / 2.8  # of the true centroid, against the centre's projection
     axle = -lr - shift  # the true rear axle, from the true centroid
