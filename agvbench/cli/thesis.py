@@ -6,6 +6,8 @@ examples:
   agvbench thesis --out tables/            each table as CSV, everything as thesis.md
   agvbench thesis --json thesis.json       the same for programs
 
+sections: steering, drive, maps, cornering, battery, lever_arm, errata, prediction, sensitivity, turns
+
 Each refit stands beside the printed figure; where they differ, the errata say why. The prediction uses chapters
 6, 7, 8.1 and appendix B only; what the thesis leaves open is assumed by a rule fixed beforehand, and the section
 'sensitivity' shows what the other answers would change.

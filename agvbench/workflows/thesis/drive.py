@@ -65,8 +65,9 @@ def _figures() -> list[Figure]:
     ]
     refit = refit_drive(3, PARTIAL_US).coefficients
     powers = ("pw³", "pw²", "pw", "1")
+    lost = f"rounded too far: v(1500 µs) = {printed_cubic(1500.0):.2f} m/s as printed"
     figures += [
-        Figure(f"coefficient of {power}", "eq. 7.3", printed, value)
+        Figure(f"coefficient of {power}", "eq. 7.3", printed, value, lost)
         for power, printed, value in zip(powers, PRINTED_CUBIC, refit, strict=True)
     ]
     return figures

@@ -45,4 +45,4 @@ class Figure:
 
 def figures_table(name: str, title: str, figures: list[Figure], note: str = "") -> Table:
     """Return a table of figures."""
-    return Table(name, title, COLUMNS, tuple(figure.row() for figure in figures), note)
+    return Table(name, title, COLUMNS, tuple(figure.row() for figure in figures), note, digits=6)

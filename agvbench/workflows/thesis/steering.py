@@ -82,8 +82,9 @@ def _figures(axle: str) -> list[Figure]:
     line, where = refit_line(axle, 1), EQUATION[axle]
     slope, intercept, r_squared = PRINTED[axle]
     spread = _largest_spread(axle)
+    saturated = f"saturated points are in the fit: {refit_line(axle, 2).coefficients[0]:.4f} with two dropped"
     return [
-        Figure(f"{axle} slope [deg/µs]", where, slope, line.coefficients[0], "one point dropped at each end"),
+        Figure(f"{axle} slope [deg/µs]", where, slope, line.coefficients[0], saturated),
         Figure(f"{axle} intercept [deg]", where, intercept, line.coefficients[1], "one point dropped at each end"),
         Figure(f"{axle} R²", "table 7.5", r_squared, line.r_squared, "one point dropped at each end"),
         Figure(f"{axle} largest spread about the median [deg]", "7.2", {"front": "0.46", "rear": "0.94"}[axle], spread),
@@ -125,7 +126,7 @@ def steering_section() -> Section:
     )
     tables = (
         figures_table("steering", "Steering lines, as printed and refitted", [f for a in AXLES for f in _figures(a)]),
-        Table("steering_lines", "Lines by points dropped and by statistic", columns, tuple(rows)),
+        Table("steering_lines", "Lines by points dropped and by statistic", columns, tuple(rows), digits=5),
     )
     values = {f"{a}_{k}": v for a in AXLES for k, v in _named(two[a])}
     return Section("steering", "Steering (tables 7.1, 7.2, eq. 7.1, 7.2)", findings, tables, dict(values))
