@@ -57,7 +57,7 @@ def encode_command(message: CommandMessage) -> bytes:
         If a number is not finite, or `hold_s` is out of range.
     """
     _check(message.t_s, message.command, message.hold_s)
-    header = pack_header(Kind.COMMAND, flags=message.flags, source=message.source, count=1, sequence=message.sequence)
+    header = pack_header(Kind.COMMAND, message.flags, message.source, 1, message.sequence)
     return header + _BODY.pack(message.t_s, *message.command, message.hold_s)
 
 
@@ -80,7 +80,9 @@ def decode_command(payload: bytes) -> CommandMessage:
 
 
 def _check(t_s: float, command: Command, hold_s: float) -> None:
-    if not (math.isfinite(t_s) and all(map(math.isfinite, command))):
+    drive, front, rear = command
+    # A sum is finite only if all its terms are; where it overflows, the terms are looked at one by one.
+    if not (math.isfinite(t_s + drive + front + rear) or all(map(math.isfinite, (t_s, *command)))):
         raise MessageError("command is not finite", value=f"t_s={t_s}, {tuple(command)}")
     if not 0.0 <= hold_s <= MAX_HOLD_S:
         raise MessageError("command's hold is out of range", value=f"{hold_s} s", limit=f"0 to {MAX_HOLD_S:g} s")

@@ -84,7 +84,7 @@ def pack_rows(frames: Frames) -> bytes:
         frames.t_s, frames.x_m, frames.y_m, frames.heading_rad, frames.mean_error_m, frames.received_s, frames.frame,
         frames.tracked,
     )  # fmt: skip
-    if any(len(column) != count for column in columns):
+    if set(map(len, columns)) != {count}:
         raise MessageError("columns of frames differ in length", value=[len(column) for column in columns])
     if count == 1:
         return _ROW.pack(*(column[0] for column in columns))
@@ -124,8 +124,7 @@ def encode_frames(message: FramesMessage) -> bytes:
     count = message.frame_count
     if count > MAX_ROWS:
         raise MessageError("too many frames for one message", value=count, limit=f"at most {MAX_ROWS}")
-    flags, source, sequence = message.flags, message.source, message.sequence
-    header = pack_header(Kind.FRAMES, flags=flags, source=source, count=count, sequence=sequence)
+    header = pack_header(Kind.FRAMES, message.flags, message.source, count, message.sequence)
     return header + _BODY.pack(message.acknowledged, message.clock, message.now_s) + message.rows
 
 

@@ -63,7 +63,7 @@ class Header(NamedTuple):
     sequence: int
 
 
-def pack_header(kind: Kind, *, flags: int = 0, source: int = 0, count: int = 0, sequence: int = 0) -> bytes:
+def pack_header(kind: Kind, flags: int = 0, source: int = 0, count: int = 0, sequence: int = 0) -> bytes:
     """Return the header's bytes."""
     return _HEADER.pack(MAGIC, VERSION, kind, flags, source, count, sequence)
 

@@ -4,8 +4,8 @@ Round trip: a command from the runner's link to an AGV adapter, frames from a mo
 publishers and subscribers that pass the same bytes. The adapters answer at once, so that nothing but the bus is timed.
 Ours and the peer take turns in blocks; the ratio is the median of the blocks' ratios of medians.
 
-Load: 25 mocap adapters in one process, each publishing a frame when it comes (all that have come, if it falls behind), and
-one recorder with a thread for each vehicle.
+Load: 25 mocap adapters in one process, each publishing a frame when it comes (all that have come, if it falls behind),
+and one recorder with a thread for each vehicle.
 """
 
 from __future__ import annotations

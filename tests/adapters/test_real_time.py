@@ -60,6 +60,7 @@ class Silent(AgvAdapter):
     def __init__(self) -> None:
         self.applied: list[CommandMessage] = []
         self.stopped = threading.Event()
+        self.fourth_came = threading.Event()
 
     @classmethod
     def open(cls, address: str, options: AdapterOptions) -> Silent:
@@ -70,6 +71,8 @@ class Silent(AgvAdapter):
 
     def apply(self, message: CommandMessage) -> None:
         self.applied.append(message)
+        if message.sequence == 4:
+            self.fourth_came.set()
 
     def stop(self) -> None:
         self.stopped.set()
@@ -102,6 +105,7 @@ def test_lost_commands_and_nonsense_are_told_and_do_not_stop_the_host() -> None:
         for number in (1, 4):
             session.put(keys.command, encode_command(CommandMessage(number, 0.0, NEUTRAL, 10.0)))
         assert b"2 commands were lost before 4" in events.recv().payload.to_bytes()
+        assert adapter.fourth_came.wait(10.0)
         host.close()
         assert host.loss.lost == 2
         assert [message.sequence for message in adapter.applied] == [1, 4]
