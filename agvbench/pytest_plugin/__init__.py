@@ -19,7 +19,7 @@ from agvbench.pytest_plugin.collecting import (
     pytest_collection_modifyitems,
     pytest_generate_tests,
 )
-from agvbench.pytest_plugin.fixtures import agvbench_repeat, bench, drive
+from agvbench.pytest_plugin.fixtures import agvbench_repeat, bench, drive, pytest_runtestloop
 from agvbench.pytest_plugin.options import pytest_addoption, pytest_configure
 from agvbench.pytest_plugin.telling import (
     pytest_pyfunc_call,
@@ -42,5 +42,6 @@ __all__ = [
     "pytest_report_teststatus",
     "pytest_runtest_makereport",
     "pytest_runtest_protocol",
+    "pytest_runtestloop",
     "pytest_terminal_summary",
 ]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
+from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 import pytest
@@ -24,25 +25,36 @@ def agvbench_repeat(request: pytest.FixtureRequest) -> int:
     return int(request.param)
 
 
-@pytest.fixture(scope="session")
-def bench(request: pytest.FixtureRequest) -> Iterator[BenchSession]:
-    """Open the bench session: rig, campaign and models. What cannot be set up ends the session with one line."""
-    config = request.config
-    if hasattr(config, "workerinput"):
-        pytest.fail("one vehicle drives one run at a time: leave -n out", pytrace=False)
+@pytest.hookimpl(wrapper=True)
+def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, object]:
+    """Open the bench session before the first benchmark; what cannot be set up is told in one line, as bad usage."""
+    config = session.config
+    parallel = hasattr(config, "workerinput") or getattr(config.option, "dist", "no") != "no"
+    if config.option.collectonly or parallel or not any(is_bench(item) for item in session.items):
+        return (yield)
     from agvbench.running.opening import open_session
 
-    try:
-        with open_session(
-            given_options(config),
-            out=config.getoption("out"),
-            resume=bool(config.getoption("resume")),
-            dry_run=bool(config.getoption("dry_run")),
-        ) as session:
-            config.stash[SESSION] = session
-            yield session
-    except AgvbenchError as error:
-        pytest.exit(str(error), returncode=error.exit_code)
+    with ExitStack() as stack:
+        try:
+            opened = open_session(
+                given_options(config),
+                out=config.getoption("out"),
+                resume=bool(config.getoption("resume")),
+                dry_run=bool(config.getoption("dry_run")),
+            )
+            config.stash[SESSION] = stack.enter_context(opened)
+        except AgvbenchError as error:
+            raise pytest.UsageError(str(error)) from None
+        return (yield)
+
+
+@pytest.fixture(scope="session")
+def bench(request: pytest.FixtureRequest) -> BenchSession:
+    """Return the bench session: rig, campaign and models."""
+    if SESSION not in request.config.stash:
+        pytest.fail("one vehicle drives one run at a time: leave -n out", pytrace=False)
+    session: BenchSession = request.config.stash[SESSION]
+    return session
 
 
 @pytest.fixture

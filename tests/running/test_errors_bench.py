@@ -1,0 +1,107 @@
+"""Bad input to a bench session: one line each, word for word as the documents have it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from agvbench.campaign import CampaignHeader, CampaignWriter
+from agvbench.errors import AgvbenchError
+from agvbench.model import example_path
+from agvbench.running.calibrating import calibrate_campaign
+from agvbench.running.driver import Driver
+from agvbench.running.opening import open_session
+from agvbench.running.settings import BenchSettings
+from agvbench.workflows.bench import find_benchmark
+from agvbench.workflows.init import make_lab
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "errors-bench.md"
+ROWS = dict(re.findall(r"^\| (.+?) \| `(.+)` \|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE))
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "something").touch()
+
+
+def opened(out="new", *, resume=False, dry_run=False, **given):
+    def act():
+        with open_session(given, out=out, resume=resume, dry_run=dry_run):
+            pass
+
+    return act
+
+
+def resumed_with_another_seed():
+    Path("begun").mkdir()
+    BenchSettings(seed=1).save(Path("begun"))
+    opened("begun", resume=True, seed=2)()
+
+
+def over_the_bus_in_another_unit(monkeypatch):
+    """A vehicle that says of itself that it takes µs, as one in another process would."""
+    from agvbench.running import opening
+
+    real = opening.open_rig
+
+    def in_microseconds(**options):
+        return real(**options | {"command_unit": "us", "neutral": 1500.0})
+
+    monkeypatch.setattr(opening, "open_rig", in_microseconds)
+    opened(vehicle=str(example_path("front_steered")))()
+
+
+def driven(**arguments):
+    def act():
+        with open_session({}, out="new", resume=False, dry_run=True) as session:
+            driver = Driver(session, "run", experiment="free", repeat=1)
+            driver.trajectory(**arguments) if "name" in arguments else driver.hold(**arguments)
+
+    return act
+
+
+def calibrated_from_nothing():
+    header = CampaignHeader(1, "full", "agv1", 0.181, 0.121, "us", 1500.0, 120.0)
+    Path("full/something").unlink()
+    calibrate_campaign(CampaignWriter.create("full", header), maps="default")
+
+
+CASES = {
+    "`--repeats -1`": opened(repeats=-1),
+    "`--attempts 0`": opened(attempts=0),
+    "`--seed -1`": opened(seed=-1),
+    "`--order odd`": opened(order="odd"),
+    "`--maps spline`": opened(maps="spline"),
+    "`--vehicle nope.toml`": opened(vehicle="nope.toml"),
+    "`--calibration nope.toml`": opened(calibration="nope.toml"),
+    "`--plant nope.py:x`": opened(plant="nope.py:x"),
+    "`--workspace oval:3`": opened(workspace="oval:3"),
+    "`--out full` (not empty)": opened("full"),
+    "`--resume` with nothing to resume": opened(None, resume=True),
+    "`--resume --seed 2` after `--seed 1`": resumed_with_another_seed,
+    "`--vehicle` in −1…1, vehicle in µs, over the bus": over_the_bus_in_another_unit,
+    "`agvbench bench nosuch`": lambda: find_benchmark("nosuch"),
+    "`agvbench init full` (not empty)": lambda: make_lab("full"),
+    "`drive.hold(drive=2.0, …)`": driven(for_s=1.0, drive=2.0),
+    '`drive.trajectory("1", condition="blue")`': driven(name="1", condition="blue"),
+    "`trajectories` without calibration": calibrated_from_nothing,
+}
+
+
+def test_every_row_of_the_page_has_a_case():
+    assert set(ROWS) == set(CASES)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_line_is_the_documented_one(name, monkeypatch):
+    act = CASES[name]
+    with pytest.raises(AgvbenchError) as caught:
+        act(monkeypatch) if act is over_the_bus_in_another_unit else act()
+    line = str(caught.value)
+    expected = re.escape(ROWS[name]).replace("CAUSE", ".+")
+    assert re.fullmatch(expected, line), line
+    assert caught.value.exit_code == 2
