@@ -78,13 +78,12 @@ def battery_section() -> Section:
     findings = (
         (
             f"The battery costs {percent:.2f} % of speed per hour: a line through table 8.2 predicts a left-out "
-            "interval "
-            f"to {line:.1f} mm/s, a constant to {constant:.1f}."
+            f"interval to {line:.1f} mm/s, a constant to {constant:.1f}."
         ),
         (
             f"Within one drive of {TRAJECTORY_RUN_S:.0f} s that is {20.0 * percent * TRAJECTORY_RUN_S / 3600.0:.2f} "
-            "mm of 2 m, "
-            f"but {20.0 * percent:.0f} mm between drives an hour apart: harmless only if conditions are interleaved."
+            f"mm of 2 m, but {20.0 * percent:.0f} mm between drives an hour apart: harmless only if conditions are "
+            "interleaved."
         ),
     )
     return Section(

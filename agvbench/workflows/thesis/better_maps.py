@@ -109,9 +109,8 @@ def maps_section() -> Section:
         + " and ".join(f"{printed[a]:.2f}°" for a in AXLES)
         + ".",
         (
-            f"Table 7.4: a dead band with saturation predicts a left-out pulse to {band:.1f} mm/s, the thesis' "
-            "cubic to "
-            f"{cubic:.1f}, the measured curve itself, interpolated, to {table:.1f}."
+            f"Table 7.4: a dead band with saturation predicts a left-out pulse to {band:.1f} mm/s, the thesis' cubic "
+            f"to {cubic:.1f}, the measured curve itself, interpolated, to {table:.1f}."
         ),
     )
     tables = (

@@ -161,6 +161,15 @@ def _would_differ() -> float:
     return expected_differing(predicted, REPEAT_NOISE_MPS)
 
 
+def _asymmetry() -> str:
+    """Return each servo's stops and the pulse at which it is straight, in words."""
+    words = []
+    for axle, servo in zip(("front", "rear"), true_maps("end_stops"), strict=True):
+        low, high = np.degrees(servo.output_range)
+        words.append(f"{axle} {low:.1f}° … {high:.1f}°, straight at {float(servo.inverse(0.0)):.0f} µs")
+    return "; ".join(words)
+
+
 def cornering_section() -> Section:
     """Return what appendix B holds, and the loss fitted to it."""
     count, blocks, rows = count_mirrored(), identical_blocks(), _form_rows()
@@ -168,26 +177,19 @@ def cornering_section() -> Section:
     findings = (
         (
             f"{count.identical} of {count.pairs} mirrored pairs print the same speed ({count.at_rest} of them at "
-            "rest); "
-            f"the other is {'; '.join(count.differing)}. The servos are not symmetric (±40.2/42.1°, zero at 1488 "
-            "and 1474 µs): "
+            f"rest); the other is {'; '.join(count.differing)}. The servos are not symmetric ({_asymmetry()}): "
             f"driven twice, about {_would_differ():.0f} pairs would differ in print. The halves were mirrored or "
-            "averaged: "
-            "they count, and are split, as one."
+            "averaged: they count, and are split, as one."
         ),
         (
             f"The straight column is the same in all three modes for {straight_speeds_repeated()} of 16 drive "
-            "pulses, and the "
-            f"blocks {', '.join(f'{a:.0f} and {b:.0f} µs' for a, b in blocks)} are equal in all 21 cells: 336 "
-            "printed medians "
-            "are at most 160 different measurements."
+            f"pulses, and the blocks {', '.join(f'{a:.0f} and {b:.0f} µs' for a, b in blocks)} are equal in all 21 "
+            "cells: 336 printed medians are at most 160 different measurements."
         ),
         (
             f"Eq. 5.6 misses appendix B by {rows[0][3]:.1f} mm/s rms; a loss of {fitted_loss():.4f} per |tan δf| + "
-            "|tan δr| "
-            f"leaves {rows[1][3]:.1f} held out (the printed step of 10 mm/s alone gives 2.9). Forms in curvature do "
-            "worse: crab, "
-            "which does not turn, loses speed too."
+            f"|tan δr| leaves {rows[1][3]:.1f} held out (the printed step of 10 mm/s alone gives 2.9). Forms in "
+            "curvature do worse: crab, which does not turn, loses speed too."
         ),
     )
     figures = [

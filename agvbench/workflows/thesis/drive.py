@@ -94,11 +94,13 @@ def drive_section() -> Section:
         "All four R² of table 7.5 come back from table 7.4; 'partial' is 1200…1850 µs, 14 points.",
         (
             f"Eq. 7.3 cannot be used as printed: its rounding leaves v(1500 µs) = {printed_cubic(1500.0):.2f} m/s. "
-            "The coefficient of pw, printed 0.024, must be 0.0243017 (one unit of its last digit moves v by 1.5 m/s)."
+            f"The coefficient of pw, printed 0.024, must be {refit_drive(3, PARTIAL_US).coefficients[2]:.7f} (one "
+            "unit of its last digit moves v by 1.5 m/s)."
         ),
         "About half speed the cubic is low: "
         + ", ".join(f"{e:+.1f} % at {p:.0f} µs" for p, e in errors.items())
-        + "; at 1450 and 1550 µs, where the vehicle all but stands, it says 0.087 and −0.050 m/s.",
+        + f"; at 1550 µs, where the vehicle all but stands ({table_speed(1550.0):.3f} m/s), it says "
+        + f"{float(refit_drive(3, PARTIAL_US)(1550.0)):.3f}.",
     )
     columns = ("pulse [µs]", "table 7.4 [m/s]", "refitted cubic [m/s]", "eq. 7.3 as printed [m/s]")
     tables = (

@@ -7,9 +7,12 @@ import math
 import numpy as np
 
 from agvbench.vehicle.kinematics import body_motion
+from agvbench.workflows.thesis.battery import ENDURANCE_S
 from agvbench.workflows.thesis.drive import half_speed_errors, printed_cubic
 from agvbench.workflows.thesis.layout import Cell, Section, Table
+from agvbench.workflows.thesis.lever_arm import common_lever_arm
 from agvbench.workflows.thesis.mirror import count_mirrored
+from agvbench.workflows.thesis.polynomial import fit_polynomial
 from agvbench.workflows.thesis.published import Figure, figures_table
 from agvbench.workflows.thesis.ramps import ACCELERATION_MPS2, BRAKING_MPS2, driven_distance
 from agvbench.workflows.thesis.scoring import CONDITIONS
@@ -21,6 +24,7 @@ from agvbench.workflows.thesis.tables import (
     end_pose_rows,
     endurance_table,
     idle_axle_table,
+    steering_table,
     verification_table,
 )
 
@@ -96,10 +100,15 @@ def _fits() -> list[tuple[str, str, str, str]]:
         (
             "7.3",
             "too few points for a cubic",
-            "11 points suffice; the front cubic reaches R² 0.9997",
+            f"11 points suffice; the front cubic reaches R² {_front_cubic():.4f}",
             "end stops, not a cubic",
         ),
     ]
+
+
+def _front_cubic() -> float:
+    table = steering_table("front")
+    return fit_polynomial(table.pulse_us[1:-1], table.median_deg[1:-1], 3).r_squared
 
 
 def _measurements() -> list[tuple[str, str, str, str]]:
@@ -107,6 +116,7 @@ def _measurements() -> list[tuple[str, str, str, str]]:
     rear = idle_axle_table("rear").median_deg
     pulse, front, _ = verification_table()
     slope = float(np.polyfit(pulse, front, 1)[0])
+    later, neutral = refit_line("front", 2), steering_table("front").median_deg[6]
     single = cornering_table().speed_mps["single"][list(cornering_table().drive_us).index(1700.0)]
     net = 1000.0 * (driven_distance(_FULL_SPEED_MPS, 6.25, "accelerate_and_brake") - 2.0)
     return [
@@ -114,12 +124,15 @@ def _measurements() -> list[tuple[str, str, str, str]]:
             "table 7.1",
             "rear axle at 1500 µs",
             f"drifts {rear.min():.2f}° … {rear.max():.2f}° with the front",
-            "a lever arm of 4 mm",
+            f"a lever arm of {1e3 * abs(common_lever_arm()[0]):.0f} mm",
         ),
         (
             "table 6.1",
             "the same servos",
-            f"front {slope:.4f} °/µs and +1.87° at 1500 µs; table 7.1 has −0.0861 and −1.59°",
+            (
+                f"front {slope:.4f} °/µs and {front[3]:+.2f}° at 1500 µs; table 7.1 has "
+                f"{later.coefficients[0]:.4f} and {neutral:+.2f}°"
+            ),
             "not one calibration",
         ),
         ("appendix B", f"{count.pairs} mirrored pairs", f"{count.identical} are identical", "count pairs once"),
@@ -127,8 +140,8 @@ def _measurements() -> list[tuple[str, str, str, str]]:
             "appendix B",
             "1700 µs, single",
             (
-                f"{single[1]:.2f} at 1100, {single[2]:.2f} at 1300, {single[3]:.2f} at 1500 µs: not monotone, in both "
-                "halves"
+                f"{single[1]:.2f} at 1100, {single[2]:.2f} at 1300, {single[3]:.2f} at 1500 µs: not monotone, in "
+                "both halves"
             ),
             "0.23 was meant?",
         ),
@@ -141,7 +154,7 @@ def _measurements() -> list[tuple[str, str, str, str]]:
         (
             "table 8.2",
             "11 intervals 3000 s apart",
-            f"the last would start at {endurance_table()[0][-1]:.0f} s of 29 877",
+            f"the last would start at {endurance_table()[0][-1]:.0f} s of {ENDURANCE_S:.0f}",
             "about 2985 s",
         ),
         ("6.3", "HS-700BB: 900–1200 µs", "every table commands 900…2100 µs", "900–2100 µs"),
@@ -194,8 +207,7 @@ def errata_section() -> Section:
         ),
         (
             "Two change results: the signs and speeds of eq. 5.6 and 5.8 (the thesis' own code has them right), and "
-            "the fits of "
-            "eq. 7.1 to 7.3."
+            "the fits of eq. 7.1 to 7.3."
         ),
     )
     return Section("errata", "Errata", findings, tables)

@@ -82,15 +82,13 @@ def lever_arm_section() -> Section:
     findings = (
         (
             f"One lever arm explains the drift of both tables: {rows[0][2]:.1f} ± {rows[0][3]:.1f} mm from the rear "
-            "axle of "
-            f"table 7.1 and {rows[1][2]:.1f} ± {rows[1][3]:.1f} mm from the front axle of table 7.2, "
+            f"axle of table 7.1 and {rows[1][2]:.1f} ± {rows[1][3]:.1f} mm from the front axle of table 7.2, "
             f"{1e3 * arm:.1f} ± {1e3 * error:.1f} mm together. Coupling needs two shares of opposite sign "
             f"({rows[0][5]:+.4f} and {rows[1][5]:+.4f}) and fits as well: the lever arm is the simpler of the two."
         ),
         (
-            f"A negative arm means: the markers' centroid lies {-1e3 * arm:.1f} mm further back than table 5.1 "
-            "says. Both axles "
-            "shift alike, so the yaw rate does not change, and chapter 8 is not affected."
+            f"A negative arm means: the markers' centroid lies {-1e3 * arm:.1f} mm further back than table 5.1 says. "
+            "Both axles shift alike, so the yaw rate does not change, and chapter 8 is not affected."
         ),
     )
     values: dict[str, Cell] = {"lever_arm_m": arm, "lever_arm_stderr_m": error}

@@ -43,8 +43,9 @@ def _rows_table(rows: list[ScoredRow]) -> Table:
         "Tables 8.3–8.10: measured medians, predicted, and the null",
         columns,
         tuple(_cells(row) for row in rows),
-        "Predictions carry their sign, measured Δs and straight Δδ are printed without: 'error' compares magnitudes, "
-        "'other sign' is the error if the vehicle went the other way. The heading of a turn is the amount turned.",
+        "Predictions carry their sign, measured Δs and straight Δδ are printed without: 'error' compares "
+        "magnitudes, 'other sign' is the error if the vehicle went the other way. The heading of a turn is the "
+        "amount turned.",
         (
             "no.",
             "condition",
@@ -100,21 +101,19 @@ def _findings(rows: list[ScoredRow]) -> tuple[str, ...]:
     lost = sum(other[g] > null[g] for g in unsigned)
     return (
         (
-            "Nothing here is fitted to chapter 8: maps from tables 7.1, 7.2 and 7.4, loss from appendix B, "
-            "commands as 7.3 says."
+            "Nothing here is fitted to chapter 8: maps from tables 7.1, 7.2 and 7.4, loss from appendix B, commands "
+            "as 7.3 says."
         ),
         (
             f"Closer than 'it hits the target' on {closer} of {len(rows)} rows, inside the measured quartiles on "
-            f"{inside}. "
-            f"Over the eight groups the median error is {score_against_null(rows):.2f} of the null's (geometric mean): "
-            f"{_in_words(score_against_null(rows))} than no model."
+            f"{inside}. Over the eight groups the median error is {score_against_null(rows):.2f} of the null's "
+            f"(geometric mean): {_in_words(score_against_null(rows))} than no model."
         ),
         f"The prediction is closer on: {_list(by_verdict['prediction'])}.",
         f"The null is closer on: {_list(by_verdict['null'])}. Even (within 10 %): {_list(by_verdict['even'])}.",
         (
             "That grants the prediction the sign of every unsigned row. Had the vehicle gone the other way, the "
-            "null would "
-            f"be closer on {lost} of those {len(unsigned)} groups."
+            f"null would be closer on {lost} of those {len(unsigned)} groups."
         ),
         *_by_cause(rows),
     )
@@ -138,9 +137,8 @@ def _by_cause(rows: list[ScoredRow]) -> tuple[str, ...]:
             f"{_numbers(measured, straight)}°): saturated points tilt eq. 7.1 and 7.2, so 'straight ahead' is not."
         ),
         (
-            "Contradicted: timed by its cubic, the half speed drives 3 and 4 would miss by "
-            f"{_numbers(amount, half)} mm; "
-            f"they missed by {_numbers(measured, half)}. The thesis timed them otherwise, or something cancels."
+            f"Contradicted: timed by its cubic, the half speed drives 3 and 4 would miss by {_numbers(amount, half)} "
+            f"mm; they missed by {_numbers(measured, half)}. The thesis timed them otherwise, or something cancels."
         ),
         (
             f"Unexplained: the uncalibrated backward turns turned {_numbers(measured, back)}° where the tables say "

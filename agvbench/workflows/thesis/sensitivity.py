@@ -153,8 +153,8 @@ def _post_hoc_table() -> Table:
     columns: tuple[str, ...] = ("chosen on", "chosen (where not as assumed)", "as assumed there", "chosen there")
     columns += ("checked on", "as assumed, checked", "chosen, checked")
     note = (
-        "Error / null, geometric mean over groups; below 1 beats the null. "
-        "What concerns one condition only is not carried over."
+        "Error / null, geometric mean over groups; below 1 beats the null. What concerns one condition only is not "
+        "carried over."
     )
     return Table(
         "sensitivity_post_hoc",
@@ -174,8 +174,8 @@ def _differences(assumed: Assumptions) -> str:
 def _findings(post_hoc: Table, missed: list[str]) -> tuple[str, ...]:
     every = {c: [x.against_null for x in combinations(c)] for c in CONDITIONS}
     counts = " and ".join(
-        f"{sum(x < 1.0 for x in scores)} of {len(scores)} beat the null on the {c} rows "
-        f"(median {median(scores):.2f} of it)"
+        f"{sum(x < 1.0 for x in scores)} of {len(scores)} beat the null on the {c} rows (median {median(scores):.2f} "
+        "of it)"
         for c, scores in every.items()
     )
     checked = "; ".join(
@@ -201,8 +201,8 @@ def _about_ramps() -> str:
     )
     measured = " and ".join(f"{r.measured.median:.1f}" for r in rows["none"])
     return (
-        f"Ramps after 8.1 are not seen where they should be: calibrated drives 1 and 2 miss by {measured} mm; "
-        f"ramps {shown}."
+        f"Ramps after 8.1 are not seen where they should be: calibrated drives 1 and 2 miss by {measured} mm; ramps "
+        f"{shown}."
     )
 
 

@@ -112,16 +112,14 @@ def steering_section() -> Section:
     findings = (
         (
             "Eq. 7.1, 7.2 and their R² come back to every printed digit from the medians with one point dropped at "
-            "each "
-            "end."
+            "each end."
         ),
         "That leaves saturated points (1000 and 2000 µs) in the fit and flattens the lines. Two dropped give "
         + ", ".join(f"{a} {two[a].coefficients[0]:.4f} deg/µs (R² {two[a].r_squared:.4f})" for a in AXLES)
         + f": the printed slopes are {_percent(two, 'front'):.1f} % and {_percent(two, 'rear'):.1f} % too small.",
         (
             f"Asked for straight ahead, the printed lines leave the front axle at {errors['front']:+.2f}° and the "
-            "rear at "
-            f"{errors['rear']:+.2f}°: the calibrated vehicle does not drive straight."
+            f"rear at {errors['rear']:+.2f}°: the calibrated vehicle does not drive straight."
         ),
     )
     tables = (

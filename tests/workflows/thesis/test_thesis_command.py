@@ -61,6 +61,15 @@ def test_the_same_bytes_in_another_process(tmp_path):
     assert texts[0] == texts[1]
 
 
+def test_findings_are_filled_in_and_end():
+    for section in thesis_sections():
+        assert section.findings
+        for finding in section.findings:
+            assert "{" not in finding
+            assert finding.endswith(".")
+            assert "nan" not in finding
+
+
 def test_sections_come_in_reading_order():
     assert [s.name for s in thesis_sections(["battery", "steering"])] == ["steering", "battery"]
     assert "sections: " + ", ".join(section_names()) in thesis.__doc__
