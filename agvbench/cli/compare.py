@@ -30,16 +30,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fail-on", choices=("regression", "any", "never"), default="regression", help="when to exit with 1"
     )
-    parser.add_argument("--margin-mm", metavar="MM", type=float, help="noise band of distances (default: 2)")
-    parser.add_argument("--margin-deg", metavar="DEG", type=float, help="noise band of headings (default: 0.2)")
+    parser.add_argument("--margin-mm", metavar="MM", type=float, help="noise band of distances (default: 5)")
+    parser.add_argument("--margin-deg", metavar="DEG", type=float, help="noise band of headings (default: 1)")
     parser.add_argument("--json", metavar="F", type=Path, help="write the comparison as JSON, too")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Compare, print the comparison, and return its exit code."""
-    from rich.console import Console
-
-    from agvbench.reporting.console import print_comparison
+    from agvbench.reporting.console import print_comparison, wide_console
     from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
     from agvbench.workflows.compare import compare_campaigns, exit_code, write_json
 
@@ -52,5 +50,5 @@ def run(arguments: argparse.Namespace) -> int:
     )
     if arguments.json:
         write_json(comparison, arguments.json)
-    print_comparison(Console(), comparison)
+    print_comparison(wide_console(), comparison)
     return exit_code(comparison, arguments.fail_on)

@@ -21,17 +21,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``agvbench report``."""
     parser.add_argument("campaign", metavar="DIR", type=Path, help="campaign directory")
     parser.add_argument("--out", metavar="DIR", type=Path, help="where to write (default: report/ in the campaign)")
-    parser.add_argument("--margin-mm", metavar="MM", type=float, help="noise band of distances (default: 2)")
-    parser.add_argument("--margin-deg", metavar="DEG", type=float, help="noise band of headings (default: 0.2)")
+    parser.add_argument("--margin-mm", metavar="MM", type=float, help="noise band of distances (default: 5)")
+    parser.add_argument("--margin-deg", metavar="DEG", type=float, help="noise band of headings (default: 1)")
     parser.add_argument("--no-recording", action="store_true", help="leave out campaign.rrd")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the report and print its summary."""
-    from rich.console import Console
-
     from agvbench.reporting import write_report
-    from agvbench.reporting.console import print_report
+    from agvbench.reporting.console import print_report, wide_console
     from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
 
     report = write_report(
@@ -41,5 +39,5 @@ def run(arguments: argparse.Namespace) -> int:
         margin_deg=MARGIN_DEG if arguments.margin_deg is None else arguments.margin_deg,
         recording=not arguments.no_recording,
     )
-    print_report(Console(), report)
+    print_report(wide_console(), report)
     return 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from agvbench.reporting.content import Column, Paragraph, Table, Value, plain
+from agvbench.statistics.comparison import ALL
 from agvbench.statistics.words import headline
 
 if TYPE_CHECKING:
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from agvbench.workflows.report import ReportData
 
 _VERDICT_STYLES = {"better": "green", "worse": "bold red", "same": "cyan", "cannot": "dim"}
-_LONGEST_HEADING = 14
+_LONGEST_HEADING, _NARROWEST = 14, 110
 
 
 def console_table(table: Table) -> RenderableType:
@@ -33,12 +34,19 @@ def console_table(table: Table) -> RenderableType:
     return shown
 
 
+def wide_console() -> Console:
+    """Return standard output, at least 110 columns wide where nobody's terminal says otherwise."""
+    from rich.console import Console
+
+    console = Console()
+    return console if console.is_terminal else Console(width=max(_NARROWEST, console.width))
+
+
 def comparison_summary(comparison: Comparison) -> RenderableType:
     """Return a comparison as a table that fits a console: medians, difference with its interval, verdict."""
     heading_a, heading_b = _headings(comparison)
     columns = [
         Column("trajectory", "trajectory"),
-        Column("condition", "condition"),
         Column("quantity", "error"),
         Column("median_a", heading_a, 2),
         Column("median_b", heading_b, 2),
@@ -46,9 +54,8 @@ def comparison_summary(comparison: Comparison) -> RenderableType:
         Column("interval", "95 % interval"),
         Column("verdict", "verdict"),
     ]
-    rows = [_console_row(d, columns[5]) for d in comparison.differences]
-    if len({d.condition for d in comparison.differences} - {"all"}) == 1:
-        columns, rows = columns[:1] + columns[2:], [row[:1] + row[2:] for row in rows]
+    several = len({d.condition for d in comparison.differences if d.trajectory != ALL}) > 1
+    rows = [_console_row(d, columns[4], several=several) for d in comparison.differences]
     caption = f"{heading_b} against {heading_a} (medians; smaller is better)"
     return console_table(Table("comparison", caption, columns, rows))
 
@@ -58,10 +65,11 @@ def _headings(comparison: Comparison) -> tuple[str, str]:
     return names if max(map(len, names)) <= _LONGEST_HEADING else ("A", "B")
 
 
-def _console_row(d: Difference, difference: Column) -> list[Value]:
+def _console_row(d: Difference, difference: Column, *, several: bool) -> list[Value]:
+    name = f"{d.trajectory} {d.condition}" if several and d.trajectory != ALL else d.trajectory
     error = f"|{d.quantity.symbol}| {d.quantity.unit}"
     medians = d.a.median, d.b.median, d.interval.estimate
-    return [d.trajectory, d.condition, error, *medians, _interval(d, difference), str(d.verdict)]
+    return [name, error, *medians, _interval(d, difference), str(d.verdict)]
 
 
 def _interval(d: Difference, column: Column) -> str:

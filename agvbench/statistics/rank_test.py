@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from functools import lru_cache, reduce
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agvbench.types import Floats
 
@@ -85,19 +86,15 @@ class _Stratum:
         self.twice_u = int(twice_ranks[len(a) :].sum()) - self.n_b * (self.n_b + 1)
         self.sorted_ranks = tuple(np.sort(twice_ranks).tolist())
 
-    def distribution(self) -> Floats:
-        return _distribution(self.sorted_ranks, self.n_b)
-
     def variance(self) -> float:
         # Of twice U under permutation: sampling n_b of the ranks without replacement.
         return self.pairs * float(np.var(self.sorted_ranks)) / (self.size - 1)
 
 
-def _twice_ranks(values: Floats) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+def _twice_ranks(values: Floats) -> NDArray[np.int64]:
     """Return twice the mid-ranks, which are integers."""
-    _, inverse, counts = np.unique(values, return_inverse=True, return_counts=True)
-    last = np.cumsum(counts)
-    return np.asarray((2 * last - counts + 1)[inverse], dtype=np.int64)
+    ordered = np.sort(values)
+    return np.searchsorted(ordered, values, "left") + np.searchsorted(ordered, values, "right") + 1
 
 
 @lru_cache(maxsize=256)
@@ -116,11 +113,17 @@ def _distribution(sorted_twice_ranks: tuple[int, ...], n_b: int) -> Floats:
 
 
 def _exact(strata: Sequence[_Stratum], statistic: int, highest: int) -> tuple[float, float, float]:
-    probability = reduce(np.convolve, (stratum.distribution() for stratum in strata))
-    upper, lower = np.cumsum(probability[::-1])[::-1], np.cumsum(probability)
+    upper, lower, least = _tails(tuple((stratum.sorted_ranks, stratum.n_b) for stratum in strata))
+    return min(1.0, float(upper[statistic])), min(1.0, float(lower[min(statistic, highest)])), least
+
+
+@lru_cache(maxsize=256)
+def _tails(strata: tuple[tuple[tuple[int, ...], int], ...]) -> tuple[Floats, Floats, float]:
+    """Return P(statistic ≥ k) and P(statistic ≤ k) for every k, and the smaller of the probabilities at the ends."""
+    probability = reduce(np.convolve, (_distribution(*stratum) for stratum in strata))
     reached = np.flatnonzero(probability > 0.0)
     least = float(min(probability[reached[0]], probability[reached[-1]]))
-    return min(1.0, float(upper[statistic])), min(1.0, float(lower[min(statistic, highest)])), least
+    return np.cumsum(probability[::-1])[::-1], np.cumsum(probability), least
 
 
 def _normal(strata: Sequence[_Stratum], statistic: int, highest: int) -> tuple[float, float, float]:

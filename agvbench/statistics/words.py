@@ -25,7 +25,7 @@ def headline(comparison: Comparison) -> str:
     worse, better = len(comparison.of(Verdict.WORSE)), len(comparison.of(Verdict.BETTER))
     same, unknown = len(comparison.of(Verdict.SAME)), len(comparison.of(Verdict.UNKNOWN))
     if not comparison.could_compare:
-        return f"Could not compare: {describe(comparison.differences[0], comparison)}."
+        return f"Could not compare: {describe(comparison.of(Verdict.UNKNOWN)[0], comparison)}."
     counts = [f"{worse} worse", f"{better} better", f"{same} the same within the margin", f"{unknown} undecided"]
     answer = "Regression" if worse else "No regression shown"
     return f"{answer}: of {len(comparison.differences)} comparisons {', '.join(counts)}."

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 from agvbench.campaign import Campaign
-from agvbench.errors import FileError, FlagError
+from agvbench.errors import AgvbenchError, FileError, FlagError
 from agvbench.statistics import Comparison, Verdict, compare, pose_errors
 from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
 from agvbench.statistics.comparison_json import comparison_to_json
@@ -38,7 +39,7 @@ def compare_campaigns(
         )
     errors_a = pose_errors(Campaign.open(a))
     errors_b = errors_a if b is None else pose_errors(Campaign.open(b))
-    return compare(
+    comparison = compare(
         errors_a,
         errors_b,
         margin_mm=margin_mm,
@@ -47,6 +48,8 @@ def compare_campaigns(
         same_campaign=b is None,
         names=_names(Path(a), None if b is None else Path(b), conditions),
     )
+    notes = comparison.notes if b is None else (*comparison.notes, *_calibration_note(Path(a), Path(b), comparison))
+    return replace(comparison, notes=notes)
 
 
 def exit_code(comparison: Comparison, fail_on: str) -> int:
@@ -70,6 +73,29 @@ def write_json(comparison: Comparison, path: str | Path) -> None:
         Path(path).write_text(f"{text}\n", encoding="utf-8")
     except OSError as error:
         raise FileError(f"cannot be written ({error.strerror})", where=path, remedy="choose another file") from None
+
+
+def _calibration_note(a: Path, b: Path, comparison: Comparison) -> tuple[str, ...]:
+    """Return a warning where both sides were calibrated, each for itself."""
+    hashes = [_calibration_hash(side) for side in (a, b)]
+    uncalibrated = all(d.condition in {"uncalibrated", "all"} for d in comparison.differences)
+    if not all(hashes) or hashes[0] == hashes[1] or uncalibrated:
+        return ()
+    said = (
+        f"The sides were calibrated separately ({hashes[0]} and {hashes[1]}): what one calibration measured better or "
+        "worse than the other is part of every difference but the uncalibrated ones. To compare firmware or vehicles "
+        "alone, drive both with one calibration (bench --calibration FILE)."
+    )
+    return (said,)
+
+
+def _calibration_hash(campaign: Path) -> str:
+    from agvbench.model import VehicleModel
+
+    try:
+        return VehicleModel.load(campaign / "vehicle.toml").calibration_hash
+    except AgvbenchError:
+        return ""
 
 
 def _names(a: Path, b: Path | None, conditions: tuple[str, str] | None) -> tuple[str, str]:

@@ -93,3 +93,13 @@ def test_too_few_repeats_are_exit_code_2_and_said(tmp_path, capsys):
     code, out, _ = run(capsys, "compare", a, b)
     assert code == 2
     assert "Could not compare: 2 repeats cannot show any difference here, however large; 5 of each could." in out
+
+
+def test_separate_calibrations_are_said(tmp_path, capsys):
+    make = {"repeats": 8, "rate_hz": 30.0, "trajectories": ("1_forward",), "conditions": ("calibrated",)}
+    a, b = (make_campaign(tmp_path / name, seed=seed, **make) for seed, name in enumerate("ab"))
+    warning = "The sides were calibrated separately"
+    assert warning not in run(capsys, "compare", a, b)[1]
+    text = (b / "vehicle.toml").read_text(encoding="utf-8")
+    (b / "vehicle.toml").write_text(text.replace("neutral = 1500.0", "neutral = 1510.0"), encoding="utf-8")
+    assert warning in run(capsys, "compare", a, b)[1]

@@ -36,24 +36,26 @@ def find(comparison, trajectory, quantity="delta_s_mm", condition=None):
     )
 
 
-@pytest.mark.parametrize(
-    ("noise", "repeats"),
-    [
-        (heavy_tailed, 5),
-        (heavy_tailed, 10),
-        pytest.param(normal, 5, marks=pytest.mark.slow),
-        pytest.param(normal, 10, marks=pytest.mark.slow),
-        pytest.param(with_outliers, 10, marks=pytest.mark.slow),
-    ],
-)
-def test_two_campaigns_of_the_same_vehicle_report_a_regression_in_at_most_two_percent(noise, repeats):
-    draw = noise(np.random.default_rng(20 + repeats))
-    bias = {(t, c): (12.0, 1.0) for t in TARGETS for c in ("uncalibrated", "calibrated")}
-    alarms = 0
-    for _ in range(PAIRS):
-        a, b = (error_table(draw, repeats=repeats, shift=bias) for _ in range(2))
-        alarms += compare(a, b, margin_mm=0.0, margin_deg=0.0, resamples=2).is_regression
-    assert alarms <= 0.02 * PAIRS
+def alarms(draw, repeats, conditions):
+    """Count the regressions that pairs of campaigns of one vehicle report."""
+    bias = {(t, c): (12.0, 1.0) for t in TARGETS for c in conditions}
+    make = {"repeats": repeats, "conditions": conditions, "shift": bias}
+    pairs = ((error_table(draw, **make), error_table(draw, **make)) for _ in range(PAIRS))
+    return sum(compare(a, b, margin_mm=0.0, margin_deg=0.0, resamples=2).is_regression for a, b in pairs)
+
+
+@pytest.mark.parametrize("repeats", [5, 10])
+def test_two_campaigns_of_the_same_vehicle_report_a_regression_in_at_most_two_percent(repeats):
+    draw = heavy_tailed(np.random.default_rng(20 + repeats))
+    assert alarms(draw, repeats, ("calibrated",)) <= 0.02 * PAIRS
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("repeats", [5, 10])
+@pytest.mark.parametrize("noise", [normal, heavy_tailed, with_outliers])
+def test_so_do_two_campaigns_under_two_conditions_each(noise, repeats):
+    draw = noise(np.random.default_rng(50 + repeats))
+    assert alarms(draw, repeats, ("uncalibrated", "calibrated")) <= 0.02 * PAIRS
 
 
 @pytest.mark.parametrize(("noise", "least"), [(normal, 0.9), pytest.param(heavy_tailed, 0.85, marks=pytest.mark.slow)])
@@ -62,12 +64,12 @@ def test_a_shift_of_three_sd_in_one_of_twenty_eight_comparisons_is_found(noise, 
     base = {(t, c): (20.0, 2.0) for t in TARGETS for c in ("uncalibrated", "calibrated")}
     worse = base | {("6_forward_right", "calibrated"): (35.0, 2.0)}
     found = 0
-    for _ in range(PAIRS // 2):
+    for _ in range(PAIRS // 4):
         comparison = compare(
             error_table(draw, repeats=10, shift=base), error_table(draw, repeats=10, shift=worse), resamples=2
         )
         found += find(comparison, "6_forward_right", condition="calibrated").verdict is Verdict.WORSE
-    assert found >= least * PAIRS / 2
+    assert found >= least * PAIRS / 4
 
 
 @pytest.mark.parametrize("repeats", [5, 10])
@@ -142,6 +144,7 @@ def test_a_small_change_everywhere_shows_in_all_trajectories_together():
     comparison = compare(
         error_table(normal(rng), repeats=10, conditions=conditions, shift=base),
         error_table(normal(rng), repeats=10, conditions=conditions, shift=worse),
+        margin_mm=2.0,
     )
     assert find(comparison, ALL).verdict is Verdict.WORSE
 

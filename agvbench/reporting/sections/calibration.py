@@ -18,8 +18,8 @@ _COLUMNS = (
     Column("points", "points", 0),
     Column("left_out", "left out", 0),
     Column("unit", "unit"),
-    Column("residual_sd", "residual sd", 3),
-    Column("largest_residual", "largest", 3),
+    Column("residual_sd", "residual sd", 4),
+    Column("largest_residual", "largest", 4),
 )
 _CAPTION = (
     "Measured points with their standard errors and the fitted map; below, what the map leaves. "

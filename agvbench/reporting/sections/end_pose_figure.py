@@ -11,6 +11,7 @@ from agvbench.reporting.conditions import condition_numbers
 from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph, plain
 from agvbench.reporting.figures.end_pose import draw_end_poses
 from agvbench.reporting.sections.base import Section
+from agvbench.reporting.titles import panel_title
 from agvbench.statistics import valid
 from agvbench.types import Floats, Pose
 from agvbench.workflows.report import ReportData
@@ -44,7 +45,8 @@ def _panels(counted: pd.DataFrame, numbers: dict[str, int]) -> Iterator[Panel]:
         rows = counted[counted["trajectory"] == name]
         ends = {n: _in_target_frame(rows[rows["condition"] == c]) for c, n in numbers.items()}
         drawn = {n: points for n, points in ends.items() if len(points)}
-        yield Panel(plain(name), draw_end_poses(drawn, f"end-pose-{index}"))
+        target = Pose(*rows[[f"target_{axis}" for axis in _POSE]].iloc[0])
+        yield Panel(panel_title(str(name), target), draw_end_poses(drawn, f"end-pose-{index}"))
 
 
 def _in_target_frame(rows: pd.DataFrame) -> Floats:

@@ -11,12 +11,13 @@ from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph, pla
 from agvbench.reporting.figures.floor import draw_paths
 from agvbench.reporting.figures.paths import drawn_path
 from agvbench.reporting.sections.base import Section
+from agvbench.reporting.titles import panel_title
 from agvbench.statistics.end_poses import in_order
 from agvbench.types import Floats, Run
 from agvbench.workflows.report import ReportData
 
 _MOST_PER_PANEL = 60
-_OVER_FLOOR = "All runs that count, where they were driven."
+_OVER_FLOOR = "All runs that count, where they were driven; those without a target calibrate, or drive freely."
 _FROM_START = (
     "Runs with a target, moved to a common start (hollow); the arrow is the target and its heading. "
     f"At most {_MOST_PER_PANEL} runs per trajectory and condition are drawn."
@@ -39,9 +40,14 @@ class Trajectories(Section):
             return [Paragraph("No run that counts has frames to draw.")]
         numbers = condition_numbers(in_order(pd.Series([run.condition for run in runs])))
         legend = [(plain(condition), number) for condition, number in numbers.items()]
-        over = draw_paths(_by_condition(runs, paths, numbers), "floor", size_in=6.4)
-        floor = FigureBlock("floor", _OVER_FLOOR, [Panel("Floor", over)], legend, wide=True)
-        panels = list(_panels([run for run in runs if run.target.is_finite], paths, numbers))
+        aimed, free = ([run for run in runs if run.target.is_finite is whether] for whether in (True, False))
+        over = [
+            Panel(title, draw_paths(_by_condition(group, paths, numbers), title, size_in=5.6))
+            for title, group in (("Runs with a target", aimed), ("Runs without a target", free))
+            if group
+        ]
+        floor = FigureBlock("floor", _OVER_FLOOR, over, legend, wide=True)
+        panels = list(_panels(aimed, paths, numbers))
         return [floor, FigureBlock("trajectories", _FROM_START, panels, legend)] if panels else [floor]
 
 
@@ -52,7 +58,7 @@ def _panels(runs: Sequence[Run], paths: dict[str, Floats], numbers: dict[str, in
         svg = draw_paths(
             _by_condition(chosen, moved, numbers), f"trajectory-{index}", target=chosen[0].target, size_in=3.1
         )
-        yield Panel(plain(name), svg)
+        yield Panel(panel_title(name, chosen[0].target), svg)
 
 
 def _by_condition(runs: Sequence[Run], paths: dict[str, Floats], numbers: dict[str, int]) -> dict[int, list[Floats]]:
