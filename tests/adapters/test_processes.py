@@ -106,9 +106,8 @@ def test_a_vehicle_without_a_camera_says_so(endpoint: str) -> None:
             assert len(drive_run(link, "a")) > 0
 
 
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
-def test_signals_end_a_process_cleanly(how: signal.Signals, endpoint: str) -> None:
+def test_ctrl_c_ends_a_process_cleanly_as_sigterm_does_everywhere_else_here(endpoint: str) -> None:
     with process("sim", "--plant", TINY, "--listen", endpoint) as child:
-        child.send_signal(how)
+        child.send_signal(signal.SIGINT)
         assert child.communicate(timeout=20) == ("stopped\n", "")
         assert child.returncode == 0
