@@ -99,7 +99,7 @@ def print_report(console: Console, report: WrittenReport) -> None:
 
     for comparison in report.data.comparisons:
         console.print(comparison_summary(comparison))
-    if not report.data.comparisons:
+    if not report.data.comparisons and len(report.data.end_poses):
         console.print(end_pose_summary(report.data))
     for block in report.sections[0].blocks:
         if isinstance(block, Paragraph):

@@ -158,3 +158,12 @@ def test_recording_holds_every_run_in_columns(report):
     assert len(runs) == counted
     # 7.2 s at 30 Hz, of which about 1 % were not tracked.
     assert 200 * counted < moving <= 217 * counted
+
+
+def test_sections_with_nothing_to_show_are_listed_at_the_end(campaigns, tmp_path):
+    written = write_report(campaigns("free driving"), tmp_path, recording=False)
+    text = read(written, "report.html")
+    said = " ".join("".join(Page(text).text).split())
+    assert "Not in this report" in said
+    assert "End poses: No run has a target and a measured end pose." in said
+    assert text.count("<h2>") == 5

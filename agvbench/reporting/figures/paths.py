@@ -8,21 +8,23 @@ from agvbench.types import Floats, Frames
 
 _JUMP_M = 0.1
 _NEIGHBOURS = 5
-_POINTS = 80
+_FEWEST_POINTS, _MOST_POINTS, _POINTS_PER_M = 80, 600, 20.0
 
 
-def drawn_path(frames: Frames, *, points: int = _POINTS) -> Floats:
-    """Return at most `points` poses, shape (n, 4): t [s], x, y [m], heading [rad], spread evenly over the way driven.
+def drawn_path(frames: Frames) -> Floats:
+    """Return poses spread evenly over the way driven, shape (n, 4): t [s], x, y [m], heading [rad].
+
+    There is one every 50 mm, but at least 80 in all (if there are so many) and at most 600.
 
     Frames that are not tracked, or lie more than 0.1 m from the median of the five around them, are left out: this is
     for looking at, not for measuring.
     """
     poses = _in_order(frames)
     poses = poses[_smooth(poses)]
-    if len(poses) <= points:
+    if len(poses) <= _FEWEST_POINTS:
         return poses
     way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(poses[:, 1]), np.diff(poses[:, 2])))])
-    wanted = np.linspace(0.0, way[-1], points)
+    wanted = np.linspace(0.0, way[-1], int(np.clip(way[-1] * _POINTS_PER_M, _FEWEST_POINTS, _MOST_POINTS)))
     return np.asarray(poses[np.unique(np.searchsorted(way, wanted).clip(0, len(poses) - 1))])
 
 

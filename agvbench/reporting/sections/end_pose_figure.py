@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from agvbench.reporting.conditions import condition_numbers
-from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph, plain
+from agvbench.reporting.conditions import condition_numbers, legend
+from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph
 from agvbench.reporting.figures.end_pose import draw_end_poses
 from agvbench.reporting.sections.base import Section
 from agvbench.reporting.titles import panel_title
@@ -36,8 +36,8 @@ class EndPoseFigure(Section):
         counted, numbers = valid(data.errors), condition_numbers(data.conditions)
         if counted.empty:
             return [Paragraph("No end pose to draw.")]
-        legend = [(plain(c), n) for c, n in numbers.items() if c in set(counted["condition"])]
-        return [FigureBlock("end-pose-figure", _CAPTION, list(_panels(counted, numbers)), legend)]
+        named = legend({c: n for c, n in numbers.items() if c in set(counted["condition"])})
+        return [FigureBlock("end-pose-figure", _CAPTION, list(_panels(counted, numbers)), named)]
 
 
 def _panels(counted: pd.DataFrame, numbers: dict[str, int]) -> Iterator[Panel]:

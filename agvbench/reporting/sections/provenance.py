@@ -33,11 +33,16 @@ def _facts(data: ReportData) -> Iterator[tuple[str, str]]:
     yield "motion capture", f"{header.mocap_rate_hz:g} Hz"
     yield "firmware", _distinct(run.firmware for run in data.runs)
     yield "sessions", _distinct(run.session or "" for run in data.runs)
-    yield "runs", f"{len(data.runs)}, over {max(run.started_s for run in data.runs) / 60.0:.0f} minutes"
+    yield "runs", f"{len(data.runs)}, over {_how_long(max(run.started_s for run in data.runs))}"
     yield "vehicle model", " ".join(filter(None, [data.curves.model_name, data.curves.model_hash]))
     for name, value in data.provenance.items():
         yield name.replace("_", " "), value
     yield "report made by", f"agvbench {__version__}"
+
+
+def _how_long(seconds: float) -> str:
+    units = ((86400.0, "days", 3.0), (3600.0, "hours", 3.0), (60.0, "minutes", 0.0))
+    return next(f"{seconds / unit:.0f} {name}" for unit, name, least in units if seconds >= least * unit)
 
 
 def _distinct(names: Iterator[str]) -> str:

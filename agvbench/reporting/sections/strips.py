@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from agvbench.reporting.conditions import condition_numbers
-from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph, plain
+from agvbench.reporting.conditions import condition_numbers, legend
+from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph
 from agvbench.reporting.figures.strips import Strip, draw_strips
 from agvbench.reporting.sections.base import Section
 from agvbench.statistics import valid
@@ -38,8 +38,7 @@ class Strips(Section):
             )
             for q in QUANTITIES
         ]
-        legend = [(plain(condition), number) for condition, number in numbers.items()]
-        return [FigureBlock("strips", _CAPTION, panels, legend, wide=True)]
+        return [FigureBlock("strips", _CAPTION, panels, legend(numbers), wide=True)]
 
 
 def _strips(data: ReportData, quantity: Quantity, numbers: dict[str, int]) -> list[Strip]:

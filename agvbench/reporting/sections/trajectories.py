@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from agvbench.reporting.conditions import condition_numbers
-from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph, plain
+from agvbench.reporting.conditions import condition_numbers, legend
+from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph
 from agvbench.reporting.figures.floor import draw_paths
 from agvbench.reporting.figures.paths import drawn_path
 from agvbench.reporting.sections.base import Section
@@ -39,16 +39,16 @@ class Trajectories(Section):
         if not runs:
             return [Paragraph("No run that counts has frames to draw.")]
         numbers = condition_numbers(in_order(pd.Series([run.condition for run in runs])))
-        legend = [(plain(condition), number) for condition, number in numbers.items()]
+        named = legend(numbers)
         aimed, free = ([run for run in runs if run.target.is_finite is whether] for whether in (True, False))
         over = [
             Panel(title, draw_paths(_by_condition(group, paths, numbers), title, size_in=5.6))
             for title, group in (("Runs with a target", aimed), ("Runs without a target", free))
             if group
         ]
-        floor = FigureBlock("floor", _OVER_FLOOR, over, legend, wide=True)
+        floor = FigureBlock("floor", _OVER_FLOOR, over, named, wide=True)
         panels = list(_panels(aimed, paths, numbers))
-        return [floor, FigureBlock("trajectories", _FROM_START, panels, legend)] if panels else [floor]
+        return [floor, FigureBlock("trajectories", _FROM_START, panels, named)] if panels else [floor]
 
 
 def _panels(runs: Sequence[Run], paths: dict[str, Floats], numbers: dict[str, int]) -> Iterator[Panel]:
