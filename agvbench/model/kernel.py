@@ -15,18 +15,10 @@ from numpy.typing import NDArray
 
 from agvbench.model.compiled import compiled
 from agvbench.model.panel import (
-    FRONT,
-    HEADING,
-    REAR,
-    SPEED,
     WORK_SIZE,
-    X,
-    Y,
     advance,
     evaluate,
-    fill_constant,
-    fill_decay,
-    fill_lag,
+    fill_nodes,
     integrate,
 )
 from agvbench.model.quadrature import SERIES_LIMIT
@@ -45,7 +37,7 @@ SLOTS = (
 )
 
 # Largest error inside a panel [m and rad]; at its end, collocation leaves far less, so that errors hardly add up.
-_TOLERANCE = 1e-9
+_TOLERANCE = 1e-8
 # First guess of a panel's length in time constants, and how a next one may grow.
 _FIRST_GUESS, _LARGEST_GROWTH, _SAFETY = 1.0, 3.0, 0.85
 # No vehicle needs shorter panels [s]: numbers that ask for them are nonsense, but must not hang the loop.
@@ -53,31 +45,12 @@ _SHORTEST_S = 1e-6
 
 
 @compiled(inner=True)
-def _fill_nodes(work: Floats, state: Floats, target: Floats, lag_s: float, speed_lag_s: float, length: float) -> None:
-    """Put axle angles and speed at the nodes of a panel that starts at `state`."""
-    if state[3] == target[0] and state[4] == target[1]:
-        fill_constant(work, FRONT, target[0])
-        fill_constant(work, REAR, target[1])
-    else:
-        fill_decay(work, length / lag_s)
-        fill_lag(work, FRONT, state[3], target[0])
-        fill_lag(work, REAR, state[4], target[1])
-    if state[5] == target[2]:
-        fill_constant(work, SPEED, target[2])
-    else:
-        fill_decay(work, length / speed_lag_s)
-        fill_lag(work, SPEED, state[5], target[2])
-
-
-@compiled(inner=True)
-def _settle(state: Floats, target: Floats, lag_s: float, speed_lag_s: float, length: float) -> None:
-    """Take axle angles and speed to the end of a panel."""
-    if lag_s > 0.0:
-        left = math.exp(-length / lag_s)
-        state[3] = target[0] + (state[3] - target[0]) * left
-        state[4] = target[1] + (state[4] - target[1]) * left
-    if speed_lag_s > 0.0:
-        state[5] = target[2] + (state[5] - target[2]) * math.exp(-length / speed_lag_s)
+def _settle(state: Floats, target: Floats, steering_ratio: float, speed_ratio: float) -> None:
+    """Take axle angles and speed to the end of a panel; the ratios are its length over the time constants."""
+    steering_left, speed_left = math.exp(-steering_ratio), math.exp(-speed_ratio)
+    state[3] = target[0] + (state[3] - target[0]) * steering_left
+    state[4] = target[1] + (state[4] - target[1]) * steering_left
+    state[5] = target[2] + (state[5] - target[2]) * speed_left
 
 
 @compiled(inner=True)
@@ -94,7 +67,7 @@ def _first_length(state: Floats, target: Floats, lag_s: float, speed_lag_s: floa
 def _stretch(
     work: Floats,
     state: Floats,
-    axles: Floats,
+    vehicle: Floats,
     target: Floats,
     lag_s: float,
     speed_lag_s: float,
@@ -114,8 +87,8 @@ def _stretch(
         elif 2.0 * length > remaining:
             length = 0.5 * remaining
         while True:
-            _fill_nodes(work, state, target, lag_s, speed_lag_s, length)
-            error, turned = integrate(work, state[2], axles[0], axles[1], length)
+            fill_nodes(work, state, target, length / lag_s, length / speed_lag_s)
+            error, turned = integrate(work, state[2], vehicle[0], vehicle[1], length)
             if (error <= _TOLERANCE and turned <= SERIES_LIMIT) or length <= _SHORTEST_S:
                 break
             length *= 0.5
@@ -125,10 +98,8 @@ def _stretch(
         while k < stop and t_s[k] <= following:
             k += 1
         middle = now + 0.5 * length
-        evaluate(work, X, t_s[first:k], middle, length, out[0][first:k])
-        evaluate(work, Y, t_s[first:k], middle, length, out[1][first:k])
-        evaluate(work, HEADING, t_s[first:k], middle, length, out[2][first:k])
-        _settle(state, target, lag_s, speed_lag_s, length)
+        evaluate(work, middle, length, t_s, out, first, k)
+        _settle(state, target, length / lag_s, length / speed_lag_s)
         now = following
         # The error goes with the eighth power of the length.
         growth = _SAFETY * math.sqrt(math.sqrt(math.sqrt(_TOLERANCE / (error + 1e-30))))
@@ -140,7 +111,7 @@ def _stretch(
 def _hold_command(
     work: Floats,
     state: Floats,
-    parameters: Floats,
+    vehicle: Floats,
     target: Floats,
     start: float,
     end: float,
@@ -150,7 +121,7 @@ def _hold_command(
     stop: int,
 ) -> int:
     """Simulate one command from `start` to `end`; return the next time to report."""
-    axles, lag_s, accelerate_s, brake_s = parameters[0:2], parameters[3], parameters[4], parameters[5]
+    lag_s, accelerate_s, brake_s = vehicle[3], vehicle[4], vehicle[5]
     if lag_s <= 0.0:
         state[3], state[4] = target[0], target[1]
     now = start
@@ -163,7 +134,7 @@ def _hold_command(
             until = min(end, stands_s)
         elif speed_lag_s <= 0.0:
             state[5] = target[2]
-        k = _stretch(work, state, axles, target, lag_s, speed_lag_s, now, until, t_s, out, k, stop)
+        k = _stretch(work, state, vehicle, target, lag_s, speed_lag_s, now, until, t_s, out, k, stop)
         if stands_s <= end:
             state[5] = 0.0
         now = until
@@ -177,6 +148,13 @@ def _stand(state: Floats, t_s: Floats, until: float, out: Floats, k: int, stop: 
         out[0, k], out[1, k], out[2, k] = state[0], state[1], state[2]
         k += 1
     return k
+
+
+@compiled(inner=True)
+def _copy_row(table: Floats, row: int, out: Floats) -> None:
+    """Copy ``table[row]``: a slice would cost more than the numbers in it, by counting references."""
+    for i in range(out.size):
+        out[i] = table[row, i]
 
 
 @compiled()
@@ -209,13 +187,14 @@ def simulate(
     out
         (3, times): receives x, y, heading.
     """
-    work, state = np.zeros(WORK_SIZE), np.empty(6)
+    work, state, vehicle, target = np.zeros(WORK_SIZE), np.empty(6), np.empty(6), np.empty(3)
     for run in range(len(initial)):
-        state[:] = initial[run]
+        _copy_row(initial, run, state)
+        _copy_row(parameters, run, vehicle)
         k, stop = starts[run], starts[run + 1]
         if k == stop:
             continue
-        first, last, delay = command_starts[run], command_starts[run + 1] - 1, parameters[run, 2]
+        first, last, delay = command_starts[run], command_starts[run + 1] - 1, vehicle[2]
         k = _stand(state, t_s, command_t_s[first] + delay, out, k, stop)
         for command in range(first, last + 1):
             start, end = command_t_s[command] + delay, t_s[stop - 1]
@@ -223,5 +202,6 @@ def simulate(
                 end = min(end, command_t_s[command + 1] + delay)
             if start >= end:
                 break
-            k = _hold_command(work, state, parameters[run], targets[command], start, end, t_s, out, k, stop)
+            _copy_row(targets, command, target)
+            k = _hold_command(work, state, vehicle, target, start, end, t_s, out, k, stop)
         _stand(state, t_s, math.inf, out, k, stop)

@@ -24,18 +24,18 @@ from agvbench.model.quadrature import (
 )
 from agvbench.types import Floats
 
-# Offsets into the working array. At the nodes: axle angles, speed, decay of the lag; displacement per unit of s forward
-# and left in the vehicle frame, along x and y in the floor frame, and in heading; heading turned since the start.
-FRONT, REAR, SPEED, DECAY, FORWARD, LEFT, ALONG_X, ALONG_Y, YAW = range(0, 9 * COUNT, COUNT)
-# Polynomials in s (the first fills up to PADDED numbers, as do the three that follow).
-TURNED, X, Y, HEADING = range(9 * COUNT, 9 * COUNT + 4 * PADDED, PADDED)
-WORK_SIZE = 9 * COUNT + 4 * PADDED
+# Offsets into the working array. At the nodes: axle angles, speed; displacement per unit of s forward and left in the
+# vehicle frame, along x and y in the floor frame, and in heading.
+FRONT, REAR, SPEED, FORWARD, LEFT, ALONG_X, ALONG_Y, YAW = range(0, 8 * COUNT, COUNT)
+# Heading turned since the start of the panel, at the nodes; polynomials in s: all padded.
+TURNED, X, Y, HEADING = range(8 * COUNT, 8 * COUNT + 4 * PADDED, PADDED)
+WORK_SIZE = 8 * COUNT + 4 * PADDED
 
 # exp(x) = exp(x / 2⁶)^(2⁶); below −40 nothing is left at the 1e-17 that a double resolves.
 _HALVINGS, _LEAST_EXPONENT = 6, -40.0
 
 
-@compiled(fast=True, inner=True)
+@compiled(fast=True, inner=True, inline=True)
 def _sine(x: float) -> float:
     square = x * x
     total: float = SINE[10]
@@ -44,7 +44,7 @@ def _sine(x: float) -> float:
     return x * total
 
 
-@compiled(fast=True, inner=True)
+@compiled(fast=True, inner=True, inline=True)
 def _cosine(x: float) -> float:
     square = x * x
     total: float = COSINE[11]
@@ -53,7 +53,7 @@ def _cosine(x: float) -> float:
     return total
 
 
-@compiled(fast=True, inner=True)
+@compiled(fast=True, inner=True, inline=True)
 def _decay(x: float) -> float:
     x = max(x, _LEAST_EXPONENT) / 2.0**_HALVINGS
     total: float = EXPONENTIAL[14]
@@ -65,27 +65,22 @@ def _decay(x: float) -> float:
 
 
 @compiled(fast=True, inner=True)
-def fill_decay(work: Floats, ratio: float) -> None:
-    """Put exp(−ratio · elapsed share) into DECAY; `ratio` is the panel's length over the time constant."""
+def fill_nodes(work: Floats, state: Floats, target: Floats, steering_ratio: float, speed_ratio: float) -> None:
+    """Put axle angles and speed at the nodes: first-order lags from `state` (…, front, rear, speed) to `target`.
+
+    The ratios are the panel's length over the time constants, infinite for a constant of zero.
+    """
+    # In names of their own, since the compiler cannot know that `work` does not overlap.
+    front, rear, speed = target[0], target[1], target[2]
+    front_gap, rear_gap, speed_gap = state[3] - front, state[4] - rear, state[5] - speed
     for i in range(COUNT):
-        work[DECAY + i] = _decay(-ratio * ELAPSED[i])
+        steering_left, speed_left = _decay(-steering_ratio * ELAPSED[i]), _decay(-speed_ratio * ELAPSED[i])
+        work[FRONT + i] = front + front_gap * steering_left
+        work[REAR + i] = rear + rear_gap * steering_left
+        work[SPEED + i] = speed + speed_gap * speed_left
 
 
-@compiled(fast=True, inner=True)
-def fill_lag(work: Floats, row: int, start: float, target: float) -> None:
-    """Put a first-order lag from `start` to `target` into a row, with the decay that is in DECAY."""
-    for i in range(COUNT):
-        work[row + i] = target + (start - target) * work[DECAY + i]
-
-
-@compiled(fast=True, inner=True)
-def fill_constant(work: Floats, row: int, value: float) -> None:
-    """Put a constant into a row."""
-    for i in range(COUNT):
-        work[row + i] = value
-
-
-@compiled(fast=True, inner=True)
+@compiled(fast=True, inner=True, inline=True)
 def _project(work: Floats, matrix: Floats, source: int, target: int) -> float:
     """Put `matrix` times the row `source` into `target`; return the sum of it, the polynomial's value at s = 1."""
     # In names of their own, since the compiler cannot know that `target` does not overlap.
@@ -100,7 +95,7 @@ def _project(work: Floats, matrix: Floats, source: int, target: int) -> float:
     return total
 
 
-@compiled(fast=True, inner=True)
+@compiled(fast=True, inner=True, inline=True)
 def _size_of_term(work: Floats, weights: Floats) -> float:
     """Return how large one Legendre coefficient of the displacements is."""
     x = y = yaw = 0.0
@@ -163,11 +158,17 @@ def advance(work: Floats, state: Floats) -> None:
 
 
 @compiled(fast=True, inner=True)
-def evaluate(work: Floats, row: int, t_s: Floats, middle_s: float, length: float, out: Floats) -> None:
-    """Evaluate the polynomial X, Y or HEADING of the panel at the times `t_s`, into `out`."""
-    c0, c1, c2, c3, c4 = work[row], work[row + 1], work[row + 2], work[row + 3], work[row + 4]
-    c5, c6, c7, c8 = work[row + 5], work[row + 6], work[row + 7], work[row + 8]
+def evaluate(work: Floats, middle_s: float, length: float, t_s: Floats, out: Floats, first: int, stop: int) -> None:
+    """Evaluate the panel's polynomials at ``t_s[first:stop]``, into that part of `out` (3, times)."""
+    x0, x1, x2, x3, x4 = work[X], work[X + 1], work[X + 2], work[X + 3], work[X + 4]
+    x5, x6, x7, x8 = work[X + 5], work[X + 6], work[X + 7], work[X + 8]
+    y0, y1, y2, y3, y4 = work[Y], work[Y + 1], work[Y + 2], work[Y + 3], work[Y + 4]
+    y5, y6, y7, y8 = work[Y + 5], work[Y + 6], work[Y + 7], work[Y + 8]
+    h0, h1, h2, h3, h4 = work[HEADING], work[HEADING + 1], work[HEADING + 2], work[HEADING + 3], work[HEADING + 4]
+    h5, h6, h7, h8 = work[HEADING + 5], work[HEADING + 6], work[HEADING + 7], work[HEADING + 8]
     scale = 2.0 / length
-    for i in range(t_s.size):
+    for i in range(first, stop):
         s = (t_s[i] - middle_s) * scale
-        out[i] = c0 + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * (c5 + s * (c6 + s * (c7 + s * c8)))))))
+        out[0, i] = x0 + s * (x1 + s * (x2 + s * (x3 + s * (x4 + s * (x5 + s * (x6 + s * (x7 + s * x8)))))))
+        out[1, i] = y0 + s * (y1 + s * (y2 + s * (y3 + s * (y4 + s * (y5 + s * (y6 + s * (y7 + s * y8)))))))
+        out[2, i] = h0 + s * (h1 + s * (h2 + s * (h3 + s * (h4 + s * (h5 + s * (h6 + s * (h7 + s * h8)))))))

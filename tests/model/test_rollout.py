@@ -66,7 +66,7 @@ def test_rollout_agrees_with_dop853_to_a_micrometre(truth: Truth, seed: int, sca
     start = rng.uniform(-3.0, 3.0, 3)
     t = np.sort(rng.uniform(-0.2, times[-1] + 2.0, 150))
     ours = vehicle(truth).rollout([commands(times, settled)], [start], [t])[0]
-    np.testing.assert_allclose(ours, truth.poses(times, settled, start, (0.0, 0.0), t), rtol=0.0, atol=2e-8)
+    np.testing.assert_allclose(ours, truth.poses(times, settled, start, (0.0, 0.0), t), rtol=0.0, atol=3e-9)
 
 
 def test_a_vehicle_with_every_lag_at_camera_rate_stays_within_nanometres() -> None:
@@ -92,7 +92,7 @@ def test_settled_commands_give_exact_arcs(front: float, rear: float, speed: floa
     velocity = complex(forward, left)
     turned = (np.exp(1j * heading) - np.exp(0.7j)) / (1j * yaw) if yaw else t * np.exp(0.7j)
     position = complex(1.0, -2.0) + velocity * turned
-    np.testing.assert_allclose(got, np.column_stack([position.real, position.imag, heading]), rtol=0.0, atol=2e-8)
+    np.testing.assert_allclose(got, np.column_stack([position.real, position.imag, heading]), rtol=0.0, atol=3e-9)
 
 
 def test_straight_line_with_speed_lag_has_its_closed_form() -> None:
