@@ -63,6 +63,11 @@ class Header(NamedTuple):
     sequence: int
 
 
+def prefix(kind: Kind) -> bytes:
+    """Return the first six bytes of every message of `kind`: magic, version, kind."""
+    return MAGIC + bytes([VERSION, kind])
+
+
 def pack_header(kind: Kind, flags: int = 0, source: int = 0, count: int = 0, sequence: int = 0) -> bytes:
     """Return the header's bytes."""
     return _HEADER.pack(MAGIC, VERSION, kind, flags, source, count, sequence)
