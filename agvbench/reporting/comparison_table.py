@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from agvbench.reporting.content import Column, Table, Value
 from agvbench.statistics import Comparison, Difference
-from agvbench.statistics.comparison import ALL
+from agvbench.statistics.differences import ALL
 from agvbench.statistics.verdict import ALPHA_SAME
 from agvbench.statistics.words import describe
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from agvbench.reporting.content import Column, Paragraph, Table, Value, plain
-from agvbench.statistics.comparison import ALL
+from agvbench.statistics.differences import ALL
 from agvbench.statistics.words import headline
 
 if TYPE_CHECKING:

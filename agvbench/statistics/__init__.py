@@ -1,6 +1,7 @@
 """Errors of runs, their spread, and comparisons."""
 
-from agvbench.statistics.comparison import Comparison, Difference, compare
+from agvbench.statistics.comparison import Comparison, compare
+from agvbench.statistics.differences import Difference
 from agvbench.statistics.end_poses import end_pose_table
 from agvbench.statistics.runs import pose_errors, valid
 from agvbench.statistics.spread import bias_and_spread

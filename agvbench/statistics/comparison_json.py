@@ -6,7 +6,8 @@ import math
 from typing import Any
 
 from agvbench.statistics.bootstrap import CONFIDENCE
-from agvbench.statistics.comparison import Comparison, Difference, Sample
+from agvbench.statistics.comparison import Comparison
+from agvbench.statistics.differences import Difference, Sample
 from agvbench.statistics.words import describe, headline
 
 SCHEMA = 1

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from agvbench.statistics.comparison import Comparison, Difference
+from agvbench.statistics.comparison import Comparison
+from agvbench.statistics.differences import Difference
 from agvbench.statistics.power import fewest_repeats
 from agvbench.statistics.verdict import Verdict
 

@@ -9,8 +9,8 @@ from statistics_samples import TARGETS, error_table
 
 from agvbench.errors import FlagError, InputError
 from agvbench.statistics import Verdict, compare
-from agvbench.statistics.comparison import ALL
 from agvbench.statistics.comparison_json import comparison_to_json
+from agvbench.statistics.differences import ALL
 from agvbench.statistics.words import describe, headline
 
 PAIRS = 200

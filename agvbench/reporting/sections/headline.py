@@ -10,7 +10,7 @@ import numpy as np
 from agvbench.reporting.content import Block, Bullets, Paragraph, plain
 from agvbench.reporting.sections.base import Section
 from agvbench.statistics import Comparison, Difference, Verdict, valid
-from agvbench.statistics.comparison import ALL
+from agvbench.statistics.differences import ALL
 from agvbench.statistics.quantities import QUANTITIES
 from agvbench.statistics.words import describe
 from agvbench.workflows.report import ReportData
