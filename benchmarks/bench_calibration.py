@@ -34,7 +34,7 @@ def bench_steering_opposite(drive, share):
     drive.hold(drive=1.0, front=share, rear=-share, for_s=8.0)
 
 
-@pytest.mark.repeats(1)
+@pytest.mark.repeats(3, full=1)
 @pytest.mark.grid("steering", [0.0], STEPS_OF_7)
 @pytest.mark.grid("configuration", ["straight"], ["single", "double", "crab"])
 @pytest.mark.grid("share", STEPS_OF_25, STEPS_OF_25)

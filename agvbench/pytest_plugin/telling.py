@@ -101,9 +101,11 @@ def pytest_runtest_makereport(
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_report_teststatus(report: pytest.TestReport) -> tuple[str, str, str] | None:
+def pytest_report_teststatus(report: pytest.TestReport | pytest.CollectReport) -> tuple[str, str, str] | None:
     """Leave the dots of passed benchmarks to the progress line."""
-    if "agvbench" in dict(report.user_properties) and report.when == "call" and not report.failed:
+    if not isinstance(report, pytest.TestReport) or "agvbench" not in dict(report.user_properties):
+        return None
+    if report.when == "call" and not report.failed:
         return report.outcome, "", ""
     return None
 
