@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, ClassVar, Self
@@ -18,7 +18,7 @@ class Stage(StrEnum):
     """Where in the chain from command to measured pose an effect acts; the chain is in this order."""
 
     TRANSPORT = "transport"
-    ACTUATOR = "actuator"
+    SERVO = "servo"
     WHEELS = "wheels"
     BODY = "body"
     FLOOR = "floor"
@@ -39,6 +39,8 @@ class Parameter:
         The value at which the effect does nothing (∞ for a limit).
     low, high
         The values that make sense: what a file may say and a fit may search.
+    scale
+        How large it is where it matters: a fit starts and steps in this measure.
     """
 
     name: str
@@ -46,11 +48,30 @@ class Parameter:
     null: float
     low: float
     high: float
+    scale: float
 
 
-def parameter(*, unit: str, low: float, high: float, null: float = 0.0) -> Any:
+def parameter(*, unit: str, low: float, high: float, scale: float, null: float = 0.0) -> Any:
     """Declare a field of an effect; its default is its null value. See `Parameter`."""
-    return dataclasses.field(default=null, metadata={"unit": unit, "null": null, "low": low, "high": high})
+    metadata = {"unit": unit, "null": null, "low": low, "high": high, "scale": scale}
+    return dataclasses.field(default=null, metadata=metadata)
+
+
+Hook = Callable[..., Any]
+
+#: The hooks in the order of the chain, each with the stages that it belongs to.
+HOOKS: Mapping[str, tuple[Stage, ...]] = {
+    "arrive": (Stage.TRANSPORT,),
+    "aim": (Stage.SERVO,),
+    "steer": (Stage.WHEELS,),
+    "drive": (Stage.WHEELS,),
+    "move": (Stage.BODY,),
+    "drift": (Stage.FLOOR,),
+    "capture": (Stage.CAMERA,),
+    "see": (Stage.CAMERA,),
+}
+#: Hooks that turn one time into another; all others change the state in place.
+TIME_HOOKS = frozenset({"arrive", "capture"})
 
 
 @dataclass(frozen=True)
@@ -58,8 +79,11 @@ class Effect:
     """One physical cause that a vehicle model may have or lack.
 
     A concrete effect is a frozen dataclass in a file of this package; each field is a `parameter`, and an
-    effect made without arguments does nothing. What it does is in its docstring as an equation;
-    `agvbench.model` simulates it.
+    effect made without arguments does nothing. What it does is in its docstring as an equation, and in one
+    or more hooks: static methods with the names below, taking `state` (see `agvbench.effects.state`) and then every
+    parameter by name, in order. Hooks are compiled into the simulation, so they use arithmetic, ``math`` and the
+    constants of their file only; they may be called as plain Python, too. A new file needs nothing else to be
+    simulated, tested, listed, saved and fitted.
 
     Attributes
     ----------
@@ -71,12 +95,41 @@ class Effect:
         The assumption of the thesis (sections 3.2, 7.3, 9.2) that does not hold if the effect is there.
     reference
         Where the equation comes from.
+    limits
+        Where the equation stops to hold, or what cannot be told apart from it.
+    arrive
+        ``arrive(state, time_s, …) -> time_s``: when a command given at `time_s` takes effect.
+    aim
+        Called when a command takes effect, which is in ``DRIVE_COMMAND`` …; may change where actuators settle and how
+        they get there: ``FRONT_AIM`` … ``BRAKE_LAG``.
+    steer
+        Called at every moment, as all that follow; may change ``FRONT`` and ``REAR``.
+    drive
+        May change ``FRONT_SPEED`` and ``REAR_SPEED``; knows the tangents of the angles.
+    move
+        May change ``FORWARD``, ``LEFT`` and ``YAW_RATE``.
+    drift
+        May change ``X_RATE``, ``Y_RATE`` and ``YAW_RATE``.
+    capture
+        ``capture(state, time_s, …) -> time_s``: when the pose that is stamped `time_s` was true.
+    see
+        Called for every frame; may change ``SEEN_X``, ``SEEN_Y`` and ``SEEN_HEADING``, given ``X``, ``Y``, ``HEADING``.
     """
 
     name: ClassVar[str]
     stage: ClassVar[Stage]
     relaxes: ClassVar[str]
     reference: ClassVar[str]
+    limits: ClassVar[str]
+
+    arrive: ClassVar[Hook | None] = None
+    aim: ClassVar[Hook | None] = None
+    steer: ClassVar[Hook | None] = None
+    drive: ClassVar[Hook | None] = None
+    move: ClassVar[Hook | None] = None
+    drift: ClassVar[Hook | None] = None
+    capture: ClassVar[Hook | None] = None
+    see: ClassVar[Hook | None] = None
 
     def __post_init__(self) -> None:
         for p in self.parameters():
@@ -90,6 +143,11 @@ class Effect:
     def parameters(cls) -> tuple[Parameter, ...]:
         """Return the declared parameters, in order."""
         return tuple(Parameter(name=f.name, **f.metadata) for f in dataclasses.fields(cls))
+
+    @classmethod
+    def hooks(cls) -> Mapping[str, Hook]:
+        """Return the hooks that this effect has, by name, in the order of the chain."""
+        return {name: hook for name in HOOKS if (hook := getattr(cls, name)) is not None}
 
     @property
     def values(self) -> Mapping[str, float]:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from agvbench.effects.base import Effect, Stage, parameter
+from agvbench.effects.state import ACCELERATE_LAG, BRAKE_LAG
+from agvbench.types import Floats
 
 
 @dataclass(frozen=True)
@@ -18,9 +20,16 @@ class SpeedLag(Effect):
     """
 
     name: ClassVar[str] = "speed_lag"
-    stage: ClassVar[Stage] = Stage.ACTUATOR
+    stage: ClassVar[Stage] = Stage.SERVO
     relaxes: ClassVar[str] = "acceleration and deceleration are negligible (3.2, assumption 5)"
     reference: ClassVar[str] = "Bentvelsen 2015, section 8.1"
+    limits: ClassVar[str] = "ramps limited by force look like a longer lag at larger steps of speed"
 
-    accelerate_s: float = parameter(unit="s", low=0.0, high=10.0)
-    brake_s: float = parameter(unit="s", low=0.0, high=10.0)
+    accelerate_s: float = parameter(unit="s", low=0.0, high=10.0, scale=0.2)
+    brake_s: float = parameter(unit="s", low=0.0, high=10.0, scale=0.2)
+
+    @staticmethod
+    def aim(state: Floats, accelerate_s: float, brake_s: float) -> None:
+        """Give the drive its lags."""
+        state[ACCELERATE_LAG] = accelerate_s
+        state[BRAKE_LAG] = brake_s

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from agvbench.effects.base import Effect, Stage, parameter
+from agvbench.effects.state import STEERING_LAG
+from agvbench.types import Floats
 
 
 @dataclass(frozen=True)
@@ -13,8 +15,16 @@ class SteeringLag(Effect):
     """First-order lag of both axles behind their servos' static maps: ``δ̇ = (δ_map − δ) / time_constant_s``."""
 
     name: ClassVar[str] = "steering_lag"
-    stage: ClassVar[Stage] = Stage.ACTUATOR
+    stage: ClassVar[Stage] = Stage.SERVO
     relaxes: ClassVar[str] = "axles rotate instantaneously (7.3)"
     reference: ClassVar[str] = "Rajamani 2012, Vehicle Dynamics and Control, section 2.3 (first-order actuator)"
+    limits: ClassVar[str] = (
+        "invisible where steering is set before the vehicle moves; a servo of second order looks like lag and delay"
+    )
 
-    time_constant_s: float = parameter(unit="s", low=0.0, high=5.0)
+    time_constant_s: float = parameter(unit="s", low=0.0, high=5.0, scale=0.1)
+
+    @staticmethod
+    def aim(state: Floats, time_constant_s: float) -> None:
+        """Give the servos their lag."""
+        state[STEERING_LAG] = time_constant_s

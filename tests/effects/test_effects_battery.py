@@ -21,7 +21,7 @@ each_effect = pytest.mark.parametrize("cls", KINDS.values(), ids=KINDS.keys())
 
 def test_every_file_of_the_package_adds_an_effect() -> None:
     files = {path.stem for path in Path(effects_package.__file__).parent.glob("*.py")}
-    assert files - {"__init__", "base", "registry"} == set(KINDS)
+    assert files - {"__init__", "base", "registry", "state"} == set(KINDS)
     assert {"actuation_delay", "steering_lag", "speed_lag"} <= set(KINDS)
 
 

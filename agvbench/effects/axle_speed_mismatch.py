@@ -1,0 +1,30 @@
+"""The rear wheels run at another speed than the front ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from agvbench.effects.base import Effect, Stage, parameter
+from agvbench.effects.state import REAR_SPEED
+from agvbench.types import Floats
+
+
+@dataclass(frozen=True)
+class AxleSpeedMismatch(Effect):
+    """Both axles are driven, not equally: ``v_r = (1 + ratio) v_f`` in equation 5.6."""
+
+    name: ClassVar[str] = "axle_speed_mismatch"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    relaxes: ClassVar[str] = "the front axle's speed equals the rear's (9.2)"
+    reference: ClassVar[str] = "Bentvelsen 2015, equation 5.6 and section 9.2"
+    limits: ClassVar[str] = (
+        "with equal angles of both axles it is a scale of speed, which the drive's map absorbs; 5 % hardly shows"
+    )
+
+    ratio: float = parameter(unit="–", low=-0.5, high=0.5, scale=0.05)
+
+    @staticmethod
+    def drive(state: Floats, ratio: float) -> None:
+        """Drive the rear axle faster."""
+        state[REAR_SPEED] *= 1.0 + ratio

@@ -1,0 +1,30 @@
+"""Steered wheels cost speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from agvbench.effects.base import Effect, Stage, parameter
+from agvbench.effects.state import FRONT_SPEED, REAR_SPEED, TAN_FRONT, TAN_REAR
+from agvbench.types import Floats
+
+
+@dataclass(frozen=True)
+class CorneringSpeedLoss(Effect):
+    """Speed falls with the angle of the axles: ``v ← v (1 − loss (|tan δf| + |tan δr|))``."""
+
+    name: ClassVar[str] = "cornering_speed_loss"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    relaxes: ClassVar[str] = "speed does not depend on steering (7.4)"
+    reference: ClassVar[str] = "Bentvelsen 2015, appendix B (cornering speed)"
+    limits: ClassVar[str] = "other laws (in the square of the angle, in curvature) differ at large angles"
+
+    loss: float = parameter(unit="–", low=-0.5, high=0.7, scale=0.1)
+
+    @staticmethod
+    def drive(state: Floats, loss: float) -> None:
+        """Slow both axles."""
+        left = 1.0 - loss * (abs(state[TAN_FRONT]) + abs(state[TAN_REAR]))
+        state[FRONT_SPEED] *= left
+        state[REAR_SPEED] *= left

@@ -1,0 +1,33 @@
+"""What an effect's hooks see and change: the state of one vehicle at one moment, an array with a place for each number.
+
+Angles are counter-clockwise positive, speeds forward positive; units are SI and radians. `Hook` says which hook
+may change what.
+"""
+
+from __future__ import annotations
+
+# When: seconds in the run, hours since the session began, metres driven in the run.
+TIME, HOURS, DISTANCE = range(3)
+# True pose of the point that the vehicle file calls the marker centroid, in the floor frame.
+X, Y, HEADING = range(3, 6)
+# The command in force, each as its distance from neutral, in command units.
+DRIVE_COMMAND, FRONT_COMMAND, REAR_COMMAND = range(6, 9)
+# What the static maps make of it: where axles and drive settle.
+FRONT_AIM, REAR_AIM, SPEED_AIM = range(9, 12)
+# How they get there: servos obey δ̇ = (aim − δ) / lag within ± rate, and the axle follows with a play of this width.
+STEERING_LAG, STEERING_RATE, PLAY = range(12, 15)
+# The drive obeys v̇ = (aim − v) / lag, one lag for |v| growing, one for |v| falling.
+ACCELERATE_LAG, BRAKE_LAG = range(15, 17)
+# Angles of the axles, speed of the drive.
+FRONT, REAR, SPEED = range(17, 20)
+# Tangents of the angles, and the speed of each axle along its wheels.
+TAN_FRONT, TAN_REAR, FRONT_SPEED, REAR_SPEED = range(20, 24)
+# Motion of the marker centroid in the vehicle frame: forward, to the left, turning.
+FORWARD, LEFT, YAW_RATE = range(24, 27)
+# Its velocity in the floor frame.
+X_RATE, Y_RATE = range(27, 29)
+# The pose that the camera reports.
+SEEN_X, SEEN_Y, SEEN_HEADING = range(29, 32)
+# Kept by the simulation: cosines, and the angles that they belong to.
+COS_FRONT, COS_REAR, KNOWN_FRONT, KNOWN_REAR = range(32, 36)
+SIZE = 36

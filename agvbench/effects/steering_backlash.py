@@ -1,0 +1,35 @@
+"""Axles have play."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from agvbench.effects.base import Effect, Stage, parameter
+from agvbench.effects.state import PLAY
+from agvbench.types import Floats
+
+
+@dataclass(frozen=True)
+class SteeringBacklash(Effect):
+    """Play between servo and axle: δ stays until its servo is half a width away, then follows at that distance.
+
+    Where an axle stands depends on where it came from, so a run begins with both axles in the middle of their play.
+    """
+
+    name: ClassVar[str] = "steering_backlash"
+    stage: ClassVar[Stage] = Stage.SERVO
+    relaxes: ClassVar[str] = "parts are tight (3.2)"
+    reference: ClassVar[str] = (
+        "Tao and Kokotović 1996, Adaptive Control of Systems with Actuator and Sensor Nonlinearities (play)"
+    )
+    limits: ClassVar[str] = (
+        "shows only where the same command is reached from both sides; else it is an offset, which a static map absorbs"
+    )
+
+    width_rad: float = parameter(unit="rad", low=0.0, high=0.5, scale=0.03)
+
+    @staticmethod
+    def aim(state: Floats, width_rad: float) -> None:
+        """Give the linkage its play."""
+        state[PLAY] = width_rad

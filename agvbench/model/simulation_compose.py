@@ -1,0 +1,119 @@
+"""Make one compiled kernel of the loop and the hooks of all effects.
+
+The kernel is a real module file, so that numba can keep its machine code: the text of `simulation_loop`, with one
+function per stage that calls the hooks in turn. The file's name has a hash of everything that goes into it, for numba
+itself does not notice a changed function in another file. It lies in ``$AGVBENCH_CACHE``, else in the user's cache.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import inspect
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+import numba
+
+from agvbench.effects import HOOKS, TIME_HOOKS, Effect
+from agvbench.effects import state as state_module
+from agvbench.errors import FileError
+from agvbench.model import compiled as compiled_module
+from agvbench.model import simulation_actuators, simulation_loop
+
+_IMPORT = "from agvbench.model.simulation_stages import aim, arrive, capture, drift, drive, move, see, steer\n"
+
+
+@cache
+def kernel(kinds: tuple[type[Effect], ...]) -> Callable[..., None]:
+    """Return the compiled ``simulate`` of `agvbench.model.simulation_loop` with the hooks of `kinds`.
+
+    Parameters are laid out in the order of `kinds`. Compiling takes some seconds, once per set of effects and version.
+
+    Raises
+    ------
+    FileError
+        If there is no directory to keep the kernel in.
+    """
+    text = kernel_text(kinds)
+    name = f"kernel_{_digest(text, kinds)}"
+    directory = _directory()
+    path = directory / f"{name}.py"
+    try:
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            _write(path, text)
+    except OSError as error:
+        remedy = "set AGVBENCH_CACHE to a directory that can be written"
+        raise FileError(f"cannot keep compiled code ({error.strerror})", where=path, remedy=remedy) from None
+    simulate: Callable[..., None] = _load(f"agvbench_{name}", path).simulate
+    return simulate
+
+
+def kernel_text(kinds: Sequence[type[Effect]]) -> str:
+    """Return the source of the kernel with the hooks of `kinds`."""
+    imports, stages = [], []
+    for stage in HOOKS:
+        calls, first = [], 0
+        for kind in kinds:
+            count = len(kind.parameters())
+            if stage in kind.hooks():
+                imports.append(f"from {kind.__module__} import {kind.__qualname__}")
+                alias = f"_{stage}_{kind.name}"
+                stages.append(f"{alias} = compiled(inner=True)({kind.__qualname__}.{stage})\n")
+                values = "".join(f", p[{i}]" for i in range(first, first + count))
+                time = ", time_s" if stage in TIME_HOOKS else ""
+                calls.append(f"    {'time_s = ' if time else ''}{alias}(s{time}{values})\n")
+            first += count
+        stages.append(_stage(stage, calls))
+    head, found, tail = inspect.getsource(simulation_loop).partition(_IMPORT)
+    assert found, "the loop imports its stages in one line"  # noqa: S101 - a contract between two files
+    # Stages are defined where the imports end, before their first use.
+    imported, marker, code = tail.partition("Integers = ")
+    return head + "".join(f"{line}\n" for line in dict.fromkeys(imports)) + imported + "\n".join(stages) + marker + code
+
+
+def _stage(name: str, calls: Sequence[str]) -> str:
+    time = name in TIME_HOOKS
+    arguments = "s, time_s, p" if time else "s, p"
+    body = "".join(calls) + ("    return time_s\n" if time else "    return\n")
+    return f"\n@compiled(inner=True)\ndef {name}({arguments}):\n{body}\n"
+
+
+def _digest(text: str, kinds: Sequence[type[Effect]]) -> str:
+    """Return a hash over everything whose change must lead to compiling again."""
+    modules = [state_module, compiled_module, simulation_actuators]
+    modules += [sys.modules[kind.__module__] for kind in kinds]
+    parts = [text, numba.__version__, *map(inspect.getsource, dict.fromkeys(modules))]
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
+
+
+def _directory() -> Path:
+    if chosen := os.environ.get("AGVBENCH_CACHE"):
+        return Path(chosen)
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "agvbench"
+
+
+def _write(path: Path, text: str) -> None:
+    """Write the whole file or nothing: others may be writing it at the same time."""
+    path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
+    with os.fdopen(handle, "w", encoding="utf-8") as file:
+        file.write(text)
+    Path(temporary).replace(path)
+
+
+def _load(name: str, path: Path) -> ModuleType:
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None and spec.loader is not None  # noqa: S101, PT018 - a path to a .py file has both
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module

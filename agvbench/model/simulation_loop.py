@@ -1,0 +1,308 @@
+"""The general simulation's loop over runs, commands and steps, from command to measured pose.
+
+Steps end where a command takes effect and where the actuators' way has a kink, so that nothing in a step jumps. In a
+step the motion is taken at the three Gauss–Legendre nodes; heading and position follow by collocation (Hairer,
+Nørsett and Wanner 1993, section II.7), and frames are read off its polynomial.
+
+The stages imported here do nothing. The simulation runs this file's text with the effects' hooks in their place; see
+`agvbench.model.simulation_compose`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.effects.state import (
+    ACCELERATE_LAG,
+    BRAKE_LAG,
+    COS_FRONT,
+    COS_REAR,
+    DISTANCE,
+    DRIVE_COMMAND,
+    FORWARD,
+    FRONT,
+    FRONT_AIM,
+    FRONT_COMMAND,
+    FRONT_SPEED,
+    HEADING,
+    HOURS,
+    KNOWN_FRONT,
+    KNOWN_REAR,
+    LEFT,
+    PLAY,
+    REAR,
+    REAR_AIM,
+    REAR_COMMAND,
+    REAR_SPEED,
+    SEEN_HEADING,
+    SEEN_X,
+    SEEN_Y,
+    SIZE,
+    SPEED,
+    SPEED_AIM,
+    STEERING_LAG,
+    STEERING_RATE,
+    TAN_FRONT,
+    TAN_REAR,
+    TIME,
+    X_RATE,
+    Y_RATE,
+    YAW_RATE,
+    X,
+    Y,
+)
+from agvbench.model.compiled import compiled
+from agvbench.model.simulation_actuators import PLAN_SIZE, actuate, leave_command, plan_command, step_length
+from agvbench.model.simulation_stages import aim, arrive, capture, drift, drive, move, see, steer
+from agvbench.types import Floats
+
+Integers = NDArray[np.int64]
+
+# Gauss–Legendre nodes on [0, 1]; ∫₀^c of the polynomial through values at the nodes is the values times
+# c (BASIS[j, 0] + c BASIS[j, 1] + c² BASIS[j, 2]).
+_ROOT = math.sqrt(15.0)
+_NODES = np.array([0.5 - _ROOT / 10.0, 0.5, 0.5 + _ROOT / 10.0])
+_BASIS = np.linalg.inv(np.vander(_NODES, 3, increasing=True)).T / np.array([1.0, 2.0, 3.0])
+_TO_NODES = np.stack([c * (_BASIS @ np.array([1.0, c, c * c])) for c in _NODES])
+_WEIGHTS = _BASIS.sum(axis=1)
+
+# Work of one step: at the nodes, motion forward, left and turning, then velocity along x, y and turning.
+_AHEAD, _ASIDE, _TURN, _ALONG_X, _ALONG_Y, _TURNED = range(0, 18, 3)
+_WORK_SIZE = 18
+_SECONDS_PER_HOUR = 3600.0
+
+
+@compiled(inner=True)
+def _start(s: Floats, p: Floats, initial: Floats, run: int) -> None:
+    """Put the true pose into `s` that the camera reports as `initial`: what it changes is small, so fixed point."""
+    s[X], s[Y], s[HEADING] = initial[run, 0], initial[run, 1], initial[run, 2]
+    for _ in range(60):
+        _look(s, p)
+        x, y, heading = initial[run, 0] - s[SEEN_X], initial[run, 1] - s[SEEN_Y], initial[run, 2] - s[SEEN_HEADING]
+        s[X] += x
+        s[Y] += y
+        s[HEADING] += heading
+        if abs(x) + abs(y) + abs(heading) < 1e-14:
+            break
+
+
+@compiled(inner=True)
+def _look(s: Floats, p: Floats) -> None:
+    s[SEEN_X], s[SEEN_Y], s[SEEN_HEADING] = s[X], s[Y], s[HEADING]
+    see(s, p)
+
+
+@compiled(inner=True)
+def _report(s: Floats, p: Floats, out: Floats, k: int) -> None:
+    _look(s, p)
+    out[k, 0], out[k, 1], out[k, 2] = s[SEEN_X], s[SEEN_Y], s[SEEN_HEADING]
+
+
+@compiled(inner=True)
+def _obey(s: Floats, p: Floats, commands: Floats, settled: Floats, row: int) -> None:
+    """Put the command and what it aims at into `s`."""
+    s[DRIVE_COMMAND], s[FRONT_COMMAND], s[REAR_COMMAND] = commands[row, 0], commands[row, 1], commands[row, 2]
+    s[FRONT_AIM], s[REAR_AIM], s[SPEED_AIM] = settled[row, 0], settled[row, 1], settled[row, 2]
+    s[STEERING_LAG], s[STEERING_RATE], s[PLAY], s[ACCELERATE_LAG], s[BRAKE_LAG] = 0.0, math.inf, 0.0, 0.0, 0.0
+    aim(s, p)
+
+
+@compiled(inner=True, fast=True)
+def _motion(s: Floats, p: Floats, front_axle_m: float, rear_axle_m: float) -> None:
+    """Turn angles and speed in `s` into the body's motion (thesis eq. 5.6–5.8, corrected)."""
+    steer(s, p)
+    front, rear = s[FRONT], s[REAR]
+    if front != s[KNOWN_FRONT] or rear != s[KNOWN_REAR]:
+        s[KNOWN_FRONT], s[KNOWN_REAR] = front, rear
+        s[COS_FRONT], s[COS_REAR] = math.cos(front), math.cos(rear)
+        s[TAN_FRONT], s[TAN_REAR] = math.sin(front) / s[COS_FRONT], math.sin(rear) / s[COS_REAR]
+    s[FRONT_SPEED] = s[REAR_SPEED] = s[SPEED]
+    drive(s, p)
+    forward = 0.5 * (s[FRONT_SPEED] * s[COS_FRONT] + s[REAR_SPEED] * s[COS_REAR])
+    per_wheelbase = forward / (front_axle_m + rear_axle_m)
+    s[FORWARD] = forward
+    s[LEFT] = per_wheelbase * (front_axle_m * s[TAN_REAR] + rear_axle_m * s[TAN_FRONT])
+    s[YAW_RATE] = per_wheelbase * (s[TAN_FRONT] - s[TAN_REAR])
+    move(s, p)
+
+
+@compiled(inner=True, fast=True)
+def _step(
+    s: Floats, p: Floats, plan: Floats, work: Floats, geometry: Floats, begin: float, tau: float, length: float,
+    started_h: float, start: Floats,
+) -> None:  # fmt: skip
+    """Fill `work` for a step of `length` from `tau` after `begin`; `start` is the pose there and the distance."""
+    x_rate, y_rate = s[X_RATE], s[Y_RATE]
+    for i in range(3):
+        elapsed = _NODES[i] * length
+        actuate(plan, tau + elapsed, s)
+        s[TIME] = begin + tau + elapsed
+        s[HOURS] = started_h + s[TIME] / _SECONDS_PER_HOUR
+        # Good enough for what depends on the place: the velocity at the last node.
+        s[X], s[Y], s[HEADING] = start[0] + elapsed * x_rate, start[1] + elapsed * y_rate, start[2]
+        s[DISTANCE] = start[3] + elapsed * abs(s[SPEED])
+        _motion(s, p, geometry[0], geometry[1])
+        work[_AHEAD + i], work[_ASIDE + i], work[_TURN + i] = s[FORWARD], s[LEFT], s[YAW_RATE]
+    for i in range(3):
+        turned = 0.0
+        for j in range(3):
+            turned += _TO_NODES[i, j] * work[_TURN + j]
+        heading = start[2] + length * turned
+        cosine, sine = math.cos(heading), math.sin(heading)
+        s[HEADING] = heading
+        s[FORWARD], s[LEFT], s[YAW_RATE] = work[_AHEAD + i], work[_ASIDE + i], work[_TURN + i]
+        s[X_RATE] = cosine * s[FORWARD] - sine * s[LEFT]
+        s[Y_RATE] = sine * s[FORWARD] + cosine * s[LEFT]
+        drift(s, p)
+        work[_ALONG_X + i], work[_ALONG_Y + i], work[_TURNED + i] = s[X_RATE], s[Y_RATE], s[YAW_RATE]
+
+
+@compiled(inner=True, fast=True)
+def _frames(
+    s: Floats, p: Floats, work: Floats, start: Floats, now: float, length: float, t_s: Floats, out: Floats, k: int,
+    stop: int,
+) -> int:  # fmt: skip
+    """Report the frames captured in a step from `now`; return the next one."""
+    when = capture(s, t_s[k], p)
+    while when <= now + length:
+        elapsed = when - now
+        share = elapsed / length
+        x = y = heading = 0.0
+        for j in range(3):
+            weight = elapsed * (_BASIS[j, 0] + share * (_BASIS[j, 1] + share * _BASIS[j, 2]))
+            x += weight * work[_ALONG_X + j]
+            y += weight * work[_ALONG_Y + j]
+            heading += weight * work[_TURNED + j]
+        s[X], s[Y], s[HEADING] = start[0] + x, start[1] + y, start[2] + heading
+        _report(s, p, out, k)
+        k += 1
+        if k == stop:
+            break
+        when = capture(s, t_s[k], p)
+    return k
+
+
+@compiled(inner=True, fast=True)
+def _end_step(work: Floats, start: Floats, length: float) -> None:
+    ahead = 0.0
+    for j in range(3):
+        weight = _WEIGHTS[j] * length
+        start[0] += weight * work[_ALONG_X + j]
+        start[1] += weight * work[_ALONG_Y + j]
+        start[2] += weight * work[_TURNED + j]
+        ahead += weight * abs(work[_AHEAD + j])
+    start[3] += ahead
+
+
+@compiled(inner=True)
+def _wait(
+    s: Floats, p: Floats, start: Floats, until: float, t_s: Floats, out: Floats, k: int, stop: int
+) -> int:  # fmt: skip
+    """Report the pose at the start for every frame captured up to `until`; return the next one."""
+    while k < stop and capture(s, t_s[k], p) <= until:
+        s[X], s[Y], s[HEADING] = start[0], start[1], start[2]
+        _report(s, p, out, k)
+        k += 1
+    return k
+
+
+@compiled()
+def simulate(
+    geometry: Floats,
+    step_s: float,
+    p: Floats,
+    initial: Floats,
+    begins_s: Floats,
+    started_h: Floats,
+    commands: Floats,
+    settled: Floats,
+    command_t_s: Floats,
+    command_starts: Integers,
+    t_s: Floats,
+    starts: Integers,
+    chosen: Integers,
+    out: Floats,
+) -> None:
+    """Simulate the chosen runs of a batch.
+
+    Parameters
+    ----------
+    geometry
+        Distances of front and rear axle from the marker centroid.
+    step_s
+        Longest step.
+    p
+        Every effect's parameters.
+    initial
+        (runs, 4): the measured pose at the start, and the drive's speed there (NaN: what the commands before made it).
+    begins_s
+        (runs,): stamp of the measured pose at the start; NaN where the vehicle stands until its first command.
+    started_h
+        (runs,): when each run began, in hours since the session began.
+    commands, settled
+        (rows, 3): commands (drive, front, rear) from neutral; settled angles and speed (front, rear, drive).
+    command_t_s, command_starts
+        (rows,), (runs + 1,): when each command was given, the first of a run at −∞; where each run's rows begin.
+    t_s, starts
+        (frames,), (runs + 1,): stamps asked for, and where each run's begin.
+    chosen
+        Runs to simulate.
+    out
+        (frames, 3): receives x, y, heading.
+    """
+    s, plan, work = np.zeros(SIZE), np.zeros(PLAN_SIZE), np.zeros(_WORK_SIZE)
+    servos, start = np.zeros(5), np.zeros(4)
+    s[KNOWN_FRONT] = math.nan
+    for run in chosen:
+        k, stop = starts[run], starts[run + 1]
+        if k == stop:
+            continue
+        first, last = command_starts[run], command_starts[run + 1] - 1
+        s[X_RATE] = s[Y_RATE] = 0.0
+        _start(s, p, initial, run)
+        start[0], start[1], start[2], start[3] = s[X], s[Y], s[HEADING], 0.0
+        if math.isnan(begins_s[run]):
+            begin = arrive(s, command_t_s[first + 1], p)
+        else:
+            begin = capture(s, begins_s[run], p)
+        k = _wait(s, p, start, begin, t_s, out, k, stop)
+        _obey(s, p, commands, settled, first)
+        servos[0] = servos[2] = s[FRONT_AIM]
+        servos[1] = servos[3] = s[REAR_AIM]
+        servos[4] = 0.0
+        for row in range(first, last + 1):
+            if k == stop:
+                break
+            now = arrive(s, command_t_s[row], p) if row > first else -math.inf
+            end = arrive(s, command_t_s[row + 1], p) if row < last else math.inf
+            if row == first:
+                # At rest at neutral, for as long as it may have been.
+                now = min(begin, end)
+            _obey(s, p, commands, settled, row)
+            if now < begin:
+                until = min(begin, end)
+                plan_command(plan, s, servos)
+                leave_command(plan, until - now, servos)
+                now = until
+            if now >= end:
+                continue
+            if now == begin and not math.isnan(initial[run, 3]):
+                servos[4] = initial[run, 3]
+            plan_command(plan, s, servos)
+            tau, duration = 0.0, end - now
+            while tau < duration and k < stop:
+                length = step_length(plan, tau, step_s)
+                is_last = length > duration - tau - 1e-12
+                if is_last:
+                    length = duration - tau
+                _step(s, p, plan, work, geometry, now, tau, length, started_h[run], start)
+                k = _frames(s, p, work, start, now + tau, length, t_s, out, k, stop)
+                _end_step(work, start, length)
+                tau += length
+                if is_last:
+                    break
+            if row < last:
+                leave_command(plan, duration, servos)

@@ -1,0 +1,51 @@
+"""The stages of a vehicle without effects: none does anything.
+
+`agvbench.model.simulation_compose` puts the hooks of all effects in the place of these functions.
+"""
+
+from __future__ import annotations
+
+from agvbench.model.compiled import compiled
+from agvbench.types import Floats
+
+
+@compiled(inner=True)
+def arrive(s: Floats, time_s: float, p: Floats) -> float:
+    """Return when a command given at `time_s` takes effect."""
+    return time_s
+
+
+@compiled(inner=True)
+def aim(s: Floats, p: Floats) -> None:
+    """Change what a command makes the actuators aim at, and how they get there."""
+
+
+@compiled(inner=True)
+def steer(s: Floats, p: Floats) -> None:
+    """Change the axles' angles."""
+
+
+@compiled(inner=True)
+def drive(s: Floats, p: Floats) -> None:
+    """Change the axles' speeds."""
+
+
+@compiled(inner=True)
+def move(s: Floats, p: Floats) -> None:
+    """Change the body's motion."""
+
+
+@compiled(inner=True)
+def drift(s: Floats, p: Floats) -> None:
+    """Change the velocity in the floor frame."""
+
+
+@compiled(inner=True)
+def capture(s: Floats, time_s: float, p: Floats) -> float:
+    """Return when the pose stamped `time_s` was true."""
+    return time_s
+
+
+@compiled(inner=True)
+def see(s: Floats, p: Floats) -> None:
+    """Change the pose that the camera reports."""
