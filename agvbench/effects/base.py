@@ -97,6 +97,9 @@ class Effect:
         Where the equation comes from.
     limits
         Where the equation stops to hold, or what cannot be told apart from it.
+    local
+        Whether its hooks change over short times or ways, when the actuators rest (with place, time, distance): the
+        simulation then keeps its steps short.
     arrive
         ``arrive(state, time_s, …) -> time_s``: when a command given at `time_s` takes effect.
     aim
@@ -122,6 +125,7 @@ class Effect:
     reference: ClassVar[str]
     limits: ClassVar[str]
 
+    local: ClassVar[bool] = False
     arrive: ClassVar[Hook | None] = None
     aim: ClassVar[Hook | None] = None
     steer: ClassVar[Hook | None] = None

@@ -30,5 +30,6 @@ class WheelDiameterMismatch(Effect):
     @staticmethod
     def move(state: Floats, curvature_per_m: float) -> None:
         """Add the curvature to the path of the centroid, forward and backward alike."""
-        speed = math.copysign(math.hypot(state[FORWARD], state[LEFT]), state[FORWARD])
-        state[YAW_RATE] += curvature_per_m * speed
+        if curvature_per_m != 0.0:
+            speed = math.copysign(math.hypot(state[FORWARD], state[LEFT]), state[FORWARD])
+            state[YAW_RATE] += curvature_per_m * speed

@@ -30,7 +30,7 @@ from agvbench.vehicle.geometry import Geometry
 Integers = NDArray[np.int64]
 Map = Callable[[Floats], ArrayLike]
 
-STEP_S = 0.05
+STEP_S = 0.025
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class Simulation:
     runs
         At least one.
     step_s
-        Longest step [s].
+        Longest step [s] while an effect is `local`; else steps are as long as the motion allows.
     kinds
         Further effects than those of the registry, say empirical terms: classes in a module of their own.
 
@@ -143,6 +143,7 @@ class Simulation:
         self._command_t_s = np.concatenate([[-np.inf, *run.commands.t_s] for run in runs])
         self._started_h = np.array([run.started_h for run in runs], dtype=np.float64)
         self._begins_s = np.array([np.nan if run.begins_s is None else run.begins_s for run in runs])
+        self._local = np.array([kind.local for kind in self.kinds for _ in kind.parameters()])
         self._all_runs = np.arange(len(runs))
         self._kernel = kernel(self.kinds)
 
@@ -216,8 +217,7 @@ class Simulation:
         """
         poses = np.full((len(self.t_s), 3), np.nan) if out is None else out
         self._kernel(
-            np.array([self.geometry.front_axle_m, self.geometry.rear_axle_m]),
-            self.step_s,
+            np.array([self.geometry.front_axle_m, self.geometry.rear_axle_m, self._longest_step(parameters), 0.0]),
             np.ascontiguousarray(parameters, dtype=np.float64),
             np.ascontiguousarray(initial, dtype=np.float64),
             self._begins_s,
@@ -262,6 +262,9 @@ class Simulation:
         from agvbench.model.simulation_slopes import slopes
 
         return slopes(self, settled, parameters, initial, directions, self.indices(*effects), initial_state)
+
+    def _longest_step(self, parameters: Floats) -> float:
+        return self.step_s if np.any(parameters[self._local] != self.nulls[self._local]) else np.inf
 
     def split(self, frames: Floats) -> list[Floats]:
         """Return an array over all frames as one per run."""

@@ -1,3 +1,4 @@
+# mypy: warn-return-any=False
 """Servos and drive while one command is in force, in closed form.
 
 A servo obeys δ̇ = (aim − δ) / lag within ± rate: it ramps as long as the lag asks for more than the rate, and then its
@@ -37,7 +38,9 @@ PLAN_SIZE = _EVENTS + _EVENT_COUNT
 # What is left of a gap [rad, m/s] when it counts as settled.
 _SETTLED = 1e-9
 # How long a step may be in time constants: at first, and per time constant that has passed.
-_FIRST_STEP, _STEP_GROWTH = 1.0, 0.2
+_FIRST_STEP, _STEP_GROWTH = 0.5, 0.15
+# The longest step while a servo ramps, and how close to a kink counts as there [s].
+_RAMP_STEP_S, _TOGETHER = 0.05, 1e-12
 
 
 @compiled(inner=True)
@@ -145,23 +148,24 @@ def leave_command(plan: Floats, tau: float, servos: Floats) -> None:
 
 
 @compiled(inner=True)
-def _within(step_s: float, lag: float, since: float) -> float:
-    return min(step_s, _FIRST_STEP * lag + _STEP_GROWTH * max(0.0, since)) if lag > 0.0 else step_s
+def _within(longest: float, lag: float, since: float) -> float:
+    return min(longest, _FIRST_STEP * lag + _STEP_GROWTH * max(0.0, since)) if lag > 0.0 else longest
 
 
 @compiled(inner=True)
-def step_length(plan: Floats, tau: float, step_s: float) -> float:
+def step_length(plan: Floats, tau: float, longest: float) -> float:
     """Return how long a step from `tau` may be: to the next kink at most, and short while a lag is under way."""
-    step = step_s
-    if tau < plan[_FRONT + _SETTLED_S] and tau >= plan[_FRONT + _RAMPED_S]:
-        step = _within(step, plan[_LAG], tau - plan[_FRONT + _RAMPED_S])
-    if tau < plan[_REAR + _SETTLED_S] and tau >= plan[_REAR + _RAMPED_S]:
-        step = _within(step, plan[_LAG], tau - plan[_REAR + _RAMPED_S])
+    step = longest
+    for servo in (_FRONT, _REAR):
+        if tau < plan[servo + _RAMPED_S]:
+            step = min(step, _RAMP_STEP_S)
+        elif tau < plan[servo + _SETTLED_S]:
+            step = _within(step, plan[_LAG], tau - plan[servo + _RAMPED_S])
     if tau < plan[_DRIVE_SETTLED_S]:
         rests = plan[_RESTS_S]
         step = _within(step, plan[_FIRST_LAG], tau) if tau < rests else _within(step, plan[_SECOND_LAG], tau - rests)
     for i in range(_EVENT_COUNT):
         to_event = plan[_EVENTS + i] - tau
-        if 1e-12 < to_event < step:
+        if _TOGETHER < to_event < step:
             step = to_event
     return step

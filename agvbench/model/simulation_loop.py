@@ -1,7 +1,7 @@
 """The general simulation's loop over runs, commands and steps, from command to measured pose.
 
 Steps end where a command takes effect and where the actuators' way has a kink, so that nothing in a step jumps. In a
-step the motion is taken at the three Gauss–Legendre nodes; heading and position follow by collocation (Hairer,
+step the motion is taken at the four Gauss–Legendre nodes; heading and position follow by collocation (Hairer,
 Nørsett and Wanner 1993, section II.7), and frames are read off its polynomial.
 
 The stages imported here do nothing. The simulation runs this file's text with the effects' hooks in their place; see
@@ -62,17 +62,23 @@ from agvbench.types import Floats
 Integers = NDArray[np.int64]
 
 # Gauss–Legendre nodes on [0, 1]; ∫₀^c of the polynomial through values at the nodes is the values times
-# c (BASIS[j, 0] + c BASIS[j, 1] + c² BASIS[j, 2]).
-_ROOT = math.sqrt(15.0)
-_NODES = np.array([0.5 - _ROOT / 10.0, 0.5, 0.5 + _ROOT / 10.0])
-_BASIS = np.linalg.inv(np.vander(_NODES, 3, increasing=True)).T / np.array([1.0, 2.0, 3.0])
-_TO_NODES = np.stack([c * (_BASIS @ np.array([1.0, c, c * c])) for c in _NODES])
+# c (BASIS[j, 0] + c BASIS[j, 1] + …).
+_COUNT = 4
+_NODES = 0.5 + 0.5 * np.polynomial.legendre.leggauss(_COUNT)[0]
+_BASIS = np.linalg.inv(np.vander(_NODES, _COUNT, increasing=True)).T / np.arange(1.0, _COUNT + 1.0)
+_TO_NODES = np.stack([c * (_BASIS @ c ** np.arange(_COUNT)) for c in _NODES])
 _WEIGHTS = _BASIS.sum(axis=1)
 
 # Work of one step: at the nodes, motion forward, left and turning, then velocity along x, y and turning.
-_AHEAD, _ASIDE, _TURN, _ALONG_X, _ALONG_Y, _TURNED = range(0, 18, 3)
-_WORK_SIZE = 18
+_AHEAD, _ASIDE, _TURN, _ALONG_X, _ALONG_Y, _TURNED = range(0, 6 * _COUNT, _COUNT)
+_WORK_SIZE = 6 * _COUNT
 _SECONDS_PER_HOUR = 3600.0
+
+# Numbers of the vehicle: axles, longest step, and when the run began, in hours.
+_FRONT_AXLE, _REAR_AXLE, _STEP, _STARTED = range(4)
+# The first step of a command, whose turn is not known yet [s]; how far a later one may turn [rad, and s at most 1].
+_FIRST_STEP_S, _TURN_PER_STEP = 0.05, 0.15
+_TOGETHER = 1e-12
 
 
 @compiled(inner=True)
@@ -131,24 +137,24 @@ def _motion(s: Floats, p: Floats, front_axle_m: float, rear_axle_m: float) -> No
 
 @compiled(inner=True, fast=True)
 def _step(
-    s: Floats, p: Floats, plan: Floats, work: Floats, geometry: Floats, begin: float, tau: float, length: float,
-    started_h: float, start: Floats,
+    s: Floats, p: Floats, plan: Floats, work: Floats, vehicle: Floats, begin: float, tau: float, length: float,
+    start: Floats,
 ) -> None:  # fmt: skip
     """Fill `work` for a step of `length` from `tau` after `begin`; `start` is the pose there and the distance."""
     x_rate, y_rate = s[X_RATE], s[Y_RATE]
-    for i in range(3):
+    for i in range(_COUNT):
         elapsed = _NODES[i] * length
         actuate(plan, tau + elapsed, s)
         s[TIME] = begin + tau + elapsed
-        s[HOURS] = started_h + s[TIME] / _SECONDS_PER_HOUR
+        s[HOURS] = vehicle[_STARTED] + s[TIME] / _SECONDS_PER_HOUR
         # Good enough for what depends on the place: the velocity at the last node.
         s[X], s[Y], s[HEADING] = start[0] + elapsed * x_rate, start[1] + elapsed * y_rate, start[2]
         s[DISTANCE] = start[3] + elapsed * abs(s[SPEED])
-        _motion(s, p, geometry[0], geometry[1])
+        _motion(s, p, vehicle[_FRONT_AXLE], vehicle[_REAR_AXLE])
         work[_AHEAD + i], work[_ASIDE + i], work[_TURN + i] = s[FORWARD], s[LEFT], s[YAW_RATE]
-    for i in range(3):
+    for i in range(_COUNT):
         turned = 0.0
-        for j in range(3):
+        for j in range(_COUNT):
             turned += _TO_NODES[i, j] * work[_TURN + j]
         heading = start[2] + length * turned
         cosine, sine = math.cos(heading), math.sin(heading)
@@ -171,8 +177,8 @@ def _frames(
         elapsed = when - now
         share = elapsed / length
         x = y = heading = 0.0
-        for j in range(3):
-            weight = elapsed * (_BASIS[j, 0] + share * (_BASIS[j, 1] + share * _BASIS[j, 2]))
+        for j in range(_COUNT):
+            weight = elapsed * (_BASIS[j, 0] + share * (_BASIS[j, 1] + share * (_BASIS[j, 2] + share * _BASIS[j, 3])))
             x += weight * work[_ALONG_X + j]
             y += weight * work[_ALONG_Y + j]
             heading += weight * work[_TURNED + j]
@@ -188,7 +194,7 @@ def _frames(
 @compiled(inner=True, fast=True)
 def _end_step(work: Floats, start: Floats, length: float) -> None:
     ahead = 0.0
-    for j in range(3):
+    for j in range(_COUNT):
         weight = _WEIGHTS[j] * length
         start[0] += weight * work[_ALONG_X + j]
         start[1] += weight * work[_ALONG_Y + j]
@@ -198,9 +204,7 @@ def _end_step(work: Floats, start: Floats, length: float) -> None:
 
 
 @compiled(inner=True)
-def _wait(
-    s: Floats, p: Floats, start: Floats, until: float, t_s: Floats, out: Floats, k: int, stop: int
-) -> int:  # fmt: skip
+def _wait(s: Floats, p: Floats, start: Floats, until: float, t_s: Floats, out: Floats, k: int, stop: int) -> int:
     """Report the pose at the start for every frame captured up to `until`; return the next one."""
     while k < stop and capture(s, t_s[k], p) <= until:
         s[X], s[Y], s[HEADING] = start[0], start[1], start[2]
@@ -209,10 +213,90 @@ def _wait(
     return k
 
 
+@compiled(inner=True)
+def _hold(
+    s: Floats,
+    p: Floats,
+    plan: Floats,
+    work: Floats,
+    vehicle: Floats,
+    begin: float,
+    duration: float,
+    start: Floats,
+    t_s: Floats,
+    out: Floats,
+    k: int,
+    stop: int,
+) -> int:
+    """Drive one command for `duration` seconds, or to the last frame; return the next frame."""
+    tau, longest = 0.0, min(vehicle[_STEP], _FIRST_STEP_S)
+    while tau < duration and k < stop:
+        length = step_length(plan, tau, longest)
+        is_last = length > duration - tau - _TOGETHER
+        if is_last:
+            length = duration - tau
+        _step(s, p, plan, work, vehicle, begin, tau, length, start)
+        k = _frames(s, p, work, start, begin + tau, length, t_s, out, k, stop)
+        _end_step(work, start, length)
+        if is_last:
+            break
+        tau += length
+        longest = min(vehicle[_STEP], _TURN_PER_STEP / max(abs(work[_TURN + _COUNT - 1]), _TURN_PER_STEP))
+    return k
+
+
+@compiled(inner=True)
+def _drive_run(
+    s: Floats,
+    p: Floats,
+    plan: Floats,
+    work: Floats,
+    vehicle: Floats,
+    begin: float,
+    speed: float,
+    commands: Floats,
+    settled: Floats,
+    command_t_s: Floats,
+    first: int,
+    last: int,
+    start: Floats,
+    servos: Floats,
+    t_s: Floats,
+    out: Floats,
+    k: int,
+    stop: int,
+) -> None:
+    """Drive one run, whose pose is held until `begin`; actuators obey what comes before."""
+    now = -math.inf
+    for row in range(first, last + 1):
+        end = arrive(s, command_t_s[row + 1], p) if row < last else math.inf
+        _obey(s, p, commands, settled, row)
+        if row == first:
+            # At rest at neutral, for as long as it may have been.
+            servos[0] = servos[2] = s[FRONT_AIM]
+            servos[1] = servos[3] = s[REAR_AIM]
+            servos[4] = 0.0
+            now = min(begin, end)
+        elif now < begin:
+            until = min(begin, end)
+            plan_command(plan, s, servos)
+            leave_command(plan, until - now, servos)
+            now = until
+        if now >= end:
+            continue
+        if now == begin and not math.isnan(speed):
+            servos[4] = speed
+        plan_command(plan, s, servos)
+        k = _hold(s, p, plan, work, vehicle, now, end - now, start, t_s, out, k, stop)
+        if k == stop:
+            break
+        leave_command(plan, end - now, servos)
+        now = end
+
+
 @compiled()
 def simulate(
-    geometry: Floats,
-    step_s: float,
+    vehicle: Floats,
     p: Floats,
     initial: Floats,
     begins_s: Floats,
@@ -230,10 +314,8 @@ def simulate(
 
     Parameters
     ----------
-    geometry
-        Distances of front and rear axle from the marker centroid.
-    step_s
-        Longest step.
+    vehicle
+        (4,): distances of front and rear axle from the marker centroid, longest step; the last is for the loop.
     p
         Every effect's parameters.
     initial
@@ -261,48 +343,17 @@ def simulate(
         if k == stop:
             continue
         first, last = command_starts[run], command_starts[run + 1] - 1
+        vehicle[_STARTED] = started_h[run]
         s[X_RATE] = s[Y_RATE] = 0.0
         _start(s, p, initial, run)
         start[0], start[1], start[2], start[3] = s[X], s[Y], s[HEADING], 0.0
-        if math.isnan(begins_s[run]):
-            begin = arrive(s, command_t_s[first + 1], p)
-        else:
+        begin = arrive(s, command_t_s[first + 1], p)
+        if not math.isnan(begins_s[run]):
             begin = capture(s, begins_s[run], p)
         k = _wait(s, p, start, begin, t_s, out, k, stop)
-        _obey(s, p, commands, settled, first)
-        servos[0] = servos[2] = s[FRONT_AIM]
-        servos[1] = servos[3] = s[REAR_AIM]
-        servos[4] = 0.0
-        for row in range(first, last + 1):
-            if k == stop:
-                break
-            now = arrive(s, command_t_s[row], p) if row > first else -math.inf
-            end = arrive(s, command_t_s[row + 1], p) if row < last else math.inf
-            if row == first:
-                # At rest at neutral, for as long as it may have been.
-                now = min(begin, end)
-            _obey(s, p, commands, settled, row)
-            if now < begin:
-                until = min(begin, end)
-                plan_command(plan, s, servos)
-                leave_command(plan, until - now, servos)
-                now = until
-            if now >= end:
-                continue
-            if now == begin and not math.isnan(initial[run, 3]):
-                servos[4] = initial[run, 3]
-            plan_command(plan, s, servos)
-            tau, duration = 0.0, end - now
-            while tau < duration and k < stop:
-                length = step_length(plan, tau, step_s)
-                is_last = length > duration - tau - 1e-12
-                if is_last:
-                    length = duration - tau
-                _step(s, p, plan, work, geometry, now, tau, length, started_h[run], start)
-                k = _frames(s, p, work, start, now + tau, length, t_s, out, k, stop)
-                _end_step(work, start, length)
-                tau += length
-                if is_last:
-                    break
-            if row < last:
-                leave_command(plan, duration, servos)
+        speed = initial[run, 3]
+        if k < stop:
+            _drive_run(
+                s, p, plan, work, vehicle, begin, speed, commands, settled, command_t_s, first, last, start, servos,
+                t_s, out, k, stop,
+            )  # fmt: skip
