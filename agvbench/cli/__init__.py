@@ -25,6 +25,14 @@ shell completion: eval "$(register-python-argcomplete agvbench)"
 """
 
 
+class _CommandList(argparse.RawDescriptionHelpFormatter):
+    """Leaves room for the longest command's name: argparse forgets that commands are indented."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, max_help_position=16)
+        self._action_max_length = 14
+
+
 def _commands() -> dict[str, ModuleType]:
     names = sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_"))
     return {name.removesuffix("_"): importlib.import_module(f"{__name__}.{name}") for name in names}
@@ -36,7 +44,7 @@ def build_parser() -> argparse.ArgumentParser:
         prog="agvbench",
         description="Does the vehicle do what it is told, what does calibration buy, and what does the model not know?",
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=_CommandList,
     )
     parser.add_argument("--version", action="version", version=f"agvbench {__version__}")
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)

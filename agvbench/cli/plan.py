@@ -1,5 +1,6 @@
 """Show what trajectories mean for a vehicle: commands, time, floor and target. Nothing drives.
 
+examples:
   agvbench plan                              all trajectories, for the thesis' vehicle
   agvbench plan 5 7 --vehicle vehicle.toml   two of the eight, for yours
   agvbench plan my_turn.toml --commands      the timed commands, as CSV
