@@ -1,0 +1,68 @@
+"""Plants that hide an effect: for blind trials of a diagnosis.
+
+Every name of the catalogue is a factory for the command line, and so is every pair:
+``--plant agvbench.simulator.hidden:steering_lag``, ``…:steering_lag_and_lateral_slip``, ``…:nothing``.
+``…:make_plant`` draws one by its seed.
+
+Examples
+--------
+>>> from agvbench.simulator import load_plant
+>>> plant = load_plant("agvbench.simulator.hidden:nothing")(seed=1)
+>>> plant.reset((0.0, 0.0, 0.0), seed=2)
+>>> x, y, heading = plant.advance(900.0, 1500.0, 1500.0, 1.0)
+>>> 0.2 < x < 0.4
+True
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from agvbench.errors import PlantError
+from agvbench.simulator.hidden.catalogue import CATALOGUE, NOTHING, recipes
+from agvbench.simulator.hidden.drawing import drawn_spec, factory, make_hidden_plant
+from agvbench.simulator.hidden.plant import HiddenPlant
+from agvbench.simulator.hidden.rivals import true_rivals
+from agvbench.simulator.hidden.separation import Bench, Separation, separation
+from agvbench.simulator.hidden.truth import HiddenEffect, SealedTruth
+from agvbench.simulator.hidden.vehicle import BaseVehicle, draw_vehicle
+
+__all__ = [
+    "CATALOGUE",
+    "BaseVehicle",
+    "Bench",
+    "HiddenEffect",
+    "HiddenPlant",
+    "SealedTruth",
+    "Separation",
+    "draw_vehicle",
+    "make_hidden_plant",
+    "make_plant",
+    "sealed_truth",
+    "separation",
+    "true_rivals",
+]
+
+
+def make_plant(seed: int) -> HiddenPlant:
+    """Return a plant that hides what its seed draws: nothing, one effect or two."""
+    return make_hidden_plant(drawn_spec(seed), seed)
+
+
+def sealed_truth(spec: str, seed: int) -> SealedTruth:
+    """Return what the plant of a specification and seed hides; for scoring."""
+    return make_hidden_plant(spec, seed).sealed_truth()
+
+
+def __getattr__(name: str) -> Callable[[int], HiddenPlant]:
+    """Return the factory of a name or of a pair of names."""
+    try:
+        recipes(name)
+    except PlantError:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}") from None
+    return factory(name)
+
+
+def __dir__() -> list[str]:
+    """Return what can be asked for: the error for a misspelt plant looks here."""
+    return sorted([*__all__, NOTHING, *CATALOGUE])

@@ -1,0 +1,96 @@
+# mypy: warn-return-any=False
+"""Wheels, body and floor, compiled: from axle angles and wheel speed to the motion of the vehicle."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from agvbench.simulator.hidden.constants import (
+    AXLE_RATIO,
+    DRIFT,
+    DRIFT_DIRECTION,
+    DRIFT_SHARE,
+    FRONT_AXLE,
+    FRONT_FROM_REAR,
+    LOSS_SQUARE,
+    LOSS_TANGENT,
+    NAP,
+    NAP_DIRECTION,
+    PATCH_LOSS,
+    PATCH_RADIUS,
+    PATCH_X,
+    PATCH_Y,
+    REAR_AXLE,
+    REAR_FROM_FRONT,
+    REVERSE_GAIN,
+    RUNOUT,
+    RUNOUT_PERIOD,
+    RUNOUT_PHASE,
+    RUNOUT_TRACK,
+    SLIP_LINEAR,
+    SLIP_SQUARE,
+    TORQUE_STEER,
+    WARM_GAIN,
+    WARM_HOURS,
+    WHEEL_CURVATURE,
+)  # fmt: skip
+from agvbench.types import Floats
+
+MOVES_MPS = 0.002
+"""A vehicle slower than this stands, as far as the floor is concerned."""
+_HOUR_S = 3600.0
+
+
+@njit(cache=True)
+def wheels(p: Floats, front: float, rear: float, speed: float, session_s: float) -> tuple[float, float]:
+    """Return the wheels' angles [rad] for the axles' angles: what the linkage makes of them."""
+    warm = 1.0 + p[WARM_GAIN] * (1.0 - math.exp(-session_s / (_HOUR_S * p[WARM_HOURS])))
+    front, rear = warm * front, warm * rear
+    front, rear = front + p[FRONT_FROM_REAR] * rear, rear + p[REAR_FROM_FRONT] * front
+    if speed < 0.0:
+        return (1.0 + p[REVERSE_GAIN]) * front - p[TORQUE_STEER], (1.0 + p[REVERSE_GAIN]) * rear
+    return front + p[TORQUE_STEER], rear
+
+
+@njit(cache=True)
+def _grip(p: Floats, x: float, y: float, heading: float, front: float, rear: float) -> float:
+    """Return the share of the wheel speed that place, heading and steering leave."""
+    left = 1.0 - p[LOSS_TANGENT] * (abs(math.tan(front)) + abs(math.tan(rear)))
+    left -= p[LOSS_SQUARE] * (front * front + rear * rear)
+    left *= 1.0 + p[NAP] * math.cos(heading - p[NAP_DIRECTION])
+    if (x - p[PATCH_X]) ** 2 + (y - p[PATCH_Y]) ** 2 < p[PATCH_RADIUS] ** 2:
+        left *= 1.0 - p[PATCH_LOSS]
+    return left
+
+
+@njit(cache=True)
+def motion(
+    p: Floats, x: float, y: float, heading: float, rolled: float, front: float, rear: float, speed: float
+) -> tuple[float, float, float, float]:
+    """Return the time derivatives of x, y, heading and of the distance that the wheels have rolled.
+
+    No axle moves sideways: ``V + lf r = U tan δf`` and ``V − lr r = U tan δr`` with U ahead, V to the left, r the yaw
+    rate; U is the mean of what both axles' wheels give along the body.
+    """
+    lf, lr = p[FRONT_AXLE], p[REAR_AXLE]
+    tan_front, tan_rear = math.tan(front), math.tan(rear)
+    left_of_speed = _grip(p, x, y, heading, front, rear)
+    ahead = 0.5 * speed * left_of_speed * (math.cos(front) + (1.0 + p[AXLE_RATIO]) * math.cos(rear))
+    aside = ahead * (lr * tan_front + lf * tan_rear) / (lf + lr)
+    path_speed = math.copysign(math.hypot(ahead, aside), ahead)
+    fast = abs(path_speed)
+    turn = ahead * (tan_front - tan_rear) / (lf + lr)
+    turn = turn / (1.0 + p[SLIP_SQUARE] * fast * fast + p[SLIP_LINEAR] * fast) + p[WHEEL_CURVATURE] * path_speed
+    uneven = p[RUNOUT] * math.sin(2.0 * math.pi * rolled / p[RUNOUT_PERIOD] + p[RUNOUT_PHASE])
+    turn -= uneven / p[RUNOUT_TRACK] * ahead
+    ahead += 0.5 * uneven * ahead
+    drift = p[DRIFT_SHARE] * fast + (p[DRIFT] if fast > MOVES_MPS else 0.0)
+    c, s = math.cos(heading), math.sin(heading)
+    return (
+        c * ahead - s * aside + drift * math.cos(p[DRIFT_DIRECTION]),
+        s * ahead + c * aside + drift * math.sin(p[DRIFT_DIRECTION]),
+        turn,
+        abs(speed),
+    )

@@ -1,0 +1,264 @@
+# mypy: warn-return-any=False
+"""The integrator of hidden plants, compiled: classical Runge-Kutta on a grid that begins anew with every command.
+
+Steps end at grid points and whenever a command takes effect. A call that ends inside a step returns a partial step
+from its start and throws it away: how the time is split changes a result by rounding only.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from agvbench.simulator.hidden import _actuators as actuators
+from agvbench.simulator.hidden import _body as body
+from agvbench.simulator.hidden import _sight as sight
+from agvbench.simulator.hidden.constants import (
+    COMMAND_HIGH,
+    COMMAND_LOW,
+    DELAY_S,
+    DRIVE_DELAY_SHARE,
+    LATENCY_S,
+    NEUTRAL,
+    SEAM_DIRECTION,
+    SEAM_KICK,
+    SEAM_PLACE,
+    SHORTFALL,
+    SMOOTHING_S,
+    STICK_S,
+    STICK_TWIST,
+)  # fmt: skip
+from agvbench.types import Floats
+
+STEP_S = 1.0 / 600.0
+_ROUNDING_S = 1e-10
+
+# The state of a run; SESSION goes on from run to run, and so does ROLLED.
+(
+    X, Y, HEADING, ROLLED, CLOCK, GRID, SESSION,
+    DRIVE, FRONT, REAR, AIM_WHEEL, AIM_FRONT, AIM_REAR,
+    SERVO_FRONT, RATE_FRONT, SERVO_REAR, RATE_REAR, AXLE_FRONT, AXLE_REAR, WHEEL,
+    STARTED, MOVING, SMOOTH_X, SMOOTH_Y, SMOOTH_HEADING, ASKED_DRIVE, ASKED_FRONT, ASKED_REAR,
+) = range(28)  # fmt: skip
+STATE_SIZE = 28
+PLAY_FRONT, PLAY_REAR, PLAY_SPEED = range(3)
+
+# Commands on their way: a ring of (when, which, value), which = 0 drive, 1 front, 2 rear.
+RING = 256
+# Poses passed: a ring of (when, x, y, heading).
+PAST = 2048
+
+
+@njit(cache=True)
+def begin(p: Floats, state: Floats, past: Floats, marks: np.ndarray, pose: tuple[float, float, float]) -> None:
+    """Put the vehicle at rest where the camera sees it at `pose`."""
+    session, rolled = state[SESSION], state[ROLLED]
+    state[:] = 0.0
+    state[SESSION], state[ROLLED] = session, rolled
+    state[X], state[Y], state[HEADING] = sight.unseen(p, pose[0], pose[1], pose[2])
+    state[SMOOTH_X], state[SMOOTH_Y], state[SMOOTH_HEADING] = pose
+    state[DRIVE] = state[FRONT] = state[REAR] = p[NEUTRAL]
+    state[ASKED_DRIVE] = state[ASKED_FRONT] = state[ASKED_REAR] = p[NEUTRAL]
+    state[AIM_FRONT] = state[SERVO_FRONT] = state[AXLE_FRONT] = actuators.front_aim(p, p[NEUTRAL])
+    state[AIM_REAR] = state[SERVO_REAR] = state[AXLE_REAR] = actuators.rear_aim(p, p[NEUTRAL])
+    state[GRID] = STEP_S
+    marks[:] = 0
+    past[0, 0], past[0, 1], past[0, 2], past[0, 3] = 0.0, state[X], state[Y], state[HEADING]
+    marks[2] = 1
+
+
+@njit(cache=True)
+def _ask(p: Floats, state: Floats, ring: Floats, marks: np.ndarray, which: int, value: float) -> None:
+    """Send a changed command on its way."""
+    value = actuators.clip(value, p[COMMAND_LOW], p[COMMAND_HIGH])
+    if value == state[ASKED_DRIVE + which]:
+        return
+    state[ASKED_DRIVE + which] = value
+    share = p[DRIVE_DELAY_SHARE] if which == 0 else 1.0
+    at = marks[1] % RING
+    ring[at, 0], ring[at, 1], ring[at, 2] = state[CLOCK] + share * p[DELAY_S], which, value
+    marks[1] += 1
+
+
+@njit(cache=True)
+def _latch(p: Floats, state: Floats, which: int, value: float) -> None:
+    """Let a command that has arrived take effect."""
+    state[DRIVE + which] = value
+    if which == 0:
+        state[AIM_WHEEL] = actuators.wheel_aim(p, value)
+        return
+    aim = actuators.front_aim(p, value) if which == 1 else actuators.rear_aim(p, value)
+    state[AIM_WHEEL + which] = aim - p[SHORTFALL] * (aim - state[AIM_WHEEL + which])
+
+
+@njit(cache=True)
+def _next_arrival(ring: Floats, marks: np.ndarray) -> int:
+    """Return where in the ring the earliest command on its way lies, or -1; taken ones are marked by -1."""
+    best, when = -1, math.inf
+    while marks[0] < marks[1] and ring[marks[0] % RING, 1] < 0.0:
+        marks[0] += 1
+    for i in range(marks[0], marks[1]):
+        if ring[i % RING, 1] >= 0.0 and ring[i % RING, 0] < when:
+            best, when = i % RING, ring[i % RING, 0]
+    return best
+
+
+@njit(cache=True)
+def _rates(
+    p: Floats, state: Floats, play: Floats, at: tuple[float, float, float, float], front: float, rear: float,
+    speed: float, t: float,
+) -> tuple[float, float, float, float]:  # fmt: skip
+    """Return the derivatives of x, y, heading and rolled distance at `at`, `t` seconds into the step."""
+    since = state[CLOCK] + t - state[STARTED]
+    if since < p[STICK_S] and abs(speed) > body.MOVES_MPS:
+        return 0.0, 0.0, math.copysign(p[STICK_TWIST] / p[STICK_S], speed), abs(speed)
+    front, rear = body.wheels(p, front + play[PLAY_FRONT], rear + play[PLAY_REAR], speed, state[SESSION])
+    return body.motion(p, at[0], at[1], at[2], at[3], front, rear, speed)
+
+
+@njit(cache=True)
+def _step(p: Floats, state: Floats, play: Floats, dt: float, out: Floats) -> None:
+    """Write the state `dt` later into `out`."""
+    out[:] = state
+    h = 0.5 * dt
+    driven = state[CLOCK] - state[STARTED] if state[MOVING] > 0.0 else 0.0
+    aim = state[AIM_WHEEL] * actuators.supply(p, state[SESSION], driven) * (1.0 + play[PLAY_SPEED])
+    w0 = actuators.wheel(p, aim, state[WHEEL], 0.0)
+    w1 = actuators.wheel(p, aim, state[WHEEL], h)
+    w2 = actuators.wheel(p, aim, w1, h)
+    f0, _ = actuators.servo(p, state[AIM_FRONT], state[SERVO_FRONT], state[RATE_FRONT], 0.0)
+    f1, rf1 = actuators.servo(p, state[AIM_FRONT], state[SERVO_FRONT], state[RATE_FRONT], h)
+    f2, rf2 = actuators.servo(p, state[AIM_FRONT], f1, rf1, h)
+    r0, _ = actuators.servo(p, state[AIM_REAR], state[SERVO_REAR], state[RATE_REAR], 0.0)
+    r1, rr1 = actuators.servo(p, state[AIM_REAR], state[SERVO_REAR], state[RATE_REAR], h)
+    r2, rr2 = actuators.servo(p, state[AIM_REAR], r1, rr1, h)
+    a0 = actuators.linked(p, f0, state[AXLE_FRONT])
+    a1 = actuators.linked(p, f1, a0)
+    a2 = actuators.linked(p, f2, a1)
+    b0 = actuators.linked(p, r0, state[AXLE_REAR])
+    b1 = actuators.linked(p, r1, b0)
+    b2 = actuators.linked(p, r2, b1)
+    x, y, z, d = state[X], state[Y], state[HEADING], state[ROLLED]
+    k1 = _rates(p, state, play, (x, y, z, d), a0, b0, w0, 0.0)
+    k2 = _rates(p, state, play, (x + h * k1[0], y + h * k1[1], z + h * k1[2], d + h * k1[3]), a1, b1, w1, h)
+    k3 = _rates(p, state, play, (x + h * k2[0], y + h * k2[1], z + h * k2[2], d + h * k2[3]), a1, b1, w1, h)
+    k4 = _rates(p, state, play, (x + dt * k3[0], y + dt * k3[1], z + dt * k3[2], d + dt * k3[3]), a2, b2, w2, dt)
+    for i in range(4):
+        out[X + i] = state[X + i] + dt / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
+    out[SERVO_FRONT], out[RATE_FRONT], out[SERVO_REAR], out[RATE_REAR] = f2, rf2, r2, rr2
+    out[AXLE_FRONT], out[AXLE_REAR], out[WHEEL] = a2, b2, w2
+    out[CLOCK], out[SESSION] = state[CLOCK] + dt, state[SESSION] + dt
+    _cross_seam(p, state, out)
+
+
+@njit(cache=True)
+def _cross_seam(p: Floats, state: Floats, out: Floats) -> None:
+    """Turn a vehicle that has crossed the seam: one way when it crosses one way, the other way when it comes back."""
+    if p[SEAM_KICK] == 0.0:
+        return
+    c, s = math.cos(p[SEAM_DIRECTION]), math.sin(p[SEAM_DIRECTION])
+    before = c * state[X] + s * state[Y] - p[SEAM_PLACE]
+    after = c * out[X] + s * out[Y] - p[SEAM_PLACE]
+    if before < 0.0 <= after:
+        out[HEADING] += p[SEAM_KICK]
+    elif after < 0.0 <= before:
+        out[HEADING] -= p[SEAM_KICK]
+
+
+@njit(cache=True)
+def _notice_start(state: Floats) -> None:
+    """Note when the vehicle was last told to move from rest."""
+    moving = abs(state[AIM_WHEEL]) > 0.0
+    if moving and state[MOVING] == 0.0:
+        state[STARTED] = state[CLOCK]
+    state[MOVING] = 1.0 if moving else 0.0
+
+
+@njit(cache=True)
+def _commit(p: Floats, state: Floats, work: Floats, past: Floats, marks: np.ndarray) -> None:
+    """Make a step's end the state, and remember the pose."""
+    dt = work[CLOCK] - state[CLOCK]
+    if p[SMOOTHING_S] > 0.0:
+        _smooth(p, work, dt)
+    state[:] = work
+    at = marks[2] % PAST
+    past[at, 0], past[at, 1], past[at, 2], past[at, 3] = state[CLOCK], state[X], state[Y], state[HEADING]
+    marks[2] += 1
+
+
+@njit(cache=True)
+def _smooth(p: Floats, work: Floats, dt: float) -> None:
+    x, y, heading = sight.seen(p, work[X], work[Y], work[HEADING])
+    share = -math.expm1(-dt / p[SMOOTHING_S])
+    work[SMOOTH_X] += share * (x - work[SMOOTH_X])
+    work[SMOOTH_Y] += share * (y - work[SMOOTH_Y])
+    work[SMOOTH_HEADING] += share * (heading - work[SMOOTH_HEADING])
+
+
+@njit(cache=True)
+def _look(p: Floats, work: Floats, past: Floats, marks: np.ndarray, dt: float) -> tuple[float, float, float]:
+    """Return what the camera says at the time of `work`, `dt` after the last committed state."""
+    if p[SMOOTHING_S] > 0.0:
+        _smooth(p, work, dt)
+        return work[SMOOTH_X], work[SMOOTH_Y], work[SMOOTH_HEADING]
+    if p[LATENCY_S] == 0.0:
+        return sight.seen(p, work[X], work[Y], work[HEADING])
+    when = work[CLOCK] - p[LATENCY_S]
+    t1, x1, y1, z1 = work[CLOCK], work[X], work[Y], work[HEADING]
+    oldest = max(0, marks[2] - PAST)
+    for i in range(marks[2] - 1, oldest - 1, -1):
+        t0, x0, y0, z0 = past[i % PAST, 0], past[i % PAST, 1], past[i % PAST, 2], past[i % PAST, 3]
+        if t0 <= when:
+            share = (when - t0) / (t1 - t0) if t1 > t0 else 0.0
+            return sight.seen(p, x0 + share * (x1 - x0), y0 + share * (y1 - y0), z0 + share * (z1 - z0))
+        t1, x1, y1, z1 = t0, x0, y0, z0
+    return sight.seen(p, x1, y1, z1)
+
+
+@njit(cache=True)
+def advance(
+    p: Floats, play: Floats, state: Floats, ring: Floats, past: Floats, marks: np.ndarray, work: Floats,
+    drive: float, front: float, rear: float, dt: float,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Hold the command for `dt` seconds; return the pose that the camera sees then.
+
+    `marks` holds how many commands have been taken and sent, how many poses passed, and nothing else; the part of a
+    step that is under way is kept in ``work[1, 0]``.
+    """
+    target = work[1, 0] + dt  # time since the last committed state
+    asked = (drive, front, rear)
+    changed = False
+    for which in range(3):
+        value = actuators.clip(asked[which], p[COMMAND_LOW], p[COMMAND_HIGH])
+        changed = changed or value != state[ASKED_DRIVE + which]
+    if changed:
+        if work[1, 0] > _ROUNDING_S:
+            _step(p, state, play, work[1, 0], work[0])
+            _commit(p, state, work[0], past, marks)
+        work[1, 0], target = 0.0, dt
+        state[GRID] = state[CLOCK] + STEP_S
+        for which in range(3):
+            _ask(p, state, ring, marks, which, asked[which])
+    while True:
+        arrival = _next_arrival(ring, marks)
+        if arrival >= 0 and ring[arrival, 0] <= state[CLOCK] + _ROUNDING_S:
+            _latch(p, state, int(ring[arrival, 1]), ring[arrival, 2])
+            ring[arrival, 1] = -1.0
+            _notice_start(state)
+            continue
+        end = state[GRID] - state[CLOCK]
+        if arrival >= 0:
+            end = min(end, ring[arrival, 0] - state[CLOCK])
+        if end > target + _ROUNDING_S:
+            break
+        _step(p, state, play, end, work[0])
+        _commit(p, state, work[0], past, marks)
+        if state[CLOCK] >= state[GRID] - _ROUNDING_S:
+            state[GRID] += STEP_S
+        target -= end
+    target = max(0.0, target)
+    work[1, 0] = target
+    _step(p, state, play, target, work[0])
+    return _look(p, work[0], past, marks, target)

@@ -1,0 +1,115 @@
+"""`HiddenPlant`: a quiet vehicle with static maps that may hide an effect, behind the plant protocol."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from agvbench.errors import PlantError
+from agvbench.simulator.hidden import _kernel as kernel
+from agvbench.simulator.hidden.constants import LATENCY_S, pack
+from agvbench.simulator.hidden.truth import SealedTruth
+
+LONGEST_ADVANCE_S = 86_400.0
+TURNAROUND_S = 15.0
+"""Between a run and the next reset: what fetching the vehicle takes. Batteries drain and servos warm meanwhile."""
+_SEEDS = 2**64
+
+
+class HiddenPlant:
+    """A vehicle whose sealed truth says what it hides.
+
+    Commands beyond the range are clipped; what is no finite number is an error. Equal calls give equal poses bit for
+    bit. A reset places the vehicle so that the camera *sees* it at the pose: a displaced marker, a scale or a lens
+    shows in how it moves, not in where it starts.
+
+    Parameters
+    ----------
+    constants
+        Base and mechanisms by name (`constants.BASE`, `constants.NULL`); what is not given is at base or null.
+    play
+        Standard deviations of what each reset draws: front and rear angle [rad], relative speed.
+    seed
+        Seeds the play, together with the seed of each reset.
+    truth
+        What `sealed_truth` returns.
+    turnaround_s
+        Time that passes at a reset after a drive [s].
+    """
+
+    def __init__(
+        self,
+        constants: dict[str, float],
+        play: tuple[float, float, float],
+        seed: int,
+        truth: SealedTruth,
+        *,
+        turnaround_s: float = TURNAROUND_S,
+    ) -> None:
+        self._constants = pack(constants)
+        if self._constants[LATENCY_S] > 0.9 * kernel.PAST * kernel.STEP_S:
+            raise PlantError(
+                "camera latency is too long", value=f"{self._constants[LATENCY_S]:g} s",
+                limit=f"{0.9 * kernel.PAST * kernel.STEP_S:.1f} s",
+            )  # fmt: skip
+        self._spread, self._seed, self._truth, self._turnaround_s = play, seed, truth, turnaround_s
+        self._state = np.zeros(kernel.STATE_SIZE)
+        self._ring, self._past = np.zeros((kernel.RING, 3)), np.zeros((kernel.PAST, 4))
+        self._marks = np.zeros(3, dtype=np.int64)
+        self._work = np.zeros((2, kernel.STATE_SIZE))
+        self._play = np.zeros(3)
+        self._driven = False
+        self.reset((0.0, 0.0, 0.0), seed=0)
+
+    def reset(self, pose: tuple[float, float, float], *, seed: int) -> None:
+        """Put the vehicle at rest where the camera sees it at `pose`; the session's time goes on.
+
+        Raises
+        ------
+        PlantError
+            If the pose is not finite.
+        """
+        x, y, heading = (float(value) for value in pose)
+        if not math.isfinite(x + y + heading):
+            raise PlantError(
+                "start pose is not finite", where="reset", value=tuple(pose), remedy="give x, y in m and heading in rad"
+            )
+        rng = np.random.default_rng([self._seed % _SEEDS, seed % _SEEDS])
+        self._play[:] = rng.standard_normal(3) * self._spread
+        if self._driven:
+            self._state[kernel.SESSION] += self._work[1, 0] + self._turnaround_s
+        self._driven = False
+        self._work[1, 0] = 0.0
+        kernel.begin(self._constants, self._state, self._past, self._marks, (x, y, heading))
+
+    def advance(self, drive: float, front: float, rear: float, dt: float) -> tuple[float, float, float]:
+        """Hold the command for `dt` seconds; return the pose that the camera sees, without its noise (m, m, rad).
+
+        Raises
+        ------
+        PlantError
+            If a command is not a finite number, or `dt` is negative, not finite or over a day.
+        """
+        try:
+            drive, front, rear, dt = float(drive), float(front), float(rear), float(dt)
+        except (TypeError, ValueError):
+            raise PlantError("command is not a number", where="advance", value=(drive, front, rear, dt)) from None
+        if not math.isfinite(drive + front + rear):
+            raise PlantError(
+                "command is not finite", where="advance", value=f"drive {drive}, front {front}, rear {rear}"
+            )
+        if not 0.0 <= dt <= LONGEST_ADVANCE_S:
+            raise PlantError(
+                "time step is out of range", where="advance", value=f"{dt} s", limit=f"0 to {LONGEST_ADVANCE_S:.0f} s"
+            )
+        self._driven = self._driven or dt > 0.0
+        pose: tuple[float, float, float] = kernel.advance(
+            self._constants, self._play, self._state, self._ring, self._past, self._marks, self._work,
+            drive, front, rear, dt,
+        )  # fmt: skip
+        return pose
+
+    def sealed_truth(self) -> SealedTruth:
+        """Return what is hidden. For scoring, after the diagnosis has answered."""
+        return self._truth

@@ -1,0 +1,86 @@
+"""`Recipe`: how one hidden effect is drawn, and how its size becomes constants of the plant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from agvbench.simulator.hidden.truth import HiddenEffect, Kind
+
+Values = dict[str, float]
+Constants = Callable[[Values], Values]
+
+
+@dataclass(frozen=True)
+class Size:
+    """One number of an effect: drawn uniformly from [low, high], of either sign if `signed`.
+
+    ``grows`` says how a stronger effect looks: +1 by a larger number, −1 by a smaller one (a rate limit), 0 not at all
+    (a place, a direction, a time constant of a form). ``most`` is what nobody would overlook without instruments.
+    """
+
+    low: float
+    high: float
+    signed: bool = False
+    grows: int = 1
+    most: float = math.inf
+
+    def draw(self, rng: np.random.Generator) -> float:
+        """Return a value."""
+        value = float(rng.uniform(self.low, self.high))
+        return -value if self.signed and rng.random() < 0.5 else value
+
+    def grown(self, value: float, factor: float) -> float:
+        """Return the value of an effect that is `factor` times as strong."""
+        grown = value * factor**self.grows
+        return float(math.copysign(min(abs(grown), self.most), grown))
+
+
+def _same(values: Values) -> Values:
+    return dict(values)
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """One effect that a plant may hide.
+
+    Parameters
+    ----------
+    name, library_name, kind, covariates, random_phase
+        As in `HiddenEffect`.
+    sizes
+        Its parameters, by name.
+    constants
+        From parameters to the plant's constants; by default the names are the same.
+    base
+        Constants of the base vehicle that must give way: a map without end stops, say.
+    absorbed
+        Whether free static maps take it up by construction.
+    """
+
+    name: str
+    library_name: str | None
+    kind: Kind
+    sizes: Mapping[str, Size]
+    constants: Constants = _same
+    base: Values = field(default_factory=dict)
+    covariates: tuple[str, ...] = ()
+    absorbed: bool = False
+    random_phase: bool = False
+
+    def draw(self, rng: np.random.Generator) -> Values:
+        """Return parameters."""
+        return {name: size.draw(rng) for name, size in self.sizes.items()}
+
+    def grown(self, values: Values, factor: float) -> Values:
+        """Return the parameters of a stronger effect."""
+        return {name: self.sizes[name].grown(value, factor) for name, value in values.items()}
+
+    def effect(self, values: Values) -> HiddenEffect:
+        """Return what the sealed truth says of it."""
+        return HiddenEffect(
+            self.name, self.library_name, self.kind, dict(values), self.covariates, self.random_phase
+        )  # fmt: skip

@@ -1,0 +1,206 @@
+"""How visible a hidden effect is, measured on the plant itself: drive with it and without it, under equal commands.
+
+What a bench can refit must not count as visible. Static maps are free values per command level; on a plant without
+dynamics a change of a level's value is a change of the level. So maps are refitted by Gauss-Newton on the *commands*
+of the base plant, and no model is asked.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from agvbench.simulator.hidden.drives import ReferenceDrive, path, reference_drives
+from agvbench.simulator.hidden.plant import TURNAROUND_S, HiddenPlant
+from agvbench.simulator.hidden.truth import SealedTruth
+from agvbench.simulator.hidden.vehicle import BaseVehicle
+from agvbench.types import Floats
+
+LEVER_M = 0.15
+"""What a heading error counts: it moves the ends of the vehicle by this much per radian."""
+CAMERA_NOISE_M = 0.0005 / math.sqrt(5.0)
+"""Per axis: five markers of 0.5 mm."""
+REPEATS = 6
+_STRETCH = 8.0
+"""A session has about so many times the runs of the reference drives: each waits so many turnarounds."""
+_STEP = 2.0
+"""Command units by which a level is moved for its derivative: 0.2° or 1 mm/s."""
+_ROUNDS = 3
+_UNBOUNDED = {
+    "command_low": -1e6,
+    "command_high": 1e6,
+    "front_low": -1.4,
+    "front_high": 1.4,
+    "rear_low": -1.4,
+    "rear_high": 1.4,
+}
+"""A map that is refitted may go beyond the vehicle's own range; no reference drive reaches an end stop."""
+
+Paths = list[Floats]
+Levels = dict[tuple[int, float], float]
+Mechanism = Callable[[Sequence[float]], dict[str, float]]
+
+
+def rms(residual: Floats) -> float:
+    """Return the rms length of poses' differences, shape (n, 3) [m]."""
+    return float(np.sqrt(np.mean(np.sum(residual**2, axis=1))))
+
+
+def _scaled(poses: Floats) -> Floats:
+    return poses * (1.0, 1.0, LEVER_M)
+
+
+@dataclass(frozen=True)
+class Separation:
+    """Rms distances on the reference drives [floors], with static maps refitted and held; the floor [m]."""
+
+    refitted: float
+    held: float
+    floor_m: float
+
+
+class Bench:
+    """Drives plants of one base vehicle through the reference drives.
+
+    Parameters
+    ----------
+    base
+        The vehicle.
+    override
+        Base constants that gave way to an effect.
+    """
+
+    def __init__(self, base: BaseVehicle, override: dict[str, float] | None = None) -> None:
+        self._constants, self._play = base.constants | (override or {}) | _UNBOUNDED, base.play
+        self.drives = reference_drives(base.constants)
+        self.base_path = self.paths({})
+        self.floor_m = self._floor_m()
+        self.levels = self._free_levels()
+        self._columns: Floats | None = None
+
+    def plant(self, mechanism: dict[str, float], *, play: bool = False) -> HiddenPlant:
+        """Return a plant with the mechanism's constants, without play unless it is asked for."""
+        spread = self._play if play else (0.0, 0.0, 0.0)
+        constants = self._constants | mechanism
+        return HiddenPlant(constants, spread, 0, SealedTruth("nothing"), turnaround_s=_STRETCH * TURNAROUND_S)
+
+    def paths(self, mechanism: dict[str, float], levels: Levels | None = None) -> Paths:
+        """Return the paths of all drives, headings scaled to metres."""
+        plant = self.plant(mechanism)
+        return [_scaled(path(plant, _moved(drive, levels or {}))) for drive in self.drives]
+
+    def difference(self, mechanism: dict[str, float]) -> Floats:
+        """Return by how much the mechanism moves the paths with the maps held, shape (samples, 3) [m]."""
+        return np.concatenate(self.paths(mechanism)) - np.concatenate(self.base_path)
+
+    def columns(self) -> Floats:
+        """Return the derivatives of the base plant's paths by every free level, shape (3 samples, levels)."""
+        if self._columns is None:
+            self._columns = np.column_stack([self._column(level) for level in self.levels])
+        return self._columns
+
+    def refitted(self, wanted: Floats) -> Floats:
+        """Return what is left of paths (samples, 3) when the base plant's levels follow them."""
+        values = np.zeros(len(self.levels))
+        best = left = wanted - np.concatenate(self.base_path)
+        for _ in range(_ROUNDS):
+            values += np.linalg.lstsq(self.columns(), left.ravel(), rcond=1e-9)[0]
+            levels = dict(zip(self.levels, values.tolist(), strict=True))
+            left = wanted - np.concatenate(self.paths({}, levels))
+            if rms(left) >= rms(best):
+                break
+            best = left
+        return best
+
+    def _column(self, level: tuple[int, float]) -> Floats:
+        plant = self.plant({})
+        parts = []
+        for drive, before in zip(self.drives, self.base_path, strict=True):
+            moved = _moved(drive, {level: _STEP})
+            same = moved == drive
+            parts.append(np.zeros_like(before) if same else (_scaled(path(plant, moved)) - before) / _STEP)
+        return np.concatenate(parts).ravel()
+
+    def _free_levels(self) -> list[tuple[int, float]]:
+        """Return (column, command) of every level, save for the drive's neutral, which stops by definition."""
+        neutral = self.drives[0].rows[0][1]
+        found = {(i, row[1 + i]) for drive in self.drives for row in drive.rows for i in range(3)}
+        return sorted(level for level in found if level != (0, neutral))
+
+    def _floor_m(self) -> float:
+        """Return the rms scatter of the drives between runs, with the camera's noise."""
+        plant = self.plant({}, play=True)
+        repeats = [
+            np.concatenate([_scaled(path(plant, d, seed=1 + 100 * k + i)) for i, d in enumerate(self.drives)])
+            for k in range(REPEATS)
+        ]
+        scatter = np.sum(np.var(repeats, axis=0, ddof=1), axis=1).mean()
+        return float(math.sqrt(scatter + 2.0 * CAMERA_NOISE_M**2))
+
+
+def _moved(drive: ReferenceDrive, levels: Levels) -> ReferenceDrive:
+    """Return the drive with the commands of some levels moved."""
+    rows = tuple((s, *(u + levels.get((i, u), 0.0) for i, u in enumerate(command))) for s, *command in drive.rows)
+    return ReferenceDrive(drive.name, rows)  # type: ignore[arg-type]
+
+
+def separation(bench: Bench, mechanism: dict[str, float]) -> Separation:
+    """Return how far a mechanism moves the reference drives.
+
+    Parameters
+    ----------
+    bench
+        Of the base vehicle.
+    mechanism
+        Constants that are not at their null.
+    """
+    moved = np.concatenate(bench.paths(mechanism))
+    held = rms(moved - np.concatenate(bench.base_path))
+    return Separation(rms(bench.refitted(moved)) / bench.floor_m, held / bench.floor_m, bench.floor_m)
+
+
+def fit_mechanism(bench: Bench, wanted: Floats, constants: Mechanism, start: Sequence[float]) -> float:
+    """Return the rms [m] that a mechanism leaves of `wanted` (samples, 3) when fitted together with all levels.
+
+    Parameters
+    ----------
+    bench
+        Of the base vehicle.
+    wanted
+        Paths to explain.
+    constants
+        From the mechanism's parameters to the plant's constants.
+    start
+        Where to begin.
+    """
+    values, levels = np.array(start, dtype=np.float64), np.zeros(len(bench.levels))
+    scale = np.abs(values)
+    left, best = _left(bench, wanted, constants, values, levels), math.inf
+    for _ in range(2 * _ROUNDS):
+        if rms(left) >= 0.999 * best:
+            break
+        best = rms(left)
+        steps = 0.02 * scale
+        columns = [
+            (left - _left(bench, wanted, constants, values + np.eye(len(values))[i] * steps[i], levels)).ravel()
+            / steps[i]
+            for i in range(len(values))
+        ]
+        matrix = np.column_stack([bench.columns(), *columns])
+        change = np.linalg.lstsq(matrix, left.ravel(), rcond=1e-9)[0]
+        step = np.clip(change[len(levels) :], -0.7 * scale, 0.7 * scale)
+        levels, values = levels + change[: len(levels)], values + step
+        scale = np.maximum(np.abs(values), 0.05 * scale)
+        left = _left(bench, wanted, constants, values, levels)
+    return min(best, rms(left))
+
+
+def _left(
+    bench: Bench, wanted: Floats, constants: Mechanism, values: Floats, levels: Floats
+) -> Floats:  # fmt: skip
+    moves = dict(zip(bench.levels, levels.tolist(), strict=True))
+    left: Floats = wanted - np.concatenate(bench.paths(constants(values.tolist()), moves))
+    return left
