@@ -1,0 +1,49 @@
+"""Say whether the vehicle model is adequate, and if not which physical effect it lacks.
+
+A part of the runs is set aside. On the others the static maps are fitted again, together with one effect after another
+of the library; an effect is named if it predicts groups of runs that it was not fitted to better than chance allows.
+What is then left is held against the floor, the scatter between repeats.
+
+  ADEQUATE          what is left is scatter
+  NAMED             the effects named explain the rest
+  AMBIGUOUS         several effects explain it equally well
+  UNKNOWN           something is left that no effect of the library explains, and on what it depends
+  NOT_IDENTIFIABLE  this campaign cannot tell, and why
+
+examples:
+  agvbench diagnose campaigns/tonight                         the answer and the errors before and after
+  agvbench diagnose campaigns/tonight --out corrected.toml    keep the vehicle with maps refitted and effects added
+  agvbench diagnose campaigns/tonight --json d.json --check   for scripts: exit code 1 unless ADEQUATE
+"""
+
+from __future__ import annotations
+
+import argparse
+
+HELP = "find the physical effect that the vehicle model lacks"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument("directory", metavar="DIR", help="a campaign directory")
+    parser.add_argument("--json", metavar="FILE", dest="json_file", help="write the diagnosis there")
+    parser.add_argument("--out", metavar="vehicle.toml", help="write the corrected vehicle there")
+    parser.add_argument(
+        "--vehicle", metavar="FILE", help="the model before (default: vehicle.toml in DIR, else maps fitted to DIR)"
+    )
+    parser.add_argument("--check", action="store_true", help="exit with 1 unless the answer is ADEQUATE")
+    parser.add_argument("--seed", type=int, default=0, help="draws which runs are set aside (default 0)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Diagnose; return the exit code."""
+    from agvbench.workflows.diagnose import run_diagnose
+
+    found = run_diagnose(
+        arguments.directory,
+        json_file=arguments.json_file,
+        out=arguments.out,
+        vehicle=arguments.vehicle,
+        seed=arguments.seed,
+    )
+    return 1 if arguments.check and not found.adequate else 0

@@ -1,0 +1,244 @@
+"""From a campaign to a verdict."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.calibration import RunMeasurement, measure_run
+from agvbench.calibration.source import CampaignLike, HeaderLike
+from agvbench.diagnosis.candidates import bounds_of, candidates
+from agvbench.diagnosis.estimates import named_effects
+from agvbench.diagnosis.grouping import held_out_runs
+from agvbench.diagnosis.levels import ROLES, FreeMaps, free_maps, start_values
+from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.reading import Readings, read_runs
+from agvbench.diagnosis.residuals import Misses, floor, lack_of_fit, misses
+from agvbench.diagnosis.result import Diagnosis, HeldOut, Verdict
+from agvbench.diagnosis.selection import Selection, Selector
+from agvbench.diagnosis.structure import Dependence, dependences, residual_rates
+from agvbench.diagnosis.vehicle import corrected_vehicle
+from agvbench.errors import CampaignError, FitError
+from agvbench.model import VehicleModel, nominal_model
+from agvbench.types import Floats, Run
+from agvbench.vehicle.geometry import Geometry
+
+FEWEST_RUNS = 20
+FEWEST_REPEATED = 3
+AT_THE_FLOOR = 1.25
+"""What is left is at the floor up to this times it, or if repeats cannot tell it from the floor."""
+
+_LACK_OF_FIT = 0.01
+_LEAST_TURN_RAD = 0.05
+
+
+@dataclass(frozen=True)
+class _Judged:
+    before: Misses
+    after: Misses
+    floor: dict[str, float]
+    lack_of_fit: float | None
+
+
+def diagnose(
+    campaign: CampaignLike,
+    *,
+    vehicle: VehicleModel | None = None,
+    seed: int = 0,
+    tell: Callable[[str], None] = lambda _: None,
+) -> Diagnosis:
+    """Say whether static maps describe the vehicle that drove `campaign`, and if not which effects they lack.
+
+    Parameters
+    ----------
+    campaign
+        Header and runs; runs must begin at rest.
+    vehicle
+        The model before. By default static maps fitted to the campaign's own runs.
+    seed
+        Draws which groups of runs are set aside, where the campaign has no column ``split``.
+    tell
+        Called with a line whenever there is progress.
+
+    Raises
+    ------
+    CampaignError, FitError
+        If the campaign is too small, or its tables contradict themselves.
+    """
+    header = campaign.header
+    geometry = Geometry(header.front_axle_m, header.rear_axle_m)
+    readings = read_runs(campaign)
+    if reason := _cannot_tell(readings, header):
+        return Diagnosis(Verdict.NOT_IDENTIFIABLE, reason, provenance=_provenance(header, readings, seed))
+    held = held_out_runs(readings.runs, readings.group, seed)
+    if not held.any():
+        return Diagnosis(
+            Verdict.NOT_IDENTIFIABLE,
+            "no run can be set aside to judge on: drive repeats, or commands in more combinations",
+            provenance=_provenance(header, readings, seed),
+        )
+    fitted, kept = readings.select(~held), readings.select(held)
+    tell(f"{len(fitted)} runs to fit, {len(kept)} held out")
+    measured = _measured(fitted.runs, geometry, header.neutral)
+    maps = free_maps(fitted.runs, header.neutral)
+    start = start_values(maps, measured, _believed(maps, header, geometry, vehicle))
+    tried = candidates()
+    selection = Selector(Batch(fitted, maps, geometry), tried, start, seed, tell).select()
+    return _conclude(
+        header, readings, held, selection, vehicle, geometry, seed, bounds_of(tried, selection.chosen.names)
+    )
+
+
+def _cannot_tell(readings: Readings, header: HeaderLike) -> str:
+    """Return why this campaign cannot be diagnosed, or nothing."""
+    if not len(readings):
+        first = next(iter(readings.refused.items()), ("", "there are none"))
+        raise CampaignError("no run can be used", where=f"campaign {header.name}", value=f"{first[0]}: {first[1]}")
+    if len(readings) < FEWEST_RUNS:
+        raise CampaignError(
+            "too few runs to diagnose",
+            where=f"campaign {header.name}",
+            value=len(readings),
+            limit=f"at least {FEWEST_RUNS} that begin at rest",
+            remedy="drive bench_calibration.py and bench_trajectories.py first",
+        )
+    _, sizes = np.unique(readings.group, return_counts=True)
+    if np.count_nonzero(sizes >= 2) < FEWEST_REPEATED:
+        return f"without repeats there is no floor: at least {FEWEST_REPEATED} commands must be driven twice or more"
+    moved = np.nanmax(np.hypot(*np.moveaxis(readings.poses[..., :2] - readings.start[:, None, :2], -1, 0)), axis=1)
+    if np.count_nonzero(moved > 0.1) < FEWEST_RUNS // 2:
+        return f"the vehicle hardly moved: {np.count_nonzero(moved > 0.1)} runs went farther than 0.1 m"
+    turned = np.nanmax(np.abs(readings.poses[..., 2] - readings.start[:, None, 2]), axis=1)
+    if np.count_nonzero(turned > _LEAST_TURN_RAD) < FEWEST_REPEATED:
+        return "steering was never excited: hardly a run turns"
+    return ""
+
+
+def _measured(runs: tuple[Run, ...], geometry: Geometry, neutral: float) -> list[RunMeasurement]:
+    out = []
+    for run in runs:
+        try:
+            out.append(measure_run(run, geometry, neutral=neutral))
+        except FitError:
+            continue  # a run without a steady part is no start value, but evidence all the same
+    return out
+
+
+def _believed(
+    maps: FreeMaps, header: HeaderLike, geometry: Geometry, vehicle: VehicleModel | None
+) -> dict[str, Floats]:
+    model = vehicle or nominal_model(header.vehicle_name, geometry, header.command_unit, header.neutral)
+    return {role: np.asarray(getattr(model, role)(maps.nodes[role])) for role in ROLES}
+
+
+def _conclude(
+    header: HeaderLike,
+    readings: Readings,
+    held: NDArray[np.bool_],
+    selection: Selection,
+    vehicle: VehicleModel | None,
+    geometry: Geometry,
+    seed: int,
+    bounds: Floats,
+) -> Diagnosis:
+    fit = selection.chosen.fit
+    maps = fit.predictor.maps
+    every = Predictor(Batch(readings, maps, geometry), selection.chosen.names)
+    poses = every.predict(fit.parameters)
+    static = Predictor(every.batch).predict(selection.base.fit.parameters)
+    before = static if vehicle is None else _believed_poses(vehicle, readings)
+    judged = _judge(readings, held, before, poses)
+    if judged is None:
+        why = "there are no repeats among the runs held out or fitted, and so no floor"
+        return Diagnosis(Verdict.NOT_IDENTIFIABLE, why, provenance=_provenance(header, readings, seed))
+    rest = dependences(residual_rates(readings, poses), readings.group, seed)
+    effects = named_effects(selection, bounds)
+    significant = _is_significant(judged, rest)
+    verdict, why = _verdict(effects, significant, rest)
+    model = corrected_vehicle(header, geometry, fit, maps)
+    return Diagnosis(
+        verdict,
+        why,
+        effects,
+        significant,
+        tuple(rest),
+        _held_out(readings.select(held), judged),
+        dataclasses.replace(model, provenance={"campaign": header.name, "method": "diagnose", "seed": seed}),
+        selection.rejected,
+        _provenance(header, readings, seed)
+        | {
+            "fit_runs": int((~held).sum()),
+            "models_fitted": selection.tried,
+            "lack_of_fit_p_value": judged.lack_of_fit,
+            "scatter": {
+                "front_deg": float(np.degrees(fit.scatter.offsets[1])),
+                "rear_deg": float(np.degrees(fit.scatter.offsets[2])),
+                "speed_percent": 100.0 * float(fit.scatter.offsets[3]),
+            },
+        },
+    )
+
+
+def _believed_poses(vehicle: VehicleModel, readings: Readings) -> Floats:
+    poses = vehicle.rollout([run.commands for run in readings.runs], readings.start, list(readings.t_s))
+    return np.array(poses)
+
+
+def _judge(readings: Readings, held: NDArray[np.bool_], before: Floats, after: Floats) -> _Judged | None:
+    kept = readings.select(held)
+    missed = misses(kept, after[held])
+    least = floor(missed, kept.group) or floor(misses(readings, after), readings.group)
+    if least is None:
+        return None
+    return _Judged(misses(kept, before[held]), missed, least, lack_of_fit(missed, kept.group))
+
+
+def _is_significant(judged: _Judged, rest: list[Dependence]) -> bool:
+    after = judged.after.rms()
+    above = any(after[name] > AT_THE_FLOOR * judged.floor[name] for name in ("position_rms_mm", "heading_rms_deg"))
+    lacks = judged.lack_of_fit is not None and judged.lack_of_fit < _LACK_OF_FIT
+    return (above and lacks) or bool(rest)
+
+
+def _verdict(effects: tuple[object, ...], significant: bool, rest: list[Dependence]) -> tuple[Verdict, str]:
+    if significant:
+        on = f" it depends on {rest[0].covariate}" if rest else " but on none of the covariates looked at"
+        return Verdict.UNKNOWN, "structure remains that no effect explains:" + on
+    if not effects:
+        return Verdict.ADEQUATE, "static maps predict as well as repeats agree with one another"
+    if any(getattr(effect, "confounded_with", ()) for effect in effects):
+        return Verdict.AMBIGUOUS, "several effects explain the residual equally well"
+    return Verdict.NAMED, "the effects named bring the prediction to the floor"
+
+
+def _held_out(kept: Readings, judged: _Judged) -> HeldOut:
+    before, after = judged.before.rms(), judged.after.rms()
+    errors = {name: {"before": before[name], "after": after[name], "floor": judged.floor[name]} for name in before}
+    was, now = judged.before.squares()["position_rms_mm"], judged.after.squares()["position_rms_mm"]
+    slack = (judged.floor["position_rms_mm"] / 1e3) ** 2
+    worse = []
+    for g in np.unique(kept.group):
+        own = kept.group == g
+        if float(np.mean(now[own])) > float(np.mean(was[own])) + slack:
+            run = kept.runs[int(np.argmax(own))]
+            worse.append(run.trajectory or run.run_id)
+    return HeldOut(len(kept), errors, tuple(dict.fromkeys(worse)))
+
+
+def _provenance(header: HeaderLike, readings: Readings, seed: int) -> dict[str, object]:
+    from agvbench import __version__
+
+    refused: dict[str, int] = {}
+    for reason in readings.refused.values():
+        refused[reason] = refused.get(reason, 0) + 1
+    return {
+        "agvbench": __version__,
+        "campaign": header.name,
+        "seed": seed,
+        "runs_used": len(readings),
+        "runs_refused": refused,
+    }

@@ -1,0 +1,64 @@
+"""Parameters of the effects found, with standard errors and what the data do not pin."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from agvbench.diagnosis.result import Estimate, NamedEffect
+from agvbench.diagnosis.selection import RIVAL_MARGIN, Selection
+from agvbench.effects import effect_kinds
+from agvbench.types import Floats
+
+_FLAT = 3.0
+
+
+def named_effects(selection: Selection, bounds: Floats) -> tuple[NamedEffect, ...]:
+    """Return the effects of the chosen model.
+
+    Standard errors come from the scatter between runs: each run's pull on the parameters is taken as one draw
+    (sandwich), so that what a run's samples share is not counted many times.
+    """
+    fit = selection.chosen.fit
+    maps = fit.predictor.maps.size
+    stderr = np.sqrt(np.maximum(np.diagonal(_sandwich(fit.information, fit.gradient, fit.covariance)), 0.0))
+    kinds = effect_kinds()
+    at = 0
+    found = []
+    for name in selection.chosen.names:
+        estimates = {}
+        for p in kinds[name].parameters():
+            value, error = float(fit.parameters[maps + at]), float(stderr[maps + at])
+            note = _note(value, error, bounds[at], p.scale)
+            estimates[p.name] = Estimate(value, error, p.unit, note)
+            at += 1
+        rivals = sorted(selection.rivals[name].items(), key=lambda pair: pair[1])
+        found.append(
+            NamedEffect(
+                name,
+                estimates,
+                tuple(rival for rival, _ in rivals),
+                {
+                    "loss_without_it": selection.gains[name],
+                    "rival_margin": RIVAL_MARGIN,
+                    **{f"{rival}_instead": worse for rival, worse in rivals},
+                },
+            )
+        )
+    return tuple(found)
+
+
+def _sandwich(information: Floats, gradient: Floats, covariance: Floats) -> Floats:
+    """Return the covariance of the parameters: the larger of what the model says and what the runs' pulls say."""
+    runs, size = gradient.shape
+    meat = gradient.T @ gradient * runs / max(runs - size, 1)
+    robust = covariance @ meat @ covariance
+    scale = np.sqrt(np.maximum(np.diagonal(robust) / np.maximum(np.diagonal(covariance), 1e-300), 1.0))
+    return np.asarray(covariance * scale[:, None] * scale[None, :])
+
+
+def _note(value: float, stderr: float, bounds: Floats, scale: float) -> str:
+    if value <= bounds[0] or value >= bounds[1]:
+        return "at its bound"
+    if stderr > _FLAT * scale:
+        return "the data hardly pin it"
+    return ""

@@ -1,0 +1,260 @@
+"""Free maps and effects fitted together, with what differs from run to run integrated out.
+
+Each run has its own start pose, an offset of each axle and a factor on its speed, drawn about zero with a scatter that
+is estimated, too. Without them a run's frames would pass for as many pieces of evidence, and the smallest play in a
+servo for an effect. They are found anew about every prediction (not once about zero), and enter the
+likelihood by Laplace's approximation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from agvbench.diagnosis.prediction import Predictor
+from agvbench.types import Floats
+
+EVIDENCE_POSES = 4.0
+"""A run's samples count as this many independent poses: what a model misses at one time it misses at the next."""
+
+_ITERATIONS = 8
+_HALVINGS = 4
+_LEAST_M, _LEAST_RAD = 1e-4, 2e-4
+_START_EXTRA_M = 2e-4
+_LEAST_SCATTER = np.array([2e-4, 2e-4, 2e-4, 2e-4])
+_ENOUGH = 0.05
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Standard deviations.
+
+    Within a run ``position_m`` and ``heading_rad``; from run to run ``offsets`` (4,): start heading [rad], front and
+    rear axle [rad], log of speed.
+    """
+
+    position_m: float
+    heading_rad: float
+    offsets: Floats
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model.
+
+    ``parameters`` (P,), the maps' values first; ``offsets`` (R, 6) of each run; ``scatter``; ``loss`` (R,): minus two
+    log likelihood of each run; ``information`` (R, P, P) and ``gradient`` (R, P): its quadratic form about them;
+    ``residual`` (R, K, 3): measured minus predicted with the offsets.
+    """
+
+    predictor: Predictor
+    parameters: Floats
+    offsets: Floats
+    scatter: Scatter
+    loss: Floats
+    information: Floats
+    gradient: Floats
+    residual: Floats
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of the parameters (P, P)."""
+        return np.asarray(np.linalg.pinv(self.information.sum(axis=0) + _ridge(self.predictor), hermitian=True))
+
+    def effect_values(self) -> dict[str, float]:
+        """Return the effects' parameters by name."""
+        own = self.parameters[self.predictor.maps.size :]
+        return dict(zip(self.predictor.parameter_names, own.tolist(), strict=True))
+
+
+@dataclass(frozen=True)
+class _Terms:
+    loss: Floats
+    information: Floats
+    gradient: Floats
+    inner_inverse: Floats
+    mixed: Floats
+    pull: Floats
+
+
+def first_scatter() -> Scatter:
+    """Return a generous scatter to start from."""
+    return Scatter(0.05, 0.05, np.array([0.01, 0.01, 0.01, 0.02]))
+
+
+def fit(
+    predictor: Predictor,
+    parameters: Floats,
+    bounds: Floats,
+    *,
+    offsets: Floats | None = None,
+    scatter: Scatter | None = None,
+    iterations: int = _ITERATIONS,
+) -> Fit:
+    """Fit by Gauss–Newton with halved steps, the scatter by expectation maximisation between steps.
+
+    Parameters
+    ----------
+    predictor
+        Runs, maps and effects.
+    parameters
+        (P,) where to start.
+    bounds
+        (effects' parameters, 2): lowest and highest value of each.
+    offsets, scatter
+        Where to start; by default none and generous.
+    iterations
+        At most this many steps.
+    """
+    readings = predictor.readings
+    offsets = np.zeros((len(readings), 6)) if offsets is None else offsets.copy()
+    scatter = scatter or first_scatter()
+    parameters = parameters.copy()
+    before = np.inf
+    for _ in range(iterations):
+        linear = predictor.linearise(parameters, offsets)
+        residual = _residual(predictor, linear.poses)
+        terms = _terms(predictor, residual, linear.by_parameters, linear.by_offsets, offsets, scatter)
+        parameters, offsets, residual = _step(predictor, parameters, offsets, residual, terms, scatter, bounds)
+        scatter = _rescatter(predictor, residual, offsets, terms.inner_inverse)
+        after = float(terms.loss.sum())
+        if abs(before - after) < _ENOUGH:
+            break
+        before = after
+    linear = predictor.linearise(parameters, offsets)
+    residual = _residual(predictor, linear.poses)
+    terms = _terms(predictor, residual, linear.by_parameters, linear.by_offsets, offsets, scatter)
+    return Fit(predictor, parameters, offsets, scatter, terms.loss, terms.information, terms.gradient, residual)
+
+
+def resolve_offsets(fitted: Fit, predictor: Predictor) -> Fit:
+    """Return `fitted` for the runs of another `predictor`, the parameters kept and the runs' offsets found."""
+    free = replace(fitted.scatter)
+    offsets = np.zeros((len(predictor.readings), 6))
+    for _ in range(3):
+        linear = predictor.linearise(fitted.parameters, offsets)
+        residual = _residual(predictor, linear.poses)
+        terms = _terms(predictor, residual, linear.by_parameters, linear.by_offsets, offsets, free)
+        offsets = offsets + np.einsum("rij,rj->ri", terms.inner_inverse, terms.pull)
+    linear = predictor.linearise(fitted.parameters, offsets)
+    residual = _residual(predictor, linear.poses)
+    terms = _terms(predictor, residual, linear.by_parameters, linear.by_offsets, offsets, free)
+    return Fit(predictor, fitted.parameters, offsets, free, terms.loss, terms.information, terms.gradient, residual)
+
+
+def _residual(predictor: Predictor, poses: Floats) -> Floats:
+    return np.asarray(np.nan_to_num(predictor.readings.poses - poses))
+
+
+def _temper(predictor: Predictor) -> tuple[Floats, Floats]:
+    count = predictor.readings.seen.sum(axis=1).astype(np.float64)
+    return np.minimum(1.0, EVIDENCE_POSES / np.maximum(count, 1.0)), count
+
+
+def _priors(predictor: Predictor, scatter: Scatter) -> Floats:
+    start = np.hypot(predictor.readings.start_stderr, _START_EXTRA_M)
+    out = np.empty((len(predictor.readings), 6))
+    out[:, :2] = start[:, :2]
+    out[:, 2] = np.hypot(start[:, 2], scatter.offsets[0])
+    out[:, 3:] = scatter.offsets[1:]
+    return out
+
+
+def _terms(
+    predictor: Predictor,
+    residual: Floats,
+    by_parameters: Floats,
+    by_offsets: Floats,
+    offsets: Floats,
+    scatter: Scatter,
+) -> _Terms:
+    runs = len(residual)
+    temper, count = _temper(predictor)
+    weight = np.sqrt(temper)[:, None, None] * predictor.readings.seen[:, :, None]
+    weight = weight / np.array([scatter.position_m, scatter.position_m, scatter.heading_rad])
+    e = (residual * weight).reshape(runs, -1)
+    j = (by_parameters * weight[..., None]).reshape(runs, e.shape[1], -1)
+    a = (by_offsets * weight[..., None]).reshape(runs, e.shape[1], 6)
+    prior = _priors(predictor, scatter)
+    at, jt = a.transpose(0, 2, 1), j.transpose(0, 2, 1)
+    inner = at @ a
+    inner[:, range(6), range(6)] += prior**-2.0
+    inverse = np.linalg.inv(inner)
+    pull = (at @ e[..., None])[..., 0] - offsets / prior**2
+    mixed = at @ j
+    information = jt @ j - mixed.transpose(0, 2, 1) @ inverse @ mixed
+    gradient = (jt @ e[..., None])[..., 0] - (mixed.transpose(0, 2, 1) @ (inverse @ pull[..., None]))[..., 0]
+    squares = np.sum(e * e, axis=1) + np.sum((offsets / prior) ** 2, axis=1)
+    # The offsets are a step away from their best values: what that step gains belongs to the loss.
+    squares -= np.einsum("ri,rij,rj->r", pull, inverse, pull)
+    logs = np.linalg.slogdet(inner)[1] + 2.0 * np.sum(np.log(prior), axis=1)
+    logs += temper * count * (4.0 * np.log(scatter.position_m) + 2.0 * np.log(scatter.heading_rad))
+    return _Terms(squares + logs, information, gradient, inverse, mixed, pull)
+
+
+def _step(
+    predictor: Predictor,
+    parameters: Floats,
+    offsets: Floats,
+    residual: Floats,
+    terms: _Terms,
+    scatter: Scatter,
+    bounds: Floats,
+) -> tuple[Floats, Floats, Floats]:
+    matrix = terms.information.sum(axis=0) + _ridge(predictor)
+    free = np.ones(len(parameters), dtype=np.bool_)
+    maps = predictor.maps.size
+    for _ in range(3):
+        move = np.zeros(len(parameters))
+        move[free] = np.linalg.lstsq(matrix[np.ix_(free, free)], terms.gradient.sum(axis=0)[free], rcond=1e-12)[0]
+        wanted = parameters[maps:] + move[maps:]
+        kept = np.clip(wanted, bounds[:, 0], bounds[:, 1])
+        held = np.flatnonzero(kept != wanted)
+        if not len(held):
+            break
+        # What meets its bound goes there; the others are solved for again without it.
+        stuck = held[parameters[maps + held] == kept[held]]
+        if not len(stuck):
+            break
+        free[maps + stuck] = False
+    move_offsets = np.einsum("rij,rj->ri", terms.inner_inverse, terms.pull - terms.mixed @ move)
+    now = _objective(predictor, residual, offsets, scatter)
+    share = 1.0
+    for _ in range(_HALVINGS):
+        new = parameters + share * move
+        new[maps:] = np.clip(new[maps:], bounds[:, 0], bounds[:, 1])
+        new_offsets = offsets + share * move_offsets
+        new_residual = _residual(predictor, predictor.predict(new, new_offsets))
+        if _objective(predictor, new_residual, new_offsets, scatter) <= now:
+            return new, new_offsets, new_residual
+        share *= 0.4
+    return parameters, offsets, residual
+
+
+def _objective(predictor: Predictor, residual: Floats, offsets: Floats, scatter: Scatter) -> float:
+    temper, _ = _temper(predictor)
+    seen = predictor.readings.seen[:, :, None]
+    e = residual * seen / np.array([scatter.position_m, scatter.position_m, scatter.heading_rad])
+    squares = temper * np.sum(e * e, axis=(1, 2)) + np.sum((offsets / _priors(predictor, scatter)) ** 2, axis=1)
+    return float(squares.sum())
+
+
+def _rescatter(predictor: Predictor, residual: Floats, offsets: Floats, inner_inverse: Floats) -> Scatter:
+    seen = predictor.readings.seen
+    count = float(seen.sum())
+    position = np.sqrt(np.sum(residual[..., :2] ** 2 * seen[..., None]) / (2.0 * count))
+    heading = np.sqrt(np.sum(residual[..., 2] ** 2 * seen) / count)
+    variance = offsets[:, 2:] ** 2 + np.diagonal(inner_inverse, axis1=1, axis2=2)[:, 2:]
+    return Scatter(
+        max(float(position), _LEAST_M),
+        max(float(heading), _LEAST_RAD),
+        np.maximum(np.sqrt(variance.mean(axis=0)), _LEAST_SCATTER),
+    )
+
+
+def _ridge(predictor: Predictor) -> Floats:
+    """Return a prior so weak that it only speaks where the data say nothing: 1 rad, 1 m/s, 100 for effects."""
+    strength = np.full(predictor.maps.size + len(predictor.parameter_names), 1.0)
+    strength[predictor.maps.size :] = 1e-4
+    return np.diag(strength)

@@ -1,0 +1,96 @@
+"""Which runs were told the same, and which are set aside before anything is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.errors import FitError
+from agvbench.types import Commands, Run
+
+HELD_OUT_SHARE = 0.25
+_SAME_TIME_S = 0.05
+
+
+def group_runs(runs: Sequence[Run]) -> NDArray[np.int64]:
+    """Return a number for each run, (R,); runs whose commands are the same within 50 ms share it."""
+    groups: list[tuple[Commands, int]] = []
+    by_rows: dict[bytes, list[tuple[Commands, int]]] = {}
+    numbers = np.empty(len(runs), dtype=np.int64)
+    for i, run in enumerate(runs):
+        c = run.commands
+        alike = by_rows.setdefault(np.column_stack([c.drive, c.front, c.rear]).round(9).tobytes(), [])
+        found = next((n for other, n in alike if np.all(np.abs(other.t_s - c.t_s) <= _SAME_TIME_S)), None)
+        if found is None:
+            found = len(groups)
+            groups.append((c, found))
+            alike.append(groups[-1])
+        numbers[i] = found
+    return numbers
+
+
+def held_out_runs(runs: Sequence[Run], group: NDArray[np.int64], seed: int) -> NDArray[np.bool_]:
+    """Return which runs are set aside, (R,).
+
+    The campaign's own ``split`` decides where it has one. Else whole groups are drawn, about a quarter of the
+    runs, such that every level of every command in them was also driven in a group that stays: what is judged is how
+    known commands combine, not how a map is interpolated.
+
+    Raises
+    ------
+    FitError
+        If the campaign sets all or none of its runs aside.
+    """
+    split = [run.split for run in runs]
+    if any(split):
+        held = np.array([name == "held_out" for name in split])
+        if held.all() or not held.any():
+            raise FitError("the column split must name runs to fit and runs held out", where="runs", value=set(split))
+        return held
+    return _drawn(runs, group, np.random.default_rng([0xD1A6, seed]))
+
+
+def _drawn(runs: Sequence[Run], group: NDArray[np.int64], rng: np.random.Generator) -> NDArray[np.bool_]:
+    levels = {int(g): _levels(runs[int(np.argmax(group == g))].commands) for g in np.unique(group)}
+    uses: dict[tuple[str, float], int] = {}
+    for own in levels.values():
+        for level in own:
+            uses[level] = uses.get(level, 0) + 1
+    held = np.zeros(len(runs), dtype=np.bool_)
+    for g in rng.permutation(np.unique(group)).tolist():
+        own = group == g
+        if np.count_nonzero(held) + np.count_nonzero(own) > 1.1 * HELD_OUT_SHARE * len(runs):
+            continue
+        if all(uses[level] > 1 for level in levels[g]):
+            held |= own
+            for level in levels[g]:
+                uses[level] -= 1
+    return held if held.any() else _some_repeats(group, rng)
+
+
+def _some_repeats(group: NDArray[np.int64], rng: np.random.Generator) -> NDArray[np.bool_]:
+    """Return one in four of the repeats of each group: where no group can be spared as a whole."""
+    held = np.zeros(len(group), dtype=np.bool_)
+    for g in np.unique(group):
+        own = np.flatnonzero(group == g)
+        if len(own) >= 2:
+            held[rng.permutation(own)[: max(1, len(own) // 4)]] = True
+    return held
+
+
+def _levels(commands: Commands) -> set[tuple[str, float]]:
+    return {(role, float(v)) for role in ("drive", "front", "rear") for v in np.unique(getattr(commands, role))}
+
+
+def folds(group: NDArray[np.int64], count: int, seed: int) -> NDArray[np.int64]:
+    """Return the fold of each run, (R,): all runs of a group are in one fold; folds are about equally large."""
+    names, sizes = np.unique(group, return_counts=True)
+    order = np.random.default_rng([0xF01D, seed]).permutation(len(names))
+    order = order[np.argsort(-sizes[order], kind="stable")]
+    load, fold_of = np.zeros(count, dtype=np.int64), {}
+    for k in order:
+        fold_of[int(names[k])] = int(np.argmin(load))
+        load[fold_of[int(names[k])]] += sizes[k]
+    return np.array([fold_of[int(g)] for g in group], dtype=np.int64)

@@ -1,0 +1,124 @@
+"""A campaign as the diagnosis sees it: runs from rest, sampled alike, with their start poses and groups."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.calibration import inspect_frames
+from agvbench.diagnosis.grouping import group_runs
+from agvbench.errors import FitError
+from agvbench.statistics.rest import start_pose
+from agvbench.types import Floats, Frames, Run
+
+SAMPLES = 24
+"""Poses per run: as many for a short run as for a long one, since a run is one piece of evidence."""
+
+_NEAR_S = 0.04
+_FEWEST_FRAMES = 20
+_FEWEST_SAMPLES = SAMPLES // 2
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Runs that begin at rest; R runs, K samples each.
+
+    ``t_s`` (R, K) and ``poses`` (R, K, 3) [m, m, rad], of single frames, with the heading continuous from the
+    start pose; NaN where none was kept. ``start`` (R, 3) with ``start_stderr`` (R, 3), from the frames at
+    rest; ``started_h`` (R,) [h] since the run's session began; ``group`` (R,): runs told the same
+    have the same number. ``refused`` tells for each run that cannot be used why, by its id.
+    """
+
+    runs: tuple[Run, ...]
+    t_s: Floats
+    poses: Floats
+    start: Floats
+    start_stderr: Floats
+    started_h: Floats
+    group: NDArray[np.int64]
+    refused: dict[str, str]
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Which samples there are, (R, K)."""
+        return np.isfinite(self.poses[:, :, 0])
+
+    def select(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> Readings:
+        """Return the runs that a mask or an index array chooses."""
+        chosen = np.arange(len(self))[index]
+        return Readings(
+            tuple(self.runs[i] for i in chosen),
+            self.t_s[chosen],
+            self.poses[chosen],
+            self.start[chosen],
+            self.start_stderr[chosen],
+            self.started_h[chosen],
+            self.group[chosen],
+            self.refused,
+        )
+
+
+def read_runs(runs: Iterable[Run]) -> Readings:
+    """Clean, sample and group the runs that count; a run that cannot be used is named in ``refused``."""
+    every = list(runs)
+    began = _session_starts(every)
+    kept: list[Run] = []
+    rows: list[tuple[Floats, Floats, Floats, Floats]] = []
+    refused: dict[str, str] = {}
+    for run in every:
+        try:
+            rows.append(_read(run))
+        except FitError as error:
+            refused[run.run_id] = str(error).removeprefix(f"{run.run_id}: ")
+        else:
+            kept.append(run)
+    started_h = np.array([(run.started_s - began[run.session]) / 3600.0 for run in kept])
+    t_s, poses, start, stderr = (np.array([row[i] for row in rows]) for i in range(4))
+    return Readings(tuple(kept), t_s, poses, start, stderr, started_h, group_runs(kept), refused)
+
+
+def _session_starts(runs: list[Run]) -> dict[str | None, float]:
+    began: dict[str | None, float] = {}
+    for run in runs:
+        began[run.session] = min(run.started_s, began.get(run.session, np.inf))
+    return began
+
+
+def _read(run: Run) -> tuple[Floats, Floats, Floats, Floats]:
+    if not run.is_ok:
+        raise FitError(run.status)
+    frames, _ = inspect_frames(run.frames)
+    if len(frames) < _FEWEST_FRAMES or not len(run.commands):
+        raise FitError("too few frames", value=len(frames), limit=f"at least {_FEWEST_FRAMES}")
+    rest = start_pose(run)
+    start = np.array(rest.pose)
+    stderr = np.array([rest.stderr_x_m, rest.stderr_y_m, rest.stderr_heading_rad])
+    t_s, poses = _sampled(frames, np.linspace(0.0, float(frames.t_s[-1]), SAMPLES + 1)[1:])
+    if np.count_nonzero(np.isfinite(poses[:, 0])) < _FEWEST_SAMPLES:
+        raise FitError("too much of the run was not seen")
+    turn = np.round((_heading_near_start(frames) - start[2]) / (2.0 * np.pi)) * 2.0 * np.pi
+    poses[:, 2] -= turn
+    return t_s, poses, start, np.where(np.isfinite(stderr), stderr, 1e-3)
+
+
+def _heading_near_start(frames: Frames) -> float:
+    return float(np.unwrap(frames.heading_rad)[int(np.searchsorted(frames.t_s, 0.0, side="right")) - 1])
+
+
+def _sampled(frames: Frames, t_s: Floats) -> tuple[Floats, Floats]:
+    """Return the times and poses of the frames nearest to `t_s`; a pose is NaN where none is near.
+
+    Single frames and no means: a mean rounds the corners at which a vehicle starts, stops and turns, which would
+    look like a lag.
+    """
+    nearest = np.clip(np.searchsorted(0.5 * (frames.t_s[1:] + frames.t_s[:-1]), t_s), 0, len(frames) - 1)
+    poses = np.column_stack([frames.x_m, frames.y_m, np.unwrap(frames.heading_rad)])[nearest]
+    near = np.abs(frames.t_s[nearest] - t_s) <= _NEAR_S
+    poses[~near] = np.nan
+    return np.where(near, frames.t_s[nearest], t_s), poses

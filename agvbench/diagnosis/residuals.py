@@ -1,0 +1,127 @@
+"""What a prediction from the start pose misses, and what no model can predict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.diagnosis.reading import Readings
+from agvbench.types import Floats
+
+QUANTITIES = ("position_rms_mm", "heading_rms_deg", "delta_s_mm", "delta_heading_deg")
+_UNITS = {
+    "position_rms_mm": 1e3,
+    "heading_rms_deg": 180.0 / np.pi,
+    "delta_s_mm": 1e3,
+    "delta_heading_deg": 180.0 / np.pi,
+}
+
+
+@dataclass(frozen=True)
+class Misses:
+    """Measured minus predicted.
+
+    ``path`` (R, K, 3) [m, m, rad] in each run's start frame, zero where nothing was ``seen`` (R, K);
+    ``delta_s_m`` and ``delta_heading_rad`` (R,) at the end.
+    """
+
+    path: Floats
+    seen: NDArray[np.bool_]
+    delta_s_m: Floats
+    delta_heading_rad: Floats
+
+    def rms(self) -> dict[str, float]:
+        """Return each quantity's root mean square over runs, in the unit of its name."""
+        squares = self.squares()
+        return {name: _UNITS[name] * float(np.sqrt(np.mean(squares[name]))) for name in QUANTITIES}
+
+    def squares(self) -> Mapping[str, Floats]:
+        """Return each quantity's mean square of each run (R,): a run counts once, however long it is."""
+        count = np.maximum(self.seen.sum(axis=1), 1)
+        return {
+            "position_rms_mm": np.sum(self.path[..., :2] ** 2, axis=(1, 2)) / count,
+            "heading_rms_deg": np.sum(self.path[..., 2] ** 2, axis=1) / count,
+            "delta_s_mm": self.delta_s_m**2,
+            "delta_heading_deg": self.delta_heading_rad**2,
+        }
+
+
+def misses(readings: Readings, poses: Floats) -> Misses:
+    """Return what predicted `poses` (R, K, 3) miss."""
+    seen = readings.seen
+    difference = np.where(seen[..., None], readings.poses - poses, 0.0)
+    cos, sin = np.cos(readings.start[:, 2])[:, None], np.sin(readings.start[:, 2])[:, None]
+    path = np.stack(
+        [
+            cos * difference[..., 0] + sin * difference[..., 1],
+            cos * difference[..., 1] - sin * difference[..., 0],
+            difference[..., 2],
+        ],
+        axis=-1,
+    )
+    rows = np.arange(len(readings))
+    last = seen.shape[1] - 1 - np.argmax(seen[:, ::-1], axis=1)
+    went = np.hypot(*(readings.poses[rows, last, :2] - readings.start[:, :2]).T)
+    told = np.hypot(*(poses[rows, last, :2] - readings.start[:, :2]).T)
+    return Misses(path, seen, went - told, path[rows, last, 2])
+
+
+def floor(missed: Misses, group: NDArray[np.int64]) -> dict[str, float] | None:
+    """Return the scatter between repeats, as a root mean square to compare with `Misses.rms`; None without repeats.
+
+    What repeats of one command have in common is the model's to predict; what differs between them is not. Taken
+    from what the *final* model misses, so that a cause that depends on place or time does not pass for scatter. Groups
+    whose scatter is beyond four times the median's (one bad run) count as that.
+    """
+    per_group: dict[str, list[tuple[float, float]]] = {name: [] for name in QUANTITIES}
+    for g in np.unique(group):
+        own = np.flatnonzero(group == g)
+        if len(own) < 2:
+            continue
+        both = missed.seen[own].all(axis=0)
+        path = missed.path[own][:, both]
+        off = path - path.mean(axis=0)
+        dof = len(own) - 1.0
+        values = {
+            "position_rms_mm": float(np.sum(off[..., :2] ** 2)) / dof / max(int(both.sum()), 1),
+            "heading_rms_deg": float(np.sum(off[..., 2] ** 2)) / dof / max(int(both.sum()), 1),
+            "delta_s_mm": float(np.var(missed.delta_s_m[own], ddof=1)),
+            "delta_heading_deg": float(np.var(missed.delta_heading_rad[own], ddof=1)),
+        }
+        for name, value in values.items():
+            per_group[name].append((value, len(own)))
+    if not per_group["position_rms_mm"]:
+        return None
+    out = {}
+    for name, pairs in per_group.items():
+        value, runs = np.array(pairs).T
+        most = 16.0 * np.median(value)
+        out[name] = _UNITS[name] * float(np.sqrt(np.sum(np.minimum(value, most) * runs) / np.sum(runs)))
+    return out
+
+
+def lack_of_fit(missed: Misses, group: NDArray[np.int64]) -> float | None:
+    """Return a p-value that what is missed is the same for all groups of repeats: lack of fit against pure error.
+
+    The unit is the run. From each run come three numbers (where it ended: along, across, heading); between and within
+    groups they are compared by F, and the smallest p-value is corrected for being one of three. None without repeats.
+    """
+    from scipy import stats
+
+    names, index, sizes = np.unique(group, return_inverse=True, return_counts=True)
+    within_dof, between_dof = len(group) - len(names), len(names)
+    if within_dof < 3 or not between_dof:
+        return None
+    rows = np.arange(len(group))
+    last = missed.seen.shape[1] - 1 - np.argmax(missed.seen[:, ::-1], axis=1)
+    least = 1.0
+    for k in range(3):
+        value = missed.path[rows, last, k]
+        mean = np.bincount(index, weights=value) / sizes
+        within = float(np.sum((value - mean[index]) ** 2)) / within_dof
+        between = float(np.sum(sizes * mean**2)) / between_dof
+        least = min(least, float(stats.f.sf(between / within, between_dof, within_dof))) if within > 0.0 else least
+    return min(1.0, 3.0 * least)

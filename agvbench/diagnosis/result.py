@@ -1,0 +1,137 @@
+"""What a diagnosis says, and its JSON (schema 1)."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from agvbench.diagnosis.structure import Dependence
+from agvbench.model import VehicleModel
+
+SCHEMA = 1
+
+
+class Verdict(StrEnum):
+    """The answer."""
+
+    ADEQUATE = "ADEQUATE"
+    NAMED = "NAMED"
+    AMBIGUOUS = "AMBIGUOUS"
+    UNKNOWN = "UNKNOWN"
+    NOT_IDENTIFIABLE = "NOT_IDENTIFIABLE"
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter's ``value`` with its ``stderr`` and ``unit``; ``note`` says if the data do not pin it."""
+
+    value: float
+    stderr: float
+    unit: str
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """An effect that earned its place.
+
+    ``parameters`` by name; ``confounded_with`` the effects that predict as well in its place; ``evidence``: what
+    leaving it out costs in cross-validated minus two log likelihood, and how much worse each rival is.
+    """
+
+    name: str
+    parameters: Mapping[str, Estimate]
+    confounded_with: tuple[str, ...]
+    evidence: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Errors on the runs set aside: by quantity (``position_rms_mm`` …) ``before``, ``after`` and ``floor``."""
+
+    runs: int
+    errors: Mapping[str, Mapping[str, float]]
+    worse_on: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What the vehicle model lacks.
+
+    ``verdict`` and ``why`` in words; ``effects``; ``depends_on`` what the rest depends on, ``significant`` whether that
+    matters; ``held_out`` (None if nothing could be predicted); ``model`` with refitted maps and the effects found;
+    ``rejected`` the gain of each effect that did not earn its place; ``provenance``.
+    """
+
+    verdict: Verdict
+    why: str
+    effects: tuple[NamedEffect, ...] = ()
+    significant: bool = False
+    depends_on: tuple[Dependence, ...] = ()
+    held_out: HeldOut | None = None
+    model: VehicleModel | None = None
+    rejected: Mapping[str, float] = field(default_factory=dict)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def adequate(self) -> bool:
+        """Whether the model needs nothing but its maps."""
+        return self.verdict is Verdict.ADEQUATE
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the content of the JSON file, schema 1; numbers that are not finite are null."""
+        none: dict[str, dict[str, float]] = {}
+        errors = self.held_out.errors if self.held_out else none
+        content = {
+            "schema": SCHEMA,
+            "verdict": str(self.verdict),
+            "effects": [_effect(effect) for effect in self.effects],
+            "unexplained": {
+                "significant": self.significant,
+                "depends_on": [
+                    {"covariate": d.covariate, "p_value": d.p_value, "share": d.share, "through": d.feature}
+                    for d in self.depends_on
+                ],
+            },
+            "held_out": {
+                "runs": self.held_out.runs if self.held_out else 0,
+                "position_rms_mm": dict(errors.get("position_rms_mm", {})),
+                "heading_rms_deg": dict(errors.get("heading_rms_deg", {})),
+                "delta_s_mm": dict(errors.get("delta_s_mm", {})),
+                "delta_heading_deg": dict(errors.get("delta_heading_deg", {})),
+                "worse_on": list(self.held_out.worse_on) if self.held_out else [],
+            },
+            "next_experiment": None,
+            "provenance": {"why": self.why, **self.provenance, "rejected": dict(self.rejected)},
+        }
+        return dict(_finite(content))
+
+    def to_text(self) -> str:
+        """Return the JSON file's text, the same for the same diagnosis."""
+        return json.dumps(self.to_json(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _effect(effect: NamedEffect) -> dict[str, Any]:
+    return {
+        "name": effect.name,
+        "parameters": {
+            name: {"value": e.value, "stderr": e.stderr, "unit": e.unit, **({"note": e.note} if e.note else {})}
+            for name, e in effect.parameters.items()
+        },
+        "confounded_with": list(effect.confounded_with),
+        "evidence": dict(effect.evidence),
+    }
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(item) for item in value]
+    if isinstance(value, float):
+        return float(f"{value:.6g}") if math.isfinite(value) else None
+    return value

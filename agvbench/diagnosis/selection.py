@@ -1,0 +1,203 @@
+"""Which effects the model needs, and which others would do as well."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.diagnosis.candidates import Candidate, bounds_of
+from agvbench.diagnosis.fitting import Fit, fit
+from agvbench.diagnosis.grouping import folds
+from agvbench.diagnosis.judging import FOLDS, cross_validated, without_best
+from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.residuals import misses
+from agvbench.types import Floats
+
+Tell = Callable[[str], None]
+
+LEAST_GAIN = 12.0
+"""Least cross-validated gain in minus two log likelihood that earns an effect its place, before the correction for
+having tried many: each effect tried adds as if its gain came from one of so many."""
+
+RIVAL_MARGIN = 10.0
+"""An effect that predicts this much worse, or less, in place of a named one is its rival."""
+
+NOTICEABLE = 0.15
+"""An effect has to move the prediction by this part of what remains unpredicted, be it ever so certain."""
+
+_FIRST, _SHORT, _LONG = 1, 3, 10
+_HOPELESS = 3.0
+_MOST_EFFECTS = 4
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A fitted model, the effects in it, and each run's cross-validated loss (R,)."""
+
+    names: tuple[str, ...]
+    fit: Fit
+    loss: Floats
+
+    @property
+    def total(self) -> float:
+        """The cross-validated loss of all runs."""
+        return float(self.loss.sum())
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What was chosen.
+
+    ``base`` is the model without effects, ``chosen`` the one with all that earned their place; ``rivals`` by named
+    effect the others that would do in its place, with how much worse they predict; ``gains`` by named effect what its
+    loss would cost; ``tried`` how many models were fitted, ``rejected`` the gain of each effect that did not earn its
+    place.
+    """
+
+    base: Scored
+    chosen: Scored
+    rivals: dict[str, dict[str, float]]
+    gains: dict[str, float]
+    rejected: dict[str, float]
+    tried: int
+
+
+@dataclass
+class Selector:
+    """Tries effects on the runs to be fitted."""
+
+    batch: Batch
+    candidates: dict[str, Candidate]
+    start: Floats
+    seed: int
+    tell: Tell
+    tried: int = 0
+    _fold: NDArray[np.int64] = field(init=False)
+    _known: dict[tuple[str, ...], Scored] = field(init=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._fold = folds(self.batch.readings.group, FOLDS, self.seed)
+
+    @property
+    def least_gain(self) -> float:
+        """What an effect must gain, corrected for the number of effects that are tried for each place."""
+        return LEAST_GAIN + 2.0 * math.log(max(len(self.candidates), 1))
+
+    def select(self) -> Selection:
+        """Add effects until none gains, then drop those without which the model predicts as well."""
+        base = current = self.score((), self.start, None)
+        rejected: dict[str, float] = {}
+        while len(current.names) < _MOST_EFFECTS:
+            offers = {name: self.grown(current, name) for name in self.candidates if name not in current.names}
+            rejected = {name: current.total - offer.total for name, offer in offers.items()}
+            worthy = {name: offer for name, offer in offers.items() if self.earns(current, offer)}
+            if not worthy:
+                break
+            current = min(worthy.values(), key=lambda offer: offer.total)
+            self.tell(f"{' + '.join(current.names)}: gains {base.total - current.total:.0f}")
+        current, gains = self._pruned(base, current)
+        rejected = {name: gain for name, gain in rejected.items() if name not in current.names}
+        return Selection(base, current, self._rivals(base, current), gains, rejected, self.tried)
+
+    def earns(self, without: Scored, with_it: Scored) -> bool:
+        """Whether the larger model predicts better by enough, not in a few groups of runs alone, and to be noticed."""
+        gain = without.loss - with_it.loss
+        return bool(
+            gain.sum() > self.least_gain
+            and without_best(gain, self.batch.readings.group) > 0.0
+            and self._noticeable(without, with_it)
+        )
+
+    def _noticeable(self, without: Scored, with_it: Scored) -> bool:
+        """Whether the prediction moves by a noticeable part of what the larger model misses anyway."""
+        readings = self.batch.readings
+        small, large = (model.fit.predictor.predict(model.fit.parameters) for model in (without, with_it))
+        missed = misses(readings, large).squares()
+        moved = misses(replace(readings, poses=np.where(readings.seen[..., None], small, np.nan)), large).squares()
+        return any(
+            float(np.mean(moved[name])) > NOTICEABLE**2 * float(np.mean(missed[name]))
+            for name in ("position_rms_mm", "heading_rms_deg")
+        )
+
+    def _pruned(self, base: Scored, current: Scored) -> tuple[Scored, dict[str, float]]:
+        while current.names:
+            smaller = {name: self.shrunk(base, current, name) for name in current.names}
+            gains = {name: model.total - current.total for name, model in smaller.items()}
+            useless = [name for name, model in smaller.items() if not self.earns(model, current)]
+            if not useless:
+                return current, gains
+            current = smaller[min(useless, key=lambda name: gains[name])]
+        return current, {}
+
+    def _rivals(self, base: Scored, current: Scored) -> dict[str, dict[str, float]]:
+        found: dict[str, dict[str, float]] = {}
+        for name in current.names:
+            rest = self.shrunk(base, current, name)
+            swapped = {
+                other: self.grown(rest, other).total - current.total
+                for other in self.candidates
+                if other not in current.names
+            }
+            found[name] = {other: worse for other, worse in swapped.items() if worse < RIVAL_MARGIN}
+        return found
+
+    def shrunk(self, base: Scored, current: Scored, name: str) -> Scored:
+        """Return the model without the effect called `name`."""
+        names = tuple(n for n in current.names if n != name)
+        if not names:
+            return base
+        own = current.fit.effect_values()
+        kept = [value for key, value in own.items() if key.partition(".")[0] != name]
+        maps = current.fit.parameters[: self.batch.maps.size]
+        return self.score(names, np.r_[maps, kept], current.fit)
+
+    def grown(self, current: Scored, name: str) -> Scored:
+        """Return `current` with the effect called `name`, fitted from the best of its starts."""
+        names = (*current.names, name)
+        key = tuple(sorted(names))
+        if key in self._known:
+            return self._known[key]
+        predictor = self._predictor(names)
+        bounds = bounds_of(self.candidates, names)
+        now = current.fit
+        attempts = [
+            fit(
+                predictor,
+                np.r_[now.parameters, start],
+                bounds,
+                offsets=now.offsets,
+                scatter=now.scatter,
+                iterations=_FIRST,
+            )
+            for start in self.candidates[name].starts
+        ]
+        best = min(attempts, key=lambda attempt: float(attempt.loss.sum()))
+        short = fit(predictor, best.parameters, bounds, offsets=best.offsets, scatter=best.scatter, iterations=_SHORT)
+        if float(now.loss.sum() - short.loss.sum()) < _HOPELESS:
+            self.tried += 1
+            self._known[key] = Scored(names, short, cross_validated(short, self._fold, bounds))
+        return self.score(names, short.parameters, short)
+
+    def score(self, names: tuple[str, ...], parameters: Floats, near: Fit | None) -> Scored:
+        """Fit the model with the effects `names` and cross-validate it; what was fitted before is remembered."""
+        key = tuple(sorted(names))
+        if key not in self._known:
+            bounds = bounds_of(self.candidates, names)
+            fitted = fit(
+                self._predictor(names) if near is None or near.predictor.effects != names else near.predictor,
+                parameters,
+                bounds,
+                offsets=None if near is None else near.offsets,
+                scatter=None if near is None else near.scatter,
+                iterations=_LONG,
+            )
+            self.tried += 1
+            self._known[key] = Scored(names, fitted, cross_validated(fitted, self._fold, bounds))
+        return self._known[key]
+
+    def _predictor(self, names: tuple[str, ...]) -> Predictor:
+        return Predictor(self.batch, names)

@@ -1,0 +1,58 @@
+"""The vehicle with refitted maps and the effects found."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from agvbench.calibration.source import HeaderLike
+from agvbench.diagnosis.fitting import Fit
+from agvbench.diagnosis.levels import FreeMaps
+from agvbench.effects import Effect, effect_kinds
+from agvbench.model import VehicleModel
+from agvbench.types import Floats
+from agvbench.vehicle.geometry import Geometry
+from agvbench.vehicle.maps import Fixed, MonotoneTable, StaticMap
+
+_DIGITS = 9
+
+
+def corrected_vehicle(header: HeaderLike, geometry: Geometry, fitted: Fit, maps: FreeMaps) -> VehicleModel:
+    """Return the vehicle that `fitted` describes; its maps are tables, made monotone where scatter made them turn."""
+    where = maps.slices()
+    weight = np.maximum(np.diagonal(fitted.information.sum(axis=0)), 1e-6)
+    values = {role: fitted.parameters[own] for role, own in where.items()}
+    front, rear = (_table(maps.nodes[r], values[r], weight[where[r]]) for r in ("front", "rear"))
+    place = int(np.searchsorted(maps.nodes["drive"], maps.neutral))
+    drive = _table(
+        np.insert(maps.nodes["drive"], place, maps.neutral),
+        np.insert(values["drive"], place, 0.0),
+        np.insert(weight[where["drive"]], place, 1e12),
+    )
+    return VehicleModel(
+        name=header.vehicle_name,
+        geometry=geometry,
+        command_unit=header.command_unit,
+        neutral=header.neutral,
+        front=front,
+        rear=rear,
+        drive=drive,
+        effects=_effects(fitted),
+    )
+
+
+def _effects(fitted: Fit) -> tuple[Effect, ...]:
+    kinds, values = effect_kinds(), fitted.effect_values()
+    return tuple(
+        kinds[name](**{key.partition(".")[2]: v for key, v in values.items() if key.partition(".")[0] == name})
+        for name in fitted.predictor.effects
+    )
+
+
+def _table(commands: Floats, values: Floats, weight: Floats) -> StaticMap:
+    if len(commands) < 2 or np.ptp(values) == 0.0:
+        return Fixed(output=round(float(values[0]), _DIGITS), command=float(commands[0]))
+    from scipy.optimize import isotonic_regression
+
+    rising = bool(np.polyfit(commands, values, 1)[0] > 0.0)
+    smooth = np.asarray(isotonic_regression(values, weights=weight, increasing=rising).x)
+    return MonotoneTable(tuple(commands.tolist()), tuple(smooth.round(_DIGITS).tolist()), "linear")

@@ -1,0 +1,194 @@
+"""A vehicle of a few lines, independent of the package's model: what the diagnosis is tested on.
+
+Semi-implicit Euler at 240 Hz from commands to poses, in the floor frame; every cause can be switched on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from agvbench.campaign import CampaignHeader
+from agvbench.types import NO_TARGET, Command, Commands, Frames, Pose, Run
+
+FRONT_M, REAR_M, NEUTRAL = 0.181, 0.121, 1500.0
+HEADER = CampaignHeader(
+    schema=1,
+    name="tiny",
+    vehicle_name="tiny",
+    front_axle_m=FRONT_M,
+    rear_axle_m=REAR_M,
+    command_unit="us",
+    neutral=NEUTRAL,
+    mocap_rate_hz=60.0,
+)
+_STEP_S = 1.0 / 240.0
+_BEFORE_S, _AFTER_S = 0.4, 1.2
+
+
+@dataclass(frozen=True)
+class Tiny:
+    """What is true of the vehicle; all zero is what free maps can describe."""
+
+    delay_s: float = 0.0
+    steering_lag_s: float = 0.0
+    accelerate_s: float = 0.0
+    brake_s: float = 0.0
+    slip: float = 0.0
+    droop_per_hour: float = 0.0
+    tilt_mps: float = 0.0
+    tilt_rad: float = 0.0
+    front_from_rear: float = 0.0
+    rear_from_front: float = 0.0
+    cornering_loss: float = 0.0
+    reverse_gain: float = 0.0
+    slow_patch: float = 0.0
+    axle_scatter_rad: float = 0.001
+    speed_scatter: float = 0.002
+    noise_m: float = 3e-4
+    noise_rad: float = 1e-3
+
+
+def speed_of(command: float) -> float:
+    off = NEUTRAL - command
+    size = max(abs(off) - 40.0, 0.0)
+    return math.copysign(min(0.32, 0.45 * size / (size + 120.0)), off) if size else 0.0
+
+
+def front_of(command: float) -> float:
+    return min(max(-0.0015 * (command - NEUTRAL) - 0.026, -0.72), 0.70)
+
+
+def rear_of(command: float) -> float:
+    return min(max(-0.00153 * (command - NEUTRAL) - 0.037, -0.68), 0.69)
+
+
+def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np.random.Generator) -> Frames:
+    """Return 60 Hz frames of one run, from rest to rest."""
+    f_off, r_off = rng.normal(0.0, tiny.axle_scatter_rad, 2)
+    gain = 1.0 + rng.normal(0.0, tiny.speed_scatter)
+    gain *= 1.0 - tiny.droop_per_hour * started_s / 3600.0
+    x, y, heading = start
+    front, rear, speed = front_of(NEUTRAL) + f_off, rear_of(NEUTRAL) + r_off, 0.0
+    poses, times = [], []
+    steps = round((commands.t_s[-1] + _AFTER_S + _BEFORE_S) / _STEP_S)
+    for k in range(steps):
+        t = k * _STEP_S - _BEFORE_S
+        if k % 4 == 0:
+            times.append(t)
+            poses.append((x, y, heading))
+        row = int(np.searchsorted(commands.t_s, t - tiny.delay_s + 1e-12, side="right")) - 1
+        c = commands.at(row) if row >= 0 else Command(NEUTRAL, NEUTRAL, NEUTRAL)
+        told = speed_of(c.drive) * gain
+        away = 1.0 - math.exp(-_STEP_S / tiny.steering_lag_s) if tiny.steering_lag_s else 1.0
+        was = front, rear, speed
+        front += (front_of(c.front) + f_off - front) * away
+        rear += (rear_of(c.rear) + r_off - rear) * away
+        lag = tiny.accelerate_s if abs(told) > abs(speed) else tiny.brake_s
+        speed += (told - speed) * (1.0 - math.exp(-_STEP_S / lag) if lag else 1.0)
+        relief = 1.0 + tiny.reverse_gain if speed < 0.0 else 1.0
+        f, r, s = (
+            (old + new) / 2.0 if lagged else new
+            for old, new, lagged in zip(
+                was, (front, rear, speed), (tiny.steering_lag_s, tiny.steering_lag_s, lag), strict=True
+            )
+        )
+        df = (f + tiny.front_from_rear * r) * relief
+        dr = (r + tiny.rear_from_front * f) * relief
+        v = s * (1.0 - tiny.cornering_loss * (abs(math.tan(df)) + abs(math.tan(dr))))
+        if math.hypot(x - 0.6, y - 0.3) < 0.7:
+            v *= 1.0 - tiny.slow_patch
+        forward = v * (math.cos(df) + math.cos(dr)) / 2.0
+        beta = math.atan((FRONT_M * math.tan(dr) + REAR_M * math.tan(df)) / (FRONT_M + REAR_M))
+        pace = forward / math.cos(beta)
+        yaw = forward * (math.tan(df) - math.tan(dr)) / (FRONT_M + REAR_M) / (1.0 + tiny.slip * pace * pace)
+        middle = heading + yaw * _STEP_S / 2.0
+        moving = 1.0 if abs(v) > 1e-3 else 0.0
+        x += (pace * math.cos(middle + beta) + moving * tiny.tilt_mps * math.cos(tiny.tilt_rad)) * _STEP_S
+        y += (pace * math.sin(middle + beta) + moving * tiny.tilt_mps * math.sin(tiny.tilt_rad)) * _STEP_S
+        heading += yaw * _STEP_S
+    p = np.array(poses)
+    n = len(p)
+    p[:, :2] += rng.normal(0.0, tiny.noise_m, (n, 2))
+    p[:, 2] += rng.normal(0.0, tiny.noise_rad, n)
+    nan = np.full(n, np.nan)
+    return Frames(np.array(times), p[:, 0], p[:, 1], p[:, 2], np.ones(n, dtype=bool), np.full(n, -1), nan, nan)
+
+
+def _held(drive_us: float, front: float, rear: float, seconds: float) -> Commands:
+    return Commands(
+        np.array([0.0, 0.4, 0.4 + seconds]),
+        np.array([NEUTRAL, drive_us, NEUTRAL]),
+        np.array([front, front, front]),
+        np.array([rear, rear, rear]),
+    )
+
+
+def _steps(drive_us: float, fronts: list[float], rears: list[float], seconds: float) -> Commands:
+    t = [0.0, *(0.4 + seconds * np.arange(len(fronts))), 0.4 + seconds * len(fronts)]
+    return Commands(
+        np.array(t),
+        np.array([NEUTRAL, *([drive_us] * len(fronts)), NEUTRAL]),
+        np.array([fronts[0], *fronts, fronts[-1]]),
+        np.array([rears[0], *rears, rears[-1]]),
+    )
+
+
+def experiments(*, steps: bool = True) -> Iterator[tuple[str, Commands, int]]:
+    """Yield (experiment, commands, repeats) of a whole small campaign."""
+    n = NEUTRAL
+    levels = (1000.0, 1150.0, 1300.0, 1400.0, 1500.0, 1600.0, 1700.0, 1850.0, 2000.0)
+    for c in levels:
+        yield "steering_front", _held(900.0, c, n, 4.0), 2
+        yield "steering_rear", _held(900.0, n, c, 4.0), 2
+    for c in (1300.0, 1700.0):
+        yield "steering_opposite", _held(900.0, c, 3000.0 - c, 4.0), 2
+        yield "steering_opposite", _held(2100.0, c, 3000.0 - c, 4.0), 2
+        yield "steering_opposite", _held(900.0, c, c, 4.0), 2
+    for c in (900.0, 1200.0, 1350.0, 1400.0, 1430.0, 1570.0, 1600.0, 1650.0, 1800.0, 2100.0):
+        yield "drive", _held(c, n, n, 4.0), 2
+    for c in (1350.0, 1650.0):
+        yield "trajectory", _held(c, 1400.0, 1600.0, 5.0), 3
+        yield "trajectory", _held(c, 1600.0, 1400.0, 5.0), 3
+    for c in (900.0, 2100.0):
+        yield "trajectory", _held(c, 1400.0, 1600.0, 5.0), 3
+        yield "trajectory", _held(c, 1600.0, 1400.0, 5.0), 3
+    if steps:
+        for c in (900.0, 2100.0, 1350.0):
+            yield "step", _steps(c, [1300.0, 1700.0, 1300.0, 1700.0, 1500.0], [n] * 5, 1.2), 3
+            yield "step", _steps(c, [1500.0, 1300.0, 1700.0, 1400.0], [1500.0, 1700.0, 1300.0, 1600.0], 1.5), 3
+
+
+def campaign_runs(tiny: Tiny, *, seed: int = 0, steps: bool = True, hours: float = 1.0) -> list[Run]:
+    """Drive a campaign: repeats interleaved, start poses at random."""
+    rng = np.random.default_rng(seed)
+    plan = [
+        (name, commands, repeat, k)
+        for k, (name, commands, repeats) in enumerate(experiments(steps=steps))
+        for repeat in range(1, repeats + 1)
+    ]
+    plan.sort(key=lambda row: (row[2], rng.random()))
+    runs = []
+    for i, (name, commands, repeat, k) in enumerate(plan):
+        started = 3600.0 * hours * i / len(plan)
+        start = Pose(*rng.uniform(-0.7, 0.7, 2), rng.uniform(-math.pi, math.pi))
+        frames = drive(tiny, commands, start, started, rng)
+        runs.append(
+            Run(
+                f"{i:03d}-{name}-{k}",
+                name,
+                "",
+                "calibrated",
+                repeat,
+                NO_TARGET,
+                started,
+                "ok",
+                "tiny",
+                commands,
+                frames,
+            )
+        )
+    return runs
