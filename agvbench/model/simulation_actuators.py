@@ -41,6 +41,8 @@ _SETTLED = 1e-9
 _FIRST_STEP, _STEP_GROWTH = 0.5, 0.15
 # The longest step while a servo ramps, and how close to a kink counts as there [s].
 _RAMP_STEP_S, _TOGETHER = 0.05, 1e-12
+# Numbers that ask for shorter steps are nonsense, but must not hang the loop [s].
+_SHORTEST_S = 1e-6
 
 
 @compiled(inner=True)
@@ -149,7 +151,9 @@ def leave_command(plan: Floats, tau: float, servos: Floats) -> None:
 
 @compiled(inner=True)
 def _within(longest: float, lag: float, since: float) -> float:
-    return min(longest, _FIRST_STEP * lag + _STEP_GROWTH * max(0.0, since)) if lag > 0.0 else longest
+    if lag <= 0.0:
+        return longest
+    return min(longest, max(_SHORTEST_S, _FIRST_STEP * lag + _STEP_GROWTH * max(0.0, since)))
 
 
 @compiled(inner=True)

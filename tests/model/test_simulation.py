@@ -1,0 +1,158 @@
+"""The general simulation against equations written out independently."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+
+import numpy as np
+import pytest
+from simulation_truth import COMMANDS, FRAMES, LF, LR, REST, RUN_TIMES, SETTLED, SIZES, STARTED_H, true_poses
+
+from agvbench.effects import effect_kinds
+from agvbench.errors import InputError
+from agvbench.model.simulation import SimulatedRun, Simulation
+from agvbench.types import Commands
+from agvbench.vehicle.geometry import Geometry
+
+START = (0.4, -0.3, 0.6)
+ROWS = np.vstack([[*REST, 0.0], SETTLED])
+INITIAL = np.array([[*START, 0.0]])
+RUN = SimulatedRun(
+    Commands(RUN_TIMES, 1500.0 + COMMANDS[:, 0], 1500.0 + COMMANDS[:, 1], 1500.0 + COMMANDS[:, 2]), FRAMES, STARTED_H
+)
+PAIRS = list(itertools.combinations(SIZES, 2))
+
+
+@pytest.fixture(scope="module")
+def simulation() -> Simulation:
+    return Simulation(Geometry(LF, LR), 1500.0, [RUN])
+
+
+def parameters(simulation, sizes):
+    kinds = effect_kinds()
+    return simulation.parameters([kinds[name](**values) for name, values in sizes.items()])
+
+
+def error(simulation, sizes):
+    predicted = simulation.predict(ROWS, parameters(simulation, sizes), INITIAL)
+    return np.abs(predicted - true_poses(sizes, START)).max()
+
+
+def test_there_is_a_truth_for_every_effect():
+    assert set(SIZES) == set(effect_kinds())
+
+
+def test_without_effects(simulation):
+    assert error(simulation, {}) < 1e-7
+
+
+@pytest.mark.parametrize("name", SIZES)
+def test_one_effect(simulation, name):
+    assert error(simulation, {name: SIZES[name]}) < 2e-6
+
+
+def test_every_pair_of_effects(simulation):
+    errors = {pair: error(simulation, {name: SIZES[name] for name in pair}) for pair in PAIRS}
+    worst = max(errors, key=errors.__getitem__)
+    assert errors[worst] < 2e-5, worst
+    assert sorted(errors.values())[int(0.9 * len(errors))] < 2e-6
+
+
+@pytest.mark.parametrize("name", SIZES)
+def test_derivatives_with_respect_to_an_effects_parameters(simulation, name):
+    at = parameters(simulation, {name: SIZES[name]})
+    slopes = simulation.jacobian(ROWS, at, INITIAL, effects=[name])
+    assert slopes.parameter_names == tuple(f"{name}.{parameter}" for parameter in SIZES[name])
+    for column, (parameter, value) in zip(slopes.parameters, SIZES[name].items(), strict=True):
+        step = 2e-3 * value
+        above, below = (true_poses({name: {**SIZES[name], parameter: value + by}}, START) for by in (step, -step))
+        expected = (above - below) / (2.0 * step)
+        # A pose that is read on a kink has two slopes; hence the quantile.
+        assert np.quantile(np.abs(column - expected), 0.99) < 3e-3 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("name", ["actuation_delay", "steering_lag", "mocap_latency"])
+def test_derivatives_at_null(simulation, name):
+    slopes = simulation.jacobian(ROWS, simulation.parameters(), INITIAL, effects=[name]).parameters
+    for column, parameter in zip(slopes, SIZES[name], strict=True):
+        null = true_poses({}, START)
+        small = true_poses({name: {parameter: 5e-3}}, START)
+        expected = (small - null) / 5e-3
+        assert np.quantile(np.abs(column - expected), 0.95) < 0.03 * np.abs(expected).max()
+
+
+def test_no_slope_at_an_infinite_limit(simulation):
+    slopes = simulation.jacobian(ROWS, simulation.parameters(), INITIAL, effects=["steering_rate_limit"])
+    assert not slopes.parameters.any()
+
+
+def test_derivatives_with_respect_to_start_and_maps(simulation):
+    at = parameters(simulation, {"speed_lag": SIZES["speed_lag"], "steering_lag": SIZES["steering_lag"]})
+    direction = np.zeros((2, *ROWS.shape))
+    direction[0, :, 0] = 1.0  # an offset of the front axle
+    direction[1, :, 2] = ROWS[:, 2]  # a scale of speed
+    slopes = simulation.jacobian(ROWS, at, INITIAL, directions=direction, initial_state=True)
+    poses = simulation.predict(ROWS, at, INITIAL)
+    np.testing.assert_allclose(slopes.initial[0], np.broadcast_to([1.0, 0.0, 0.0], poses.shape), atol=1e-8)
+    turned = np.column_stack([-(poses[:, 1] - START[1]), poses[:, 0] - START[0], np.ones(len(poses))])
+    np.testing.assert_allclose(slopes.initial[2], turned, atol=1e-6)
+    for column, along in zip(slopes.settled, direction, strict=True):
+        moved = simulation.predict(ROWS + 1e-3 * along, at, INITIAL)
+        np.testing.assert_allclose(poses + 1e-3 * column, moved, atol=2e-5)
+
+
+def test_only_touched_runs_are_simulated():
+    both = Simulation(Geometry(LF, LR), 1500.0, [RUN, RUN])
+    rows, initial = np.vstack([ROWS, ROWS]), np.vstack([INITIAL, INITIAL])
+    direction = np.zeros((1, *rows.shape))
+    direction[0, len(ROWS) :, 1] = 1.0
+    slopes = both.jacobian(rows, both.parameters(), initial, directions=direction)
+    first, second = both.split(slopes.settled[0])
+    assert not first.any()
+    assert second.any()
+
+
+def test_a_window_of_a_run_goes_on_where_the_run_was():
+    sizes = {name: SIZES[name] for name in ("actuation_delay", "steering_lag", "steering_rate_limit", "speed_lag")}
+    sizes |= {name: SIZES[name] for name in ("mocap_latency", "marker_offset", "steering_backlash", "mocap_scale")}
+    whole = true_poses(sizes, START)
+    for first in (40, 70, 110):
+        window = SimulatedRun(RUN.commands, FRAMES[first:], STARTED_H, begins_s=FRAMES[first])
+        simulation = Simulation(Geometry(LF, LR), 1500.0, [window])
+        initial = np.array([[*whole[first], np.nan]])
+        predicted = simulation.predict(ROWS, parameters(simulation, sizes), initial)
+        np.testing.assert_allclose(predicted, whole[first:], atol=1e-5)
+
+
+def test_a_window_may_begin_at_another_speed():
+    window = SimulatedRun(Commands(*np.array([[0.0], [1500.0], [1500.0], [1500.0]])), FRAMES[10:], begins_s=1.0)
+    simulation = Simulation(Geometry(LF, LR), 1500.0, [window])
+    lag = parameters(simulation, {"speed_lag": {"accelerate_s": 0.3, "brake_s": 0.5}})
+    poses = simulation.predict(np.zeros((2, 3)), lag, np.array([[0.0, 0.0, 0.0, 0.4]]))
+    rolled = np.where(FRAMES[10:] > 1.0, 0.4 * 0.5 * -np.expm1(-(FRAMES[10:] - 1.0) / 0.5), 0.0)
+    np.testing.assert_allclose(poses[:, 0], rolled, atol=5e-7)
+
+
+def test_effects_and_parameters_are_two_ways_to_say_the_same(simulation):
+    effects = (effect_kinds()["steering_lag"](0.2), effect_kinds()["steering_rate_limit"](3.0))
+    assert simulation.effects(simulation.parameters(effects)) == effects
+    assert simulation.effects(simulation.parameters()) == ()
+    assert [simulation.parameter_names[i] for i in simulation.indices("speed_lag")] == [
+        "speed_lag.accelerate_s",
+        "speed_lag.brake_s",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"t_s": np.array([1.0, 0.5])}, "run 0: t_s: time goes back; sort by time"),
+        ({"t_s": np.array([np.nan])}, "run 0: t_s: is not finite"),
+        ({"commands": Commands(*np.empty((4, 0)))}, "run 0: a run needs a command; give at least one row"),
+    ],
+)
+def test_bad_runs_are_refused(change, message):
+    with pytest.raises(InputError) as caught:
+        Simulation(Geometry(LF, LR), 1500.0, [dataclasses.replace(RUN, **change)])
+    assert str(caught.value) == message
