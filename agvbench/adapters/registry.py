@@ -62,6 +62,12 @@ def open_mocap(spec: str, options: AdapterOptions) -> MocapAdapter:
     return _choose("mocap", scheme, mocap_adapters()).open(address, options)
 
 
+def check_specs(agv: str, mocap: str) -> None:
+    """Raise `LinkError` unless there are adapters of these names; nothing is opened."""
+    _choose("agv", parse_spec(agv)[0], agv_adapters())
+    _choose("mocap", parse_spec(mocap)[0], mocap_adapters())
+
+
 def _choose(role: str, scheme: str, known: dict[str, type[_Adapter]]) -> type[_Adapter]:
     if scheme in known:
         return known[scheme]

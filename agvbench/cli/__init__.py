@@ -51,6 +51,7 @@ def build_parser() -> argparse.ArgumentParser:
     for name, module in _commands().items():
         sub = subparsers.add_parser(
             name,
+            allow_abbrev=False,
             help=module.HELP,
             description=module.__doc__,
             formatter_class=argparse.RawDescriptionHelpFormatter,

@@ -53,7 +53,8 @@ def _repeats(mark: pytest.Mark, *, full: bool, asked: int | None) -> int:
     """Return how often to drive: a fixed number, or what ``--repeats`` asks for where the mark leaves it open."""
     fixed = mark.args[0] if mark.args else None
     if fixed is None:
-        return _DEFAULT_REPEATS if asked is None else max(asked, 0)
+        # What is asked wrongly is told once everything is collected.
+        return _DEFAULT_REPEATS if asked is None else max(asked, 1)
     return int(mark.kwargs.get("full") or fixed) if full else int(fixed)
 
 

@@ -42,9 +42,13 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
                 resume=bool(config.getoption("resume")),
                 dry_run=bool(config.getoption("dry_run")),
             )
-            config.stash[SESSION] = stack.enter_context(opened)
+            config.stash[SESSION] = bench_session = stack.enter_context(opened)
         except AgvbenchError as error:
             raise pytest.UsageError(str(error)) from None
+        reporter = config.pluginmanager.get_plugin("terminalreporter")
+        if reporter is not None:
+            for notice in bench_session.notices:
+                reporter.write_line(notice)
         return (yield)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -46,5 +45,4 @@ def settings_from(config: pytest.Config) -> BenchSettings:
     """
     from agvbench.running.settings import BenchSettings
 
-    known = {f.name for f in fields(BenchSettings)}
-    return BenchSettings(**{name: value for name, value in given_options(config).items() if name in known})
+    return BenchSettings.given(given_options(config))

@@ -105,7 +105,7 @@ def pytest_report_teststatus(report: pytest.TestReport | pytest.CollectReport) -
     """Leave the dots of passed benchmarks to the progress line."""
     if not isinstance(report, pytest.TestReport) or "agvbench" not in dict(report.user_properties):
         return None
-    if report.when == "call" and not report.failed:
+    if report.when == "call":
         return report.outcome, "", ""
     return None
 

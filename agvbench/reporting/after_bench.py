@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rich.console import Group
+from rich.console import Group, RenderableType
 from rich.text import Text
 
 from agvbench.errors import AgvbenchError
@@ -12,7 +12,7 @@ from agvbench.reporting.console import end_pose_summary
 from agvbench.reporting.content import Paragraph
 from agvbench.reporting.text import as_text
 from agvbench.reporting.write import write_report
-from agvbench.workflows.report import gather
+from agvbench.workflows.report import ReportData, gather
 
 
 def conclude(directory: Path, *, report: bool) -> str:
@@ -22,10 +22,15 @@ def conclude(directory: Path, *, report: bool) -> str:
     """
     try:
         if not report:
-            return as_text(Group(end_pose_summary(gather(directory)), Text(f"campaign: {directory}")))
+            return as_text(Group(*_end_poses(gather(directory)), Text(f"campaign: {directory}")))
         written = write_report(directory)
     except AgvbenchError as error:
         return f"no report: {error}\ncampaign: {directory}"
     said = [Text(block.text) for block in written.sections[0].blocks if isinstance(block, Paragraph)]
     where = [Text(f"campaign: {directory}"), Text(f"report:   {written.files[0]}")]
-    return as_text(Group(end_pose_summary(written.data), *said, Text(""), *where))
+    return as_text(Group(*_end_poses(written.data), *said, Text(""), *where))
+
+
+def _end_poses(data: ReportData) -> list[RenderableType]:
+    """Return the table of end poses, or nothing where no run had a target to miss."""
+    return [end_pose_summary(data)] if len(data.end_poses) else []

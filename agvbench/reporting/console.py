@@ -118,7 +118,18 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
         console.print(Text(f"left out: {plain(line)}", style="dim"))
     for note in comparison.notes:
         console.print(Text(note, style="dim"))
+    console.print(Text(_legend(comparison), style="dim"))
     console.print(Text(headline(comparison), style="bold"))
+
+
+def _legend(comparison: Comparison) -> str:
+    """Return how verdicts are reached, with this comparison's margins."""
+    margins = {f"{d.margin:g} {d.quantity.unit}" for d in comparison.differences}
+    return (
+        f"margins: ± {', ± '.join(sorted(margins))}. better or worse: beyond the margin, and beyond chance after"
+        " correcting for all rows; same: within the margin; cannot say: neither could be shown, even where an interval"
+        " leaves out 0"
+    )
 
 
 def _styled(cell: str, column: Column) -> RenderableType:

@@ -18,6 +18,7 @@ def dry_run_table(planned: Sequence[tuple[DriveOrder, Plan]]) -> str:
     Times are those of the plans, with the rests around each run and the way back to the start.
     """
     from rich.table import Table
+    from rich.text import Text
 
     from agvbench.reporting.text import as_text
 
@@ -28,7 +29,7 @@ def dry_run_table(planned: Sequence[tuple[DriveOrder, Plan]]) -> str:
     for column in ("experiment", "trajectory", "condition"):
         table.add_column(column)
     for column in ("runs", "each [s]", "all [min]", "floor [m]"):
-        table.add_column(column, justify="right")
+        table.add_column(Text(column), justify="right")
     for (experiment, trajectory, condition), plans in cells.items():
         longest = max(plan.duration_s for plan in plans)
         floor = " × ".join(f"{max(sides):.2f}" for sides in zip(*(plan.floor_m for plan in plans), strict=True))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 from agvbench.bus.link import VehicleLink
 from agvbench.campaign import CampaignWriter
-from agvbench.errors import LinkError
+from agvbench.errors import LinkError, PlantError
 from agvbench.model import VehicleModel
 from agvbench.running.campaign_time import CampaignTime
 from agvbench.running.drive import DEFAULT_TIMING, Drive, Timing, drive, exchanged
@@ -41,7 +41,7 @@ class Bench:
         self._calibrated: VehicleModel | None = None
         self._time, self._timing, self._limits = campaign_time, timing, limits
         self._identity = link.identity()
-        self._failure: LinkError | None = None
+        self._failure: LinkError | PlantError | None = None
         self._recorded = recorded
 
     def model(self, condition: str) -> VehicleModel:
@@ -130,7 +130,7 @@ class Bench:
         self, order: DriveOrder, run_id: str, started_s: float, seen: list[Frames], error: BaseException
     ) -> None:
         """Keep what was seen of a run that failed, and remember a failure of the hardware."""
-        if isinstance(error, LinkError):
+        if isinstance(error, LinkError | PlantError):
             self._failure = error
         why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error) or type(error).__name__
         frames = Frames.concatenate(seen)

@@ -11,7 +11,7 @@ from typing import Any
 
 import pandas as pd
 
-from agvbench.adapters import open_rig
+from agvbench.adapters import check_specs, open_rig
 from agvbench.bus.link import VehicleLink
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
 from agvbench.errors import VehicleError
@@ -28,6 +28,8 @@ from agvbench.running.vehicles import uncalibrated_vehicle
 from agvbench.types import Run
 
 PROVENANCE_TABLE = "provenance"
+LAB_VEHICLE = "vehicle.toml"
+"""The vehicle of a lab folder, believed before calibration where no other is named."""
 
 
 @contextmanager
@@ -44,6 +46,7 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
     models = _known_models(settings)
     workspace = Workspace.parse(settings.workspace)
     if dry_run:
+        check_specs(settings.agv, settings.mocap)
         models.setdefault("calibrated", thesis_vehicle())
         yield BenchSession(directory, models=models, workspace=workspace, bench=None)
         return
@@ -61,13 +64,28 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
         header = _header(directory.name, models["uncalibrated"], link)
         writer = _writer(directory, settings, header, resume=resume, simulated=link.identity().simulated)
         bench = _bench(settings, models, link, writer)
-        yield BenchSession(directory, models=models, workspace=workspace, bench=bench)
+        session = BenchSession(directory, models=models, workspace=workspace, bench=bench)
+        session.notices = _notices(settings, given, resume=resume, resumed=bool(writer.finished_ids), where=directory)
+        yield session
 
 
 def _settings(given: Mapping[str, Any], directory: Path, *, resume: bool) -> BenchSettings:
     if resume and (directory / SETTINGS_FILE).exists():
         return settings_for_resume(BenchSettings.load(directory), given)
-    return BenchSettings(**given)
+    beside = {"vehicle": LAB_VEHICLE} if "vehicle" not in given and Path(LAB_VEHICLE).is_file() else {}
+    return BenchSettings.given({**beside, **given})
+
+
+def _notices(
+    settings: BenchSettings, given: Mapping[str, Any], *, resume: bool, resumed: bool, where: Path
+) -> list[str]:
+    """Return what was decided without being asked for."""
+    notices = []
+    if resume and not resumed:
+        notices.append(f"nothing to resume in {where}: a new session begins")
+    if settings.vehicle == LAB_VEHICLE and "vehicle" not in given:
+        notices.append(f"vehicle: {LAB_VEHICLE} of this folder")
+    return notices
 
 
 def _known_models(settings: BenchSettings) -> dict[str, VehicleModel]:

@@ -8,8 +8,8 @@ from typing import Any
 # Not given is None everywhere, so that a resumed session can tell what was asked from what is usual.
 _FLAG: dict[str, Any] = {"action": "store_true", "default": None}
 OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
-    ("--agv", {"metavar": "ADAPTER"}, "vehicle adapter: sim (default), serial:PORT, simavr"),
-    ("--mocap", {"metavar": "ADAPTER"}, "motion capture adapter: sim (default), natnet:HOST"),
+    ("--agv", {"metavar": "ADAPTER"}, "vehicle adapter: sim (default), or live, the same in real time"),
+    ("--mocap", {"metavar": "ADAPTER"}, "motion capture adapter: sim (default)"),
     (
         "--plant",
         {"metavar": "PLANT"},

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from agvbench.errors import PlanError
 from agvbench.model import VehicleModel
 from agvbench.planning import Plan, Trajectory, Workspace, plan
 from agvbench.running.bench import Bench
@@ -29,6 +30,8 @@ class BenchSession:
         self.planned: list[tuple[DriveOrder, Plan]] = []
         self._models, self._bench = models, bench
         self._plans: dict[tuple[Trajectory, str], Plan] = {}
+        self._undrivable: dict[tuple[Trajectory, str], PlanError] = {}
+        self.notices: list[str] = []
 
     @property
     def is_dry(self) -> bool:
@@ -46,10 +49,18 @@ class BenchSession:
         ------
         PlanError
             If the vehicle cannot drive it, or not inside the workspace.
+        NotDrivenError
+            If that was said before.
         """
         key = (trajectory, condition)
+        if key in self._undrivable:
+            raise NotDrivenError(f"cannot be driven, as its first repeat says: {self._undrivable[key]}")
         if key not in self._plans:
-            self._plans[key] = plan(trajectory, self.model(condition), workspace=self.workspace)
+            try:
+                self._plans[key] = plan(trajectory, self.model(condition), workspace=self.workspace)
+            except PlanError as error:
+                self._undrivable[key] = error
+                raise
         return self._plans[key]
 
     def driver(self, run_id: str, *, experiment: str, repeat: int) -> Driver:

@@ -51,6 +51,20 @@ class BenchSettings:
         _check(self.order in ORDERS, "--order", self.order, ", ".join(ORDERS), "choose one of these")
         _check(self.maps in MAPS, "--maps", self.maps, ", ".join(MAPS), "choose one of these")
 
+    @classmethod
+    def given(cls, options: Mapping[str, Any]) -> BenchSettings:
+        """Return the settings that `options` ask for; what is not among them is as usual.
+
+        Raises
+        ------
+        FlagError
+            If a value cannot be used.
+        """
+        repeats = options.get("repeats", 1)
+        _check(repeats >= 1, "--repeats", repeats, "at least 1", "give a whole number of repeats")
+        known = {f.name for f in fields(cls)}
+        return cls(**{name: value for name, value in options.items() if name in known})
+
     def save(self, directory: Path) -> None:
         """Write the settings beside the campaign's tables."""
         (directory / SETTINGS_FILE).write_text(tomli_w.dumps(asdict(self)), encoding="utf-8")
@@ -85,6 +99,7 @@ def settings_for_resume(saved: BenchSettings, given: Mapping[str, Any]) -> Bench
         If an option differs from what the session began with.
     """
     known = {f.name for f in fields(BenchSettings)}
+    BenchSettings.given(given)
     for name, value in given.items():
         if name not in known or name in _FREE_ON_RESUME:
             continue

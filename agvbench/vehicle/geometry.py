@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from agvbench.errors import VehicleError
 from agvbench.vehicle.checks import coerce_float, require_positive
+
+LONGEST_M = 20.0
 
 
 @dataclass(frozen=True)
@@ -21,7 +24,7 @@ class Geometry:
     Raises
     ------
     VehicleError
-        Unless both are finite and greater than zero.
+        Unless both are finite, greater than zero and at most 20 m.
 
     Examples
     --------
@@ -35,6 +38,14 @@ class Geometry:
     def __post_init__(self) -> None:
         coerce_float(self, "front_axle_m", "rear_axle_m")
         require_positive(self, "front_axle_m", "rear_axle_m")
+        for name in ("front_axle_m", "rear_axle_m"):
+            if (value := getattr(self, name)) > LONGEST_M:
+                raise VehicleError(
+                    f"{name} is longer than any vehicle",
+                    value=f"{value:g} m",
+                    limit=f"at most {LONGEST_M:g} m",
+                    remedy="give metres",
+                )
 
     @property
     def wheelbase_m(self) -> float:

@@ -13,6 +13,7 @@ from agvbench.calibration import Calibration, MapFit, calibrate
 from agvbench.campaign import Campaign
 from agvbench.errors import FileError, FitError
 
+_EXPLAINS = 0.5
 _CAPTION = (
     "● is in the vehicle model. n commands measured, out left out of the fit. R² and residual (standard deviation): "
     "over the points fitted; rms: over all points; predicted: each command but the outermost, from a fit without it."
@@ -34,11 +35,13 @@ def run_calibrate(directory: str, *, maps: str = "default", session: str | None 
         calibration = calibrate(Campaign.open(directory), maps=maps, session=session)
     console = Console()
     console.print(fits_table(calibration))
-    for word in [*refused(calibration), *calibration.warnings]:
+    for word in [*refused(calibration), *calibration.warnings, *unexplained(calibration)]:
         console.print(f"  {word}", highlight=False, markup=False, soft_wrap=True)
     if out is not None:
         save(calibration, Path(out))
         console.print(f"{out}: calibration {calibration.model.calibration_hash}", soft_wrap=True)
+    else:
+        console.print("nothing written; --out vehicle.toml writes the vehicle model with the maps marked ●")
 
 
 def save(calibration: Calibration, path: Path) -> None:
@@ -95,6 +98,16 @@ def refused(calibration: Calibration) -> list[str]:
         for role, fits in calibration.fits.items()
         for name, fit in fits.items()
         if isinstance(fit, FitError)
+    ]
+
+
+def unexplained(calibration: Calibration) -> list[str]:
+    """Return a warning for each chosen map that explains less than half of what was measured."""
+    return [
+        f"WARNING: {role}: the map explains {100 * max(0.0, fit.r_squared):.0f} % of what was measured; drive it over"
+        " its whole range before you believe it"
+        for role, fits in calibration.fits.items()
+        if isinstance(fit := fits.get(calibration.chosen.get(role, "")), MapFit) and fit.r_squared < _EXPLAINS
     ]
 
 

@@ -33,7 +33,6 @@ def compare_campaigns(
     if b is None and conditions is None:
         raise FlagError(
             "one campaign has nothing to be compared with",
-            where="agvbench compare",
             value=a,
             remedy="give a second campaign, or two conditions with --conditions",
         )
