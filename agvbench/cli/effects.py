@@ -1,0 +1,40 @@
+"""List the physical effects that a vehicle model may have, or begin a new one.
+
+An effect is one file of agvbench/effects/: parameters with their bounds, and hooks that say what it does. A new
+file is simulated, tested, listed and fitted without another line elsewhere.
+
+examples:
+  agvbench effects                         name, stage, parameters, and the assumption that each relaxes
+  agvbench effects new servo_warm_up       write agvbench/effects/servo_warm_up.py, to be edited
+  agvbench effects new seam --dir /tmp     write it elsewhere
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+HELP = "list the physical effects that a model may have; write the file of a new one"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``agvbench effects``."""
+    actions = parser.add_subparsers(dest="action", metavar="ACTION")
+    new = actions.add_parser(
+        "new", help="write the file of a new effect", description="Write the file of a new effect."
+    )
+    new.add_argument("name", metavar="NAME", help="its name: lower case, with underscores")
+    new.add_argument("--dir", metavar="DIR", type=Path, help="folder to write into (default: agvbench/effects)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """List effects or write a template; return the exit code."""
+    from agvbench.workflows.effects import effects_table, write_template
+
+    if arguments.action == "new":
+        print(f"wrote {write_template(arguments.name, arguments.dir)}: now say what it does")
+        return 0
+    from agvbench.reporting.console import wide_console
+
+    wide_console().print(effects_table())
+    return 0

@@ -1,0 +1,36 @@
+"""``agvbench effects`` and ``agvbench effects new``."""
+
+from __future__ import annotations
+
+from agvbench.cli import main
+from agvbench.effects import effect_kinds
+
+
+def test_lists_every_effect_with_its_parameters(capsys):
+    assert main(["effects"]) == 0
+    listed = capsys.readouterr().out
+    for name, kind in effect_kinds().items():
+        assert name in listed
+        assert all(p.name in listed for p in kind.parameters())
+
+
+def test_new_writes_a_file_once(tmp_path, capsys):
+    command = ["effects", "new", "servo_warm_up", "--dir", str(tmp_path)]
+    assert main(command) == 0
+    assert "class ServoWarmUp(Effect):" in (tmp_path / "servo_warm_up.py").read_text(encoding="utf-8")
+    assert main(command) == 2
+    assert capsys.readouterr().err == (
+        f"agvbench effects: {tmp_path / 'servo_warm_up.py'}: exists already; choose another name\n"
+    )
+
+
+def test_names_that_cannot_be(tmp_path, capsys):
+    for name in ("Warm", "warm-up", "class", "", "steering_lag"):
+        assert main(["effects", "new", name, "--dir", str(tmp_path)]) == 2
+        assert capsys.readouterr().err.startswith("agvbench effects: NAME: ")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_is_not_there(tmp_path, capsys):
+    assert main(["effects", "new", "seam", "--dir", str(tmp_path / "none")]) == 2
+    assert "cannot be written (No such file or directory); choose another --dir" in capsys.readouterr().err
