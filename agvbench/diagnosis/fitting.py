@@ -8,11 +8,11 @@ likelihood by Laplace's approximation.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from agvbench.diagnosis.prediction import Predictor
+from agvbench.diagnosis.prediction import Linearised, Predictor
 from agvbench.types import Floats
 
 EVIDENCE_POSES = 4.0
@@ -56,6 +56,7 @@ class Fit:
     information: Floats
     gradient: Floats
     residual: Floats
+    linear: Linearised
 
     @property
     def covariance(self) -> Floats:
@@ -125,22 +126,35 @@ def fit(
     linear = predictor.linearise(parameters, offsets)
     residual = _residual(predictor, linear.poses)
     terms = _terms(predictor, residual, linear.by_parameters, linear.by_offsets, offsets, scatter)
-    return Fit(predictor, parameters, offsets, scatter, terms.loss, terms.information, terms.gradient, residual)
+    return Fit(predictor, parameters, offsets, scatter, terms.loss, terms.information, terms.gradient, residual, linear)
 
 
-def resolve_offsets(fitted: Fit, predictor: Predictor) -> Fit:
-    """Return `fitted` for the runs of another `predictor`, the parameters kept and the runs' offsets found."""
-    free = replace(fitted.scatter)
-    offsets = np.zeros((len(predictor.readings), 6))
-    for _ in range(3):
-        linear = predictor.linearise(fitted.parameters, offsets)
-        residual = _residual(predictor, linear.poses)
-        terms = _terms(predictor, residual, linear.by_parameters, linear.by_offsets, offsets, free)
-        offsets = offsets + np.einsum("rij,rj->ri", terms.inner_inverse, terms.pull)
-    linear = predictor.linearise(fitted.parameters, offsets)
-    residual = _residual(predictor, linear.poses)
-    terms = _terms(predictor, residual, linear.by_parameters, linear.by_offsets, offsets, free)
-    return Fit(predictor, fitted.parameters, offsets, free, terms.loss, terms.information, terms.gradient, residual)
+def promised_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floats) -> float:
+    """Return by how much the loss would fall with more effects, their parameters near `start`, to first order.
+
+    `larger` has the effects of `fitted` and then others. It is linearised at `start`, with the derivatives by what
+    was fitted before left as they are: some simulations in place of a fit.
+    """
+    parameters = np.r_[fitted.parameters, start]
+    poses, slopes = larger.by_last(parameters, fitted.offsets, len(start))
+    by_parameters = np.concatenate([fitted.linear.by_parameters, slopes], axis=-1)
+    residual = _residual(larger, poses)
+    terms = _terms(larger, residual, by_parameters, fitted.linear.by_offsets, fitted.offsets, fitted.scatter)
+    gradient = terms.gradient.sum(axis=0)
+    move = np.linalg.lstsq(terms.information.sum(axis=0) + _ridge(larger), gradient, rcond=1e-12)[0]
+    # What would go beyond its bound stops there, and the rest is solved for again.
+    ends = np.clip(start + move[len(fitted.parameters) :], bounds[:, 0], bounds[:, 1])
+    if np.any(ends != start + move[len(fitted.parameters) :]):
+        held = np.r_[np.zeros(len(fitted.parameters)), ends - start]
+        matrix = terms.information.sum(axis=0) + _ridge(larger)
+        free = np.r_[np.ones(len(fitted.parameters)), np.zeros(len(start))].astype(np.bool_)
+        rest = np.linalg.lstsq(matrix[np.ix_(free, free)], (gradient - matrix @ held)[free], rcond=1e-12)[0]
+        move = held
+        move[: len(fitted.parameters)] = rest
+        saved = 2.0 * gradient @ move - move @ matrix @ move
+    else:
+        saved = gradient @ move
+    return float(fitted.loss.sum() - terms.loss.sum() + saved)
 
 
 def _residual(predictor: Predictor, poses: Floats) -> Floats:

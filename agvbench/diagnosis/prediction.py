@@ -32,7 +32,7 @@ class Linearised:
 
 
 class Batch:
-    """Runs packed for simulation: as they are, and as lanes, each of which differs from its run in one level or heading.
+    """Runs packed for simulation: as they are, and as lanes, each of which differs in one level or in heading.
 
     A run's own levels of command are varied one by one, which gives the derivatives by the maps' values and by the
     run's offsets alike. Packed once, it serves every set of effects.
@@ -133,11 +133,22 @@ class Predictor:
             for node in range(weights.shape[1]):
                 used = weights[:, node] != 0.0
                 np.add.at(target[..., node], run[used], change[used] * weights[used, node][:, None, None])
-        for k, step in enumerate(self._steps):
-            moved = own.copy()
-            moved[k] += step
-            by_parameters[..., self.maps.size + k] = (self._simulate(settled, moved, initial) - base) / step
+        for k in range(len(own)):
+            by_parameters[..., self.maps.size + k] = self._slope(settled, own, initial, base, k)
         return Linearised(base, by_parameters, by_offsets)
+
+    def by_last(self, parameters: Floats, offsets: Floats, count: int) -> tuple[Floats, Floats]:
+        """Return poses (R, K, 3), and their derivatives by the last `count` parameters (R, K, 3, count)."""
+        settled, initial = self._inputs(parameters, offsets)
+        own = parameters[self.maps.size :]
+        base = self._simulate(settled, own, initial)
+        last = range(len(own) - count, len(own))
+        return base, np.stack([self._slope(settled, own, initial, base, k) for k in last], axis=-1)
+
+    def _slope(self, settled: Floats, own: Floats, initial: Floats, base: Floats, k: int) -> Floats:
+        moved = own.copy()
+        moved[k] += self._steps[k]
+        return (self._simulate(settled, moved, initial) - base) / self._steps[k]
 
     def _simulate_lanes(self, settled: Floats, initial: Floats, own: Floats) -> Floats:
         batch = self.batch

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.diagnosis.candidates import Candidate, bounds_of
-from agvbench.diagnosis.fitting import Fit, fit
+from agvbench.diagnosis.fitting import Fit, fit, promised_gain
 from agvbench.diagnosis.grouping import folds
 from agvbench.diagnosis.judging import FOLDS, cross_validated, without_best
 from agvbench.diagnosis.prediction import Batch, Predictor
@@ -29,8 +29,8 @@ RIVAL_MARGIN = 10.0
 NOTICEABLE = 0.15
 """An effect has to move the prediction by this part of what remains unpredicted, be it ever so certain."""
 
-_FIRST, _SHORT, _LONG = 1, 3, 10
-_HOPELESS = 3.0
+_SHORT, _LONG = 3, 10
+_HOPELESS = 3.0  # what promises less, to first order, is not fitted
 _MOST_EFFECTS = 4
 
 
@@ -163,20 +163,19 @@ class Selector:
             return self._known[key]
         predictor = self._predictor(names)
         bounds = bounds_of(self.candidates, names)
-        now = current.fit
-        attempts = [
-            fit(
-                predictor,
-                np.r_[now.parameters, start],
-                bounds,
-                offsets=now.offsets,
-                scatter=now.scatter,
-                iterations=_FIRST,
-            )
-            for start in self.candidates[name].starts
-        ]
-        best = min(attempts, key=lambda attempt: float(attempt.loss.sum()))
-        short = fit(predictor, best.parameters, bounds, offsets=best.offsets, scatter=best.scatter, iterations=_SHORT)
+        candidate, now = self.candidates[name], current.fit
+        promises = [promised_gain(now, predictor, start, candidate.bounds) for start in candidate.starts]
+        best = int(np.argmax(promises))
+        if promises[best] < _HOPELESS:
+            return replace(current, names=names)  # as good as without it, and never chosen
+        short = fit(
+            predictor,
+            np.r_[now.parameters, candidate.starts[best]],
+            bounds,
+            offsets=now.offsets,
+            scatter=now.scatter,
+            iterations=_SHORT,
+        )
         if float(now.loss.sum() - short.loss.sum()) < _HOPELESS:
             self.tried += 1
             self._known[key] = Scored(names, short, cross_validated(short, self._fold, bounds))
