@@ -214,7 +214,15 @@ class Simulation:
         -------
         ndarray
             (frames, 3): x, y [m], heading [rad], which is continuous and not wrapped.
+
+        Raises
+        ------
+        InputError
+            If a number is NaN.
         """
+        for what, values in (("parameters", parameters), ("settled", settled), ("initial", initial[:, :3])):
+            if np.isnan(values).any():
+                raise InputError("is not a number", where=what, value="NaN")
         poses = np.full((len(self.t_s), 3), np.nan) if out is None else out
         self._kernel(
             np.array([self.geometry.front_axle_m, self.geometry.rear_axle_m, self._longest_step(parameters), 0.0]),

@@ -78,6 +78,8 @@ _SECONDS_PER_HOUR = 3600.0
 _FRONT_AXLE, _REAR_AXLE, _STEP, _STARTED = range(4)
 # The first step of a command, whose turn is not known yet [s]; how far a later one may turn [rad, and s at most 1].
 _FIRST_STEP_S, _TURN_PER_STEP = 0.05, 0.15
+# No vehicle turns faster [rad/s]: numbers that say so are nonsense, but must not hang the loop.
+_FASTEST_TURN = 150.0
 _TOGETHER = 1e-12
 
 
@@ -241,7 +243,8 @@ def _hold(
         if is_last:
             break
         tau += length
-        longest = min(vehicle[_STEP], _TURN_PER_STEP / max(abs(work[_TURN + _COUNT - 1]), _TURN_PER_STEP))
+        turning = min(max(abs(work[_TURN + _COUNT - 1]), _TURN_PER_STEP), _FASTEST_TURN)
+        longest = min(vehicle[_STEP], _TURN_PER_STEP / turning)
     return k
 
 
