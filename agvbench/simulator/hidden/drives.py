@@ -6,7 +6,7 @@ They are made for the base vehicle, from its own maps, as a calibrated bench wou
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,10 +23,11 @@ _DEG = math.pi / 180.0
 
 @dataclass(frozen=True)
 class ReferenceDrive:
-    """One drive: rows of (duration [s], drive, front, rear) in command units."""
+    """One drive: rows of (duration [s], drive, front, rear) in command units, from a start on the floor [m]."""
 
     name: str
     rows: tuple[tuple[float, float, float, float], ...]
+    start: tuple[float, float] = (0.0, 0.0)
 
 
 class _Commands:
@@ -78,11 +79,18 @@ def reference_drives(constants: dict[str, float]) -> list[ReferenceDrive]:
 
 
 def path(plant: Plant, drive: ReferenceDrive, *, seed: int = 0) -> Floats:
-    """Return the poses (n, 3) of a drive from the origin, one every 50 ms or at the end of a row."""
-    plant.reset((0.0, 0.0, 0.0), seed=seed)
+    """Return the poses (n, 3) of a drive, heading along x at its start, one every 50 ms and at the end of a row."""
+    plant.reset((*drive.start, 0.0), seed=seed)
     poses: list[tuple[float, float, float]] = []
     for duration_s, wheel, front, rear in drive.rows:
         whole = int(duration_s / SAMPLE_S)
         steps = [SAMPLE_S] * whole + [duration_s - whole * SAMPLE_S]
         poses.extend(plant.advance(wheel, front, rear, dt) for dt in steps)
     return np.array(poses)
+
+
+def centred(plant: Plant, drive: ReferenceDrive) -> ReferenceDrive:
+    """Return the drive begun where its path lies about the middle of the room, as a bench places it."""
+    poses = path(plant, drive)
+    middle = 0.5 * (poses.min(axis=0) + poses.max(axis=0))
+    return replace(drive, start=(drive.start[0] - float(middle[0]), drive.start[1] - float(middle[1])))

@@ -9,7 +9,7 @@ from agvbench.simulator.hidden.recipe import Recipe, Size
 
 _DEG = math.pi / 180.0
 _TURN = Size(-math.pi, math.pi, grows=0)
-_POSITION = ("x_m", "y_m", "position")
+_POSITION = ("x_m", "y_m")
 
 
 def _outside(
@@ -39,30 +39,30 @@ OUTSIDE = (
         seam_kick="kick_rad", seam_place="place_m", seam_direction="direction_rad",
     ),
     _outside(  # carpet: against the nap it drives slower
-        "floor_nap", ("heading", "heading_rad"), {"share": Size(0.02, 0.06), "direction_rad": _TURN},
+        "floor_nap", ("heading_rad",), {"share": Size(0.02, 0.06), "direction_rad": _TURN},
         nap="share", nap_direction="direction_rad",
     ),
     _outside(  # an eccentric left wheel: speed and course swing once per turn
-        "wheel_runout", ("distance", "distance_m", "distance modulo a period"),
+        "wheel_runout", ("distance_modulo_period_m",),
         {"share": Size(0.04, 0.10), "period_m": Size(0.25, 0.60, grows=0), "phase_rad": _TURN}, True,
         runout="share", runout_period="period_m", runout_phase="phase_rad",
     ),
     _outside(  # a servo amplifier that turns further as it warms
-        "servo_warm_up", ("campaign_time", "campaign time", "started_s", "steering"),
+        "servo_warm_up", ("campaign_time_h",),
         {"gain": Size(0.04, 0.10, signed=True), "time_constant_h": Size(0.2, 0.6, grows=0)},
         warm_gain="gain", warm_hours="time_constant_h",
     ),
     _outside(  # the motor loses speed while it drives, and recovers at rest
-        "speed_sag", ("time_in_run", "time in run", "t_s"),
+        "speed_sag", ("time_in_run_s",),
         {"share": Size(0.04, 0.10), "time_constant_s": Size(2.0, 5.0, grows=0)}, sag="share", sag_s="time_constant_s",
     ),
     _outside(  # one axle breaks loose before the other: no progress, but a twist
-        "stick_slip", ("time_in_run", "time in run", "t_s", "history"),
+        "stick_slip", ("time_in_run_s", "history"),
         {"twist_rad": Size(0.8 * _DEG, 2.5 * _DEG, signed=True), "duration_s": Size(0.05, 0.15, grows=0)},
         stick_twist="twist_rad", stick_s="duration_s",
     ),
     _outside(  # a servo stops short of where it is sent, by a share of the way
-        "servo_hysteresis", ("history", "steering"), {"share": Size(0.05, 0.12)}, shortfall="share",
+        "servo_hysteresis", ("history", "curvature_per_m"), {"share": Size(0.05, 0.12)}, shortfall="share",
     ),
     _outside(  # the drive's torque turns the front wheels one way ahead, the other way back
         "torque_steer", ("direction",), {"angle_rad": Size(0.6 * _DEG, 2.0 * _DEG, signed=True)},

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from agvbench.simulator.hidden.drives import ReferenceDrive, path, reference_drives
+from agvbench.simulator.hidden.drives import ReferenceDrive, centred, path, reference_drives
 from agvbench.simulator.hidden.plant import TURNAROUND_S, HiddenPlant
 from agvbench.simulator.hidden.truth import SealedTruth
 from agvbench.simulator.hidden.vehicle import BaseVehicle
@@ -75,7 +75,7 @@ class Bench:
 
     def __init__(self, base: BaseVehicle, override: dict[str, float] | None = None) -> None:
         self._constants, self._play = base.constants | (override or {}) | _UNBOUNDED, base.play
-        self.drives = reference_drives(base.constants)
+        self.drives = [centred(self.plant({}), drive) for drive in reference_drives(base.constants)]
         self.base_path = self.paths({})
         self.floor_m = self._floor_m()
         self.levels = self._free_levels()
@@ -144,7 +144,7 @@ class Bench:
 def _moved(drive: ReferenceDrive, levels: Levels) -> ReferenceDrive:
     """Return the drive with the commands of some levels moved."""
     rows = tuple((s, *(u + levels.get((i, u), 0.0) for i, u in enumerate(command))) for s, *command in drive.rows)
-    return ReferenceDrive(drive.name, rows)  # type: ignore[arg-type]
+    return replace(drive, rows=rows)  # type: ignore[arg-type]
 
 
 def separation(bench: Bench, mechanism: dict[str, float]) -> Separation:
@@ -180,7 +180,7 @@ def fit_mechanism(bench: Bench, wanted: Floats, constants: Mechanism, start: Seq
     scale = np.abs(values)
     left, best = _left(bench, wanted, constants, values, levels), math.inf
     for _ in range(2 * _ROUNDS):
-        if rms(left) >= 0.999 * best:
+        if rms(left) >= 0.97 * best:
             break
         best = rms(left)
         steps = 0.02 * scale
