@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from agvbench.diagnosis.judging import clustered_covariance
 from agvbench.diagnosis.result import Estimate, NamedEffect
 from agvbench.diagnosis.selection import RIVAL_MARGIN, Selection
 from agvbench.effects import effect_kinds
@@ -15,12 +16,11 @@ _FLAT = 3.0
 def named_effects(selection: Selection, bounds: Floats) -> tuple[NamedEffect, ...]:
     """Return the effects of the chosen model.
 
-    Standard errors come from the scatter between runs: each run's pull on the parameters is taken as one draw
-    (sandwich), so that what a run's samples share is not counted many times.
+    Standard errors are those of `clustered_covariance`.
     """
     fit = selection.chosen.fit
     maps = fit.predictor.maps.size
-    stderr = np.sqrt(np.maximum(np.diagonal(_sandwich(fit.information, fit.gradient, fit.covariance)), 0.0))
+    stderr = np.sqrt(np.diagonal(clustered_covariance(fit, fit.predictor.readings.group)))
     kinds = effect_kinds()
     at = 0
     found = []
@@ -45,15 +45,6 @@ def named_effects(selection: Selection, bounds: Floats) -> tuple[NamedEffect, ..
             )
         )
     return tuple(found)
-
-
-def _sandwich(information: Floats, gradient: Floats, covariance: Floats) -> Floats:
-    """Return the covariance of the parameters: the larger of what the model says and what the runs' pulls say."""
-    runs, size = gradient.shape
-    meat = gradient.T @ gradient * runs / max(runs - size, 1)
-    robust = covariance @ meat @ covariance
-    scale = np.sqrt(np.maximum(np.diagonal(robust) / np.maximum(np.diagonal(covariance), 1e-300), 1.0))
-    return np.asarray(covariance * scale[:, None] * scale[None, :])
 
 
 def _note(value: float, stderr: float, bounds: Floats, scale: float) -> str:

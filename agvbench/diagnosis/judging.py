@@ -10,6 +10,7 @@ from agvbench.types import Floats
 
 FOLDS = 5
 _BEST_SHARE = 0.05
+_CLEAR = 1e-4
 
 
 def cross_validated(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Floats:
@@ -43,3 +44,39 @@ def without_best(gain: Floats, group: NDArray[np.int64]) -> float:
     by_group = np.bincount(index, weights=gain)
     best = np.sort(by_group)[::-1][: max(1, round(_BEST_SHARE * len(names)))]
     return float(by_group.sum() - best.sum())
+
+
+def clustered_covariance(fitted: Fit, group: NDArray[np.int64]) -> Floats:
+    """Return the covariance of the parameters (P, P), with the pull of each group of runs taken as one draw.
+
+    What a run's samples share, and what repeats of a command share, is then not counted many times (the sandwich of
+    Liang and Zeger, 1986). Where it is the smaller, the likelihood's own covariance is kept.
+    """
+    _, index = np.unique(group, return_inverse=True)
+    pulls = np.zeros((int(index.max()) + 1, fitted.gradient.shape[1]))
+    np.add.at(pulls, index, fitted.gradient)
+    own = fitted.covariance
+    maps = fitted.predictor.maps.size
+    spare = max(len(group) - maps, 1)
+    robust = own @ (pulls.T @ pulls * len(group) / spare) @ own
+    widen = np.sqrt(np.maximum(np.diagonal(robust) / np.maximum(np.diagonal(own), 1e-300), 1.0))
+    return np.asarray(own * widen[:, None] * widen[None, :])
+
+
+def differs_from_nothing(fitted: Fit, name: str, group: NDArray[np.int64]) -> bool:
+    """Return whether the parameters of the effect called `name` are clear of what does nothing (Wald's test).
+
+    Limits, whose null is infinite, are judged by their gain alone.
+    """
+    from scipy import stats
+
+    predictor = fitted.predictor
+    own = np.array([key.partition(".")[0] == name for key in predictor.parameter_names])
+    at = predictor.maps.size + np.flatnonzero(own)
+    nulls = predictor.nulls[own]
+    if not np.isfinite(nulls).all():
+        return True
+    off = fitted.parameters[at] - nulls
+    covariance = clustered_covariance(fitted, group)[np.ix_(at, at)]
+    statistic = float(off @ np.linalg.pinv(covariance, hermitian=True) @ off)
+    return bool(stats.chi2.sf(statistic, len(at)) < _CLEAR)

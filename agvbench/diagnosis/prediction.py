@@ -82,6 +82,7 @@ class Predictor:
         self.readings, self.maps = batch.readings, batch.maps
         self._own = np.concatenate([np.empty(0, dtype=np.int64), *(batch.base.indices(name) for name in effects)])
         self.parameter_names: list[str] = [batch.base.parameter_names[i] for i in self._own]
+        self.nulls: Floats = batch.base.nulls[self._own]
         self._steps = _STEP_SHARE * batch.base.scales[self._own]
 
     def _all(self, own: Floats) -> Floats:
@@ -148,7 +149,7 @@ class Predictor:
     def _slope(self, settled: Floats, own: Floats, initial: Floats, base: Floats, k: int) -> Floats:
         moved = own.copy()
         moved[k] += self._steps[k]
-        return (self._simulate(settled, moved, initial) - base) / self._steps[k]
+        return np.asarray((self._simulate(settled, moved, initial) - base) / self._steps[k])
 
     def _simulate_lanes(self, settled: Floats, initial: Floats, own: Floats) -> Floats:
         batch = self.batch

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from agvbench.diagnosis.candidates import Candidate, bounds_of
 from agvbench.diagnosis.fitting import Fit, fit, promised_gain
 from agvbench.diagnosis.grouping import folds
-from agvbench.diagnosis.judging import FOLDS, cross_validated, without_best
+from agvbench.diagnosis.judging import FOLDS, cross_validated, differs_from_nothing, without_best
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.residuals import misses
 from agvbench.types import Floats
@@ -110,6 +110,10 @@ class Selector:
             gain.sum() > self.least_gain
             and without_best(gain, self.batch.readings.group) > 0.0
             and self._noticeable(without, with_it)
+            and all(
+                differs_from_nothing(with_it.fit, name, self.batch.readings.group)
+                for name in set(with_it.names) - set(without.names)
+            )
         )
 
     def _noticeable(self, without: Scored, with_it: Scored) -> bool:

@@ -1,0 +1,50 @@
+"""Campaigns of a vehicle of a few lines, in memory and on disk."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from tiny_vehicle import HEADER, Tiny, campaign_runs
+
+from agvbench.campaign import CampaignWriter
+from agvbench.types import Run
+
+
+class TinyCampaign:
+    """A header and runs, as `diagnose` takes them."""
+
+    header = HEADER
+
+    def __init__(self, runs: list[Run]) -> None:
+        self.runs = runs
+
+    def __iter__(self) -> Iterator[Run]:
+        return iter(self.runs)
+
+
+@pytest.fixture(scope="session")
+def tiny_campaign() -> Callable[..., TinyCampaign]:
+    """Return a function that drives a campaign with what is true of the vehicle."""
+    known: dict[Tiny, TinyCampaign] = {}
+
+    def drive(tiny: Tiny) -> TinyCampaign:
+        if tiny not in known:
+            known[tiny] = TinyCampaign(campaign_runs(tiny))
+        return known[tiny]
+
+    return drive
+
+
+@pytest.fixture(scope="session")
+def write_campaign() -> Callable[[Path, list[Run]], Path]:
+    """Return a function that writes runs as a campaign directory."""
+
+    def write(path: Path, runs: list[Run]) -> Path:
+        writer = CampaignWriter.create(path, HEADER)
+        for run in runs:
+            writer.append(run)
+        return path
+
+    return write

@@ -1,0 +1,71 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tiny_vehicle import NEUTRAL, experiments
+
+from agvbench.diagnosis.grouping import HELD_OUT_SHARE, folds, group_runs, held_out_runs
+from agvbench.errors import FitError
+from agvbench.types import NO_TARGET, Commands, Frames, Run
+
+
+def bare_runs() -> list[Run]:
+    return [
+        Run(f"{k}-{r}", name, "", "calibrated", r, NO_TARGET, 0.0, "ok", "", commands, Frames.empty())
+        for k, (name, commands, repeats) in enumerate(experiments())
+        for r in range(repeats)
+    ]
+
+
+def test_repeats_share_a_group_and_nothing_else_does():
+    runs = bare_runs()
+    group = group_runs(runs)
+    told = [(*c.t_s, *c.drive, *c.front, *c.rear) for c in (run.commands for run in runs)]
+    same = np.array([[a == b for b in told] for a in told])
+    assert np.array_equal(group[:, None] == group[None, :], same)
+
+
+def test_times_that_jitter_by_milliseconds_are_the_same_commands():
+    runs = bare_runs()[:1]
+    c = runs[0].commands
+    late = Commands(c.t_s + np.array([0.0, 0.004, 0.009]), c.drive, c.front, c.rear)
+    longer = Commands(c.t_s + np.array([0.0, 0.0, 0.5]), c.drive, c.front, c.rear)
+    three = [runs[0], dataclasses.replace(runs[0], commands=late), dataclasses.replace(runs[0], commands=longer)]
+    assert group_runs(three).tolist() == [0, 0, 1]
+
+
+@given(seed=st.integers(0, 50))
+def test_what_is_set_aside_is_whole_groups_whose_levels_were_driven_elsewhere_too(seed):
+    runs = bare_runs()
+    group = group_runs(runs)
+    held = held_out_runs(runs, group, seed)
+    assert 0 < held.sum() <= 1.1 * HELD_OUT_SHARE * len(runs)
+    assert not set(group[held]) & set(group[~held])
+    for role in ("drive", "front", "rear"):
+        kept = {float(v) for run, out in zip(runs, held, strict=True) if not out for v in getattr(run.commands, role)}
+        aside = {float(v) for run, out in zip(runs, held, strict=True) if out for v in getattr(run.commands, role)}
+        assert aside <= kept | {NEUTRAL}
+
+
+def test_the_campaigns_own_split_is_kept():
+    runs = [dataclasses.replace(r, split="held_out" if i % 3 == 0 else "fit") for i, r in enumerate(bare_runs())]
+    held = held_out_runs(runs, group_runs(runs), 0)
+    assert held.tolist() == [i % 3 == 0 for i in range(len(runs))]
+
+
+def test_a_split_that_leaves_nothing_to_fit_is_one_line():
+    runs = [dataclasses.replace(r, split="held_out") for r in bare_runs()]
+    with pytest.raises(FitError, match="must name runs to fit and runs held out"):
+        held_out_runs(runs, group_runs(runs), 0)
+
+
+@given(group=st.lists(st.integers(0, 12), min_size=5, max_size=60), seed=st.integers(0, 9))
+def test_a_group_is_in_one_fold(group, seed):
+    numbers = np.array(group)
+    fold = folds(numbers, 4, seed)
+    assert all(len(set(fold[numbers == g])) == 1 for g in set(group))
+    assert np.array_equal(fold, folds(numbers, 4, seed))

@@ -1,0 +1,46 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from agvbench.diagnosis.residuals import Misses, floor, lack_of_fit
+
+GROUP = np.repeat(np.arange(40), 4)
+
+
+def scattered(seed: int, *, scatter_m: float, common_m: float) -> Misses:
+    """Return misses along x of runs in groups of four: `common_m` for a group, `scatter_m` for each run."""
+    rng = np.random.default_rng(seed)
+    off = rng.normal(0.0, common_m, 40)[GROUP] + rng.normal(0.0, scatter_m, 160)
+    path = np.zeros((160, 24, 3))
+    path[..., 0] = off[:, None]
+    path[..., 1:] = rng.normal(0.0, 1e-5, (160, 1, 2))
+    return Misses(path, np.ones((160, 24), dtype=bool), off, path[:, -1, 2])
+
+
+def test_the_floor_is_the_scatter_of_repeats_whatever_they_have_in_common():
+    for common in (0.0, 0.05):
+        found = floor(scattered(1, scatter_m=0.004, common_m=common), GROUP)
+        assert found["position_rms_mm"] == pytest.approx(4.0, rel=0.15)
+        assert found["delta_s_mm"] == pytest.approx(4.0, rel=0.15)
+
+
+def test_one_spoilt_run_hardly_lifts_the_floor():
+    missed = scattered(2, scatter_m=0.004, common_m=0.0)
+    missed.path[5, :, 0] += 1.0
+    assert floor(missed, GROUP)["position_rms_mm"] < 8.0
+
+
+def test_without_repeats_there_is_no_floor():
+    missed = scattered(3, scatter_m=0.004, common_m=0.0)
+    assert floor(missed, np.arange(160)) is None
+    assert lack_of_fit(missed, np.arange(160)) is None
+
+
+def test_scatter_alone_is_no_lack_of_fit():
+    p_values = [lack_of_fit(scattered(seed, scatter_m=0.004, common_m=0.0), GROUP) for seed in range(200)]
+    assert np.mean(np.array(p_values) < 0.05) < 0.11
+
+
+def test_what_repeats_have_in_common_is_lack_of_fit():
+    assert lack_of_fit(scattered(4, scatter_m=0.004, common_m=0.004), GROUP) < 1e-6
