@@ -72,6 +72,18 @@ def test_derivatives_with_respect_to_an_effects_parameters(simulation, name):
         assert np.quantile(np.abs(column - expected), 0.99) < 3e-3 * np.abs(expected).max()
 
 
+@pytest.mark.parametrize("name", SIZES)
+def test_a_planted_effect_is_recovered_from_independent_data(simulation, name):
+    measured = true_poses({name: SIZES[name]}, START)
+    which, planted = simulation.indices(name), np.array(list(SIZES[name].values()))
+    at = parameters(simulation, {name: {parameter: 0.7 * value for parameter, value in SIZES[name].items()}})
+    for _ in range(8):
+        residual = measured - simulation.predict(ROWS, at, INITIAL)
+        slopes = simulation.jacobian(ROWS, at, INITIAL, effects=[name]).parameters
+        at[which] += np.linalg.lstsq(slopes.reshape(len(which), -1).T, residual.ravel(), rcond=None)[0]
+    np.testing.assert_allclose(at[which], planted, rtol=2e-4)
+
+
 @pytest.mark.parametrize("name", ["actuation_delay", "steering_lag", "mocap_latency"])
 def test_derivatives_at_null(simulation, name):
     slopes = simulation.jacobian(ROWS, simulation.parameters(), INITIAL, effects=[name]).parameters
