@@ -5,6 +5,7 @@ file is simulated, tested, listed and fitted without another line elsewhere.
 
 examples:
   agvbench effects                         name, stage, parameters, and the assumption that each relaxes
+  agvbench effects --markdown              the same at length, as in the documentation
   agvbench effects new servo_warm_up       write agvbench/effects/servo_warm_up.py, to be edited
   agvbench effects new seam --dir /tmp     write it elsewhere
 """
@@ -19,6 +20,7 @@ HELP = "list the physical effects that a model may have; write the file of a new
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``agvbench effects``."""
+    parser.add_argument("--markdown", action="store_true", help="print the page of the reference")
     actions = parser.add_subparsers(dest="action", metavar="ACTION")
     new = actions.add_parser(
         "new", help="write the file of a new effect", description="Write the file of a new effect."
@@ -29,10 +31,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """List effects or write a template; return the exit code."""
-    from agvbench.workflows.effects import effects_table, write_template
+    from agvbench.workflows.effects import effects_table, reference_page, write_template
 
     if arguments.action == "new":
         print(f"wrote {write_template(arguments.name, arguments.dir)}: now say what it does")
+        return 0
+    if arguments.markdown:
+        print(reference_page(), end="")
         return 0
     from agvbench.reporting.console import wide_console
 

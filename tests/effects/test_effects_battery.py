@@ -166,7 +166,8 @@ def test_the_template_passes_the_checks_of_form(tmp_path: Path) -> None:
 
 def test_the_reference_page_is_up_to_date() -> None:
     page = Path(__file__).parents[2] / "docs" / "reference" / "effects.md"
-    assert page.read_text(encoding="utf-8") == reference_page()
+    remedy = "run: agvbench effects --markdown > docs/reference/effects.md"
+    assert page.read_text(encoding="utf-8") == reference_page(), remedy
 
 
 def load(path: Path):  # type: ignore[no-untyped-def]

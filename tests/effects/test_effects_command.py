@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from agvbench.cli import main
 from agvbench.effects import effect_kinds
+from agvbench.workflows.effects import reference_page
 
 
 def test_lists_every_effect_with_its_parameters(capsys):
@@ -14,13 +15,18 @@ def test_lists_every_effect_with_its_parameters(capsys):
         assert all(p.name in listed for p in kind.parameters())
 
 
+def test_markdown_is_the_reference_page(capsys):
+    assert main(["effects", "--markdown"]) == 0
+    assert capsys.readouterr().out == reference_page()
+
+
 def test_new_writes_a_file_once(tmp_path, capsys):
-    command = ["effects", "new", "servo_warm_up", "--dir", str(tmp_path)]
+    command = ["effects", "new", "made_up_by_a_test", "--dir", str(tmp_path)]
     assert main(command) == 0
-    assert "class ServoWarmUp(Effect):" in (tmp_path / "servo_warm_up.py").read_text(encoding="utf-8")
+    assert "class MadeUpByATest(Effect):" in (tmp_path / "made_up_by_a_test.py").read_text(encoding="utf-8")
     assert main(command) == 2
     assert capsys.readouterr().err == (
-        f"agvbench effects: {tmp_path / 'servo_warm_up.py'}: exists already; choose another name\n"
+        f"agvbench effects: {tmp_path / 'made_up_by_a_test.py'}: exists already; choose another name\n"
     )
 
 
