@@ -1,0 +1,45 @@
+"""Hold blind trials of the diagnosis: plants with a hidden effect, its truth sealed until the answer is given.
+
+For each seed a quiet vehicle is drawn, and driven once for each thing that it may hide: nothing, every effect of the
+library, some of them in another order or form, causes outside the library, and pairs. The campaign is diagnosed like
+any other; then the truth is unsealed and scored, every share with its exact 95 % bounds.
+
+examples:
+  agvbench challenge --seeds 1 --only steering_lag            one trial, in about a minute
+  agvbench challenge --seeds 10 --json challenge.json         everything, ten vehicles: hours
+  agvbench challenge --seeds 300 --only nothing               how often a name is given where nothing is hidden
+  agvbench challenge --first-seed 5000                        vehicles that nobody has looked at
+"""
+
+from __future__ import annotations
+
+import argparse
+
+HELP = "blind trials of the diagnosis on plants with a hidden effect"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument("--seeds", type=int, default=1, metavar="N", help="vehicles to draw (default 1)")
+    parser.add_argument("--first-seed", type=int, default=0, metavar="N", help="the first vehicle's seed (default 0)")
+    parser.add_argument(
+        "--only", nargs="+", default=[], metavar="NAME", help="what to hide (default: everything, and some pairs)"
+    )
+    parser.add_argument("--repeats", type=int, default=5, metavar="N", help="of each trajectory (default 5)")
+    parser.add_argument("--jobs", type=int, metavar="N", help="trials at a time (default: one per processor)")
+    parser.add_argument("--json", metavar="FILE", dest="json_file", help="write scores and every trial there")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Hold the trials; return the exit code."""
+    from agvbench.workflows.challenge import run_challenge
+
+    run_challenge(
+        arguments.seeds,
+        first_seed=arguments.first_seed,
+        specs=arguments.only,
+        repeats=arguments.repeats,
+        jobs=arguments.jobs,
+        json_file=arguments.json_file,
+    )
+    return 0

@@ -1,0 +1,185 @@
+"""What ``agvbench challenge`` does: drive plants with a sealed truth, diagnose, unseal, score."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from agvbench.errors import AgvbenchError, FileError, FlagError, PlantError
+from agvbench.simulator.hidden import SealedTruth, sealed_truth, true_rivals
+from agvbench.simulator.hidden.catalogue import AND, CATALOGUE, NOTHING, recipes
+from agvbench.simulator.hidden.drawing import vehicle_of
+from agvbench.workflows.challenge_scores import Scores, Trial, plain, score
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from agvbench.diagnosis import Diagnosis
+
+BENCHMARKS = ("calibration", "trajectories", "step_response", "free_driving")
+_PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
+_POSITION = "position_rms_mm"
+PAIRS = (
+    "steering_lag_and_lateral_slip", "speed_lag_and_cornering_speed_loss", "axle_coupling_and_battery_droop",
+    "actuation_delay_and_reverse_steering_gain", "steering_lag_and_slow_patch", "speed_lag_and_floor_seam",
+    "cornering_speed_loss_and_servo_warm_up",
+)  # fmt: skip
+"""Two effects of the library, and one beside one from outside."""
+
+
+def run_challenge(
+    seeds: int, *, first_seed: int, specs: Sequence[str], repeats: int, jobs: int | None, json_file: str | None
+) -> Scores:
+    """Hold the trials with a progress bar, print the scores, and write them if asked for.
+
+    Raises
+    ------
+    FlagError
+        If a number is out of range or a name unknown.
+    FileError
+        If the JSON file cannot be written.
+    """
+    from rich.console import Console
+
+    if seeds < 1 or repeats < 2:
+        raise FlagError(
+            "too few to score", where="--seeds, --repeats", value=f"{seeds}, {repeats}", limit="from 1, from 2"
+        )
+    for spec in specs:
+        try:
+            recipes(spec)
+        except PlantError as error:
+            raise FlagError(error.what, where="--only", value=error.value, limit=error.limit) from None
+    wanted = [(s, n) for n in range(first_seed, first_seed + seeds) for s in specs or (NOTHING, *CATALOGUE, *PAIRS)]
+    trials = sorted(_held(wanted, repeats, jobs or os.cpu_count() or 1), key=lambda t: (t.spec, t.seed))
+    scores = score(trials)
+    tell(scores, Console())
+    if json_file is not None:
+        _write(Path(json_file), scores, trials)
+    return scores
+
+
+def hold_trial(spec: str, seed: int, repeats: int) -> Trial:
+    """Drive a campaign with one hidden plant, diagnose it, and only then unseal the truth.
+
+    A diagnosis that ends with an error is the answer ``"ERROR"``.
+    """
+    from agvbench.campaign import Campaign
+    from agvbench.diagnosis import Diagnosis, Verdict, diagnose
+
+    with tempfile.TemporaryDirectory(prefix="agvbench-challenge-") as folder:
+        directory = Path(folder) / "campaign"
+        _drive(spec, seed, repeats, directory)
+        began = time.process_time()
+        try:
+            found, failed = diagnose(Campaign.open(directory)), False
+        except AgvbenchError as error:  # hours of other trials must not be lost for one that has no answer
+            found, failed = Diagnosis(Verdict.NOT_IDENTIFIABLE, str(error)), True
+        seconds = time.process_time() - began
+    trial = unsealed(spec, seed, sealed_truth(spec, seed), found, seconds)
+    return replace(trial, verdict="ERROR") if failed else trial
+
+
+def unsealed(spec: str, seed: int, truth: SealedTruth, found: Diagnosis, seconds: float) -> Trial:
+    """Return the trial: the answer beside the truth."""
+    held = found.held_out.errors.get(_POSITION, {}) if found.held_out else {}
+    named = tuple(effect.name for effect in found.effects)
+    others = {other for effect in found.effects for other in effect.confounded_with}
+    doubtful = {*named, *others} - set(truth.library_names)
+    ask = len(truth.effects) == 1 and truth.library_names and doubtful
+    return Trial(
+        spec,
+        seed,
+        truth.kind,
+        tuple(effect.name for effect in truth.effects),
+        truth.library_names,
+        next((effect.covariates for effect in truth.effects if effect.covariates), ()),
+        truth.absorbed,
+        any(effect.random_phase for effect in truth.effects),
+        {e.name: e.parameters for e in truth.effects if e.kind == "library"},
+        str(found.verdict),
+        named,
+        tuple(sorted(others)),
+        tuple(dependence.covariate for dependence in found.depends_on),
+        {e.name: {k: (p.value, p.stderr) for k, p in e.parameters.items()} for e in found.effects},
+        {name: value**2 for name, value in held.items()},
+        found.held_out.worse_on if found.held_out else (),
+        tuple(true_rivals(vehicle_of(seed), truth)) if ask else (),
+        seconds,
+    )
+
+
+def _drive(spec: str, seed: int, repeats: int, directory: Path) -> None:
+    options = [f"--plant=agvbench.simulator.hidden:{spec}", f"--seed={seed}", f"--repeats={repeats}", "--no-report"]
+    command = [sys.executable, "-c", _PROGRAM, "bench", *BENCHMARKS, *options, f"--out={directory}"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - our own program
+    if done.returncode not in {0, 1}:
+        raise PlantError(
+            "the bench could not drive this plant", where=f"{spec}, seed {seed}",
+            value=" ".join((done.stderr or done.stdout).split())[-300:],
+        )  # fmt: skip
+
+
+def _held(wanted: Sequence[tuple[str, int]], repeats: int, jobs: int) -> Iterator[Trial]:
+    from rich.console import Console
+    from rich.progress import track
+
+    console = Console(stderr=True)
+    with ProcessPoolExecutor(jobs) as pool:
+        futures = [pool.submit(hold_trial, spec, seed, repeats) for spec, seed in wanted]
+        bar = track(
+            as_completed(futures), "blind trials", len(futures), console=console, disable=not console.is_terminal
+        )  # fmt: skip
+        for future in bar:
+            yield future.result()
+
+
+def tell(scores: Scores, console: Console) -> None:
+    """Print the shares with their bounds, the confusion matrix and the rest."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(title=f"{scores.trials} blind trials", box=box.SIMPLE_HEAD, title_justify="left")
+    for heading in ("", "count", "share", "95 % bounds"):
+        table.add_column(heading, justify="left" if not heading else "right")
+    for text, share in (*scores.shares.items(), ("95 % intervals that cover", scores.coverage)):
+        value = f"{share.value:.1%}" if share.total else "–"
+        table.add_row(text, f"{share.count} of {share.total}", value, f"{share.low:.1%} to {share.high:.1%}")
+    console.print(table)
+    answers = Table(title="hidden, and answered", box=box.SIMPLE_HEAD, title_justify="left")
+    answers.add_column("hidden")
+    answers.add_column("answers")
+    for spec, counts in scores.confusion.items():
+        ordered = sorted(counts.items(), key=lambda item: (-item[1], item[0]))
+        answers.add_row(spec.replace(AND, " + "), ", ".join(f"{count} × {answer}" for answer, count in ordered))
+    console.print(answers)
+    for group, (worst, median) in scores.removed.items():
+        console.print(
+            f"excess held-out error removed, {group}: median {median:.3f}, worst {worst:.3f}", highlight=False
+        )
+    if math.isfinite(scores.list_length):
+        console.print(f"effects in an AMBIGUOUS answer: {scores.list_length:.1f} on average", highlight=False)
+    console.print(f"something predicted worse than before: {scores.worse_on} trials", highlight=False)
+    middle, most = scores.seconds
+    console.print(f"time of a diagnosis: median {middle:.1f} s, longest {most:.1f} s", highlight=False)
+
+
+def _write(path: Path, scores: Scores, trials: Sequence[Trial]) -> None:
+    content: dict[str, Any] = {"schema": 1, **scores.to_json(), "each": [plain(asdict(trial)) for trial in trials]}
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise FileError(
+            "cannot be written", where=path, value=error.strerror, remedy="give --json a place you may write to"
+        ) from None
