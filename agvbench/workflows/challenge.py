@@ -164,9 +164,9 @@ def tell(scores: Scores, console: Console) -> None:
         answers.add_row(spec.replace(AND, " + "), ", ".join(f"{count} × {answer}" for answer, count in ordered))
     console.print(answers)
     for group, (worst, median) in scores.removed.items():
-        console.print(
-            f"excess held-out error removed, {group}: median {median:.3f}, worst {worst:.3f}", highlight=False
-        )
+        if math.isfinite(median):
+            text = f"excess held-out error removed, {group}: median {median:.3f}, worst {worst:.3f}"
+            console.print(text, highlight=False, soft_wrap=True)
     if math.isfinite(scores.list_length):
         console.print(f"effects in an AMBIGUOUS answer: {scores.list_length:.1f} on average", highlight=False)
     console.print(f"something predicted worse than before: {scores.worse_on} trials", highlight=False)
