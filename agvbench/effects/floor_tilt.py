@@ -24,7 +24,7 @@ class FloorTilt(Effect):
     name: ClassVar[str] = "floor_tilt"
     stage: ClassVar[Stage] = Stage.FLOOR
     relaxes: ClassVar[str] = "the floor is level (3.2)"
-    reference: ClassVar[str] = "Bentvelsen 2015, section 9.2 (the floor of the laboratory)"
+    reference: ClassVar[str] = "a form of our own: the simplest that a slope of the floor can have"
     limits: ClassVar[str] = (
         "one slope for the whole floor, no part that goes with speed; only runs in several directions show it"
     )

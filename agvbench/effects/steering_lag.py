@@ -17,7 +17,7 @@ class SteeringLag(Effect):
     name: ClassVar[str] = "steering_lag"
     stage: ClassVar[Stage] = Stage.SERVO
     relaxes: ClassVar[str] = "axles rotate instantaneously (7.3)"
-    reference: ClassVar[str] = "Rajamani 2012, Vehicle Dynamics and Control, section 2.3 (first-order actuator)"
+    reference: ClassVar[str] = "first-order actuator, as in textbooks of control"
     limits: ClassVar[str] = (
         "invisible where steering is set before the vehicle moves; a servo of second order looks like lag and delay"
     )
