@@ -5,7 +5,7 @@ library, some of them in another order or form, causes outside the library, and 
 any other; then the truth is unsealed and scored, every share with its exact 95 % bounds.
 
 examples:
-  agvbench challenge --seeds 1 --only steering_lag            one trial, in about a minute
+  agvbench challenge --seeds 1 --only steering_lag            one trial, in a minute or two
   agvbench challenge --seeds 10 --json challenge.json         everything, ten vehicles: hours
   agvbench challenge --seeds 300 --only nothing               how often a name is given where nothing is hidden
   agvbench challenge --first-seed 5000                        vehicles that nobody has looked at
