@@ -11,6 +11,7 @@ from agvbench.types import Floats
 FOLDS = 5
 _BEST_SHARE = 0.05
 _CLEAR = 1e-4
+_OWN_SHARE = 0.01
 
 
 def cross_validated(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Floats:
@@ -18,19 +19,27 @@ def cross_validated(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Flo
 
     About the optimum the loss is quadratic, run by run, so that leaving a fold out is a solution of the normal
     equations without its share: one Newton step from the parameters of all runs, exact as far as the loss is quadratic.
-    A parameter at its bound stays there.
+    A parameter at its bound stays there. A value of a map that only the fold itself determines (a level driven
+    nowhere else) is calibration, and fitted to the fold.
     """
     maps = fitted.predictor.maps.size
-    own = fitted.parameters[maps:]
+    effects = fitted.parameters[maps:]
     free = np.ones(len(fitted.parameters), dtype=np.bool_)
-    free[maps:] = (own > bounds[:, 0]) & (own < bounds[:, 1])
+    free[maps:] = (effects > bounds[:, 0]) & (effects < bounds[:, 1])
     information = fitted.information[:, free][:, :, free]
     gradient = fitted.gradient[:, free]
     weak = 1e-6 * np.diag(np.diagonal(information.sum(axis=0)) + 1.0)
     loss = fitted.loss.copy()
     for k in np.unique(fold):
         out = fold == k
-        move = np.linalg.lstsq(information[~out].sum(axis=0) + weak, gradient[~out].sum(axis=0), rcond=1e-12)[0]
+        others = information[~out].sum(axis=0)
+        own = np.diagonal(others) < _OWN_SHARE * np.diagonal(information.sum(axis=0))
+        move = np.zeros(len(own))
+        known = np.ix_(~own, ~own)
+        move[~own] = np.linalg.lstsq((others + weak)[known], gradient[~out].sum(axis=0)[~own], rcond=1e-12)[0]
+        within, pull = information[out].sum(axis=0), gradient[out].sum(axis=0)
+        rest = pull[own] - within[np.ix_(own, ~own)] @ move[~own]
+        move[own] = np.linalg.lstsq((within + weak)[np.ix_(own, own)], rest, rcond=1e-12)[0]
         loss[out] += -2.0 * gradient[out] @ move + np.einsum("rij,i,j->r", information[out], move, move)
     return loss
 

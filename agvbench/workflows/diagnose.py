@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from rich import box
@@ -10,7 +11,7 @@ from rich.table import Table
 
 from agvbench.campaign import Campaign
 from agvbench.diagnosis import Diagnosis, NamedEffect, diagnose
-from agvbench.errors import FileError
+from agvbench.errors import FileError, FlagError
 from agvbench.model import VehicleModel
 
 _TITLES = {
@@ -36,9 +37,11 @@ def run_diagnose(
     ------
     CampaignError, FitError, VehicleError
         If the campaign or the vehicle cannot be used.
-    FileError
-        If a file cannot be written.
+    FileError, FlagError
+        If a file cannot be written, or the seed is negative.
     """
+    if seed < 0:
+        raise FlagError("must not be negative", where="--seed", value=seed)
     campaign = Campaign.open(directory).check()
     believed = Path(vehicle) if vehicle is not None else campaign.path / "vehicle.toml"
     model = VehicleModel.load(believed) if vehicle is not None or believed.exists() else None
@@ -50,10 +53,10 @@ def run_diagnose(
         found = diagnose(campaign, vehicle=model, seed=seed)
     tell(found, Console())
     if json_file is not None:
-        _write(Path(json_file), found.to_text())
+        text = found.to_text()
+        _write("--json", Path(json_file), lambda path: path.write_text(text, encoding="utf-8"))
     if out is not None and found.model is not None:
-        Path(out).parent.mkdir(parents=True, exist_ok=True)
-        found.model.save(out)
+        _write("--out", Path(out), found.model.save)
     return found
 
 
@@ -96,11 +99,10 @@ def errors_table(found: Diagnosis) -> Table:
     return table
 
 
-def _write(path: Path, text: str) -> None:
+def _write(flag: str, path: Path, write: Callable[[Path], object]) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
+        write(path)
     except OSError as error:
-        raise FileError(
-            "cannot be written", where=path, value=error.strerror, remedy="give --json a place you may write to"
-        ) from None
+        remedy = f"give {flag} a place you may write to"
+        raise FileError("cannot be written", where=path, value=error.strerror, remedy=remedy) from None

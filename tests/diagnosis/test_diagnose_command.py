@@ -65,3 +65,8 @@ def test_runs_that_were_hardly_seen_are_left_out_and_counted(tiny_campaign):
     assert [run.run_id for run in readings.runs] == [runs[2].run_id]
     assert readings.refused[bad.run_id] == "rejected: bumped"
     assert "too few frames" in readings.refused[blind.run_id]
+
+
+def test_a_negative_seed_is_one_line(adequate, capsys):
+    assert main(["diagnose", str(adequate), "--seed", "-1"]) == 2
+    assert "--seed: must not be negative: -1" in capsys.readouterr().err
