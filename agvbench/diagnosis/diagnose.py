@@ -58,7 +58,8 @@ def diagnose(
     campaign
         Header and runs; runs must begin at rest.
     vehicle
-        The model before. By default static maps fitted to the campaign's own runs.
+        The model before; effects that it has stay, and are not named again. By default static maps fitted to the
+        campaign's own runs.
     seed
         Draws which groups of runs are set aside, where the campaign has no column ``split``.
     tell
@@ -87,7 +88,10 @@ def diagnose(
     maps = free_maps(fitted.runs, header.neutral)
     start = start_values(maps, measured, _believed(maps, header, geometry, vehicle))
     tried = candidates()
-    selection = Selector(Batch(fitted, maps, geometry), tried, start, seed, tell).select()
+    given = tuple(e for e in (vehicle.effects if vehicle else ()) if e.name in tried and not e.is_null)
+    values = np.array([value for effect in given for value in effect.values.values()])
+    names = tuple(effect.name for effect in given)
+    selection = Selector(Batch(fitted, maps, geometry), tried, start, seed, tell, names, values).select()
     return _conclude(
         header, readings, held, selection, vehicle, geometry, seed, bounds_of(tried, selection.chosen.names)
     )
@@ -149,7 +153,7 @@ def _conclude(
     maps = fit.predictor.maps
     every = Predictor(Batch(readings, maps, geometry), selection.chosen.names)
     poses = every.predict(fit.parameters)
-    static = Predictor(every.batch).predict(selection.base.fit.parameters)
+    static = Predictor(every.batch, selection.base.names).predict(selection.base.fit.parameters)
     before = static if vehicle is None else _believed_poses(vehicle, readings)
     judged = _judge(readings, held, before, poses)
     if judged is None:
@@ -209,7 +213,7 @@ def _verdict(effects: tuple[object, ...], significant: bool, rest: list[Dependen
         on = f" it depends on {rest[0].covariate}" if rest else " but on none of the covariates looked at"
         return Verdict.UNKNOWN, "structure remains that no effect explains:" + on
     if not effects:
-        return Verdict.ADEQUATE, "static maps predict as well as repeats agree with one another"
+        return Verdict.ADEQUATE, "the model, its maps fitted again, predicts as well as repeats agree with one another"
     if any(getattr(effect, "confounded_with", ()) for effect in effects):
         return Verdict.AMBIGUOUS, "several effects explain the residual equally well"
     return Verdict.NAMED, "the effects named bring the prediction to the floor"

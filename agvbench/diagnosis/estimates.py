@@ -31,6 +31,8 @@ def named_effects(selection: Selection, bounds: Floats) -> tuple[NamedEffect, ..
             note = _note(value, error, bounds[at], p.scale)
             estimates[p.name] = Estimate(value, error, p.unit, note)
             at += 1
+        if name in selection.base.names:
+            continue  # the vehicle was known to have it
         rivals = sorted(selection.rivals[name].items(), key=lambda pair: pair[1])
         found.append(
             NamedEffect(

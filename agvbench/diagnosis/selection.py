@@ -68,13 +68,19 @@ class Selection:
 
 @dataclass
 class Selector:
-    """Tries effects on the runs to be fitted."""
+    """Tries effects on the runs to be fitted.
+
+    ``given`` are effects that the vehicle is known to have: they stay in every model, with parameters fitted again from
+    ``given_values``.
+    """
 
     batch: Batch
     candidates: dict[str, Candidate]
     start: Floats
     seed: int
     tell: Tell
+    given: tuple[str, ...] = ()
+    given_values: Floats = field(default_factory=lambda: np.empty(0))
     tried: int = 0
     _fold: NDArray[np.int64] = field(init=False)
     _known: dict[tuple[str, ...], Scored] = field(init=False, default_factory=dict)
@@ -89,9 +95,9 @@ class Selector:
 
     def select(self) -> Selection:
         """Add effects until none gains, then drop those without which the model predicts as well."""
-        base = current = self.score((), self.start, None)
+        base = current = self.score(self.given, np.r_[self.start, self.given_values], None)
         rejected: dict[str, float] = {}
-        while len(current.names) < _MOST_EFFECTS:
+        while len(current.names) < len(self.given) + _MOST_EFFECTS:
             offers = {name: self.grown(current, name) for name in self.candidates if name not in current.names}
             rejected = {name: current.total - offer.total for name, offer in offers.items()}
             worthy = {name: offer for name, offer in offers.items() if self.earns(current, offer)}
@@ -127,9 +133,12 @@ class Selector:
             for name in ("position_rms_mm", "heading_rms_deg")
         )
 
+    def _found(self, current: Scored) -> tuple[str, ...]:
+        return tuple(name for name in current.names if name not in self.given)
+
     def _pruned(self, base: Scored, current: Scored) -> tuple[Scored, dict[str, float]]:
-        while current.names:
-            smaller = {name: self.shrunk(base, current, name) for name in current.names}
+        while found := self._found(current):
+            smaller = {name: self.shrunk(base, current, name) for name in found}
             gains = {name: model.total - current.total for name, model in smaller.items()}
             useless = [name for name, model in smaller.items() if not self.earns(model, current)]
             if not useless:
@@ -139,7 +148,7 @@ class Selector:
 
     def _rivals(self, base: Scored, current: Scored) -> dict[str, dict[str, float]]:
         found: dict[str, dict[str, float]] = {}
-        for name in current.names:
+        for name in self._found(current):
             rest = self.shrunk(base, current, name)
             swapped = {
                 other: self.grown(rest, other).total - current.total
@@ -152,7 +161,7 @@ class Selector:
     def shrunk(self, base: Scored, current: Scored, name: str) -> Scored:
         """Return the model without the effect called `name`."""
         names = tuple(n for n in current.names if n != name)
-        if not names:
+        if names == self.given:
             return base
         own = current.fit.effect_values()
         kept = [value for key, value in own.items() if key.partition(".")[0] != name]

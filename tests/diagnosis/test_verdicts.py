@@ -93,3 +93,15 @@ def test_a_vehicle_that_never_turned_says_nothing_about_steering(tiny_campaign):
     found = diagnose(type(campaign)(straight))
     assert found.verdict is Verdict.NOT_IDENTIFIABLE
     assert "steering" in found.why
+
+
+@pytest.mark.slow
+def test_an_effect_that_the_vehicle_is_known_to_have_is_not_named_again(tiny_campaign):
+    campaign = tiny_campaign(Tiny(steering_lag_s=0.15))
+    corrected = diagnose(campaign).model
+    again = diagnose(campaign, vehicle=corrected)
+    assert again.verdict is Verdict.ADEQUATE
+    assert again.effects == ()
+    assert again.model.effect("steering_lag").time_constant_s == pytest.approx(0.15, rel=0.03)
+    position = again.held_out.errors["position_rms_mm"]
+    assert position["before"] == pytest.approx(position["after"], rel=0.05)
