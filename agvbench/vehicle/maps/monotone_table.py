@@ -121,4 +121,6 @@ class MonotoneTable(StaticMap):
     def _pchip(self) -> PchipInterpolator:
         from scipy.interpolate import PchipInterpolator
 
-        return PchipInterpolator(np.asarray(self.commands), np.asarray(self.outputs))
+        # The inverse of a denormal slope overflows on the way to a derivative of zero, which is right.
+        with np.errstate(over="ignore"):
+            return PchipInterpolator(np.asarray(self.commands), np.asarray(self.outputs))
