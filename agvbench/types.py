@@ -50,8 +50,8 @@ class Pose(NamedTuple):
     def relative_to(self, start: Pose) -> Pose:
         """Return this pose in the frame of `start`.
 
-        >>> Pose(1.0, 3.0, math.pi / 2).relative_to(Pose(1.0, 1.0, math.pi / 2))
-        Pose(x_m=2.0, y_m=0.0, heading_rad=0.0)
+        >>> Pose(3.0, 2.0, 0.5).relative_to(Pose(1.0, 1.0, 0.0))
+        Pose(x_m=2.0, y_m=1.0, heading_rad=0.5)
         """
         dx, dy = self.x_m - start.x_m, self.y_m - start.y_m
         c, s = math.cos(start.heading_rad), math.sin(start.heading_rad)
