@@ -39,7 +39,8 @@ def parts(directory: Path) -> dict[str, bytes]:
 
 
 def run_parts(directory: Path) -> set[str]:
-    return {path.name for path in (directory / "runs.parquet").glob("*.parquet")}
+    # A part that was being written when the process died has a name of its own until it is whole.
+    return {path.name for path in (directory / "runs.parquet").glob("[!.]*.parquet")}
 
 
 def until_another_run_is_finished(process: subprocess.Popen[str], directory: Path, so_far: int) -> None:
