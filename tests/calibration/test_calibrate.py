@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from calibration_samples import FRONT_M, REAR_M, Vehicle, held, run_of
 
+from agvbench import simulator
 from agvbench.calibration import calibrate
 from agvbench.errors import FitError, InputError, VehicleError
 from agvbench.model import VehicleModel
@@ -245,7 +246,6 @@ def test_campaigns_that_do_not_determine_a_vehicle_are_one_clear_line(runs):
 
 def simulated(seed):
     """Drive the calibration of a simulated plant, seen by a simulated camera."""
-    simulator = pytest.importorskip("agvbench.simulator")
     plant, camera, rng = simulator.make_plant(seed), simulator.Camera(), np.random.default_rng(seed)
     runs = []
     for k, (experiment, *command) in enumerate(PLAN):
