@@ -51,7 +51,7 @@ class AgvHost(Host):
         self._lock_step = adapter.identity().lock_step
         self._answers |= {RESET: self._reset, REPLAY: self._replay}
         self._subscriber = session.declare_subscriber(keys.command, zenoh.handlers.FifoChannel(_COMMANDS_WAITING))
-        self._closed = threading.Event()
+        self._closed, self._left = threading.Event(), False
         self._outdated = (0, 0)
         adapter.start(self)
         self._run("commands", self._serve_commands)
@@ -80,7 +80,7 @@ class AgvHost(Host):
         handler = self._subscriber.handler
         while True:
             try:
-                payload = bytes(handler.recv().payload.to_bytes())
+                payload = handler.recv().payload.to_bytes()
             except self._zenoh_error:
                 return
             try:
@@ -91,12 +91,11 @@ class AgvHost(Host):
             self._carry_out(message)
 
     def _carry_out(self, message: CommandMessage) -> None:
-        lost = self.loss.saw(message.source, message.sequence)
-        if lost:
+        if lost := self.loss.saw(message.source, message.sequence):
             self.event(Level.WARNING, "commands_lost", f"{lost} commands were lost before {message.sequence}")
         try:
             with self._lock:
-                if self._closed.is_set() or self._is_outdated(message):
+                if self._left or self._is_outdated(message):
                     return
                 if message.flags & CommandFlags.STOP:
                     self._heard_s = None
@@ -131,6 +130,7 @@ class AgvHost(Host):
 
     def close(self) -> None:
         """Stop the vehicle, leave the bus, release the adapter."""
+        self._left = True
         self._closed.set()
         # An adapter that hangs in a command must not keep the vehicle from being stopped.
         locked = self._lock.acquire(timeout=_STOP_PATIENCE_S)

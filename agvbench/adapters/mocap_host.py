@@ -71,7 +71,7 @@ class MocapHost(Host):
         handler = self._subscriber.handler
         while True:
             try:
-                payload = bytes(handler.recv().payload.to_bytes())
+                payload = handler.recv().payload.to_bytes()
             except self._zenoh_error:
                 return
             try:
@@ -91,7 +91,7 @@ class MocapHost(Host):
 
     def frames(self, frames: Frames, *, clock: FrameClock, acknowledged: int = 0) -> None:
         """Publish frames, in as many messages as they need."""
-        if len(frames) <= MAX_ROWS:
+        if len(frames.t_s) <= MAX_ROWS:
             self._publish(frames, clock, acknowledged, FramesFlags.LAST)
             return
         starts = range(0, len(frames), MAX_ROWS)
@@ -101,10 +101,10 @@ class MocapHost(Host):
             self._publish(part, clock, acknowledged, flags)
 
     def _publish(self, frames: Frames, clock: FrameClock, acknowledged: int, flags: int) -> None:
-        rows = pack_rows(frames)
+        rows, sequence = pack_rows(frames), self._sequence
         with self._lock:
             message = FramesMessage(
-                self._sequence.take(), rows, acknowledged, clock, self._clock.now(), flags, self._sequence.source
+                sequence.take(), rows, acknowledged, clock, self._clock.now(), flags, sequence.source
             )
             try:
                 self._publisher.put(encode_frames(message))

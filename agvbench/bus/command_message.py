@@ -18,6 +18,8 @@ MAX_HOLD_S = 3600.0
 # Header and body in one: a process that has just been woken pays for every Python call tenfold.
 _MESSAGE = struct.Struct("<6sHIIQ5d")
 _PREFIX = prefix(Kind.COMMAND)
+# Bound once, and named tuples without their Python constructor: a process just woken fetches all from memory.
+_unpack, _isfinite, _tuple = _MESSAGE.unpack, math.isfinite, tuple.__new__
 
 
 class CommandFlags:
@@ -61,7 +63,7 @@ def encode_command(message: CommandMessage) -> bytes:
     sequence, t_s, command, hold_s, flags, source = message
     drive, front, rear = command
     # A sum is finite only if all its terms are; where it overflows, the terms are looked at one by one.
-    if not (math.isfinite(t_s + drive + front + rear) and 0.0 <= hold_s <= MAX_HOLD_S):
+    if not (_isfinite(t_s + drive + front + rear) and 0.0 <= hold_s <= MAX_HOLD_S):
         _check(t_s, command, hold_s)
     return _MESSAGE.pack(_PREFIX, flags, source, 1, sequence, t_s, drive, front, rear, hold_s)
 
@@ -76,13 +78,13 @@ def decode_command(payload: bytes) -> CommandMessage:
     """
     if len(payload) != _MESSAGE.size:
         raise _refusal(payload)
-    found, flags, source, count, sequence, t_s, drive, front, rear, hold_s = _MESSAGE.unpack(payload)
+    found, flags, source, count, sequence, t_s, drive, front, rear, hold_s = _unpack(payload)
     if found != _PREFIX or count != 1 or flags > _KNOWN:
         raise _refusal(payload)
-    command = Command(drive, front, rear)
-    if not (math.isfinite(t_s + drive + front + rear) and 0.0 <= hold_s <= MAX_HOLD_S):
+    command = _tuple(Command, (drive, front, rear))
+    if not (_isfinite(t_s + drive + front + rear) and 0.0 <= hold_s <= MAX_HOLD_S):
         _check(t_s, command, hold_s)
-    return CommandMessage(sequence, t_s, command, hold_s, flags, source)
+    return _tuple(CommandMessage, (sequence, t_s, command, hold_s, flags, source))
 
 
 def _refusal(payload: bytes) -> MessageError:

@@ -22,6 +22,8 @@ from agvbench.types import Frames
 # Header and body in one: a process that has just been woken pays for every Python call tenfold.
 _HEAD = struct.Struct("<6sHIIQQB7xd")
 _PREFIX = prefix(Kind.FRAMES)
+# Named tuples without their Python constructor, for the same reason.
+_tuple = tuple.__new__
 _ROWS_AT = _HEAD.size
 _ROW = struct.Struct("<6dq?")
 _FIELDS = ("t_s", "x_m", "y_m", "heading_rad", "mean_error_m", "received_s")
@@ -81,15 +83,16 @@ def pack_rows(frames: Frames) -> bytes:
     MessageError
         If columns differ in length.
     """
-    count = len(frames)
     columns = (
         frames.t_s, frames.x_m, frames.y_m, frames.heading_rad, frames.mean_error_m, frames.received_s, frames.frame,
         frames.tracked,
     )  # fmt: skip
-    if set(map(len, columns)) != {count}:
-        raise MessageError("columns of frames differ in length", value=[len(column) for column in columns])
+    count, *others = map(len, columns)
+    if others != [count] * 7:
+        raise MessageError("columns of frames differ in length", value=[count, *others])
     if count == 1:
-        return _ROW.pack(*(column[0] for column in columns))
+        t_s, x_m, y_m, heading_rad, mean_error_m, received_s, frame, tracked = columns
+        return _ROW.pack(t_s[0], x_m[0], y_m[0], heading_rad[0], mean_error_m[0], received_s[0], frame[0], tracked[0])
     rows = np.empty(count, _ROWS)
     for name, column in zip(_ROWS.names or (), columns, strict=True):
         rows[name] = column
@@ -144,7 +147,7 @@ def decode_frames(payload: bytes) -> FramesMessage:
     good = found == _PREFIX and flags <= FramesFlags.LAST and count <= MAX_ROWS and clock in _CLOCKS
     if not good or len(payload) != _ROWS_AT + _ROW.size * count:
         raise _refusal(payload)
-    return FramesMessage(sequence, payload[_ROWS_AT:], acknowledged, _CLOCKS[clock], now_s, flags, source)
+    return _tuple(FramesMessage, (sequence, payload[_ROWS_AT:], acknowledged, _CLOCKS[clock], now_s, flags, source))
 
 
 def _refusal(payload: bytes) -> MessageError:

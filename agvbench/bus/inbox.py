@@ -19,6 +19,7 @@ from agvbench.errors import LinkError, MessageError
 _CAPACITY = 4096
 _EVENTS_KEPT = 1000
 _KIND_AT = 5
+_EVENT = Kind.EVENT.value
 
 
 class Inbox:
@@ -67,13 +68,13 @@ class Inbox:
             If the session was closed.
         """
         try:
-            payload = bytes(self._handler.recv().payload.to_bytes())
+            payload: bytes = self._handler.recv().payload.to_bytes()
         except self._closed_error:
             raise LinkError("the bus was closed", where=self._keys.root) from None
         if not payload:
             return None
         try:
-            if len(payload) >= HEADER_BYTES and payload[_KIND_AT] == Kind.EVENT:
+            if len(payload) >= HEADER_BYTES and payload[_KIND_AT] == _EVENT:
                 return self._note(decode_event(payload))
             message = decode_frames(payload)
         except MessageError as error:

@@ -19,7 +19,7 @@ class Sequence:
         return self.last
 
 
-@dataclass
+@dataclass(slots=True)
 class LossCounter:
     """Counts what a receiver missed of one sender.
 
