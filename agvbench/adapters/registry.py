@@ -6,14 +6,13 @@
 from __future__ import annotations
 
 import difflib
-import importlib
-import pkgutil
 from functools import cache
 from typing import TypeVar
 
 from agvbench.adapters import agv, mocap
 from agvbench.adapters.contract import AdapterOptions, AgvAdapter, MocapAdapter
 from agvbench.errors import LinkError
+from agvbench.registry import classes_by_file
 
 _Adapter = TypeVar("_Adapter", AgvAdapter, MocapAdapter)
 
@@ -21,23 +20,17 @@ _Adapter = TypeVar("_Adapter", AgvAdapter, MocapAdapter)
 @cache
 def agv_adapters() -> dict[str, type[AgvAdapter]]:
     """Return the AGV adapters by scheme."""
-    return _find(agv.__name__, list(agv.__path__), AgvAdapter)  # type: ignore[type-abstract]
+    return _by_scheme(classes_by_file(agv, AgvAdapter))  # type: ignore[type-abstract]
 
 
 @cache
 def mocap_adapters() -> dict[str, type[MocapAdapter]]:
     """Return the mocap adapters by scheme."""
-    return _find(mocap.__name__, list(mocap.__path__), MocapAdapter)  # type: ignore[type-abstract]
+    return _by_scheme(classes_by_file(mocap, MocapAdapter))  # type: ignore[type-abstract]
 
 
-def _find(package: str, path: list[str], base: type[_Adapter]) -> dict[str, type[_Adapter]]:
-    found: dict[str, type[_Adapter]] = {}
-    for info in pkgutil.iter_modules(path):
-        module = importlib.import_module(f"{package}.{info.name}")
-        for value in vars(module).values():
-            if isinstance(value, type) and issubclass(value, base) and value.__module__ == module.__name__:
-                found[value.scheme] = value
-    return dict(sorted(found.items()))
+def _by_scheme(found: list[type[_Adapter]]) -> dict[str, type[_Adapter]]:
+    return {cls.scheme: cls for cls in sorted(found, key=lambda cls: cls.scheme)}
 
 
 def parse_spec(spec: str) -> tuple[str, str]:

@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-import importlib
-import inspect
-import pkgutil
 from collections.abc import Mapping
 from functools import cache
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from agvbench.effects.base import Effect
 from agvbench.errors import VehicleError
+from agvbench.registry import classes_by_file
 
 
 @cache
 def effect_kinds() -> Mapping[str, type[Effect]]:
     """Return every effect's class by its name, in alphabetical order."""
-    package = __name__.rpartition(".")[0]
-    kinds: dict[str, type[Effect]] = {}
-    for module_info in pkgutil.iter_modules([str(Path(__file__).parent)]):
-        module = importlib.import_module(f"{package}.{module_info.name}")
-        for _, cls in inspect.getmembers(module, inspect.isclass):
-            if issubclass(cls, Effect) and cls is not Effect and cls.__module__ == module.__name__:
-                kinds[cls.name] = cls
+    kinds = {cls.name: cls for cls in classes_by_file("agvbench.effects", Effect)}
     return MappingProxyType(dict(sorted(kinds.items())))
 
 

@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-import importlib
-import inspect
-import pkgutil
 from collections.abc import Mapping
 from functools import cache
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from agvbench.errors import VehicleError
+from agvbench.registry import classes_by_file
 from agvbench.vehicle.maps.base import StaticMap
 
 
 @cache
 def map_kinds() -> Mapping[str, type[StaticMap]]:
     """Return every kind of map with its class, in alphabetical order."""
-    package = __name__.rpartition(".")[0]
-    kinds: dict[str, type[StaticMap]] = {}
-    for module_info in pkgutil.iter_modules([str(Path(__file__).parent)]):
-        module = importlib.import_module(f"{package}.{module_info.name}")
-        for _, cls in inspect.getmembers(module, inspect.isclass):
-            if issubclass(cls, StaticMap) and not inspect.isabstract(cls) and cls.__module__ == module.__name__:
-                kinds[cls.kind] = cls
+    kinds = {cls.kind: cls for cls in classes_by_file("agvbench.vehicle.maps", StaticMap)}  # type: ignore[type-abstract]
     return MappingProxyType(dict(sorted(kinds.items())))
 
 

@@ -1,0 +1,40 @@
+"""Find classes by file: whoever adds an effect, a kind of map or an adapter adds one module, and nothing else."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+from types import ModuleType
+from typing import TypeGuard, TypeVar
+
+_Class = TypeVar("_Class")
+
+
+def classes_by_file(package: ModuleType | str, base: type[_Class]) -> list[type[_Class]]:
+    """Return every concrete subclass of `base` that a module of `package` defines, in the order of module names.
+
+    Parameters
+    ----------
+    package
+        The package, or its name; its modules are imported, those of packages inside it are not.
+    base
+        What the classes derive from; itself, and what is still abstract, is left out.
+
+    Examples
+    --------
+    >>> from agvbench.errors import AgvbenchError
+    >>> classes_by_file("agvbench.vehicle", AgvbenchError)
+    []
+    """
+    module = importlib.import_module(package) if isinstance(package, str) else package
+    modules = (
+        importlib.import_module(info.name) for info in pkgutil.iter_modules(module.__path__, f"{module.__name__}.")
+    )
+    return [cls for inside in modules for cls in vars(inside).values() if _is_own(cls, base, inside)]
+
+
+def _is_own(value: object, base: type[_Class], module: ModuleType) -> TypeGuard[type[_Class]]:
+    if not (isinstance(value, type) and issubclass(value, base) and value is not base):
+        return False
+    return value.__module__ == module.__name__ and not inspect.isabstract(value)
