@@ -63,6 +63,14 @@ def perf(session: nox.Session) -> None:
     session.run("python", "benchmarks/perf/run_all.py", *session.posargs)
 
 
+@nox.session
+def challenge(session: nox.Session) -> None:
+    """Hold blind trials of the diagnosis; again goes on where it was interrupted."""
+    install(session)
+    trials = ["--seeds", "10", "--first-seed", "1000", "--json", "campaigns/challenge.json", "--resume"]
+    session.run("agvbench", "challenge", *(session.posargs or trials))
+
+
 @nox.session(venv_backend="none")
 def lock(session: nox.Session) -> None:
     """Resolve the newest versions that pyproject.toml allows into the lock file."""

@@ -7,6 +7,7 @@ any other; then the truth is unsealed and scored, every share with its exact 95 
 examples:
   agvbench challenge --seeds 1 --only steering_lag            one trial, in a minute or two
   agvbench challenge --seeds 10 --json challenge.json         everything, ten vehicles: hours
+  agvbench challenge --seeds 10 --json challenge.json --resume   go on after an interruption
   agvbench challenge --seeds 300 --only nothing               how often a name is given where nothing is hidden
   agvbench challenge --first-seed 5000                        vehicles that nobody has looked at
 """
@@ -28,6 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--repeats", type=int, default=5, metavar="N", help="of each trajectory (default 5)")
     parser.add_argument("--jobs", type=int, metavar="N", help="trials at a time (default: one per processor)")
     parser.add_argument("--json", metavar="FILE", dest="json_file", help="write scores and every trial there")
+    parser.add_argument("--resume", action="store_true", help="go on with the trials that the JSON file lacks")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -41,5 +43,6 @@ def run(arguments: argparse.Namespace) -> int:
         repeats=arguments.repeats,
         jobs=arguments.jobs,
         json_file=arguments.json_file,
+        resume=arguments.resume,
     )
     return 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import subprocess
@@ -11,15 +10,16 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from agvbench.errors import AgvbenchError, FileError, FlagError, PlantError
+from agvbench.errors import AgvbenchError, FlagError, PlantError
 from agvbench.simulator.hidden import SealedTruth, sealed_truth, true_rivals
 from agvbench.simulator.hidden.catalogue import AND, CATALOGUE, NOTHING, recipes
 from agvbench.simulator.hidden.drawing import vehicle_of
-from agvbench.workflows.challenge_scores import Scores, Trial, plain, score
+from agvbench.workflows.challenge_file import known_trials, write_trials
+from agvbench.workflows.challenge_scores import Scores, Trial, score
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -38,19 +38,31 @@ PAIRS = (
 
 
 def run_challenge(
-    seeds: int, *, first_seed: int, specs: Sequence[str], repeats: int, jobs: int | None, json_file: str | None
+    seeds: int,
+    *,
+    first_seed: int,
+    specs: Sequence[str],
+    repeats: int,
+    jobs: int | None,
+    json_file: str | None,
+    resume: bool = False,
 ) -> Scores:
     """Hold the trials with a progress bar, print the scores, and write them if asked for.
+
+    The file is written anew after each trial, so that an interruption loses those under way only; with `resume` the
+    trials that it holds are not held again.
 
     Raises
     ------
     FlagError
         If a number is out of range or a name unknown.
     FileError
-        If the JSON file cannot be written.
+        If the JSON file cannot be written or, to resume, read.
     """
     from rich.console import Console
 
+    if resume and json_file is None:
+        raise FlagError("needs the file to go on with", where="--resume", remedy="add --json FILE")
     if seeds < 1 or repeats < 2:
         raise FlagError(
             "too few to score", where="--seeds, --repeats", value=f"{seeds}, {repeats}", limit="from 1, from 2"
@@ -60,12 +72,16 @@ def run_challenge(
             recipes(spec)
         except PlantError as error:
             raise FlagError(error.what, where="--only", value=error.value, limit=error.limit) from None
+    file = None if json_file is None else Path(json_file)
+    done = known_trials(file, repeats) if resume and file is not None and file.exists() else {}
     wanted = [(s, n) for n in range(first_seed, first_seed + seeds) for s in specs or (NOTHING, *CATALOGUE, *PAIRS)]
-    trials = sorted(_held(wanted, repeats, jobs or os.cpu_count() or 1), key=lambda t: (t.spec, t.seed))
-    scores = score(trials)
+    missing = [one for one in wanted if one not in done]
+    for trial in _held(missing, repeats, jobs or os.cpu_count() or 1):
+        done[trial.spec, trial.seed] = trial
+        if file is not None:
+            write_trials(file, repeats, list(done.values()))
+    scores = score([done[one] for one in sorted(wanted)])
     tell(scores, Console())
-    if json_file is not None:
-        _write(Path(json_file), scores, trials)
     return scores
 
 
@@ -172,14 +188,3 @@ def tell(scores: Scores, console: Console) -> None:
     console.print(f"something predicted worse than before: {scores.worse_on} trials", highlight=False)
     middle, most = scores.seconds
     console.print(f"time of a diagnosis: median {middle:.1f} s, longest {most:.1f} s", highlight=False)
-
-
-def _write(path: Path, scores: Scores, trials: Sequence[Trial]) -> None:
-    content: dict[str, Any] = {"schema": 1, **scores.to_json(), "each": [plain(asdict(trial)) for trial in trials]}
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise FileError(
-            "cannot be written", where=path, value=error.strerror, remedy="give --json a place you may write to"
-        ) from None

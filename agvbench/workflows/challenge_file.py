@@ -1,0 +1,69 @@
+"""The file of a challenge: scores and every trial, written after each trial and read again to go on."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from agvbench.errors import FileError
+from agvbench.workflows.challenge_scores import Trial, plain, score
+
+SCHEMA = 1
+
+
+def write_trials(path: Path, repeats: int, trials: Sequence[Trial]) -> None:
+    """Write scores and trials, in the order of what was hidden; the file is replaced at once or not at all.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written.
+    """
+    ordered = sorted(trials, key=lambda trial: (trial.spec, trial.seed))
+    content: dict[str, Any] = {"schema": SCHEMA, "repeats": repeats, **score(ordered).to_json()}
+    content["each"] = [plain(asdict(trial)) for trial in ordered]
+    part = path.with_name(f"{path.name}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+        part.replace(path)
+    except OSError as error:
+        raise FileError(
+            "cannot be written", where=path, value=error.strerror, remedy="give --json a place you may write to"
+        ) from None
+
+
+def known_trials(path: Path, repeats: int) -> dict[tuple[str, int], Trial]:
+    """Return the trials that a file holds, by what was hidden and seed.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read, is no such file, or was made with other `repeats`.
+    """
+    import msgspec
+
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        found = msgspec.convert(_with_nan(content["each"]), list[Trial])
+        was = content["repeats"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise FileError(
+            "holds no challenge to go on with", where=path, value=str(error).splitlines()[0],
+            remedy="leave out --resume to begin anew",
+        ) from None  # fmt: skip
+    if was != repeats:
+        raise FileError("has trials with other repeats", where=path, value=was, limit=f"--repeats {repeats}")
+    return {(trial.spec, trial.seed): trial for trial in found}
+
+
+def _with_nan(content: Any) -> Any:
+    if isinstance(content, dict):
+        return {key: _with_nan(value) for key, value in content.items()}
+    if isinstance(content, list):
+        return [_with_nan(value) for value in content]
+    return math.nan if content is None else content
