@@ -202,7 +202,7 @@ class Simulation:
         parameters
             (p,); see `parameters`. Nothing checks that they are within bounds.
         initial
-            (runs, 4): what the camera reports at the start (x, y, heading), and the speed of the drive there (0 for a
+            (runs, 4): what the camera reports at the start (x, y, heading), and the speed of the centroid ahead (0 for a
             run from rest; NaN in a window: what the commands before it have made it). Effects of the camera change
             what follows, not the start itself.
         runs

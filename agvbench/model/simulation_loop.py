@@ -81,6 +81,8 @@ _FIRST_STEP_S, _TURN_PER_STEP = 0.05, 0.15
 # No vehicle turns faster [rad/s]: numbers that say so are nonsense, but must not hang the loop.
 _FASTEST_TURN = 150.0
 _TOGETHER = 1e-12
+# Less of the drive's speed than this is left ahead only if numbers are nonsense.
+_LEAST_PART = 0.05
 
 
 @compiled(inner=True)
@@ -249,6 +251,18 @@ def _hold(
 
 
 @compiled(inner=True)
+def _drive_speed(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, ahead: float) -> float:
+    """Return the drive's speed with which the centroid moves `ahead`, as the axles stand: one is a part of the other."""
+    if ahead == 0.0:
+        return 0.0
+    s[TIME] = now
+    s[HOURS] = vehicle[_STARTED] + now / _SECONDS_PER_HOUR
+    s[FRONT], s[REAR], s[SPEED] = servos[2], servos[3], ahead
+    _motion(s, p, vehicle[_FRONT_AXLE], vehicle[_REAR_AXLE])
+    return ahead * ahead / s[FORWARD] if s[FORWARD] / ahead > _LEAST_PART else ahead
+
+
+@compiled(inner=True)
 def _drive_run(
     s: Floats,
     p: Floats,
@@ -288,7 +302,7 @@ def _drive_run(
         if now >= end:
             continue
         if now == begin and not math.isnan(speed):
-            servos[4] = speed
+            servos[4] = _drive_speed(s, p, vehicle, servos, now, speed)
         plan_command(plan, s, servos)
         k = _hold(s, p, plan, work, vehicle, now, end - now, start, t_s, out, k, stop)
         if k == stop:
@@ -322,7 +336,7 @@ def simulate(
     p
         Every effect's parameters.
     initial
-        (runs, 4): the measured pose at the start, and the drive's speed there (NaN: what the commands before made it).
+        (runs, 4): the measured pose at the start, and the speed ahead there (NaN: what the commands before made it).
     begins_s
         (runs,): stamp of the measured pose at the start; NaN where the vehicle stands until its first command.
     started_h
