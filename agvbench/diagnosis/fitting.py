@@ -4,15 +4,20 @@ Each run has its own start pose, an offset of each axle and a factor on its spee
 is estimated, too. Without them a run's frames would pass for as many pieces of evidence, and the smallest play in a
 servo for an effect. They are found anew about every prediction (not once about zero), and enter the
 likelihood by Laplace's approximation.
+
+Windows of free driving have no offsets but those of their start pose: what one window misses its neighbours miss, too, so
+that an offset drawn for each would explain a cause away. Their errors grow with time and have heavy tails, another day's
+driving being many times as far off as this one's: the likelihood is Student's, of a window and not of its samples.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from agvbench.diagnosis.prediction import Linearised, Predictor
+from agvbench.diagnosis.reading import Readings
 from agvbench.types import Floats
 
 EVIDENCE_POSES = 4.0
@@ -24,6 +29,8 @@ _LEAST_M, _LEAST_RAD = 1e-4, 2e-4
 _START_EXTRA_M = 2e-4
 _LEAST_SCATTER = np.array([2e-4, 2e-4, 2e-4, 2e-4])
 _ENOUGH = 0.05
+_TAIL = 4.0  # degrees of freedom of a window's errors
+_WINDOW_POSES = 1.0
 
 
 @dataclass(frozen=True)
@@ -31,12 +38,13 @@ class Scatter:
     """Standard deviations.
 
     Within a run ``position_m`` and ``heading_rad``; from run to run ``offsets`` (4,): start heading [rad], front and
-    rear axle [rad], log of speed.
+    rear axle [rad], log of speed. ``growth`` (K,) or (1,): how large errors of each sample are beside those.
     """
 
     position_m: float
     heading_rad: float
     offsets: Floats
+    growth: Floats = field(default_factory=lambda: np.ones(1))
 
 
 @dataclass(frozen=True)
@@ -110,7 +118,7 @@ def fit(
     """
     readings = predictor.readings
     offsets = np.zeros((len(readings), 6)) if offsets is None else offsets.copy()
-    scatter = scatter or first_scatter()
+    scatter = scatter or (first_scatter() if predictor.readings.begins is None else _scatter_of_windows(readings))
     parameters = parameters.copy()
     before = np.inf
     for _ in range(iterations):
@@ -118,7 +126,7 @@ def fit(
         residual = _residual(predictor, linear.poses)
         terms = _terms(predictor, residual, linear.by_parameters, linear.by_offsets, offsets, scatter)
         parameters, offsets, residual = _step(predictor, parameters, offsets, residual, terms, scatter, bounds)
-        scatter = _rescatter(predictor, residual, offsets, terms.inner_inverse)
+        scatter = _rescatter(predictor, residual, offsets, terms.inner_inverse, scatter)
         after = float(terms.loss.sum())
         if abs(before - after) < _ENOUGH:
             break
@@ -163,7 +171,24 @@ def _residual(predictor: Predictor, poses: Floats) -> Floats:
 
 def _temper(predictor: Predictor) -> tuple[Floats, Floats]:
     count = predictor.readings.seen.sum(axis=1).astype(np.float64)
-    return np.minimum(1.0, EVIDENCE_POSES / np.maximum(count, 1.0)), count
+    evidence = EVIDENCE_POSES if predictor.readings.begins is None else _WINDOW_POSES
+    return np.minimum(1.0, evidence / np.maximum(count, 1.0)), count
+
+
+def _scale(scatter: Scatter) -> Floats:
+    """Return the standard deviation of each sample's error, (K or 1, 3)."""
+    return np.asarray(scatter.growth[:, None] * [scatter.position_m, scatter.position_m, scatter.heading_rad])
+
+
+def _student(squares: Floats, numbers: Floats) -> tuple[Floats, Floats]:
+    """Return each window's loss and weight by Student's law, given its squared errors and how many numbers they are."""
+    return (_TAIL + numbers) * np.log1p(squares / _TAIL), (_TAIL + numbers) / (_TAIL + squares)
+
+
+def _scatter_of_windows(readings: Readings) -> Scatter:
+    """Return a scatter to start from: errors that grow with time, and hardly an offset."""
+    ahead_s = np.nanmean(readings.t_s - readings.begins_s[:, None], axis=0)
+    return Scatter(0.1, 0.1, _LEAST_SCATTER.copy(), ahead_s / ahead_s[-1])
 
 
 def _priors(predictor: Predictor, scatter: Scatter) -> Floats:
@@ -186,7 +211,7 @@ def _terms(
     runs = len(residual)
     temper, count = _temper(predictor)
     weight = np.sqrt(temper)[:, None, None] * predictor.readings.seen[:, :, None]
-    weight = weight / np.array([scatter.position_m, scatter.position_m, scatter.heading_rad])
+    weight = weight / _scale(scatter)
     e = (residual * weight).reshape(runs, -1)
     j = (by_parameters * weight[..., None]).reshape(runs, e.shape[1], -1)
     a = (by_offsets * weight[..., None]).reshape(runs, e.shape[1], 6)
@@ -204,6 +229,10 @@ def _terms(
     squares -= np.einsum("ri,rij,rj->r", pull, inverse, pull)
     logs = np.linalg.slogdet(inner)[1] + 2.0 * np.sum(np.log(prior), axis=1)
     logs += temper * count * (4.0 * np.log(scatter.position_m) + 2.0 * np.log(scatter.heading_rad))
+    if predictor.readings.begins is not None:
+        logs += 6.0 * temper * (predictor.readings.seen * np.log(scatter.growth)).sum(axis=1)
+        squares, trust = _student(squares, 3.0 * temper * count)
+        information, gradient = information * trust[:, None, None], gradient * trust[:, None]
     return _Terms(squares + logs, information, gradient, inverse, mixed, pull)
 
 
@@ -249,13 +278,19 @@ def _step(
 def _objective(predictor: Predictor, residual: Floats, offsets: Floats, scatter: Scatter) -> float:
     temper, _ = _temper(predictor)
     seen = predictor.readings.seen[:, :, None]
-    e = residual * seen / np.array([scatter.position_m, scatter.position_m, scatter.heading_rad])
+    e = residual * seen / _scale(scatter)
     squares = temper * np.sum(e * e, axis=(1, 2)) + np.sum((offsets / _priors(predictor, scatter)) ** 2, axis=1)
+    if predictor.readings.begins is not None:
+        squares, _ = _student(squares, 3.0 * temper * seen.sum(axis=(1, 2)))
     return float(squares.sum())
 
 
-def _rescatter(predictor: Predictor, residual: Floats, offsets: Floats, inner_inverse: Floats) -> Scatter:
+def _rescatter(
+    predictor: Predictor, residual: Floats, offsets: Floats, inner_inverse: Floats, scatter: Scatter
+) -> Scatter:
     seen = predictor.readings.seen
+    if predictor.readings.begins is not None:
+        return _rescatter_windows(predictor, residual, scatter)
     count = float(seen.sum())
     position = np.sqrt(np.sum(residual[..., :2] ** 2 * seen[..., None]) / (2.0 * count))
     heading = np.sqrt(np.sum(residual[..., 2] ** 2 * seen) / count)
@@ -264,6 +299,25 @@ def _rescatter(predictor: Predictor, residual: Floats, offsets: Floats, inner_in
         max(float(position), _LEAST_M),
         max(float(heading), _LEAST_RAD),
         np.maximum(np.sqrt(variance.mean(axis=0)), _LEAST_SCATTER),
+    )
+
+
+def _rescatter_windows(predictor: Predictor, residual: Floats, scatter: Scatter) -> Scatter:
+    seen = predictor.readings.seen
+    temper, count = _temper(predictor)
+    e = residual * seen[..., None] / _scale(scatter)
+    _, trust = _student(temper * np.sum(e * e, axis=(1, 2)), 3.0 * temper * count)
+    weight = seen * trust[:, None]
+    total = np.maximum(seen.sum(axis=0), 1.0)
+    position = np.sqrt(np.sum(residual[..., :2] ** 2 * weight[..., None], axis=(0, 2)) / (2.0 * total))
+    heading = np.sqrt(np.sum(residual[..., 2] ** 2 * weight, axis=0) / total)
+    # One growth for both, that of position, which is what is asked for in the end.
+    growth = np.maximum(position, _LEAST_M) / max(float(position[-1]), _LEAST_M)
+    return Scatter(
+        max(float(position[-1]), _LEAST_M),
+        max(float(np.sqrt(np.mean((heading / growth) ** 2))), _LEAST_RAD),
+        scatter.offsets,
+        growth,
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,40 +36,58 @@ class Batch:
     """Runs packed for simulation: as they are, and as lanes, each of which differs in one level or in heading.
 
     A run's own levels of command are varied one by one, which gives the derivatives by the maps' values and by the
-    run's offsets alike. Packed once, it serves every set of effects.
+    run's offsets alike. Where commands change so often that a run has more levels than free values, the values are
+    varied instead (``by_node``). Packed once, it serves every set of effects.
     """
 
     def __init__(self, readings: Readings, maps: FreeMaps, geometry: Geometry) -> None:
         self.readings, self.maps, self.geometry = readings, maps, geometry
+        begins = [None] * len(readings) if readings.begins is None else readings.begins.t_s.tolist()
         runs = [
-            SimulatedRun(run.commands, t, float(h))
-            for run, t, h in zip(readings.runs, readings.t_s, readings.started_h, strict=True)
+            SimulatedRun(run.commands, t, float(h), begins_s=b)
+            for run, t, h, b in zip(readings.runs, readings.t_s, readings.started_h, begins, strict=True)
         ]
         self.base = Simulation(geometry, maps.neutral, runs)
         self.commands: dict[str, Floats] = {role: getattr(self.base, role) for role in ROLES}
         self.weights = {role: maps.weights(role, self.commands[role]) for role in ROLES}
         self.drives = self.commands["drive"] != maps.neutral
-        run, kind, row, moved = [], [], [], []
-        for i in range(len(runs)):
-            own = np.arange(self.base.row_starts[i], self.base.row_starts[i + 1])
-            for role, moves in [("base", own[:0]), ("heading", own[:0]), *self._levels(own)]:
+        owns = [np.arange(a, b) for a, b in pairwise(self.base.row_starts.tolist())]
+        levels = [list(self._levels(own)) for own in owns]
+        nodes = [list(self._nodes(own)) for own in owns]
+        self.by_node = sum(map(len, nodes)) < sum(map(len, levels))
+        run, kind, row, changed = [], [], [], []
+        for i, own in enumerate(owns):
+            still = np.zeros((len(own), len(ROLES)))
+            for role, first, change in [
+                ("base", -1, still),
+                ("heading", -1, still),
+                *(nodes if self.by_node else levels)[i],
+            ]:
                 run.append(i)
                 kind.append(role)
-                row.append(int(moves[0]) if len(moves) else -1)
-                moved.append(np.isin(own, moves))
+                row.append(first)
+                changed.append(change)
+        # Of a lane that varies a level, `lane_row` is a row that has it; of one that varies a node, the node.
         self.lane_run, self.lane_kind, self.lane_row = np.array(run), np.array(kind), np.array(row)
         self.lanes = Simulation(geometry, maps.neutral, [runs[i] for i in run])
-        starts = self.base.row_starts
-        self.rows = np.concatenate([np.arange(starts[i], starts[i + 1]) for i in run])
-        self.row_kind = np.where(np.concatenate(moved), self.lane_kind[self.lanes.row_runs], "")
+        self.rows = np.concatenate([owns[i] for i in run])
+        self.row_change = np.concatenate(changed)
 
-    def _levels(self, own: NDArray[np.int64]) -> Iterator[tuple[str, NDArray[np.int64]]]:
-        """Yield each level of each command of one run with the rows that have it."""
-        for role in ROLES:
-            rows = own[self.drives[own]] if role == "drive" else own
-            values = self.commands[role][rows]
-            for level in np.unique(values):
-                yield role, rows[values == level]
+    def _levels(self, own: NDArray[np.int64]) -> Iterator[tuple[str, int, Floats]]:
+        """Yield each level of each command of one run: a row that has it, and by how much each row changes with it."""
+        for k, role in enumerate(ROLES):
+            rows = self.drives[own] if role == "drive" else np.ones(len(own), dtype=np.bool_)
+            values = self.commands[role][own]
+            for level in np.unique(values[rows]):
+                moves = rows & (values == level)
+                yield role, int(own[np.argmax(moves)]), np.outer(moves, np.arange(len(ROLES)) == k).astype(np.float64)
+
+    def _nodes(self, own: NDArray[np.int64]) -> Iterator[tuple[str, int, Floats]]:
+        """Yield each free value that one run depends on: its number, and by how much each row changes with it."""
+        for k, role in enumerate(ROLES):
+            weights = self.weights[role][own] * (self.drives[own][:, None] if role == "drive" else 1.0)
+            for node in np.flatnonzero(weights.any(axis=0)):
+                yield role, int(node), np.outer(weights[:, node], np.arange(len(ROLES)) == k)
 
 
 class Predictor:
@@ -98,6 +117,8 @@ class Predictor:
         speed = np.where(self.batch.drives, values[2] * np.exp(offsets[run, 5]), 0.0)
         initial = np.zeros((len(self.readings), 4))
         initial[:, :3] = self.readings.start + offsets[:, :3]
+        if self.readings.begins is not None:
+            initial[:, 3] = self.readings.begins.speed_mps
         return np.column_stack([front, rear, speed]), initial
 
     def predict(self, parameters: Floats, offsets: Floats | None = None) -> Floats:
@@ -127,6 +148,12 @@ class Predictor:
             run, row = batch.lane_run[chosen], batch.lane_row[chosen]
             change = (lanes[chosen] - base[run]) / _STEP
             drives = role == "drive"
+            if batch.by_node:
+                scale = np.exp(offsets[run, 5]) if drives else np.ones(len(run))
+                own_value = scale * parameters[where[role]][row] if drives else scale
+                np.add.at(by_offsets[..., 3 + k], run, change * own_value[:, None, None])
+                by_parameters[run, :, :, where[role].start + row] = change * scale[:, None, None]
+                continue
             factor = settled[row, 2] if drives else np.ones(len(row))
             np.add.at(by_offsets[..., 3 + k], run, change * factor[:, None, None])
             weights = batch.weights[role][row] * (np.exp(offsets[run, 5]) if drives else np.ones(len(row)))[:, None]
@@ -153,7 +180,7 @@ class Predictor:
 
     def _simulate_lanes(self, settled: Floats, initial: Floats, own: Floats) -> Floats:
         batch = self.batch
-        varied = settled[batch.rows] + _STEP * (batch.row_kind[:, None] == np.array(ROLES))
+        varied = settled[batch.rows] + _STEP * batch.row_change
         first = initial[batch.lane_run]
         first[:, 2] += _STEP * (batch.lane_kind == "heading")
         return batch.lanes.predict(varied, self._all(own), first).reshape(len(batch.lane_run), -1, 3)

@@ -1,4 +1,4 @@
-"""A campaign as the diagnosis sees it: runs from rest, sampled alike, with their start poses and groups."""
+"""A campaign as the diagnosis sees it: runs from rest or windows of free driving, sampled alike, in groups."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from agvbench.calibration import inspect_frames
 from agvbench.diagnosis.grouping import group_runs
+from agvbench.diagnosis.windows import Beginnings, Horizon, blocks, cut_windows, recording_of
 from agvbench.errors import FitError
 from agvbench.statistics.rest import start_pose
 from agvbench.types import Floats, Frames, Run
@@ -24,12 +25,13 @@ _FEWEST_SAMPLES = SAMPLES // 2
 
 @dataclass(frozen=True)
 class Readings:
-    """Runs that begin at rest; R runs, K samples each.
+    """Runs that begin at rest, or windows of free driving; R of them, K samples each.
 
     ``t_s`` (R, K) and ``poses`` (R, K, 3) [m, m, rad], of single frames, with the heading continuous from the
     start pose; NaN where none was kept. ``start`` (R, 3) with ``start_stderr`` (R, 3), from the frames at
     rest; ``started_h`` (R,) [h] since the run's session began; ``group`` (R,): runs told the same
-    have the same number. ``refused`` tells for each run that cannot be used why, by its id.
+    have the same number, and so have windows of one stretch. ``refused`` tells for each run that cannot be used why,
+    by its id. ``begins`` says when and how fast windows begin; None for runs from rest.
     """
 
     runs: tuple[Run, ...]
@@ -40,6 +42,7 @@ class Readings:
     started_h: Floats
     group: NDArray[np.int64]
     refused: dict[str, str]
+    begins: Beginnings | None = None
 
     def __len__(self) -> int:
         return len(self.runs)
@@ -61,7 +64,13 @@ class Readings:
             self.started_h[chosen],
             self.group[chosen],
             self.refused,
+            None if self.begins is None else self.begins.select(chosen),
         )
+
+    @property
+    def begins_s(self) -> Floats:
+        """When prediction begins, on each run's clock (R,)."""
+        return np.zeros(len(self)) if self.begins is None else self.begins.t_s
 
 
 def read_runs(runs: Iterable[Run]) -> Readings:
@@ -81,6 +90,34 @@ def read_runs(runs: Iterable[Run]) -> Readings:
     started_h = np.array([(run.started_s - began[run.session]) / 3600.0 for run in kept])
     t_s, poses, start, stderr = (np.array([row[i] for row in rows]) for i in range(4))
     return Readings(tuple(kept), t_s, poses, start, stderr, started_h, group_runs(kept), refused)
+
+
+def read_windows(runs: Iterable[Run], horizon: Horizon, neutral: float) -> Readings:
+    """Cut runs into windows; a run that has none is named in ``refused``."""
+    every = list(runs)
+    began = _session_starts(every)
+    refused: dict[str, str] = {}
+    windows = []
+    for run in every:
+        own = list(cut_windows(run, horizon, neutral)) if run.is_ok else []
+        if not own:
+            refused[run.run_id] = "no window in motion" if run.is_ok else run.status
+        windows += own
+    begins = Beginnings(
+        np.array([w.t0_s for w in windows]),
+        np.array([w.speed_mps for w in windows]),
+        np.array([w.speed_stderr for w in windows]),
+        np.array([w.naive for w in windows]).reshape(-1, 3),
+        np.array([w.noise for w in windows]).reshape(-1, 2),
+        np.array([recording_of(w.run) for w in windows], dtype=np.str_),
+        np.array([w.run.session or "" for w in windows], dtype=np.str_),
+    )
+    started_h = np.array([(w.run.started_s - began[w.run.session]) / 3600.0 for w in windows])
+    t_s, poses, start, stderr = (
+        np.array([getattr(w, name) for w in windows]) for name in ("t_s", "poses", "start", "start_stderr")
+    )
+    group = blocks(windows, horizon)
+    return Readings(tuple(w.run for w in windows), t_s, poses, start, stderr, started_h, group, refused, begins)
 
 
 def _session_starts(runs: list[Run]) -> dict[str | None, float]:
