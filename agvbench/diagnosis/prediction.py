@@ -37,11 +37,12 @@ class Batch:
 
     A run's own levels of command are varied one by one, which gives the derivatives by the maps' values and by the
     run's offsets alike. Where commands change so often that a run has more levels than free values, the values are
-    varied instead (``by_node``). Packed once, it serves every set of effects.
+    varied instead (``by_node``). Packed once, it serves every set of effects. ``level_scatter`` as for
+    `Simulation.predict`.
     """
 
-    def __init__(self, readings: Readings, maps: FreeMaps, geometry: Geometry) -> None:
-        self.readings, self.maps, self.geometry = readings, maps, geometry
+    def __init__(self, readings: Readings, maps: FreeMaps, geometry: Geometry, level_scatter: float = np.inf) -> None:
+        self.readings, self.maps, self.geometry, self.level_scatter = readings, maps, geometry, level_scatter
         begins = [None] * len(readings) if readings.begins is None else readings.begins.t_s.tolist()
         runs = [
             SimulatedRun(run.commands, t, float(h), begins_s=b)
@@ -128,7 +129,7 @@ class Predictor:
         return self._simulate(settled, parameters[self.maps.size :], initial)
 
     def _simulate(self, settled: Floats, own: Floats, initial: Floats) -> Floats:
-        poses = self.batch.base.predict(settled, self._all(own), initial)
+        poses = self.batch.base.predict(settled, self._all(own), initial, level_scatter=self.batch.level_scatter)
         return poses.reshape(len(self.readings), -1, 3)
 
     def linearise(self, parameters: Floats, offsets: Floats) -> Linearised:
@@ -183,4 +184,6 @@ class Predictor:
         varied = settled[batch.rows] + _STEP * batch.row_change
         first = initial[batch.lane_run]
         first[:, 2] += _STEP * (batch.lane_kind == "heading")
-        return batch.lanes.predict(varied, self._all(own), first).reshape(len(batch.lane_run), -1, 3)
+        return batch.lanes.predict(varied, self._all(own), first, level_scatter=batch.level_scatter).reshape(
+            len(batch.lane_run), -1, 3
+        )

@@ -192,6 +192,7 @@ class Simulation:
         *,
         runs: ArrayLike | None = None,
         out: Floats | None = None,
+        level_scatter: float = np.inf,
     ) -> Floats:
         """Return the predicted poses of every frame.
 
@@ -209,6 +210,10 @@ class Simulation:
             Indices of the runs to simulate; all by default. Other runs' frames are left as they are in `out`.
         out
             (frames, 3), written to if given.
+        level_scatter
+            How far, as a logarithm, the speed at the start may be from what the commands before it have made it by mere
+            scatter. Where it is farther, the drive is taken to run at another level (battery, floor, temperature),
+            and whenever it is told to go its speed is faster or slower by the same amount. By default it never is.
 
         Returns
         -------
@@ -225,7 +230,15 @@ class Simulation:
                 raise InputError("is not a number", where=what, value="NaN")
         poses = np.full((len(self.t_s), 3), np.nan) if out is None else out
         self._kernel(
-            np.array([self.geometry.front_axle_m, self.geometry.rear_axle_m, self._longest_step(parameters), 0.0]),
+            np.array(
+                [
+                    self.geometry.front_axle_m,
+                    self.geometry.rear_axle_m,
+                    self._longest_step(parameters),
+                    0.0,
+                    level_scatter,
+                ]
+            ),
             np.ascontiguousarray(parameters, dtype=np.float64),
             np.ascontiguousarray(initial, dtype=np.float64),
             self._begins_s,

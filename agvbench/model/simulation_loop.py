@@ -74,8 +74,8 @@ _AHEAD, _ASIDE, _TURN, _ALONG_X, _ALONG_Y, _TURNED = range(0, 6 * _COUNT, _COUNT
 _WORK_SIZE = 6 * _COUNT
 _SECONDS_PER_HOUR = 3600.0
 
-# Numbers of the vehicle: axles, longest step, and when the run began, in hours.
-_FRONT_AXLE, _REAR_AXLE, _STEP, _STARTED = range(4)
+# Numbers of the vehicle: axles, longest step, when the run began in hours, and the scatter of the drive's level.
+_FRONT_AXLE, _REAR_AXLE, _STEP, _STARTED, _LEVEL_SCATTER = range(5)
 # The first step of a command, whose turn is not known yet [s]; how far a later one may turn [rad, and s at most 1].
 _FIRST_STEP_S, _TURN_PER_STEP = 0.05, 0.15
 # No vehicle turns faster [rad/s]: numbers that say so are nonsense, but must not hang the loop.
@@ -83,6 +83,8 @@ _FASTEST_TURN = 150.0
 _TOGETHER = 1e-12
 # Less of the drive's speed than this is left ahead only if numbers are nonsense.
 _LEAST_PART = 0.05
+# Below this speed [m/s] the drive's level hardly shows.
+_LEVEL_MPS = 0.05
 
 
 @compiled(inner=True)
@@ -112,10 +114,12 @@ def _report(s: Floats, p: Floats, out: Floats, k: int) -> None:
 
 
 @compiled(inner=True)
-def _obey(s: Floats, p: Floats, commands: Floats, settled: Floats, row: int) -> None:
-    """Put the command and what it aims at into `s`."""
+def _obey(s: Floats, p: Floats, commands: Floats, settled: Floats, row: int, lift: float) -> None:
+    """Put the command and what it aims at into `s`; a drive that is told to go goes faster by `lift`."""
     s[DRIVE_COMMAND], s[FRONT_COMMAND], s[REAR_COMMAND] = commands[row, 0], commands[row, 1], commands[row, 2]
     s[FRONT_AIM], s[REAR_AIM], s[SPEED_AIM] = settled[row, 0], settled[row, 1], settled[row, 2]
+    if settled[row, 2] != 0.0:
+        s[SPEED_AIM] += lift
     s[STEERING_LAG], s[STEERING_RATE], s[PLAY], s[ACCELERATE_LAG], s[BRAKE_LAG] = 0.0, math.inf, 0.0, 0.0, 0.0
     aim(s, p)
 
@@ -251,15 +255,36 @@ def _hold(
 
 
 @compiled(inner=True)
-def _drive_speed(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, ahead: float) -> float:
-    """Return the drive's speed with which the centroid moves `ahead`, as the axles stand: one is a part of the other."""
-    if ahead == 0.0:
-        return 0.0
+def _ahead(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, speed: float) -> float:
+    """Return how fast the centroid moves ahead at this speed of the drive, as the axles stand."""
     s[TIME] = now
     s[HOURS] = vehicle[_STARTED] + now / _SECONDS_PER_HOUR
-    s[FRONT], s[REAR], s[SPEED] = servos[2], servos[3], ahead
+    s[FRONT], s[REAR], s[SPEED] = servos[2], servos[3], speed
     _motion(s, p, vehicle[_FRONT_AXLE], vehicle[_REAR_AXLE])
-    return ahead * ahead / s[FORWARD] if s[FORWARD] / ahead > _LEAST_PART else ahead
+    return s[FORWARD]
+
+
+@compiled(inner=True)
+def _drive_speed(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, ahead: float) -> float:
+    """Return the drive's speed with which the centroid moves `ahead`: one is a part of the other."""
+    if ahead == 0.0:
+        return 0.0
+    part = _ahead(s, p, vehicle, servos, now, ahead) / ahead
+    return ahead / part if part > _LEAST_PART else ahead
+
+
+@compiled(inner=True)
+def _lift(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, ahead: float) -> float:
+    """Return by how much the drive is faster than its commands before have made it, so far as it is not scatter."""
+    scatter = vehicle[_LEVEL_SCATTER]
+    if scatter == math.inf:
+        return 0.0
+    told = _ahead(s, p, vehicle, servos, now, servos[4])
+    factor = (told * ahead + _LEVEL_MPS**2) / (told * told + _LEVEL_MPS**2)
+    off = math.log(factor) if factor > 0.0 else 0.0
+    if off == 0.0:
+        return 0.0
+    return off * off / (off * off + scatter * scatter) * (_drive_speed(s, p, vehicle, servos, now, ahead) - servos[4])
 
 
 @compiled(inner=True)
@@ -284,10 +309,10 @@ def _drive_run(
     stop: int,
 ) -> None:
     """Drive one run, whose pose is held until `begin`; actuators obey what comes before."""
-    now = -math.inf
+    now, lift = -math.inf, 0.0
     for row in range(first, last + 1):
         end = arrive(s, command_t_s[row + 1], p) if row < last else math.inf
-        _obey(s, p, commands, settled, row)
+        _obey(s, p, commands, settled, row, lift)
         if row == first:
             # At rest at neutral, for as long as it may have been.
             servos[0] = servos[2] = s[FRONT_AIM]
@@ -302,7 +327,9 @@ def _drive_run(
         if now >= end:
             continue
         if now == begin and not math.isnan(speed):
+            lift = _lift(s, p, vehicle, servos, now, speed)
             servos[4] = _drive_speed(s, p, vehicle, servos, now, speed)
+            _obey(s, p, commands, settled, row, lift)
         plan_command(plan, s, servos)
         k = _hold(s, p, plan, work, vehicle, now, end - now, start, t_s, out, k, stop)
         if k == stop:
@@ -332,7 +359,9 @@ def simulate(
     Parameters
     ----------
     vehicle
-        (4,): distances of front and rear axle from the marker centroid, longest step; the last is for the loop.
+        (5,): distances of front and rear axle from the marker centroid, longest step; the fourth is for the loop; and how
+        far, as a logarithm, the speed at the start may be from what the commands before it made it by mere scatter: beyond
+        that the drive runs at another level (∞: never).
     p
         Every effect's parameters.
     initial
