@@ -105,6 +105,14 @@ class Predictor:
         self.nulls: Floats = batch.base.nulls[self._own]
         self._steps = _STEP_SHARE * batch.base.scales[self._own]
 
+    def settled(self, parameters: Floats) -> tuple[Floats, Floats]:
+        """Return settled angles and speed of every row (rows, 3), and initial states (R, 4)."""
+        return self._inputs(parameters, np.zeros((len(self.readings), len(OFFSETS))))
+
+    def all_parameters(self, parameters: Floats) -> Floats:
+        """Return the simulation's whole parameter vector for the predictor's own."""
+        return self._all(parameters[self.maps.size :])
+
     def _all(self, own: Floats) -> Floats:
         values = self.batch.base.nulls.copy()
         values[self._own] = own

@@ -57,7 +57,7 @@ def residual_rates(readings: Readings, poses: Floats) -> Rates:
     """
     measured = np.concatenate([readings.start[:, None], readings.poses], axis=1)
     predicted = np.concatenate([readings.start[:, None], poses], axis=1)
-    t_s = np.concatenate([np.zeros((len(readings), 1)), readings.t_s], axis=1)
+    t_s = np.column_stack([readings.begins_s, readings.t_s])
     steps_m, steps_p = _body_steps(measured), _body_steps(predicted)
     length = np.hypot(steps_p[..., 0], steps_p[..., 1])
     use = np.isfinite(steps_m).all(axis=-1) & (length > _STILL_M)
