@@ -22,6 +22,7 @@ from agvbench.types import Floats
 SILENCE_LIMIT_S = 0.5
 _COMMANDS_WAITING = 256
 _STOP_PATIENCE_S = 0.5
+_STOP = CommandFlags.STOP
 
 
 class AgvHost(Host):
@@ -77,10 +78,10 @@ class AgvHost(Host):
         return b""
 
     def _serve_commands(self) -> None:
-        handler = self._subscriber.handler
+        receive = self._subscriber.handler.recv
         while True:
             try:
-                payload = handler.recv().payload.to_bytes()
+                payload = receive().payload.to_bytes()
             except self._zenoh_error:
                 return
             try:
@@ -88,28 +89,26 @@ class AgvHost(Host):
             except MessageError as error:
                 self._fail(error)
                 continue
-            self._carry_out(message)
+            if lost := self.loss.saw(message.source, message.sequence):
+                self.event(Level.WARNING, "commands_lost", f"{lost} commands were lost before {message.sequence}")
+            try:
+                with self._lock:
+                    self._carry_out(message)
+            except Exception as error:  # noqa: BLE001  (whatever the adapter raises, the runner must hear of it)
+                self._fail(error, message.sequence)
 
     def _carry_out(self, message: CommandMessage) -> None:
-        if lost := self.loss.saw(message.source, message.sequence):
-            self.event(Level.WARNING, "commands_lost", f"{lost} commands were lost before {message.sequence}")
-        try:
-            with self._lock:
-                if self._left or self._is_outdated(message):
-                    return
-                if message.flags & CommandFlags.STOP:
-                    self._heard_s = None
-                    self._adapter.stop()
-                else:
-                    self._heard_s = self._clock.now()
-                    self._adapter.apply(message)
-        except Exception as error:  # noqa: BLE001  (whatever the adapter raises, the runner must hear of it)
-            self._fail(error, message.sequence)
-
-    def _is_outdated(self, message: CommandMessage) -> bool:
-        """Whether the vehicle was placed anew after this command was sent: a runner was interrupted in between."""
         source, after = self._outdated
-        return message.source == source and message.sequence <= after
+        if message.sequence <= after and message.source == source:
+            return  # the vehicle was placed anew after this was sent: a runner was interrupted in between
+        if self._left:
+            return
+        if message.flags & _STOP:
+            self._heard_s = None
+            self._adapter.stop()
+        else:
+            self._heard_s = self._clock.now()
+            self._adapter.apply(message)
 
     def _watch(self) -> None:
         """Stop a vehicle whose runner has fallen silent."""

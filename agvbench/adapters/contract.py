@@ -7,6 +7,7 @@ with one subclass and its ``scheme``; it is found by name and inherits the tests
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -84,6 +85,22 @@ class MocapReports(Protocol):
 
     def frames(self, frames: Frames, *, clock: FrameClock, acknowledged: int = 0) -> None:
         """Publish frames whose times are in `clock`; `acknowledged` is the command they complete (lock step)."""
+
+    def frame(
+        self,
+        t_s: float,
+        x_m: float,
+        y_m: float,
+        heading_rad: float,
+        *,
+        clock: FrameClock,
+        tracked: bool = True,
+        frame: int = -1,
+        mean_error_m: float = math.nan,
+        received_s: float = math.nan,
+        acknowledged: int = 0,
+    ) -> None:
+        """Publish one frame from plain numbers, see `agvbench.types.Frames`: the quick way in real time."""
 
     def event(self, level: Level, kind: str, text: str, *, acknowledged: int = 0) -> None:
         """Say something to whoever listens: one word for programs and a line for people."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from agvbench.adapters.contract import MocapAdapter
 from agvbench.adapters.hosting import Host
 from agvbench.bus.clock import Clock
-from agvbench.bus.frames_message import FrameClock, FramesFlags, FramesMessage, encode_frames, pack_rows
+from agvbench.bus.frames_message import FrameClock, FramesFlags, pack_frames, pack_row, pack_rows
 from agvbench.bus.identity_message import encode_mocap_identity
 from agvbench.bus.keys import MOCAP, RESET, Keys
 from agvbench.bus.request_message import decode_reset, encode_sampling
@@ -52,6 +53,7 @@ class MocapHost(Host):
             priority=zenoh.Priority.REAL_TIME,
             express=True,
         )
+        self._put_frames = self._publisher.put
         self._subscriber = None
         if listens_for_truth:
             self._subscriber = session.declare_subscriber(keys.truth, zenoh.handlers.FifoChannel(_TRUTHS_WAITING))
@@ -92,22 +94,42 @@ class MocapHost(Host):
     def frames(self, frames: Frames, *, clock: FrameClock, acknowledged: int = 0) -> None:
         """Publish frames, in as many messages as they need."""
         if len(frames.t_s) <= MAX_ROWS:
-            self._publish(frames, clock, acknowledged, FramesFlags.LAST)
+            self._publish(pack_rows(frames), clock, acknowledged, FramesFlags.LAST)
             return
         starts = range(0, len(frames), MAX_ROWS)
         for start in starts:
             part = frames.select(np.arange(start, min(start + MAX_ROWS, len(frames))))
             flags = FramesFlags.LAST if start == starts[-1] else FramesFlags.NONE
-            self._publish(part, clock, acknowledged, flags)
+            self._publish(pack_rows(part), clock, acknowledged, flags)
 
-    def _publish(self, frames: Frames, clock: FrameClock, acknowledged: int, flags: int) -> None:
-        rows, sequence = pack_rows(frames), self._sequence
+    def frame(
+        self,
+        t_s: float,
+        x_m: float,
+        y_m: float,
+        heading_rad: float,
+        *,
+        clock: FrameClock,
+        tracked: bool = True,
+        frame: int = -1,
+        mean_error_m: float = math.nan,
+        received_s: float = math.nan,
+        acknowledged: int = 0,
+    ) -> None:
+        """Publish one frame, from plain numbers."""
+        self._publish(
+            pack_row(t_s, x_m, y_m, heading_rad, mean_error_m, received_s, frame, tracked),
+            clock,
+            acknowledged,
+            FramesFlags.LAST,
+        )
+
+    def _publish(self, rows: bytes, clock: FrameClock, acknowledged: int, flags: int) -> None:
         with self._lock:
-            message = FramesMessage(
-                sequence.take(), rows, acknowledged, clock, self._clock.now(), flags, sequence.source
-            )
+            number = self._sequence.take()
+            message = pack_frames(number, rows, acknowledged, clock, self._clock.now(), flags, self._sequence.source)
             try:
-                self._publisher.put(encode_frames(message))
+                self._put_frames(message)
             except self._zenoh_error:
                 return
 

@@ -19,7 +19,7 @@ MAX_HOLD_S = 3600.0
 _MESSAGE = struct.Struct("<6sHIIQ5d")
 _PREFIX = prefix(Kind.COMMAND)
 # Bound once, and named tuples without their Python constructor: a process just woken fetches all from memory.
-_unpack, _isfinite, _tuple = _MESSAGE.unpack, math.isfinite, tuple.__new__
+_pack, _unpack, _isfinite, _tuple = _MESSAGE.pack, _MESSAGE.unpack, math.isfinite, tuple.__new__
 
 
 class CommandFlags:
@@ -52,20 +52,24 @@ class CommandMessage(NamedTuple):
     source: int = 0
 
 
-def encode_command(message: CommandMessage) -> bytes:
-    """Return the message's 64 bytes.
+def pack_command(sequence: int, t_s: float, command: Command, hold_s: float, flags: int, source: int) -> bytes:
+    """Return the 64 bytes of a message with these fields, see `CommandMessage`.
 
     Raises
     ------
     MessageError
         If a number is not finite, or `hold_s` is out of range.
     """
-    sequence, t_s, command, hold_s, flags, source = message
     drive, front, rear = command
     # A sum is finite only if all its terms are; where it overflows, the terms are looked at one by one.
     if not (_isfinite(t_s + drive + front + rear) and 0.0 <= hold_s <= MAX_HOLD_S):
         _check(t_s, command, hold_s)
-    return _MESSAGE.pack(_PREFIX, flags, source, 1, sequence, t_s, drive, front, rear, hold_s)
+    return _pack(_PREFIX, flags, source, 1, sequence, t_s, drive, front, rear, hold_s)
+
+
+def encode_command(message: CommandMessage) -> bytes:
+    """Return the message's bytes, or raise as `pack_command`."""
+    return pack_command(*message)
 
 
 def decode_command(payload: bytes) -> CommandMessage:

@@ -22,8 +22,8 @@ from agvbench.types import Frames
 # Header and body in one: a process that has just been woken pays for every Python call tenfold.
 _HEAD = struct.Struct("<6sHIIQQB7xd")
 _PREFIX = prefix(Kind.FRAMES)
-# Named tuples without their Python constructor, for the same reason.
-_tuple = tuple.__new__
+# Bound once, and named tuples without their Python constructor, for the same reason.
+_pack, _unpack, _tuple = _HEAD.pack, _HEAD.unpack_from, tuple.__new__
 _ROWS_AT = _HEAD.size
 _ROW = struct.Struct("<6dq?")
 _FIELDS = ("t_s", "x_m", "y_m", "heading_rad", "mean_error_m", "received_s")
@@ -47,6 +47,9 @@ class FramesFlags:
     """The last message that answers the acknowledged command."""
 
 
+# One frame as it travels, from plain numbers: t_s, x_m, y_m, heading_rad, mean_error_m, received_s, frame, tracked.
+pack_row = _ROW.pack
+_LAST, _ROW_BYTES = FramesFlags.LAST, _ROW.size
 _CLOCKS = {int(clock): clock for clock in FrameClock}
 
 
@@ -118,19 +121,25 @@ def unpack_rows(parts: Sequence[bytes]) -> Frames:
     return Frames(t_s, x_m, y_m, heading_rad, tracked.view(np.bool_), frame, mean_error_m, received_s)
 
 
-def encode_frames(message: FramesMessage) -> bytes:
-    """Return the message's bytes.
+def pack_frames(
+    sequence: int, rows: bytes, acknowledged: int, clock: FrameClock, now_s: float, flags: int, source: int
+) -> bytes:
+    """Return the bytes of a message with these fields, see `FramesMessage`.
 
     Raises
     ------
     MessageError
         If there are more than `MAX_ROWS` frames.
     """
-    sequence, rows, acknowledged, clock, now_s, flags, source = message
     count = len(rows) // _ROW.size
     if count > MAX_ROWS:
         raise MessageError("too many frames for one message", value=count, limit=f"at most {MAX_ROWS}")
-    return _HEAD.pack(_PREFIX, flags, source, count, sequence, acknowledged, clock, now_s) + rows
+    return _pack(_PREFIX, flags, source, count, sequence, acknowledged, clock, now_s) + rows
+
+
+def encode_frames(message: FramesMessage) -> bytes:
+    """Return the message's bytes, or raise as `pack_frames`."""
+    return pack_frames(*message)
 
 
 def decode_frames(payload: bytes) -> FramesMessage:
@@ -143,9 +152,9 @@ def decode_frames(payload: bytes) -> FramesMessage:
     """
     if len(payload) < _ROWS_AT:
         raise _refusal(payload)
-    found, flags, source, count, sequence, acknowledged, clock, now_s = _HEAD.unpack_from(payload)
-    good = found == _PREFIX and flags <= FramesFlags.LAST and count <= MAX_ROWS and clock in _CLOCKS
-    if not good or len(payload) != _ROWS_AT + _ROW.size * count:
+    found, flags, source, count, sequence, acknowledged, clock, now_s = _unpack(payload)
+    good = found == _PREFIX and flags <= _LAST and count <= MAX_ROWS and clock in _CLOCKS
+    if not good or len(payload) != _ROWS_AT + _ROW_BYTES * count:
         raise _refusal(payload)
     return _tuple(FramesMessage, (sequence, payload[_ROWS_AT:], acknowledged, _CLOCKS[clock], now_s, flags, source))
 

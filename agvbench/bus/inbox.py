@@ -42,7 +42,7 @@ class Inbox:
         self._keys = keys
         self._subscriber = session.declare_subscriber(keys.reports, zenoh.handlers.FifoChannel(_CAPACITY))
         # The subscriber itself is locked while a thread waits in it; its handler is not.
-        self._handler = self._subscriber.handler
+        self._recv = self._subscriber.handler.recv
         self._closed_error = zenoh.ZError
         self._wake_lock = threading.Lock()
         self._waker: Any = session.declare_publisher(
@@ -68,7 +68,7 @@ class Inbox:
             If the session was closed.
         """
         try:
-            payload: bytes = self._handler.recv().payload.to_bytes()
+            payload: bytes = self._recv().payload.to_bytes()
         except self._closed_error:
             raise LinkError("the bus was closed", where=self._keys.root) from None
         if not payload:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from agvbench.bus.command_message import CommandFlags, CommandMessage, encode_command
+from agvbench.bus.command_message import CommandFlags, pack_command
 from agvbench.bus.keys import Keys
 from agvbench.bus.sequence import Sequence
 from agvbench.errors import LinkError
@@ -18,6 +18,8 @@ class CommandOutbox:
         import zenoh
 
         self._sequence = Sequence()
+        self.source = self._sequence.source
+        """What tells this sender from others."""
         self._keys = keys
         self._error = zenoh.ZError
         self._publisher = session.declare_publisher(
@@ -26,6 +28,7 @@ class CommandOutbox:
             priority=zenoh.Priority.REAL_TIME,
             express=True,
         )
+        self._put = self._publisher.put
 
     def send(self, command: Command, t_s: float, hold_s: float, flags: int = CommandFlags.NONE) -> int:
         """Publish a command; return its sequence number.
@@ -38,17 +41,11 @@ class CommandOutbox:
             If the session was closed.
         """
         sequence = self._sequence.take()
-        message = CommandMessage(sequence, t_s, command, hold_s, flags, self._sequence.source)
         try:
-            self._publisher.put(encode_command(message))
+            self._put(pack_command(sequence, t_s, command, hold_s, flags, self.source))
         except self._error:
             raise LinkError("the bus was closed", where=self._keys.root) from None
         return sequence
-
-    @property
-    def source(self) -> int:
-        """What tells this sender from others."""
-        return self._sequence.source
 
     @property
     def last(self) -> int:

@@ -43,6 +43,13 @@ class LossCounter:
     def saw(self, source: int, sequence: int) -> int:
         """Note a message; return how many before it are missing."""
         self.received += 1
+        if source == self._source and sequence == self._last + 1:
+            self._last = sequence
+            return 0
+        return self._saw_other(source, sequence)
+
+    def _saw_other(self, source: int, sequence: int) -> int:
+        """Note a message that is not the next."""
         if source != self._source:
             self.restarts += self._source is not None
             self._source, self._last = source, sequence

@@ -69,7 +69,7 @@ class EchoAgv(AgvAdapter):
 
     scheme = "echo"
 
-    def __init__(self, answer: Callable[[int, int], None]) -> None:
+    def __init__(self, answer: Callable[[float, int], None]) -> None:
         self._answer = answer
 
     @classmethod
@@ -83,7 +83,7 @@ class EchoAgv(AgvAdapter):
 
     def apply(self, message: CommandMessage) -> None:
         """Have the camera publish."""
-        self._answer(int(message.command.front), message.sequence)
+        self._answer(message.command.front, message.sequence)
 
     def reset(self, request: Reset) -> None:
         """Do nothing."""
@@ -120,9 +120,12 @@ class EchoMocap(MocapAdapter):
         """Begin a run."""
         return Sampling(120.0, 0.0)
 
-    def publish(self, count: int, acknowledged: int) -> None:
+    def publish(self, count: float, acknowledged: int) -> None:
         """Publish some of them."""
-        self.reports.frames(self._ready[count], clock=FrameClock.RUN, acknowledged=acknowledged)
+        if count == 1:
+            self.reports.frame(0.0, 0.0, 0.0, 0.0, clock=FrameClock.RUN, acknowledged=acknowledged)
+        else:
+            self.reports.frames(self._ready[int(count)], clock=FrameClock.RUN, acknowledged=acknowledged)
 
     def close(self) -> None:
         """Do nothing."""
