@@ -5,8 +5,8 @@ is estimated, too. Without them a run's frames would pass for as many pieces of 
 servo for an effect. They are found anew about every prediction (not once about zero), and enter the
 likelihood by Laplace's approximation.
 
-Windows of free driving have no offsets but those of their start pose: what one window misses its neighbours miss, too, so
-that an offset drawn for each would explain a cause away. Their errors grow with time and have heavy tails, another day's
+Windows of free driving have no offsets but those of their start pose: what one window misses its neighbours miss, too,
+so that an offset for each would explain a cause away. Their errors grow with time and have heavy tails, another day's
 driving being many times as far off as this one's: the likelihood is Student's, of a window and not of its samples.
 """
 

@@ -203,8 +203,8 @@ class Simulation:
         parameters
             (p,); see `parameters`. Nothing checks that they are within bounds.
         initial
-            (runs, 4): what the camera reports at the start (x, y, heading), and the speed of the centroid ahead (0 for a
-            run from rest; NaN in a window: what the commands before it have made it). Effects of the camera change
+            (runs, 4): what the camera reports at the start (x, y, heading), and the speed of the centroid ahead (0 for
+            a run from rest; NaN in a window: what the commands before it have made it). Effects of the camera change
             what follows, not the start itself.
         runs
             Indices of the runs to simulate; all by default. Other runs' frames are left as they are in `out`.

@@ -359,9 +359,9 @@ def simulate(
     Parameters
     ----------
     vehicle
-        (5,): distances of front and rear axle from the marker centroid, longest step; the fourth is for the loop; and how
-        far, as a logarithm, the speed at the start may be from what the commands before it made it by mere scatter: beyond
-        that the drive runs at another level (∞: never).
+        (5,): distances of front and rear axle from the marker centroid, longest step; the fourth is for the loop; and
+        how far, as a logarithm, the speed at the start may be from what the commands before it made it by mere scatter:
+        beyond that the drive runs at another level (∞: never).
     p
         Every effect's parameters.
     initial

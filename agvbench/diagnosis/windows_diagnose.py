@@ -1,0 +1,246 @@
+"""From free driving to a verdict: windows in place of runs from rest."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.calibration.source import HeaderLike
+from agvbench.diagnosis.candidates import bounds_of, candidates
+from agvbench.diagnosis.estimates import named_effects
+from agvbench.diagnosis.fitting import Fit, fit
+from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.reading import Readings, read_windows
+from agvbench.diagnosis.result import Diagnosis, HeldOut, NamedEffect, Verdict
+from agvbench.diagnosis.selection import Scored, Selection, Selector
+from agvbench.diagnosis.structure import Dependence, dependences, residual_rates
+from agvbench.diagnosis.vehicle import corrected_vehicle
+from agvbench.diagnosis.windows import SUPPORT_S, Horizon
+from agvbench.diagnosis.windows_errors import QUANTITIES, by_recording, floor_squares, rms, squares
+from agvbench.diagnosis.windows_maps import smooth_maps, start_values_of_windows
+from agvbench.diagnosis.windows_predictors import believed, level_scatter, naive, speed_held
+from agvbench.diagnosis.windows_split import MOST_FITTED, MOST_JUDGED, held_out_windows, thinned
+from agvbench.errors import CampaignError
+from agvbench.model import VehicleModel
+from agvbench.types import Floats, Run
+from agvbench.vehicle.geometry import Geometry
+
+FEWEST_WINDOWS = 20
+FEWEST_STRETCHES = 5
+_LEAST_TURN_RAD = 0.05
+
+
+def diagnose_windows(
+    header: HeaderLike,
+    runs: Sequence[Run],
+    horizon: Horizon,
+    *,
+    vehicle: VehicleModel | None,
+    seed: int,
+    tell: Callable[[str], None],
+) -> Diagnosis:
+    """Diagnose free driving; see `agvbench.diagnosis.diagnose`.
+
+    Errors are those at the horizon. What differs from session to session in the drive's level is read off the speed at
+    the beginning of a window, where there are several sessions.
+    """
+    geometry = Geometry(header.front_axle_m, header.rear_axle_m)
+    readings = read_windows(runs, horizon, header.neutral)
+    if reason := _cannot_tell(readings, header, horizon):
+        return Diagnosis(Verdict.NOT_IDENTIFIABLE, reason, provenance=_provenance(header, readings, seed))
+    held = held_out_windows(readings, seed)
+    if not held.any():
+        return Diagnosis(
+            Verdict.NOT_IDENTIFIABLE,
+            "no stretch of driving can be set aside to judge on: drive for longer",
+            provenance=_provenance(header, readings, seed),
+        )
+    fitted = readings.select(thinned(np.flatnonzero(~held), MOST_FITTED))
+    tell(f"{len(fitted)} windows to fit, {np.count_nonzero(held)} held out")
+    static = _static(fitted, geometry, header.neutral)
+    tried = candidates()
+    given = tuple(e for e in (vehicle.effects if vehicle else ()) if e.name in tried and not e.is_null)
+    values = np.array([value for effect in given for value in effect.values.values()])
+    several = len(np.unique(readings.begins.session)) > 1 if readings.begins else False
+    scatter = level_scatter(static.predictor, static.parameters) if several else np.inf
+    batch = Batch(fitted, static.predictor.maps, geometry, scatter)
+    selector = Selector(batch, tried, static.parameters, seed, tell, tuple(e.name for e in given), values)
+    selection = selector.select()
+    tell("judging on what was held out")
+    judged = readings.select(np.sort(np.r_[np.flatnonzero(held), thinned(np.flatnonzero(~held), MOST_JUDGED)]))
+    held = np.isin([r.run_id for r in judged.runs], [r.run_id for r in readings.select(held).runs])
+    return _Conclusion(header, geometry, readings, judged, held, static, selector, selection, vehicle, seed).diagnosis(
+        horizon
+    )
+
+
+def _cannot_tell(readings: Readings, header: HeaderLike, horizon: Horizon) -> str:
+    if not len(readings):
+        first = next(iter(readings.refused.items()), ("", "there are none"))
+        raise CampaignError("no run can be used", where=f"campaign {header.name}", value=f"{first[0]}: {first[1]}")
+    if len(readings) < FEWEST_WINDOWS:
+        raise CampaignError(
+            "too little free driving to diagnose",
+            where=f"campaign {header.name}",
+            value=f"{len(readings)} windows of {horizon.horizon_s:g} s",
+            limit=f"at least {FEWEST_WINDOWS}",
+            remedy="drive for longer, or predict less far ahead (campaign.toml, [prediction] horizon_s)",
+        )
+    if len(np.unique(readings.group)) < FEWEST_STRETCHES:
+        stretches = len(np.unique(readings.group))
+        return f"{stretches} stretches of {horizon.block_s:g} s are too few to set some aside: drive for longer"
+    turned = np.nanmax(np.abs(readings.poses[..., 2] - readings.start[:, None, 2]), axis=1)
+    if np.count_nonzero(turned > _LEAST_TURN_RAD) < FEWEST_STRETCHES:
+        return "steering was never excited: hardly a window turns"
+    return ""
+
+
+def _static(fitted: Readings, geometry: Geometry, neutral: float) -> Fit:
+    """Return the static maps fitted to the windows."""
+    maps = smooth_maps(fitted.runs, neutral)
+    start = start_values_of_windows(maps, fitted, geometry)
+    return fit(Predictor(Batch(fitted, maps, geometry)), start, np.empty((0, 2)))
+
+
+@dataclasses.dataclass
+class _Conclusion:
+    header: HeaderLike
+    geometry: Geometry
+    readings: Readings
+    judged: Readings
+    held: NDArray[np.bool_]
+    static: Fit
+    selector: Selector
+    selection: Selection
+    vehicle: VehicleModel | None
+    seed: int
+
+    def diagnosis(self, horizon: Horizon) -> Diagnosis:
+        chosen, judged = self.selection.chosen, self.judged
+        poses = self._poses(chosen)
+        static = Predictor(Batch(judged, self.static.predictor.maps, self.geometry))
+        predicted = {
+            "static": static.predict(self.static.parameters),
+            "speed_held": speed_held(static.batch, self.static.parameters),
+            "naive": naive(judged),
+            "after": poses,
+        }
+        before = predicted["static"]
+        if self.vehicle is not None:
+            before = predicted["believed"] = believed(self.vehicle, judged)
+        rest = self._dependences(poses)
+        bounds = bounds_of(self.selector.candidates, chosen.names)
+        effects = named_effects(self.selection, bounds)
+        verdict, why = _verdict(effects, rest)
+        model = corrected_vehicle(self.header, self.geometry, chosen.fit, chosen.fit.predictor.maps)
+        scatter = self.selector.batch.level_scatter
+        return Diagnosis(
+            verdict,
+            why,
+            effects,
+            bool(rest),
+            tuple(rest),
+            self._held_out(before, poses),
+            dataclasses.replace(
+                model, provenance={"campaign": self.header.name, "method": "diagnose", "seed": self.seed}
+            ),
+            self.selection.rejected,
+            _provenance(self.header, self.readings, self.seed)
+            | {
+                "fit_windows": len(self.selector.batch.readings),
+                "models_fitted": self.selection.tried,
+                "windows": {
+                    "horizon_s": horizon.horizon_s,
+                    "stride_s": horizon.stride_s,
+                    "initial_state_from_s": [-SUPPORT_S, 0.0],
+                    "level_scatter": float(scatter),
+                    "recordings": by_recording(judged, predicted, self.held, self.seed),
+                    "effects": self._each(poses),
+                },
+            },
+        )
+
+    def _poses(self, model: Scored) -> Floats:
+        """Return what `model` predicts for every window that is judged."""
+        batch = self.selector.batch
+        if not hasattr(self, "_every"):
+            self._every = Batch(self.judged, batch.maps, self.geometry, batch.level_scatter)
+        return Predictor(self._every, model.fit.predictor.effects).predict(model.fit.parameters)
+
+    def _held_out(self, before: Floats, after: Floats) -> HeldOut:
+        kept = self.judged.select(self.held)
+        least = floor_squares(kept)
+        was, now = squares(kept, before[self.held]), squares(kept, after[self.held])
+        errors = {
+            name: {"before": rms(was[name], name), "after": rms(now[name], name), "floor": rms(least[name], name)}
+            for name in QUANTITIES
+        }
+        recording = kept.begins.recording if kept.begins is not None else np.empty(0, dtype=np.str_)
+        worse = []
+        for name in dict.fromkeys(recording.tolist()):
+            own = recording == name
+            change = np.nanmean(now["position_rms_mm"][own]) - np.nanmean(was["position_rms_mm"][own])
+            if change > np.nanmean(least["position_rms_mm"][own]):
+                worse.append(name)
+        return HeldOut(len(kept), errors, tuple(worse))
+
+    def _each(self, poses: Floats) -> dict[str, dict[str, object]]:
+        """Return for each effect whether it was kept, and the held-out position error with and without it."""
+        chosen = self.selection.chosen
+        out: dict[str, dict[str, object]] = {}
+        now = self._error(poses)
+        for name in self.selector.candidates:
+            if name in self.selector.given:
+                continue
+            kept = name in chosen.names
+            other = (
+                self.selector.shrunk(self.selection.base, chosen, name) if kept else self.selector.grown(chosen, name)
+            )
+            error = self._error(self._poses(other))
+            out[name] = {
+                "kept": kept,
+                "gain": self.selection.gains[name] if kept else chosen.total - other.total,
+                "held_out_position_mm": {"with": now if kept else error, "without": error if kept else now},
+            }
+        return out
+
+    def _error(self, poses: Floats) -> float:
+        name = "position_rms_mm"
+        return rms(squares(self.judged.select(self.held), poses[self.held])[name], name)
+
+    def _dependences(self, poses: Floats) -> list[Dependence]:
+        """Return what the rest depends on, a stretch of driving being one piece of evidence."""
+        rates = residual_rates(self.judged, poses)
+        _, stretch = np.unique(self.judged.group, return_inverse=True)
+        rates.covariates.pop("distance_m")  # counted from the window's beginning, where a wheel may stand anyhow
+        clustered = dataclasses.replace(rates, run=stretch[rates.run].astype(np.int64))
+        return dependences(clustered, np.arange(int(stretch.max()) + 1), self.seed)
+
+
+def _verdict(effects: tuple[NamedEffect, ...], rest: list[Dependence]) -> tuple[Verdict, str]:
+    if rest:
+        return Verdict.UNKNOWN, f"structure remains that no effect explains: it depends on {rest[0].covariate}"
+    if not effects:
+        return Verdict.ADEQUATE, "nothing that was looked at predicts better than static maps, fitted again"
+    if any(effect.confounded_with for effect in effects):
+        return Verdict.AMBIGUOUS, "several effects explain the residual equally well"
+    return Verdict.NAMED, "nothing that was looked at explains what the effects named leave"
+
+
+def _provenance(header: HeaderLike, readings: Readings, seed: int) -> dict[str, object]:
+    from agvbench import __version__
+
+    refused: dict[str, int] = {}
+    for reason in readings.refused.values():
+        refused[reason] = refused.get(reason, 0) + 1
+    return {
+        "agvbench": __version__,
+        "campaign": header.name,
+        "seed": seed,
+        "runs_used": len({run.run_id.rpartition("@")[0] for run in readings.runs}),
+        "runs_refused": refused,
+        "windows_used": len(readings),
+    }

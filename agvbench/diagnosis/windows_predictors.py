@@ -1,0 +1,79 @@
+"""What a model of free driving is compared with: each predictor gets the same pose and speed to start from."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.reading import Readings
+from agvbench.diagnosis.windows_split import _begins
+from agvbench.model import VehicleModel
+from agvbench.model.simulation import SimulatedRun, Simulation
+from agvbench.types import Floats
+
+
+def naive(readings: Readings) -> Floats:
+    """Return poses (W, K, 3) of arcs: the velocity and yaw rate of the last 0.1 s go on."""
+    ahead, left, yaw = (column[:, None] for column in _begins(readings).naive.T)
+    time = readings.t_s - readings.begins_s[:, None]
+    half = 0.5 * yaw * time
+    chord = time * np.sinc(half / np.pi)
+    heading = readings.start[:, 2, None] + half
+    c, s = np.cos(heading), np.sin(heading)
+    x = readings.start[:, 0, None] + chord * (c * ahead - s * left)
+    y = readings.start[:, 1, None] + chord * (s * ahead + c * left)
+    return np.stack([x, y, heading + half], axis=-1)
+
+
+def speed_held(batch: Batch, parameters: Floats) -> Floats:
+    """Return poses (W, K, 3) of the static maps' steering at the speed that was measured at the beginning."""
+    predictor = Predictor(batch)
+    static = parameters[: predictor.maps.size]
+    settled, initial = predictor.settled(static)
+    front, rear = settled[:, 0], settled[:, 1]
+    ahead = _begins(batch.readings).speed_mps[batch.base.row_runs]
+    settled[:, 2] = 2.0 * ahead / (np.cos(front) + np.cos(rear))
+    poses = batch.base.predict(settled, batch.base.nulls, initial)
+    return poses.reshape(len(batch.readings), -1, 3)
+
+
+def believed(vehicle: VehicleModel, readings: Readings) -> Floats:
+    """Return poses (W, K, 3) that a vehicle model predicts."""
+    begins = _begins(readings)
+    runs = [
+        SimulatedRun(run.commands, t, float(h), begins_s=float(b))
+        for run, t, h, b in zip(readings.runs, readings.t_s, readings.started_h, begins.t_s, strict=True)
+    ]
+    simulation = Simulation(vehicle.geometry, vehicle.neutral, runs)
+    settled = simulation.settled(vehicle.front, vehicle.rear, vehicle.drive)
+    initial = np.column_stack([readings.start, begins.speed_mps])
+    poses = simulation.predict(settled, simulation.parameters(vehicle.effects), initial)
+    return poses.reshape(len(readings), -1, 3)
+
+
+def level_scatter(predictor: Predictor, parameters: Floats) -> float:
+    """Return how far the logarithm of speed scatters within a session from what commands have made it.
+
+    Beyond twice that, the speed at the beginning of a window says that the drive runs at another level.
+    """
+    begins, batch = _begins(predictor.readings), predictor.batch
+    shortly = [
+        SimulatedRun(run.commands, np.array([b + _SHORTLY_S]), float(h), begins_s=float(b))
+        for run, h, b in zip(predictor.readings.runs, predictor.readings.started_h, begins.t_s, strict=True)
+    ]
+    settled, initial = predictor.settled(parameters)
+    initial[:, 3] = np.nan
+    simulation = Simulation(batch.geometry, batch.maps.neutral, shortly)
+    moved = simulation.predict(settled, predictor.all_parameters(parameters), initial) - initial[:, :3]
+    told = (np.cos(initial[:, 2]) * moved[:, 0] + np.sin(initial[:, 2]) * moved[:, 1]) / _SHORTLY_S
+    use = (np.abs(told) > _SLOW_MPS) & (told * begins.speed_mps > 0.0) & (np.abs(begins.speed_mps) > _SLOW_MPS)
+    off = np.log(np.abs(begins.speed_mps[use]) / np.abs(told[use]))
+    session = begins.session[use]
+    for name in np.unique(session):
+        off[session == name] -= np.median(off[session == name])
+    return max(_LEAST_SCATTER, 2.0 * 1.4826 * float(np.median(np.abs(off)))) if len(off) else _LEAST_SCATTER
+
+
+_SHORTLY_S = 0.01
+_SLOW_MPS = 0.05
+_LEAST_SCATTER = 0.05
