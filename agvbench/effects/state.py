@@ -30,4 +30,6 @@ X_RATE, Y_RATE = range(27, 29)
 SEEN_X, SEEN_Y, SEEN_HEADING = range(29, 32)
 # Kept by the simulation: cosines, and the angles that they belong to.
 COS_FRONT, COS_REAR, KNOWN_FRONT, KNOWN_REAR = range(32, 36)
-SIZE = 36
+# Where steering settled under the command before the one in force, for each axle whose command has changed.
+FRONT_BEFORE, REAR_BEFORE = range(36, 38)
+SIZE = 38

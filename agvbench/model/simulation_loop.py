@@ -25,6 +25,7 @@ from agvbench.effects.state import (
     FORWARD,
     FRONT,
     FRONT_AIM,
+    FRONT_BEFORE,
     FRONT_COMMAND,
     FRONT_SPEED,
     HEADING,
@@ -35,6 +36,7 @@ from agvbench.effects.state import (
     PLAY,
     REAR,
     REAR_AIM,
+    REAR_BEFORE,
     REAR_COMMAND,
     REAR_SPEED,
     SEEN_HEADING,
@@ -116,6 +118,10 @@ def _report(s: Floats, p: Floats, out: Floats, k: int) -> None:
 @compiled(inner=True)
 def _obey(s: Floats, p: Floats, commands: Floats, settled: Floats, row: int, lift: float) -> None:
     """Put the command and what it aims at into `s`; a drive that is told to go goes faster by `lift`."""
+    if commands[row, 1] != s[FRONT_COMMAND]:
+        s[FRONT_BEFORE] = s[FRONT_AIM]
+    if commands[row, 2] != s[REAR_COMMAND]:
+        s[REAR_BEFORE] = s[REAR_AIM]
     s[DRIVE_COMMAND], s[FRONT_COMMAND], s[REAR_COMMAND] = commands[row, 0], commands[row, 1], commands[row, 2]
     s[FRONT_AIM], s[REAR_AIM], s[SPEED_AIM] = settled[row, 0], settled[row, 1], settled[row, 2]
     if settled[row, 2] != 0.0:
@@ -310,6 +316,9 @@ def _drive_run(
 ) -> None:
     """Drive one run, whose pose is held until `begin`; actuators obey what comes before."""
     now, lift = -math.inf, 0.0
+    # At first nothing was before.
+    s[FRONT_COMMAND], s[REAR_COMMAND] = commands[first, 1], commands[first, 2]
+    s[FRONT_BEFORE], s[REAR_BEFORE] = settled[first, 0], settled[first, 1]
     for row in range(first, last + 1):
         end = arrive(s, command_t_s[row + 1], p) if row < last else math.inf
         _obey(s, p, commands, settled, row, lift)
