@@ -14,12 +14,18 @@ examples:
   agvbench diagnose campaigns/tonight                         the answer and the errors before and after
   agvbench diagnose campaigns/tonight --out corrected.toml    keep the vehicle with maps refitted and effects added
   agvbench diagnose campaigns/tonight --json d.json --check   for scripts: exit code 1 unless ADEQUATE
+  agvbench diagnose campaigns/tonight --next next.toml        write the run that would tell rivals apart
+  agvbench diagnose campaigns/tonight --run-next              drive it, and decide: a copy of the campaign with the new
+                                                              runs is diagnosed again, the old one is left as it is
 """
 
 from __future__ import annotations
 
 import argparse
 
+from agvbench.running.options import OPTIONS, destination
+
+_OF_THE_RIG = ("--agv", "--mocap", "--plant", "--workspace", "--connect", "--lab")
 HELP = "find the physical effect that the vehicle model lacks"
 
 
@@ -33,6 +39,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--check", action="store_true", help="exit with 1 unless the answer is ADEQUATE")
     parser.add_argument("--seed", type=int, default=0, help="draws which runs are set aside (default 0)")
+    parser.add_argument(
+        "--next", metavar="FILE.toml", dest="next_file", help="write the trajectory to drive next there"
+    )
+    parser.add_argument("--run-next", action="store_true", help="drive it on the connected plant and diagnose again")
+    parser.add_argument(
+        "--next-out", metavar="DIR", help="the campaign with the new runs (default: DIR-next beside DIR)"
+    )
+    rig = parser.add_argument_group("what --run-next drives (default: what the campaign's bench.toml says)")
+    for flag, keywords, text in OPTIONS:
+        if flag in _OF_THE_RIG:
+            rig.add_argument(flag, help=text, **keywords)
+    rig.add_argument("--plant-seed", type=int, metavar="N", help="seed of a simulated plant")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -45,5 +63,10 @@ def run(arguments: argparse.Namespace) -> int:
         out=arguments.out,
         vehicle=arguments.vehicle,
         seed=arguments.seed,
+        next_file=arguments.next_file,
+        drive_next=arguments.run_next,
+        next_out=arguments.next_out,
+        rig={destination(flag): getattr(arguments, destination(flag)) for flag in _OF_THE_RIG}
+        | {"seed": arguments.plant_seed},
     )
     return 1 if arguments.check and not found.adequate else 0

@@ -15,6 +15,7 @@ from agvbench.diagnosis.candidates import bounds_of, candidates
 from agvbench.diagnosis.estimates import named_effects
 from agvbench.diagnosis.grouping import held_out_runs
 from agvbench.diagnosis.levels import ROLES, FreeMaps, free_maps, start_values
+from agvbench.diagnosis.next_experiment_propose import with_next_experiment
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.reading import Readings, read_runs
 from agvbench.diagnosis.residuals import Misses, floor, lack_of_fit, misses
@@ -164,7 +165,7 @@ def _conclude(
     significant = _is_significant(judged, rest)
     verdict, why = _verdict(effects, significant, rest)
     model = corrected_vehicle(header, geometry, fit, maps)
-    return Diagnosis(
+    found = Diagnosis(
         verdict,
         why,
         effects,
@@ -185,6 +186,7 @@ def _conclude(
             },
         },
     )
+    return with_next_experiment(found, selection, readings, header, seed)
 
 
 def _believed_poses(vehicle: VehicleModel, readings: Readings) -> Floats:

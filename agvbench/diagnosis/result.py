@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
+from agvbench.diagnosis.next_experiment import NextExperiment
 from agvbench.diagnosis.structure import Dependence
 from agvbench.model import VehicleModel
 
@@ -64,7 +65,8 @@ class Diagnosis:
 
     ``verdict`` and ``why`` in words; ``effects``; ``depends_on`` what the rest depends on, ``significant`` whether that
     matters; ``held_out`` (None if nothing could be predicted); ``model`` with refitted maps and the effects found;
-    ``rejected`` the gain of each effect that did not earn its place; ``provenance``.
+    ``rejected`` the gain of each effect that did not earn its place; ``provenance``; ``next_experiment``: the run that
+    would tell rivals apart or pin what the data leave open, None where there is none.
     """
 
     verdict: Verdict
@@ -76,6 +78,7 @@ class Diagnosis:
     model: VehicleModel | None = None
     rejected: Mapping[str, float] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    next_experiment: NextExperiment | None = None
 
     @property
     def adequate(self) -> bool:
@@ -105,7 +108,7 @@ class Diagnosis:
                 "delta_heading_deg": dict(errors.get("delta_heading_deg", {})),
                 "worse_on": list(self.held_out.worse_on) if self.held_out else [],
             },
-            "next_experiment": None,
+            "next_experiment": None if self.next_experiment is None else self.next_experiment.to_table(),
             "provenance": {"why": self.why, **self.provenance, "rejected": dict(self.rejected)},
         }
         return dict(_finite(content))

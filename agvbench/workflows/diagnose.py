@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
+import tomli_w
 from rich import box
 from rich.console import Console
 from rich.table import Table
 
 from agvbench.campaign import Campaign
 from agvbench.diagnosis import Diagnosis, NamedEffect, diagnose
+from agvbench.diagnosis.next_experiment_propose import with_first_experiment
 from agvbench.errors import FileError, FlagError
 from agvbench.model import VehicleModel
 
@@ -30,13 +33,22 @@ def run_diagnose(
     out: str | None = None,
     vehicle: str | None = None,
     seed: int = 0,
+    next_file: str | None = None,
+    drive_next: bool = False,
+    next_out: str | None = None,
+    rig: Mapping[str, Any] | None = None,
 ) -> Diagnosis:
     """Diagnose the campaign in `directory`, print the answer, and write JSON and the corrected vehicle if asked for.
+
+    With `drive_next` the run that the diagnosis proposes is driven with the `rig`, added to a copy of the campaign, and
+    that is diagnosed: what is written and returned is the second answer. ``next_file`` takes the trajectory proposed.
 
     Raises
     ------
     CampaignError, FitError, VehicleError
         If the campaign or the vehicle cannot be used.
+    PlanError, LinkError, PlantError
+        If the next run cannot be driven.
     FileError, FlagError
         If a file cannot be written, or the seed is negative.
     """
@@ -45,19 +57,51 @@ def run_diagnose(
     campaign = Campaign.open(directory).check()
     believed = Path(vehicle) if vehicle is not None else campaign.path / "vehicle.toml"
     model = VehicleModel.load(believed) if vehicle is not None or believed.exists() else None
-    errors = Console(stderr=True)
-    if errors.is_terminal:
-        with errors.status("reading runs") as status:
-            found = diagnose(campaign, vehicle=model, seed=seed, tell=status.update)
-    else:
-        found = diagnose(campaign, vehicle=model, seed=seed)
+    found = _diagnosed(campaign, model, seed)
     tell(found, Console())
+    if next_file is not None and found.next_experiment is not None:
+        trajectory = found.next_experiment.trajectory
+        text = tomli_w.dumps(trajectory.to_table())
+        _write("--next", Path(next_file), lambda path: path.write_text(text, encoding="utf-8"))
+    if drive_next:
+        found = _decided(campaign, found, model, seed, next_out, rig or {})
     if json_file is not None:
         text = found.to_text()
         _write("--json", Path(json_file), lambda path: path.write_text(text, encoding="utf-8"))
     if out is not None and found.model is not None:
         _write("--out", Path(out), found.model.save)
     return found
+
+
+def _diagnosed(campaign: Campaign, model: VehicleModel | None, seed: int) -> Diagnosis:
+    errors = Console(stderr=True)
+    if not errors.is_terminal:
+        return with_first_experiment(diagnose(campaign, vehicle=model, seed=seed))
+    with errors.status("reading runs") as status:
+        return with_first_experiment(diagnose(campaign, vehicle=model, seed=seed, tell=status.update))
+
+
+def _decided(
+    campaign: Campaign,
+    found: Diagnosis,
+    model: VehicleModel | None,
+    seed: int,
+    out: str | None,
+    rig: Mapping[str, Any],
+) -> Diagnosis:
+    """Drive the run that `found` proposes and return what is then found."""
+    from agvbench.workflows.run_next import run_next
+
+    console = Console()
+    if found.next_experiment is None:
+        console.print("nothing is driven: no run would tell more", highlight=False)
+        return found
+    extended = run_next(campaign, found.next_experiment, found.model or model, rig, out=out, seed=seed)
+    name = found.next_experiment.trajectory.name
+    console.print(f"drove {name}; the campaign with it: {extended.path}", highlight=False, soft_wrap=True)
+    again = _diagnosed(extended.check(), model, seed)
+    tell(again, console)
+    return again
 
 
 def tell(found: Diagnosis, console: Console) -> None:
@@ -72,6 +116,18 @@ def tell(found: Diagnosis, console: Console) -> None:
         console.print(errors_table(found))
         if found.held_out.worse_on:
             console.print(f"  worse than before on: {', '.join(found.held_out.worse_on)}", soft_wrap=True)
+    for line in next_in_words(found):
+        console.print(f"  {line}", highlight=False, markup=False, soft_wrap=True)
+
+
+def next_in_words(found: Diagnosis) -> Iterator[str]:
+    """Yield what to drive next, what no run can tell apart, and which parameters these runs do not pin."""
+    if (experiment := found.next_experiment) is not None:
+        yield f"next run, {experiment.trajectory.name}: {experiment.why}"
+    for item in found.provenance.get("inseparable", ()):
+        yield f"no run from rest to rest tells {' from '.join(item['between'])}; it takes {item['needs']}"
+    for name, why in found.provenance.get("not_identifiable", {}).items():
+        yield f"{name} is not identifiable from these runs ({why})"
 
 
 def in_words(effect: NamedEffect) -> str:
