@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis.levels import ROLES, FreeMaps
 from agvbench.diagnosis.reading import Readings
+from agvbench.effects import Effect
 from agvbench.model.simulation import SimulatedRun, Simulation
 from agvbench.types import Floats
 from agvbench.vehicle.geometry import Geometry
@@ -37,18 +38,26 @@ class Batch:
 
     A run's own levels of command are varied one by one, which gives the derivatives by the maps' values and by the
     run's offsets alike. Where commands change so often that a run has more levels than free values, the values are
-    varied instead (``by_node``). Packed once, it serves every set of effects. ``level_scatter`` as for
+    varied instead (``by_node``). Packed once, it serves every set of effects, also ``kinds``
+    beyond those of the library. ``level_scatter`` as for
     `Simulation.predict`.
     """
 
-    def __init__(self, readings: Readings, maps: FreeMaps, geometry: Geometry, level_scatter: float = np.inf) -> None:
+    def __init__(
+        self,
+        readings: Readings,
+        maps: FreeMaps,
+        geometry: Geometry,
+        level_scatter: float = np.inf,
+        kinds: Sequence[type[Effect]] = (),
+    ) -> None:
         self.readings, self.maps, self.geometry, self.level_scatter = readings, maps, geometry, level_scatter
         begins = [None] * len(readings) if readings.begins is None else readings.begins.t_s.tolist()
         runs = [
             SimulatedRun(run.commands, t, float(h), begins_s=b)
             for run, t, h, b in zip(readings.runs, readings.t_s, readings.started_h, begins, strict=True)
         ]
-        self.base = Simulation(geometry, maps.neutral, runs)
+        self.base = Simulation(geometry, maps.neutral, runs, kinds=kinds)
         self.commands: dict[str, Floats] = {role: getattr(self.base, role) for role in ROLES}
         self.weights = {role: maps.weights(role, self.commands[role]) for role in ROLES}
         self.drives = self.commands["drive"] != maps.neutral
@@ -70,7 +79,7 @@ class Batch:
                 changed.append(change)
         # Of a lane that varies a level, `lane_row` is a row that has it; of one that varies a node, the node.
         self.lane_run, self.lane_kind, self.lane_row = np.array(run), np.array(kind), np.array(row)
-        self.lanes = Simulation(geometry, maps.neutral, [runs[i] for i in run])
+        self.lanes = Simulation(geometry, maps.neutral, [runs[i] for i in run], kinds=kinds)
         self.rows = np.concatenate([owns[i] for i in run])
         self.row_change = np.concatenate(changed)
 
