@@ -95,20 +95,20 @@ class Bench:
     def _repeat_unseen(self, order: DriveOrder, run: Run) -> Run:
         if self._identity.simulated:
             duration_s = float(str(run.extra["duration_s"]))
-            commands, until_s = exchanged(run.commands, self._neutral(order), duration_s, self._timing)
+            commands, until_s = exchanged(run.commands, self._neutral(), duration_s, self._timing)
             self.link.replay(run.run_id, commands, pose=order.start, until_s=until_s)
             self._time.has_run(run.started_s, duration_s)
         return run
 
-    def _neutral(self, order: DriveOrder) -> Command:
-        """Return the command before a run: no drive, and the wheels as the run's first command has them."""
-        return order.commands.at(0)._replace(drive=self.nominal.neutral)
+    def _neutral(self) -> Command:
+        """Return the command before a run: everything neutral, since a run's first command is the first recorded."""
+        return Command(self.nominal.neutral, self.nominal.neutral, self.nominal.neutral)
 
     def _drive(self, order: DriveOrder, run_id: str, seen: list[Frames]) -> Drive:
         return drive(
             self.link,
             order.commands,
-            neutral=self._neutral(order),
+            neutral=self._neutral(),
             start=order.start,
             run_key=run_id if self._identity.simulated else None,
             timing=self._timing,
