@@ -1,6 +1,7 @@
 """The eight test trajectories (agvbench): thesis section 8.2, each condition ten times.
 
 Trajectories 3 and 4, at half speed, have no uncalibrated condition: no half speed is known before calibration.
+The condition ``corrected`` is driven where a model with effects is given with ``--corrected``.
 """
 
 import pytest
@@ -10,7 +11,7 @@ THE_EIGHT = [str(number) for number in range(1, 9)]
 
 @pytest.mark.repeats
 @pytest.mark.experiment("trajectory")
-@pytest.mark.parametrize("condition", ["uncalibrated", "calibrated"])
+@pytest.mark.parametrize("condition", ["uncalibrated", "calibrated", "corrected"])
 @pytest.mark.parametrize("trajectory", THE_EIGHT)
 def bench_trajectory(drive, trajectory, condition):
     """Drive one trajectory under one condition; Δs and Δδ follow from where it ends."""

@@ -74,6 +74,11 @@ def rollout(
     return batch.split(out)
 
 
+def has_fast_kernel(model: VehicleModel) -> bool:
+    """Return whether the kernel knows every effect of `model`."""
+    return all(effect.is_null or f"{effect.name}.{name}" in SLOTS for effect in model.effects for name in effect.values)
+
+
 def kernel_parameters(model: VehicleModel) -> Floats:
     """Return the numbers of `model` that the kernel needs beside the static maps, in the order of `SLOTS`.
 

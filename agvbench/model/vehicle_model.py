@@ -153,8 +153,21 @@ class VehicleModel:
 
         save_vehicle(self, Path(path))
 
-    def rollout(self, commands: Sequence[Commands], initial: ArrayLike, t_s: Sequence[ArrayLike]) -> list[Floats]:
-        """Simulate a batch of runs; see `agvbench.model.rollout.rollout`."""
-        from agvbench.model.rollout import rollout
+    def rollout(
+        self,
+        commands: Sequence[Commands],
+        initial: ArrayLike,
+        t_s: Sequence[ArrayLike],
+        started_h: Sequence[float] | None = None,
+    ) -> list[Floats]:
+        """Simulate a batch of runs; see `agvbench.model.rollout.rollout`.
 
-        return rollout(self, commands, initial, [np.asarray(t, dtype=np.float64) for t in t_s])
+        Effects that the fast kernel does not know are simulated by `agvbench.model.simulation_rollout.general_rollout`,
+        for which `started_h` says when each run began, in hours since the session began.
+        """
+        from agvbench.model.rollout import has_fast_kernel, rollout
+        from agvbench.model.simulation_rollout import general_rollout
+
+        if has_fast_kernel(self):
+            return rollout(self, commands, initial, [np.asarray(t, dtype=np.float64) for t in t_s])
+        return general_rollout(self, commands, initial, t_s, started_h)

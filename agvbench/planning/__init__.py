@@ -5,21 +5,30 @@
     TOML ─► Trajectory ─► segments ─► legs ─► commands, expected path, target, floor
             (schema)      (shapes)    (this vehicle's axle angles, speed and time)
 
-`load_trajectory` reads, `plan` does the rest and raises `PlanError` before anything moves.
+`load_trajectory` reads, `plan` does the rest and raises `PlanError` before anything moves. For a model with effects,
+`corrected_plan` changes steering and durations until the model comes to rest on the target.
 """
 
+from agvbench.planning.corrected import CorrectedPlan, Correction, corrected_plan, depends_on_time
 from agvbench.planning.planner import Plan, place, plan
 from agvbench.planning.reading import list_trajectories, load_trajectory, trajectory_from_table
+from agvbench.planning.resting import Departure, Miss
 from agvbench.planning.summary import DryRun, DryRunRow, dry_run
 from agvbench.planning.trajectory import Trajectory
 from agvbench.planning.workspace import Workspace
 
 __all__ = [
+    "CorrectedPlan",
+    "Correction",
+    "Departure",
     "DryRun",
     "DryRunRow",
+    "Miss",
     "Plan",
     "Trajectory",
     "Workspace",
+    "corrected_plan",
+    "depends_on_time",
     "dry_run",
     "list_trajectories",
     "load_trajectory",

@@ -74,3 +74,8 @@ def _axles(t_s: Floats, poses: Floats, geometry: Geometry) -> Floats:
     along = np.column_stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])])
     front, rear = poses[:, :2] + geometry.front_axle_m * along, poses[:, :2] - geometry.rear_axle_m * along
     return np.column_stack([np.repeat(t_s, 2), np.stack([front, rear], axis=1).reshape(-1, 2)])
+
+
+def axles_swept(path: Floats, geometry: Geometry) -> Floats:
+    """Return when and where the axles' centres pass on a `path` (n, 4) of t, x, y, heading; shape (2n, 3)."""
+    return _axles(path[:, 0], path[:, 1:], geometry)

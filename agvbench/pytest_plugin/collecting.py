@@ -5,12 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import pytest
 
 from agvbench.errors import AgvbenchError
 from agvbench.pytest_plugin.options import settings_from
+
+if TYPE_CHECKING:
+    from agvbench.running.settings import BenchSettings
 
 REPEAT = "agvbench_repeat"
 CALIBRATION_EXPERIMENTS = frozenset({"steering_front", "steering_rear", "steering_opposite", "drive"})
@@ -67,12 +70,16 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     try:
         settings = settings_from(config)
         undriven = [item for item in benches if not _condition_applies(item)]
+        unknown = [] if _corrected_vehicle(config, settings) else [item for item in benches if _is_corrected(item)]
     except AgvbenchError as error:
         raise pytest.UsageError(str(error)) from None
     from agvbench.running.order import ordered
 
     _check_names(benches)
-    driven = [item for item in benches if item not in set(undriven)]
+    if len(unknown) == len(benches):
+        raise pytest.UsageError("--corrected: no corrected model; give the vehicle file that a diagnosis wrote")
+    left_out = {*undriven, *unknown}
+    driven = [item for item in benches if item not in left_out]
     driven = ordered(driven, settings.order, seed=settings.seed, phase=phase, repeat=repeat, name=run_name)
     items[:] = [item for item in items if not is_bench(item)] + driven
     if undriven:
@@ -121,6 +128,21 @@ def _check_names(items: Iterable[pytest.Item]) -> None:
                 f"two benchmarks would record the run {name!r}: {seen[name]} and {item.nodeid}; rename one"
             )
         seen[name] = item.nodeid
+
+
+def _corrected_vehicle(config: pytest.Config, settings: BenchSettings) -> str:
+    """Return the file of the corrected model, given now or when the session that goes on began; "" for none."""
+    if settings.corrected or not config.getoption("resume"):
+        return settings.corrected
+    from agvbench.running.directory import choose_directory
+    from agvbench.running.settings import SETTINGS_FILE, BenchSettings
+
+    directory = choose_directory(config.getoption("out"), resume=True)
+    return BenchSettings.load(directory).corrected if (directory / SETTINGS_FILE).exists() else ""
+
+
+def _is_corrected(item: pytest.Item) -> bool:
+    return parameters(item).get("condition") == "corrected"
 
 
 def _condition_applies(item: pytest.Item) -> bool:

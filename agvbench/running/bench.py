@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping
 
 from agvbench.bus.link import VehicleLink
 from agvbench.campaign import CampaignWriter
-from agvbench.errors import LinkError, PlantError
+from agvbench.errors import FlagError, LinkError, PlantError
 from agvbench.model import VehicleModel
+from agvbench.planning import Departure
 from agvbench.running.campaign_time import CampaignTime
 from agvbench.running.drive import DEFAULT_TIMING, Drive, Timing, drive, exchanged
 from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess
@@ -19,7 +20,8 @@ from agvbench.types import Command, Frames, Run
 class Bench:
     """Drives orders over `link` and records them with `writer`.
 
-    ``calibrate`` is called once, when the first order asks for the calibrated model.
+    ``calibrate`` is called once, when the first order asks for the calibrated model; ``corrected`` is the model of the
+    condition of that name, if there is one.
     """
 
     def __init__(
@@ -32,6 +34,7 @@ class Bench:
         campaign_time: CampaignTime,
         calibrate: Callable[[], VehicleModel],
         recorded: Mapping[str, Run],
+        corrected: VehicleModel | None = None,
         timing: Timing = DEFAULT_TIMING,
         limits: QualityLimits = DEFAULT_LIMITS,
     ) -> None:
@@ -39,18 +42,34 @@ class Bench:
         self.link, self.writer = link, writer
         self.nominal, self._calibrate = nominal, calibrate
         self._calibrated: VehicleModel | None = None
+        self._corrected = corrected
         self._time, self._timing, self._limits = campaign_time, timing, limits
         self._identity = link.identity()
         self._failure: LinkError | PlantError | None = None
         self._recorded = recorded
 
     def model(self, condition: str) -> VehicleModel:
-        """Return the vehicle model that commands are computed with under `condition`."""
+        """Return the vehicle model that commands are computed with under `condition`.
+
+        Raises
+        ------
+        FlagError
+            If it is ``"corrected"`` and there is no such model.
+        """
         if condition == "uncalibrated":
             return self.nominal
+        if condition == "corrected":
+            if self._corrected is None:
+                raise FlagError("no corrected model", where="--corrected", remedy="give what a diagnosis wrote")
+            return self._corrected
         if self._calibrated is None:
             self._calibrated = self._calibrate()
         return self._calibrated
+
+    @property
+    def departure(self) -> Departure:
+        """When the next run begins."""
+        return Departure(started_h=self._time.now_s() / 3600.0)
 
     def run(self, order: DriveOrder) -> Run:
         """Drive `order` until an attempt counts; return the last attempt.

@@ -92,6 +92,8 @@ def _known_models(settings: BenchSettings) -> dict[str, VehicleModel]:
     models = {"uncalibrated": uncalibrated_vehicle(settings.vehicle)}
     if settings.calibration:
         models["calibrated"] = VehicleModel.load(settings.calibration)
+    if settings.corrected:
+        models["corrected"] = VehicleModel.load(settings.corrected)
     return models
 
 
@@ -144,6 +146,7 @@ def _bench(
     return Bench(
         settings,
         nominal=models["uncalibrated"],
+        corrected=models.get("corrected"),
         link=link,
         writer=writer,
         campaign_time=_campaign_time(link, writer),

@@ -17,6 +17,11 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
     ),
     ("--vehicle", {"metavar": "FILE"}, "vehicle.toml believed before calibration (default: nominal maps)"),
     ("--calibration", {"metavar": "FILE"}, "calibrated vehicle.toml (default: calibrate in this session)"),
+    (
+        "--corrected",
+        {"metavar": "FILE"},
+        "vehicle.toml with effects, for the condition corrected (default: not driven)",
+    ),
     ("--maps", {"choices": ("default", "thesis")}, "maps to calibrate: default, or the thesis' line and cubic"),
     ("--repeats", {"type": int, "metavar": "N"}, "repeats of each trajectory and condition (default: 10)"),
     (

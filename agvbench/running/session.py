@@ -7,7 +7,7 @@ from pathlib import Path
 
 from agvbench.errors import PlanError
 from agvbench.model import VehicleModel
-from agvbench.planning import Plan, Trajectory, Workspace, plan
+from agvbench.planning import Departure, Plan, Trajectory, Workspace, corrected_plan, depends_on_time, plan
 from agvbench.running.bench import Bench
 from agvbench.running.constant import Shares
 from agvbench.running.driver import Driver, NotDrivenError
@@ -31,6 +31,7 @@ class BenchSession:
         self._models, self._bench = models, bench
         self._plans: dict[tuple[Trajectory, str], Plan] = {}
         self._undrivable: dict[tuple[Trajectory, str], PlanError] = {}
+        self._hourly: set[tuple[Trajectory, str]] = set()
         self.notices: list[str] = []
 
     @property
@@ -45,6 +46,9 @@ class BenchSession:
     def plan(self, trajectory: Trajectory, condition: str) -> Plan:
         """Return the plan of `trajectory` under `condition`: made once, driven in every repeat.
 
+        Under ``"corrected"`` it makes up for the model's effects, and is made anew for every run if one of them
+        depends on how long the session lasts.
+
         Raises
         ------
         PlanError
@@ -57,11 +61,23 @@ class BenchSession:
             raise NotDrivenError(f"cannot be driven, as its first repeat says: {self._undrivable[key]}")
         if key not in self._plans:
             try:
-                self._plans[key] = plan(trajectory, self.model(condition), workspace=self.workspace)
+                self._plans[key] = self._planned(trajectory, condition)
             except PlanError as error:
                 self._undrivable[key] = error
                 raise
+        if key in self._hourly:
+            return self._planned(trajectory, condition)
         return self._plans[key]
+
+    def _planned(self, trajectory: Trajectory, condition: str) -> Plan:
+        model = self.model(condition)
+        if condition != "corrected":
+            return plan(trajectory, model, workspace=self.workspace)
+        departure = Departure() if self._bench is None else self._bench.departure
+        made = corrected_plan(trajectory, model, workspace=self.workspace, departure=departure)
+        if depends_on_time(made, model, departure):
+            self._hourly.add((trajectory, condition))
+        return made
 
     def driver(self, run_id: str, *, experiment: str, repeat: int) -> Driver:
         """Return what drives the run `run_id`."""

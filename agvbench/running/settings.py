@@ -25,8 +25,9 @@ class BenchSettings:
     """The options that decide what is driven.
 
     ``agv``, ``mocap`` and ``plant`` name adapters and the simulated plant; ``vehicle`` and ``calibration`` are
-    vehicle files ("" for the shipped nominal vehicle, and for calibrating in this session); ``repeats`` 0 means
-    what each benchmark declares; ``order`` is one of `ORDERS`; ``full`` drives every pulse of the thesis.
+    vehicle files ("" for the shipped nominal vehicle, and for calibrating in this session), ``corrected`` the one with
+    the effects that a diagnosis found ("" for none: the condition is not driven); ``repeats`` 0 means what each
+    benchmark declares; ``order`` is one of `ORDERS`; ``full`` drives every pulse of the thesis.
     """
 
     agv: str = "sim"
@@ -34,6 +35,7 @@ class BenchSettings:
     plant: str = "agvbench.simulator:make_plant"
     vehicle: str = ""
     calibration: str = ""
+    corrected: str = ""
     maps: str = "default"
     repeats: int = 0
     order: str = "interleaved"

@@ -57,3 +57,12 @@ def test_nonsense_ends():
     settled = np.array([[0.0, 0.0, 0.0], [np.pi / 2, -np.pi / 2, 0.3]])
     parameters = simulation.parameters([SteeringLag(1e-12), SpeedLag(1e-300, 0.0)])
     assert simulation.predict(settled, parameters, np.zeros((1, 4))).shape == (50, 3)
+
+
+def test_a_model_with_any_effect_can_be_rolled_out():
+    droop = effect_kinds()["battery_droop"](per_hour=0.2)
+    model = thesis_vehicle().with_effects(SteeringLag(0.12), droop)
+    started_h = [0.5, 1.0]
+    expected = general_rollout(model, COMMANDS, INITIAL, TIMES, started_h)
+    for ours, theirs in zip(model.rollout(COMMANDS, INITIAL, TIMES, started_h), expected, strict=True):
+        np.testing.assert_array_equal(ours, theirs)

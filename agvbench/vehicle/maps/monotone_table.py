@@ -115,6 +115,10 @@ class MonotoneTable(StaticMap):
         return np.where(between, solved, flat)
 
     def _solve(self, output: Floats, left: Floats, right: Floats) -> Floats:
+        if self.interpolation == "linear":
+            low, high = self._output(left), self._output(right)
+            rise = np.where(high == low, 1.0, high - low)
+            return np.asarray(left + np.clip((output - low) / rise, 0.0, 1.0) * (right - left))
         return solve_monotone(self._output, self._slope, output, left, right)
 
     @cached_property

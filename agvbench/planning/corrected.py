@@ -1,0 +1,133 @@
+"""Plans for a vehicle whose effects are known: commands that make up for them, and what they cannot make up for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from agvbench.effects import Stage
+from agvbench.model import VehicleModel
+from agvbench.planning.legs import Leg, legs_of
+from agvbench.planning.motion import axles_swept
+from agvbench.planning.placing import check_fits
+from agvbench.planning.planner import Plan, commands_of, plan
+from agvbench.planning.resting import Departure, Miss, coasting_path, rest_poses
+from agvbench.planning.shooting import shoot
+from agvbench.planning.trajectory import Trajectory
+from agvbench.planning.workspace import Workspace
+from agvbench.types import Commands, Floats, Pose
+
+
+@dataclass(frozen=True)
+class Correction:
+    """What a corrected plan makes up for, by the model that it was made with.
+
+    Parameters
+    ----------
+    uncorrected
+        Where the plan of the static maps alone would end.
+    remaining
+        Where the corrected plan ends.
+    beyond_camera
+        Where it ends if the camera's own effects are left out: a camera that measures a wrong scale, or markers that
+        sit elsewhere than the vehicle file says, make the vehicle miss where they see it hit. None where the model
+        has no such effect.
+    at_limits
+        What could not be changed further, if anything remains.
+    """
+
+    uncorrected: Miss
+    remaining: Miss
+    beyond_camera: Miss | None = None
+    at_limits: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class CorrectedPlan(Plan):
+    """A `Plan` whose ``expected`` path has the model's effects and ends at rest; ``correction`` tells what they cost.
+
+    It is None where there is nothing to correct: commands of the trajectory's own, or no target.
+    """
+
+    correction: Correction | None = None
+
+
+def corrected_plan(
+    trajectory: Trajectory,
+    model: VehicleModel,
+    *,
+    workspace: Workspace | None = None,
+    departure: Departure | None = None,
+    start: Pose | None = None,
+) -> CorrectedPlan:
+    """Return timed commands with which `model`, effects and all, comes to rest on the target.
+
+    The plan of the static maps alone comes first; then steering and durations are changed as little as brings the
+    model's rest pose, as the camera sees it, onto the target (see `agvbench.planning.shooting`).
+
+    Parameters
+    ----------
+    trajectory, workspace, start
+        As for `plan`.
+    model
+        What is known of the vehicle.
+    departure
+        When and where the run begins; its start pose gives way to `start` or, with a workspace, to the one that is
+        chosen there.
+
+    Raises
+    ------
+    PlanError
+        If the vehicle cannot drive the trajectory, or not inside the workspace.
+    """
+    made = plan(trajectory, model, workspace=workspace, start=start)
+    departure = departure or Departure()
+    if workspace is not None or start is not None:
+        departure = replace(departure, start=made.start)
+    if trajectory.commands is not None or not made.target.is_finite:
+        return _plain(made)
+    legs = legs_of(trajectory, model)
+
+    def ends(several: Sequence[Sequence[Leg]]) -> Floats:
+        return rest_poses(model, [commands_of(each, model) for each in several], departure)
+
+    shot = shoot(legs, model.front, model.rear, made.target, ends)
+    commands = commands_of(shot.legs, model)
+    path = coasting_path(model, commands, departure)
+    swept = axles_swept(path, model.geometry)
+    if workspace is not None:
+        check_fits(swept, departure.start, workspace, where=trajectory.name)
+    before, after = (Miss(Pose(*end), made.target) for end in ends([legs, shot.legs]).tolist())
+    correction = Correction(before, after, _beyond_camera(model, commands, departure, made.target), shot.at_limits)
+    width, height = np.ptp(swept[:, 1:], axis=0).tolist()
+    return replace(
+        _plain(made),
+        commands=commands,
+        duration_s=float(commands.t_s[-1]),
+        expected=path,
+        floor_m=(width, height),
+        start=departure.start,
+        swept=swept,
+        correction=correction,
+    )
+
+
+def depends_on_time(made: CorrectedPlan, model: VehicleModel, departure: Departure) -> bool:
+    """Return whether the vehicle would rest elsewhere, by the model, if the run began an hour later."""
+    later = replace(departure, started_h=departure.started_h + 1.0)
+    now, then = (rest_poses(model, [made.commands], when) for when in (departure, later))
+    return bool(np.abs(then - now).max() > 1e-5)
+
+
+def _plain(made: Plan) -> CorrectedPlan:
+    return CorrectedPlan(**vars(made))
+
+
+def _beyond_camera(model: VehicleModel, commands: Commands, departure: Departure, target: Pose) -> Miss | None:
+    kept = tuple(effect for effect in model.effects if effect.stage is not Stage.CAMERA)
+    if len(kept) == len(model.effects):
+        return None
+    end = rest_poses(replace(model, effects=kept), [commands], departure)[0]
+    return Miss(Pose(*end.tolist()), target)
