@@ -14,6 +14,7 @@ examples:
   agvbench diagnose campaigns/tonight                         the answer and the errors before and after
   agvbench diagnose campaigns/tonight --out corrected.toml    keep the vehicle with maps refitted and effects added
   agvbench diagnose campaigns/tonight --json d.json --check   for scripts: exit code 1 unless ADEQUATE
+  agvbench diagnose campaigns/tonight --report d.html         pictures of the residuals, before and after
   agvbench diagnose campaigns/tonight --next next.toml        write the run that would tell rivals apart
   agvbench diagnose campaigns/tonight --run-next              drive it, and decide: a copy of the campaign with the new
                                                               runs is diagnosed again, the old one is left as it is
@@ -46,6 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--next-out", metavar="DIR", help="the campaign with the new runs (default: DIR-next beside DIR)"
     )
+    parser.add_argument("--report", metavar="FILE.html", help="draw the residuals, before and after, into one page")
     rig = parser.add_argument_group("what --run-next drives (default: what the campaign's bench.toml says)")
     for flag, keywords, text in OPTIONS:
         if flag in _OF_THE_RIG:
@@ -69,4 +71,8 @@ def run(arguments: argparse.Namespace) -> int:
         rig={destination(flag): getattr(arguments, destination(flag)) for flag in _OF_THE_RIG}
         | {"seed": arguments.plant_seed},
     )
+    if arguments.report is not None:
+        from agvbench.reporting.diagnosis_report import write_diagnosis_report
+
+        write_diagnosis_report(found, arguments.report)
     return 1 if arguments.check and not found.adequate else 0

@@ -18,6 +18,7 @@ from agvbench.diagnosis.levels import ROLES, FreeMaps, free_maps, start_values
 from agvbench.diagnosis.next_experiment_propose import with_next_experiment
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.reading import Readings, read_runs
+from agvbench.diagnosis.residual_table import with_residuals
 from agvbench.diagnosis.residuals import Misses, floor, lack_of_fit, misses
 from agvbench.diagnosis.result import Diagnosis, HeldOut, Verdict
 from agvbench.diagnosis.selection import Selection, Selector
@@ -186,6 +187,7 @@ def _conclude(
             },
         },
     )
+    found = with_residuals(found, readings, held, before, poses)
     return with_next_experiment(found, selection, readings, header, seed)
 
 

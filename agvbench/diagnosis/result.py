@@ -7,11 +7,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from agvbench.diagnosis.next_experiment import NextExperiment
 from agvbench.diagnosis.structure import Dependence
 from agvbench.model import VehicleModel
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SCHEMA = 1
 
@@ -66,7 +69,8 @@ class Diagnosis:
     ``verdict`` and ``why`` in words; ``effects``; ``depends_on`` what the rest depends on, ``significant`` whether that
     matters; ``held_out`` (None if nothing could be predicted); ``model`` with refitted maps and the effects found;
     ``rejected`` the gain of each effect that did not earn its place; ``provenance``; ``next_experiment``: the run that
-    would tell rivals apart or pin what the data leave open, None where there is none.
+    would tell rivals apart or pin what the data leave open, None where there is none; ``residuals`` as
+    `agvbench.diagnosis.residual_table` returns them, for pictures.
     """
 
     verdict: Verdict
@@ -79,6 +83,7 @@ class Diagnosis:
     rejected: Mapping[str, float] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     next_experiment: NextExperiment | None = None
+    residuals: pd.DataFrame | None = field(default=None, compare=False, repr=False)
 
     @property
     def adequate(self) -> bool:

@@ -16,6 +16,7 @@ from agvbench.diagnosis import Diagnosis, NamedEffect, diagnose
 from agvbench.diagnosis.next_experiment_propose import with_first_experiment
 from agvbench.errors import FileError, FlagError
 from agvbench.model import VehicleModel
+from agvbench.workflows.diagnosis_files import keep
 
 _TITLES = {
     "position_rms_mm": "position along the way, mm",
@@ -68,6 +69,7 @@ def run_diagnose(
     if json_file is not None:
         text = found.to_text()
         _write("--json", Path(json_file), lambda path: path.write_text(text, encoding="utf-8"))
+        keep(found, Path(json_file))
     if out is not None and found.model is not None:
         _write("--out", Path(out), found.model.save)
     return found

@@ -15,6 +15,7 @@ from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM, checked_margin
 from agvbench.statistics.end_poses import in_order
 from agvbench.types import Run
 from agvbench.workflows.calibration_curves import CalibrationCurves, read_calibration_curves
+from agvbench.workflows.diagnosis_files import ShownDiagnosis, read_diagnosis
 from agvbench.workflows.run_quality import run_quality
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ class ReportData:
 
     ``errors`` is what `pose_errors` returns, ``end_poses`` the table of tables 8.3–8.10, ``spread`` accuracy apart from
     repeatability, ``comparisons`` every condition against the next one, ``quality`` one row per run. ``problems`` are
-    sentences about what could not be read or compared.
+    sentences about what could not be read or compared; ``diagnosis`` lies in the directory, or None.
     """
 
     path: Path
@@ -43,6 +44,7 @@ class ReportData:
     curves: CalibrationCurves
     provenance: dict[str, str] = field(default_factory=dict)
     problems: list[str] = field(default_factory=list)
+    diagnosis: ShownDiagnosis | None = None
 
     @property
     def conditions(self) -> list[str]:
@@ -89,6 +91,7 @@ def gather(
         curves=read_calibration_curves(campaign),
         provenance=_provenance(campaign, problems),
         problems=problems,
+        diagnosis=read_diagnosis(campaign.path),
     )
 
 

@@ -2,17 +2,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-import sys
 from pathlib import Path
 
 import pytest
+from tiny_vehicle import HEADER, Tiny, campaign_runs
 
 from agvbench.campaign import Campaign, CampaignWriter
 from agvbench.cli import main
 from agvbench.planning import load_trajectory
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "diagnosis"))
-from tiny_vehicle import HEADER, Tiny, campaign_runs
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,149 @@
+"""What the vehicle model lacks: verdict, effects, errors before and after, and pictures of the residual."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from agvbench.reporting.content import Block, Bullets, Column, FigureBlock, Panel, Paragraph, Table, Value, plain
+from agvbench.reporting.figures.residuals import AFTER, BEFORE, draw_dependence, draw_floor
+from agvbench.reporting.sections.base import Section
+from agvbench.workflows.diagnosis_files import ShownDiagnosis
+from agvbench.workflows.report import ReportData
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_FEATURES = {
+    "speed": ("Distance missed along the way", "missed [%]", 100.0),
+    "sideways": ("Distance missed to the left", "missed [%]", 100.0),
+    "turning": ("Turn missed", "missed [°/m]", 180.0 / math.pi),
+}
+_AGAINST = {
+    "time_in_run_s": "time in the run [s]",
+    "speed_mps": "speed [m/s]",
+    "curvature_per_m": "steering: curvature [1/m]",
+    "direction": "direction (−1 backward, 1 forward)",
+    "campaign_time_h": "time since the session began [h]",
+}
+_ERRORS = {
+    "position_rms_mm": "position along the way [mm]",
+    "heading_rms_deg": "heading along the way [°]",
+    "delta_s_mm": "Δs at the end [mm]",
+    "delta_heading_deg": "Δδ at the end [°]",
+}
+_CAPTION = (
+    "What each step between two samples misses, per metre driven, in the vehicle's own frame: medians with quartiles "
+    "of steps of all runs, with static maps (before) and with what was found (after). In the maps of the floor the "
+    "area of a mark is the size of the median; discs miss to the plus side, squares to the minus side; each pair has "
+    "one scale."
+)
+
+
+class DiagnosisSection(Section):
+    """The diagnosis that lies in the campaign directory."""
+
+    slug, title, order = "diagnosis", "What the model lacks", 75
+
+    def blocks(self, data: ReportData) -> Sequence[Block]:
+        """Return verdict, tables and pictures, or how to get them."""
+        if data.diagnosis is None:
+            return [Paragraph("No diagnosis lies here: agvbench diagnose DIR --json DIR/diagnosis.json makes one.")]
+        return diagnosis_blocks(data.diagnosis)
+
+
+def diagnosis_blocks(shown: ShownDiagnosis) -> list[Block]:
+    """Return what there is to say about a diagnosis; whatever its file lacks is left out."""
+    content = shown.content
+    if not content:
+        return [Paragraph(" ".join(plain(problem) for problem in shown.problems) or "The diagnosis is empty.")]
+    provenance = _mapping(content.get("provenance"))
+    blocks: list[Block] = [Paragraph(plain(f"{content.get('verdict')}: {provenance.get('why', '')}"), lead=True)]
+    blocks += [table for table in (_effects(content), _errors(content)) if table.rows]
+    sentences = [plain(text) for text in (*_sentences(content, provenance), *shown.problems)]
+    if sentences:
+        blocks.append(Bullets(sentences))
+    if shown.residuals is None or shown.residuals.empty:
+        blocks.append(Paragraph("The residuals were not kept, and are not drawn."))
+    else:
+        blocks += _pictures(shown.residuals)
+    return blocks
+
+
+def _mapping(value: object) -> Mapping[str, Any]:
+    return value if isinstance(value, Mapping) else {}
+
+
+def _list(value: object) -> list[Any]:
+    return value if isinstance(value, list) else []
+
+
+def _number(value: object) -> float:
+    return float(value) if isinstance(value, int | float) else math.nan
+
+
+def _effects(content: Mapping[str, Any]) -> Table:
+    rows: list[list[Value]] = []
+    for effect in map(_mapping, _list(content.get("effects"))):
+        others = ", ".join(map(str, _list(effect.get("confounded_with"))))
+        for name, estimate in _mapping(effect.get("parameters")).items():
+            e = _mapping(estimate)
+            value, stderr = (f"{_number(e.get(key)):.4g}" for key in ("value", "stderr"))
+            rows.append([str(effect.get("name")), str(name), f"{value} ± {stderr}", str(e.get("unit", "")), others])
+    columns = ("effect", "parameter", "estimate", "unit", "or instead")
+    return Table("effects", "Effects found.", [Column(c.replace(" ", "_"), c) for c in columns], rows)
+
+
+def _errors(content: Mapping[str, Any]) -> Table:
+    held = _mapping(content.get("held_out"))
+    rows: list[list[Value]] = []
+    for name, title in _ERRORS.items():
+        errors = _mapping(held.get(name))
+        if errors:
+            rows.append([title, *(_number(errors.get(key)) for key in ("before", "after", "floor"))])
+    columns = [Column("quantity", "root mean square"), *(Column(c, c, 2) for c in ("before", "after", "floor"))]
+    runs = _number(held.get("runs"))
+    return Table("held_out", f"Prediction errors of {runs:.0f} runs held out.", columns, rows)
+
+
+def _sentences(content: Mapping[str, Any], provenance: Mapping[str, Any]) -> Iterator[str]:
+    rest = _mapping(content.get("unexplained"))
+    for d in map(_mapping, _list(rest.get("depends_on"))):
+        share = _number(d.get("share"))
+        yield f"What is left depends on {d.get('covariate')} through {d.get('through')} ({100.0 * share:.0f} % of it)."
+    following = _mapping(content.get("next_experiment"))
+    if following:
+        name = _mapping(following.get("trajectory")).get("name")
+        yield f"Next run, {name}: {following.get('why')}."
+    for item in map(_mapping, _list(provenance.get("inseparable"))):
+        pair = " from ".join(map(str, _list(item.get("between"))))
+        yield f"No run from rest to rest tells {pair}; it takes {item.get('needs')}."
+    for name, why in _mapping(provenance.get("not_identifiable")).items():
+        yield f"{name} is not identifiable from these runs ({why})."
+
+
+def _pictures(residuals: pd.DataFrame) -> list[Block]:
+    blocks: list[Block] = []
+    for feature, (title, label, unit) in _FEATURES.items():
+        before, after = (unit * residuals[f"{when}_{feature}"].to_numpy() for when in ("before", "after"))
+        panels = [
+            Panel(
+                f"{title}, against {words.partition(' [')[0].partition(' (')[0]}",
+                draw_dependence(residuals[name].to_numpy(), before, after, f"res-{feature}-{name}", x=words, y=label),
+            )
+            for name, words in _AGAINST.items()
+        ]
+        x, y = residuals["x_m"].to_numpy(), residuals["y_m"].to_numpy()
+        most = float(np.quantile(np.abs(before), 0.9))
+        unit_name = label.partition("[")[2].rstrip("]")
+        for when, values in (("before", before), ("after", after)):
+            label_floor = f"largest mark: {most:.2g} {unit_name}"
+            drawn = draw_floor(x, y, values, f"res-{feature}-floor-{when}", most=most, label=label_floor)
+            panels.append(Panel(f"{title}, by place on the floor, {when}", drawn))
+        caption = _CAPTION if not blocks else title + ", as above."
+        legend = [("before", BEFORE), ("after", AFTER)]
+        blocks.append(FigureBlock(f"residual-{feature}", caption, panels, legend))
+    return blocks

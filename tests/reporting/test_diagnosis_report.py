@@ -1,0 +1,105 @@
+from __future__ import annotations
+
+import json
+import re
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pandas as pd
+import pytest
+from report_samples import HOSTILE, make_campaign
+
+from agvbench.cli import main
+from agvbench.reporting.content import Bullets, Content, FigureBlock, Paragraph, Table
+from agvbench.reporting.html import to_html
+from agvbench.reporting.sections.diagnosis import diagnosis_blocks
+from agvbench.workflows.diagnosis_files import JSON, RESIDUALS, ShownDiagnosis, read_diagnosis
+
+
+def residuals(rows=600, seed=0):
+    """Steps whose speed misses 3 % at every place before, and nothing after."""
+    rng = np.random.default_rng(seed)
+    table = pd.DataFrame(
+        {
+            "time_in_run_s": rng.uniform(0.0, 8.0, rows),
+            "speed_mps": rng.uniform(0.1, 0.32, rows),
+            "curvature_per_m": rng.choice([-1.0, 0.0, 1.0], rows),
+            "direction": rng.choice([-1.0, 1.0], rows),
+            "campaign_time_h": rng.uniform(0.0, 1.0, rows),
+            "x_m": rng.uniform(-2.0, 2.0, rows),
+            "y_m": rng.uniform(-2.0, 2.0, rows),
+            "length_m": np.full(rows, 0.05),
+        }
+    )
+    for feature in ("speed", "sideways", "turning"):
+        table[f"before_{feature}"] = 0.03 + 0.001 * rng.normal(size=rows)
+        table[f"after_{feature}"] = 0.001 * rng.normal(size=rows)
+    return table
+
+
+def content(name="steering_lag"):
+    errors = {"before": 20.0, "after": 2.0, "floor": 1.9}
+    return {
+        "schema": 1,
+        "verdict": "AMBIGUOUS",
+        "effects": [
+            {
+                "name": name,
+                "parameters": {"time_constant_s": {"value": 0.2, "stderr": 0.01, "unit": "s"}},
+                "confounded_with": ["axle_coupling"],
+            }
+        ],
+        "unexplained": {"significant": True, "depends_on": [{"covariate": "x_m", "share": 0.4, "through": "speed"}]},
+        "held_out": {"runs": 24, "position_rms_mm": errors},
+        "next_experiment": {"why": "it parts them", "trajectory": {"name": "next_one"}},
+        "provenance": {"why": "two would do", "inseparable": [{"between": ["a", "b"], "needs": "a clock"}]},
+    }
+
+
+def test_everything_that_was_found_is_said_and_drawn():
+    blocks = diagnosis_blocks(ShownDiagnosis(content(), residuals()))
+    lead = next(b for b in blocks if isinstance(b, Paragraph))
+    assert lead.text == "AMBIGUOUS: two would do"
+    effects, held_out = (b for b in blocks if isinstance(b, Table))
+    assert effects.rows == [["steering_lag", "time_constant_s", "0.2 ± 0.01", "s", "axle_coupling"]]
+    assert held_out.rows == [["position along the way [mm]", 20.0, 2.0, 1.9]]
+    sentences = " ".join(next(b for b in blocks if isinstance(b, Bullets)).items)
+    for words in ("x_m through speed (40 %", "next_one: it parts them", "a from b; it takes a clock"):
+        assert words in sentences
+    figures = [b for b in blocks if isinstance(b, FigureBlock)]
+    assert len(figures) == 3
+    for figure in figures:
+        assert len(figure.panels) == 7  # time, speed, steering, direction, session; the floor before and after
+        for panel in figure.panels:
+            ET.fromstring(panel.svg.replace("xlink:href", "href"))  # noqa: S314 - drawn by this package
+
+
+@pytest.mark.parametrize(
+    "broken", [{}, {"schema": 1}, {"schema": 1, "effects": 3, "held_out": [], "provenance": "?"}], ids=repr
+)
+def test_a_file_that_lacks_things_is_shown_as_far_as_it_goes(broken):
+    assert diagnosis_blocks(ShownDiagnosis(broken, None, ("it is odd.",)))
+
+
+def test_hostile_names_are_escaped():
+    blocks = diagnosis_blocks(ShownDiagnosis(content(HOSTILE), residuals(80)))
+    page = to_html("t", "s", [Content("diagnosis", "D", tuple(blocks))])
+    body = page[page.index("<body>") :]
+    assert "<script" not in body
+    assert "\x1b" not in body
+
+
+def test_the_campaigns_report_has_the_section_once_a_diagnosis_lies_there(tmp_path, capsys):
+    path = make_campaign(tmp_path / "c", repeats=1, calibration=False)
+    assert read_diagnosis(path) is None
+    (path / JSON).write_text(json.dumps(content()), encoding="utf-8")
+    residuals().to_parquet(path / RESIDUALS)
+    assert main(["report", str(path), "--out", str(tmp_path / "r")]) == 0
+    page = (tmp_path / "r" / "report.html").read_text(encoding="utf-8")
+    assert re.search(r'<section id="diagnosis">', page)
+    assert "AMBIGUOUS: two would do" in page
+    (path / JSON).write_text("{", encoding="utf-8")
+    assert "cannot be read" in read_diagnosis(path).problems[0]
+    (path / JSON).write_text(json.dumps(content()), encoding="utf-8")
+    (path / RESIDUALS).write_bytes(b"PAR1 no more")
+    assert read_diagnosis(path).residuals is None
