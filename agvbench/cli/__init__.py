@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from types import ModuleType
 
 from agvbench import __version__
-from agvbench.errors import AgvbenchError
+from agvbench.errors import AgvbenchError, FlagError
 
 _EPILOG = """\
 exit codes: 0 done; 1 the answer is "no" (a regression, not adequate);
@@ -61,6 +61,19 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _unknown_option(parser: argparse.ArgumentParser, command: str, given: str) -> FlagError:
+    """Return what to say of an argument that the command does not have, with the nearest that it has."""
+    import difflib
+
+    if not given.startswith("-"):
+        return FlagError("one argument too many", value=given, remedy=f"see agvbench {command} --help")
+    subparsers = next(a for a in parser._actions if isinstance(a, argparse._SubParsersAction))
+    known = [option for action in subparsers.choices[command]._actions for option in action.option_strings]
+    close = difflib.get_close_matches(given.partition("=")[0], known, n=1)
+    meant = f"did you mean {close[0]}? " if close else ""
+    return FlagError("no such option", value=given, remedy=f"{meant}agvbench {command} --help lists all")
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code."""
     parser = build_parser()
@@ -68,8 +81,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         import argcomplete
 
         argcomplete.autocomplete(parser)
-    arguments = parser.parse_args(argv)
+    arguments, unknown = parser.parse_known_args(argv)
     try:
+        if unknown:
+            raise _unknown_option(parser, arguments.command, unknown[0])
         return int(arguments.run(arguments))
     except AgvbenchError as error:
         print(f"agvbench {arguments.command}: {error}", file=sys.stderr)

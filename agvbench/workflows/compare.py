@@ -47,7 +47,7 @@ def compare_campaigns(
         same_campaign=b is None,
         names=_names(Path(a), None if b is None else Path(b), conditions),
     )
-    notes = comparison.notes if b is None else (*comparison.notes, *_calibration_note(Path(a), Path(b), comparison))
+    notes = comparison.notes if b is None else (*comparison.notes, *_notes(Path(a), Path(b), comparison))
     return replace(comparison, notes=notes)
 
 
@@ -72,6 +72,13 @@ def write_json(comparison: Comparison, path: str | Path) -> None:
         Path(path).write_text(f"{text}\n", encoding="utf-8")
     except OSError as error:
         raise FileError(f"cannot be written ({error.strerror})", where=path, remedy="choose another file") from None
+
+
+def _notes(a: Path, b: Path, comparison: Comparison) -> tuple[str, ...]:
+    """Return what to know before believing a comparison of two campaigns."""
+    if a.resolve() == b.resolve():
+        return ("both sides are the same campaign: no difference can be found",)
+    return _calibration_note(a, b, comparison)
 
 
 def _calibration_note(a: Path, b: Path, comparison: Comparison) -> tuple[str, ...]:

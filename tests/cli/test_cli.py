@@ -73,3 +73,19 @@ def test_a_reader_that_left_is_no_error():
     command = f"'{sys.executable}' -c \"{program}\" | head -1"
     done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=True)
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (
+            ["bench", "--repeat=3"],
+            "no such option: --repeat=3; did you mean --repeats? agvbench bench --help lists all",
+        ),
+        (["report", "somewhere", "--zzz"], "no such option: --zzz; agvbench report --help lists all"),
+        (["init", "here", "there"], "one argument too many: there; see agvbench init --help"),
+    ],
+)
+def test_an_option_that_is_not_there_is_one_line(arguments, told, capsys):
+    assert main(arguments) == 2
+    assert capsys.readouterr().err == f"agvbench {arguments[0]}: {told}\n"
