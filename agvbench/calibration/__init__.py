@@ -4,6 +4,7 @@ from agvbench.calibration.axles import axle_angles_from_arc, axle_angles_from_cu
 from agvbench.calibration.calibrate import Calibration, calibrate
 from agvbench.calibration.circle import CircleFit, CircleFits, fit_circle, fit_circles
 from agvbench.calibration.frames import FrameQuality, clean_frames, inspect_frames
+from agvbench.calibration.identification import Identification, PoseNoise, identify
 from agvbench.calibration.map_fit import LeftOut, MapFit
 from agvbench.calibration.map_fits import (
     compare_maps,
@@ -22,8 +23,10 @@ __all__ = [
     "CircleFits",
     "CurvePoints",
     "FrameQuality",
+    "Identification",
     "LeftOut",
     "MapFit",
+    "PoseNoise",
     "RunMeasurement",
     "axle_angles_from_arc",
     "axle_angles_from_curvature",
@@ -35,6 +38,7 @@ __all__ = [
     "fit_circles",
     "fit_drive_map",
     "fit_steering_map",
+    "identify",
     "inspect_frames",
     "measure_run",
     "quaternion_to_heading",
