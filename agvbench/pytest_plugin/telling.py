@@ -115,7 +115,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
     if _PROGRESS in config.stash:
         config.stash[_PROGRESS].end()
     session = config.stash.get(SESSION, None)
-    if session is None:
+    if session is None or (config.getoption("no_summary") and not session.is_dry):
         return
     from agvbench.reporting.after_bench import conclude
     from agvbench.reporting.dry_run import dry_run_table

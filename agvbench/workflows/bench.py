@@ -19,8 +19,12 @@ _IN_PROCESS = "ignore:Module already imported:pytest.PytestAssertRewriteWarning"
 _BAD_INPUT = {pytest.ExitCode.USAGE_ERROR: 2, pytest.ExitCode.NO_TESTS_COLLECTED: 2}
 
 
-def run_benchmarks(names: Sequence[str], options: Mapping[str, Any], *, only: str | None = None) -> int:
+def run_benchmarks(
+    names: Sequence[str], options: Mapping[str, Any], *, only: str | None = None, summary: bool = True
+) -> int:
     """Run the benchmarks `names` with `options`; return the exit code of ``agvbench``.
+
+    ``only`` chooses among them as pytest's ``-k`` does; without ``summary`` nothing is said at the end.
 
     Raises
     ------
@@ -31,6 +35,8 @@ def run_benchmarks(names: Sequence[str], options: Mapping[str, Any], *, only: st
     arguments = [*files, "-q", "--strict-markers", "-p", "no:cacheprovider", "-W", _IN_PROCESS, *_flags(options)]
     if only:
         arguments += ["-k", only]
+    if not summary:
+        arguments += ["--no-summary", "-q"]
     code = pytest.main(arguments)
     return int(_BAD_INPUT.get(pytest.ExitCode(code), code)) if code in list(pytest.ExitCode) else int(code)
 

@@ -1,0 +1,60 @@
+"""Close the loop: find what the model lacks, correct for it, and show every trajectory before and after.
+
+Four stages, each with its result in the loop's directory:
+
+  before/          a bench session that excites the vehicle: calibration, the eight trajectories, step responses, free
+                   driving
+  diagnosis.json   what the calibrated model lacks (agvbench diagnose), and vehicle.toml, the model with the effects
+  plans.json       what plans with that model make up for, and what they cannot
+  after/           the eight trajectories uncalibrated, calibrated and corrected, driven in turns
+  report.html      before and after, trajectory by trajectory, with an equivalence test of the bias
+
+Corrected plans change steering and durations as little as brings the model to rest on the target. Scatter from run to
+run cannot be corrected, nor what the diagnosis could not name. Simulated by default: a vehicle like the thesis', which
+has effects that its calibration does not know.
+
+examples:
+  agvbench loop                                      the default vehicle, 10 repeats, in some minutes
+  agvbench loop --repeats 30 --out loops/tonight     more repeats, into loops/tonight/
+  agvbench loop --out loops/tonight --resume         go on where it stopped
+  agvbench loop --plant agvbench.simulator.hidden:lateral_slip --seed 7   a vehicle with a hidden effect
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from agvbench.running.options import OPTIONS, destination
+
+HELP = "bench, diagnose, correct the model, bench again: before and after"
+# The loop decides what is calibrated and corrected, and a calibration to the full is agvbench bench's.
+_DECIDED = {"--calibration", "--corrected", "--full"}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    for flag, keywords, text in OPTIONS:
+        if flag not in _DECIDED:
+            parser.add_argument(flag, help=text, **keywords)
+    parser.add_argument("--out", metavar="DIR", help="the loop's directory (default: a new one under campaigns/)")
+    parser.add_argument(
+        "--resume", action="store_true", help="go on with an interrupted loop: the one in --out, or the last"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Go round the loop and write its report; return the exit code."""
+    from agvbench.reporting.console import wide_console
+    from agvbench.reporting.loop import print_loop, write_loop_report
+    from agvbench.workflows.loop import run_loop
+
+    console = wide_console()
+    given = {destination(flag): getattr(arguments, destination(flag), None) for flag, _, _ in OPTIONS}
+    loop = run_loop(
+        given,
+        out=arguments.out,
+        resume=arguments.resume,
+        tell=lambda line: console.print(line, highlight=False, markup=False, soft_wrap=True),
+    )
+    print_loop(console, write_loop_report(loop))
+    return 0

@@ -1,0 +1,188 @@
+"""The report of a loop: before and after first, then what was found, planned and driven."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from agvbench.errors import FileError
+from agvbench.reporting.console import console_table
+from agvbench.reporting.content import Block, Bullets, Column, Content, Paragraph, Table, Value, plain
+from agvbench.reporting.csv_table import to_csv
+from agvbench.reporting.html import to_html
+from agvbench.reporting.latex import to_latex
+from agvbench.reporting.markdown import to_markdown
+from agvbench.reporting.progress import track
+from agvbench.reporting.sections import all_sections
+from agvbench.statistics.equivalence import Bias
+from agvbench.statistics.quantities import QUANTITIES
+from agvbench.types import CONDITIONS
+from agvbench.workflows.loop import Loop
+from agvbench.workflows.loop_table import BeforeAfter, before_after, counts, root_mean_square_bias
+from agvbench.workflows.report import gather
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+_NOTE = (
+    "Bias: mean of the signed errors; sd: standard deviation of one repeat. The last column tests the corrected bias "
+    "against ± 1 sd at the 5 % level: within, beyond, or too few repeats to say."
+)
+_CAPTION = "Before and after: bias of Δs [mm] and Δδ [deg]"
+
+
+@dataclass(frozen=True)
+class LoopReport:
+    """What the report of a loop says, and the files that say it."""
+
+    loop: Loop
+    rows: Sequence[BeforeAfter]
+    files: Sequence[Path]
+
+
+def write_loop_report(loop: Loop) -> LoopReport:
+    """Write ``report.html``, ``report.md`` and tables into the loop's directory.
+
+    Raises
+    ------
+    CampaignError
+        If the second campaign cannot be read.
+    FileError
+        If the directory cannot be written.
+    """
+    data = gather(loop.after, track=lambda runs, total: track(runs, total, what="reading runs"))
+    rows = before_after(data.errors)
+    sections = [*_sections(loop, rows), *(section.content(data) for section in all_sections())]
+    title, subtitle = f"Loop {plain(loop.directory.name)}", f"{plain(data.header.vehicle_name)} · {len(data.runs)} runs"
+    texts = {"report.html": to_html(title, subtitle, sections), "report.md": to_markdown(title, sections)}
+    for table in (table for section in sections for table in section.tables):
+        texts |= {f"tables/{table.slug}.csv": to_csv(table), f"tables/{table.slug}.tex": to_latex(table)}
+    try:
+        (loop.directory / "tables").mkdir(exist_ok=True)
+        for name, text in texts.items():
+            (loop.directory / name).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise FileError("cannot be written", where=loop.directory, value=error.strerror) from None
+    return LoopReport(loop, rows, [loop.directory / name for name in texts])
+
+
+def print_loop(console: Console, report: LoopReport) -> None:
+    """Print before and after, and where the report is."""
+    from rich.text import Text
+
+    console.print(console_table(_narrow(before_after_table(report.rows), report.rows)))
+    for sentence in _headline(report.loop, report.rows):
+        console.print(Text(sentence))
+    console.print(Text(f"report: {report.files[0]}"), soft_wrap=True)
+
+
+def before_after_table(rows: Sequence[BeforeAfter]) -> Table:
+    """Return the table of biases under each condition, and whether the corrected one is within the scatter."""
+    shown = _conditions(rows)
+    columns = [Column("trajectory", "trajectory"), Column("error", "error")]
+    for condition in shown:
+        columns.append(Column(f"{condition}_bias", "bias", 2, group=condition))
+        columns.append(Column(f"{condition}_sd", "sd", 2, group=condition))
+    columns += [Column("repeats", "n", 0), Column("verdict", "corrected bias ± 1 sd")]
+    return Table("before_after", _CAPTION, columns, [_row(row, shown) for row in rows], note=_NOTE)
+
+
+def _row(row: BeforeAfter, shown: Sequence[str]) -> list[Value]:
+    cells = [row.by_condition.get(condition) for condition in shown]
+    numbers: list[Value] = [n for cell in cells for n in ((cell.bias, cell.sd) if cell else (None, None))]
+    left = row.corrected
+    ends: list[Value] = ["", ""] if left is None else [left.repeats, str(left.verdict)]
+    return [row.trajectory, f"{row.quantity.symbol} {row.quantity.unit}", *numbers, *ends]
+
+
+def _conditions(rows: Sequence[BeforeAfter]) -> list[str]:
+    return [c for c in CONDITIONS if any(c in row.by_condition for row in rows)]
+
+
+def _narrow(table: Table, rows: Sequence[BeforeAfter]) -> Table:
+    """Return the table for a console: one column per condition."""
+    conditions = _conditions(rows)
+    columns = [*table.columns[:2], *(Column(c, c, 2) for c in conditions), Column("sd", "± sd", 2), *table.columns[-2:]]
+    shown = []
+    for row, cells in zip(rows, table.rows, strict=True):
+        biases = cells[2 : 2 + 2 * len(conditions) : 2]
+        shown.append([*cells[:2], *biases, row.corrected.sd if row.corrected else None, *cells[-2:]])
+    return Table(table.slug, table.caption, columns, shown)
+
+
+def _sections(loop: Loop, rows: Sequence[BeforeAfter]) -> list[Content]:
+    said = [f"{plain(name)}: {sentence}" for name, sentence in _said(loop.plans)]
+    blocks: list[Block] = [Paragraph(sentence, lead=True) for sentence in _headline(loop, rows)]
+    return [
+        Content("before-after", "Before and after", [*blocks, before_after_table(rows)]),
+        Content("diagnosis", "What the calibrated model lacks", list(_diagnosis(loop.diagnosis))),
+        Content("plans", "What corrected plans make up for", [_plans(loop.plans), *([Bullets(said)] if said else [])]),
+    ]
+
+
+def _headline(loop: Loop, rows: Sequence[BeforeAfter]) -> Iterator[str]:
+    for quantity in QUANTITIES:
+        biases = {c: root_mean_square_bias(list(rows), quantity, c) for c in CONDITIONS}
+        known = [f"{c} {b:.{quantity.digits}f} {quantity.unit}" for c, b in biases.items() if b == b]  # noqa: PLR0124
+        yield f"Bias of {quantity.symbol}, root mean square over trajectories: {', '.join(known)}."
+    found = counts(list(rows))
+    total = sum(found.values())
+    yield (
+        f"Of {total} corrected biases {found[Bias.WITHIN]} are within ± 1 standard deviation of a repeat, "
+        f"{found[Bias.BEYOND]} beyond; of {found[Bias.UNKNOWN]} the repeats cannot say."
+    )
+    verdict = str(loop.diagnosis.get("verdict"))
+    if verdict not in {"NAMED", "ADEQUATE"}:
+        yield f"The diagnosis was {plain(verdict)}: only what it named is corrected."
+
+
+def _diagnosis(content: Mapping[str, Any]) -> Iterator[Block]:
+    yield Paragraph(f"{content['verdict']}: {content.get('provenance', {}).get('why', '')}", lead=True)
+    columns = [
+        *(Column("effect", "effect"), Column("parameter", "parameter"), Column("value", "value", 4)),
+        *(Column("stderr", "standard error", 4), Column("unit", "unit"), Column("rivals", "or instead")),
+    ]
+    rows: list[list[Value]] = [
+        [effect["name"], name, p["value"], p["stderr"], p["unit"], ", ".join(effect["confounded_with"])]
+        for effect in content["effects"]
+        for name, p in effect["parameters"].items()
+    ]
+    if rows:
+        yield Table("effects", "Effects that the corrected model has.", columns, rows)
+    left = [f"{d['covariate']} ({d['share']:.0%} of it)" for d in content["unexplained"]["depends_on"]]
+    if left:
+        yield Paragraph(f"Not explained, and not corrected unless named above; it depends on {', '.join(left)}.")
+
+
+def _plans(plans: Mapping[str, Any]) -> Table:
+    groups = {"uncorrected": "by the model, uncorrected", "remaining": "by the model, corrected"}
+    columns = [Column("trajectory", "trajectory")]
+    for key, group in groups.items():
+        columns += [
+            Column(f"{key}_delta_s_mm", "Δs mm", 1, group=group),
+            Column(f"{key}_across_mm", "across mm", 1, group=group),
+        ]
+        columns += [Column(f"{key}_delta_heading_deg", "Δδ deg", 2, group=group)]
+    fields = ("delta_s_mm", "across_mm", "delta_heading_deg")
+    rows: list[list[Value]] = [
+        [name, *(entry[key][field] for key in groups for field in fields)]
+        for name, entry in plans.items()
+        if "remaining" in entry
+    ]
+    return Table(
+        "plans",
+        "Where the corrected model ends, driven by its static maps alone and by corrected plans.",
+        columns,
+        rows,
+    )
+
+
+def _said(plans: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    for name, entry in plans.items():
+        for sentence in [entry["problem"]] if "problem" in entry else entry.get("said", []):
+            yield name, plain(sentence)
+
+
+__all__ = ["LoopReport", "before_after_table", "print_loop", "write_loop_report"]

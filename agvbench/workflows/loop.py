@@ -1,0 +1,199 @@
+"""What ``agvbench loop`` does: bench, diagnose, correct the model, plan with it, bench again.
+
+Each stage leaves its result in the loop's directory, and a stage whose result is there is not done again.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from agvbench.campaign import Campaign
+from agvbench.diagnosis import Diagnosis, diagnose
+from agvbench.errors import AgvbenchError, FileError, FitError
+from agvbench.model import VehicleModel
+from agvbench.running.settings import BenchSettings
+from agvbench.workflows.diagnose import in_words
+from agvbench.workflows.loop_plans import plans_of
+from agvbench.workflows.loop_settings import AFTER, BEFORE, DIAGNOSIS, PLANS, SETTINGS, VEHICLE, opened, write
+
+EXCITING = ("calibration", "trajectories", "step_response", "free_driving")
+"""What the first session drives: the second and third tell lags, which steady driving hides."""
+SHOWING = ("trajectories",)
+"""What the second session drives."""
+_PROGRAM = (
+    "import json, sys; from agvbench.workflows.bench import run_benchmarks;"
+    " sys.exit(run_benchmarks(*json.loads(sys.argv[1]), summary=False))"
+)
+_DONE = {0, 1}  # 1: some run was never driven well enough; what was is a campaign all the same
+
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A loop that was driven.
+
+    Parameters
+    ----------
+    directory
+        Where everything is.
+    settings
+        What it was asked for.
+    diagnosis
+        The content of ``diagnosis.json``.
+    plans
+        The content of ``plans.json``: what corrected plans make up for, by trajectory.
+    """
+
+    directory: Path
+    settings: BenchSettings
+    diagnosis: Mapping[str, Any]
+    plans: Mapping[str, Any]
+
+    @property
+    def before(self) -> Path:
+        """The campaign that was diagnosed."""
+        return self.directory / BEFORE
+
+    @property
+    def after(self) -> Path:
+        """The campaign that compares the conditions."""
+        return self.directory / AFTER
+
+
+def run_loop(given: Mapping[str, Any], *, out: str | None, resume: bool, tell: Tell = lambda _: None) -> Loop:
+    """Go round the loop, or on from where it was interrupted.
+
+    Parameters
+    ----------
+    given
+        Options of a bench session by name; those that are None are as usual.
+    out
+        The directory; a new one under ``campaigns/`` by default.
+    resume
+        Whether to go on in it.
+    tell
+        Called with a line whenever there is progress.
+
+    Raises
+    ------
+    AgvbenchError
+        If an option, the plant, a campaign or a file cannot be used.
+    """
+    directory, settings = opened(given, out, resume=resume)
+    tell(f"1/4 driving to diagnose: {', '.join(EXCITING)} → {directory / BEFORE}")
+    if not (directory / DIAGNOSIS).exists():
+        _first_bench(directory, settings, tell)
+    tell(f"2/4 diagnosing → {directory / DIAGNOSIS}, {VEHICLE}")
+    diagnosis = _diagnosed(directory, settings.seed, tell)
+    tell(f"3/4 planning with what was found → {directory / PLANS}")
+    plans = _planned(directory, settings, tell)
+    tell(f"4/4 driving uncalibrated, calibrated and corrected in turns → {directory / AFTER}")
+    models = {"calibration": str(directory / BEFORE / VEHICLE), "corrected": str(directory / VEHICLE)}
+    _bench(directory / AFTER, SHOWING, settings, models, tell)
+    return Loop(directory, settings, diagnosis, plans)
+
+
+def _first_bench(directory: Path, settings: BenchSettings, tell: Tell) -> None:
+    try:
+        _bench(directory / BEFORE, EXCITING, settings, {}, tell)
+    except AgvbenchError:
+        # What could not begin leaves nothing behind that would have to be resumed.
+        if not (directory / BEFORE / "campaign.toml").exists():
+            (directory / SETTINGS).unlink(missing_ok=True)
+            if not any(directory.iterdir()):
+                directory.rmdir()
+        raise
+
+
+def _bench(directory: Path, names: Sequence[str], settings: BenchSettings, more: Mapping[str, str], tell: Tell) -> None:
+    """Drive a session in a process of its own, on from where it was interrupted.
+
+    Raises
+    ------
+    AgvbenchError
+        If it cannot be driven.
+    """
+    options = {name: value for name, value in asdict(settings).items() if value != getattr(BenchSettings(), name)}
+    options |= {**more, "out": str(directory), "resume": directory.exists(), "no_report": True}
+    command = [sys.executable, "-c", _PROGRAM, json.dumps([names, options])]
+    errors = ""
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:  # noqa: S603 - our own program
+        try:
+            errors = process.communicate()[1]
+        except KeyboardInterrupt:
+            # It was interrupted as well, stops the vehicle, and records what it has seen.
+            process.wait()
+            raise
+    if process.returncode not in _DONE:
+        said = [line.removeprefix("ERROR: ") for line in errors.splitlines() if line.strip()]
+        raise AgvbenchError(said[-1] if said else f"the bench ended with exit code {process.returncode}")
+    if errors:
+        sys.stderr.write(errors)
+    if process.returncode:
+        tell(f"    some runs could not be driven: agvbench report {directory} says which")
+
+
+def _diagnosed(directory: Path, seed: int, tell: Tell) -> dict[str, Any]:
+    """Return the diagnosis, after writing it and the corrected vehicle, unless they are there already."""
+    path, vehicle = directory / DIAGNOSIS, directory / VEHICLE
+    if path.exists() and vehicle.exists():
+        content = _read(path)
+        tell(f"    {content['verdict']}, as found before")
+        return content
+    calibrated = VehicleModel.load(directory / BEFORE / VEHICLE) if (directory / BEFORE / VEHICLE).exists() else None
+    found = diagnose(Campaign.open(directory / BEFORE).check(), vehicle=calibrated, seed=seed, tell=lambda line: None)
+    model = found.model or calibrated
+    if model is None:
+        raise FitError("nothing to correct with", where=directory / BEFORE, value=found.why)
+    for line in _in_words(found):
+        tell(f"    {line}")
+    part = directory / f".{VEHICLE}.part"
+    model.save(part)
+    os.replace(part, vehicle)  # noqa: PTH105 - says what it does
+    write(path, found.to_text())
+    return _read(path)
+
+
+def _in_words(found: Diagnosis) -> list[str]:
+    lines = [f"{found.verdict}: {found.why}", *(in_words(effect) for effect in found.effects)]
+    if found.model is None:
+        return [*lines, "no effect can be corrected: the condition corrected drives the calibrated maps"]
+    if found.depends_on:
+        covariates = ", ".join(d.covariate for d in found.depends_on[:3])
+        lines.append(f"what no effect explains is not corrected; it depends on {covariates}")
+    if not found.effects:
+        lines.append("no effect was named: the condition corrected drives maps fitted again")
+    return lines
+
+
+def _planned(directory: Path, settings: BenchSettings, tell: Tell) -> dict[str, Any]:
+    """Return what corrected plans make up for, after writing it, unless it is there already."""
+    path = directory / PLANS
+    if not path.exists():
+        content = plans_of(VehicleModel.load(directory / VEHICLE), settings.workspace)
+        write(path, json.dumps({"schema": 1, "plans": content}, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    plans: dict[str, Any] = _read(path)["plans"]
+    for name, entry in plans.items():
+        if entry.get("problem"):
+            tell(f"    {name}: {entry['problem']}")
+        for sentence in entry.get("said", ()):
+            tell(f"    {name}: {sentence}")
+    return plans
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise FileError(
+            "cannot be read", where=path, value=error, remedy="delete it; --resume makes it again"
+        ) from None
+    return content

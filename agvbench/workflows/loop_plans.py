@@ -1,0 +1,75 @@
+"""What corrected plans make up for, trajectory by trajectory, before anything is driven."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from agvbench.errors import PlanError
+from agvbench.model import VehicleModel
+from agvbench.planning import Correction, Departure, Miss, Workspace, corrected_plan, load_trajectory
+from agvbench.running.drive import DEFAULT_TIMING
+
+THE_EIGHT = tuple(str(number) for number in range(1, 9))
+_NOTICEABLE_M, _NOTICEABLE_RAD = 5e-4, math.radians(0.05)
+
+
+def plans_of(model: VehicleModel, workspace: str, names: Sequence[str] = THE_EIGHT) -> dict[str, dict[str, Any]]:
+    """Return, by trajectory, where the model would end uncorrected and ends corrected, and what to say about it.
+
+    Keys: ``uncorrected``, ``remaining`` and, if the model has effects of the camera, ``beyond_camera``, each with
+    ``delta_s_mm``, ``delta_heading_deg``, ``along_mm``, ``across_mm``; ``said``, sentences; or ``problem`` where it
+    cannot be driven.
+    """
+    floor = Workspace.parse(workspace)
+    departure = Departure(steered_s=DEFAULT_TIMING.rest_before_s)
+    out: dict[str, dict[str, Any]] = {}
+    for name in names:
+        try:
+            made = corrected_plan(load_trajectory(name), model, workspace=floor, departure=departure)
+        except PlanError as error:
+            out[name] = {"problem": str(error)}
+            continue
+        if made.correction is not None:
+            out[name] = _entry(made.correction)
+    return out
+
+
+def _entry(correction: Correction) -> dict[str, Any]:
+    entry: dict[str, Any] = {
+        "uncorrected": _numbers(correction.uncorrected),
+        "remaining": _numbers(correction.remaining),
+        "said": _said(correction),
+    }
+    if correction.beyond_camera is not None:
+        entry["beyond_camera"] = _numbers(correction.beyond_camera)
+    return entry
+
+
+def _numbers(miss: Miss) -> dict[str, float]:
+    return {
+        "delta_s_mm": round(1e3 * miss.delta_s_m, 3),
+        "delta_heading_deg": round(math.degrees(miss.delta_heading_rad), 4),
+        "along_mm": round(1e3 * miss.along_m, 3),
+        "across_mm": round(1e3 * miss.across_m, 3),
+    }
+
+
+def _said(correction: Correction) -> list[str]:
+    said = []
+    if _noticeable(correction.remaining):
+        why = f": {' and '.join(correction.at_limits)} at the limit" if correction.at_limits else ""
+        said.append(f"cannot be made up for: {_in_words(correction.remaining)} remain{why}")
+    if correction.beyond_camera is not None and _noticeable(correction.beyond_camera):
+        off = _in_words(correction.beyond_camera)
+        said.append(f"on target as the camera sees it; if the camera errs as the model says, truly {off} off")
+    return said
+
+
+def _noticeable(miss: Miss) -> bool:
+    return miss.distance_m > _NOTICEABLE_M or abs(miss.delta_heading_rad) > _NOTICEABLE_RAD
+
+
+def _in_words(miss: Miss) -> str:
+    return f"{1e3 * miss.distance_m:.1f} mm and {math.degrees(miss.delta_heading_rad):.2f}°"

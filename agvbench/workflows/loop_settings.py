@@ -1,0 +1,80 @@
+"""Where a loop keeps what it was asked for and what it has done, so that it can go on after an interruption."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import asdict
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from agvbench.errors import FileError, FlagError
+from agvbench.running.directory import CAMPAIGNS
+from agvbench.running.settings import BenchSettings, settings_for_resume
+
+SETTINGS = "loop.toml"
+BEFORE, DIAGNOSIS, VEHICLE, PLANS, AFTER = "before", "diagnosis.json", "vehicle.toml", "plans.json", "after"
+
+
+def opened(given: Mapping[str, Any], out: str | None, *, resume: bool) -> tuple[Path, BenchSettings]:
+    """Return the loop's directory and settings: new ones, or with `resume` those of the loop that goes on.
+
+    Raises
+    ------
+    FlagError
+        If there is nothing to resume, a loop is there already, or an option contradicts the loop that goes on.
+    FileError
+        If the directory cannot be made or its settings not be read.
+    """
+    options = {name: value for name, value in given.items() if value is not None}
+    if resume:
+        directory = Path(out) if out is not None else _newest()
+        return directory, settings_for_resume(_load(directory / SETTINGS), options)
+    directory = Path(out) if out is not None else CAMPAIGNS / datetime.now().astimezone().strftime("loop-%Y%m%d-%H%M%S")
+    settings = BenchSettings.given(options)
+    if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
+        remedy = "go on with --resume" if (directory / SETTINGS).exists() else "choose another directory"
+        raise FlagError("exists already and is not empty", where="--out", value=directory, remedy=remedy)
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError("cannot be made", where=directory, value=error.strerror, remedy="choose another") from None
+    write(directory / SETTINGS, tomli_w.dumps(asdict(settings)))
+    return directory, settings
+
+
+def write(path: Path, text: str) -> None:
+    """Write a file that is either whole or not there.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written.
+    """
+    part = path.with_name(f".{path.name}.part")
+    try:
+        part.write_text(text, encoding="utf-8")
+        os.replace(part, path)  # noqa: PTH105 - says what it does
+    except OSError as error:
+        raise FileError("cannot be written", where=path, value=error.strerror) from None
+
+
+def _newest() -> Path:
+    loops = sorted(CAMPAIGNS.glob(f"*/{SETTINGS}"), key=lambda path: path.stat().st_mtime)
+    if not loops:
+        where = f"none in {CAMPAIGNS}/"
+        raise FlagError("no loop to resume", where="--resume", value=where, remedy="name it with --out DIR")
+    return loops[-1].parent
+
+
+def _load(path: Path) -> BenchSettings:
+    try:
+        return BenchSettings(**tomllib.loads(path.read_text(encoding="utf-8")))
+    except FileNotFoundError:
+        raise FileError("no loop to resume", where=path, remedy="start anew without --resume") from None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, TypeError) as error:
+        raise FileError("not the settings of a loop", where=path, value=error, remedy="start anew") from None
