@@ -24,6 +24,8 @@ from agvbench.diagnosis.result import Diagnosis, HeldOut, Verdict
 from agvbench.diagnosis.selection import Selection, Selector
 from agvbench.diagnosis.structure import Dependence, dependences, residual_rates
 from agvbench.diagnosis.vehicle import corrected_vehicle
+from agvbench.diagnosis.windows import horizon_of
+from agvbench.diagnosis.windows_diagnose import diagnose_windows
 from agvbench.errors import CampaignError, FitError
 from agvbench.model import VehicleModel, nominal_model
 from agvbench.types import Floats, Run
@@ -58,7 +60,8 @@ def diagnose(
     Parameters
     ----------
     campaign
-        Header and runs; runs must begin at rest.
+        Header and runs. Where the header has a prediction horizon, or runs do not begin at rest, they are cut into
+        windows.
     vehicle
         The model before; effects that it has stay, and are not named again. By default static maps fitted to the
         campaign's own runs.
@@ -73,8 +76,11 @@ def diagnose(
         If the campaign is too small, or its tables contradict themselves.
     """
     header = campaign.header
+    runs = list(campaign)
+    if (horizon := horizon_of(header, runs)) is not None:
+        return diagnose_windows(header, runs, horizon, vehicle=vehicle, seed=seed, tell=tell)
     geometry = Geometry(header.front_axle_m, header.rear_axle_m)
-    readings = read_runs(campaign)
+    readings = read_runs(runs)
     if reason := _cannot_tell(readings, header):
         return Diagnosis(Verdict.NOT_IDENTIFIABLE, reason, provenance=_provenance(header, readings, seed))
     held = held_out_runs(readings.runs, readings.group, seed)

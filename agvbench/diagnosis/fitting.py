@@ -30,7 +30,6 @@ _START_EXTRA_M = 2e-4
 _LEAST_SCATTER = np.array([2e-4, 2e-4, 2e-4, 2e-4])
 _ENOUGH = 0.05
 _TAIL = 4.0  # degrees of freedom of a window's errors
-_WINDOW_POSES = 1.0
 
 
 @dataclass(frozen=True)
@@ -165,13 +164,21 @@ def promised_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floats)
     return float(fitted.loss.sum() - terms.loss.sum() + saved)
 
 
+def loss_at(fitted: Fit, parameters: Floats) -> Floats:
+    """Return each run's loss (R,) at other parameters, by simulation, with the scatter of `fitted`."""
+    predictor = fitted.predictor
+    residual = _residual(predictor, predictor.predict(parameters, fitted.offsets))
+    none = fitted.linear.by_parameters[..., :0]
+    return _terms(predictor, residual, none, fitted.linear.by_offsets, fitted.offsets, fitted.scatter).loss
+
+
 def _residual(predictor: Predictor, poses: Floats) -> Floats:
     return np.asarray(np.nan_to_num(predictor.readings.poses - poses))
 
 
 def _temper(predictor: Predictor) -> tuple[Floats, Floats]:
     count = predictor.readings.seen.sum(axis=1).astype(np.float64)
-    evidence = EVIDENCE_POSES if predictor.readings.begins is None else _WINDOW_POSES
+    evidence = EVIDENCE_POSES if predictor.readings.begins is None else 1.0 / predictor.batch.redundancy
     return np.minimum(1.0, evidence / np.maximum(count, 1.0)), count
 
 
@@ -180,9 +187,13 @@ def _scale(scatter: Scatter) -> Floats:
     return np.asarray(scatter.growth[:, None] * [scatter.position_m, scatter.position_m, scatter.heading_rad])
 
 
-def _student(squares: Floats, numbers: Floats) -> tuple[Floats, Floats]:
-    """Return each window's loss and weight by Student's law, given its squared errors and how many numbers they are."""
-    return (_TAIL + numbers) * np.log1p(squares / _TAIL), (_TAIL + numbers) / (_TAIL + squares)
+def _student(predictor: Predictor, squares: Floats) -> tuple[Floats, Floats]:
+    """Return each window's loss and weight by Student's law for three numbers, given its squared errors.
+
+    The squares are those of a part of a window where windows tell the same again; so is the loss.
+    """
+    part = 1.0 / predictor.batch.redundancy
+    return part * (_TAIL + 3.0) * np.log1p(squares / part / _TAIL), (_TAIL + 3.0) / (_TAIL + squares / part)
 
 
 def _scatter_of_windows(readings: Readings) -> Scatter:
@@ -231,7 +242,7 @@ def _terms(
     logs += temper * count * (4.0 * np.log(scatter.position_m) + 2.0 * np.log(scatter.heading_rad))
     if predictor.readings.begins is not None:
         logs += 6.0 * temper * (predictor.readings.seen * np.log(scatter.growth)).sum(axis=1)
-        squares, trust = _student(squares, 3.0 * temper * count)
+        squares, trust = _student(predictor, squares)
         information, gradient = information * trust[:, None, None], gradient * trust[:, None]
     return _Terms(squares + logs, information, gradient, inverse, mixed, pull)
 
@@ -281,7 +292,7 @@ def _objective(predictor: Predictor, residual: Floats, offsets: Floats, scatter:
     e = residual * seen / _scale(scatter)
     squares = temper * np.sum(e * e, axis=(1, 2)) + np.sum((offsets / _priors(predictor, scatter)) ** 2, axis=1)
     if predictor.readings.begins is not None:
-        squares, _ = _student(squares, 3.0 * temper * seen.sum(axis=(1, 2)))
+        squares, _ = _student(predictor, squares)
     return float(squares.sum())
 
 
@@ -304,9 +315,9 @@ def _rescatter(
 
 def _rescatter_windows(predictor: Predictor, residual: Floats, scatter: Scatter) -> Scatter:
     seen = predictor.readings.seen
-    temper, count = _temper(predictor)
+    temper, _ = _temper(predictor)
     e = residual * seen[..., None] / _scale(scatter)
-    _, trust = _student(temper * np.sum(e * e, axis=(1, 2)), 3.0 * temper * count)
+    _, trust = _student(predictor, temper * np.sum(e * e, axis=(1, 2)))
     weight = seen * trust[:, None]
     total = np.maximum(seen.sum(axis=0), 1.0)
     position = np.sqrt(np.sum(residual[..., :2] ** 2 * weight[..., None], axis=(0, 2)) / (2.0 * total))

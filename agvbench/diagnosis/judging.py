@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.diagnosis.fitting import Fit
+from agvbench.diagnosis.fitting import Fit, loss_at
 from agvbench.types import Floats
 
 FOLDS = 5
@@ -22,6 +22,8 @@ def cross_validated(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Flo
     A parameter at its bound stays there. A value of a map that only the fold itself determines (a level driven
     nowhere else) is calibration, and fitted to the fold.
     """
+    if fitted.predictor.readings.begins is not None:
+        return _cross_validated_windows(fitted, fold, bounds)
     maps = fitted.predictor.maps.size
     effects = fitted.parameters[maps:]
     free = np.ones(len(fitted.parameters), dtype=np.bool_)
@@ -44,14 +46,39 @@ def cross_validated(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Flo
     return loss
 
 
-def without_best(gain: Floats, group: NDArray[np.int64]) -> float:
-    """Return what is left of the total `gain` (R,) without the best twentieth of groups, at least one of them.
+def _cross_validated_windows(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Floats:
+    """Return each window's loss (W,) under the effects that the other folds determine.
+
+    A fold is another session or recording, with levels of its own: maps are calibrated on all of them, for what is
+    asked is whether effects found elsewhere hold here. The loss is far from quadratic, so it is simulated anew.
+    """
+    maps, count = fitted.predictor.maps.size, len(fitted.parameters)
+    loss = fitted.loss.copy()
+    if maps == count:
+        return loss
+    total = fitted.information.sum(axis=0) + np.eye(count)
+    for k in np.unique(fold):
+        out = fold == k
+        others = (
+            fitted.information[~out].sum(axis=0) + np.eye(count) * np.r_[np.ones(maps), np.full(count - maps, 1e-4)]
+        )
+        step = np.linalg.lstsq(others, fitted.gradient[~out].sum(axis=0), rcond=1e-12)[0]
+        moved = fitted.parameters.copy()
+        moved[maps:] = np.clip(moved[maps:] + step[maps:], bounds[:, 0], bounds[:, 1])
+        change = moved[maps:] - fitted.parameters[maps:]
+        moved[:maps] -= np.linalg.lstsq(total[:maps, :maps], total[:maps, maps:] @ change, rcond=1e-12)[0]
+        loss[out] = loss_at(fitted, moved)[out]
+    return loss
+
+
+def without_best(gain: Floats, group: NDArray[np.int64], share: float = _BEST_SHARE) -> float:
+    """Return what is left of the total `gain` (R,) without the best `share` of groups, at least one of them.
 
     A true cause helps wherever it acts; a gain that sits in one group of runs is that group's own trouble.
     """
     names, index = np.unique(group, return_inverse=True)
     by_group = np.bincount(index, weights=gain)
-    best = np.sort(by_group)[::-1][: max(1, round(_BEST_SHARE * len(names)))]
+    best = np.sort(by_group)[::-1][: max(1, round(share * len(names)))]
     return float(by_group.sum() - best.sum())
 
 

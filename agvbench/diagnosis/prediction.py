@@ -40,7 +40,7 @@ class Batch:
     run's offsets alike. Where commands change so often that a run has more levels than free values, the values are
     varied instead (``by_node``). Packed once, it serves every set of effects, also ``kinds``
     beyond those of the library. ``level_scatter`` as for
-    `Simulation.predict`.
+    `Simulation.predict`; ``redundancy``: so many windows are as much evidence as one.
     """
 
     def __init__(
@@ -49,9 +49,11 @@ class Batch:
         maps: FreeMaps,
         geometry: Geometry,
         level_scatter: float = np.inf,
+        redundancy: float = 1.0,
         kinds: Sequence[type[Effect]] = (),
     ) -> None:
-        self.readings, self.maps, self.geometry, self.level_scatter = readings, maps, geometry, level_scatter
+        self.readings, self.maps, self.geometry = readings, maps, geometry
+        self.level_scatter, self.redundancy = level_scatter, redundancy
         begins = [None] * len(readings) if readings.begins is None else readings.begins.t_s.tolist()
         runs = [
             SimulatedRun(run.commands, t, float(h), begins_s=b)
@@ -115,7 +117,7 @@ class Predictor:
         self._steps = _STEP_SHARE * batch.base.scales[self._own]
 
     def settled(self, parameters: Floats) -> tuple[Floats, Floats]:
-        """Return settled angles and speed of every row (rows, 3), and initial states (R, 4)."""
+        """Return settled angles and speed of every row (rows, 3), and initial states (R, 5)."""
         return self._inputs(parameters, np.zeros((len(self.readings), len(OFFSETS))))
 
     def all_parameters(self, parameters: Floats) -> Floats:
@@ -128,15 +130,16 @@ class Predictor:
         return values
 
     def _inputs(self, parameters: Floats, offsets: Floats) -> tuple[Floats, Floats]:
-        """Return settled values of every row (rows, 3) and initial states (runs, 4)."""
+        """Return settled values of every row (rows, 3) and initial states (runs, 5)."""
         where, run = self.maps.slices(), self.batch.base.row_runs
         values = [self.batch.weights[role] @ parameters[where[role]] for role in ROLES]
         front, rear = (np.clip(values[k] + offsets[run, 3 + k], -_FARTHEST_RAD, _FARTHEST_RAD) for k in (0, 1))
         speed = np.where(self.batch.drives, values[2] * np.exp(offsets[run, 5]), 0.0)
-        initial = np.zeros((len(self.readings), 4))
+        initial = np.zeros((len(self.readings), 5))
         initial[:, :3] = self.readings.start + offsets[:, :3]
         if self.readings.begins is not None:
             initial[:, 3] = self.readings.begins.speed_mps
+            initial[:, 4] = self.readings.begins.lately_mps
         return np.column_stack([front, rear, speed]), initial
 
     def predict(self, parameters: Floats, offsets: Floats | None = None) -> Floats:

@@ -107,6 +107,7 @@ def read_windows(runs: Iterable[Run], horizon: Horizon, neutral: float) -> Readi
         np.array([w.t0_s for w in windows]),
         np.array([w.speed_mps for w in windows]),
         np.array([w.speed_stderr for w in windows]),
+        np.array([w.lately_mps for w in windows]),
         np.array([w.naive for w in windows]).reshape(-1, 3),
         np.array([w.noise for w in windows]).reshape(-1, 2),
         np.array([recording_of(w.run) for w in windows], dtype=np.str_),

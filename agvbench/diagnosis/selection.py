@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from agvbench.diagnosis.grouping import folds
 from agvbench.diagnosis.judging import FOLDS, cross_validated, differs_from_nothing, without_best
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.residuals import misses
+from agvbench.diagnosis.windows_split import fold_groups
 from agvbench.types import Floats
 
 Tell = Callable[[str], None]
@@ -80,13 +82,14 @@ class Selector:
     seed: int
     tell: Tell
     given: tuple[str, ...] = ()
+    best_share: ClassVar[float] = 0.05
     given_values: Floats = field(default_factory=lambda: np.empty(0))
     tried: int = 0
     _fold: NDArray[np.int64] = field(init=False)
     _known: dict[tuple[str, ...], Scored] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
-        self._fold = folds(self.batch.readings.group, FOLDS, self.seed)
+        self._fold = folds(fold_groups(self.batch.readings), FOLDS, self.seed)
 
     @property
     def least_gain(self) -> float:
@@ -114,7 +117,7 @@ class Selector:
         gain = without.loss - with_it.loss
         return bool(
             gain.sum() > self.least_gain
-            and without_best(gain, self.batch.readings.group) > 0.0
+            and without_best(gain, self.batch.readings.group, self.best_share) > 0.0
             and self._noticeable(without, with_it)
             and all(
                 differs_from_nothing(with_it.fit, name, self.batch.readings.group)
@@ -210,6 +213,10 @@ class Selector:
             self.tried += 1
             self._known[key] = Scored(names, fitted, cross_validated(fitted, self._fold, bounds))
         return self._known[key]
+
+    def known(self, names: tuple[str, ...]) -> Scored | None:
+        """Return the model with the effects `names` if it was fitted."""
+        return self._known.get(tuple(sorted(names)))
 
     def _predictor(self, names: tuple[str, ...]) -> Predictor:
         return Predictor(self.batch, names)

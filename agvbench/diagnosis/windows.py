@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from agvbench.calibration import inspect_frames
 from agvbench.calibration.source import HeaderLike
+from agvbench.model.simulation_loop import LATELY_S
 from agvbench.types import Commands, Floats, Frames, Run
 
 SUPPORT_S = 0.2
@@ -31,6 +32,7 @@ NAIVE_S = 0.1
 
 _DEFAULT_HORIZON_S, _DEFAULT_STRIDE_S = 2.0, 1.0
 _NEAR_S = 0.04
+_LATELY_SPANS = 4.0
 _FEWEST_FRAMES = 6
 _HELD_S = 1e3
 _STILL_MPS = 0.02
@@ -56,7 +58,8 @@ class Horizon:
 class Beginnings:
     """The state at the beginning of W windows; arrays of shape (W,) unless said otherwise.
 
-    ``t_s`` on the run's clock; ``speed_mps`` of the markers' centroid ahead, ``speed_stderr``; ``naive`` (W, 3): its
+    ``t_s`` on the run's clock; ``speed_mps`` of the markers' centroid ahead, ``speed_stderr``, and
+    lately (``lately_mps``); ``naive`` (W, 3): its
     velocity ahead and to the left [m/s] and yaw rate [rad/s] over the last `NAIVE_S`; ``noise`` (W, 2): standard
     deviation of one frame in position [m] and heading [rad]; ``recording`` and ``session`` by name.
     """
@@ -64,6 +67,7 @@ class Beginnings:
     t_s: Floats
     speed_mps: Floats
     speed_stderr: Floats
+    lately_mps: Floats
     naive: Floats
     noise: Floats
     recording: NDArray[np.str_]
@@ -90,6 +94,7 @@ class Window:
     poses: Floats
     speed_mps: float
     speed_stderr: float
+    lately_mps: float
     naive: Floats
     noise: Floats
 
@@ -108,7 +113,7 @@ def _rests(run: Run) -> bool:
     """Whether the vehicle stood still in the last frames before the first command."""
     frames = run.frames.select(run.frames.tracked.astype(np.bool_) & (run.frames.t_s <= 0.0))
     if len(frames) < 2:
-        return len(frames) > 0 and bool(run.commands.t_s[0] >= 0.0) and np.any(run.frames.t_s < 0.0)
+        return len(frames) > 0 and bool(np.any(run.frames.t_s < 0.0))
     last = frames.select(frames.t_s > frames.t_s[-1] - SUPPORT_S)
     span_s = float(last.t_s[-1] - last.t_s[0])
     moved = float(np.hypot(last.x_m[-1] - last.x_m[0], last.y_m[-1] - last.y_m[0]))
@@ -140,6 +145,7 @@ class _State:
     pose_stderr: Floats
     speed_mps: float
     speed_stderr: float
+    lately_mps: float
     naive: Floats
 
 
@@ -166,8 +172,19 @@ def _state(t: Floats, motion: Floats, noise: Floats) -> _State | None:
         at * noise[[0, 0, 1]],
         float(c * slope[0] + s * slope[1]),
         float(rising * noise[0]),
+        _lately(t, motion),
         np.array([cm * vx + sm * vy, cm * vy - sm * vx, yaw]),
     )
+
+
+def _lately(t: Floats, motion: Floats) -> float:
+    """Return the speed ahead, averaged with weights that fall by e every `LATELY_S` before the last frame."""
+    own = t > t[-1] - _LATELY_SPANS * LATELY_S
+    dt, step = np.diff(t[own]), np.diff(motion[own], axis=0)
+    heading = motion[own][1:, 2] - 0.5 * step[:, 2]
+    weight = np.exp((t[own][1:] - t[-1]) / LATELY_S)
+    ahead = np.cos(heading) * step[:, 0] + np.sin(heading) * step[:, 1]
+    return float(np.sum(weight * ahead) / np.sum(weight * dt))
 
 
 def _noise(motion: Floats) -> Floats:
@@ -209,6 +226,7 @@ def _window(
         poses,
         state.speed_mps,
         state.speed_stderr,
+        state.lately_mps,
         state.naive,
         noise,
     )
@@ -231,7 +249,7 @@ def _told(run: Run, t0: float, end_s: float) -> Commands:
 def recording_of(run: Run) -> str:
     """Return the name of the recording that a run is a piece of; a run by itself else."""
     source = run.extra.get("source")
-    return str(source) if source else run.run_id
+    return str(source) if source else run.run_id.rpartition("@")[0] or run.run_id
 
 
 def blocks(windows: list[Window], horizon: Horizon) -> NDArray[np.int64]:

@@ -15,13 +15,14 @@ from agvbench.diagnosis.fitting import Fit, fit
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.reading import Readings, read_windows
 from agvbench.diagnosis.result import Diagnosis, HeldOut, NamedEffect, Verdict
-from agvbench.diagnosis.selection import Scored, Selection, Selector
+from agvbench.diagnosis.selection import Scored, Selection
 from agvbench.diagnosis.structure import Dependence, dependences, residual_rates
 from agvbench.diagnosis.vehicle import corrected_vehicle
 from agvbench.diagnosis.windows import SUPPORT_S, Horizon
 from agvbench.diagnosis.windows_errors import QUANTITIES, by_recording, floor_squares, rms, squares
 from agvbench.diagnosis.windows_maps import smooth_maps, start_values_of_windows
-from agvbench.diagnosis.windows_predictors import believed, level_scatter, naive, speed_held
+from agvbench.diagnosis.windows_predictors import believed, level_scatter, naive, redundancy, speed_held
+from agvbench.diagnosis.windows_selection import WindowSelector
 from agvbench.diagnosis.windows_split import MOST_FITTED, MOST_JUDGED, held_out_windows, thinned
 from agvbench.errors import CampaignError
 from agvbench.model import VehicleModel
@@ -66,8 +67,13 @@ def diagnose_windows(
     values = np.array([value for effect in given for value in effect.values.values()])
     several = len(np.unique(readings.begins.session)) > 1 if readings.begins else False
     scatter = level_scatter(static.predictor, static.parameters) if several else np.inf
-    batch = Batch(fitted, static.predictor.maps, geometry, scatter)
-    selector = Selector(batch, tried, static.parameters, seed, tell, tuple(e.name for e in given), values)
+    level = fit(Predictor(Batch(fitted, static.predictor.maps, geometry, scatter)), static.parameters, np.empty((0, 2)))
+    alike = redundancy(level)
+    batch = Batch(fitted, static.predictor.maps, geometry, scatter, alike)
+    aside = readings.select(thinned(np.flatnonzero(held), MOST_FITTED))
+    elsewhere = Batch(aside, static.predictor.maps, geometry, scatter)
+    names = tuple(e.name for e in given)
+    selector = WindowSelector(batch, tried, level.parameters, seed, tell, names, values, elsewhere=elsewhere)
     selection = selector.select()
     tell("judging on what was held out")
     judged = readings.select(np.sort(np.r_[np.flatnonzero(held), thinned(np.flatnonzero(~held), MOST_JUDGED)]))
@@ -113,7 +119,7 @@ class _Conclusion:
     judged: Readings
     held: NDArray[np.bool_]
     static: Fit
-    selector: Selector
+    selector: WindowSelector
     selection: Selection
     vehicle: VehicleModel | None
     seed: int
@@ -157,6 +163,7 @@ class _Conclusion:
                     "stride_s": horizon.stride_s,
                     "initial_state_from_s": [-SUPPORT_S, 0.0],
                     "level_scatter": float(scatter),
+                    "redundancy": self.selector.batch.redundancy,
                     "recordings": by_recording(judged, predicted, self.held, self.seed),
                     "effects": self._each(poses),
                 },
@@ -188,7 +195,10 @@ class _Conclusion:
         return HeldOut(len(kept), errors, tuple(worse))
 
     def _each(self, poses: Floats) -> dict[str, dict[str, object]]:
-        """Return for each effect whether it was kept, and the held-out position error with and without it."""
+        """Return for each effect whether it was kept, and the held-out position error with and without it.
+
+        An effect that promised nothing was not fitted: its gain is zero, and there is no error with it.
+        """
         chosen = self.selection.chosen
         out: dict[str, dict[str, object]] = {}
         now = self._error(poses)
@@ -196,13 +206,15 @@ class _Conclusion:
             if name in self.selector.given:
                 continue
             kept = name in chosen.names
-            other = (
-                self.selector.shrunk(self.selection.base, chosen, name) if kept else self.selector.grown(chosen, name)
-            )
-            error = self._error(self._poses(other))
+            if kept:
+                other: Scored | None = self.selector.shrunk(self.selection.base, chosen, name)
+            else:
+                other = self.selector.known((*chosen.names, name))
+            error = None if other is None else self._error(self._poses(other))
             out[name] = {
                 "kept": kept,
-                "gain": self.selection.gains[name] if kept else chosen.total - other.total,
+                "gain": self.selection.gains[name] if kept else chosen.total - other.total if other else 0.0,
+                "extrapolates": name in self.selector.extrapolating,
                 "held_out_position_mm": {"with": now if kept else error, "without": error if kept else now},
             }
         return out

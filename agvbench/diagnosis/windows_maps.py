@@ -91,4 +91,3 @@ def _stiff(nodes: Floats, weights: Floats, value: Floats) -> Floats:
         off = np.abs(value - weights @ found)
         trust = 1.0 / np.maximum(off, 1e-3 + np.median(off))
     return found
-

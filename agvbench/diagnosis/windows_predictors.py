@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from agvbench.diagnosis.fitting import Fit
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.reading import Readings
 from agvbench.diagnosis.windows_split import _begins
@@ -74,6 +75,29 @@ def level_scatter(predictor: Predictor, parameters: Floats) -> float:
     return max(_LEAST_SCATTER, 2.0 * 1.4826 * float(np.median(np.abs(off)))) if len(off) else _LEAST_SCATTER
 
 
+def redundancy(fitted: Fit) -> float:
+    """Return how many windows tell as much as one, from how alike neighbours miss.
+
+    One, and twice the correlation of what a window misses with what the next ones in its stretch do, as far as
+    that is positive (the variance of a mean of a stationary sequence).
+    """
+    group = fitted.predictor.readings.group
+    e = np.nan_to_num(fitted.residual[:, -1])
+    e = e / np.maximum(np.median(np.abs(e), axis=0), 1e-9)
+    e = e / np.sqrt(1.0 + np.sum(e * e, axis=1, keepdims=True))  # as Student's law weighs them
+    total, own = 1.0, float(np.mean(np.sum(e * e, axis=1)))
+    for k in range(1, _FARTHEST_ALIKE + 1):
+        alike = group[k:] == group[:-k]
+        if np.count_nonzero(alike) < _FEWEST_PAIRS:
+            break
+        correlation = float(np.mean(np.sum(e[k:] * e[:-k], axis=1)[alike])) / own
+        if correlation <= 0.0:
+            break
+        total += 2.0 * correlation
+    return total
+
+
+_FARTHEST_ALIKE, _FEWEST_PAIRS = 10, 10
 _SHORTLY_S = 0.01
 _SLOW_MPS = 0.05
 _LEAST_SCATTER = 0.05

@@ -10,12 +10,13 @@ from agvbench.diagnosis.reading import Readings
 from agvbench.diagnosis.windows import Beginnings
 from agvbench.errors import FitError
 
-MOST_FITTED = 400
+MOST_FITTED = 300
 """Fits use at most so many windows, evenly spaced: neighbours tell much the same."""
 
 MOST_JUDGED = 1500
 _MOST_SHARE = 1.0 / 3.0
 _KEPT_SESSIONS = 2
+_FEWEST_FOLDS = 4
 
 
 def held_out_windows(readings: Readings, seed: int) -> NDArray[np.bool_]:
@@ -43,6 +44,20 @@ def held_out_windows(readings: Readings, seed: int) -> NDArray[np.bool_]:
         if held.any():
             return held
     return np.zeros(len(readings), dtype=np.bool_)
+
+
+def fold_groups(readings: Readings) -> NDArray[np.int64]:
+    """Return what cross-validation leaves out together, (R,): groups of runs, or sessions or recordings of windows.
+
+    Whole sessions where there are enough of them, else recordings, else stretches: what is learnt has to hold elsewhere.
+    """
+    if readings.begins is None:
+        return readings.group
+    for names in (readings.begins.session, readings.begins.recording):
+        known, number = np.unique(names, return_inverse=True)
+        if len(known) >= _FEWEST_FOLDS:
+            return number.astype(np.int64)
+    return readings.group
 
 
 def _begins(readings: Readings) -> Beginnings:

@@ -205,13 +205,14 @@ class Simulation:
         initial
             (runs, 4): what the camera reports at the start (x, y, heading), and the speed of the centroid ahead (0 for
             a run from rest; NaN in a window: what the commands before it have made it). Effects of the camera change
-            what follows, not the start itself.
+            what follows, not the start itself. With a fifth column: the speed ahead lately (averaged with weights that
+            fall by e every 0.5 s), from which the drive's level is read.
         runs
             Indices of the runs to simulate; all by default. Other runs' frames are left as they are in `out`.
         out
             (frames, 3), written to if given.
         level_scatter
-            How far, as a logarithm, the speed at the start may be from what the commands before it have made it by mere
+            How far, as a logarithm, the speed lately may be from what the commands before it have made it by mere
             scatter. Where it is farther, the drive is taken to run at another level (battery, floor, temperature),
             and whenever it is told to go its speed is faster or slower by the same amount. By default it never is.
 

@@ -87,6 +87,9 @@ _TOGETHER = 1e-12
 _LEAST_PART = 0.05
 # Below this speed [m/s] the drive's level hardly shows.
 _LEVEL_MPS = 0.05
+# Lately: averaged with weights that fall with this time constant [s].
+LATELY_S = 0.5
+_STATE = 4
 
 
 @compiled(inner=True)
@@ -280,17 +283,17 @@ def _drive_speed(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: flo
 
 
 @compiled(inner=True)
-def _lift(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, ahead: float) -> float:
-    """Return by how much the drive is faster than its commands before have made it, so far as it is not scatter."""
+def _lift(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, lately: float) -> float:
+    """Return by how much the drive has lately been faster than its commands made it, so far as it is not scatter."""
     scatter = vehicle[_LEVEL_SCATTER]
     if scatter == math.inf:
         return 0.0
-    told = _ahead(s, p, vehicle, servos, now, servos[4])
-    factor = (told * ahead + _LEVEL_MPS**2) / (told * told + _LEVEL_MPS**2)
+    told = _ahead(s, p, vehicle, servos, now, servos[5])
+    factor = (told * lately + _LEVEL_MPS**2) / (told * told + _LEVEL_MPS**2)
     off = math.log(factor) if factor > 0.0 else 0.0
     if off == 0.0:
         return 0.0
-    return off * off / (off * off + scatter * scatter) * (_drive_speed(s, p, vehicle, servos, now, ahead) - servos[4])
+    return off * off / (off * off + scatter * scatter) * (_drive_speed(s, p, vehicle, servos, now, lately) - servos[5])
 
 
 @compiled(inner=True)
@@ -302,6 +305,7 @@ def _drive_run(
     vehicle: Floats,
     begin: float,
     speed: float,
+    lately: float,
     commands: Floats,
     settled: Floats,
     command_t_s: Floats,
@@ -326,17 +330,18 @@ def _drive_run(
             # At rest at neutral, for as long as it may have been.
             servos[0] = servos[2] = s[FRONT_AIM]
             servos[1] = servos[3] = s[REAR_AIM]
-            servos[4] = 0.0
+            servos[4] = servos[5] = 0.0
             now = min(begin, end)
         elif now < begin:
             until = min(begin, end)
             plan_command(plan, s, servos)
             leave_command(plan, until - now, servos)
+            servos[5] += (servos[4] - servos[5]) * -math.expm1((now - until) / LATELY_S)
             now = until
         if now >= end:
             continue
         if now == begin and not math.isnan(speed):
-            lift = _lift(s, p, vehicle, servos, now, speed)
+            lift = _lift(s, p, vehicle, servos, now, lately)
             servos[4] = _drive_speed(s, p, vehicle, servos, now, speed)
             _obey(s, p, commands, settled, row, lift)
         plan_command(plan, s, servos)
@@ -374,7 +379,8 @@ def simulate(
     p
         Every effect's parameters.
     initial
-        (runs, 4): the measured pose at the start, and the speed ahead there (NaN: what the commands before made it).
+        (runs, 4): the measured pose at the start, and the speed ahead there (NaN: what the commands before made it); or
+        (runs, 5) with the speed ahead lately, which tells the drive's level.
     begins_s
         (runs,): stamp of the measured pose at the start; NaN where the vehicle stands until its first command.
     started_h
@@ -391,7 +397,7 @@ def simulate(
         (frames, 3): receives x, y, heading.
     """
     s, plan, work = np.zeros(SIZE), np.zeros(PLAN_SIZE), np.zeros(_WORK_SIZE)
-    servos, start = np.zeros(5), np.zeros(4)
+    servos, start = np.zeros(6), np.zeros(4)
     s[KNOWN_FRONT] = math.nan
     for run in chosen:
         k, stop = starts[run], starts[run + 1]
@@ -407,8 +413,9 @@ def simulate(
             begin = capture(s, begins_s[run], p)
         k = _wait(s, p, start, begin, t_s, out, k, stop)
         speed = initial[run, 3]
+        lately = initial[run, 4] if initial.shape[1] > _STATE else speed
         if k < stop:
             _drive_run(
-                s, p, plan, work, vehicle, begin, speed, commands, settled, command_t_s, first, last, start, servos,
+                s, p, plan, work, vehicle, begin, speed, lately, commands, settled, command_t_s, first, last, start, servos,
                 t_s, out, k, stop,
             )  # fmt: skip

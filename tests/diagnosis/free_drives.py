@@ -1,0 +1,48 @@
+"""Free driving of the vehicle of a few lines: a joystick that wanders, in sessions, recorded from the middle of a drive."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from tiny_vehicle import HEADER, NEUTRAL, Tiny, drive
+
+from agvbench.types import NO_TARGET, Commands, Frames, Pose, Run
+
+FREE_HEADER = dataclasses.replace(HEADER, name="free", prediction_horizon_s=2.0, prediction_stride_s=1.0)
+_RECORDED_FROM_S, _PERIOD_S = 2.0, 0.1
+
+
+def joystick(seconds: float, rng: np.random.Generator) -> Commands:
+    """Return commands ten times a second: drive and both axles wander, each about as fast as a hand does."""
+    count = round(seconds / _PERIOD_S)
+    t_s = _PERIOD_S * np.arange(count)
+
+    def wander(middle: float, size: float, every_s: float) -> np.ndarray:
+        knots = np.arange(0.0, seconds + 2.0 * every_s, every_s)
+        return middle + np.round(size * np.interp(t_s, knots, rng.uniform(-1.0, 1.0, len(knots))))
+
+    return Commands(t_s, wander(1150.0, 200.0, 1.5), wander(NEUTRAL, 350.0, 1.0), wander(NEUTRAL, 250.0, 1.3))
+
+
+def free_runs(tiny: Tiny, *, seed: int = 0, sessions: int = 4, runs: int = 3, seconds: float = 30.0) -> list[Run]:
+    """Drive `runs` in each of the sessions; what is kept of each begins in the middle of the drive."""
+    rng = np.random.default_rng([7, seed])
+    out = []
+    for session in range(sessions):
+        for k in range(runs):
+            commands = joystick(seconds, rng)
+            started_s = 3600.0 * session + 120.0 * k
+            frames = drive(tiny, commands, Pose(0.0, 0.0, rng.uniform(-3.0, 3.0)), started_s, rng)
+            run = Run(f"{session}-{k}", "free", "", "", 0, NO_TARGET, started_s, "ok", "", *_later(commands, frames))
+            out.append(dataclasses.replace(run, session=f"day {session}"))
+    return out
+
+
+def _later(commands: Commands, frames: Frames) -> tuple[Commands, Frames]:
+    kept = frames.select(frames.t_s >= _RECORDED_FROM_S)
+    kept = dataclasses.replace(kept, t_s=kept.t_s - _RECORDED_FROM_S)
+    first = round(_RECORDED_FROM_S / _PERIOD_S)
+    values = (commands.drive[first:], commands.front[first:], commands.rear[first:])
+    last = kept.t_s <= commands.t_s[-1] - _RECORDED_FROM_S
+    return Commands(commands.t_s[first:] - _RECORDED_FROM_S, *values), kept.select(last)

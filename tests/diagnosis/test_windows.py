@@ -1,0 +1,180 @@
+"""Windows of free driving: where they begin, what they may know, and what they are compared with."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from free_drives import FREE_HEADER, free_runs
+from hypothesis import given
+from hypothesis import strategies as st
+from tiny_vehicle import HEADER, NEUTRAL, Tiny, campaign_runs
+
+from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.reading import Readings, read_windows
+from agvbench.diagnosis.windows import Horizon, Window, cut_windows, horizon_of
+from agvbench.diagnosis.windows_errors import by_recording, floor_squares, interval, squares
+from agvbench.diagnosis.windows_maps import smooth_maps, start_values_of_windows
+from agvbench.diagnosis.windows_predictors import naive
+from agvbench.diagnosis.windows_split import held_out_windows, thinned
+from agvbench.types import NO_TARGET, Commands, Frames, Run
+from agvbench.vehicle.geometry import Geometry
+
+HORIZON = Horizon(2.0, 1.0)
+QUIET = Tiny(axle_scatter_rad=0.0, speed_scatter=0.0, noise_m=1e-6, noise_rad=1e-6)
+GEOMETRY = Geometry(HEADER.front_axle_m, HEADER.rear_axle_m)
+
+
+def arc(speed: float, yaw: float, noise_m: float = 0.0, seconds: float = 8.0, rate: float = 100.0) -> Run:
+    """Return a run on a circle, from formulas."""
+    t = np.arange(0.0, seconds, 1.0 / rate)
+    heading = yaw * t
+    x, y = speed * np.sin(heading) / yaw, speed * (1.0 - np.cos(heading)) / yaw
+    rng = np.random.default_rng(0)
+    x, y = (v + rng.normal(0.0, noise_m, len(t)) for v in (x, y))
+    nan = np.full(len(t), np.nan)
+    frames = Frames(t, x, y, heading, np.ones(len(t), dtype=bool), np.full(len(t), -1), nan, nan)
+    one = np.array([0.0])
+    return Run("arc", "free", "", "", 0, NO_TARGET, 0.0, "ok", "", Commands(one, one + 1000.0, one + 1400, one), frames)
+
+
+@pytest.fixture(scope="module")
+def readings() -> Readings:
+    return read_windows(free_runs(QUIET, sessions=3, runs=1), HORIZON, NEUTRAL)
+
+
+@given(speed=st.floats(0.1, 2.0), yaw=st.floats(-2.0, 2.0).filter(lambda w: abs(w) > 0.01))
+def test_the_state_on_a_circle_is_that_of_the_circle(speed, yaw):
+    window = next(cut_windows(arc(speed, yaw), HORIZON, NEUTRAL))
+    t = window.t0_s
+    truth = [speed * math.sin(yaw * t) / yaw, speed * (1.0 - math.cos(yaw * t)) / yaw, yaw * t]
+    np.testing.assert_allclose(window.start, truth, atol=2e-4 * (1.0 + speed * yaw * yaw))
+    assert window.speed_mps == pytest.approx(speed, rel=0.02)
+    assert window.lately_mps == pytest.approx(speed, rel=0.01)
+
+
+def test_the_naive_predictor_goes_on_along_the_circle():
+    windows = list(cut_windows(arc(0.8, 0.9), HORIZON, NEUTRAL))
+    read = read_windows([arc(0.8, 0.9)], HORIZON, NEUTRAL)
+    assert len(read) == len(windows) > 3
+    np.testing.assert_allclose(naive(read), read.poses, atol=0.003)
+
+
+def test_nothing_after_the_beginning_is_used():
+    run = arc(0.5, 0.3, noise_m=1e-3)
+    cut = next(cut_windows(run, HORIZON, NEUTRAL))
+    later = run.frames.t_s > cut.t0_s
+    shaken = dataclasses.replace(run.frames, x_m=run.frames.x_m + 0.01 * later * np.sin(40.0 * run.frames.t_s))
+    again = next(cut_windows(dataclasses.replace(run, frames=shaken), HORIZON, NEUTRAL))
+    for name in ("start", "speed_mps", "lately_mps", "naive"):
+        np.testing.assert_allclose(getattr(again, name), getattr(cut, name), atol=1e-12)
+    assert not np.allclose(again.poses, cut.poses, atol=1e-3)
+
+
+def test_stated_errors_of_the_beginning_are_those_made():
+    off = []
+    for seed in range(60):
+        run = arc(0.5, 0.3)
+        noise = np.random.default_rng(seed).normal(0.0, 1e-3, (2, len(run.frames)))
+        frames = dataclasses.replace(run.frames, x_m=run.frames.x_m + noise[0], y_m=run.frames.y_m + noise[1])
+        noisy: Window = next(cut_windows(dataclasses.replace(run, frames=frames), HORIZON, NEUTRAL))
+        clean: Window = next(cut_windows(run, HORIZON, NEUTRAL))
+        off.append([*(noisy.start - clean.start)[:2] / noisy.start_stderr[:2]])
+        off[-1].append((noisy.speed_mps - clean.speed_mps) / noisy.speed_stderr)
+    assert np.sqrt(np.mean(np.square(off), axis=0)) == pytest.approx(np.ones(3), rel=0.35)
+
+
+def test_a_tracker_that_jumps_metres_moves_no_window():
+    run = arc(0.5, 0.3)
+    wild = run.frames.x_m.copy()
+    wild[[210, 211, 400]] += 9.0
+    jumped = dataclasses.replace(run, frames=dataclasses.replace(run.frames, x_m=wild))
+    for a, b in zip(cut_windows(run, HORIZON, NEUTRAL), cut_windows(jumped, HORIZON, NEUTRAL), strict=False):
+        assert abs(a.speed_mps - b.speed_mps) < 0.05
+        assert np.nanmax(np.abs(b.poses[:, :2])) < 2.3  # the circle lies within 0 … 2.2 m, wild frames at 9 m
+
+
+def test_runs_from_rest_stay_runs_and_free_driving_becomes_windows():
+    assert horizon_of(HEADER, campaign_runs(Tiny())[:6]) is None
+    free = free_runs(QUIET, sessions=1, runs=2)
+    assert horizon_of(HEADER, free) == Horizon()
+    assert horizon_of(FREE_HEADER, free) == HORIZON
+
+
+def test_slopes_by_nodes_are_those_of_whole_maps(readings):
+    some = readings.select(np.arange(0, len(readings), 9))
+    maps = smooth_maps(some.runs, NEUTRAL)
+    batch = Batch(some, maps, GEOMETRY, 0.1)
+    assert batch.by_node
+    predictor = Predictor(batch, ("steering_lag", "cornering_speed_loss"))
+    values = np.r_[start_values_of_windows(maps, some, GEOMETRY), 0.1, 0.05]
+    none = np.zeros((len(some), 6))
+    slopes = predictor.linearise(values, none)
+    rng = np.random.default_rng(3)
+    way = rng.normal(size=len(values)) * 1e-4
+    there, back = predictor.predict(values + way), predictor.predict(values - way)
+    np.testing.assert_allclose((there - back) / 2.0, slopes.by_parameters @ way, atol=2e-6)
+    way = rng.normal(size=none.shape) * 1e-4
+    there, back = predictor.predict(values, way), predictor.predict(values, -way)
+    expected = np.einsum("wkcj,wj->wkc", slopes.by_offsets, way)
+    np.testing.assert_allclose((there - back) / 2.0, expected, atol=2e-6)
+
+
+def test_start_values_are_near_the_maps_that_drove(readings):
+    from tiny_vehicle import front_of, speed_of
+
+    maps = smooth_maps(readings.runs, NEUTRAL)
+    start, where = start_values_of_windows(maps, readings, GEOMETRY), maps.slices()
+    inner = slice(2, -2)
+    fronts = [front_of(c) for c in maps.nodes["front"]]
+    np.testing.assert_allclose(start[where["front"]][inner], fronts[inner], atol=0.08)
+    speeds = [speed_of(c) for c in maps.nodes["drive"]]
+    np.testing.assert_allclose(start[where["drive"]][inner], speeds[inner], atol=0.05)
+
+
+def test_whole_sessions_are_set_aside(readings):
+    held = held_out_windows(readings, 0)
+    sessions = readings.begins.session
+    assert 0 < np.count_nonzero(held) < 0.5 * len(held)
+    assert not set(sessions[held]) & set(sessions[~held])
+    assert len(set(sessions[~held])) >= 2
+
+
+def test_the_split_of_the_campaign_decides(readings):
+    runs = [dataclasses.replace(r, split="held_out" if r.session == "day 1" else "fit") for r in readings.runs]
+    held = held_out_windows(dataclasses.replace(readings, runs=tuple(runs)), 0)
+    assert set(readings.begins.session[held]) == {"day 1"}
+
+
+@given(count=st.integers(1, 500), most=st.integers(2, 300))
+def test_thinning_keeps_order_and_ends(count, most):
+    kept = thinned(np.arange(count), most)
+    assert len(kept) <= most
+    assert (np.diff(kept) > 0).all()
+    assert kept[0] == 0
+    assert kept[-1] == count - 1
+
+
+def test_errors_are_told_by_recording_with_intervals_over_stretches(readings):
+    table = by_recording(readings, {"naive": naive(readings)}, np.zeros(len(readings), dtype=bool), 0)
+    counts = [np.count_nonzero(readings.begins.recording == f"{k}-0") for k in range(3)]
+    assert [row["windows"] for row in table] == counts
+    error = np.sqrt(np.nanmean(squares(readings, naive(readings))["position_rms_mm"][: counts[0]])) * 1e3
+    assert table[0]["ahead_2_s"]["naive_mm"]["rms"] == pytest.approx(error)
+    assert table[0]["ahead_1_s"]["naive_mm"]["rms"] < error
+
+
+def test_an_interval_covers_its_error_and_is_unknown_without_stretches():
+    values = np.random.default_rng(0).exponential(1.0, 64)
+    draws = [np.random.default_rng(k).integers(0, 64, 64) for k in range(300)]
+    many = interval(values, draws)
+    assert many["low"] < many["rms"] < many["high"]
+    assert np.isnan(interval(values, [])["low"])
+
+
+def test_there_is_a_floor_where_a_perfect_predictor_misses_nothing(readings):
+    exact = readings.poses.copy()
+    assert np.nanmax(squares(readings, exact)["position_rms_mm"]) == 0.0
+    assert (floor_squares(readings)["position_rms_mm"] > 0.0).all()
