@@ -45,7 +45,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Go round the loop and write its report; return the exit code."""
     from agvbench.reporting.console import wide_console
-    from agvbench.reporting.loop import print_loop, write_loop_report
     from agvbench.workflows.loop import run_loop
 
     console = wide_console()
@@ -56,5 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
         resume=arguments.resume,
         tell=lambda line: console.print(line, highlight=False, markup=False, soft_wrap=True),
     )
+    from agvbench.reporting.loop import print_loop, write_loop_report
+
     print_loop(console, write_loop_report(loop))
     return 0

@@ -12,16 +12,16 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from agvbench.campaign import Campaign
-from agvbench.diagnosis import Diagnosis, diagnose
 from agvbench.errors import AgvbenchError, FileError, FitError
 from agvbench.model import VehicleModel
 from agvbench.running.settings import BenchSettings
-from agvbench.workflows.diagnose import in_words
 from agvbench.workflows.loop_plans import plans_of
 from agvbench.workflows.loop_settings import AFTER, BEFORE, DIAGNOSIS, PLANS, SETTINGS, VEHICLE, opened, write
+
+if TYPE_CHECKING:
+    from agvbench.diagnosis import Diagnosis
 
 EXCITING = ("calibration", "trajectories", "step_response", "free_driving")
 """What the first session drives: the second and third tell lags, which steady driving hides."""
@@ -143,6 +143,9 @@ def _bench(directory: Path, names: Sequence[str], settings: BenchSettings, more:
 
 def _diagnosed(directory: Path, seed: int, tell: Tell) -> dict[str, Any]:
     """Return the diagnosis, after writing it and the corrected vehicle, unless they are there already."""
+    from agvbench.campaign import Campaign
+    from agvbench.diagnosis import diagnose
+
     path, vehicle = directory / DIAGNOSIS, directory / VEHICLE
     if path.exists() and vehicle.exists():
         content = _read(path)
@@ -163,6 +166,8 @@ def _diagnosed(directory: Path, seed: int, tell: Tell) -> dict[str, Any]:
 
 
 def _in_words(found: Diagnosis) -> list[str]:
+    from agvbench.workflows.diagnose import in_words
+
     lines = [f"{found.verdict}: {found.why}", *(in_words(effect) for effect in found.effects)]
     if found.model is None:
         return [*lines, "no effect can be corrected: the condition corrected drives the calibrated maps"]
