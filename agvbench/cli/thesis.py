@@ -5,8 +5,9 @@ examples:
   agvbench thesis --section prediction     the 28 rows of tables 8.3-8.10, predicted, beside the null
   agvbench thesis --out tables/            each table as CSV, everything as thesis.md
   agvbench thesis --json thesis.json       the same for programs
+  agvbench thesis --section residuals --figures DIR   from each residual to its effect, with pictures
 
-sections: steering, drive, maps, cornering, battery, lever_arm, errata, prediction, sensitivity, turns
+sections: steering, drive, maps, cornering, battery, lever_arm, errata, prediction, sensitivity, turns, residuals
 
 Each refit stands beside the printed figure; where they differ, the errata say why. The prediction uses chapters
 6, 7, 8.1 and appendix B only; what the thesis leaves open is assumed by a rule fixed beforehand, and the section
@@ -28,6 +29,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures as JSON")
     parser.add_argument("--out", type=Path, metavar="DIR", help="write the tables as CSV and Markdown")
+    parser.add_argument(
+        "--figures", type=Path, metavar="DIR", help="draw the residuals, before and after, one SVG per table"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -45,6 +49,10 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.out is not None:
             write_tables(computed, arguments.out)
         sections = iter(computed)
+    if arguments.figures is not None:
+        from agvbench.reporting.thesis_figures import write_thesis_figures
+
+        write_thesis_figures(arguments.figures)
     for section in sections:
         print_section(section, console)
     return 0

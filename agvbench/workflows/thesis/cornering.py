@@ -123,7 +123,8 @@ def fitted_loss() -> float:
     return fit_loss(steering_measure)
 
 
-def _residual(form: Form, loss: float) -> Floats:
+def residual_of(form: Form, loss: float) -> Floats:
+    """Return what eq. 5.6 with a `loss` of this form leaves of every sample [m/s]; a loss of 0 is eq. 5.6 alone."""
     s = samples()
     share = (1.0 - loss * form(s.front_rad, s.rear_rad)) / (1.0 - loss * _neutral(form)[1])
     return s.speed_mps - _explained(s) * share
@@ -135,16 +136,16 @@ def held_out_rms_mm(form: Form) -> float:
     errors = np.empty_like(s.speed_mps)
     for pair in np.unique(s.pair_us):
         out = s.pair_us == pair
-        errors[out] = _residual(form, fit_loss(form, ~out))[out]
+        errors[out] = residual_of(form, fit_loss(form, ~out))[out]
     return 1000.0 * rms(errors)
 
 
 def _form_rows() -> tuple[tuple[str, float | None, float, float], ...]:
-    none = 1000.0 * rms(_residual(steering_measure, 0.0))
+    none = 1000.0 * rms(residual_of(steering_measure, 0.0))
     rows: list[tuple[str, float | None, float, float]] = [("eq. 5.6 alone", None, none, none)]
     for name, form in FORMS.items():
         loss = fit_loss(form)
-        rows.append((f"eq. 5.6 and {name}", loss, 1000.0 * rms(_residual(form, loss)), held_out_rms_mm(form)))
+        rows.append((f"eq. 5.6 and {name}", loss, 1000.0 * rms(residual_of(form, loss)), held_out_rms_mm(form)))
     return tuple(rows)
 
 

@@ -24,6 +24,7 @@ _MODULES = {
     "prediction": "prediction_section",
     "sensitivity": "sensitivity",
     "turns": "turns",
+    "residuals": "residuals",
 }
 
 

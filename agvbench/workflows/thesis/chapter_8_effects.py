@@ -1,0 +1,218 @@
+"""One effect at a time added to the prediction of chapter 8: fitted to drives of one condition, checked on the other.
+
+Each has one parameter. Rows are compared as the thesis prints them (magnitudes), each error over the median error of
+the null prediction for its quantity and shape, so that millimetres and degrees count alike; a fit minimises the mean.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from statistics import mean, median
+
+import numpy as np
+
+from agvbench.vehicle.kinematics import body_motion
+from agvbench.workflows.thesis.assumptions import Assumptions, Condition
+from agvbench.workflows.thesis.commands import Told, told
+from agvbench.workflows.thesis.cornering import NEUTRAL_US, cornering_share, fitted_loss
+from agvbench.workflows.thesis.eight import Trajectory
+from agvbench.workflows.thesis.prediction import Prediction, arc_end, driven
+from agvbench.workflows.thesis.scoring import CONDITIONS, ScoredRow, score_row
+from agvbench.workflows.thesis.steering import true_maps
+from agvbench.workflows.thesis.tables import GEOMETRY, end_pose_rows
+from agvbench.workflows.thesis.vehicle import true_speed
+
+_VALUES = 81
+
+
+@dataclass
+class Drive:
+    """One drive while effects act on it: axle angles [rad], distance along the wheels [m], curvature added [1/m]."""
+
+    front_rad: float
+    rear_rad: float
+    distance_m: float
+    speed_mps: float
+    side: int
+    curvature_per_m: float = 0.0
+    bend: float = 1.0
+
+
+@dataclass(frozen=True)
+class Cause:
+    """An effect of one parameter: its `unit`, the range looked in, and how it changes a drive."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    act: Callable[[Drive, float], None]
+
+
+def _reverse(d: Drive, gain: float) -> None:
+    if d.distance_m < 0.0:
+        d.front_rad, d.rear_rad = (1.0 + gain) * d.front_rad, (1.0 + gain) * d.rear_rad
+
+
+def _right(d: Drive, gain: float) -> None:
+    if d.side < 0:
+        d.front_rad, d.rear_rad = (1.0 + gain) * d.front_rad, (1.0 + gain) * d.rear_rad
+
+
+def _coupled(d: Drive, share: float) -> None:
+    d.front_rad, d.rear_rad = d.front_rad + share * d.rear_rad, d.rear_rad + share * d.front_rad
+
+
+def _wheels(d: Drive, curvature: float) -> None:
+    d.curvature_per_m = curvature
+
+
+def _slip(d: Drive, gradient: float) -> None:
+    d.bend = 1.0 / (1.0 + gradient * d.speed_mps**2)
+
+
+def _roll(d: Drive, seconds: float) -> None:
+    d.distance_m += d.speed_mps * seconds
+
+
+def _faster(d: Drive, share: float) -> None:
+    d.distance_m *= 1.0 + share
+
+
+def _offset(d: Drive, angle: float) -> None:
+    d.front_rad, d.rear_rad = d.front_rad + angle, d.rear_rad - angle
+
+
+CAUSES = (
+    Cause("reverse_steering_gain", "–", -0.4, 0.4, _reverse),
+    Cause("steering gain to the right", "–", -0.4, 0.4, _right),
+    Cause("axle_coupling, both alike", "–", -0.4, 0.4, _coupled),
+    Cause("wheel_diameter_mismatch", "1/m", -0.1, 0.1, _wheels),
+    Cause("lateral_slip", "s²/m²", -3.0, 3.0, _slip),
+    Cause("speed_lag, braking less accelerating", "s", -0.4, 0.4, _roll),
+    Cause("speed off by a share", "–", -0.15, 0.15, _faster),
+    Cause("straight ahead off, opposite", "rad", -0.05, 0.05, _offset),
+)
+
+
+@cache
+def _told_drives(condition: Condition, assumed: Assumptions) -> tuple[tuple[Trajectory, Told, Drive], ...]:
+    drives = []
+    for trajectory in driven(condition):
+        command = told(trajectory, condition, assumed)
+        front, rear = true_maps(assumed.true_steering)
+        speed = true_speed(command.drive_us, assumed.true_drive if condition == "calibrated" else "measured")
+        angles = float(front(command.front_us)), float(rear(command.rear_us))
+        drives.append((trajectory, command, Drive(*angles, speed * command.duration_s, speed, trajectory.side)))
+    return tuple(drives)
+
+
+def predicted(cause: Cause | None, value: float, condition: Condition, assumed: Assumptions) -> list[Prediction]:
+    """Return the predictions of one condition with `cause` at `value`; without a cause those of the plain model."""
+    out = []
+    for trajectory, command, as_told in _told_drives(condition, assumed):
+        drive = replace(as_told)
+        if cause is not None:
+            cause.act(drive, value)
+        speed, sideslip, yaw = (float(x) for x in body_motion(drive.front_rad, drive.rear_rad, 1.0, 1.0, GEOMETRY))
+        kept = float(cornering_share(drive.front_rad, drive.rear_rad, fitted_loss())) / _neutral(assumed.true_steering)
+        length = drive.distance_m * kept * speed
+        turned = drive.distance_m * kept * yaw * drive.bend + drive.curvature_per_m * length
+        end, turned = arc_end(length, sideslip, turned)
+        delta_s = math.hypot(end.x_m, end.y_m) - trajectory.distance_m(assumed.turn_target)
+        out.append(Prediction(trajectory, condition, command, end, math.degrees(turned), 1000.0 * delta_s))
+    return out
+
+
+@cache
+def _neutral(kind: str) -> float:
+    front, rear = (float(m(NEUTRAL_US)) for m in true_maps(kind))
+    speed, _, _ = body_motion(front, rear, 1.0, 1.0, GEOMETRY)
+    return float(speed) * float(cornering_share(front, rear, fitted_loss()))
+
+
+def rows_with(cause: Cause | None, value: float) -> list[ScoredRow]:
+    """Return the 28 rows with `cause` at `value`."""
+    assumed = Assumptions()
+    every = [(p.trajectory.number, c, p) for c in CONDITIONS for p in predicted(cause, value, c, assumed)]
+    by_key: dict[tuple[int, str], Prediction] = {(number, condition): p for number, condition, p in every}
+    return [score_row(row, by_key[row.trajectory, row.condition]) for row in end_pose_rows()]
+
+
+@cache
+def scales() -> Mapping[tuple[str, str], float]:
+    """Return the null's median error by (shape, quantity) over all rows: the unit of errors."""
+    found: dict[tuple[str, str], list[float]] = {}
+    for row in rows_with(None, 0.0):
+        found.setdefault(row.group[1:], []).append(row.null_error)
+    return {key: median(values) for key, values in found.items()}
+
+
+def mean_error(rows: Iterable[ScoredRow]) -> float:
+    """Return the mean error of rows over `scales`."""
+    return mean(row.error / scales()[row.group[1:]] for row in rows)
+
+
+def null_error(rows: Iterable[ScoredRow]) -> float:
+    """Return the mean error of "it hits the target" over `scales`."""
+    return mean(row.null_error / scales()[row.group[1:]] for row in rows)
+
+
+Chosen = Callable[[ScoredRow], bool]
+
+
+@cache
+def _table(cause: Cause) -> list[tuple[float, list[ScoredRow]]]:
+    return [(float(v), rows_with(cause, float(v))) for v in np.linspace(cause.low, cause.high, _VALUES)]
+
+
+def fitted(cause: Cause, chosen: Chosen) -> tuple[float, list[ScoredRow]]:
+    """Return the value of `cause` that fits the `chosen` rows best, and all rows at it."""
+    return min(_table(cause), key=lambda pair: mean_error(r for r in pair[1] if chosen(r)))
+
+
+@dataclass(frozen=True)
+class Checked:
+    """One cause: its value from each condition, mean errors on the other condition before and after, and without it.
+
+    ``left_out`` is the mean error on trajectories that the value was not fitted to, one at a time.
+    """
+
+    cause: Cause
+    value: Mapping[str, float]
+    before: Mapping[str, float]
+    after: Mapping[str, float]
+    left_out_before: float
+    left_out_after: float
+
+    @property
+    def carries_over(self) -> bool:
+        """Whether it helps on the drives it was not fitted to, both ways and trajectory by trajectory."""
+        both = all(self.after[c] < self.before[c] for c in CONDITIONS)
+        return both and self.left_out_after < self.left_out_before
+
+
+def check(cause: Cause) -> Checked:
+    """Return `cause` fitted to the uncalibrated rows and checked on the calibrated ones, and back."""
+    plain = rows_with(None, 0.0)
+    value: dict[str, float] = {}
+    before: dict[str, float] = {}
+    after: dict[str, float] = {}
+    for own, other in zip(CONDITIONS, reversed(CONDITIONS), strict=True):
+        value[own], rows = fitted(cause, lambda r, own=own: r.measured.condition == own)  # type: ignore[misc]
+        before[other] = mean_error(r for r in plain if r.measured.condition == other)
+        after[other] = mean_error(r for r in rows if r.measured.condition == other)
+    kept = []
+    for n in range(1, 9):
+        _, rows = fitted(cause, lambda r, n=n: r.measured.trajectory != n)  # type: ignore[misc]
+        kept += [r for r in rows if r.measured.trajectory == n]
+    return Checked(cause, value, before, after, mean_error(plain), mean_error(kept))
+
+
+@cache
+def checks() -> tuple[Checked, ...]:
+    """Return every cause, checked."""
+    return tuple(check(cause) for cause in CAUSES)
