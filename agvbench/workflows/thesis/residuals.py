@@ -36,8 +36,8 @@ class Traced:
 
     ``source`` where it is; ``before`` and ``after`` models in words; ``effect`` the library's name; ``size`` of it in
     words; ``left_out`` what was held out; ``at`` (n,) the places, in the unit of ``axis``; ``missed_before`` and
-    ``missed_after`` (n,) held-out errors there, measured minus predicted, in ``unit``; ``floor`` what no model can remove, or NaN where the
-    table does not say; ``unexplained`` in words.
+    ``missed_after`` (n,) held-out errors there, measured minus predicted, in ``unit``; ``floor`` what no model can
+    remove, or NaN where the table does not say; ``unexplained`` in words.
     """
 
     name: str
