@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from agvbench.calibration import RunMeasurement, measure_run
 from agvbench.calibration.source import CampaignLike, HeaderLike
 from agvbench.diagnosis.candidates import bounds_of, candidates
+from agvbench.diagnosis.empirical import Explained, described, explain, term_candidates, with_term_first
+from agvbench.diagnosis.empirical_terms import TERMS
 from agvbench.diagnosis.estimates import named_effects
 from agvbench.diagnosis.grouping import held_out_runs
 from agvbench.diagnosis.levels import ROLES, FreeMaps, free_maps, start_values
@@ -19,10 +21,10 @@ from agvbench.diagnosis.next_experiment_propose import with_next_experiment
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.reading import Readings, read_runs
 from agvbench.diagnosis.residual_table import with_residuals
-from agvbench.diagnosis.residuals import Misses, floor, lack_of_fit, misses
+from agvbench.diagnosis.residuals import AT_THE_FLOOR, LACK_OF_FIT, Misses, floor, lack_of_fit, misses
 from agvbench.diagnosis.result import Diagnosis, HeldOut, Verdict
 from agvbench.diagnosis.selection import Selection, Selector
-from agvbench.diagnosis.structure import Dependence, dependences, residual_rates
+from agvbench.diagnosis.structure import RANDOM_PHASE, Dependence, dependences, residual_rates
 from agvbench.diagnosis.vehicle import corrected_vehicle
 from agvbench.diagnosis.windows import horizon_of
 from agvbench.diagnosis.windows_diagnose import diagnose_windows
@@ -33,10 +35,6 @@ from agvbench.vehicle.geometry import Geometry
 
 FEWEST_RUNS = 20
 FEWEST_REPEATED = 3
-AT_THE_FLOOR = 1.25
-"""What is left is at the floor up to this times it, or if repeats cannot tell it from the floor."""
-
-_LACK_OF_FIT = 0.01
 _LEAST_TURN_RAD = 0.05
 
 
@@ -99,10 +97,10 @@ def diagnose(
     given = tuple(e for e in (vehicle.effects if vehicle else ()) if e.name in tried and not e.is_null)
     values = np.array([value for effect in given for value in effect.values.values()])
     names = tuple(effect.name for effect in given)
-    selection = Selector(Batch(fitted, maps, geometry), tried, start, seed, tell, names, values).select()
-    return _conclude(
-        header, readings, held, selection, vehicle, geometry, seed, bounds_of(tried, selection.chosen.names)
-    )
+    selector = Selector(Batch(fitted, maps, geometry), tried, start, seed, tell, names, values)
+    selection = selector.select()
+    explained = explain(selection, selector)
+    return _conclude(header, readings, held, selection, explained, vehicle, geometry, seed)
 
 
 def _cannot_tell(readings: Readings, header: HeaderLike) -> str:
@@ -151,15 +149,16 @@ def _conclude(
     header: HeaderLike,
     readings: Readings,
     held: NDArray[np.bool_],
-    selection: Selection,
+    library: Selection,
+    explained: Explained | None,
     vehicle: VehicleModel | None,
     geometry: Geometry,
     seed: int,
-    bounds: Floats,
 ) -> Diagnosis:
+    selection = explained.selection if explained else library
     fit = selection.chosen.fit
     maps = fit.predictor.maps
-    every = Predictor(Batch(readings, maps, geometry), selection.chosen.names)
+    every = Predictor(Batch(readings, maps, geometry, kinds=TERMS if explained else ()), selection.chosen.names)
     poses = every.predict(fit.parameters)
     static = Predictor(every.batch, selection.base.names).predict(selection.base.fit.parameters)
     before = static if vehicle is None else _believed_poses(vehicle, readings)
@@ -167,10 +166,16 @@ def _conclude(
     if judged is None:
         why = "there are no repeats among the runs held out or fitted, and so no floor"
         return Diagnosis(Verdict.NOT_IDENTIFIABLE, why, provenance=_provenance(header, readings, seed))
-    rest = dependences(residual_rates(readings, poses), readings.group, seed)
-    effects = named_effects(selection, bounds)
-    significant = _is_significant(judged, rest)
-    verdict, why = _verdict(effects, significant, rest)
+    unexplained = poses
+    if explained is not None:
+        without = explained.without
+        unexplained = Predictor(every.batch, without.names).predict(without.fit.parameters)
+    rest = dependences(residual_rates(readings, unexplained), readings.group, seed)
+    if explained is not None:
+        rest = with_term_first(rest, explained)
+    effects = named_effects(selection, bounds_of(candidates() | term_candidates(), selection.chosen.names))
+    significant = explained is not None or _is_significant(judged, rest)
+    verdict, why = _verdict(effects, significant, rest, explained)
     model = corrected_vehicle(header, geometry, fit, maps)
     found = Diagnosis(
         verdict,
@@ -191,10 +196,11 @@ def _conclude(
                 "rear_deg": float(np.degrees(fit.scatter.offsets[2])),
                 "speed_percent": 100.0 * float(fit.scatter.offsets[3]),
             },
-        },
+        }
+        | ({"empirical_term": described(explained)} if explained else {}),
     )
     found = with_residuals(found, readings, held, before, poses)
-    return with_next_experiment(found, selection, readings, header, seed)
+    return found if explained else with_next_experiment(found, selection, readings, header, seed)
 
 
 def _believed_poses(vehicle: VehicleModel, readings: Readings) -> Floats:
@@ -214,13 +220,19 @@ def _judge(readings: Readings, held: NDArray[np.bool_], before: Floats, after: F
 def _is_significant(judged: _Judged, rest: list[Dependence]) -> bool:
     after = judged.after.rms()
     above = any(after[name] > AT_THE_FLOOR * judged.floor[name] for name in ("position_rms_mm", "heading_rms_deg"))
-    lacks = judged.lack_of_fit is not None and judged.lack_of_fit < _LACK_OF_FIT
+    lacks = judged.lack_of_fit is not None and judged.lack_of_fit < LACK_OF_FIT
     return (above and lacks) or bool(rest)
 
 
-def _verdict(effects: tuple[object, ...], significant: bool, rest: list[Dependence]) -> tuple[Verdict, str]:
+def _verdict(
+    effects: tuple[object, ...], significant: bool, rest: list[Dependence], explained: Explained | None
+) -> tuple[Verdict, str]:
     if significant:
         on = f" it depends on {rest[0].covariate}" if rest else " but on none of the covariates looked at"
+        if explained is not None:
+            on += f", and {explained.term.name} describes it"
+        elif rest and rest[0].covariate == RANDOM_PHASE:
+            on += ", with another phase in every run, which nothing that is planned beforehand can remove"
         return Verdict.UNKNOWN, "structure remains that no effect explains:" + on
     if not effects:
         return Verdict.ADEQUATE, "the model, its maps fitted again, predicts as well as repeats agree with one another"

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from agvbench.diagnosis.empirical_terms import TERMS, EmpiricalTerm
 from agvbench.diagnosis.judging import clustered_covariance
 from agvbench.diagnosis.result import Estimate, NamedEffect
 from agvbench.diagnosis.selection import RIVAL_MARGIN, Selection
-from agvbench.effects import effect_kinds
+from agvbench.effects import Effect, effect_kinds
 from agvbench.types import Floats
 
 _FLAT = 3.0
@@ -21,7 +22,7 @@ def named_effects(selection: Selection, bounds: Floats) -> tuple[NamedEffect, ..
     fit = selection.chosen.fit
     maps = fit.predictor.maps.size
     stderr = np.sqrt(np.diagonal(clustered_covariance(fit, fit.predictor.readings.group)))
-    kinds = effect_kinds()
+    kinds: dict[str, type[Effect]] = {**effect_kinds(), **{term.name: term for term in TERMS}}
     at = 0
     found = []
     for name in selection.chosen.names:
@@ -31,8 +32,8 @@ def named_effects(selection: Selection, bounds: Floats) -> tuple[NamedEffect, ..
             note = _note(value, error, bounds[at], p.scale)
             estimates[p.name] = Estimate(value, error, p.unit, note)
             at += 1
-        if name in selection.base.names:
-            continue  # the vehicle was known to have it
+        if name in selection.base.names or issubclass(kinds[name], EmpiricalTerm):
+            continue  # the vehicle was known to have it; or it is no effect but a description
         rivals = sorted(selection.rivals[name].items(), key=lambda pair: pair[1])
         found.append(
             NamedEffect(

@@ -12,6 +12,12 @@ from agvbench.diagnosis.reading import Readings
 from agvbench.types import Floats
 
 QUANTITIES = ("position_rms_mm", "heading_rms_deg", "delta_s_mm", "delta_heading_deg")
+AT_THE_FLOOR = 1.25
+"""What is left is at the floor up to this times it, or if repeats cannot tell it from the floor."""
+
+LACK_OF_FIT = 0.01
+"""Groups of repeats differ beyond their scatter below this p-value."""
+
 _UNITS = {
     "position_rms_mm": 1e3,
     "heading_rms_deg": 180.0 / np.pi,

@@ -9,17 +9,18 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis.grouping import folds
 from agvbench.diagnosis.reading import Readings
-from agvbench.statistics.multiplicity import holm
 from agvbench.types import Floats
 
 FEATURES = ("speed", "sideways", "turning")
 ALPHA = 1e-3
-"""A dependence is significant below this, after Holm's correction for all that were looked at."""
+"""A dependence is significant below this, corrected for all that were looked at."""
 
 LEAST_SHARE = 0.02
+RANDOM_PHASE = "distance_modulo_period_m"
 _KNOTS = 6
 _STILL_M = 0.01
 _PERIODS_M = np.geomspace(0.1, 1.0, 25)
+_FLIPS = 4999
 
 
 @dataclass(frozen=True)
@@ -39,14 +40,21 @@ class Dependence:
 class Rates:
     """The residual per metre driven, between successive samples.
 
-    ``run`` (n,) its run; ``value`` (n, 3): share of the distance that is missed along and to the left, and turn missed
-    [rad/m]; ``weight`` (n,) metres; ``covariates`` by name (n,).
+    ``run`` (n,) its run; ``value`` (n, 3): share of the distance that is missed along and to the left, and curvature
+    missed [1/m]; ``weight`` (n,) metres; ``covariates`` by name (n,); ``begin`` and ``end`` (n, 3) measured poses.
     """
 
     run: NDArray[np.int64]
     value: Floats
     weight: Floats
     covariates: dict[str, Floats]
+    begin: Floats
+    end: Floats
+
+    @property
+    def middle(self) -> Floats:
+        """Where the vehicle was (n, 2)."""
+        return np.asarray(0.5 * (self.begin + self.end)[:, :2])
 
 
 def residual_rates(readings: Readings, poses: Floats) -> Rates:
@@ -58,22 +66,27 @@ def residual_rates(readings: Readings, poses: Floats) -> Rates:
     measured = np.concatenate([readings.start[:, None], readings.poses], axis=1)
     predicted = np.concatenate([readings.start[:, None], poses], axis=1)
     t_s = np.column_stack([readings.begins_s, readings.t_s])
-    steps_m, steps_p = _body_steps(measured), _body_steps(predicted)
+    # A step goes from one sample that was seen to the next, however many were not between them.
+    last = np.maximum.accumulate(np.where(np.isfinite(measured[..., 0]), np.arange(measured.shape[1]), 0), axis=1)
+    rows = np.arange(len(measured))[:, None]
+    begin, begin_s = measured[rows, last[:, :-1]], t_s[rows, last[:, :-1]]
+    steps_m = _body_steps(begin, measured[:, 1:])
+    steps_p = _body_steps(predicted[rows, last[:, :-1]], predicted[:, 1:])
     length = np.hypot(steps_p[..., 0], steps_p[..., 1])
     use = np.isfinite(steps_m).all(axis=-1) & (length > _STILL_M)
     run = np.nonzero(use)[0]
     size = length[use]
     direction = np.sign(steps_p[..., 0])[use]
-    value = (steps_m - steps_p)[use] / size[:, None]
-    value[:, 0] *= direction
-    middle = 0.5 * (measured[:, 1:] + measured[:, :-1])[use]
-    duration = np.diff(t_s, axis=1)[use]
+    # By the way driven, forward counted positive: a trim of the axles is the same backward as forward.
+    value = (steps_m - steps_p)[use] * (direction / size)[:, None]
+    middle = 0.5 * (measured[:, 1:] + begin)[use]
+    duration = (t_s[:, 1:] - begin_s)[use]
     driven = (np.cumsum(np.where(use, length, 0.0), axis=1) - 0.5 * length)[use]
     covariates = {
         "x_m": middle[:, 0],
         "y_m": middle[:, 1],
         "heading_rad": np.mod(middle[:, 2], 2.0 * np.pi),
-        "time_in_run_s": 0.5 * (t_s[:, 1:] + t_s[:, :-1])[use],
+        "time_in_run_s": 0.5 * (t_s[:, 1:] + begin_s)[use],
         "campaign_time_h": readings.started_h[run],
         "speed_mps": size / duration,
         "direction": direction,
@@ -81,13 +94,13 @@ def residual_rates(readings: Readings, poses: Floats) -> Rates:
         "sideslip": direction * steps_p[..., 1][use] / size,
         "distance_m": driven,
     }
-    return Rates(run, value, size, covariates)
+    return Rates(run, value, size, covariates, begin[use], measured[:, 1:][use])
 
 
-def _body_steps(poses: Floats) -> Floats:
-    """Return successive steps (R, K, 3) in the frame half way between the headings at their ends."""
-    step = np.diff(poses, axis=1)
-    heading = 0.5 * (poses[:, 1:, 2] + poses[:, :-1, 2])
+def _body_steps(begin: Floats, end: Floats) -> Floats:
+    """Return steps (R, K, 3) in the frame half way between the headings at their ends."""
+    step = end - begin
+    heading = 0.5 * (begin[..., 2] + end[..., 2])
     cos, sin = np.cos(heading), np.sin(heading)
     return np.stack(
         [cos * step[..., 0] + sin * step[..., 1], cos * step[..., 1] - sin * step[..., 0], step[..., 2]], -1
@@ -97,31 +110,36 @@ def _body_steps(poses: Floats) -> Floats:
 def dependences(rates: Rates, group: NDArray[np.int64], seed: int) -> list[Dependence]:
     """Return what the residual significantly depends on, the largest share first.
 
-    For each feature and covariate: least squares on a smooth curve, its Wald statistic with the run as unit (errors
-    within a run may be correlated as they like), and the share of variance predicted in groups of runs left out.
-    Distance enters modulo a period, the best of several, each of them counted as a try.
+    For each feature and covariate: least squares on a smooth curve, its score statistic with the group of runs as unit
+    (errors within may be correlated as they like), and the share of variance predicted in groups left out.
+    Distance enters modulo a period, the best of several. p-values count how often the largest of all
+    statistics that were looked at is as large when each group's scores have their sign by chance (wild bootstrap
+    by groups; Westfall and Young 1993 for having looked at many): asymptotic ones are too small where groups are few.
     """
-    fold = folds(group, 5, seed)
-    found: list[Dependence] = []
-    tried: list[float] = []
+    fold = folds(group, 5, seed)[rates.run]
+    _, unit = np.unique(group[rates.run], return_inverse=True)
+    rng = np.random.default_rng([0x5C0E, seed])
+    signs = np.asarray(rng.integers(0, 2, (_FLIPS, int(unit.max()) + 1)) * 2 - 1, dtype=np.float64)
+    most = np.full(_FLIPS, -np.inf)
+    found: list[tuple[str, str, float, float]] = []
     for name, covariate in rates.covariates.items():
         bases = [_basis(covariate, name)] if name != "distance_m" else [_waves(covariate, p) for p in _PERIODS_M]
         bases = [basis for basis in bases if basis.shape[1]]
+        label = name if name != "distance_m" else RANDOM_PHASE
         for k, feature in enumerate(FEATURES):
-            p_values = [_wald(basis, rates.value[:, k], rates.weight, rates.run) for basis in bases]
-            if not bases:
-                continue
-            best = int(np.argmin(p_values))
-            p_value = min(1.0, p_values[best] * len(bases))
-            share = _share(bases[best], rates.value[:, k], rates.weight, fold[rates.run])
-            label = name if name != "distance_m" else "distance_modulo_period_m"
-            found.append(Dependence(label, feature, p_value, share))
-            tried.append(p_value)
-    corrected = holm(tried)
+            value = rates.value[:, k]
+            best, strongest = None, -np.inf
+            for basis in bases:
+                strength, by_chance = _strength(basis, value, rates.weight, unit, signs)
+                np.maximum(most, by_chance, out=most)
+                if strength > strongest:
+                    best, strongest = basis, strength
+            if best is not None:
+                found.append((label, feature, strongest, _share(best, value, rates.weight, fold)))
     significant = [
-        Dependence(d.covariate, d.feature, p, d.share)
-        for d, p in zip(found, corrected, strict=True)
-        if p < ALPHA and d.share > LEAST_SHARE
+        Dependence(label, feature, p_value, share)
+        for label, feature, strength, share in found
+        if share > LEAST_SHARE and (p_value := (1.0 + np.count_nonzero(most >= strength)) / (_FLIPS + 1.0)) < ALPHA
     ]
     return sorted(significant, key=lambda d: -d.share)
 
@@ -150,23 +168,21 @@ def _centred(basis: Floats, weight: Floats) -> Floats:
     return np.asarray(basis - np.average(basis, axis=0, weights=weight))
 
 
-def _wald(basis: Floats, value: Floats, weight: Floats, run: NDArray[np.int64]) -> float:
+def _strength(
+    basis: Floats, value: Floats, weight: Floats, unit: NDArray[np.int64], signs: Floats
+) -> tuple[float, Floats]:
+    """Return how strong a dependence is, −log p by χ², and the same for groups' scores with the `signs` given."""
     from scipy import stats
 
-    design = _centred(basis, weight)
     centred = value - np.average(value, weights=weight)
-    matrix = design.T @ (design * weight[:, None])
-    coefficient = np.linalg.lstsq(matrix, design.T @ (weight * centred), rcond=1e-10)[0]
-    rest = centred - design @ coefficient
-    runs = int(run.max()) + 1
-    scores = np.zeros((runs, design.shape[1]))
-    np.add.at(scores, run, design * (weight * rest)[:, None])
-    present = len(np.unique(run))
-    meat = scores.T @ scores * present / max(present - design.shape[1] - 1, 1)
-    pull = matrix @ coefficient
-    q = design.shape[1]
-    statistic = float(pull @ np.linalg.pinv(meat, hermitian=True) @ pull) / q
-    return float(stats.f.sf(statistic, q, max(present - q - 1, 1)))
+    scores = np.zeros((signs.shape[1], basis.shape[1]))
+    np.add.at(scores, unit, _centred(basis, weight) * (weight * centred)[:, None])
+    size, turn = np.linalg.eigh(scores.T @ scores)
+    kept = size > 1e-9 * max(size[-1], 1e-300)
+    white = scores @ (turn[:, kept] / np.sqrt(size[kept]))
+    dof = int(np.count_nonzero(kept))
+    own = -stats.chi2.logsf(float(np.sum(white.sum(axis=0) ** 2)), dof)
+    return float(own), np.asarray(-stats.chi2.logsf(np.sum((signs @ white) ** 2, axis=1), dof))
 
 
 def _share(basis: Floats, value: Floats, weight: Floats, fold: NDArray[np.int64]) -> float:

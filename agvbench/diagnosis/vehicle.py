@@ -45,6 +45,7 @@ def _effects(fitted: Fit) -> tuple[Effect, ...]:
     return tuple(
         kinds[name](**{key.partition(".")[2]: v for key, v in values.items() if key.partition(".")[0] == name})
         for name in fitted.predictor.effects
+        if name in kinds  # an empirical term is not a cause, and no part of a vehicle
     )
 
 

@@ -1,0 +1,192 @@
+"""An empirical term for what no effect of the library explains, beside the effects that stand next to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.diagnosis.candidates import Candidate, candidate
+from agvbench.diagnosis.empirical_screen import Start, screen, steering
+from agvbench.diagnosis.empirical_terms import TERMS, EmpiricalTerm
+from agvbench.diagnosis.prediction import Batch
+from agvbench.diagnosis.residuals import AT_THE_FLOOR, LACK_OF_FIT, floor, lack_of_fit, misses
+from agvbench.diagnosis.selection import Scored, Selection, Selector
+from agvbench.diagnosis.structure import Dependence, residual_rates
+from agvbench.types import Floats
+
+_MOST_STARTS = 3
+_LEAST_PROMISE = 4.0
+_LEAST_OF_BEST = 0.1
+_MOST_RETRIED = 3
+_FLIPS = 9999
+
+
+@dataclass(frozen=True)
+class Explained:
+    """A selection with an empirical term.
+
+    ``selection.chosen`` holds the term beside the effects that predict better with it; ``without`` is the model of
+    these effects alone. ``gain`` is the term's, in cross-validated minus two log likelihood; ``p_value`` that of
+    as great a gain if it helped each group of runs as often as not.
+    """
+
+    selection: Selection
+    term: type[EmpiricalTerm]
+    without: Scored
+    gain: float
+    p_value: float
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The term's parameters by name."""
+        own = self.selection.chosen.fit.effect_values()
+        return {p.name: own[f"{self.term.name}.{p.name}"] for p in self.term.parameters()}
+
+
+def explain(selection: Selection, selector: Selector) -> Explained | None:
+    """Return the best empirical term, with the effects that earn their place beside it; None if no term earns its own.
+
+    Terms are tried beside the effects chosen and beside none: an effect that only mimics the unknown cause loses its
+    place as soon as the term is there.
+
+    Parameters
+    ----------
+    selection
+        What was chosen from the library.
+    selector
+        Who chose it.
+    """
+    batch = selector.batch
+    wider = Selector(
+        Batch(batch.readings, batch.maps, batch.geometry, kinds=TERMS),
+        dict(selector.candidates),
+        selector.start,
+        selector.seed,
+        selector.tell,
+        selector.given,
+        selector.given_values,
+    )
+    starts = promising(wider, selection.chosen)
+    if not starts and not _lacks(selection.chosen):
+        return None
+    found = [_best_term(wider, selection.chosen, starts)]
+    if selection.chosen.names != selection.base.names:
+        found.append(_best_term(wider, selection.base, promising(wider, selection.base)))
+    models = [_settled(wider, selection, *pair) for pair in found if pair is not None]
+    models = [model for model in models if model[0].total < selection.chosen.total - selector.least_gain]
+    if not models:
+        return None
+    chosen, term, gains = min(models, key=lambda model: model[0].total)
+    without = wider.shrunk(selection.base, chosen, term.name)
+    gain = without.loss - chosen.loss
+    rivals = {name: selection.rivals.get(name, {}) for name in gains}
+    tried = selection.tried + wider.tried
+    rejected = {n: g for n, g in selection.rejected.items() if n not in chosen.names}
+    selector.tell(f"{' + '.join(chosen.names)}: an empirical term gains {gain.sum():.0f}")
+    return Explained(
+        Selection(selection.base, chosen, rivals, gains, rejected, tried),
+        term,
+        without,
+        float(gain.sum()),
+        gain_p_value(gain, batch.readings.group, selector.seed),
+    )
+
+
+def promising(wider: Selector, root: Scored) -> list[Start]:
+    """Return the terms that promise to describe what `root` misses, the best first."""
+    batch = wider.batch
+    poses = root.fit.predictor.predict(root.fit.parameters)
+    rates = residual_rates(batch.readings, poses)
+    stands = steering(batch, root.fit.parameters, rates)
+    starts = screen(rates, stands, batch.geometry, batch.readings.group, wider.seed)
+    least = max(_LEAST_PROMISE, _LEAST_OF_BEST * starts[0].gain) if starts else 0.0
+    return [start for start in starts if start.gain > least][:_MOST_STARTS]
+
+
+def _lacks(model: Scored) -> bool:
+    """Whether what the model misses is above the scatter of repeats, and differs between groups beyond it."""
+    predictor = model.fit.predictor
+    missed = misses(predictor.readings, predictor.predict(model.fit.parameters))
+    least, group = floor(missed, predictor.readings.group), predictor.readings.group
+    p_value = lack_of_fit(missed, group)
+    if least is None or p_value is None or p_value >= LACK_OF_FIT:
+        return False
+    return any(missed.rms()[name] > AT_THE_FLOOR * least[name] for name in ("position_rms_mm", "heading_rms_deg"))
+
+
+def _best_term(wider: Selector, root: Scored, starts: list[Start]) -> tuple[Scored, type[EmpiricalTerm]] | None:
+    best: tuple[Scored, type[EmpiricalTerm]] | None = None
+    for start in starts:
+        kind = candidate(start.term)
+        values = np.clip(start.values, kind.bounds[:, 0], kind.bounds[:, 1])
+        wider.candidates[start.term.name] = replace(kind, starts=values[None, :])
+        try:
+            offer = wider.grown(root, start.term.name)
+        except np.linalg.LinAlgError:
+            continue  # a shape that runs away to where nothing can be predicted describes nothing
+        if wider.earns(root, offer) and (best is None or offer.total < best[0].total):
+            best = offer, start.term
+    return best
+
+
+def _settled(
+    wider: Selector, selection: Selection, current: Scored, term: type[EmpiricalTerm]
+) -> tuple[Scored, type[EmpiricalTerm], dict[str, float]]:
+    """Return the model with the library's effects that earn their place beside the term, and their gains."""
+    base = selection.base
+    again = [n for n in selection.chosen.names if n not in current.names]
+    again += sorted(selection.rejected, key=lambda n: -selection.rejected[n])[:_MOST_RETRIED]
+    for name in again:
+        offer = wider.grown(current, name)
+        if name not in current.names and wider.earns(current, offer):
+            current = offer
+    while True:
+        found = [n for n in current.names if n not in {*base.names, term.name}]
+        smaller = {name: wider.shrunk(base, current, name) for name in found}
+        gains = {name: model.total - current.total for name, model in smaller.items()}
+        useless = [name for name, model in smaller.items() if not wider.earns(model, current)]
+        if not useless:
+            return current, term, gains
+        current = smaller[min(useless, key=lambda name: gains[name])]
+
+
+def gain_p_value(gain: Floats, group: NDArray[np.int64], seed: int) -> float:
+    """Return how often the total gain would be as great if each group's gain (R,) had its sign by chance."""
+    _, index = np.unique(group, return_inverse=True)
+    by_group = np.bincount(index, weights=gain)
+    rng = np.random.default_rng([0xF119, seed])
+    signs = rng.integers(0, 2, (_FLIPS, len(by_group))) * 2.0 - 1.0
+    return float((1.0 + np.count_nonzero(signs @ by_group >= by_group.sum())) / (_FLIPS + 1.0))
+
+
+def described(explained: Explained) -> dict[str, object]:
+    """Return what is said of an empirical term in the diagnosis."""
+    return {
+        "name": explained.term.name,
+        "covariate": explained.term.covariates[0],
+        "through": explained.term.through,
+        "parameters": explained.values,
+        "gain": explained.gain,
+        "p_value": explained.p_value,
+    }
+
+
+def term_candidates() -> dict[str, Candidate]:
+    """Return every term by name, as effects are tried."""
+    return {term.name: candidate(term) for term in TERMS}
+
+
+def with_term_first(rest: list[Dependence], explained: Explained) -> list[Dependence]:
+    """Return the dependences with what the term depends on first.
+
+    Of covariates that the term leaves open (along x or along y) it is the one that smooth curves find stronger.
+    """
+    own = [d for d in rest if d.covariate in explained.term.covariates]
+    if own:
+        first = replace(own[0], p_value=min(own[0].p_value, explained.p_value))
+        return [first, *(d for d in rest if d is not own[0])]
+    loss = explained.without.fit.residual
+    share = 1.0 - float(np.sum(explained.selection.chosen.fit.residual**2) / max(np.sum(loss**2), 1e-300))
+    return [Dependence(explained.term.covariates[0], explained.term.through, explained.p_value, share), *rest]
