@@ -9,7 +9,7 @@
 `corrected_plan` changes steering and durations until the model comes to rest on the target.
 """
 
-from agvbench.planning.corrected import CorrectedPlan, Correction, corrected_plan, depends_on_time
+from agvbench.planning.corrected import NOTHING_LEFT, CorrectedPlan, Correction, corrected_plan, depends_on_time
 from agvbench.planning.planner import Plan, place, plan
 from agvbench.planning.reading import list_trajectories, load_trajectory, trajectory_from_table
 from agvbench.planning.resting import Departure, Miss
@@ -18,6 +18,7 @@ from agvbench.planning.trajectory import Trajectory
 from agvbench.planning.workspace import Workspace
 
 __all__ = [
+    "NOTHING_LEFT",
     "CorrectedPlan",
     "Correction",
     "Departure",

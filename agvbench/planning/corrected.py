@@ -19,6 +19,8 @@ from agvbench.planning.trajectory import Trajectory
 from agvbench.planning.workspace import Workspace
 from agvbench.types import Commands, Floats, Pose
 
+NOTHING_LEFT = Pose(0.0, 0.0, 0.0)
+
 
 @dataclass(frozen=True)
 class Correction:
@@ -29,7 +31,7 @@ class Correction:
     uncorrected
         Where the plan of the static maps alone would end.
     remaining
-        Where the corrected plan ends.
+        Where the corrected plan ends. Both include what the model is known to miss, if that was given.
     beyond_camera
         Where it ends if the camera's own effects are left out: a camera that measures a wrong scale, or markers that
         sit elsewhere than the vehicle file says, make the vehicle miss where they see it hit. None where the model
@@ -61,6 +63,7 @@ def corrected_plan(
     workspace: Workspace | None = None,
     departure: Departure | None = None,
     start: Pose | None = None,
+    remainder: Pose = NOTHING_LEFT,
 ) -> CorrectedPlan:
     """Return timed commands with which `model`, effects and all, comes to rest on the target.
 
@@ -76,6 +79,9 @@ def corrected_plan(
     departure
         When and where the run begins; its start pose gives way to `start` or, with a workspace, to the one that is
         chosen there.
+    remainder
+        What the model is known to miss on this trajectory: the measured end pose in the frame of the predicted one. The
+        aim is moved, so that with it the vehicle ends on the target.
 
     Raises
     ------
@@ -93,14 +99,17 @@ def corrected_plan(
     def ends(several: Sequence[Sequence[Leg]]) -> Floats:
         return rest_poses(model, [commands_of(each, model) for each in several], departure)
 
-    shot = shoot(legs, model.front, model.rear, made.target, ends)
+    aim = made.target.compose(NOTHING_LEFT.relative_to(remainder))
+    shot = shoot(legs, model.front, model.rear, aim, ends)
     commands = commands_of(shot.legs, model)
     path = coasting_path(model, commands, departure)
     swept = axles_swept(path, model.geometry)
     if workspace is not None:
         check_fits(swept, departure.start, workspace, where=trajectory.name)
-    before, after = (Miss(Pose(*end), made.target) for end in ends([legs, shot.legs]).tolist())
-    correction = Correction(before, after, _beyond_camera(model, commands, departure, made.target), shot.at_limits)
+    before, after = (Miss(Pose(*end).compose(remainder), made.target) for end in ends([legs, shot.legs]).tolist())
+    truly = _beyond_camera(model, commands, departure)
+    beyond = None if truly is None else Miss(truly.compose(remainder), made.target)
+    correction = Correction(before, after, beyond, shot.at_limits)
     width, height = np.ptp(swept[:, 1:], axis=0).tolist()
     return replace(
         _plain(made),
@@ -125,9 +134,9 @@ def _plain(made: Plan) -> CorrectedPlan:
     return CorrectedPlan(**vars(made))
 
 
-def _beyond_camera(model: VehicleModel, commands: Commands, departure: Departure, target: Pose) -> Miss | None:
+def _beyond_camera(model: VehicleModel, commands: Commands, departure: Departure) -> Pose | None:
     kept = tuple(effect for effect in model.effects if effect.stage is not Stage.CAMERA)
     if len(kept) == len(model.effects):
         return None
     end = rest_poses(replace(model, effects=kept), [commands], departure)[0]
-    return Miss(Pose(*end.tolist()), target)
+    return Pose(*end.tolist())

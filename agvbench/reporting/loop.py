@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +31,7 @@ _NOTE = (
     "Bias: mean of the signed errors; sd: standard deviation of one repeat. The last column tests the corrected bias "
     "against ± 1 sd at the 5 % level: within, beyond, or too few repeats to say."
 )
+_LEARNED = ("along mm", "across mm", "heading deg")
 _CAPTION = "Before and after: bias of Δs [mm] and Δδ [deg]"
 
 
@@ -133,9 +135,18 @@ def _headline(loop: Loop, rows: Sequence[BeforeAfter]) -> Iterator[str]:
         f"Of {total} corrected biases {found[Bias.WITHIN]} are within ± 1 standard deviation of a repeat, "
         f"{found[Bias.BEYOND]} beyond; of {found[Bias.UNKNOWN]} the repeats cannot say."
     )
+    moved = [entry["remainder"] for entry in loop.plans.values() if any(entry.get("remainder", {}).values())]
+    if moved:
+        farthest = max(math.hypot(left["along_mm"], left["across_mm"]) for left in moved)
+        turned = max(abs(left["heading_deg"]) for left in moved)
+        yield (
+            f"Not all of it is the model's merit: on {len(moved)} trajectories the aim was moved, by up to "
+            f"{farthest:.1f} mm and {turned:.2f} deg, by what the model missed there in the first session "
+            "(--model-only leaves that out)."
+        )
     verdict = str(loop.diagnosis.get("verdict"))
     if verdict not in {"NAMED", "ADEQUATE"}:
-        yield f"The diagnosis was {plain(verdict)}: only what it named is corrected."
+        yield f"The diagnosis was {plain(verdict)}: what it did not name is not corrected but where it showed before."
 
 
 def _diagnosis(content: Mapping[str, Any]) -> Iterator[Block]:
@@ -165,17 +176,20 @@ def _plans(plans: Mapping[str, Any]) -> Table:
             Column(f"{key}_across_mm", "across mm", 1, group=group),
         ]
         columns += [Column(f"{key}_delta_heading_deg", "Δδ deg", 2, group=group)]
+    columns += [Column(f"learned_{c.split()[0]}_{c.split()[1]}", c, 2, group="missed before") for c in _LEARNED]
     fields = ("delta_s_mm", "across_mm", "delta_heading_deg")
+    learned = ("along_mm", "across_mm", "heading_deg")
     rows: list[list[Value]] = [
-        [name, *(entry[key][field] for key in groups for field in fields)]
+        [name, *(entry[key][field] for key in groups for field in fields), *(entry["remainder"][f] for f in learned)]
         for name, entry in plans.items()
         if "remaining" in entry
     ]
     return Table(
         "plans",
-        "Where the corrected model ends, driven by its static maps alone and by corrected plans.",
+        "Where the vehicle should end, driven by the corrected model's static maps alone and by corrected plans.",
         columns,
         rows,
+        note="Missed before: what the corrected model missed in the first session, taken off the aim.",
     )
 
 

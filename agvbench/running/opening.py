@@ -22,6 +22,7 @@ from agvbench.running.calibrating import calibrate_campaign
 from agvbench.running.campaign_time import CampaignTime, SimulatedCampaignTime, WallCampaignTime
 from agvbench.running.directory import choose_directory
 from agvbench.running.provenance import provenance
+from agvbench.running.remainders import read_remainders
 from agvbench.running.session import BenchSession
 from agvbench.running.settings import SETTINGS_FILE, BenchSettings, settings_for_resume
 from agvbench.running.vehicles import uncalibrated_vehicle
@@ -44,11 +45,11 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
     directory = choose_directory(out, resume=resume)
     settings = _settings(given, directory, resume=resume)
     models = _known_models(settings)
-    workspace = Workspace.parse(settings.workspace)
+    workspace, remainders = Workspace.parse(settings.workspace), read_remainders(settings.remainders)
     if dry_run:
         check_specs(settings.agv, settings.mocap)
         models.setdefault("calibrated", thesis_vehicle())
-        yield BenchSession(directory, models=models, workspace=workspace, bench=None)
+        yield BenchSession(directory, models=models, workspace=workspace, bench=None, remainders=remainders)
         return
     with open_rig(
         agv=settings.agv,
@@ -64,7 +65,7 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
         header = _header(directory.name, models["uncalibrated"], link)
         writer = _writer(directory, settings, header, resume=resume, simulated=link.identity().simulated)
         bench = _bench(settings, models, link, writer)
-        session = BenchSession(directory, models=models, workspace=workspace, bench=bench)
+        session = BenchSession(directory, models=models, workspace=workspace, bench=bench, remainders=remainders)
         session.notices = _notices(settings, given, resume=resume, resumed=bool(writer.finished_ids), where=directory)
         yield session
 

@@ -22,6 +22,11 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
         {"metavar": "FILE"},
         "vehicle.toml with effects, for the condition corrected (default: not driven)",
     ),
+    (
+        "--remainders",
+        {"metavar": "FILE"},
+        "what the corrected model still misses, by trajectory (agvbench loop writes it)",
+    ),
     ("--maps", {"choices": ("default", "thesis")}, "maps to calibrate: default, or the thesis' line and cubic"),
     ("--repeats", {"type": int, "metavar": "N"}, "repeats of each trajectory and condition (default: 10)"),
     (

@@ -7,28 +7,45 @@ from pathlib import Path
 
 from agvbench.errors import PlanError
 from agvbench.model import VehicleModel
-from agvbench.planning import Departure, Plan, Trajectory, Workspace, corrected_plan, depends_on_time, plan
+from agvbench.planning import (
+    NOTHING_LEFT,
+    Departure,
+    Plan,
+    Trajectory,
+    Workspace,
+    corrected_plan,
+    depends_on_time,
+    plan,
+)
 from agvbench.running.bench import Bench
 from agvbench.running.constant import Shares
 from agvbench.running.driver import Driver, NotDrivenError
 from agvbench.running.records import DriveOrder
-from agvbench.types import Run
+from agvbench.running.remainders import NO_REMAINDERS
+from agvbench.types import Pose, Run
 
 
 class BenchSession:
     """A session that drives with `bench` or, where that is None, a dry run that plans everything and drives nothing.
 
-    ``models`` are those known before anything is driven, by condition; a dry run needs one of each.
+    ``models`` are those known before anything is driven, by condition; a dry run needs one of each. ``remainders`` is
+    what the corrected one still misses, by trajectory.
     """
 
     def __init__(
-        self, directory: Path, *, models: Mapping[str, VehicleModel], workspace: Workspace, bench: Bench | None
+        self,
+        directory: Path,
+        *,
+        models: Mapping[str, VehicleModel],
+        workspace: Workspace,
+        bench: Bench | None,
+        remainders: Mapping[str, Pose] = NO_REMAINDERS,
     ) -> None:
         self.directory, self.workspace = directory, workspace
         self.nominal = models["uncalibrated"]
         self.shares = Shares.of_model(self.nominal)
         self.planned: list[tuple[DriveOrder, Plan]] = []
-        self._models, self._bench = models, bench
+        self._models, self._bench, self._remainders = models, bench, remainders
         self._plans: dict[tuple[Trajectory, str], Plan] = {}
         self._undrivable: dict[tuple[Trajectory, str], PlanError] = {}
         self._hourly: set[tuple[Trajectory, str]] = set()
@@ -74,7 +91,8 @@ class BenchSession:
         if condition != "corrected":
             return plan(trajectory, model, workspace=self.workspace)
         departure = Departure() if self._bench is None else self._bench.departure
-        made = corrected_plan(trajectory, model, workspace=self.workspace, departure=departure)
+        missed = self._remainders.get(trajectory.name, NOTHING_LEFT)
+        made = corrected_plan(trajectory, model, workspace=self.workspace, departure=departure, remainder=missed)
         if depends_on_time(made, model, departure):
             self._hourly.add((trajectory, condition))
         return made

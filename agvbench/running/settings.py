@@ -26,7 +26,8 @@ class BenchSettings:
 
     ``agv``, ``mocap`` and ``plant`` name adapters and the simulated plant; ``vehicle`` and ``calibration`` are
     vehicle files ("" for the shipped nominal vehicle, and for calibrating in this session), ``corrected`` the one with
-    the effects that a diagnosis found ("" for none: the condition is not driven); ``repeats`` 0 means what each
+    the effects that a diagnosis found ("" for none: the condition is not driven) and ``remainders``
+    what that model still misses; ``repeats`` 0 means what each
     benchmark declares; ``order`` is one of `ORDERS`; ``full`` drives every pulse of the thesis.
     """
 
@@ -36,6 +37,7 @@ class BenchSettings:
     vehicle: str = ""
     calibration: str = ""
     corrected: str = ""
+    remainders: str = ""
     maps: str = "default"
     repeats: int = 0
     order: str = "interleaved"

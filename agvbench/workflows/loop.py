@@ -16,9 +16,21 @@ from typing import TYPE_CHECKING, Any
 
 from agvbench.errors import AgvbenchError, FileError, FitError
 from agvbench.model import VehicleModel
+from agvbench.running.remainders import read_remainders
 from agvbench.running.settings import BenchSettings
 from agvbench.workflows.loop_plans import plans_of
-from agvbench.workflows.loop_settings import AFTER, BEFORE, DIAGNOSIS, PLANS, SETTINGS, VEHICLE, opened, write
+from agvbench.workflows.loop_settings import (
+    AFTER,
+    BEFORE,
+    DIAGNOSIS,
+    MODEL_ONLY,
+    PLANS,
+    REMAINDERS,
+    SETTINGS,
+    VEHICLE,
+    opened,
+    write,
+)
 
 if TYPE_CHECKING:
     from agvbench.diagnosis import Diagnosis
@@ -94,16 +106,18 @@ def run_loop(given: Mapping[str, Any], *, out: str | None, resume: bool, tell: T
     tell(f"2/4 diagnosing → {directory / DIAGNOSIS}, {VEHICLE}")
     diagnosis = _diagnosed(directory, settings.seed, tell)
     tell(f"3/4 planning with what was found → {directory / PLANS}")
-    plans = _planned(directory, settings, tell)
+    learned = "" if settings.remainders == MODEL_ONLY else _learned(directory)
+    plans = _planned(directory, settings, learned, tell)
     tell(f"4/4 driving uncalibrated, calibrated and corrected in turns → {directory / AFTER}")
     models = {"calibration": str(directory / BEFORE / VEHICLE), "corrected": str(directory / VEHICLE)}
+    models |= {"remainders": learned}
     _bench(directory / AFTER, SHOWING, settings, models, tell)
     return Loop(directory, settings, diagnosis, plans)
 
 
 def _first_bench(directory: Path, settings: BenchSettings, tell: Tell) -> None:
     try:
-        _bench(directory / BEFORE, EXCITING, settings, {}, tell)
+        _bench(directory / BEFORE, EXCITING, settings, {"remainders": ""}, tell)
     except AgvbenchError:
         # What could not begin leaves nothing behind that would have to be resumed.
         if not (directory / BEFORE / "campaign.toml").exists():
@@ -179,11 +193,23 @@ def _in_words(found: Diagnosis) -> list[str]:
     return lines
 
 
-def _planned(directory: Path, settings: BenchSettings, tell: Tell) -> dict[str, Any]:
+def _learned(directory: Path) -> str:
+    """Return the file of what the corrected model missed in the first session, after writing it unless it is there."""
+    from agvbench.campaign import Campaign
+    from agvbench.workflows.loop_remainders import remainders
+
+    path = directory / REMAINDERS
+    if not path.exists():
+        content = remainders(Campaign.open(directory / BEFORE), VehicleModel.load(directory / VEHICLE))
+        write(path, json.dumps({"schema": 1, "remainders": content}, indent=2, allow_nan=False) + "\n")
+    return str(path)
+
+
+def _planned(directory: Path, settings: BenchSettings, learned: str, tell: Tell) -> dict[str, Any]:
     """Return what corrected plans make up for, after writing it, unless it is there already."""
     path = directory / PLANS
     if not path.exists():
-        content = plans_of(VehicleModel.load(directory / VEHICLE), settings.workspace)
+        content = plans_of(VehicleModel.load(directory / VEHICLE), settings.workspace, read_remainders(learned))
         write(path, json.dumps({"schema": 1, "plans": content}, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
     plans: dict[str, Any] = _read(path)["plans"]
     for name, entry in plans.items():

@@ -3,36 +3,45 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from agvbench.errors import PlanError
 from agvbench.model import VehicleModel
-from agvbench.planning import Correction, Departure, Miss, Workspace, corrected_plan, load_trajectory
+from agvbench.planning import NOTHING_LEFT, Correction, Departure, Miss, Workspace, corrected_plan, load_trajectory
 from agvbench.running.drive import DEFAULT_TIMING
+from agvbench.running.remainders import NO_REMAINDERS
+from agvbench.types import Pose
 
 THE_EIGHT = tuple(str(number) for number in range(1, 9))
 _NOTICEABLE_M, _NOTICEABLE_RAD = 5e-4, math.radians(0.05)
 
 
-def plans_of(model: VehicleModel, workspace: str, names: Sequence[str] = THE_EIGHT) -> dict[str, dict[str, Any]]:
+def plans_of(
+    model: VehicleModel,
+    workspace: str,
+    remainders: Mapping[str, Pose] = NO_REMAINDERS,
+    names: Sequence[str] = THE_EIGHT,
+) -> dict[str, dict[str, Any]]:
     """Return, by trajectory, where the model would end uncorrected and ends corrected, and what to say about it.
 
     Keys: ``uncorrected``, ``remaining`` and, if the model has effects of the camera, ``beyond_camera``, each with
-    ``delta_s_mm``, ``delta_heading_deg``, ``along_mm``, ``across_mm``; ``said``, sentences; or ``problem`` where it
+    ``delta_s_mm``, ``delta_heading_deg``, ``along_mm``, ``across_mm``; ``remainder``, what the model
+    missed before, in the frame of its end pose; ``said``, sentences; or ``problem`` where it
     cannot be driven.
     """
     floor = Workspace.parse(workspace)
     departure = Departure(steered_s=DEFAULT_TIMING.rest_before_s)
     out: dict[str, dict[str, Any]] = {}
     for name in names:
+        left = remainders.get(name, NOTHING_LEFT)
         try:
-            made = corrected_plan(load_trajectory(name), model, workspace=floor, departure=departure)
+            made = corrected_plan(load_trajectory(name), model, workspace=floor, departure=departure, remainder=left)
         except PlanError as error:
             out[name] = {"problem": str(error)}
             continue
         if made.correction is not None:
-            out[name] = _entry(made.correction)
+            out[name] = _entry(made.correction) | {"remainder": _pose(left)}
     return out
 
 
@@ -54,6 +63,11 @@ def _numbers(miss: Miss) -> dict[str, float]:
         "along_mm": round(1e3 * miss.along_m, 3),
         "across_mm": round(1e3 * miss.across_m, 3),
     }
+
+
+def _pose(pose: Pose) -> dict[str, float]:
+    heading_deg = round(math.degrees(pose.heading_rad), 4)
+    return {"along_mm": round(1e3 * pose.x_m, 3), "across_mm": round(1e3 * pose.y_m, 3), "heading_deg": heading_deg}
 
 
 def _said(correction: Correction) -> list[str]:

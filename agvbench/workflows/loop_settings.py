@@ -18,6 +18,7 @@ from agvbench.running.settings import BenchSettings, settings_for_resume
 
 SETTINGS = "loop.toml"
 BEFORE, DIAGNOSIS, VEHICLE, PLANS, AFTER = "before", "diagnosis.json", "vehicle.toml", "plans.json", "after"
+REMAINDERS, MODEL_ONLY = "remainders.json", "none"
 
 
 def opened(given: Mapping[str, Any], out: str | None, *, resume: bool) -> tuple[Path, BenchSettings]:

@@ -86,6 +86,20 @@ def test_a_plant_with_hidden_effects_ends_on_target(spec):
     assert np.abs(left).max() < 0.1 * np.abs(off).max()
 
 
+@pytest.mark.parametrize("name", ["1", "4", "6"])
+def test_what_a_model_is_known_to_miss_is_taken_off_its_aim(name):
+    truth, trajectory = hidden("lateral_slip_and_cornering_speed_loss"), load_trajectory(name)
+    model = true_model(truth).with_effects(effect_kinds()["lateral_slip"]())  # all but the slip
+    first = corrected_plan(trajectory, model, start=START)
+    end = driven(truth, first.commands, START)
+    missed = end.relative_to(Pose(*first.expected[-1, 1:]))
+    made = corrected_plan(trajectory, model, start=START, remainder=missed)
+    left = miss(driven(truth, made.commands, START), made.target)
+    # To first order: of a decimetre some millimetres stay.
+    assert np.abs(left).max() < max(0.15 * np.abs(miss(end, made.target)).max(), 0.1)
+    assert made.correction.remaining.distance_m < 1e-4
+
+
 @pytest.mark.parametrize("name", ["u_turn", "parallel_park", "s_curve", "figure_eight", "crab"])
 def test_paths_of_several_legs(name):
     truth = hidden("speed_lag_and_cornering_speed_loss", 5)
