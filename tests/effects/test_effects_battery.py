@@ -40,6 +40,7 @@ CONTRACT = {
     "lateral_slip": ["gradient"],
     "wheel_diameter_mismatch": ["curvature_per_m"],
     "axle_speed_mismatch": ["ratio"],
+    "axle_overrun": ["excess"],
     "floor_tilt": ["drift_mps", "direction_rad"],
     "mocap_latency": ["latency_s"],
     "marker_offset": ["forward_m", "left_m"],

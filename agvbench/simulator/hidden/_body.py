@@ -18,6 +18,7 @@ from agvbench.simulator.hidden.constants import (
     LOSS_TANGENT,
     NAP,
     NAP_DIRECTION,
+    OVERRUN,
     PATCH_LOSS,
     PATCH_RADIUS,
     PATCH_X,
@@ -66,6 +67,14 @@ def _grip(p: Floats, x: float, y: float, heading: float, front: float, rear: flo
 
 
 @njit(cache=True)
+def _shared(p: Floats, front: float, rear: float) -> float:
+    """Return the body's share of the wheel speed for both axles' shares: their mean, or nearer to the slower one."""
+    stiff = 1.0 + p[OVERRUN]
+    heavier, lighter = (front, rear) if front < rear else (rear, front)
+    return (stiff * heavier + lighter) / (stiff + 1.0)
+
+
+@njit(cache=True)
 def motion(
     p: Floats, x: float, y: float, heading: float, rolled: float, front: float, rear: float, speed: float
 ) -> tuple[float, float, float, float]:
@@ -77,7 +86,7 @@ def motion(
     lf, lr = p[FRONT_AXLE], p[REAR_AXLE]
     tan_front, tan_rear = math.tan(front), math.tan(rear)
     left_of_speed = _grip(p, x, y, heading, front, rear)
-    ahead = 0.5 * speed * left_of_speed * (math.cos(front) + (1.0 + p[AXLE_RATIO]) * math.cos(rear))
+    ahead = speed * left_of_speed * _shared(p, math.cos(front), (1.0 + p[AXLE_RATIO]) * math.cos(rear))
     aside = ahead * (lr * tan_front + lf * tan_rear) / (lf + lr)
     path_speed = math.copysign(math.hypot(ahead, aside), ahead)
     fast = abs(path_speed)

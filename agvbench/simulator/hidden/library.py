@@ -56,6 +56,7 @@ LIBRARY = (
         None, wheel_curvature="curvature_per_m",
     ),
     _library("axle_speed_mismatch", {"ratio": Size(0.08, 0.20, signed=True, most=0.30)}, axle_ratio="ratio"),
+    _library("axle_overrun", {"excess": Size(1.5, 4.0)}, overrun="excess"),
     _library(
         "floor_tilt", {"drift_mps": Size(0.004, 0.012), "direction_rad": _TURN},
         drift="drift_mps", drift_direction="direction_rad",

@@ -201,6 +201,17 @@ def test_axle_speed_mismatch_is_in_equation_5_6():
     check(poses(planted("axle_speed_mismatch", ratio=0.15), TURN), turn_truth(ratio=1.15))
 
 
+@pytest.mark.parametrize(("front", "rear"), [(0.5, 0.0), (-0.2, 0.6), (0.5, -0.5)])
+def test_overrun_lets_the_slower_axle_count_more(front, rear):
+    slower, faster = sorted([math.cos(front), math.cos(rear)])
+    mean = 0.5 * (slower + faster)
+    usual, braked = (
+        np.hypot(*np.diff(poses(plant, [(1.0, 1.0, front, rear)])[-2:, :2], axis=0)[0])
+        for plant in (quiet(), planted("axle_overrun", excess=2.0))
+    )
+    assert braked / usual == pytest.approx((3.0 * slower + faster) / 4.0 / mean, rel=1e-4)
+
+
 def test_tilt_drifts_in_the_floor_frame_while_moving_not_at_rest():
     plant = planted("floor_tilt", drift_mps=0.01, direction_rad=2.0)
     drift = (0.01 * math.cos(2.0), 0.01 * math.sin(2.0))

@@ -1,0 +1,37 @@
+"""Axles whose wheels point apart brake each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from agvbench.effects.base import Effect, Stage, parameter
+from agvbench.effects.state import COS_FRONT, COS_REAR, FRONT_SPEED, REAR_SPEED
+from agvbench.types import Floats
+
+
+@dataclass(frozen=True)
+class AxleOverrun(Effect):
+    """The axle that the body overruns holds it back more stiffly than the other pulls.
+
+    Each axle pulls towards its own ``w cos δ``; the slower one counts ``1 + excess`` times:
+    ``v cos β = ((1 + excess) slower + faster) / (2 + excess)``. At 0 that is equation 5.6.
+    """
+
+    name: ClassVar[str] = "axle_overrun"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    relaxes: ClassVar[str] = "speed does not depend on steering (7.4)"
+    reference: ClassVar[str] = "Bentvelsen 2015, equation 5.6 and appendix B; the law is our own"
+    limits: ClassVar[str] = "nothing shows where both axles steer alike: cornering_speed_loss does"
+
+    excess: float = parameter(unit="–", low=0.0, high=20.0, scale=1.0)
+
+    @staticmethod
+    def drive(state: Floats, excess: float) -> None:
+        """Slow both axles by what the slower one costs."""
+        front, rear = abs(state[FRONT_SPEED]) * state[COS_FRONT], abs(state[REAR_SPEED]) * state[COS_REAR]
+        whole = front + rear
+        if excess > 0.0 and whole > 0.0:
+            left = 2.0 * (whole + excess * min(front, rear)) / ((2.0 + excess) * whole)
+            state[FRONT_SPEED] *= left
+            state[REAR_SPEED] *= left
