@@ -1,0 +1,81 @@
+"""How long a whole diagnosis takes, on one core: by the number of runs, and by what is hidden.
+
+Campaigns are driven on plants that hide nothing, one effect, two, and one from outside the library
+(`agvbench.simulator.hidden`). Time is that of the process: a shared machine does not make it longer. There is no peer
+that does the same, so the figures stand alone, beside the bounds that were set: 15 s where a name is found or none is
+needed, 40 s for UNKNOWN.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+os.environ.update(dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"))
+
+from agvbench.campaign import Campaign, CampaignHeader
+from agvbench.diagnosis import Verdict, diagnose
+from agvbench.types import Run
+
+BENCHMARKS = ("calibration", "trajectories", "step_response", "free_driving")
+HIDDEN = ("nothing", "steering_lag", "steering_lag_and_lateral_slip", "slow_patch")
+SHARES = (0.5, 0.75, 1.0)
+BOUND_S = {True: 15.0, False: 40.0}
+PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
+
+
+@dataclass(frozen=True)
+class Part:
+    """Some of a campaign's runs: every one whose repeat is among the first ``share`` of repeats."""
+
+    header: CampaignHeader
+    runs: list[Run]
+
+    def __iter__(self) -> Iterator[Run]:
+        """Iterate over the runs."""
+        return iter(self.runs)
+
+
+def drive(hidden: str, repeats: int, folder: Path) -> Campaign:
+    """Return a campaign with a plant that hides something."""
+    options = [f"--plant=agvbench.simulator.hidden:{hidden}", "--seed=41", f"--repeats={repeats}", "--no-report"]
+    command = [sys.executable, "-c", PROGRAM, "bench", *BENCHMARKS, *options, f"--out={folder / hidden}"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
+    if done.returncode not in {0, 1}:
+        raise SystemExit(f"{hidden}: {done.stderr[-2000:]}")
+    return Campaign.open(folder / hidden)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--repeats", type=int, default=8, help="of each trajectory (default 8)")
+    parser.add_argument("--hidden", nargs="+", default=list(HIDDEN), help=f"what to hide (default {' '.join(HIDDEN)})")
+    arguments = parser.parse_args()
+    print(f"{'hidden':34s} {'runs':>5s} {'ours':>8s}  {'bound':>7s}  met?  answer")
+    with tempfile.TemporaryDirectory() as folder:
+        for hidden in arguments.hidden:
+            campaign = drive(hidden, arguments.repeats, Path(folder))
+            runs = list(campaign)
+            for share in SHARES:
+                part = Part(campaign.header, [run for run in runs if run.repeat < max(2, share * arguments.repeats)])
+                if share == SHARES[0]:
+                    diagnose(part)  # compiles
+                began = time.process_time()
+                found = diagnose(part)
+                taken = time.process_time() - began
+                bound = BOUND_S[found.verdict is not Verdict.UNKNOWN]
+                names = " ".join(effect.name for effect in found.effects)
+                row = f"{hidden:34s} {len(part.runs):5d} {taken:6.1f} s  ≤ {bound:2.0f} s"
+                print(f"{row}  {'yes' if taken <= bound else 'no':4s}  {found.verdict} {names}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
