@@ -71,6 +71,13 @@ def challenge(session: nox.Session) -> None:
     session.run("agvbench", "challenge", *(session.posargs or trials))
 
 
+@nox.session
+def loop(session: nox.Session) -> None:
+    """Bench, diagnose, correct the model, bench again: every trajectory before and after."""
+    install(session)
+    session.run("agvbench", "loop", *session.posargs)
+
+
 @nox.session(venv_backend="none")
 def lock(session: nox.Session) -> None:
     """Resolve the newest versions that pyproject.toml allows into the lock file."""

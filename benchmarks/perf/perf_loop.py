@@ -57,9 +57,10 @@ def _drawn(plants: int, first_seed: int) -> Iterator[tuple[str, str, int]]:
         seed += 1
 
 
-def _go_round(name: str, plant: str, seed: int, repeats: int, folder: Path) -> Driven:
+def _go_round(name: str, plant: str, seed: int, repeats: int, folder: Path, *, model_only: bool) -> Driven:
     out = folder / f"{name}-{seed}"
     options = ["--resume"] if (out / "loop.toml").exists() else [f"--repeats={repeats}", f"--seed={seed}"]
+    options += ["--model-only"] if model_only else []
     command = [sys.executable, "-c", PROGRAM, "loop", f"--plant={plant}", *options, f"--out={out}"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - our own program
     if done.returncode:
@@ -93,6 +94,7 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=10)
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
     parser.add_argument("--only", nargs="+", metavar="NAME", help="hide these instead, each with the first seed")
+    parser.add_argument("--model-only", action="store_true", help="leave aims alone, as the loop's option does")
     parser.add_argument("--keep", metavar="DIR", type=Path, help="keep the loops there")
     parser.add_argument("--cells", action="store_true", help="print every trajectory")
     given = parser.parse_args()
@@ -103,7 +105,7 @@ def main() -> None:
         folder = given.keep or Path(stack.enter_context(tempfile.TemporaryDirectory()))
         loops = []
         for name, plant, seed in wanted:
-            loops.append(_go_round(name, plant, seed, given.repeats, folder))
+            loops.append(_go_round(name, plant, seed, given.repeats, folder, model_only=given.model_only))
             _tell(loops[-1])
             if given.cells:
                 _tell_cells(loops[-1])
