@@ -230,7 +230,7 @@ def _terms(
     at, jt = a.transpose(0, 2, 1), j.transpose(0, 2, 1)
     inner = at @ a
     inner[:, range(6), range(6)] += prior**-2.0
-    inverse = np.linalg.inv(inner)
+    inverse = np.asarray(np.linalg.inv(inner))
     pull = (at @ e[..., None])[..., 0] - offsets / prior**2
     mixed = at @ j
     information = jt @ j - mixed.transpose(0, 2, 1) @ inverse @ mixed
@@ -243,7 +243,8 @@ def _terms(
     if predictor.readings.begins is not None:
         logs += 6.0 * temper * (predictor.readings.seen * np.log(scatter.growth)).sum(axis=1)
         squares, trust = _student(predictor, squares)
-        information, gradient = information * trust[:, None, None], gradient * trust[:, None]
+        information *= trust[:, None, None]
+        gradient = np.asarray(gradient * trust[:, None])
     return _Terms(squares + logs, information, gradient, inverse, mixed, pull)
 
 

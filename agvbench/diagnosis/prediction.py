@@ -64,17 +64,12 @@ class Batch:
         self.weights = {role: maps.weights(role, self.commands[role]) for role in ROLES}
         self.drives = self.commands["drive"] != maps.neutral
         owns = [np.arange(a, b) for a, b in pairwise(self.base.row_starts.tolist())]
-        levels = [list(self._levels(own)) for own in owns]
-        nodes = [list(self._nodes(own)) for own in owns]
-        self.by_node = sum(map(len, nodes)) < sum(map(len, levels))
+        self.by_node = sum(map(self._count_nodes, owns)) < sum(map(self._count_levels, owns))
+        varied = [list(self._nodes(own) if self.by_node else self._levels(own)) for own in owns]
         run, kind, row, changed = [], [], [], []
         for i, own in enumerate(owns):
             still = np.zeros((len(own), len(ROLES)))
-            for role, first, change in [
-                ("base", -1, still),
-                ("heading", -1, still),
-                *(nodes if self.by_node else levels)[i],
-            ]:
+            for role, first, change in [("base", -1, still), ("heading", -1, still), *varied[i]]:
                 run.append(i)
                 kind.append(role)
                 row.append(first)
@@ -84,6 +79,19 @@ class Batch:
         self.lanes = Simulation(geometry, maps.neutral, [runs[i] for i in run], kinds=kinds)
         self.rows = np.concatenate([owns[i] for i in run])
         self.row_change = np.concatenate(changed)
+
+    def _count_levels(self, own: NDArray[np.int64]) -> int:
+        drives = self.drives[own]
+        return sum(
+            len(np.unique(self.commands[r][own][drives] if r == "drive" else self.commands[r][own])) for r in ROLES
+        )
+
+    def _count_nodes(self, own: NDArray[np.int64]) -> int:
+        drives = self.drives[own]
+        return sum(
+            int(np.count_nonzero((self.weights[r][own][drives] if r == "drive" else self.weights[r][own]).any(axis=0)))
+            for r in ROLES
+        )
 
     def _levels(self, own: NDArray[np.int64]) -> Iterator[tuple[str, int, Floats]]:
         """Yield each level of each command of one run: a row that has it, and by how much each row changes with it."""

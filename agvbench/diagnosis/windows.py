@@ -24,7 +24,7 @@ SUPPORT_S = 0.2
 SAMPLES = 8
 """Poses per window, evenly spaced; the last one at the horizon."""
 
-HISTORY_S = 3.0
+HISTORY_S = 2.0
 """Commands of so long before a window set its actuators in motion."""
 
 NAIVE_S = 0.1

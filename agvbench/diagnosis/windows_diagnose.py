@@ -20,8 +20,8 @@ from agvbench.diagnosis.structure import Dependence, dependences, residual_rates
 from agvbench.diagnosis.vehicle import corrected_vehicle
 from agvbench.diagnosis.windows import SUPPORT_S, Horizon
 from agvbench.diagnosis.windows_errors import QUANTITIES, by_recording, floor_squares, rms, squares
-from agvbench.diagnosis.windows_maps import smooth_maps, start_values_of_windows
-from agvbench.diagnosis.windows_predictors import believed, level_scatter, naive, redundancy, speed_held
+from agvbench.diagnosis.windows_maps import NODES, smooth_maps, start_values_of_windows
+from agvbench.diagnosis.windows_predictors import believed, by_speed_error, level_scatter, naive, redundancy, speed_held
 from agvbench.diagnosis.windows_selection import WindowSelector
 from agvbench.diagnosis.windows_split import MOST_FITTED, MOST_JUDGED, held_out_windows, thinned
 from agvbench.errors import CampaignError
@@ -31,6 +31,7 @@ from agvbench.vehicle.geometry import Geometry
 
 FEWEST_WINDOWS = 20
 FEWEST_STRETCHES = 5
+AT_THE_FLOOR = 1.25
 _LEAST_TURN_RAD = 0.05
 
 
@@ -105,10 +106,18 @@ def _cannot_tell(readings: Readings, header: HeaderLike, horizon: Horizon) -> st
 
 
 def _static(fitted: Readings, geometry: Geometry, neutral: float) -> Fit:
-    """Return the static maps fitted to the windows."""
-    maps = smooth_maps(fitted.runs, neutral)
-    start = start_values_of_windows(maps, fitted, geometry)
-    return fit(Predictor(Batch(fitted, maps, geometry)), start, np.empty((0, 2)))
+    """Return the static maps fitted to the windows, as fine as their errors ask for (by Schwarz's criterion)."""
+    best: tuple[float, Fit] | None = None
+    for steering, drive in NODES:
+        maps = smooth_maps(fitted.runs, neutral, steering, drive)
+        start = start_values_of_windows(maps, fitted, geometry)
+        found = fit(Predictor(Batch(fitted, maps, geometry)), start, np.empty((0, 2)))
+        total = float(found.loss.sum()) + maps.size * float(np.log(len(fitted)))
+        if best is not None and total > best[0]:
+            break
+        best = total, found
+    assert best is not None, "there is a first choice of nodes"  # noqa: S101
+    return best[1]
 
 
 @dataclasses.dataclass
@@ -137,9 +146,14 @@ class _Conclusion:
         before = predicted["static"]
         if self.vehicle is not None:
             before = predicted["believed"] = believed(self.vehicle, judged)
+        shaken = by_speed_error(Predictor(self._every, chosen.fit.predictor.effects), chosen.fit.parameters)
         rest = self._dependences(poses)
         bounds = bounds_of(self.selector.candidates, chosen.names)
         effects = named_effects(self.selection, bounds)
+        held_out = self._held_out(before, poses, shaken)
+        # Small structure shows in many windows; what lies at the floor needs no further cause.
+        above = any(e["after"] > AT_THE_FLOOR * e["floor"] for e in held_out.errors.values())
+        rest = rest if above else []
         verdict, why = _verdict(effects, rest)
         model = corrected_vehicle(self.header, self.geometry, chosen.fit, chosen.fit.predictor.maps)
         scatter = self.selector.batch.level_scatter
@@ -149,7 +163,7 @@ class _Conclusion:
             effects,
             bool(rest),
             tuple(rest),
-            self._held_out(before, poses),
+            held_out,
             dataclasses.replace(
                 model, provenance={"campaign": self.header.name, "method": "diagnose", "seed": self.seed}
             ),
@@ -164,7 +178,7 @@ class _Conclusion:
                     "initial_state_from_s": [-SUPPORT_S, 0.0],
                     "level_scatter": float(scatter),
                     "redundancy": self.selector.batch.redundancy,
-                    "recordings": by_recording(judged, predicted, self.held, self.seed),
+                    "recordings": by_recording(judged, predicted, shaken, self.held, self.seed),
                     "effects": self._each(poses),
                 },
             },
@@ -177,9 +191,9 @@ class _Conclusion:
             self._every = Batch(self.judged, batch.maps, self.geometry, batch.level_scatter)
         return Predictor(self._every, model.fit.predictor.effects).predict(model.fit.parameters)
 
-    def _held_out(self, before: Floats, after: Floats) -> HeldOut:
+    def _held_out(self, before: Floats, after: Floats, shaken: Floats) -> HeldOut:
         kept = self.judged.select(self.held)
-        least = floor_squares(kept)
+        least = floor_squares(kept, shaken[self.held])
         was, now = squares(kept, before[self.held]), squares(kept, after[self.held])
         errors = {
             name: {"before": rms(was[name], name), "after": rms(now[name], name), "floor": rms(least[name], name)}

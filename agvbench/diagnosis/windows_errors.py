@@ -23,6 +23,7 @@ AHEAD = (SAMPLES // 2 - 1, SAMPLES - 1)
 
 _RESAMPLES = 2000
 _CONFIDENCE = 0.95
+_FEWEST_STRETCHES = 3
 
 
 def squares(readings: Readings, poses: Floats, sample: int = -1) -> dict[str, Floats]:
@@ -42,24 +43,24 @@ def squares(readings: Readings, poses: Floats, sample: int = -1) -> dict[str, Fl
     }
 
 
-def floor_squares(readings: Readings, sample: int = -1) -> dict[str, Floats]:
+def floor_squares(readings: Readings, shaken: Floats, sample: int = -1) -> dict[str, Floats]:
     """Return the squares (W,) that no predictor can avoid, from the noise of frames.
 
-    The pose and speed to start from are uncertain, and so is the pose that is judged. What the vehicle does
-    differently without a cause in its commands comes on top: without repeats it cannot be told from what a model
-    lacks, so this is the least that the floor can be.
+    The pose to start from is uncertain, so is the pose that is judged, and so is the speed to start from: `shaken`
+    (W, K, 3) is by how much the prediction changes with a standard error of it. What the vehicle does differently
+    without a cause in its commands comes on top: without repeats it cannot be told from what a model lacks, so this
+    is the least that the floor can be.
     """
     begins = _begins(readings)
-    time = readings.t_s[:, sample] - begins.t_s
     went = np.hypot(*(readings.poses[:, sample, :2] - readings.start[:, :2]).T)
     sd = readings.start_stderr
-    along = (begins.speed_stderr * time) ** 2 + begins.noise[:, 0] ** 2
-    heading = sd[:, 2] ** 2 + begins.noise[:, 1] ** 2
-    position = sd[:, 0] ** 2 + sd[:, 1] ** 2 + (sd[:, 2] * went) ** 2 + begins.noise[:, 0] ** 2 + along
+    by_speed = shaken[:, sample, 0] ** 2 + shaken[:, sample, 1] ** 2
+    along = by_speed + begins.noise[:, 0] ** 2 + sd[:, 0] ** 2
+    heading = sd[:, 2] ** 2 + begins.noise[:, 1] ** 2 + shaken[:, sample, 2] ** 2
     return {
-        "position_rms_mm": position,
+        "position_rms_mm": along + sd[:, 1] ** 2 + (sd[:, 2] * went) ** 2 + begins.noise[:, 0] ** 2,
         "heading_rms_deg": heading,
-        "delta_s_mm": along + sd[:, 0] ** 2,
+        "delta_s_mm": along,
         "delta_heading_deg": heading,
     }
 
@@ -70,7 +71,7 @@ def rms(values: Floats, name: str) -> float:
 
 
 def by_recording(
-    readings: Readings, predicted: Mapping[str, Floats], held: NDArray[np.bool_], seed: int
+    readings: Readings, predicted: Mapping[str, Floats], shaken: Floats, held: NDArray[np.bool_], seed: int
 ) -> list[dict[str, object]]:
     """Return a table: for each recording and each time ahead the position error [mm] of every predictor.
 
@@ -89,35 +90,32 @@ def by_recording(
             "windows": len(rows),
             "median_speed_mps": float(np.median(np.abs(begins.speed_mps[rows]))),
         }
-        draws = _resampled(readings.group[rows], seed)
         for sample in AHEAD:
             ahead = float(np.median(readings.t_s[rows, sample] - begins.t_s[rows]))
-            floor = floor_squares(readings, sample)["position_rms_mm"][rows]
+            floor = floor_squares(readings, shaken, sample)["position_rms_mm"][rows]
             entry: dict[str, object] = {"floor_mm": rms(floor, "position_rms_mm")}
             for name, poses in predicted.items():
-                entry[f"{name}_mm"] = interval(squares(readings, poses, sample)["position_rms_mm"][rows], draws)
+                missed = squares(readings, poses, sample)["position_rms_mm"][rows]
+                entry[f"{name}_mm"] = interval(missed, readings.group[rows], seed)
             row[f"ahead_{ahead:.2g}_s"] = entry
         table.append(row)
     return table
 
 
-def interval(values: Floats, draws: list[NDArray[np.int64]]) -> dict[str, float]:
-    """Return the root mean square [mm] of squared errors [m²] with its interval."""
-    tail = 50.0 * (1.0 - _CONFIDENCE)
-    drawn = [1e3 * np.sqrt(np.nanmean(values[draw])) for draw in draws]
-    low, high = np.percentile(drawn, [tail, 100.0 - tail]) if drawn else (np.nan, np.nan)
-    return {"rms": rms(values, "position_rms_mm"), "low": float(low), "high": float(high)}
+def interval(values: Floats, group: NDArray[np.int64], seed: int) -> dict[str, float]:
+    """Return the root mean square [mm] of squared errors [m²] with its interval, from draws of whole stretches.
 
-
-def _resampled(group: NDArray[np.int64], seed: int) -> list[NDArray[np.int64]]:
-    """Return draws of windows by whole stretches; none where there are fewer than three."""
-    names = np.unique(group)
+    The bounds are NaN where there are fewer than three stretches.
+    """
+    out = {"rms": rms(values, "position_rms_mm"), "low": np.nan, "high": np.nan}
+    seen = np.isfinite(values)
+    names, index = np.unique(group, return_inverse=True)
     if len(names) < _FEWEST_STRETCHES:
-        return []
-    rng = np.random.default_rng([0xB007, seed])
-    members = [np.flatnonzero(group == g) for g in names]
-    chosen = rng.integers(0, len(names), (_RESAMPLES, len(names)))
-    return [np.concatenate([members[k] for k in row]) for row in chosen]
-
-
-_FEWEST_STRETCHES = 3
+        return out
+    sums = np.bincount(index, weights=np.where(seen, values, 0.0))
+    counts = np.bincount(index, weights=seen.astype(np.float64))
+    drawn = np.random.default_rng([0xB007, seed]).integers(0, len(names), (_RESAMPLES, len(names)))
+    errors = 1e3 * np.sqrt(sums[drawn].sum(axis=1) / np.maximum(counts[drawn].sum(axis=1), 1.0))
+    tail = 50.0 * (1.0 - _CONFIDENCE)
+    low, high = np.percentile(errors, [tail, 100.0 - tail])
+    return {**out, "low": float(low), "high": float(high)}

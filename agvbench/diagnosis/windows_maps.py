@@ -13,8 +13,8 @@ from agvbench.types import Floats, Run
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.kinematics import axle_angles
 
-STEERING_NODES, DRIVE_NODES = 9, 6
-"""Free values of a map over the range of its commands, where commands take more levels than that."""
+NODES = ((9, 6), (13, 10), (19, 15))
+"""Free values of steering and drive maps over the range of their commands, where those take many levels."""
 
 _MANY_LEVELS = 12
 _LATE_S = 0.15
@@ -22,8 +22,8 @@ _STIFFNESS = 0.3
 _SLOWEST_MPS = 0.05
 
 
-def smooth_maps(runs: Sequence[Run], neutral: float) -> FreeMaps:
-    """Return free maps with a node for every level, or evenly spaced nodes where there are many levels.
+def smooth_maps(runs: Sequence[Run], neutral: float, steering: int, drive: int) -> FreeMaps:
+    """Return free maps with a node for every level, or so many evenly spaced nodes where there are many levels.
 
     Even spacing, not quantiles: another day's driving may dwell where this one only passed.
     """
@@ -33,7 +33,7 @@ def smooth_maps(runs: Sequence[Run], neutral: float) -> FreeMaps:
         if role == "drive":
             told = told[told != neutral]
         if len(np.unique(told)) > _MANY_LEVELS:
-            nodes[role] = _even(told, DRIVE_NODES if role == "drive" else STEERING_NODES, neutral, role)
+            nodes[role] = _even(told, drive if role == "drive" else steering, neutral, role)
     return FreeMaps(nodes, neutral)
 
 
@@ -81,13 +81,13 @@ def start_values_of_windows(maps: FreeMaps, readings: Readings, geometry: Geomet
 def _stiff(nodes: Floats, weights: Floats, value: Floats) -> Floats:
     """Return node values of a curve through `value`, robustly, stiff where there are few."""
     bends = np.diff(np.eye(len(nodes)), 2, axis=0) if len(nodes) > 2 else np.empty((0, len(nodes)))
-    trust = np.ones(len(value))
-    found = np.zeros(len(nodes))
+    trust: Floats = np.ones(len(value))
+    found: Floats = np.zeros(len(nodes))
     for _ in range(5):
         matrix = weights.T @ (weights * trust[:, None])
         stiff = _STIFFNESS * np.mean(np.diagonal(matrix)) * bends.T @ bends
         # Where nothing was driven, the line through neighbours, and zero without any.
-        found = np.linalg.solve(matrix + stiff + 1e-6 * np.eye(len(nodes)), weights.T @ (trust * value))
+        found = np.asarray(np.linalg.solve(matrix + stiff + 1e-6 * np.eye(len(nodes)), weights.T @ (trust * value)))
         off = np.abs(value - weights @ found)
-        trust = 1.0 / np.maximum(off, 1e-3 + np.median(off))
+        trust = np.asarray(1.0 / np.maximum(off, 1e-3 + np.median(off)))
     return found

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from agvbench.diagnosis.fitting import Fit
@@ -36,6 +38,16 @@ def speed_held(batch: Batch, parameters: Floats) -> Floats:
     settled[:, 2] = 2.0 * ahead / (np.cos(front) + np.cos(rear))
     poses = batch.base.predict(settled, batch.base.nulls, initial)
     return poses.reshape(len(batch.readings), -1, 3)
+
+
+def by_speed_error(predictor: Predictor, parameters: Floats) -> Floats:
+    """Return by how much predicted poses (W, K, 3) change with a standard error of the speed at the beginning."""
+    before = predictor.predict(parameters)
+    begins = _begins(predictor.readings)
+    faster = replace(begins, speed_mps=begins.speed_mps + begins.speed_stderr)
+    shaken = Predictor(predictor.batch, predictor.effects)
+    shaken.readings = replace(predictor.readings, begins=faster)
+    return shaken.predict(parameters) - before
 
 
 def believed(vehicle: VehicleModel, readings: Readings) -> Floats:

@@ -18,8 +18,8 @@ _SEEN_QUANTILE = 0.98
 class WindowSelector(Selector):
     """Tries effects on windows; see `Selector`.
 
-    ``elsewhere`` holds the windows set aside. Only their commands and their states at the beginning are used, to see how
-    far an effect would reach: one that moves the usual window there by more than nearly every window that it was
+    ``elsewhere`` holds the windows set aside. Only their commands and their states at the beginning are used, to see
+    how far an effect would reach: one that moves the usual window there by more than nearly every window that it was
     learnt from extrapolates, and does not earn its place. ``extrapolating`` names those that were refused for that.
     """
 

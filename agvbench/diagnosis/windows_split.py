@@ -49,7 +49,8 @@ def held_out_windows(readings: Readings, seed: int) -> NDArray[np.bool_]:
 def fold_groups(readings: Readings) -> NDArray[np.int64]:
     """Return what cross-validation leaves out together, (R,): groups of runs, or sessions or recordings of windows.
 
-    Whole sessions where there are enough of them, else recordings, else stretches: what is learnt has to hold elsewhere.
+    Whole sessions where there are enough of them, else recordings, else stretches: what is learnt has to hold
+    elsewhere.
     """
     if readings.begins is None:
         return readings.group

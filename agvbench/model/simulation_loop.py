@@ -416,6 +416,6 @@ def simulate(
         lately = initial[run, 4] if initial.shape[1] > _STATE else speed
         if k < stop:
             _drive_run(
-                s, p, plan, work, vehicle, begin, speed, lately, commands, settled, command_t_s, first, last, start, servos,
-                t_s, out, k, stop,
+                s, p, plan, work, vehicle, begin, speed, lately, commands, settled, command_t_s, first, last, start,
+                servos, t_s, out, k, stop,
             )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Free driving of the vehicle of a few lines: a joystick that wanders, in sessions, recorded from the middle of a drive."""
+"""Free driving of the vehicle of a few lines: a joystick that wanders, recorded from the middle of a drive."""
 
 from __future__ import annotations
 
