@@ -10,14 +10,14 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from agvbench.errors import AgvbenchError, FileError, FitError
 from agvbench.model import VehicleModel
 from agvbench.running.remainders import read_remainders
-from agvbench.running.settings import BenchSettings
+from agvbench.running.settings import SETTINGS_FILE, BenchSettings
 from agvbench.workflows.loop_plans import plans_of
 from agvbench.workflows.loop_settings import (
     AFTER,
@@ -109,8 +109,12 @@ def run_loop(given: Mapping[str, Any], *, out: str | None, resume: bool, tell: T
     learned = "" if settings.remainders == MODEL_ONLY else _learned(directory)
     plans = _planned(directory, settings, learned, tell)
     tell(f"4/4 driving uncalibrated, calibrated and corrected in turns → {directory / AFTER}")
-    models = {"calibration": str(directory / BEFORE / VEHICLE), "corrected": str(directory / VEHICLE)}
-    models |= {"remainders": learned}
+    models = {
+        "calibration": str((directory / BEFORE / VEHICLE).resolve()),
+        "corrected": str((directory / VEHICLE).resolve()),
+        "remainders": str(Path(learned).resolve()) if learned else "",
+    }
+    _moved(directory / AFTER, models)
     _bench(directory / AFTER, SHOWING, settings, models, tell)
     return Loop(directory, settings, diagnosis, plans)
 
@@ -153,6 +157,14 @@ def _bench(directory: Path, names: Sequence[str], settings: BenchSettings, more:
         sys.stderr.write(errors)
     if process.returncode:
         tell(f"    some runs could not be driven: agvbench report {directory} says which")
+
+
+def _moved(directory: Path, models: Mapping[str, str]) -> None:
+    """Let a session that goes on find its models, which lie beside it, wherever the loop has been moved."""
+    if (directory / SETTINGS_FILE).exists():
+        began = BenchSettings.load(directory)
+        calibration, corrected, remainders = (models[name] for name in ("calibration", "corrected", "remainders"))
+        replace(began, calibration=calibration, corrected=corrected, remainders=remainders).save(directory)
 
 
 def _diagnosed(directory: Path, seed: int, tell: Tell) -> dict[str, Any]:
