@@ -45,6 +45,8 @@ LEAST_REPEATS, MOST_REPEATS = 4, 12
 PINNED = 0.5
 """A parameter is pinned when its standard error is below this part of its usual size."""
 
+_WELL_PINNED = 0.05
+_SHOWS, _NOT_LOOKED_AT = 0.02, 1e3
 _MOST_PINNED = 3
 _UNKNOWN = 100.0
 _FARTHEST_APART_M, _FARTHEST_APART_RAD = 0.25, 0.35
@@ -203,7 +205,13 @@ def pin(
     wanted = [item for item, value in zip(wanted, least, strict=True) if value < PINNED]
     if not wanted:
         return None
-    best = search.best(lambda tried: -np.log(search.pin_scores(wanted, tried, LEAST_REPEATS)).sum(axis=0))
+
+    def score(tried: Sequence[Design]) -> Floats:
+        # Patterns come from calm to quick: of those that pin well enough, the calmest is driven.
+        reached = search.pin_scores(wanted, tried, LEAST_REPEATS)
+        return np.asarray(-np.log(np.maximum(reached, _WELL_PINNED)).sum(axis=0))
+
+    best = search.best(score)
     reached = search.pin_scores(wanted, [best], LEAST_REPEATS)[:, 0]
     pins = tuple(item.name for item, value in zip(wanted, reached, strict=True) if value < PINNED)
     told = ", ".join(
@@ -211,6 +219,8 @@ def pin(
         for item, value in zip(wanted, reached, strict=True)
         if value < PINNED
     )
+    if not pins:
+        return None
     trajectory = as_trajectory(best, unit, "next_excitation", "excites what nothing driven so far excites")
     return NextExperiment(
         f"{LEAST_REPEATS} repeats would pin {told}", trajectory, LEAST_REPEATS, tuple(search.starts(best)), (), pins
@@ -307,7 +317,7 @@ class _Search:
         return out
 
     def pin_scores(self, flat: Sequence[Unpinned], tried: Sequence[Design], repeats: int) -> Floats:
-        """Return the expected standard errors over scales (len(flat), designs); infinite where not looked at."""
+        """Return the expected standard errors over scales (len(flat), designs); large where not looked at."""
         chosen = self.chosen
         every = self.readings(tried)
         batch = Batch(every, chosen.predictor.maps, self.geometry)
@@ -317,14 +327,14 @@ class _Search:
             names = (*chosen.predictor.effects, item.effect)
             _, slopes = Predictor(batch, names).by_last(np.r_[chosen.parameters, item.start], still, len(item.start))
             rough = self._rough(slopes[..., item.at], len(tried))
-            kept = np.sort(np.argsort(-rough, kind="stable")[:_KEPT])
+            # Not the largest only, which are the wildest: from those that show it at all, calm ones too.
+            shows = np.flatnonzero(rough > _SHOWS * float(rough.max()))
+            kept = shows[np.unique(np.linspace(0, len(shows) - 1, _KEPT).round().astype(int))]
             some = Batch(self.readings([tried[i] for i in kept]), chosen.predictor.maps, self.geometry)
             change = item.scale * slopes[..., item.at]
             gentle = _gentle(change, len(tried))[kept]
             out[k, kept] = pin_scores(chosen, [item], [Predictor(some, names)], repeats)[0] / gentle
-        # A design that hardly shows a parameter pins it no better than the worst that was looked at.
-        worst = np.where(np.isfinite(out), out, -np.inf).max(axis=1, keepdims=True)
-        return np.where(np.isfinite(out), out, 2.0 * worst)
+        return np.where(np.isfinite(out), out, _NOT_LOOKED_AT)
 
     def _rough(self, apart: Floats, count: int) -> Floats:
         s = self.chosen.scatter

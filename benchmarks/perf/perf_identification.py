@@ -144,11 +144,11 @@ def aligned_miss(path: Floats, observed: Floats, sd: Floats) -> Floats:
     return np.concatenate([o - turned, (observed[..., 2] - path[..., 2] - angle[:, None])[..., None]], axis=-1)
 
 
-def seconds(call: Callable[[], object]) -> float:
-    """Return how long `call` takes."""
+def timed(estimate: Callable[[Floats], Floats], observed: Floats) -> tuple[float, Floats]:
+    """Return how long an estimate takes [s], and the estimate."""
     begin = time.perf_counter()
-    call()
-    return time.perf_counter() - begin
+    found = estimate(observed)
+    return time.perf_counter() - begin, found
 
 
 def efficiency(campaign: Campaign, draws: int) -> float:
@@ -180,19 +180,18 @@ def main() -> int:
     off = efficiency(campaign, given.draws)
     table.add_row(f"error / Cramér–Rao, {given.draws} draws", f"{off:.3f}", "1", "", _met(off <= EFFICIENCY, "≤ 1.05"))
     met = off <= EFFICIENCY
+    fisher = campaign.fisher()
     for what, peer, bound in (
         ("time, SciPy lm, all unknowns", campaign.peer, FASTER),
         ("time, SciPy lm, poses projected out", campaign.projected_peer, None),
     ):
-        pairs = [
-            (seconds(lambda: campaign.ours(observed)), seconds(lambda p=peer: p(observed))) for _ in range(given.rounds)
-        ]
-        mine, theirs = (statistics.median(column) for column in zip(*pairs, strict=True))
-        ratio = statistics.median(b / a for a, b in pairs)
+        rounds = [(*timed(campaign.ours, observed), *timed(peer, observed)) for _ in range(given.rounds)]
+        mine, theirs = (statistics.median(r[k] for r in rounds) for k in (0, 2))
+        ratio = statistics.median(r[2] / r[0] for r in rounds)
         met &= bound is None or ratio >= bound
         verdict = "" if bound is None else _met(ratio >= bound, f"≥ {bound:g}")
         table.add_row(what, f"{mine:.2f} s", f"{theirs:.2f} s", f"{ratio:.1f} times faster", verdict)
-        apart = np.abs(campaign.ours(observed) - peer(observed)) * np.sqrt(np.diagonal(campaign.fisher()))
+        apart = np.abs(rounds[0][1] - rounds[0][3]) * np.sqrt(np.diagonal(fisher))
         table.add_row("  farthest apart, in standard errors", "", "", f"{apart.max():.1e}", "")
     Console().print(table)
     return 0 if met else 1
