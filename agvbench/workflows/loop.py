@@ -7,17 +7,16 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from agvbench.errors import AgvbenchError, FileError, FitError
 from agvbench.model import VehicleModel
 from agvbench.running.remainders import read_remainders
-from agvbench.running.settings import SETTINGS_FILE, BenchSettings
+from agvbench.running.settings import BenchSettings
+from agvbench.workflows.loop_driving import Tell, drive, moved
 from agvbench.workflows.loop_plans import plans_of
 from agvbench.workflows.loop_settings import (
     AFTER,
@@ -39,13 +38,6 @@ EXCITING = ("calibration", "trajectories", "step_response", "free_driving")
 """What the first session drives: the second and third tell lags, which steady driving hides."""
 SHOWING = ("trajectories",)
 """What the second session drives."""
-_PROGRAM = (
-    "import json, sys; from agvbench.workflows.bench import run_benchmarks;"
-    " sys.exit(run_benchmarks(*json.loads(sys.argv[1]), summary=False))"
-)
-_DONE = {0, 1}  # 1: some run was never driven well enough; what was is a campaign all the same
-
-Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -114,14 +106,14 @@ def run_loop(given: Mapping[str, Any], *, out: str | None, resume: bool, tell: T
         "corrected": str((directory / VEHICLE).resolve()),
         "remainders": str(Path(learned).resolve()) if learned else "",
     }
-    _moved(directory / AFTER, models)
-    _bench(directory / AFTER, SHOWING, settings, models, tell)
+    moved(directory / AFTER, models)
+    drive(directory / AFTER, SHOWING, settings, models, tell)
     return Loop(directory, settings, diagnosis, plans)
 
 
 def _first_bench(directory: Path, settings: BenchSettings, tell: Tell) -> None:
     try:
-        _bench(directory / BEFORE, EXCITING, settings, {"remainders": ""}, tell)
+        drive(directory / BEFORE, EXCITING, settings, {"remainders": ""}, tell)
     except AgvbenchError:
         # What could not begin leaves nothing behind that would have to be resumed.
         if not (directory / BEFORE / "campaign.toml").exists():
@@ -129,42 +121,6 @@ def _first_bench(directory: Path, settings: BenchSettings, tell: Tell) -> None:
             if not any(directory.iterdir()):
                 directory.rmdir()
         raise
-
-
-def _bench(directory: Path, names: Sequence[str], settings: BenchSettings, more: Mapping[str, str], tell: Tell) -> None:
-    """Drive a session in a process of its own, on from where it was interrupted.
-
-    Raises
-    ------
-    AgvbenchError
-        If it cannot be driven.
-    """
-    options = {name: value for name, value in asdict(settings).items() if value != getattr(BenchSettings(), name)}
-    options |= {**more, "out": str(directory), "resume": directory.exists(), "no_report": True}
-    command = [sys.executable, "-c", _PROGRAM, json.dumps([names, options])]
-    errors = ""
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:  # noqa: S603 - our own program
-        try:
-            errors = process.communicate()[1]
-        except KeyboardInterrupt:
-            # It was interrupted as well, stops the vehicle, and records what it has seen.
-            process.wait()
-            raise
-    if process.returncode not in _DONE:
-        said = [line.removeprefix("ERROR: ") for line in errors.splitlines() if line.strip()]
-        raise AgvbenchError(said[-1] if said else f"the bench ended with exit code {process.returncode}")
-    if errors:
-        sys.stderr.write(errors)
-    if process.returncode:
-        tell(f"    some runs could not be driven: agvbench report {directory} says which")
-
-
-def _moved(directory: Path, models: Mapping[str, str]) -> None:
-    """Let a session that goes on find its models, which lie beside it, wherever the loop has been moved."""
-    if (directory / SETTINGS_FILE).exists():
-        began = BenchSettings.load(directory)
-        calibration, corrected, remainders = (models[name] for name in ("calibration", "corrected", "remainders"))
-        replace(began, calibration=calibration, corrected=corrected, remainders=remainders).save(directory)
 
 
 def _diagnosed(directory: Path, seed: int, tell: Tell) -> dict[str, Any]:
