@@ -83,6 +83,7 @@ class Selector:
     tell: Tell
     given: tuple[str, ...] = ()
     best_share: ClassVar[float] = 0.05
+    noticeable: ClassVar[float] = NOTICEABLE
     given_values: Floats = field(default_factory=lambda: np.empty(0))
     tried: int = 0
     _fold: NDArray[np.int64] = field(init=False)
@@ -132,7 +133,7 @@ class Selector:
         missed = misses(readings, large).squares()
         moved = misses(replace(readings, poses=np.where(readings.seen[..., None], small, np.nan)), large).squares()
         return any(
-            float(np.mean(moved[name])) > NOTICEABLE**2 * float(np.mean(missed[name]))
+            float(np.mean(moved[name])) > self.noticeable**2 * float(np.mean(missed[name]))
             for name in ("position_rms_mm", "heading_rms_deg")
         )
 

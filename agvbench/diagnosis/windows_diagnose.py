@@ -32,6 +32,10 @@ from agvbench.vehicle.geometry import Geometry
 FEWEST_WINDOWS = 20
 FEWEST_STRETCHES = 5
 AT_THE_FLOOR = 1.25
+FAR_ABOVE = 5.0
+"""The floor of windows is a lower bound, for the vehicle's own scatter cannot be seen without repeats: so many times it
+is more than scatter."""
+
 _LEAST_TURN_RAD = 0.05
 
 
@@ -154,14 +158,15 @@ class _Conclusion:
         # Small structure shows in many windows; what lies at the floor needs no further cause.
         above = any(e["after"] > AT_THE_FLOOR * e["floor"] for e in held_out.errors.values())
         rest = rest if above else []
-        verdict, why = _verdict(effects, rest)
+        far = any(e["after"] > FAR_ABOVE * e["floor"] for e in held_out.errors.values())
+        verdict, why = _verdict(effects, rest, far)
         model = corrected_vehicle(self.header, self.geometry, chosen.fit, chosen.fit.predictor.maps)
         scatter = self.selector.batch.level_scatter
         return Diagnosis(
             verdict,
             why,
             effects,
-            bool(rest),
+            far or bool(rest),
             tuple(rest),
             held_out,
             dataclasses.replace(
@@ -246,9 +251,14 @@ class _Conclusion:
         return dependences(clustered, np.arange(int(stretch.max()) + 1), self.seed)
 
 
-def _verdict(effects: tuple[NamedEffect, ...], rest: list[Dependence]) -> tuple[Verdict, str]:
+def _verdict(effects: tuple[NamedEffect, ...], rest: list[Dependence], far: bool) -> tuple[Verdict, str]:
     if rest:
         return Verdict.UNKNOWN, f"structure remains that no effect explains: it depends on {rest[0].covariate}"
+    if far:
+        return Verdict.UNKNOWN, (
+            f"what is missed is more than {FAR_ABOVE:g} times what noise explains, "
+            "but depends on none of the covariates looked at"
+        )
     if not effects:
         return Verdict.ADEQUATE, "nothing that was looked at predicts better than static maps, fitted again"
     if any(effect.confounded_with for effect in effects):

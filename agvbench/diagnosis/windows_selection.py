@@ -25,6 +25,8 @@ class WindowSelector(Selector):
 
     # Those who drive fast may be few: only the single best stretch is left out to see whether others gain, too.
     best_share: ClassVar[float] = 0.0
+    # What windows miss is mostly not scatter, so that a small part of it is no cause of its own.
+    noticeable: ClassVar[float] = 0.3
     elsewhere: Batch | None = None
     extrapolating: set[str] = field(default_factory=set)
 

@@ -283,7 +283,7 @@ def _drive_speed(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: flo
 
 
 @compiled(inner=True)
-def _lift(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, lately: float) -> float:
+def _lift(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, lately: float, speed: float) -> float:
     """Return by how much the drive has lately been faster than its commands made it, so far as it is not scatter."""
     scatter = vehicle[_LEVEL_SCATTER]
     if scatter == math.inf:
@@ -293,7 +293,7 @@ def _lift(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, lat
     off = math.log(factor) if factor > 0.0 else 0.0
     if off == 0.0:
         return 0.0
-    return off * off / (off * off + scatter * scatter) * (_drive_speed(s, p, vehicle, servos, now, lately) - servos[5])
+    return off * off / (off * off + scatter * scatter) * (_drive_speed(s, p, vehicle, servos, now, speed) - servos[5])
 
 
 @compiled(inner=True)
@@ -341,7 +341,7 @@ def _drive_run(
         if now >= end:
             continue
         if now == begin and not math.isnan(speed):
-            lift = _lift(s, p, vehicle, servos, now, lately)
+            lift = _lift(s, p, vehicle, servos, now, lately, speed)
             servos[4] = _drive_speed(s, p, vehicle, servos, now, speed)
             _obey(s, p, commands, settled, row, lift)
         plan_command(plan, s, servos)

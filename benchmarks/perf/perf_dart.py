@@ -1,9 +1,9 @@
 """How well free driving is predicted on days that were not fitted to: the DART recordings.
 
-Each of the smaller days is held out in turn, then both together. Printed for each recording held out: position error 1 s
-and 2 s ahead, with 95 % intervals over stretches, for the floor, the static maps, those with the measured speed held,
-the naive predictor, and the model found; and for each effect what it does to the days held out. The recordings are
-looked for in ``$AGVBENCH_MEASURED``, else in ``../shared/measured``. Run with
+Each of the smaller days is held out in turn, then both together. Printed for each recording held out: position error
+1 s and 2 s ahead, with 95 % intervals over stretches, for the floor, the static maps, those with the measured speed
+held, the naive predictor, and the model found; and for each effect what it does to the days held out. The recordings
+are looked for in ``$AGVBENCH_MEASURED``, else in ``../shared/measured``. Run with
 ``python benchmarks/perf/perf_dart.py [--figure FILE.svg]``.
 """
 
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import math
 import os
 import sys
 import tempfile
@@ -81,7 +82,7 @@ def told(console: Console, held: Sequence[str], found: Diagnosis, seconds: float
 
 def _cell(error: dict[str, float]) -> str:
     low, high = error["low"], error["high"]
-    return f"{error['rms']:.0f}" + ("" if low != low else f" ({low:.0f}…{high:.0f})")
+    return f"{error['rms']:.0f}" + ("" if math.isnan(low) else f" ({low:.0f}…{high:.0f})")
 
 
 def draw(rows: list[dict[str, Any]], path: Path) -> None:
@@ -96,8 +97,8 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
         errors = [row["ahead_2_s"][f"{name}_mm"] for row in rows]
         heights = [e["rms"] for e in errors]
         spread = [
-            [max(e["rms"] - e["low"], 0.0) if e["low"] == e["low"] else 0.0 for e in errors],
-            [max(e["high"] - e["rms"], 0.0) if e["low"] == e["low"] else 0.0 for e in errors],
+            [max(e["rms"] - e["low"], 0.0) if math.isfinite(e["low"]) else 0.0 for e in errors],
+            [max(e["high"] - e["rms"], 0.0) if math.isfinite(e["low"]) else 0.0 for e in errors],
         ]
         places = [i + 0.2 * (k - 1.5) for i in range(len(rows))]
         axes.bar(places, heights, 0.18, yerr=spread, label=label, capsize=2)

@@ -1,0 +1,70 @@
+"""Verdicts on free driving of a vehicle of known truth, in sessions."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+import pytest
+from free_drives import FREE_HEADER, free_runs
+from tiny_vehicle import Tiny
+
+from agvbench.diagnosis import Diagnosis, diagnose
+from agvbench.errors import CampaignError
+from agvbench.types import Run
+
+
+class FreeCampaign:
+    header = FREE_HEADER
+
+    def __init__(self, runs: list[Run]) -> None:
+        self.runs = runs
+
+    def __iter__(self) -> Iterator[Run]:
+        return iter(self.runs)
+
+
+@pytest.fixture(scope="module")
+def lagging() -> Diagnosis:
+    return diagnose(FreeCampaign(free_runs(Tiny(steering_lag_s=0.25), runs=2, seconds=24.0)))
+
+
+def test_a_steering_lag_is_named_with_its_size(lagging):
+    assert [effect.name for effect in lagging.effects] == ["steering_lag"]
+    assert lagging.effects[0].parameters["time_constant_s"].value == pytest.approx(0.25, abs=0.02)
+    errors = lagging.held_out.errors
+    for name in ("position_rms_mm", "heading_rms_deg"):
+        assert errors[name]["after"] < 0.2 * errors[name]["before"]
+
+
+def test_each_recording_is_told_with_every_predictor(lagging):
+    windows = json.loads(lagging.to_text())["provenance"]["windows"]
+    assert (windows["horizon_s"], windows["stride_s"]) == (2.0, 1.0)
+    assert len(windows["recordings"]) == 8
+    held = [row for row in windows["recordings"] if row["held_out"]]
+    assert held
+    for row in held:
+        ahead = row["ahead_2_s"]
+        after = ahead["after_mm"]["rms"]
+        assert after < 0.3 * min(ahead[f"{name}_mm"]["rms"] for name in ("static", "speed_held", "naive"))
+    sessions = {row["session"] for row in held}
+    assert not sessions & {row["session"] for row in windows["recordings"] if not row["held_out"]}
+
+
+def test_every_effect_is_listed_with_what_it_does_to_sessions_held_out(lagging):
+    effects = lagging.provenance["windows"]["effects"]
+    assert [name for name, entry in effects.items() if entry["kept"]] == ["steering_lag"]
+    own = effects["steering_lag"]["held_out_position_mm"]
+    assert own["with"] < own["without"]
+    assert {"lateral_slip", "speed_lag", "mocap_latency"} < set(effects)
+
+
+def test_nothing_is_named_where_nothing_is_hidden():
+    found = diagnose(FreeCampaign(free_runs(Tiny(), runs=2, seconds=24.0)))
+    assert not found.effects
+    assert found.held_out.errors["position_rms_mm"]["after"] < 5.0
+
+
+def test_too_little_driving_is_refused_in_one_line():
+    with pytest.raises(CampaignError, match="too little free driving"):
+        diagnose(FreeCampaign(free_runs(Tiny(), sessions=1, runs=1, seconds=10.0)))
