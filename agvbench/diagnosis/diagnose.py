@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from agvbench.calibration import RunMeasurement, measure_run
 from agvbench.calibration.source import CampaignLike, HeaderLike
 from agvbench.diagnosis.candidates import bounds_of, candidates
+from agvbench.diagnosis.contradictions import refuse_contradictions
 from agvbench.diagnosis.empirical import Explained, described, explain, term_candidates, with_term_first
 from agvbench.diagnosis.empirical_terms import TERMS
 from agvbench.diagnosis.estimates import named_effects
@@ -24,7 +25,7 @@ from agvbench.diagnosis.residual_table import with_residuals
 from agvbench.diagnosis.residuals import AT_THE_FLOOR, LACK_OF_FIT, Misses, floor, lack_of_fit, misses
 from agvbench.diagnosis.result import Diagnosis, HeldOut, Verdict
 from agvbench.diagnosis.selection import Selection, Selector
-from agvbench.diagnosis.structure import RANDOM_PHASE, Dependence, dependences, residual_rates
+from agvbench.diagnosis.structure import RANDOM_PHASE, Dependence, dependences, residual_rates, swing
 from agvbench.diagnosis.vehicle import corrected_vehicle
 from agvbench.diagnosis.windows import horizon_of
 from agvbench.diagnosis.windows_diagnose import diagnose_windows
@@ -81,6 +82,7 @@ def diagnose(
     readings = read_runs(runs)
     if reason := _cannot_tell(readings, header):
         return Diagnosis(Verdict.NOT_IDENTIFIABLE, reason, provenance=_provenance(header, readings, seed))
+    refuse_contradictions(readings, where=f"campaign {header.name}")
     held = held_out_runs(readings.runs, readings.group, seed)
     if not held.any():
         return Diagnosis(
@@ -170,7 +172,10 @@ def _conclude(
     if explained is not None:
         without = explained.without
         unexplained = Predictor(every.batch, without.names).predict(without.fit.parameters)
-    rest = dependences(residual_rates(readings, unexplained), readings.group, seed)
+    rates = residual_rates(readings, unexplained)
+    rest = dependences(rates, readings.group, seed)
+    if (swings := swing(rates, seed)) is not None:
+        rest = [swings, *(d for d in rest if d.covariate != RANDOM_PHASE)]
     if explained is not None:
         rest = with_term_first(rest, explained)
     effects = named_effects(selection, bounds_of(candidates() | term_candidates(), selection.chosen.names))

@@ -21,6 +21,8 @@ _KNOTS = 6
 _STILL_M = 0.01
 _PERIODS_M = np.geomspace(0.1, 1.0, 25)
 _FLIPS = 4999
+_SWINGS_M = np.geomspace(0.15, 1.0, 48)
+_SHUFFLES, _LEAST_STEPS, _STEPS_PER_SWING, _LEAST_SWING = 999, 12, 1.6, 0.3
 
 
 @dataclass(frozen=True)
@@ -139,9 +141,67 @@ def dependences(rates: Rates, group: NDArray[np.int64], seed: int) -> list[Depen
     significant = [
         Dependence(label, feature, p_value, share)
         for label, feature, strength, share in found
-        if share > LEAST_SHARE and (p_value := (1.0 + np.count_nonzero(most >= strength)) / (_FLIPS + 1.0)) < ALPHA
+        if share > LEAST_SHARE and (p_value := float(np.mean(np.r_[most >= strength, True]))) < ALPHA
     ]
     return sorted(significant, key=lambda d: -d.share)
+
+
+def swing(rates: Rates, seed: int) -> Dependence | None:
+    """Return the dependence on the distance modulo a period whose phase differs from run to run, if there is one.
+
+    An eccentric wheel swings speed and course once per turn, from wherever it happens to stand. In each run a wave
+    with a phase of its own is fitted to what a straight line leaves; what waves explain of all runs together shows the
+    period, and shuffled samples how much of it is chance. Differences of noisy poses swing a little by themselves (a
+    tenth), so the share has to be large.
+    """
+    rng = np.random.default_rng([0x5F15, seed])
+    counts = np.bincount(rates.run)
+    runs = [rates.run == run for run in np.flatnonzero(counts >= _LEAST_STEPS)]
+    best: Dependence | None = None
+    for feature in ("speed", "turning"):
+        value = rates.value[:, FEATURES.index(feature)]
+        rests = [_bent(rates.covariates["distance_m"][own], rates.weight[own], value[own]) for own in runs]
+        total = sum(float(rest @ rest) for rest, _ in rests)
+        if total <= 0.0:
+            continue
+        size = np.sum([_explained(rest[None, :], waves)[0] for rest, waves in rests], axis=0)
+        # A wave takes two numbers of a run's samples whatever they are.
+        share = (size - 2.0 * sum(float(rest @ rest) / len(rest) for rest, _ in rests)) / total
+        period = int(np.argmax(share))
+        if share[period] < max(_LEAST_SWING, best.share if best else 0.0):
+            continue
+        chance = np.zeros((_SHUFFLES, len(_SWINGS_M)))
+        for rest, waves in rests:
+            chance += _explained(rng.permuted(np.tile(rest, (_SHUFFLES, 1)), axis=1), waves)
+        p_value = (1.0 + float(np.count_nonzero(chance.max(axis=1) >= size[period]))) / (_SHUFFLES + 1.0)
+        best = Dependence(RANDOM_PHASE, feature, p_value, float(share[period]))
+    return best
+
+
+Waves = list[Floats | None]
+
+
+def _bent(distance: Floats, weight: Floats, value: Floats) -> tuple[Floats, Waves]:
+    """Return what a straight line leaves of one run, and an orthonormal wave of each period that its steps resolve."""
+    line, _ = np.linalg.qr(np.column_stack([weight, weight * distance]))
+    rest = weight * value
+    waves: Waves = []
+    for period in _SWINGS_M:
+        if period < _STEPS_PER_SWING * float(np.median(weight)):
+            waves.append(None)
+            continue
+        wave = _waves(distance, period) * weight[:, None]
+        waves.append(np.linalg.qr(wave - line @ (line.T @ wave))[0])
+    return rest - line @ (line.T @ rest), waves
+
+
+def _explained(rows: Floats, waves: Waves) -> Floats:
+    """Return what waves of each period explain of each row (rows, periods)."""
+    out = np.zeros((len(rows), len(waves)))
+    for j, wave in enumerate(waves):
+        if wave is not None:
+            out[:, j] = np.sum((rows @ wave) ** 2, axis=1)
+    return out
 
 
 def _basis(covariate: Floats, name: str) -> Floats:

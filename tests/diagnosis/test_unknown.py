@@ -1,0 +1,141 @@
+"""Structure that no effect explains: what it depends on, by chance or not, and the term that describes it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from tiny_vehicle import FRONT_M, REAR_M, Tiny, campaign_runs
+
+from agvbench.diagnosis import Verdict, diagnose
+from agvbench.diagnosis import empirical_terms as terms
+from agvbench.diagnosis.contradictions import refuse_contradictions
+from agvbench.diagnosis.empirical import gain_p_value
+from agvbench.diagnosis.empirical_screen import Start, Steering, screen
+from agvbench.diagnosis.reading import read_runs
+from agvbench.diagnosis.structure import ALPHA, RANDOM_PHASE, Rates, dependences, swing
+from agvbench.errors import CampaignError
+from agvbench.vehicle.geometry import Geometry
+
+RUNS, STEPS, REPEATS = 60, 20, 3
+GEOMETRY = Geometry(FRONT_M, REAR_M)
+GROUP = np.repeat(np.arange(RUNS // REPEATS), REPEATS)
+
+
+def drives(seed: int, *, scatter: float = 0.01) -> Rates:
+    """Return rates of straight drives over the floor that miss by chance: runs by themselves, and each step."""
+    rng = np.random.default_rng(seed)
+    size, per_run = 0.1, (RUNS, STEPS)
+    start, heading = rng.uniform(-1.0, 1.0, (RUNS, 2)), rng.uniform(-math.pi, math.pi, RUNS)
+    way = size * np.arange(STEPS + 1)
+    places = start[:, None] + way[:, None] * np.column_stack([np.cos(heading), np.sin(heading)])[:, None]
+    begin = np.dstack([places[:, :-1], np.broadcast_to(heading[:, None], per_run)]).reshape(-1, 3)
+    end = np.dstack([places[:, 1:], np.broadcast_to(heading[:, None], per_run)]).reshape(-1, 3)
+    run = np.repeat(np.arange(RUNS), STEPS)
+    value = rng.normal(0.0, scatter, (RUNS, 1, 3)) + rng.normal(0.0, scatter, (*per_run, 3))
+    distance = np.tile(0.5 * (way[1:] + way[:-1]), RUNS)
+    one = np.ones(RUNS * STEPS)
+    covariates = {
+        "x_m": 0.5 * (begin + end)[:, 0],
+        "y_m": 0.5 * (begin + end)[:, 1],
+        "heading_rad": np.mod(begin[:, 2], math.tau),
+        "time_in_run_s": distance / 0.3,
+        "campaign_time_h": np.repeat(np.linspace(0.0, 1.0, RUNS), STEPS),
+        "speed_mps": 0.3 * one,
+        "direction": np.repeat(np.where(np.arange(RUNS) % 2, 1.0, -1.0), STEPS),
+        "curvature_per_m": 0.0 * one,
+        "sideslip": 0.0 * one,
+        "distance_m": distance,
+    }
+    return Rates(run, value.reshape(-1, 3), size * one, covariates, begin, end)
+
+
+def screened(rates: Rates) -> list[Start]:
+    straight = np.zeros((len(rates.run), 2))
+    stands = Steering(straight, straight, np.zeros((len(rates.run), 3), dtype=np.int64))
+    return screen(rates, stands, GEOMETRY, GROUP, 0)
+
+
+def test_chance_is_rarely_called_a_dependence():
+    p_values = [d.p_value for seed in range(12) for d in dependences(drives(seed), GROUP, seed)]
+    assert len(p_values) <= 1  # at a level of one in a thousand
+
+
+def test_a_dependence_is_found_with_its_covariate_first():
+    rates = drives(1)
+    rates.value[:, 0] += 0.04 * np.sin(2.0 * rates.covariates["x_m"])
+    (first, *_) = dependences(rates, np.arange(RUNS), 0)
+    assert (first.covariate, first.feature) == ("x_m", "speed")
+    assert first.p_value < ALPHA
+
+
+@pytest.mark.parametrize("period", [0.3, 0.45])
+def test_a_swing_with_another_phase_in_each_run_is_a_matter_of_distance(period):
+    rates = drives(2)
+    assert swing(rates, 0) is None
+    phase = np.random.default_rng(3).uniform(0.0, math.tau, RUNS)[rates.run]
+    rates.value[:, 2] += 0.05 * np.sin(math.tau * rates.covariates["distance_m"] / period + phase)
+    found = swing(rates, 0)
+    assert found is not None
+    assert (found.covariate, found.feature) == (RANDOM_PHASE, "turning")
+    assert found.share > 0.5
+
+
+def test_a_slow_disc_is_found_where_it_lies():
+    rates = drives(4)
+    inside = np.hypot(rates.middle[:, 0] - 0.4, rates.middle[:, 1] + 0.3) < 0.5
+    rates.value[:, 0] -= 0.2 * inside
+    (best, *_) = screened(rates)
+    assert best.term is terms.SpeedInDisc
+    loss, x, y, radius = best.values
+    assert loss == pytest.approx(0.2, rel=0.2)
+    assert math.hypot(x - 0.4, y + 0.3) < 0.25  # within reach of a fit: the grid is coarse
+    assert radius == pytest.approx(0.5, abs=0.2)
+
+
+def test_a_line_that_turns_is_found_where_it_lies():
+    rates = drives(5)
+    crossed = (rates.end[:, 0] > 0.2).astype(float) - (rates.begin[:, 0] > 0.2)
+    rates.value[:, 2] += 0.04 * crossed * rates.covariates["direction"] / rates.weight
+    (best, *_) = screened(rates)
+    assert best.term is terms.TurnAtLine
+    turn, place, direction = best.values
+    assert direction == pytest.approx(0.0, abs=0.01)
+    assert place == pytest.approx(0.2, abs=0.06)
+    assert turn == pytest.approx(0.04, rel=0.25)
+
+
+def test_chance_promises_no_term():
+    assert all(start.gain < 4.0 for seed in range(3) for start in screened(drives(seed)))
+
+
+def test_the_p_value_of_a_gain_counts_groups_and_not_runs():
+    one_group = np.where(GROUP == 0, 50.0, 0.0)
+    assert gain_p_value(one_group, GROUP, 0) > 0.4
+    assert gain_p_value(np.ones(RUNS), GROUP, 0) < 1e-3
+
+
+def test_frames_that_do_not_belong_to_their_commands_are_one_line():
+    runs = campaign_runs(Tiny())
+    refuse_contradictions(read_runs(runs), where="campaign tiny")
+    order = np.random.default_rng(0).permutation(len(runs))
+    mixed = [dataclasses.replace(run, frames=runs[k].frames) for run, k in zip(runs, order, strict=True)]
+    with pytest.raises(CampaignError, match="same commands contradict each other") as error:
+        refuse_contradictions(read_runs(mixed), where="campaign tiny")
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.slow
+def test_a_disc_beside_a_lag_is_counted_in_what_is_predicted_after(tiny_campaign):
+    found = diagnose(tiny_campaign(Tiny(slow_patch=0.15, steering_lag_s=0.15)))
+    assert found.verdict is Verdict.UNKNOWN
+    assert [effect.name for effect in found.effects] == ["steering_lag"]
+    assert found.depends_on[0].covariate in {"x_m", "y_m"}
+    term = found.provenance["empirical_term"]
+    assert term["name"] == "speed_in_disc"
+    assert term["parameters"]["loss"] == pytest.approx(0.15, rel=0.15)
+    assert term["parameters"]["radius_m"] == pytest.approx(0.7, rel=0.1)
+    position = found.held_out.errors["position_rms_mm"]
+    assert position["after"] < 1.5 * position["floor"] < 0.2 * position["before"]
