@@ -293,7 +293,8 @@ def _lift(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, lat
     off = math.log(factor) if factor > 0.0 else 0.0
     if off == 0.0:
         return 0.0
-    return off * off / (off * off + scatter * scatter) * (_drive_speed(s, p, vehicle, servos, now, speed) - servos[5])
+    believed = 1.0 / (1.0 + (scatter / off) ** 4)
+    return believed * (_drive_speed(s, p, vehicle, servos, now, speed) - servos[5])
 
 
 @compiled(inner=True)

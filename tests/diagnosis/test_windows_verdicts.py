@@ -62,7 +62,8 @@ def test_every_effect_is_listed_with_what_it_does_to_sessions_held_out(lagging):
 def test_nothing_is_named_where_nothing_is_hidden():
     found = diagnose(FreeCampaign(free_runs(Tiny(), runs=2, seconds=24.0)))
     assert not found.effects
-    assert found.held_out.errors["position_rms_mm"]["after"] < 5.0
+    errors = found.held_out.errors["position_rms_mm"]
+    assert errors["after"] < 1.3 * errors["before"] < 10.0  # mm, 2 s ahead
 
 
 def test_too_little_driving_is_refused_in_one_line():
