@@ -17,6 +17,7 @@ from agvbench.diagnosis.next_experiment_propose import with_first_experiment
 from agvbench.errors import FileError, FlagError
 from agvbench.model import VehicleModel
 from agvbench.workflows.diagnosis_files import keep
+from agvbench.workflows.windows_table import windows_table
 
 _TITLES = {
     "position_rms_mm": "position along the way, mm",
@@ -116,6 +117,8 @@ def tell(found: Diagnosis, console: Console) -> None:
         console.print(f"  {text}", highlight=False, markup=False, soft_wrap=True)
     if found.held_out is not None:
         console.print(errors_table(found))
+        if windows := found.provenance.get("windows"):
+            console.print(windows_table(windows))
         if found.held_out.worse_on:
             console.print(f"  worse than before on: {', '.join(found.held_out.worse_on)}", soft_wrap=True)
     for line in next_in_words(found):
