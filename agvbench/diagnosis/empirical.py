@@ -18,7 +18,7 @@ from agvbench.types import Floats
 
 _MOST_STARTS = 3
 _LEAST_PROMISE = 4.0
-_LEAST_OF_BEST = 0.1
+_LEAST_OF_BEST = 0.3
 _MOST_RETRIED = 3
 _FLIPS = 9999
 
@@ -48,8 +48,8 @@ class Explained:
 def explain(selection: Selection, selector: Selector) -> Explained | None:
     """Return the best empirical term, with the effects that earn their place beside it; None if no term earns its own.
 
-    Terms are tried beside the effects chosen and beside none: an effect that only mimics the unknown cause loses its
-    place as soon as the term is there.
+    Terms are tried beside the effects chosen, and where none helps there beside none: an effect that only mimics the
+    unknown cause loses its place as soon as the term is there.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def explain(selection: Selection, selector: Selector) -> Explained | None:
     if not starts and not _lacks(selection.chosen):
         return None
     found = [_best_term(wider, selection.chosen, starts)]
-    if selection.chosen.names != selection.base.names:
+    if found[0] is None and selection.chosen.names != selection.base.names:
         found.append(_best_term(wider, selection.base, promising(wider, selection.base)))
     models = [_settled(wider, selection, *pair) for pair in found if pair is not None]
     models = [model for model in models if model[0].total < selection.chosen.total - selector.least_gain]
