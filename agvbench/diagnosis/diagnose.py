@@ -172,9 +172,9 @@ def _conclude(
     if explained is not None:
         without = explained.without
         unexplained = Predictor(every.batch, without.names).predict(without.fit.parameters)
-    rates = residual_rates(readings, unexplained)
-    rest = dependences(rates, readings.group, seed)
-    if (swings := swing(rates, seed)) is not None:
+    rest = dependences(residual_rates(readings, unexplained), readings.group, seed)
+    # A place passed through in every run can look like a swing: it is looked for in what the term leaves.
+    if (swings := swing(residual_rates(readings, poses), seed)) is not None:
         rest = [swings, *(d for d in rest if d.covariate != RANDOM_PHASE)]
     if explained is not None:
         rest = with_term_first(rest, explained)
