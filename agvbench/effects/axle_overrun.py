@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from agvbench.effects.base import Effect, Stage, parameter
-from agvbench.effects.state import COS_FRONT, COS_REAR, FRONT_SPEED, REAR_SPEED
+from agvbench.effects.state import COS_FRONT, COS_REAR, FORWARD, FRONT_SPEED, LEFT, REAR_SPEED, YAW_RATE
 from agvbench.types import Floats
 
 
@@ -19,7 +19,7 @@ class AxleOverrun(Effect):
     """
 
     name: ClassVar[str] = "axle_overrun"
-    stage: ClassVar[Stage] = Stage.WHEELS
+    stage: ClassVar[Stage] = Stage.BODY
     relaxes: ClassVar[str] = "speed does not depend on steering (7.4)"
     reference: ClassVar[str] = "Bentvelsen 2015, equation 5.6 and appendix B; the law is our own"
     limits: ClassVar[str] = "nothing shows where both axles steer alike: cornering_speed_loss does"
@@ -27,11 +27,12 @@ class AxleOverrun(Effect):
     excess: float = parameter(unit="–", low=0.0, high=20.0, scale=1.0)
 
     @staticmethod
-    def drive(state: Floats, excess: float) -> None:
-        """Slow both axles by what the slower one costs."""
+    def move(state: Floats, excess: float) -> None:
+        """Slow the body by what the slower axle costs."""
         front, rear = abs(state[FRONT_SPEED]) * state[COS_FRONT], abs(state[REAR_SPEED]) * state[COS_REAR]
         whole = front + rear
         if excess > 0.0 and whole > 0.0:
             left = 2.0 * (whole + excess * min(front, rear)) / ((2.0 + excess) * whole)
-            state[FRONT_SPEED] *= left
-            state[REAR_SPEED] *= left
+            state[FORWARD] *= left
+            state[LEFT] *= left
+            state[YAW_RATE] *= left

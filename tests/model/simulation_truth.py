@@ -28,6 +28,7 @@ SIZES: Mapping[str, Mapping[str, float]] = {
     "lateral_slip": {"gradient": 2.0},
     "wheel_diameter_mismatch": {"curvature_per_m": 0.05},
     "axle_speed_mismatch": {"ratio": 0.1},
+    "axle_overrun": {"excess": 1.5},
     "floor_tilt": {"drift_mps": 0.01, "direction_rad": 0.8},
     "mocap_latency": {"latency_s": 0.06},
     "marker_offset": {"forward_m": 0.02, "left_m": -0.015},
@@ -149,7 +150,9 @@ def _equations(get, aims, axles, servos, begin):  # type: ignore[no-untyped-def]
         vr = (1.0 + get("axle_speed_mismatch", "ratio")) * vf
         # Eq. 5.6–5.10 as printed, with the two corrections.
         beta = math.atan((LF * math.tan(dr) + LR * math.tan(df)) / (LF + LR))
-        speed = (vf * math.cos(df) + vr * math.cos(dr)) / (2.0 * math.cos(beta))
+        along = sorted([vf * math.cos(df), vr * math.cos(dr)], key=abs)
+        stiff = 1.0 + get("axle_overrun", "excess")
+        speed = (stiff * along[0] + along[1]) / ((stiff + 1.0) * math.cos(beta))
         curvature = math.cos(beta) * (math.tan(df) - math.tan(dr)) / (LF + LR)
         curvature /= 1.0 + get("lateral_slip", "gradient") * speed**2
         curvature += get("wheel_diameter_mismatch", "curvature_per_m")
