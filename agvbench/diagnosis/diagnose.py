@@ -14,8 +14,8 @@ from agvbench.calibration.source import CampaignLike, HeaderLike
 from agvbench.diagnosis.candidates import bounds_of, candidates
 from agvbench.diagnosis.contradictions import refuse_contradictions
 from agvbench.diagnosis.empirical import Explained, described, explain, term_candidates, with_term_first
-from agvbench.diagnosis.empirical_terms import TERMS
 from agvbench.diagnosis.estimates import named_effects
+from agvbench.diagnosis.forms import BEYOND, form_candidates, reform
 from agvbench.diagnosis.grouping import held_out_runs
 from agvbench.diagnosis.levels import ROLES, FreeMaps, free_maps, start_values
 from agvbench.diagnosis.next_experiment_propose import with_next_experiment
@@ -29,6 +29,7 @@ from agvbench.diagnosis.structure import RANDOM_PHASE, Dependence, dependences, 
 from agvbench.diagnosis.vehicle import corrected_vehicle
 from agvbench.diagnosis.windows import horizon_of
 from agvbench.diagnosis.windows_diagnose import diagnose_windows
+from agvbench.effects.forms import effect_forms
 from agvbench.errors import CampaignError, FitError
 from agvbench.model import VehicleModel, nominal_model
 from agvbench.types import Floats, Run
@@ -100,7 +101,7 @@ def diagnose(
     values = np.array([value for effect in given for value in effect.values.values()])
     names = tuple(effect.name for effect in given)
     selector = Selector(Batch(fitted, maps, geometry), tried, start, seed, tell, names, values)
-    selection = selector.select()
+    selection = reform(selector.select(), selector)
     explained = explain(selection, selector)
     return _conclude(header, readings, held, selection, explained, vehicle, geometry, seed)
 
@@ -160,7 +161,9 @@ def _conclude(
     selection = explained.selection if explained else library
     fit = selection.chosen.fit
     maps = fit.predictor.maps
-    every = Predictor(Batch(readings, maps, geometry, kinds=TERMS if explained else ()), selection.chosen.names)
+    reformed = bool(effect_forms().keys() & set(selection.chosen.names))
+    kinds = BEYOND if explained or reformed else ()
+    every = Predictor(Batch(readings, maps, geometry, kinds=kinds), selection.chosen.names)
     poses = every.predict(fit.parameters)
     static = Predictor(every.batch, selection.base.names).predict(selection.base.fit.parameters)
     before = static if vehicle is None else _believed_poses(vehicle, readings)
@@ -178,7 +181,8 @@ def _conclude(
         rest = [swings, *(d for d in rest if d.covariate != RANDOM_PHASE)]
     if explained is not None:
         rest = with_term_first(rest, explained)
-    effects = named_effects(selection, bounds_of(candidates() | term_candidates(), selection.chosen.names))
+    known = candidates() | term_candidates() | form_candidates()
+    effects = named_effects(selection, bounds_of(known, selection.chosen.names))
     significant = explained is not None or _is_significant(judged, rest)
     verdict, why = _verdict(effects, significant, rest, explained)
     model = corrected_vehicle(header, geometry, fit, maps)
@@ -205,7 +209,7 @@ def _conclude(
         | ({"empirical_term": described(explained)} if explained else {}),
     )
     found = with_residuals(found, readings, held, before, poses)
-    return found if explained else with_next_experiment(found, selection, readings, header, seed)
+    return found if explained or reformed else with_next_experiment(found, selection, readings, header, seed)
 
 
 def _believed_poses(vehicle: VehicleModel, readings: Readings) -> Floats:

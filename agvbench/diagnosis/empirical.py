@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from agvbench.diagnosis.candidates import Candidate, candidate
 from agvbench.diagnosis.empirical_screen import Start, screen, steering
 from agvbench.diagnosis.empirical_terms import TERMS, EmpiricalTerm
-from agvbench.diagnosis.prediction import Batch
+from agvbench.diagnosis.forms import wider
 from agvbench.diagnosis.residuals import AT_THE_FLOOR, LACK_OF_FIT, floor, lack_of_fit, misses
 from agvbench.diagnosis.selection import Scored, Selection, Selector
 from agvbench.diagnosis.structure import Dependence, residual_rates
@@ -59,30 +59,22 @@ def explain(selection: Selection, selector: Selector) -> Explained | None:
         Who chose it.
     """
     batch = selector.batch
-    wider = Selector(
-        Batch(batch.readings, batch.maps, batch.geometry, kinds=TERMS),
-        dict(selector.candidates),
-        selector.start,
-        selector.seed,
-        selector.tell,
-        selector.given,
-        selector.given_values,
-    )
-    starts = promising(wider, selection.chosen)
+    wide = wider(selector)
+    starts = promising(wide, selection.chosen)
     if not starts and not _lacks(selection.chosen):
         return None
-    found = [_best_term(wider, selection.chosen, starts)]
+    found = [_best_term(wide, selection.chosen, starts)]
     if found[0] is None and selection.chosen.names != selection.base.names:
-        found.append(_best_term(wider, selection.base, promising(wider, selection.base)))
-    models = [_settled(wider, selection, *pair) for pair in found if pair is not None]
+        found.append(_best_term(wide, selection.base, promising(wide, selection.base)))
+    models = [_settled(wide, selection, *pair) for pair in found if pair is not None]
     models = [model for model in models if model[0].total < selection.chosen.total - selector.least_gain]
     if not models:
         return None
     chosen, term, gains = min(models, key=lambda model: model[0].total)
-    without = wider.shrunk(selection.base, chosen, term.name)
+    without = wide.shrunk(selection.base, chosen, term.name)
     gain = without.loss - chosen.loss
     rivals = {name: selection.rivals.get(name, {}) for name in gains}
-    tried = selection.tried + wider.tried
+    tried = selection.tried + wide.tried
     rejected = {n: g for n, g in selection.rejected.items() if n not in chosen.names}
     selector.tell(f"{' + '.join(chosen.names)}: an empirical term gains {gain.sum():.0f}")
     return Explained(
@@ -94,13 +86,13 @@ def explain(selection: Selection, selector: Selector) -> Explained | None:
     )
 
 
-def promising(wider: Selector, root: Scored) -> list[Start]:
+def promising(wide: Selector, root: Scored) -> list[Start]:
     """Return the terms that promise to describe what `root` misses, the best first."""
-    batch = wider.batch
+    batch = wide.batch
     poses = root.fit.predictor.predict(root.fit.parameters)
     rates = residual_rates(batch.readings, poses)
     stands = steering(batch, root.fit.parameters, rates)
-    starts = screen(rates, stands, batch.geometry, batch.readings.group, wider.seed)
+    starts = screen(rates, stands, batch.geometry, batch.readings.group, wide.seed)
     least = max(_LEAST_PROMISE, _LEAST_OF_BEST * starts[0].gain) if starts else 0.0
     return [start for start in starts if start.gain > least][:_MOST_STARTS]
 
@@ -116,37 +108,37 @@ def _lacks(model: Scored) -> bool:
     return any(missed.rms()[name] > AT_THE_FLOOR * least[name] for name in ("position_rms_mm", "heading_rms_deg"))
 
 
-def _best_term(wider: Selector, root: Scored, starts: list[Start]) -> tuple[Scored, type[EmpiricalTerm]] | None:
+def _best_term(wide: Selector, root: Scored, starts: list[Start]) -> tuple[Scored, type[EmpiricalTerm]] | None:
     best: tuple[Scored, type[EmpiricalTerm]] | None = None
     for start in starts:
         kind = candidate(start.term)
         values = np.clip(start.values, kind.bounds[:, 0], kind.bounds[:, 1])
-        wider.candidates[start.term.name] = replace(kind, starts=values[None, :])
+        wide.candidates[start.term.name] = replace(kind, starts=values[None, :])
         try:
-            offer = wider.grown(root, start.term.name)
+            offer = wide.grown(root, start.term.name)
         except np.linalg.LinAlgError:
             continue  # a shape that runs away to where nothing can be predicted describes nothing
-        if wider.earns(root, offer) and (best is None or offer.total < best[0].total):
+        if wide.earns(root, offer) and (best is None or offer.total < best[0].total):
             best = offer, start.term
     return best
 
 
 def _settled(
-    wider: Selector, selection: Selection, current: Scored, term: type[EmpiricalTerm]
+    wide: Selector, selection: Selection, current: Scored, term: type[EmpiricalTerm]
 ) -> tuple[Scored, type[EmpiricalTerm], dict[str, float]]:
     """Return the model with the library's effects that earn their place beside the term, and their gains."""
     base = selection.base
     again = [n for n in selection.chosen.names if n not in current.names]
     again += sorted(selection.rejected, key=lambda n: -selection.rejected[n])[:_MOST_RETRIED]
     for name in again:
-        offer = wider.grown(current, name)
-        if name not in current.names and wider.earns(current, offer):
+        offer = wide.grown(current, name)
+        if name not in current.names and wide.earns(current, offer):
             current = offer
     while True:
         found = [n for n in current.names if n not in {*base.names, term.name}]
-        smaller = {name: wider.shrunk(base, current, name) for name in found}
+        smaller = {name: wide.shrunk(base, current, name) for name in found}
         gains = {name: model.total - current.total for name, model in smaller.items()}
-        useless = [name for name, model in smaller.items() if not wider.earns(model, current)]
+        useless = [name for name, model in smaller.items() if not wide.earns(model, current)]
         if not useless:
             return current, term, gains
         current = smaller[min(useless, key=lambda name: gains[name])]

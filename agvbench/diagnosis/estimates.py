@@ -9,6 +9,7 @@ from agvbench.diagnosis.judging import clustered_covariance
 from agvbench.diagnosis.result import Estimate, NamedEffect
 from agvbench.diagnosis.selection import RIVAL_MARGIN, Selection
 from agvbench.effects import Effect, effect_kinds
+from agvbench.effects.forms import effect_forms
 from agvbench.types import Floats
 
 _FLAT = 3.0
@@ -22,7 +23,7 @@ def named_effects(selection: Selection, bounds: Floats) -> tuple[NamedEffect, ..
     fit = selection.chosen.fit
     maps = fit.predictor.maps.size
     stderr = np.sqrt(np.diagonal(clustered_covariance(fit, fit.predictor.readings.group)))
-    kinds: dict[str, type[Effect]] = {**effect_kinds(), **{term.name: term for term in TERMS}}
+    kinds: dict[str, type[Effect]] = {**effect_kinds(), **effect_forms(), **{term.name: term for term in TERMS}}
     at = 0
     found = []
     for name in selection.chosen.names:
@@ -37,17 +38,24 @@ def named_effects(selection: Selection, bounds: Floats) -> tuple[NamedEffect, ..
         rivals = sorted(selection.rivals[name].items(), key=lambda pair: pair[1])
         found.append(
             NamedEffect(
-                name,
+                cause_of(name),
                 estimates,
                 tuple(rival for rival, _ in rivals),
                 {
                     "loss_without_it": selection.gains[name],
                     "rival_margin": RIVAL_MARGIN,
+                    **({"form": name} if name in effect_forms() else {}),
                     **{f"{rival}_instead": worse for rival, worse in rivals},
                 },
             )
         )
     return tuple(found)
+
+
+def cause_of(name: str) -> str:
+    """Return what the library calls the cause whose law is called `name`."""
+    form = effect_forms().get(name)
+    return name if form is None else form.form_of
 
 
 def _note(value: float, stderr: float, bounds: Floats, scale: float) -> str:

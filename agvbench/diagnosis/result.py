@@ -50,7 +50,7 @@ class NamedEffect:
     name: str
     parameters: Mapping[str, Estimate]
     confounded_with: tuple[str, ...]
-    evidence: Mapping[str, float]
+    evidence: Mapping[str, float | str]
 
 
 @dataclass(frozen=True)

@@ -109,7 +109,7 @@ class Selector:
                 break
             current = min(worthy.values(), key=lambda offer: offer.total)
             self.tell(f"{' + '.join(current.names)}: gains {base.total - current.total:.0f}")
-        current, gains = self._pruned(base, current)
+        current, gains = self.pruned(base, current)
         rejected = {name: gain for name, gain in rejected.items() if name not in current.names}
         return Selection(base, current, self._rivals(base, current), gains, rejected, self.tried)
 
@@ -140,7 +140,8 @@ class Selector:
     def _found(self, current: Scored) -> tuple[str, ...]:
         return tuple(name for name in current.names if name not in self.given)
 
-    def _pruned(self, base: Scored, current: Scored) -> tuple[Scored, dict[str, float]]:
+    def pruned(self, base: Scored, current: Scored) -> tuple[Scored, dict[str, float]]:
+        """Return the model with only the effects that earn their place, and what the loss of each would cost."""
         while found := self._found(current):
             smaller = {name: self.shrunk(base, current, name) for name in found}
             gains = {name: model.total - current.total for name, model in smaller.items()}

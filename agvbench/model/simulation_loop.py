@@ -270,7 +270,7 @@ def _ahead(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, sp
     s[HOURS] = vehicle[_STARTED] + now / _SECONDS_PER_HOUR
     s[FRONT], s[REAR], s[SPEED] = servos[2], servos[3], speed
     _motion(s, p, vehicle[_FRONT_AXLE], vehicle[_REAR_AXLE])
-    return s[FORWARD]
+    return float(s[FORWARD])
 
 
 @compiled(inner=True)
@@ -294,7 +294,7 @@ def _lift(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, lat
     if off == 0.0:
         return 0.0
     believed = 1.0 / (1.0 + (scatter / off) ** 4)
-    return believed * (_drive_speed(s, p, vehicle, servos, now, speed) - servos[5])
+    return float(believed * (_drive_speed(s, p, vehicle, servos, now, speed) - servos[5]))
 
 
 @compiled(inner=True)

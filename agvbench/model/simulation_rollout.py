@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from agvbench.effects import effect_kinds
 from agvbench.model.batch import Batch
 from agvbench.model.rollout import settled_targets
 from agvbench.model.simulation import SimulatedRun, Simulation
@@ -52,7 +53,9 @@ def general_rollout(
     hours = np.zeros(len(commands)) if started_h is None else started_h
     times = [np.asarray(t, dtype=np.float64) for t in t_s]
     runs = [SimulatedRun(c, t, float(h)) for c, t, h in zip(commands, times, hours, strict=True)]
-    simulation = Simulation(model.geometry, model.neutral, runs)
+    library = effect_kinds().values()
+    kinds = [type(effect) for effect in model.effects if type(effect) not in library]
+    simulation = Simulation(model.geometry, model.neutral, runs, kinds=kinds)
     states = np.column_stack([batch.initial, np.zeros(len(runs))])
     settled = simulation.settled(model.front, model.rear, model.drive)
     return simulation.split(simulation.predict(settled, simulation.parameters(model.effects), states))

@@ -1,0 +1,34 @@
+"""What another law of a cause declares, and how it is found: one file each, beside this one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from types import MappingProxyType
+from typing import ClassVar
+
+from agvbench.effects.base import Effect
+from agvbench.registry import classes_by_file
+
+
+@dataclass(frozen=True)
+class Form(Effect):
+    """The cause that the library calls ``form_of``, with another law; in vehicle files it has its own name.
+
+    A law with an exponent of its own stands for many: the library's is the one at which a diagnosis begins.
+    """
+
+    form_of: ClassVar[str]
+
+    @classmethod
+    def starts(cls, fitted: Mapping[str, float]) -> list[tuple[float, ...]]:
+        """Return parameters to begin a fit with, given those of the library's law by name."""
+        raise NotImplementedError
+
+
+@cache
+def effect_forms() -> Mapping[str, type[Form]]:
+    """Return every other law by its own name, in alphabetical order."""
+    found = {cls.name: cls for cls in classes_by_file("agvbench.effects.forms", Form)}
+    return MappingProxyType(dict(sorted(found.items())))

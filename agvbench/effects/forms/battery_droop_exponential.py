@@ -1,0 +1,40 @@
+"""Speed falls fast at first, then slowly."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from agvbench.effects.base import Stage, parameter
+from agvbench.effects.forms.base import Form
+from agvbench.effects.state import FRONT_SPEED, HOURS, REAR_SPEED
+from agvbench.types import Floats
+
+
+@dataclass(frozen=True)
+class BatteryDroopExponential(Form):
+    """Speed settles at a share of itself: ``v ← v (1 − share (1 − exp(−hours / time_constant)))``."""
+
+    name: ClassVar[str] = "battery_droop_exponential"
+    form_of: ClassVar[str] = "battery_droop"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    relaxes: ClassVar[str] = "the battery is negligible (9.2)"
+    reference: ClassVar[str] = "Bentvelsen 2015, section 8.2 (the steep end of a full battery)"
+    limits: ClassVar[str] = "a session much shorter than the time constant shows a line only"
+
+    share: float = parameter(unit="–", low=-0.5, high=0.9, scale=0.05)
+    time_constant_h: float = parameter(unit="h", low=0.05, high=20.0, scale=0.5, null=0.5)
+
+    @classmethod
+    def starts(cls, fitted: Mapping[str, float]) -> list[tuple[float, ...]]:
+        """Begin with the library's slope at the beginning of the session."""
+        return [(fitted["per_hour"] * hours, hours) for hours in (0.3, 1.0)]
+
+    @staticmethod
+    def drive(state: Floats, share: float, time_constant_h: float) -> None:
+        """Slow both axles by the hours that have passed."""
+        left = 1.0 + share * math.expm1(-state[HOURS] / time_constant_h)
+        state[FRONT_SPEED] *= left
+        state[REAR_SPEED] *= left

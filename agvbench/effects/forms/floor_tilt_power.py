@@ -1,0 +1,45 @@
+"""A moving vehicle drifts down the slope by a power of its speed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from agvbench.effects.base import Stage, parameter
+from agvbench.effects.forms.base import Form
+from agvbench.effects.state import FORWARD, LEFT, X_RATE, Y_RATE
+from agvbench.types import Floats
+
+_TYPICAL_MPS = 0.3
+
+
+@dataclass(frozen=True)
+class FloorTiltPower(Form):
+    """The drift grows with the speed: ``drift (v / 0.3 m/s)ᵖ`` in one direction; p near 0 is the library's."""
+
+    name: ClassVar[str] = "floor_tilt_power"
+    form_of: ClassVar[str] = "floor_tilt"
+    stage: ClassVar[Stage] = Stage.FLOOR
+    relaxes: ClassVar[str] = "the floor is level (3.2)"
+    reference: ClassVar[str] = "a form of our own"
+    limits: ClassVar[str] = "one slope for the whole floor; several speeds and directions are needed"
+
+    drift_mps: float = parameter(unit="m/s", low=0.0, high=0.2, scale=0.005)
+    direction_rad: float = parameter(unit="rad", low=-math.pi, high=math.pi, scale=0.5)
+    exponent: float = parameter(unit="–", low=0.1, high=3.0, scale=0.5, null=0.1)
+
+    @classmethod
+    def starts(cls, fitted: Mapping[str, float]) -> list[tuple[float, ...]]:
+        """Begin with half the way to proportion, and with proportion."""
+        return [(fitted["drift_mps"], fitted["direction_rad"], p) for p in (0.5, 1.0)]
+
+    @staticmethod
+    def drift(state: Floats, drift_mps: float, direction_rad: float, exponent: float) -> None:
+        """Drift while moving."""
+        if drift_mps != 0.0:
+            square = state[FORWARD] * state[FORWARD] + state[LEFT] * state[LEFT]
+            speed = drift_mps * (square / (_TYPICAL_MPS * _TYPICAL_MPS)) ** (0.5 * exponent)
+            state[X_RATE] += speed * math.cos(direction_rad)
+            state[Y_RATE] += speed * math.sin(direction_rad)

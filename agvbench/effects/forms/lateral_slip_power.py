@@ -1,0 +1,42 @@
+"""Turning falls short by a power of the speed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from agvbench.effects.base import Stage, parameter
+from agvbench.effects.forms.base import Form
+from agvbench.effects.state import FORWARD, LEFT, YAW_RATE
+from agvbench.types import Floats
+
+_TYPICAL_MPS = 0.3
+
+
+@dataclass(frozen=True)
+class LateralSlipPower(Form):
+    """Turning falls short with a power of the speed: ``κ ← κ / (1 + loss (v / 0.3 m/s)ᵖ)``; p = 2 is the library's."""
+
+    name: ClassVar[str] = "lateral_slip_power"
+    form_of: ClassVar[str] = "lateral_slip"
+    stage: ClassVar[Stage] = Stage.BODY
+    relaxes: ClassVar[str] = "slip is negligible (3.2)"
+    reference: ClassVar[str] = "Gillespie 1992, ch. 6, for p = 2; the power is our own"
+    limits: ClassVar[str] = "several speeds are needed: at one speed it is a scale of the steering"
+
+    loss: float = parameter(unit="–", low=-0.3, high=3.0, scale=0.1)
+    exponent: float = parameter(unit="–", low=0.2, high=4.0, scale=1.0, null=2.0)
+
+    @classmethod
+    def starts(cls, fitted: Mapping[str, float]) -> list[tuple[float, ...]]:
+        """Begin near the library's law, and with one in proportion to the speed."""
+        loss = fitted["gradient"] * _TYPICAL_MPS**2
+        return [(loss, 1.8), (loss, 1.0)]
+
+    @staticmethod
+    def move(state: Floats, loss: float, exponent: float) -> None:
+        """Turn less, the more the faster."""
+        if loss != 0.0:
+            square = state[FORWARD] * state[FORWARD] + state[LEFT] * state[LEFT]
+            state[YAW_RATE] /= 1.0 + loss * (square / (_TYPICAL_MPS * _TYPICAL_MPS)) ** (0.5 * exponent)
