@@ -6,15 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from agvbench.diagnosis.candidates import Candidate, candidate
+from agvbench.diagnosis.candidates import Candidate, bounds_of, candidate
 from agvbench.diagnosis.empirical_terms import TERMS
-from agvbench.diagnosis.prediction import Batch
+from agvbench.diagnosis.fitting import fit
+from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.selection import LEAST_GAIN, RIVAL_MARGIN, Scored, Selection, Selector
 from agvbench.effects import Effect
 from agvbench.effects.forms import Form, effect_forms
 
 BEYOND: tuple[type[Effect], ...] = (*TERMS, *effect_forms().values())
 """What the widest simulation has beyond the library. One simulation for all, since each takes long to compile."""
+
+_SHORT = 3
 
 
 def form_candidates() -> dict[str, Candidate]:
@@ -70,20 +73,34 @@ def _with_form(wide: Selector, selection: Selection, current: Scored, name: str,
     kind = candidate(form)
     starts = np.clip(np.array(form.starts(fitted)), kind.bounds[:, 0], kind.bounds[:, 1])
     wide.candidates[form.name] = replace(kind, starts=starts)
-    root = wide.shrunk(selection.base, current, name)
-    offers = [(wide.grown(root, form.name), LEAST_GAIN)]
+    offers = [(_swapped(wide, current, {name}, form.name), LEAST_GAIN)]
     # What stands beside a wrong law may only make up for it: the right law alone has to do as well, not better.
-    offers += [
-        (wide.grown(wide.shrunk(selection.base, root, other), form.name), -LEAST_GAIN)
-        for other in root.names
-        if other not in wide.given
-    ]
+    others = [other for other in current.names if other != name and other not in wide.given]
+    offers += [(_swapped(wide, current, {name, other}, form.name), -LEAST_GAIN) for other in others]
     worthy = [offer for offer, least in offers if offer.total < current.total - least]
     if not worthy:
         return current
     best = min(worthy, key=lambda offer: offer.total + LEAST_GAIN * len(offer.names))
     wide.tell(f"{' + '.join(best.names)}: another law gains {current.total - best.total:.0f}")
     return best
+
+
+def _swapped(wide: Selector, current: Scored, out: set[str], form: str) -> Scored:
+    """Return `current` with a law in place of the effects `out`, fitted from the scatter and offsets that it has."""
+    own = current.fit.effect_values()
+    kept = [value for key, value in own.items() if key.partition(".")[0] not in out]
+    names = (*(name for name in current.names if name not in out), form)
+    maps = current.fit.parameters[: wide.batch.maps.size]
+    near = current.fit
+    tries = [
+        fit(
+            Predictor(wide.batch, names), np.r_[maps, kept, start], bounds_of(wide.candidates, names),
+            offsets=near.offsets, scatter=near.scatter, iterations=_SHORT,
+        )
+        for start in wide.candidates[form].starts
+    ]  # fmt: skip
+    best = min(tries, key=lambda one: float(one.loss.sum()))
+    return wide.score(names, best.parameters, best)
 
 
 def _rivals(selection: Selection, name: str, better: float) -> dict[str, float]:
