@@ -2,7 +2,9 @@
 
 Round trip: a command from the runner's link to an AGV adapter, frames from a mocap adapter back; against two bare
 publishers and subscribers that pass the same bytes. The adapters answer at once, so that nothing but the bus is timed.
-Ours and the peer take turns in blocks; the ratio is the median of the blocks' ratios of medians.
+Ours and the peer take turns in blocks; the ratio is the median of the blocks' ratios of medians. Between two processes
+the other one is started several times, ours and the peer declared in either order: which is first, and how the
+threads happen to lie on the cores, makes up to 10 % for a whole launch.
 
 Load: 25 mocap adapters in one process, each publishing a frame when it comes (all that have come, if it falls behind),
 and one recorder with a thread for each vehicle.
@@ -132,12 +134,30 @@ class EchoMocap(MocapAdapter):
 
 
 @contextmanager
-def echo_node(session: zenoh.Session) -> Iterator[None]:
+def echo_node(session: zenoh.Session, *, bare_first: bool = False) -> Iterator[None]:
     """Host the echoing adapters, and the bare peer that does the same with bytes."""
+    nodes = (bare_echo, our_echo) if bare_first else (our_echo, bare_echo)
+    with nodes[0](session), nodes[1](session):
+        yield
+
+
+@contextmanager
+def our_echo(session: zenoh.Session) -> Iterator[None]:
+    """Host adapters that answer at once."""
     keys, clock = Keys("perf", "agv1"), WallClock()
     camera = EchoMocap()
     camera_host = MocapHost(session, keys, camera, clock, listens_for_truth=False)
     vehicle_host = AgvHost(session, keys, EchoAgv(camera.publish), clock, camera_host.see)
+    try:
+        yield
+    finally:
+        vehicle_host.close()
+        camera_host.close()
+
+
+@contextmanager
+def bare_echo(session: zenoh.Session) -> Iterator[None]:
+    """Do the same with bytes."""
     subscriber = session.declare_subscriber("bare/command", zenoh.handlers.FifoChannel(256))
     publisher = session.declare_publisher("bare/frames", **QOS)
     answers = {count: bytes(frames_bytes(count)) for count in (1, 96)}
@@ -159,8 +179,6 @@ def echo_node(session: zenoh.Session) -> Iterator[None]:
         subscriber.undeclare()
         thread.join()
         publisher.undeclare()
-        vehicle_host.close()
-        camera_host.close()
 
 
 class Plan(NamedTuple):
@@ -183,17 +201,31 @@ def median_s(call: Callable[[], object], plan: Plan) -> float:
     return statistics.median(taken)
 
 
-def compare(what: str, ours: Callable[[], object], bare: Callable[[], object], plan: Plan, bound: float | None) -> None:
-    """Let ours and the peer take turns in blocks; print the medians and the median ratio."""
-    rows = [(median_s(ours, plan), median_s(bare, plan)) for _ in range(plan.blocks)]
-    mine, peer = (statistics.median(column) * 1e6 for column in zip(*rows, strict=True))
-    ratio = statistics.median(own / other for own, other in rows)
-    verdict = "" if bound is None else f"≤ {bound}  {'yes' if ratio <= bound else 'no'}"
-    print(f"{what:56s} {mine:8.1f} µs {peer:8.1f} µs {ratio:7.2f}  {verdict}", flush=True)
+class Table:
+    """What was measured, by row: blocks of medians, ours and the peer's [s]."""
+
+    def __init__(self) -> None:
+        self._rows: dict[tuple[str, float | None], list[tuple[float, float]]] = {}
+
+    def compare(
+        self, what: str, ours: Callable[[], object], bare: Callable[[], object], plan: Plan, bound: float | None
+    ) -> None:
+        """Let ours and the peer take turns in blocks."""
+        blocks = self._rows.setdefault((what, bound), [])
+        blocks += [(median_s(ours, plan), median_s(bare, plan)) for _ in range(plan.blocks)]
+
+    def tell(self) -> None:
+        """Print the medians and the median ratio of every row, and forget them."""
+        for (what, bound), blocks in self._rows.items():
+            mine, peer = (statistics.median(column) * 1e6 for column in zip(*blocks, strict=True))
+            ratio = statistics.median(own / other for own, other in blocks)
+            verdict = "" if bound is None else f"≤ {bound}  {'yes' if ratio <= bound else 'no'}"
+            print(f"{what:56s} {mine:8.1f} µs {peer:8.1f} µs {ratio:7.2f}  {verdict}", flush=True)
+        self._rows.clear()
 
 
-def round_trips(session: zenoh.Session, where: str, plans: list[Plan]) -> None:
-    """Print the codec's and numbering's round trip beside bare Zenoh's, for one frame and for 0.8 s at 120 Hz."""
+def round_trips(table: Table, session: zenoh.Session, where: str, plans: list[Plan]) -> None:
+    """Measure the codec's and numbering's round trip beside bare Zenoh's, for one frame and for 0.8 s at 120 Hz."""
     keys = Keys("perf", "agv1")
     inbox, outbox = Inbox(session, keys), CommandOutbox(session, keys)
     with bare_peer(session) as bare:
@@ -204,13 +236,13 @@ def round_trips(session: zenoh.Session, where: str, plans: list[Plan]) -> None:
                 outbox.send(command, 0.0, 0.8)
                 return inbox.receive()
 
-            compare(label("round trip", where, plan, count), ours, bare(count), plan, BOUND)
+            table.compare(label("round trip", where, plan, count), ours, bare(count), plan, BOUND)
     inbox.close()
     outbox.close()
 
 
-def lock_steps(session: zenoh.Session, where: str, plans: list[Plan]) -> None:
-    """Print whole exchanges, with their clocks, watchdog and checks, beside bare Zenoh's round trip."""
+def lock_steps(table: Table, session: zenoh.Session, where: str, plans: list[Plan]) -> None:
+    """Measure whole exchanges, with their clocks, watchdog and checks, beside bare Zenoh's round trip."""
     with VehicleLink(session, "perf", "agv1") as link, bare_peer(session) as bare:
         link.reset(Pose(0.0, 0.0, 0.0), run_key="a")
         for plan, count in itertools.product(plans, (1, 96)):
@@ -219,7 +251,7 @@ def lock_steps(session: zenoh.Session, where: str, plans: list[Plan]) -> None:
             def ours(command: Command = command) -> object:
                 return link.exchange(command, t_s=0.0, hold_s=0.8)
 
-            compare(label("exchange", where, plan, count), ours, bare(count), plan, None)
+            table.compare(label("exchange", where, plan, count), ours, bare(count), plan, None)
 
 
 def label(what: str, where: str, plan: Plan, count: int) -> str:
@@ -360,10 +392,14 @@ def main() -> None:
     parser.add_argument("--full", action="store_true", help="load for 60 s instead of 5 s, and more round trips")
     parser.add_argument("--quick", action="store_true", help="fewer round trips, load for 1 s")
     parser.add_argument("--echo", metavar="ENDPOINT", help=argparse.SUPPRESS)
+    parser.add_argument("--bare-first", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--load", nargs=3, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.echo:
-        with open_session(listen=[arguments.echo]) as session, echo_node(session):
+        with (
+            open_session(listen=[arguments.echo]) as session,
+            echo_node(session, bare_first=arguments.bare_first),
+        ):
             print("ready", flush=True)
             sys.stdin.readline()
         return
@@ -373,16 +409,21 @@ def main() -> None:
         return
     more = 1 if arguments.quick else 9 if arguments.full else 4
     plans = [Plan("back to back", 5 * more, 100, 0.0), Plan("at 240 Hz", 3 * more, 40, 1 / 240.0)]
+    few = [Plan("back to back", 5, 100, 0.0), Plan("at 240 Hz", 3, 40, 1 / 240.0)]
     print(f"{'what':56s} {'ours':>11s} {'bare Zenoh':>11s} {'ratio':>7s}  bound  met?")
+    table = Table()
     with open_session() as session, echo_node(session):
-        round_trips(session, "one session", plans)
-        lock_steps(session, "one session", plans)
-    endpoint = free_endpoint()
-    process = child("--echo", endpoint)
-    with open_session(connect=[endpoint]) as session:
-        round_trips(session, "two processes", plans)
-        lock_steps(session, "two processes", plans)
-    process.communicate("\n")
+        round_trips(table, session, "one session", plans)
+        lock_steps(table, session, "one session", plans)
+    table.tell()
+    for launch in range(4 * more):
+        endpoint = free_endpoint()
+        process = child("--echo", endpoint, *(["--bare-first"] if launch % 2 else []))
+        with open_session(connect=[endpoint]) as session:
+            round_trips(table, session, "two processes", few)
+            lock_steps(table, session, "two processes", few)
+        process.communicate("\n")
+    table.tell()
     duration_s = 60.0 if arguments.full else 1.0 if arguments.quick else 5.0
     load(free_endpoint(), 240.0, duration_s)
     load(free_endpoint(), 2400.0, duration_s)
