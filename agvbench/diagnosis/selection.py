@@ -33,6 +33,7 @@ NOTICEABLE = 0.15
 
 _SHORT, _LONG = 3, 10
 _HOPELESS = 3.0  # what promises less, to first order, is not fitted
+_LIKELY = 40.0  # what promises more is fitted to the end
 _MOST_EFFECTS = 4
 
 
@@ -194,7 +195,8 @@ class Selector:
             scatter=now.scatter,
             iterations=_SHORT,
         )
-        if float(now.loss.sum() - short.loss.sum()) < _HOPELESS:
+        # What promises much may have to climb first: maps that took up a cause must give it back before it shows.
+        if promises[best] < _LIKELY and float(now.loss.sum() - short.loss.sum()) < _HOPELESS:
             self.tried += 1
             self._known[key] = Scored(names, short, cross_validated(short, self._fold, bounds))
         return self.score(names, short.parameters, short)
