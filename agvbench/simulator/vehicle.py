@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from agvbench.errors import PlantError
 from agvbench.simulator import dynamics
+from agvbench.simulator.asked import asked_advance, asked_pose
 from agvbench.simulator.parameters import MAX_DELAY_FRAMES, SimulatedVehicle
 
-LONGEST_ADVANCE_S = 86_400.0
 _SEEDS = 2**64
 
 
@@ -61,11 +59,7 @@ class VehiclePlant:
         PlantError
             If the pose is not finite.
         """
-        x, y, heading = (float(value) for value in pose)
-        if not math.isfinite(x + y + heading):
-            raise PlantError(
-                "start pose is not finite", where="reset", value=tuple(pose), remedy="give x, y in m and heading in rad"
-            )
+        x, y, heading = asked_pose(pose)
         rng = np.random.default_rng([self._seed % _SEEDS, seed % _SEEDS])
         play = self.vehicle.play
         self._play[:] = rng.standard_normal(3) * (play.front_rad, play.rear_rad, play.speed)
@@ -87,18 +81,7 @@ class VehiclePlant:
         PlantError
             If a command is not a finite number, or `dt` is negative, not finite or over a day.
         """
-        try:
-            drive, front, rear, dt = float(drive), float(front), float(rear), float(dt)
-        except (TypeError, ValueError):
-            raise PlantError("command is not a number", where="advance", value=(drive, front, rear, dt)) from None
-        if not math.isfinite(drive + front + rear):
-            raise PlantError(
-                "command is not finite", where="advance", value=f"drive {drive}, front {front}, rear {rear}"
-            )
-        if not 0.0 <= dt <= LONGEST_ADVANCE_S:
-            raise PlantError(
-                "time step is out of range", where="advance", value=f"{dt} s", limit=f"0 to {LONGEST_ADVANCE_S:.0f} s"
-            )
+        drive, front, rear, dt = asked_advance(drive, front, rear, dt)
         self._pose = dynamics.advance(
             self._constants, self._play, self._state, self._counters, self._work, drive, front, rear, dt
         )

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from agvbench.errors import PlantError
+from agvbench.simulator.asked import asked_advance, asked_pose
 from agvbench.simulator.hidden import _kernel as kernel
 from agvbench.simulator.hidden.constants import LATENCY_S, pack
 from agvbench.simulator.hidden.truth import SealedTruth
 
-LONGEST_ADVANCE_S = 86_400.0
 TURNAROUND_S = 15.0
 """Between a run and the next reset: what fetching the vehicle takes. Batteries drain and servos warm meanwhile."""
 _SEEDS = 2**64
@@ -70,11 +68,7 @@ class HiddenPlant:
         PlantError
             If the pose is not finite.
         """
-        x, y, heading = (float(value) for value in pose)
-        if not math.isfinite(x + y + heading):
-            raise PlantError(
-                "start pose is not finite", where="reset", value=tuple(pose), remedy="give x, y in m and heading in rad"
-            )
+        x, y, heading = asked_pose(pose)
         rng = np.random.default_rng([self._seed % _SEEDS, seed % _SEEDS])
         self._play[:] = rng.standard_normal(3) * self._spread
         if self._driven:
@@ -91,18 +85,7 @@ class HiddenPlant:
         PlantError
             If a command is not a finite number, or `dt` is negative, not finite or over a day.
         """
-        try:
-            drive, front, rear, dt = float(drive), float(front), float(rear), float(dt)
-        except (TypeError, ValueError):
-            raise PlantError("command is not a number", where="advance", value=(drive, front, rear, dt)) from None
-        if not math.isfinite(drive + front + rear):
-            raise PlantError(
-                "command is not finite", where="advance", value=f"drive {drive}, front {front}, rear {rear}"
-            )
-        if not 0.0 <= dt <= LONGEST_ADVANCE_S:
-            raise PlantError(
-                "time step is out of range", where="advance", value=f"{dt} s", limit=f"0 to {LONGEST_ADVANCE_S:.0f} s"
-            )
+        drive, front, rear, dt = asked_advance(drive, front, rear, dt)
         self._driven = self._driven or dt > 0.0
         pose: tuple[float, float, float] = kernel.advance(
             self._constants, self._play, self._state, self._ring, self._past, self._marks, self._work,
