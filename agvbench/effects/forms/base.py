@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -13,7 +14,7 @@ from agvbench.registry import classes_by_file
 
 
 @dataclass(frozen=True)
-class Form(Effect):
+class Form(Effect, ABC):
     """The cause that the library calls ``form_of``, with another law; in vehicle files it has its own name.
 
     A law with an exponent of its own stands for many: the library's is the one at which a diagnosis begins.
@@ -22,13 +23,13 @@ class Form(Effect):
     form_of: ClassVar[str]
 
     @classmethod
+    @abstractmethod
     def starts(cls, fitted: Mapping[str, float]) -> list[tuple[float, ...]]:
         """Return parameters to begin a fit with, given those of the library's law by name."""
-        raise NotImplementedError
 
 
 @cache
 def effect_forms() -> Mapping[str, type[Form]]:
     """Return every other law by its own name, in alphabetical order."""
-    found = {cls.name: cls for cls in classes_by_file("agvbench.effects.forms", Form)}
+    found = {cls.name: cls for cls in classes_by_file("agvbench.effects.forms", Form)}  # type: ignore[type-abstract]
     return MappingProxyType(dict(sorted(found.items())))
