@@ -10,6 +10,7 @@ from itertools import product
 import numpy as np
 
 from agvbench.effects import Effect, effect_kinds
+from agvbench.model import VehicleModel
 from agvbench.types import Floats
 
 IN_THE_MAPS = frozenset({"steering_saturation", "drive_dead_band"})
@@ -56,6 +57,13 @@ def candidate(kind: type[Effect]) -> Candidate:
 
 def _by_share(choices: list[list[float]]) -> list[list[list[float]]]:
     return [[[v for v in column if abs(v) == size] for size in sorted({abs(v) for v in column})] for column in choices]
+
+
+def given_effects(vehicle: VehicleModel | None, tried: Iterable[str]) -> tuple[tuple[str, ...], Floats]:
+    """Return names and parameters (p,) of the effects that a vehicle is known to have, of those that are `tried`."""
+    known = {*tried}
+    given = [e for e in (vehicle.effects if vehicle else ()) if e.name in known and not e.is_null]
+    return tuple(e.name for e in given), np.array([value for e in given for value in e.values.values()])
 
 
 def bounds_of(candidates_by_name: dict[str, Candidate], names: Iterable[str]) -> Floats:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 
 from agvbench.calibration import RunMeasurement, measure_run
 from agvbench.calibration.source import CampaignLike, HeaderLike
-from agvbench.diagnosis.candidates import bounds_of, candidates
+from agvbench.diagnosis.candidates import bounds_of, candidates, given_effects
 from agvbench.diagnosis.contradictions import refuse_contradictions
 from agvbench.diagnosis.empirical import Explained, described, explain, term_candidates, with_term_first
 from agvbench.diagnosis.estimates import named_effects
@@ -20,6 +19,7 @@ from agvbench.diagnosis.grouping import held_out_runs
 from agvbench.diagnosis.levels import ROLES, FreeMaps, free_maps, start_values
 from agvbench.diagnosis.next_experiment_propose import with_next_experiment
 from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.provenance import provenance, refuse_nothing
 from agvbench.diagnosis.reading import Readings, read_runs
 from agvbench.diagnosis.residual_table import with_residuals
 from agvbench.diagnosis.residuals import AT_THE_FLOOR, LACK_OF_FIT, Misses, floor, lack_of_fit, misses
@@ -97,9 +97,7 @@ def diagnose(
     maps = free_maps(fitted.runs, header.neutral)
     start = start_values(maps, measured, _believed(maps, header, geometry, vehicle))
     tried = candidates()
-    given = tuple(e for e in (vehicle.effects if vehicle else ()) if e.name in tried and not e.is_null)
-    values = np.array([value for effect in given for value in effect.values.values()])
-    names = tuple(effect.name for effect in given)
+    names, values = given_effects(vehicle, tried)
     selector = Selector(Batch(fitted, maps, geometry), tried, start, seed, tell, names, values)
     selection = reform(selector.select(), selector)
     explained = explain(selection, selector)
@@ -108,9 +106,7 @@ def diagnose(
 
 def _cannot_tell(readings: Readings, header: HeaderLike) -> str:
     """Return why this campaign cannot be diagnosed, or nothing."""
-    if not len(readings):
-        first = next(iter(readings.refused.items()), ("", "there are none"))
-        raise CampaignError("no run can be used", where=f"campaign {header.name}", value=f"{first[0]}: {first[1]}")
+    refuse_nothing(readings, header)
     if len(readings) < FEWEST_RUNS:
         raise CampaignError(
             "too few runs to diagnose",
@@ -185,7 +181,7 @@ def _conclude(
     effects = named_effects(selection, bounds_of(known, selection.chosen.names))
     significant = explained is not None or _is_significant(judged, rest)
     verdict, why = _verdict(effects, significant, rest, explained)
-    model = corrected_vehicle(header, geometry, fit, maps)
+    model = corrected_vehicle(header, geometry, fit, maps, seed)
     found = Diagnosis(
         verdict,
         why,
@@ -193,7 +189,7 @@ def _conclude(
         significant,
         tuple(rest),
         _held_out(readings.select(held), judged),
-        dataclasses.replace(model, provenance={"campaign": header.name, "method": "diagnose", "seed": seed}),
+        model,
         selection.rejected,
         _provenance(header, readings, seed)
         | {
@@ -265,15 +261,4 @@ def _held_out(kept: Readings, judged: _Judged) -> HeldOut:
 
 
 def _provenance(header: HeaderLike, readings: Readings, seed: int) -> dict[str, object]:
-    from agvbench import __version__
-
-    refused: dict[str, int] = {}
-    for reason in readings.refused.values():
-        refused[reason] = refused.get(reason, 0) + 1
-    return {
-        "agvbench": __version__,
-        "campaign": header.name,
-        "seed": seed,
-        "runs_used": len(readings),
-        "runs_refused": refused,
-    }
+    return provenance(header, readings, seed, runs_used=len(readings))

@@ -27,9 +27,11 @@ def form_candidates() -> dict[str, Candidate]:
 
 def wider(selector: Selector) -> Selector:
     """Return a selector of the same runs whose simulation has empirical terms and other laws, too."""
-    batch = selector.batch
+    if selector.wide is None:
+        batch = selector.batch
+        selector.wide = Batch(batch.readings, batch.maps, batch.geometry, kinds=BEYOND)
     return Selector(
-        Batch(batch.readings, batch.maps, batch.geometry, kinds=BEYOND),
+        selector.wide,
         dict(selector.candidates),
         selector.start,
         selector.seed,

@@ -74,7 +74,7 @@ class Selector:
     """Tries effects on the runs to be fitted.
 
     ``given`` are effects that the vehicle is known to have: they stay in every model, with parameters fitted again from
-    ``given_values``.
+    ``given_values``. ``wide`` keeps a batch with more than the library, once one was needed.
     """
 
     batch: Batch
@@ -87,6 +87,7 @@ class Selector:
     noticeable: ClassVar[float] = NOTICEABLE
     given_values: Floats = field(default_factory=lambda: np.empty(0))
     tried: int = 0
+    wide: Batch | None = field(init=False, default=None)
     _fold: NDArray[np.int64] = field(init=False)
     _known: dict[tuple[str, ...], Scored] = field(init=False, default_factory=dict)
 

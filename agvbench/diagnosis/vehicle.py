@@ -17,7 +17,7 @@ from agvbench.vehicle.maps import Fixed, MonotoneTable, StaticMap
 _DIGITS = 9
 
 
-def corrected_vehicle(header: HeaderLike, geometry: Geometry, fitted: Fit, maps: FreeMaps) -> VehicleModel:
+def corrected_vehicle(header: HeaderLike, geometry: Geometry, fitted: Fit, maps: FreeMaps, seed: int) -> VehicleModel:
     """Return the vehicle that `fitted` describes; its maps are tables, made monotone where scatter made them turn."""
     where = maps.slices()
     weight = np.maximum(np.diagonal(fitted.information.sum(axis=0)), 1e-6)
@@ -38,6 +38,7 @@ def corrected_vehicle(header: HeaderLike, geometry: Geometry, fitted: Fit, maps:
         rear=rear,
         drive=drive,
         effects=_effects(fitted),
+        provenance={"campaign": header.name, "method": "diagnose", "seed": seed},
     )
 
 

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.calibration.source import HeaderLike
-from agvbench.diagnosis.candidates import bounds_of, candidates
+from agvbench.diagnosis.candidates import bounds_of, candidates, given_effects
 from agvbench.diagnosis.estimates import named_effects
 from agvbench.diagnosis.fitting import Fit, fit
 from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.provenance import provenance, refuse_nothing
 from agvbench.diagnosis.reading import Readings, read_windows
 from agvbench.diagnosis.result import Diagnosis, HeldOut, NamedEffect, Verdict
 from agvbench.diagnosis.selection import Scored, Selection
@@ -68,8 +69,7 @@ def diagnose_windows(
     tell(f"{len(fitted)} windows to fit, {np.count_nonzero(held)} held out")
     static = _static(fitted, geometry, header.neutral)
     tried = candidates()
-    given = tuple(e for e in (vehicle.effects if vehicle else ()) if e.name in tried and not e.is_null)
-    values = np.array([value for effect in given for value in effect.values.values()])
+    names, values = given_effects(vehicle, tried)
     several = len(np.unique(readings.begins.session)) > 1 if readings.begins else False
     scatter = level_scatter(static.predictor, static.parameters) if several else np.inf
     level = fit(Predictor(Batch(fitted, static.predictor.maps, geometry, scatter)), static.parameters, np.empty((0, 2)))
@@ -77,7 +77,6 @@ def diagnose_windows(
     batch = Batch(fitted, static.predictor.maps, geometry, scatter, alike)
     aside = readings.select(thinned(np.flatnonzero(held), MOST_FITTED))
     elsewhere = Batch(aside, static.predictor.maps, geometry, scatter)
-    names = tuple(e.name for e in given)
     selector = WindowSelector(batch, tried, level.parameters, seed, tell, names, values, elsewhere=elsewhere)
     selection = selector.select()
     tell("judging on what was held out")
@@ -89,9 +88,7 @@ def diagnose_windows(
 
 
 def _cannot_tell(readings: Readings, header: HeaderLike, horizon: Horizon) -> str:
-    if not len(readings):
-        first = next(iter(readings.refused.items()), ("", "there are none"))
-        raise CampaignError("no run can be used", where=f"campaign {header.name}", value=f"{first[0]}: {first[1]}")
+    refuse_nothing(readings, header)
     if len(readings) < FEWEST_WINDOWS:
         raise CampaignError(
             "too little free driving to diagnose",
@@ -160,7 +157,7 @@ class _Conclusion:
         rest = rest if above else []
         far = any(e["after"] > FAR_ABOVE * e["floor"] for e in held_out.errors.values())
         verdict, why = _verdict(effects, rest, far)
-        model = corrected_vehicle(self.header, self.geometry, chosen.fit, chosen.fit.predictor.maps)
+        model = corrected_vehicle(self.header, self.geometry, chosen.fit, chosen.fit.predictor.maps, self.seed)
         scatter = self.selector.batch.level_scatter
         return Diagnosis(
             verdict,
@@ -169,9 +166,7 @@ class _Conclusion:
             far or bool(rest),
             tuple(rest),
             held_out,
-            dataclasses.replace(
-                model, provenance={"campaign": self.header.name, "method": "diagnose", "seed": self.seed}
-            ),
+            model,
             self.selection.rejected,
             _provenance(self.header, self.readings, self.seed)
             | {
@@ -267,16 +262,5 @@ def _verdict(effects: tuple[NamedEffect, ...], rest: list[Dependence], far: bool
 
 
 def _provenance(header: HeaderLike, readings: Readings, seed: int) -> dict[str, object]:
-    from agvbench import __version__
-
-    refused: dict[str, int] = {}
-    for reason in readings.refused.values():
-        refused[reason] = refused.get(reason, 0) + 1
-    return {
-        "agvbench": __version__,
-        "campaign": header.name,
-        "seed": seed,
-        "runs_used": len({run.run_id.rpartition("@")[0] for run in readings.runs}),
-        "runs_refused": refused,
-        "windows_used": len(readings),
-    }
+    driven = {run.run_id.rpartition("@")[0] for run in readings.runs}
+    return provenance(header, readings, seed, runs_used=len(driven)) | {"windows_used": len(readings)}
