@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from agvbench.diagnosis.residual_table import with_residuals
 from agvbench.diagnosis.residuals import AT_THE_FLOOR, LACK_OF_FIT, Misses, floor, lack_of_fit, misses
 from agvbench.diagnosis.result import Diagnosis, HeldOut, Verdict
 from agvbench.diagnosis.selection import Selection, Selector
+from agvbench.diagnosis.standing import resettle, settle
 from agvbench.diagnosis.structure import RANDOM_PHASE, Dependence, dependences, residual_rates, swing
 from agvbench.diagnosis.vehicle import corrected_vehicle
 from agvbench.diagnosis.windows import horizon_of
@@ -98,8 +99,10 @@ def diagnose(
     start = start_values(maps, measured, _believed(maps, header, geometry, vehicle))
     tried = candidates()
     names, values = given_effects(vehicle, tried)
-    selector = Selector(Batch(fitted, maps, geometry), tried, start, seed, tell, names, values)
-    selection = reform(selector.select(), selector)
+    selector = settle(Selector(Batch(fitted, maps, geometry), tried, start, seed, tell, names, values))
+    chosen, selector = resettle(selector.select(), selector)
+    selection = reform(chosen, selector)
+    readings = replace(readings, stood=selector.batch.readings.stood)
     explained = explain(selection, selector)
     return _conclude(header, readings, held, selection, explained, vehicle, geometry, seed)
 
@@ -195,6 +198,7 @@ def _conclude(
         | {
             "fit_runs": int((~held).sum()),
             "models_fitted": selection.tried,
+            "steering_stood_at": "the first command" if readings.stood else "neutral",
             "lack_of_fit_p_value": judged.lack_of_fit,
             "scatter": {
                 "front_deg": float(np.degrees(fit.scatter.offsets[1])),

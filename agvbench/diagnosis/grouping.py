@@ -3,15 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.errors import FitError
-from agvbench.types import Commands, Run
+from agvbench.types import Commands, Floats, Run
 
 HELD_OUT_SHARE = 0.25
 _SAME_TIME_S = 0.05
+_SAME_LEVEL = 1e-5
+_ROLES = ("drive", "front", "rear")
+
+
+def at_common_levels(runs: Sequence[Run]) -> Sequence[Run]:
+    """Return the runs with commands that differ by rounding alone made the same.
+
+    A level that one run computed as 0.15 and another as 0.15000000000000002 is one level: as two, it would
+    be two free values of a map, of which one may be driven in no run that is fitted.
+    """
+    levels = {role: _common([getattr(run.commands, role) for run in runs]) for role in _ROLES}
+    if not any(len(told) for told, _ in levels.values()):
+        return runs
+    out = []
+    for run in runs:
+        snapped = {}
+        for role, (told, common) in levels.items():
+            values = getattr(run.commands, role)
+            snapped[role] = common[np.searchsorted(told, values)] if len(told) and len(values) else values
+        out.append(replace(run, commands=replace(run.commands, **snapped)))
+    return out
+
+
+def _common(commands: list[Floats]) -> tuple[Floats, Floats]:
+    """Return all levels, ascending, and for each the level that stands for it; nothing where none are near."""
+    told = np.unique(np.concatenate([np.empty(0), *commands]))
+    if len(told) < 2:
+        return told[:0], told[:0]
+    near = np.diff(told) <= _SAME_LEVEL * (told[-1] - told[0])
+    if not near.any():
+        return told[:0], told[:0]
+    first = np.flatnonzero(np.r_[True, ~near])
+    return told, told[first[np.cumsum(np.r_[True, ~near]) - 1]]
 
 
 def group_runs(runs: Sequence[Run]) -> NDArray[np.int64]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from agvbench.diagnosis.levels import ROLES, FreeMaps
 from agvbench.diagnosis.reading import Readings
 from agvbench.effects import Effect
-from agvbench.model.simulation import SimulatedRun, Simulation
+from agvbench.model.simulation import Simulation
 from agvbench.types import Floats
 from agvbench.vehicle.geometry import Geometry
 
@@ -54,11 +54,7 @@ class Batch:
     ) -> None:
         self.readings, self.maps, self.geometry = readings, maps, geometry
         self.level_scatter, self.redundancy = level_scatter, redundancy
-        begins = [None] * len(readings) if readings.begins is None else readings.begins.t_s.tolist()
-        runs = [
-            SimulatedRun(run.commands, t, float(h), begins_s=b)
-            for run, t, h, b in zip(readings.runs, readings.t_s, readings.started_h, begins, strict=True)
-        ]
+        runs = readings.simulated()
         self.base = Simulation(geometry, maps.neutral, runs, kinds=kinds)
         self.commands: dict[str, Floats] = {role: getattr(self.base, role) for role in ROLES}
         self.weights = {role: maps.weights(role, self.commands[role]) for role in ROLES}

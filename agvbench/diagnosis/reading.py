@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.calibration import inspect_frames
-from agvbench.diagnosis.grouping import group_runs
+from agvbench.diagnosis.grouping import at_common_levels, group_runs
 from agvbench.diagnosis.windows import Beginnings, Horizon, blocks, cut_windows, recording_of
 from agvbench.errors import FitError
+from agvbench.model.simulation import SimulatedRun
 from agvbench.statistics.rest import start_pose
-from agvbench.types import Floats, Frames, Run
+from agvbench.types import Commands, Floats, Frames, Run
 
 SAMPLES = 24
 """Poses per run: as many for a short run as for a long one, since a run is one piece of evidence."""
@@ -31,7 +32,8 @@ class Readings:
     start pose; NaN where none was kept. ``start`` (R, 3) with ``start_stderr`` (R, 3), from the frames at
     rest; ``started_h`` (R,) [h] since the run's session began; ``group`` (R,): runs told the same
     have the same number, and so have windows of one stretch. ``refused`` tells for each run that cannot be used why,
-    by its id. ``begins`` says when and how fast windows begin; None for runs from rest.
+    by its id. ``begins`` says when and how fast windows begin; None for runs from rest. ``stood``: whether the
+    axles had settled at each run's first steering command before it was given; else they stood at neutral.
     """
 
     runs: tuple[Run, ...]
@@ -43,6 +45,7 @@ class Readings:
     group: NDArray[np.int64]
     refused: dict[str, str]
     begins: Beginnings | None = None
+    stood: bool = False
 
     def __len__(self) -> int:
         return len(self.runs)
@@ -65,7 +68,19 @@ class Readings:
             self.group[chosen],
             self.refused,
             None if self.begins is None else self.begins.select(chosen),
+            self.stood,
         )
+
+    def simulated(self) -> list[SimulatedRun]:
+        """Return the runs as they are simulated, at the samples' times."""
+        begins = [None] * len(self) if self.begins is None else self.begins.t_s.tolist()
+        return [
+            SimulatedRun(run.commands, t, float(h), b, self._stood(run.commands))
+            for run, t, h, b in zip(self.runs, self.t_s, self.started_h, begins, strict=True)
+        ]
+
+    def _stood(self, commands: Commands) -> tuple[float, float] | None:
+        return (float(commands.front[0]), float(commands.rear[0])) if self.stood else None
 
     @property
     def begins_s(self) -> Floats:
@@ -75,7 +90,7 @@ class Readings:
 
 def read_runs(runs: Iterable[Run]) -> Readings:
     """Clean, sample and group the runs that count; a run that cannot be used is named in ``refused``."""
-    every = list(runs)
+    every = list(at_common_levels(list(runs)))
     began = _session_starts(every)
     kept: list[Run] = []
     rows: list[tuple[Floats, Floats, Floats, Floats]] = []
@@ -94,7 +109,7 @@ def read_runs(runs: Iterable[Run]) -> Readings:
 
 def read_windows(runs: Iterable[Run], horizon: Horizon, neutral: float) -> Readings:
     """Cut runs into windows; a run that has none is named in ``refused``."""
-    every = list(runs)
+    every = list(at_common_levels(list(runs)))
     began = _session_starts(every)
     refused: dict[str, str] = {}
     windows = []

@@ -99,9 +99,23 @@ class Selector:
         """What an effect must gain, corrected for the number of effects that are tried for each place."""
         return LEAST_GAIN + 2.0 * math.log(max(len(self.candidates), 1))
 
+    def base(self) -> Scored:
+        """Return the model without any effect that the vehicle is not known to have."""
+        return self.score(self.given, np.r_[self.start, self.given_values], None)
+
+    def over(self, batch: Batch) -> Selector:
+        """Return a selector like this one of other runs, which knows nothing yet."""
+        return Selector(batch, dict(self.candidates), self.start, self.seed, self.tell, self.given, self.given_values)
+
+    def adopt(self, scored: Scored) -> Scored:
+        """Take over what was fitted elsewhere to runs that this model predicts alike, and return it as one's own."""
+        fitted = replace(scored.fit, predictor=self._predictor(scored.names))
+        self._known[tuple(sorted(scored.names))] = own = replace(scored, fit=fitted)
+        return own
+
     def select(self) -> Selection:
         """Add effects until none gains, then drop those without which the model predicts as well."""
-        base = current = self.score(self.given, np.r_[self.start, self.given_values], None)
+        base = current = self.base()
         rejected: dict[str, float] = {}
         while len(current.names) < len(self.given) + _MOST_EFFECTS:
             offers = {name: self.grown(current, name) for name in self.candidates if name not in current.names}

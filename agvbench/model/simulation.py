@@ -8,8 +8,8 @@
     poses = simulation.predict(settled, p, initial)                        # (frames, 3)
     slopes = simulation.jacobian(settled, p, initial, effects=["steering_lag"], initial_state=True)
 
-A *row* is a command of a run; the first row of each run is the neutral command at which it stood before. All runs'
-rows lie one after another (``row_starts``), and so do their frames (``frame_starts``).
+A *row* is a command of a run; the first row of each run is the command, usually neutral, at which it stood before. All
+runs' rows lie one after another (``row_starts``), and so do their frames (``frame_starts``).
 """
 
 from __future__ import annotations
@@ -48,12 +48,20 @@ class SimulatedRun:
     begins_s
         Stamp of the initial pose, for a window of free driving: commands before it only set the actuators in motion.
         None for a run from rest, where the vehicle stands at the initial pose until its first command takes effect.
+    stood
+        Front and rear command at which the axles had settled before the first command; by default neutral.
     """
 
     commands: Commands
     t_s: Floats
     started_h: float = 0.0
     begins_s: float | None = None
+    stood: tuple[float, float] | None = None
+
+    def before(self, neutral: float) -> dict[str, float]:
+        """Return the command under which the vehicle stood before the first, by channel."""
+        front, rear = self.stood or (neutral, neutral)
+        return {"drive": neutral, "front": front, "rear": rear}
 
 
 @dataclass(frozen=True)
@@ -135,7 +143,7 @@ class Simulation:
         self.row_runs = np.repeat(np.arange(len(runs)), np.diff(self.row_starts))
         self.frame_runs = np.repeat(np.arange(len(runs)), np.diff(self.frame_starts))
         self.drive, self.front, self.rear = (
-            np.concatenate([[neutral, *getattr(run.commands, channel)] for run in runs])
+            np.concatenate([[run.before(neutral)[channel], *getattr(run.commands, channel)] for run in runs])
             for channel in ("drive", "front", "rear")
         )
         self.t_s = np.concatenate([np.asarray(run.t_s, dtype=np.float64) for run in runs])
