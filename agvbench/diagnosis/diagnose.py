@@ -17,6 +17,7 @@ from agvbench.diagnosis.estimates import named_effects
 from agvbench.diagnosis.forms import BEYOND, form_candidates, reform
 from agvbench.diagnosis.grouping import held_out_runs
 from agvbench.diagnosis.levels import ROLES, FreeMaps, free_maps, start_values
+from agvbench.diagnosis.map_effects import map_effects
 from agvbench.diagnosis.next_experiment_propose import with_next_experiment
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.provenance import provenance, refuse_nothing
@@ -181,7 +182,7 @@ def _conclude(
     if explained is not None:
         rest = with_term_first(rest, explained)
     known = candidates() | term_candidates() | form_candidates()
-    effects = named_effects(selection, bounds_of(known, selection.chosen.names))
+    effects = named_effects(selection, bounds_of(known, selection.chosen.names)) + map_effects(fit, vehicle)
     significant = explained is not None or _is_significant(judged, rest)
     verdict, why = _verdict(effects, significant, rest, explained)
     model = corrected_vehicle(header, geometry, fit, maps, seed)

@@ -1,0 +1,239 @@
+"""Shapes of static maps, fitted to refitted values under their covariance: end stops and dead bands.
+
+The values are free and each has its error; a shape is judged by how far they are from it in these errors (generalised
+least squares), beside a smooth shape of as many parameters. A share of the range is added to every error: no real map
+is exactly a line.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.types import Floats
+from agvbench.vehicle.maps import StaticMap
+
+_MODEL_ERROR = 0.003
+_LEAST_GAIN = 12.0
+_PER_PARAMETER = 2.0
+_LEAST_SHORT = 0.05
+_CLEAR = 4.0
+_FEWEST_INSIDE = 3
+_MOST_AT_A_STOP = 0.4
+_UNKNOWN_RAD = 0.1
+_WIDTHS = 60
+
+
+@dataclass(frozen=True)
+class RefittedMap:
+    """Free ``values`` (n,) of a map at its ``commands`` (n,), ascending, with their ``covariance`` (n, n)."""
+
+    commands: Floats
+    values: Floats
+    covariance: Floats
+
+    @cached_property
+    def size(self) -> float:
+        """The range of values."""
+        return float(np.ptp(self.values))
+
+    @cached_property
+    def root(self) -> Floats:
+        """What whitens values: its square is the inverse of their covariance, the error of any shape included."""
+        whole = self.covariance + np.eye(len(self.values)) * (_MODEL_ERROR * self.size) ** 2
+        return np.asarray(np.linalg.cholesky(np.linalg.inv(whole)).T)
+
+    def select(self, chosen: NDArray[np.int64]) -> RefittedMap:
+        """Return the part of the map that an index chooses, its errors as they are with the rest unknown."""
+        return RefittedMap(self.commands[chosen], self.values[chosen], self.covariance[np.ix_(chosen, chosen)])
+
+    def fit(self, basis: Floats) -> tuple[float, Floats, Floats]:
+        """Return how far the values are from what `basis` (n, p) can make, the coefficients (p,) and their errors."""
+        left, right = self.root @ basis, self.root @ self.values
+        coefficients = np.asarray(np.linalg.lstsq(left, right, rcond=1e-12)[0], dtype=np.float64)
+        errors = np.sqrt(np.diagonal(np.linalg.pinv(left.T @ left, hermitian=True)))
+        return float(np.sum((right - left @ coefficients) ** 2)), coefficients, np.asarray(errors, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class EndStops:
+    """Lowest and highest output with standard errors, NaN where none was met; ``gain`` in χ² over no stops."""
+
+    low: tuple[float, float]
+    high: tuple[float, float]
+    gain: float
+    rising: bool
+
+
+def end_stops(refitted: RefittedMap, believed: StaticMap) -> EndStops | None:
+    """Return where a steering map stops turning; None where a line, or a smooth curve, describes it as well.
+
+    Between its stops the map is the believed one, stretched and shifted.
+    """
+    known = np.flatnonzero(np.sqrt(np.diagonal(refitted.covariance)) < _UNKNOWN_RAD)
+    own = refitted.select(known)
+    inner = np.asarray(believed(own.commands))
+    if len(known) < _FEWEST_INSIDE + 1 or np.ptp(inner) == 0.0:
+        return None
+    rising = bool(np.polyfit(own.commands, own.values, 1)[0] > 0.0)
+    inner = (inner - inner.mean()) / float(np.ptp(inner))
+    free = own.fit(np.vander(inner, 2))[0]
+    best, misfit = None, free
+    most = int(_MOST_AT_A_STOP * len(known))
+    for first, last in product(range(most + 1), repeat=2):
+        if not first + last or len(known) - first - last < _FEWEST_INSIDE:
+            continue
+        fitted = _with_stops(own, inner, first, last)
+        if fitted is not None and fitted[0] + _LEAST_GAIN * ((first > 0) + (last > 0)) < misfit:
+            best, misfit = (fitted, first, last), fitted[0] + _LEAST_GAIN * ((first > 0) + (last > 0))
+    if best is None:
+        return None
+    (chi, coefficients, errors), first, last = best
+    smooth = own.fit(np.vander(inner, min(4, len(known))))[0] + _PER_PARAMETER * 4
+    if chi + _PER_PARAMETER * len(coefficients) > smooth:
+        return None
+    ends = [(float(v), float(e)) for v, e in zip(coefficients[2:], errors[2:], strict=True)]
+    none = (math.nan, math.nan)
+    at_first = ends[0] if first else none
+    at_last = ends[-1] if last else none
+    low, high = (at_first, at_last) if rising else (at_last, at_first)
+    return EndStops(low, high, free - chi, rising)
+
+
+def _with_stops(own: RefittedMap, inner: Floats, first: int, last: int) -> tuple[float, Floats, Floats] | None:
+    """Fit a line on which the first and the last values stand at a stop; None where it does not fall short of it."""
+    count = len(inner)
+    basis = np.zeros((count, 2 + (first > 0) + (last > 0)))
+    basis[:, :2] = np.vander(inner, 2)
+    for column, at in ((2, slice(0, first)), (basis.shape[1] - 1, slice(count - last, count))):
+        if at.stop > at.start:
+            basis[at] = 0.0
+            basis[at, column] = 1.0
+    chi, coefficients, errors = own.fit(basis)
+    line = np.vander(inner, 2) @ coefficients[:2]
+    up = math.copysign(1.0, line[-1] - line[0])
+    for column, outermost, innermost, side in (
+        (2, 0, first, -up),
+        (basis.shape[1] - 1, count - 1, count - 1 - last, up),
+    ):
+        if innermost == outermost:
+            continue
+        short = side * (line[outermost] - coefficients[column])
+        # Inside, the stop is not reached; at the outermost command the line would be well beyond it.
+        inside = side * (coefficients[column] - line[innermost])
+        if short < max(_LEAST_SHORT * own.size, _CLEAR * float(errors[column])) or inside < -_MODEL_ERROR * own.size:
+            return None
+    return chi, coefficients, errors
+
+
+@dataclass(frozen=True)
+class DeadBand:
+    """Half the ``width`` of the commands that do not move the vehicle, its ``stderr``, and the ``gain`` in χ²."""
+
+    width: float
+    stderr: float
+    gain: float
+
+
+def dead_band(refitted: RefittedMap, believed: StaticMap, neutral: float) -> DeadBand | None:
+    """Return how far from neutral the drive starts to move, where it does not do so at once; else None.
+
+    Each side has its own edge, so that a neutral that is merely another one is no dead band; what counts is their mean.
+    """
+    known = np.flatnonzero(np.sqrt(np.diagonal(refitted.covariance)) < _MODEL_ERROR * 10.0 * refitted.size)
+    if not len(known):
+        return None
+    own = refitted.select(known)
+    sides = [_edge(own, believed, neutral, sign) for sign in (1.0, -1.0)]
+    found = [side for side in sides if side is not None]
+    stopped = any(side.stopped for side in found)
+    if not found or (len(found) < 2 and not stopped):
+        return None
+    width = float(np.mean([side.edge for side in found]))
+    stderr = float(np.sqrt(np.sum([side.stderr**2 for side in found]))) / len(found)
+    spread = 0.5 * float(np.ptp([side.edge for side in found]))
+    gain = sum(side.gain for side in found)
+    farthest = float(np.max(np.abs(own.commands - neutral)))
+    if width < max(_CLEAR * stderr, 0.02 * farthest) or gain < _LEAST_GAIN:
+        return None
+    return DeadBand(width, math.hypot(stderr, spread), gain)
+
+
+@dataclass(frozen=True)
+class _Edge:
+    edge: float
+    stderr: float
+    gain: float
+    stopped: bool
+
+
+def _edge(own: RefittedMap, believed: StaticMap, neutral: float, sign: float) -> _Edge | None:
+    """Return where one side starts to move; None where it has too few levels, or none that speaks for an edge."""
+    chosen = np.flatnonzero(sign * (own.commands - neutral) > 0.0)
+    if len(chosen) < 2:
+        return None
+    side = own.select(chosen)
+    away = np.abs(side.commands - neutral)
+    error = np.sqrt(np.diagonal(side.covariance)) + _MODEL_ERROR * own.size
+    told = np.abs(np.asarray(believed(side.commands)))
+    still = (np.abs(side.values) < _CLEAR * error) & (told > 2.0 * _CLEAR * error)
+    moving = ~still
+    if still.any():
+        nearest = float(away[moving].min()) if moving.any() else math.inf
+        farthest_still = float(away[still].max())
+        if nearest < farthest_still or not math.isfinite(nearest):
+            return None
+        gain = float(np.sum((told[still] / error[still]) ** 2))
+        edge, stderr = _between(side.select(np.flatnonzero(moving)), neutral, farthest_still, nearest)
+        return _Edge(edge, stderr, gain, stopped=True)
+    return _extrapolated(side, neutral)
+
+
+def _between(side: RefittedMap, neutral: float, low: float, high: float) -> tuple[float, float]:
+    """Return an edge between the last level that stood still and the first that moved."""
+    middle, spread = 0.5 * (low + high), (high - low) / math.sqrt(12.0)
+    if len(side.values) < _FEWEST_INSIDE:
+        return middle, spread
+    found = _shifted(side, neutral, low, high)
+    if found is None:
+        return middle, spread
+    return found[1], min(max(found[2], 0.01 * (high - low)), spread)
+
+
+def _extrapolated(side: RefittedMap, neutral: float) -> _Edge | None:
+    """Return an edge to which the levels that move lead back, if that describes them better than a smooth curve."""
+    away = np.abs(side.commands - neutral)
+    if len(away) < _FEWEST_INSIDE:
+        return None
+    nearest = float(away.min())
+    found = _shifted(side, neutral, -0.5 * nearest, nearest)
+    if found is None:
+        return None
+    chi, edge, stderr, terms = found
+    smooth = side.fit(away[:, None] ** np.arange(1, terms + 2))[0]
+    if chi > smooth:
+        return _Edge(0.0, stderr, 0.0, stopped=False)
+    plain = side.fit(away[:, None] ** np.arange(1, terms + 1))[0]
+    return _Edge(edge, stderr, min(plain - chi, smooth - chi + _LEAST_GAIN), stopped=False)
+
+
+def _shifted(side: RefittedMap, neutral: float, low: float, high: float) -> tuple[float, float, float, int] | None:
+    """Fit a curve that begins at an edge between `low` and `high`; return χ², edge, its error, and how many terms."""
+    away = np.abs(side.commands - neutral)
+    terms = 2 if len(away) > _FEWEST_INSIDE + 1 else 1
+    edges = np.linspace(low, high, _WIDTHS + 2)[1:-1]
+    chis = np.array([side.fit(np.maximum(away - e, 0.0)[:, None] ** np.arange(1, terms + 1))[0] for e in edges])
+    best = int(np.argmin(chis))
+    if best in (0, len(edges) - 1):
+        return float(chis[best]), float(edges[best]), float(edges[1] - edges[0]), terms
+    # Near its least value χ² is a parabola in the edge; it rises by one within a standard error.
+    step = float(edges[1] - edges[0])
+    bend = float(chis[best - 1] - 2.0 * chis[best] + chis[best + 1]) / step**2
+    off = float(chis[best - 1] - chis[best + 1]) / (2.0 * bend * step) if bend > 0.0 else 0.0
+    stderr = math.sqrt(2.0 / bend) if bend > 0.0 else step
+    return float(chis[best]), float(edges[best] + off), stderr, terms
