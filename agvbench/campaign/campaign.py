@@ -38,6 +38,7 @@ class Campaign:
         self._runs = runs
         self._sources = sources
         self.run_ids: list[str] = runs["run_id"].to_pylist()
+        self._early_s = np.zeros(len(self.run_ids))
 
     @classmethod
     def open(cls, path: str | Path) -> Campaign:
@@ -79,6 +80,9 @@ class Campaign:
         source = self._sources["commands"]
         table = TimedTable(source.path, source.read(COMMANDS), self.run_ids, in_parts=source.in_parts)
         check_commands(table, self._runs["status"].to_pylist(), self.header.command_unit)
+        # Some write a first command at −0.5 s, or at the first frame's time: a run's clock is 0 at its first command.
+        self._early_s = table.first("t_s")
+        table.shift(self._early_s)
         return table
 
     @cached_property
@@ -86,7 +90,9 @@ class Campaign:
         source = self._sources["poses"]
         rows = blank_untracked(source.read(POSES))
         table = TimedTable(source.path, rows, self.run_ids, in_parts=source.in_parts)
-        check_poses(table, self._runs["status"].to_pylist(), self._commands.last("t_s"))
+        last_s = self._commands.last("t_s")
+        table.shift(self._early_s)
+        check_poses(table, self._runs["status"].to_pylist(), last_s)
         return table
 
     @cached_property

@@ -19,7 +19,7 @@ from agvbench.campaign.timed import TimedTable
 from agvbench.errors import CampaignError
 from agvbench.types import RUN_OK, CommandUnit, Floats
 
-FIRST_COMMAND_TOLERANCE_S = 1e-3
+FIRST_COMMAND_TOLERANCE_S = 60.0
 CLOCK_TOLERANCE_S = 600.0
 FARTHEST_M = 500.0
 WIDEST_HEADING_RAD = 100.0
@@ -124,7 +124,8 @@ def check_commands(commands: TimedTable, status: list[str], unit: CommandUnit) -
     late = np.zeros(len(t_s), np.bool_)
     late[commands.starts] = np.abs(t_s[commands.starts]) > FIRST_COMMAND_TOLERANCE_S
     remedy = "t_s counts from the first command: shift the run's commands and poses"
-    _refuse(commands, late, "t_s of the first command is not 0", t_s, "0 s", remedy)
+    limit = f"within {FIRST_COMMAND_TOLERANCE_S:g} s of 0"
+    _refuse(commands, late, "t_s of the first command is not 0", t_s, limit, remedy)
 
 
 def check_poses(poses: TimedTable, status: list[str], last_command_s: Floats) -> None:

@@ -75,6 +75,19 @@ class TimedTable:
         last[has] = self.column(name)[self.offsets[1:][has] - 1]
         return last
 
+    def first(self, name: str) -> Floats:
+        """Return the first value of a column in each run, shape (runs,); 0 for a run without rows."""
+        first = np.zeros(len(self.run_ids))
+        first[self.counts > 0] = self.column(name)[self.starts]
+        return first
+
+    def shift(self, by_s: Floats) -> None:
+        """Subtract `by_s` (runs,) from the times of each run."""
+        if by_s.any():
+            t_s = self.column("t_s") - by_s[self.run_of_row]
+            self.table = self.table.set_column(self.table.column_names.index("t_s"), "t_s", pa.array(t_s))
+            self._columns["t_s"] = t_s
+
     def rows(self, index: int) -> slice:
         """Return the rows of run number `index`."""
         return slice(int(self.offsets[index]), int(self.offsets[index + 1]))

@@ -82,7 +82,7 @@ def diagnose(
     if (horizon := horizon_of(header, runs)) is not None:
         return diagnose_windows(header, runs, horizon, vehicle=vehicle, seed=seed, tell=tell)
     geometry = Geometry(header.front_axle_m, header.rear_axle_m)
-    readings = read_runs(runs)
+    readings = read_runs(runs, header.neutral)
     if reason := _cannot_tell(readings, header):
         return Diagnosis(Verdict.NOT_IDENTIFIABLE, reason, provenance=_provenance(header, readings, seed))
     refuse_contradictions(readings, where=f"campaign {header.name}")

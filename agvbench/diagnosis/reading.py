@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from agvbench.calibration import inspect_frames
 from agvbench.diagnosis.grouping import at_common_levels, group_runs
+from agvbench.diagnosis.resting import start_of
 from agvbench.diagnosis.windows import Beginnings, Horizon, blocks, cut_windows, recording_of
 from agvbench.errors import FitError
 from agvbench.model.simulation import SimulatedRun
-from agvbench.statistics.rest import start_pose
 from agvbench.types import Commands, Floats, Frames, Run
 
 SAMPLES = 24
@@ -88,8 +88,11 @@ class Readings:
         return np.zeros(len(self)) if self.begins is None else self.begins.t_s
 
 
-def read_runs(runs: Iterable[Run]) -> Readings:
-    """Clean, sample and group the runs that count; a run that cannot be used is named in ``refused``."""
+def read_runs(runs: Iterable[Run], neutral: float | None = None) -> Readings:
+    """Clean, sample and group the runs that count; a run that cannot be used is named in ``refused``.
+
+    Where `neutral` is given, a vehicle is taken to rest while its drive is there, for runs not seen before they began.
+    """
     every = list(at_common_levels(list(runs)))
     began = _session_starts(every)
     kept: list[Run] = []
@@ -97,7 +100,7 @@ def read_runs(runs: Iterable[Run]) -> Readings:
     refused: dict[str, str] = {}
     for run in every:
         try:
-            rows.append(_read(run))
+            rows.append(_read(run, neutral))
         except FitError as error:
             refused[run.run_id] = str(error).removeprefix(f"{run.run_id}: ")
         else:
@@ -143,25 +146,23 @@ def _session_starts(runs: list[Run]) -> dict[str | None, float]:
     return began
 
 
-def _read(run: Run) -> tuple[Floats, Floats, Floats, Floats]:
+def _read(run: Run, neutral: float | None) -> tuple[Floats, Floats, Floats, Floats]:
     if not run.is_ok:
         raise FitError(run.status)
     frames, _ = inspect_frames(run.frames)
     if len(frames) < _FEWEST_FRAMES or not len(run.commands):
         raise FitError("too few frames", value=len(frames), limit=f"at least {_FEWEST_FRAMES}")
-    rest = start_pose(run)
-    start = np.array(rest.pose)
-    stderr = np.array([rest.stderr_x_m, rest.stderr_y_m, rest.stderr_heading_rad])
+    start, stderr = start_of(run, frames, neutral)
     t_s, poses = _sampled(frames, np.linspace(0.0, float(frames.t_s[-1]), SAMPLES + 1)[1:])
     if np.count_nonzero(np.isfinite(poses[:, 0])) < _FEWEST_SAMPLES:
         raise FitError("too much of the run was not seen")
     turn = np.round((_heading_near_start(frames) - start[2]) / (2.0 * np.pi)) * 2.0 * np.pi
     poses[:, 2] -= turn
-    return t_s, poses, start, np.where(np.isfinite(stderr), stderr, 1e-3)
+    return t_s, poses, start, stderr
 
 
 def _heading_near_start(frames: Frames) -> float:
-    return float(np.unwrap(frames.heading_rad)[int(np.searchsorted(frames.t_s, 0.0, side="right")) - 1])
+    return float(np.unwrap(frames.heading_rad)[max(int(np.searchsorted(frames.t_s, 0.0, side="right")) - 1, 0)])
 
 
 def _sampled(frames: Frames, t_s: Floats) -> tuple[Floats, Floats]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from agvbench.calibration import inspect_frames
 from agvbench.calibration.source import HeaderLike
+from agvbench.diagnosis.resting import frame_noise, rests
 from agvbench.model.simulation_loop import LATELY_S
 from agvbench.types import Commands, Floats, Frames, Run
 
@@ -36,7 +37,6 @@ _LATELY_SPANS = 4.0
 _FEWEST_FRAMES = 6
 _HELD_S = 1e3
 _STILL_MPS = 0.02
-_LEAST_M, _LEAST_RAD = 1e-4, 2e-4
 _BLOCK_S = 10.0
 _BLOCK_HORIZONS = 4.0
 
@@ -105,19 +105,8 @@ def horizon_of(header: HeaderLike, runs: Iterable[Run]) -> Horizon | None:
     if horizon_s is not None:
         return Horizon(horizon_s, getattr(header, "prediction_stride_s", None) or horizon_s)
     usable = [run for run in runs if run.is_ok and len(run.frames)]
-    resting = sum(bool(np.any(run.frames.t_s <= 0.0) and _rests(run)) for run in usable)
+    resting = sum(rests(run, header.neutral) for run in usable)
     return Horizon() if usable and resting < 0.5 * len(usable) else None
-
-
-def _rests(run: Run) -> bool:
-    """Whether the vehicle stood still in the last frames before the first command."""
-    frames = run.frames.select(run.frames.tracked.astype(np.bool_) & (run.frames.t_s <= 0.0))
-    if len(frames) < 2:
-        return len(frames) > 0 and bool(np.any(run.frames.t_s < 0.0))
-    last = frames.select(frames.t_s > frames.t_s[-1] - SUPPORT_S)
-    span_s = float(last.t_s[-1] - last.t_s[0])
-    moved = float(np.hypot(last.x_m[-1] - last.x_m[0], last.y_m[-1] - last.y_m[0]))
-    return moved <= max(_STILL_MPS * span_s, 0.005)
 
 
 def cut_windows(run: Run, horizon: Horizon, neutral: float) -> Iterator[Window]:
@@ -127,7 +116,7 @@ def cut_windows(run: Run, horizon: Horizon, neutral: float) -> Iterator[Window]:
         return
     t = frames.t_s
     motion = np.column_stack([frames.x_m, frames.y_m, np.unwrap(frames.heading_rad)])
-    noise = _noise(motion)
+    noise = frame_noise(motion)
     first = max(float(t[0]) + SUPPORT_S, 0.0 if run.frames.t_s[0] < 0.0 else SUPPORT_S)
     for wanted in np.arange(first, float(t[-1]) - horizon.horizon_s + _NEAR_S, horizon.stride_s):
         last = int(np.searchsorted(t, wanted + 1e-9, side="right"))
@@ -185,15 +174,6 @@ def _lately(t: Floats, motion: Floats) -> float:
     weight = np.exp((t[own][1:] - t[-1]) / LATELY_S)
     ahead = np.cos(heading) * step[:, 0] + np.sin(heading) * step[:, 1]
     return float(np.sum(weight * ahead) / np.sum(weight * dt))
-
-
-def _noise(motion: Floats) -> Floats:
-    """Return the standard deviation of one frame, (2,): position [m] and heading [rad], from third differences."""
-    bends = np.abs(np.diff(motion, 3, axis=0)) / np.sqrt(20.0)
-    if not len(bends):
-        return np.array([_LEAST_M, _LEAST_RAD])
-    scale = 1.4826 * np.median(bends, axis=0)
-    return np.maximum([float(np.hypot(scale[0], scale[1])) / np.sqrt(2.0), float(scale[2])], [_LEAST_M, _LEAST_RAD])
 
 
 def _window(

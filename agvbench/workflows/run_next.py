@@ -149,7 +149,7 @@ def _kept(campaign: Campaign, seed: int) -> Iterator[Run]:
     if any(run.split for run in runs):
         yield from runs
         return
-    readings = read_runs(runs)
+    readings = read_runs(runs, campaign.header.neutral)
     held = {
         r.run_id for r, h in zip(readings.runs, held_out_runs(readings.runs, readings.group, seed), strict=True) if h
     }
