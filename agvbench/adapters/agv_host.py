@@ -78,7 +78,7 @@ class AgvHost(Host):
         return b""
 
     def _serve_commands(self) -> None:
-        receive = self._subscriber.handler.recv
+        receive, saw, lock, carry_out = self._subscriber.handler.recv, self.loss.saw, self._lock, self._carry_out
         while True:
             try:
                 payload = receive().payload.to_bytes()
@@ -89,11 +89,11 @@ class AgvHost(Host):
             except MessageError as error:
                 self._fail(error)
                 continue
-            if lost := self.loss.saw(message.source, message.sequence):
+            if lost := saw(message.source, message.sequence):
                 self.event(Level.WARNING, "commands_lost", f"{lost} commands were lost before {message.sequence}")
             try:
-                with self._lock:
-                    self._carry_out(message)
+                with lock:
+                    carry_out(message)
             except Exception as error:  # noqa: BLE001  (whatever the adapter raises, the runner must hear of it)
                 self._fail(error, message.sequence)
 

@@ -1,9 +1,9 @@
 """The frames message: a batch of motion capture frames, a row each.
 
-Body after the header: acknowledged (u64), clock (u8 and 7 bytes of zero), now_s (f64), then rows of ``t_s``, ``x_m``,
-``y_m``, ``heading_rad``, ``mean_error_m``, ``received_s`` (f64), ``frame`` (i64), ``tracked`` (u8): 48 bytes and 57 a
-frame. Rows of many messages lie one behind another when joined, and become columns at once: in real time, a recorder
-has one frame in each of thousands of messages.
+Body after the header: acknowledged (u64), clock (u8 and 7 bytes of zero), now_s (f64), then the columns ``t_s``,
+``x_m``, ``y_m``, ``heading_rad``, ``mean_error_m``, ``received_s`` (f64), ``frame`` (i64), ``tracked`` (u8), one behind
+another: 48 bytes and 57 a frame. A message with one frame is a row, and the rows of thousands of such messages, which
+is what a recorder has in real time, become columns at once.
 """
 
 from __future__ import annotations
@@ -11,13 +11,15 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 from enum import IntEnum
+from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from agvbench.bus.wire import HEADER_BYTES, MAX_ROWS, Kind, check_length, prefix, unpack_header
+from agvbench.bus.wire import BOOLEAN, FLOAT, HEADER_BYTES, INTEGER, MAX_ROWS, Kind, check_length, prefix, unpack_header
 from agvbench.errors import MessageError
-from agvbench.types import Frames
+from agvbench.types import Floats, Frames
 
 # Header and body in one: a process that has just been woken pays for every Python call tenfold.
 _HEAD = struct.Struct("<6sHIIQQB7xd")
@@ -25,9 +27,11 @@ _PREFIX = prefix(Kind.FRAMES)
 # Bound once, and named tuples without their Python constructor, for the same reason.
 _pack, _unpack, _tuple = _HEAD.pack, _HEAD.unpack_from, tuple.__new__
 _ROWS_AT = _HEAD.size
-_ROW = struct.Struct("<6dq?")
 _FIELDS = ("t_s", "x_m", "y_m", "heading_rad", "mean_error_m", "received_s")
 _ROWS = np.dtype([*((name, "<f8") for name in _FIELDS), ("frame", "<i8"), ("tracked", "u1")])
+_ROW_BYTES = _ROWS.itemsize
+_DTYPES = [*[FLOAT] * 6, INTEGER, BOOLEAN]
+_FRAME_AT, _TRACKED_AT = 48, 56
 
 
 class FrameClock(IntEnum):
@@ -47,21 +51,22 @@ class FramesFlags:
     """The last message that answers the acknowledged command."""
 
 
-# One frame as it travels, from plain numbers: t_s, x_m, y_m, heading_rad, mean_error_m, received_s, frame, tracked.
-pack_row = _ROW.pack
-_LAST, _ROW_BYTES = FramesFlags.LAST, _ROW.size
+_LAST = FramesFlags.LAST
+pack_single = partial(struct.Struct(_HEAD.format + "6dq?").pack, _PREFIX, _LAST)
+"""Returns the bytes of a last message with one frame, from plain numbers: source, 1 (frame), sequence, acknowledged,
+clock, now_s, t_s, x_m, y_m, heading_rad, mean_error_m, received_s, frame, tracked."""
 _CLOCKS = {int(clock): clock for clock in FrameClock}
 
 
 class FramesMessage(NamedTuple):
     """Frames, and which command had been carried out when they were published.
 
-    ``rows`` are the frames as they travel (`pack_rows`, `unpack_rows`); ``acknowledged`` is the sequence number of
-    the command (0 in real time), ``now_s`` [s] the publisher's clock when it published.
+    ``columns`` are the frames as they travel (`pack_columns`, `unpack_columns`); ``acknowledged`` is the sequence
+    number of the command (0 in real time), ``now_s`` [s] the publisher's clock when it published.
     """
 
     sequence: int
-    rows: bytes
+    columns: bytes
     acknowledged: int = 0
     clock: FrameClock = FrameClock.RUN
     now_s: float = 0.0
@@ -71,14 +76,14 @@ class FramesMessage(NamedTuple):
     @property
     def frame_count(self) -> int:
         """How many frames there are."""
-        return len(self.rows) // _ROW.size
+        return len(self.columns) // _ROW_BYTES
 
     def frames(self) -> Frames:
         """Return the frames, or raise `MessageError` if their numbers cannot be."""
-        return unpack_rows([self.rows])
+        return unpack_columns([self.columns])
 
 
-def pack_rows(frames: Frames) -> bytes:
+def pack_columns(frames: Frames) -> bytes:
     """Return frames as they travel.
 
     Raises
@@ -86,23 +91,19 @@ def pack_rows(frames: Frames) -> bytes:
     MessageError
         If columns differ in length.
     """
-    columns = (
+    columns = [
         frames.t_s, frames.x_m, frames.y_m, frames.heading_rad, frames.mean_error_m, frames.received_s, frames.frame,
         frames.tracked,
-    )  # fmt: skip
-    count, *others = map(len, columns)
+    ]  # fmt: skip
+    count, *others = lengths = [*map(len, columns)]
     if others != [count] * 7:
-        raise MessageError("columns of frames differ in length", value=[count, *others])
-    if count == 1:
-        t_s, x_m, y_m, heading_rad, mean_error_m, received_s, frame, tracked = columns
-        return _ROW.pack(t_s[0], x_m[0], y_m[0], heading_rad[0], mean_error_m[0], received_s[0], frame[0], tracked[0])
-    rows = np.empty(count, _ROWS)
-    for name, column in zip(_ROWS.names or (), columns, strict=True):
-        rows[name] = column
-    return rows.tobytes()
+        raise MessageError("columns of frames differ in length", value=lengths)
+    if [column.dtype for column in columns] != _DTYPES or not all(column.flags.contiguous for column in columns):
+        columns = [np.ascontiguousarray(column, dtype) for column, dtype in zip(columns, _DTYPES, strict=True)]
+    return b"".join(columns)  # type: ignore[arg-type]  # (arrays are buffers)
 
 
-def unpack_rows(parts: Sequence[bytes]) -> Frames:
+def unpack_columns(parts: Sequence[bytes]) -> Frames:
     """Return the frames of several messages, one behind another.
 
     Raises
@@ -110,19 +111,35 @@ def unpack_rows(parts: Sequence[bytes]) -> Frames:
     MessageError
         If a capture time is not finite, or ``tracked`` neither 0 nor 1.
     """
-    rows = np.frombuffer(b"".join(parts), _ROWS)
-    t_s, tracked = np.ascontiguousarray(rows["t_s"]), np.ascontiguousarray(rows["tracked"])
+    if len(parts) == 1:
+        floats, frame, tracked = _columns(parts[0])
+    elif all(len(part) == _ROW_BYTES for part in parts):
+        rows = np.frombuffer(b"".join(parts), _ROWS)
+        floats = np.array([rows[name] for name in _FIELDS])
+        frame, tracked = np.ascontiguousarray(rows["frame"]), np.ascontiguousarray(rows["tracked"])
+    else:
+        floats, frame, tracked = (np.concatenate(column, -1) for column in zip(*map(_columns, parts), strict=True))
+    t_s, x_m, y_m, heading_rad, mean_error_m, received_s = floats
     if not np.isfinite(t_s).all():
         raise MessageError("frames without a finite capture time", value=float(t_s[~np.isfinite(t_s)][0]))
     if (tracked > 1).any():
         raise MessageError("tracked is neither 0 nor 1", value=int(tracked.max()))
-    x_m, y_m, heading_rad, mean_error_m, received_s = (np.ascontiguousarray(rows[name]) for name in _FIELDS[1:])
-    frame = np.ascontiguousarray(rows["frame"])
     return Frames(t_s, x_m, y_m, heading_rad, tracked.view(np.bool_), frame, mean_error_m, received_s)
 
 
+def _columns(part: bytes) -> tuple[Floats, NDArray[np.int64], NDArray[np.uint8]]:
+    """Return one message's columns of floats, shape (6, n), its frame numbers and what was tracked, without a copy."""
+    count = len(part) // _ROW_BYTES
+    floats = np.frombuffer(part, FLOAT, 6 * count).reshape(6, count)
+    return (
+        floats,
+        np.frombuffer(part, INTEGER, count, _FRAME_AT * count),
+        np.frombuffer(part, np.uint8, count, _TRACKED_AT * count),
+    )
+
+
 def pack_frames(
-    sequence: int, rows: bytes, acknowledged: int, clock: FrameClock, now_s: float, flags: int, source: int
+    sequence: int, columns: bytes, acknowledged: int, clock: FrameClock, now_s: float, flags: int, source: int
 ) -> bytes:
     """Return the bytes of a message with these fields, see `FramesMessage`.
 
@@ -131,10 +148,10 @@ def pack_frames(
     MessageError
         If there are more than `MAX_ROWS` frames.
     """
-    count = len(rows) // _ROW.size
+    count = len(columns) // _ROW_BYTES
     if count > MAX_ROWS:
         raise MessageError("too many frames for one message", value=count, limit=f"at most {MAX_ROWS}")
-    return _pack(_PREFIX, flags, source, count, sequence, acknowledged, clock, now_s) + rows
+    return _pack(_PREFIX, flags, source, count, sequence, acknowledged, clock, now_s) + columns
 
 
 def encode_frames(message: FramesMessage) -> bytes:
@@ -143,7 +160,7 @@ def encode_frames(message: FramesMessage) -> bytes:
 
 
 def decode_frames(payload: bytes) -> FramesMessage:
-    """Return the message that `payload` holds; its rows are looked at by `unpack_rows`.
+    """Return the message that `payload` holds; its columns are looked at by `unpack_columns`.
 
     Raises
     ------
@@ -163,7 +180,7 @@ def _refusal(payload: bytes) -> MessageError:
     """Return what is wrong with a message that cannot be decoded."""
     try:
         header = unpack_header(payload, Kind.FRAMES, FramesFlags.LAST)
-        check_length(payload, _ROWS_AT + _ROW.size * header.rows)
+        check_length(payload, _ROWS_AT + _ROW_BYTES * header.rows)
     except MessageError as error:
         return error
     clock = payload[HEADER_BYTES + 8]

@@ -17,9 +17,12 @@ class CommandOutbox:
     def __init__(self, session: Any, keys: Keys) -> None:
         import zenoh
 
-        self._sequence = Sequence()
-        self.source = self._sequence.source
+        sequence = Sequence()
+        self._take = sequence.take
+        self.source = sequence.source
         """What tells this sender from others."""
+        self.last = 0
+        """The sequence number of the last command (0: none)."""
         self._keys = keys
         self._error = zenoh.ZError
         self._publisher = session.declare_publisher(
@@ -40,17 +43,12 @@ class CommandOutbox:
         LinkError
             If the session was closed.
         """
-        sequence = self._sequence.take()
+        self.last = sequence = self._take()
         try:
             self._put(pack_command(sequence, t_s, command, hold_s, flags, self.source))
         except self._error:
             raise LinkError("the bus was closed", where=self._keys.root) from None
         return sequence
-
-    @property
-    def last(self) -> int:
-        """The sequence number of the last command (0: none)."""
-        return self._sequence.last
 
     def close(self) -> None:
         """Publish no more."""

@@ -13,7 +13,7 @@ from agvbench.bus.clock import Clock, wait_until
 from agvbench.bus.clock_offset import measure_offset
 from agvbench.bus.command_message import CommandFlags
 from agvbench.bus.event_message import Event, Level
-from agvbench.bus.frames_message import FramesMessage, unpack_rows
+from agvbench.bus.frames_message import FramesMessage, unpack_columns
 from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import AGV, MOCAP, TIME, Keys
 from agvbench.bus.outbox import CommandOutbox
@@ -120,7 +120,7 @@ class RealTime:
             at_s, message = self._arrived.popleft()
             arrived_s.append(at_s)
             messages.append(message)
-        frames = unpack_rows([message.rows for message in messages])
+        frames = unpack_columns([message.columns for message in messages])
         return replace(
             frames,
             t_s=frames.t_s + (self._offset_s - start_s),

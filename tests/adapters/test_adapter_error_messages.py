@@ -15,7 +15,7 @@ from rig_driving import FAILING, NEUTRAL, START, TINY
 
 from agvbench.adapters import AdapterOptions, host_adapters, open_rig
 from agvbench.bus.command_message import CommandMessage, decode_command, encode_command
-from agvbench.bus.frames_message import FramesMessage, decode_frames, encode_frames, pack_rows, unpack_rows
+from agvbench.bus.frames_message import FramesMessage, decode_frames, encode_frames, pack_columns, unpack_columns
 from agvbench.bus.identity_message import AgvIdentity, Identity, MocapIdentity
 from agvbench.bus.link import VehicleLink
 from agvbench.bus.session import open_session
@@ -80,7 +80,7 @@ def damaged(payload: bytes, decode: Callable[[bytes], object]) -> Callable[[], o
 
 COMMAND = encode_command(CommandMessage(1, 0.0, NEUTRAL, 0.1))
 FRAMES = encode_frames(FramesMessage(1, b""))
-NAN_TIME = pack_rows(Frames(*(np.full(1, np.nan),) * 4, np.ones(1, bool), np.zeros(1, int), *(np.zeros(1),) * 2))
+NAN_TIME = pack_columns(Frames(*(np.full(1, np.nan),) * 4, np.ones(1, bool), np.zeros(1, int), *(np.zeros(1),) * 2))
 
 MISTAKES: dict[str, Callable[[], object]] = {
     "no endpoint": command_line("sim", "--listen", "localhost"),
@@ -106,13 +106,13 @@ MISTAKES: dict[str, Callable[[], object]] = {
     "time leaps ahead": exchange(t_s=9.0),
     "plant raises": exchange(Command(1700.0, 1500.0, 1500.0), plant=FAILING),
     "message of another program": damaged(b"\x00" * 64, decode_command),
-    "message of another version": damaged(COMMAND[:4] + b"\x02" + COMMAND[5:], decode_command),
+    "message of another version": damaged(COMMAND[:4] + b"\x01" + COMMAND[5:], decode_command),
     "message of another kind": damaged(COMMAND, decode_frames),
     "message is cut off": damaged(COMMAND[:-1], decode_command),
     "message is too long": damaged(COMMAND + b"\x00", decode_command),
     "message claims too many rows": damaged(FRAMES[:12] + b"\xff" * 4 + FRAMES[16:], decode_frames),
     "message with unknown flags": damaged(COMMAND[:6] + b"\x80\x00" + COMMAND[8:], decode_command),
-    "frames without a time": lambda: unpack_rows([NAN_TIME]),
+    "frames without a time": lambda: unpack_columns([NAN_TIME]),
 }
 
 

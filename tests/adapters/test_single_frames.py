@@ -55,7 +55,7 @@ def test_one_frame_in_plain_numbers_is_the_same_message() -> None:
     assert isinstance(first, FramesMessage)
     assert isinstance(second, FramesMessage)
     assert isinstance(lost, FramesMessage)
-    assert (first.rows, first.acknowledged, first.clock) == (second.rows, second.acknowledged, second.clock)
+    assert (first.columns, first.acknowledged, first.clock) == (second.columns, second.acknowledged, second.clock)
     assert second.sequence == first.sequence + 1
     assert not lost.frames().tracked[0]
     assert np.isnan(lost.frames().mean_error_m[0])

@@ -16,7 +16,14 @@ from hypothesis.extra.numpy import arrays
 
 from agvbench.bus.command_message import CommandMessage, decode_command, encode_command
 from agvbench.bus.event_message import Event, Level, decode_event, encode_event
-from agvbench.bus.frames_message import FrameClock, FramesMessage, decode_frames, encode_frames, pack_rows, unpack_rows
+from agvbench.bus.frames_message import (
+    FrameClock,
+    FramesMessage,
+    decode_frames,
+    encode_frames,
+    pack_columns,
+    unpack_columns,
+)
 from agvbench.bus.identity_message import (
     AgvIdentity,
     MocapIdentity,
@@ -92,7 +99,14 @@ commands = st.builds(
     u32,
 )
 frame_messages = st.builds(
-    FramesMessage, u64, frame_batches().map(pack_rows), u64, st.sampled_from(FrameClock), finite, st.integers(0, 1), u32
+    FramesMessage,
+    u64,
+    frame_batches().map(pack_columns),
+    u64,
+    st.sampled_from(FrameClock),
+    finite,
+    st.integers(0, 1),
+    u32,
 )
 events = st.builds(Event, u64, text, st.sampled_from(Level), text, text, u64, finite, u32)
 agv_identities = st.builds(
@@ -144,23 +158,23 @@ def test_what_is_encoded_is_decoded(codec: Any, data: st.DataObject) -> None:
 
 @few
 @given(st.lists(frame_batches(), max_size=4))
-def test_rows_of_many_messages_become_columns_bit_by_bit(batches: list[Frames]) -> None:
-    assert same(unpack_rows([pack_rows(frames) for frames in batches]), Frames.concatenate(batches))
+def test_columns_of_many_messages_are_joined_bit_by_bit(batches: list[Frames]) -> None:
+    assert same(unpack_columns([pack_columns(frames) for frames in batches]), Frames.concatenate(batches))
 
 
 @few
 @given(frame_batches(), st.integers(0, 7), st.sampled_from([np.nan, np.inf, -np.inf]))
-def test_rows_whose_numbers_cannot_be_are_refused(frames: Frames, which: int, time_s: float) -> None:
+def test_frames_whose_numbers_cannot_be_are_refused(frames: Frames, which: int, time_s: float) -> None:
     if len(frames):
         row = which % len(frames)
-        rows = bytearray(pack_rows(frames))
-        rows[57 * row : 57 * row + 8] = np.float64(time_s).tobytes()
+        rows = bytearray(pack_columns(frames))
+        rows[8 * row : 8 * row + 8] = np.float64(time_s).tobytes()
         with pytest.raises(MessageError, match="finite capture time"):
-            unpack_rows([bytes(rows)])
-        rows = bytearray(pack_rows(frames))
-        rows[57 * row + 56] = 2 + which
+            unpack_columns([bytes(rows)])
+        rows = bytearray(pack_columns(frames))
+        rows[56 * len(frames) + row] = 2 + which
         with pytest.raises(MessageError, match="tracked is neither 0 nor 1"):
-            unpack_rows([bytes(rows)])
+            unpack_columns([bytes(rows)])
 
 
 @every_codec
@@ -217,7 +231,7 @@ def _one(codec: Any) -> Any:
     none = np.empty(0)
     return {
         "command": CommandMessage(1, 0.0, Command(0.0, 0.0, 0.0), 0.1),
-        "frames": FramesMessage(1, pack_rows(Frames.empty())),
+        "frames": FramesMessage(1, pack_columns(Frames.empty())),
         "event": Event(1, "agv", Level.INFO, "kind", "text"),
         "agv_identity": AgvIdentity("a", "b", "c", "d", "us", 1500.0, True, True),
         "mocap_identity": MocapIdentity("a", 120.0, True),
@@ -232,8 +246,8 @@ def _one(codec: Any) -> Any:
 @every_codec
 def test_another_version_is_refused(codec: Any) -> None:
     payload = bytearray(codec[1](_one(codec)))
-    payload[4] = 2
-    with pytest.raises(MessageError, match=r"another version: 2 \(limit: 1\)"):
+    payload[4] = 1
+    with pytest.raises(MessageError, match=r"another version: 1 \(limit: 2\)"):
         codec[2](bytes(payload))
 
 
@@ -255,15 +269,15 @@ def test_more_frames_than_a_message_holds_are_refused() -> None:
     many = np.zeros(MAX_ROWS + 1)
     frames = Frames(many, many, many, many, many.astype(bool), many.astype(int), many, many)
     with pytest.raises(MessageError, match="too many frames"):
-        encode_frames(FramesMessage(1, pack_rows(frames)))
-    encode_frames(FramesMessage(1, pack_rows(frames.select(np.arange(MAX_ROWS)))))
+        encode_frames(FramesMessage(1, pack_columns(frames)))
+    encode_frames(FramesMessage(1, pack_columns(frames.select(np.arange(MAX_ROWS)))))
 
 
 def test_columns_that_differ_in_length_are_refused() -> None:
     two, three = np.zeros(2), np.zeros(3)
     frames = Frames(two, three, two, two, two.astype(bool), two.astype(int), two, two)
     with pytest.raises(MessageError, match="differ in length"):
-        encode_frames(FramesMessage(1, pack_rows(frames)))
+        encode_frames(FramesMessage(1, pack_columns(frames)))
 
 
 @pytest.mark.parametrize("hold_s", [-0.1, math.nan, math.inf, 3600.1])
@@ -276,4 +290,4 @@ def test_a_command_takes_64_bytes_and_a_frame_57() -> None:
     assert len(encode_command(CommandMessage(1, 0.0, Command(0.0, 0.0, 0.0), 0.1))) == 64
     one = np.zeros(1)
     frames = Frames(one, one, one, one, one.astype(bool), one.astype(int), one, one)
-    assert len(encode_frames(FramesMessage(1, pack_rows(frames)))) == 48 + 57
+    assert len(encode_frames(FramesMessage(1, pack_columns(frames)))) == 48 + 57
