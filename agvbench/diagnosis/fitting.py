@@ -13,6 +13,7 @@ driving being many times as far off as this one's: the likelihood is Student's, 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -29,6 +30,8 @@ _LEAST_M, _LEAST_RAD = 1e-4, 2e-4
 _START_EXTRA_M = 2e-4
 _LEAST_SCATTER = np.array([2e-4, 2e-4, 2e-4, 2e-4])
 _ENOUGH = 0.05
+_CLOSE = 1.0
+_WEAK = 1e-4
 _TAIL = 4.0  # degrees of freedom of a window's errors
 
 
@@ -70,6 +73,11 @@ class Fit:
         """Covariance of the parameters (P, P)."""
         return np.asarray(np.linalg.pinv(self.information.sum(axis=0) + _ridge(self.predictor), hermitian=True))
 
+    @cached_property
+    def ground(self) -> _Ground:
+        """What every promise of a larger model starts from."""
+        return _Ground.of(self)
+
     def effect_values(self) -> dict[str, float]:
         """Return the effects' parameters by name."""
         own = self.parameters[self.predictor.maps.size :]
@@ -86,6 +94,65 @@ class _Terms:
     pull: Floats
 
 
+@dataclass(frozen=True)
+class _Ground:
+    """A fitted model of runs as larger ones are linearised about it, with the runs' offsets projected out.
+
+    ``weight`` (R, K, 3) of residuals; ``a`` (R, 3K, 6) derivatives by the offsets, ``inverse`` (R, 6, 6) of their
+    information, ``drawn`` (R, 6) what their prior pulls; ``j`` (3 R K, P) derivatives by the parameters, projected;
+    ``covariance`` (P, P); ``pull`` (P,) of the offsets' prior on the parameters.
+    """
+
+    weight: Floats
+    a: Floats
+    inverse: Floats
+    drawn: Floats
+    j: Floats
+    covariance: Floats
+    pull: Floats
+
+    @classmethod
+    def of(cls, fitted: Fit) -> _Ground:
+        """Return the ground of a fit."""
+        predictor, scatter, offsets = fitted.predictor, fitted.scatter, fitted.offsets
+        weight = _weights(predictor, scatter)
+        runs = len(offsets)
+        a = (fitted.linear.by_offsets * weight[..., None]).reshape(runs, -1, 6)
+        j = (fitted.linear.by_parameters * weight[..., None]).reshape(runs, a.shape[1], -1)
+        prior = _priors(predictor, scatter)
+        inverse = _inner_inverse(a, prior)[1]
+        mixed = inverse @ (a.transpose(0, 2, 1) @ j)
+        drawn = offsets / prior**2
+        matrix = fitted.information.sum(axis=0) + _ridge(predictor)
+        projected = (j - a @ mixed).reshape(-1, j.shape[-1])
+        covariance = np.asarray(np.linalg.inv(matrix))
+        return cls(weight, a, inverse, drawn, projected, covariance, np.einsum("rij,ri->j", mixed, drawn))
+
+    def square(self, e: Floats) -> float:
+        """Return the weighted squares of residuals `e` (R, 3K), their offsets found anew."""
+        pull = np.einsum("rni,rn->ri", self.a, e) - self.drawn
+        return float(np.sum(e * e) - np.einsum("ri,rij,rj->", pull, self.inverse, pull, optimize=True))
+
+    def promise(self, residual: Floats, before: Floats, slopes: Floats, start: Floats, bounds: Floats) -> float:
+        """Return by how much the loss falls, to first order, from residuals `before` by `residual` and its `slopes`."""
+        e = (residual * self.weight).reshape(len(residual), -1)
+        new = (slopes * self.weight[..., None]).reshape(*e.shape, -1)
+        fixed = new - self.a @ (self.inverse @ (self.a.transpose(0, 2, 1) @ new))
+        pull = np.einsum("rnq,rn->q", fixed, e)
+        pull += np.einsum("rnq,rni,rij,rj->q", new, self.a, self.inverse, self.drawn, optimize=True)
+        old_pull = self.j.T @ e.ravel() + self.pull
+        shared = self.j.T @ new.reshape(len(self.j), -1)
+        own = np.einsum("rnp,rnq->pq", new, fixed) + _WEAK * np.eye(len(start))
+        # The maps and effects that there are move along; what is left is a question of the new parameters alone.
+        along = self.covariance @ shared
+        matrix, rest = own - shared.T @ along, pull - along.T @ old_pull
+        wanted = start + np.linalg.lstsq(matrix, rest, rcond=1e-12)[0]
+        move = np.clip(wanted, bounds[:, 0], bounds[:, 1]) - start
+        saved = old_pull @ self.covariance @ old_pull + 2.0 * rest @ move - move @ matrix @ move
+        was = (before * self.weight).reshape(len(residual), -1)
+        return float(self.square(was) - self.square(e) + saved)
+
+
 def first_scatter() -> Scatter:
     """Return a generous scatter to start from."""
     return Scatter(0.05, 0.05, np.array([0.01, 0.01, 0.01, 0.02]))
@@ -99,6 +166,7 @@ def fit(
     offsets: Floats | None = None,
     scatter: Scatter | None = None,
     iterations: int = _ITERATIONS,
+    near: Linearised | None = None,
 ) -> Fit:
     """Fit by Gauss–Newton with halved steps, the scatter by expectation maximisation between steps.
 
@@ -114,20 +182,25 @@ def fit(
         Where to start; by default none and generous.
     iterations
         At most this many steps.
+    near
+        Derivatives of the same maps at parameters close by. By far the most time goes into those by the maps' values,
+        and they change little: the first steps are taken with these, the last ones and the result with one's own.
     """
     readings = predictor.readings
     offsets = np.zeros((len(readings), 6)) if offsets is None else offsets.copy()
     scatter = scatter or (first_scatter() if predictor.readings.begins is None else _scatter_of_windows(readings))
     parameters = parameters.copy()
     before = np.inf
-    for _ in range(iterations):
-        linear = predictor.linearise(parameters, offsets)
+    for step in range(iterations):
+        linear = predictor.linearise(parameters, offsets, near)
         residual = _residual(predictor, linear.poses)
         terms = _terms(predictor, residual, linear.by_parameters, linear.by_offsets, offsets, scatter)
         parameters, offsets, residual = _step(predictor, parameters, offsets, residual, terms, scatter, bounds)
         scatter = _rescatter(predictor, residual, offsets, terms.inner_inverse, scatter)
         after = float(terms.loss.sum())
-        if abs(before - after) < _ENOUGH:
+        if near is not None and (before - after < _CLOSE or step >= iterations // 2):
+            near = None
+        elif abs(before - after) < _ENOUGH:
             break
         before = after
     linear = predictor.linearise(parameters, offsets)
@@ -144,23 +217,21 @@ def promised_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floats)
     """
     parameters = np.r_[fitted.parameters, start]
     poses, slopes = larger.by_last(parameters, fitted.offsets, len(start))
-    by_parameters = np.concatenate([fitted.linear.by_parameters, slopes], axis=-1)
     residual = _residual(larger, poses)
+    if larger.readings.begins is None:
+        return fitted.ground.promise(residual, fitted.residual, slopes, start, bounds)
+    by_parameters = np.concatenate([fitted.linear.by_parameters, slopes], axis=-1)
     terms = _terms(larger, residual, by_parameters, fitted.linear.by_offsets, fitted.offsets, fitted.scatter)
-    gradient = terms.gradient.sum(axis=0)
-    move = np.linalg.lstsq(terms.information.sum(axis=0) + _ridge(larger), gradient, rcond=1e-12)[0]
+    gradient, matrix = terms.gradient.sum(axis=0), terms.information.sum(axis=0) + _ridge(larger)
+    move = np.linalg.lstsq(matrix, gradient, rcond=1e-12)[0]
     # What would go beyond its bound stops there, and the rest is solved for again.
-    ends = np.clip(start + move[len(fitted.parameters) :], bounds[:, 0], bounds[:, 1])
-    if np.any(ends != start + move[len(fitted.parameters) :]):
-        held = np.r_[np.zeros(len(fitted.parameters)), ends - start]
-        matrix = terms.information.sum(axis=0) + _ridge(larger)
-        free = np.r_[np.ones(len(fitted.parameters)), np.zeros(len(start))].astype(np.bool_)
-        rest = np.linalg.lstsq(matrix[np.ix_(free, free)], (gradient - matrix @ held)[free], rcond=1e-12)[0]
-        move = held
-        move[: len(fitted.parameters)] = rest
-        saved = 2.0 * gradient @ move - move @ matrix @ move
-    else:
-        saved = gradient @ move
+    known = len(fitted.parameters)
+    ends = np.clip(start + move[known:], bounds[:, 0], bounds[:, 1])
+    if np.any(ends != start + move[known:]):
+        held = np.r_[np.zeros(known), ends - start]
+        rest = np.linalg.lstsq(matrix[:known, :known], (gradient - matrix @ held)[:known], rcond=1e-12)[0]
+        move = np.r_[rest, ends - start]
+    saved = 2.0 * gradient @ move - move @ matrix @ move
     return float(fitted.loss.sum() - terms.loss.sum() + saved)
 
 
@@ -202,6 +273,19 @@ def _scatter_of_windows(readings: Readings) -> Scatter:
     return Scatter(0.1, 0.1, _LEAST_SCATTER.copy(), ahead_s / ahead_s[-1])
 
 
+def _weights(predictor: Predictor, scatter: Scatter) -> Floats:
+    """Return what residuals are multiplied by (R, K, 3)."""
+    temper, _ = _temper(predictor)
+    return np.asarray(np.sqrt(temper)[:, None, None] * predictor.readings.seen[:, :, None] / _scale(scatter))
+
+
+def _inner_inverse(a: Floats, prior: Floats) -> tuple[Floats, Floats]:
+    """Return the information on each run's offsets (R, 6, 6), with its inverse."""
+    inner = a.transpose(0, 2, 1) @ a
+    inner[:, range(6), range(6)] += prior**-2.0
+    return inner, np.asarray(np.linalg.inv(inner))
+
+
 def _priors(predictor: Predictor, scatter: Scatter) -> Floats:
     start = np.hypot(predictor.readings.start_stderr, _START_EXTRA_M)
     out = np.empty((len(predictor.readings), 6))
@@ -221,20 +305,26 @@ def _terms(
 ) -> _Terms:
     runs = len(residual)
     temper, count = _temper(predictor)
-    weight = np.sqrt(temper)[:, None, None] * predictor.readings.seen[:, :, None]
-    weight = weight / _scale(scatter)
+    weight = _weights(predictor, scatter)
     e = (residual * weight).reshape(runs, -1)
-    j = (by_parameters * weight[..., None]).reshape(runs, e.shape[1], -1)
+    # A run has a few of all levels: the rest of its columns are zero.
+    own = predictor.touched(by_parameters.shape[-1])
+    j = np.take_along_axis(by_parameters, own[:, None, None, :], axis=-1)
+    j = (j * weight[..., None]).reshape(runs, e.shape[1], -1)
     a = (by_offsets * weight[..., None]).reshape(runs, e.shape[1], 6)
     prior = _priors(predictor, scatter)
     at, jt = a.transpose(0, 2, 1), j.transpose(0, 2, 1)
-    inner = at @ a
-    inner[:, range(6), range(6)] += prior**-2.0
-    inverse = np.asarray(np.linalg.inv(inner))
+    inner, inverse = _inner_inverse(a, prior)
     pull = (at @ e[..., None])[..., 0] - offsets / prior**2
-    mixed = at @ j
-    information = jt @ j - mixed.transpose(0, 2, 1) @ inverse @ mixed
-    gradient = (jt @ e[..., None])[..., 0] - (mixed.transpose(0, 2, 1) @ (inverse @ pull[..., None]))[..., 0]
+    short = at @ j
+    rows = np.arange(runs)[:, None]
+    mixed = np.zeros((runs, 6, by_parameters.shape[-1]))
+    mixed[rows, :, own] = short.transpose(0, 2, 1)
+    information = np.zeros((runs, mixed.shape[2], mixed.shape[2]))
+    information[rows[..., None], own[:, :, None], own[:, None, :]] = jt @ j - short.transpose(0, 2, 1) @ inverse @ short
+    gradient = np.zeros((runs, mixed.shape[2]))
+    steep = (jt @ e[..., None])[..., 0] - (short.transpose(0, 2, 1) @ (inverse @ pull[..., None]))[..., 0]
+    gradient[rows, own] = steep
     squares = np.sum(e * e, axis=1) + np.sum((offsets / prior) ** 2, axis=1)
     # The offsets are a step away from their best values: what that step gains belongs to the loss.
     squares -= np.einsum("ri,rij,rj->r", pull, inverse, pull)
@@ -336,5 +426,5 @@ def _rescatter_windows(predictor: Predictor, residual: Floats, scatter: Scatter)
 def _ridge(predictor: Predictor) -> Floats:
     """Return a prior so weak that it only speaks where the data say nothing: 1 rad, 1 m/s, 100 for effects."""
     strength = np.full(predictor.maps.size + len(predictor.parameter_names), 1.0)
-    strength[predictor.maps.size :] = 1e-4
+    strength[predictor.maps.size :] = _WEAK
     return np.diag(strength)

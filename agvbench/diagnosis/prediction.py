@@ -73,8 +73,16 @@ class Batch:
         # Of a lane that varies a level, `lane_row` is a row that has it; of one that varies a node, the node.
         self.lane_run, self.lane_kind, self.lane_row = np.array(run), np.array(kind), np.array(row)
         self.lanes = Simulation(geometry, maps.neutral, [runs[i] for i in run], kinds=kinds)
+        self.touched = self._touched(owns)
         self.rows = np.concatenate([owns[i] for i in run])
         self.row_change = np.concatenate(changed)
+
+    def _touched(self, owns: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+        """Return which of the maps' values each run depends on (R, m), and others where it depends on fewer than m."""
+        used = np.array(
+            [np.concatenate([(self.weights[role][own] != 0.0).any(axis=0) for role in ROLES]) for own in owns]
+        )
+        return np.argsort(~used, axis=1, kind="stable")[:, : max(1, int(used.sum(axis=1).max()))]
 
     def _count_levels(self, own: NDArray[np.int64]) -> int:
         drives = self.drives[own]
@@ -120,6 +128,13 @@ class Predictor:
         self.nulls: Floats = batch.base.nulls[self._own]
         self._steps = _STEP_SHARE * batch.base.scales[self._own]
 
+    def touched(self, count: int) -> NDArray[np.int64]:
+        """Return which of `count` parameters each run depends on at most (R, m): some of the maps, and every effect."""
+        if not count:
+            return np.empty((len(self.readings), 0), dtype=np.int64)
+        effects = np.broadcast_to(np.arange(self.maps.size, count), (len(self.readings), count - self.maps.size))
+        return np.concatenate([self.batch.touched, effects], axis=1)
+
     def settled(self, parameters: Floats) -> tuple[Floats, Floats]:
         """Return settled angles and speed of every row (rows, 3), and initial states (R, 5)."""
         return self._inputs(parameters, np.zeros((len(self.readings), len(OFFSETS))))
@@ -156,14 +171,30 @@ class Predictor:
         poses = self.batch.base.predict(settled, self._all(own), initial, level_scatter=self.batch.level_scatter)
         return poses.reshape(len(self.readings), -1, 3)
 
-    def linearise(self, parameters: Floats, offsets: Floats) -> Linearised:
-        """Return poses and derivatives about parameters (P,) and offsets (R, 6)."""
+    def linearise(self, parameters: Floats, offsets: Floats, near: Linearised | None = None) -> Linearised:
+        """Return poses and derivatives about parameters (P,) and offsets (R, 6).
+
+        Where `near` is given, derivatives by the maps' values and by offsets are taken from there.
+        """
         settled, initial = self._inputs(parameters, offsets)
+        own = parameters[self.maps.size :]
+        if near is None:
+            base, by_maps, by_offsets = self._by_lanes(parameters, offsets, settled, initial)
+        else:
+            base = self._simulate(settled, own, initial)
+            by_maps, by_offsets = near.by_parameters[..., : self.maps.size], near.by_offsets
+        slopes = [self._slope(settled, own, initial, base, k)[..., None] for k in range(len(own))]
+        return Linearised(base, np.concatenate([by_maps, *slopes], axis=-1), by_offsets)
+
+    def _by_lanes(
+        self, parameters: Floats, offsets: Floats, settled: Floats, initial: Floats
+    ) -> tuple[Floats, Floats, Floats]:
+        """Return poses (R, K, 3) and their derivatives by the maps' values and by offsets."""
         own = parameters[self.maps.size :]
         batch = self.batch
         lanes = self._simulate_lanes(settled, initial, own)
         base = lanes[batch.lane_kind == "base"]
-        by_parameters = np.zeros((*base.shape, len(parameters)))
+        by_parameters = np.zeros((*base.shape, self.maps.size))
         by_offsets = np.zeros((*base.shape, len(OFFSETS)))
         by_offsets[:, :, 0, 0] = by_offsets[:, :, 1, 1] = 1.0
         by_offsets[..., 2] = (lanes[batch.lane_kind == "heading"] - base) / _STEP
@@ -186,9 +217,7 @@ class Predictor:
             for node in range(weights.shape[1]):
                 used = weights[:, node] != 0.0
                 np.add.at(target[..., node], run[used], change[used] * weights[used, node][:, None, None])
-        for k in range(len(own)):
-            by_parameters[..., self.maps.size + k] = self._slope(settled, own, initial, base, k)
-        return Linearised(base, by_parameters, by_offsets)
+        return base, by_parameters, by_offsets
 
     def by_last(self, parameters: Floats, offsets: Floats, count: int) -> tuple[Floats, Floats]:
         """Return poses (R, K, 3), and their derivatives by the last `count` parameters (R, K, 3, count)."""

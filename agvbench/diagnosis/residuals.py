@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +12,17 @@ from numpy.typing import NDArray
 from agvbench.diagnosis.reading import Readings
 from agvbench.types import Floats
 
+if TYPE_CHECKING:
+    from agvbench.diagnosis.residual_spread import EndSpread
+
 QUANTITIES = ("position_rms_mm", "heading_rms_deg", "delta_s_mm", "delta_heading_deg")
 AT_THE_FLOOR = 1.25
 """What is left is at the floor up to this times it, or if repeats cannot tell it from the floor."""
 
 LACK_OF_FIT = 0.01
 """Groups of repeats differ beyond their scatter below this p-value."""
+
+_LEAST = 1e-6  # m, rad: less scatter than any camera shows
 
 _UNITS = {
     "position_rms_mm": 1e3,
@@ -109,25 +115,41 @@ def floor(missed: Misses, group: NDArray[np.int64]) -> dict[str, float] | None:
     return out
 
 
-def lack_of_fit(missed: Misses, group: NDArray[np.int64]) -> float | None:
+def lack_of_fit(missed: Misses, group: NDArray[np.int64], spread: EndSpread | None = None) -> float | None:
     """Return a p-value that what is missed is the same for all groups of repeats: lack of fit against pure error.
 
-    The unit is the run. From each run come three numbers (where it ended: along, across, heading); between and within
-    groups they are compared by F, and the smallest p-value is corrected for being one of three. None without repeats.
+    The unit is the run. From each run come three numbers (where it ended: along, across, heading), in units of how far
+    it may end from its prediction by the scatter that was fitted, which is not the same for a straight and a slalom;
+    what the parameters may be off by is added for the mean of a group. Between and within groups they are compared by
+    F, so that the size of the scatter itself does not matter. Without `spread` all runs scatter alike. None without
+    repeats.
     """
-    from scipy import stats
+    from scipy import special
 
     names, index, sizes = np.unique(group, return_inverse=True, return_counts=True)
-    within_dof, between_dof = len(group) - len(names), len(names)
-    if within_dof < 3 or not between_dof:
+    within_dof, between_dof = 3 * (len(group) - len(names)), 3 * len(names)
+    if within_dof < 9 or not between_dof:
         return None
     rows = np.arange(len(group))
     last = missed.seen.shape[1] - 1 - np.argmax(missed.seen[:, ::-1], axis=1)
-    least = 1.0
-    for k in range(3):
-        value = missed.path[rows, last, k]
-        mean = np.bincount(index, weights=value) / sizes
-        within = float(np.sum((value - mean[index]) ** 2)) / within_dof
-        between = float(np.sum(sizes * mean**2)) / between_dof
-        least = min(least, float(stats.f.sf(between / within, between_dof, within_dof))) if within > 0.0 else least
-    return min(1.0, 3.0 * least)
+    ends = missed.path[rows, last]
+    means = np.array([ends[index == g].mean(axis=0) for g in range(len(names))])
+    apart = ends - means[index]
+    if spread is None:
+        own = np.broadcast_to(apart.T @ apart / (len(group) - len(names)) + np.eye(3) * _LEAST**2, (len(group), 3, 3))
+        shared = np.zeros_like(own)
+    else:
+        own, shared = spread.own, spread.shared
+    within = between = 0.0
+    for g, size in enumerate(sizes):
+        runs = index == g
+        scatter = own[runs].mean(axis=0)
+        within += float(np.sum(_white(scatter, apart[runs].T) ** 2))
+        between += float(np.sum(_white(scatter / size + shared[runs].mean(axis=0), means[g]) ** 2))
+    if within <= 0.0:
+        return 1.0
+    return float(special.fdtrc(between_dof, within_dof, between / between_dof / (within / within_dof)))
+
+
+def _white(covariance: Floats, values: Floats) -> Floats:
+    return np.asarray(np.linalg.solve(np.linalg.cholesky(covariance), values))

@@ -209,6 +209,7 @@ class Selector:
             offsets=now.offsets,
             scatter=now.scatter,
             iterations=_SHORT,
+            near=now.linear,
         )
         # What promises much may have to climb first: maps that took up a cause must give it back before it shows.
         if promises[best] < _LIKELY and float(now.loss.sum() - short.loss.sum()) < _HOPELESS:
@@ -228,6 +229,7 @@ class Selector:
                 offsets=None if near is None else near.offsets,
                 scatter=None if near is None else near.scatter,
                 iterations=_LONG,
+                near=None if near is None else near.linear,
             )
             self.tried += 1
             self._known[key] = Scored(names, fitted, cross_validated(fitted, self._fold, bounds))

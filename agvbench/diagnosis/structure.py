@@ -178,30 +178,32 @@ def swing(rates: Rates, seed: int) -> Dependence | None:
     return best
 
 
-Waves = list[Floats | None]
+def _bent(distance: Floats, weight: Floats, value: Floats) -> tuple[Floats, Floats]:
+    """Return what a straight line leaves of one run, and orthonormal waves (n, 2, periods) of every period.
 
-
-def _bent(distance: Floats, weight: Floats, value: Floats) -> tuple[Floats, Waves]:
-    """Return what a straight line leaves of one run, and an orthonormal wave of each period that its steps resolve."""
+    Waves of periods that its steps do not resolve are zero.
+    """
     line, _ = np.linalg.qr(np.column_stack([weight, weight * distance]))
     rest = weight * value
-    waves: Waves = []
-    for period in _SWINGS_M:
-        if period < _STEPS_PER_SWING * float(np.median(weight)):
-            waves.append(None)
-            continue
-        wave = _waves(distance, period) * weight[:, None]
-        waves.append(np.linalg.qr(wave - line @ (line.T @ wave))[0])
-    return rest - line @ (line.T @ rest), waves
+    angle = 2.0 * np.pi * distance[:, None] / _SWINGS_M
+    resolved = _STEPS_PER_SWING * float(np.median(weight)) <= _SWINGS_M
+    cosine, sine = (_apart(wave * weight[:, None], line) for wave in (np.cos(angle), np.sin(angle)))
+    first = _normal(cosine)
+    second = _normal(sine - first * np.sum(first * sine, axis=0))
+    return rest - line @ (line.T @ rest), np.stack([first, second], axis=1) * resolved
 
 
-def _explained(rows: Floats, waves: Waves) -> Floats:
+def _apart(columns: Floats, line: Floats) -> Floats:
+    return np.asarray(columns - line @ (line.T @ columns))
+
+
+def _normal(columns: Floats) -> Floats:
+    return np.asarray(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
+
+
+def _explained(rows: Floats, waves: Floats) -> Floats:
     """Return what waves of each period explain of each row (rows, periods)."""
-    out = np.zeros((len(rows), len(waves)))
-    for j, wave in enumerate(waves):
-        if wave is not None:
-            out[:, j] = np.sum((rows @ wave) ** 2, axis=1)
-    return out
+    return np.asarray(((rows @ waves[:, 0]) ** 2) + (rows @ waves[:, 1]) ** 2)
 
 
 def _basis(covariate: Floats, name: str) -> Floats:
@@ -232,8 +234,6 @@ def _strength(
     basis: Floats, value: Floats, weight: Floats, unit: NDArray[np.int64], signs: Floats
 ) -> tuple[float, Floats]:
     """Return how strong a dependence is, −log p by χ², and the same for groups' scores with the `signs` given."""
-    from scipy import stats
-
     centred = value - np.average(value, weights=weight)
     scores = np.zeros((signs.shape[1], basis.shape[1]))
     np.add.at(scores, unit, _centred(basis, weight) * (weight * centred)[:, None])
@@ -241,8 +241,15 @@ def _strength(
     kept = size > 1e-9 * max(size[-1], 1e-300)
     white = scores @ (turn[:, kept] / np.sqrt(size[kept]))
     dof = int(np.count_nonzero(kept))
-    own = -stats.chi2.logsf(float(np.sum(white.sum(axis=0) ** 2)), dof)
-    return float(own), np.asarray(-stats.chi2.logsf(np.sum((signs @ white) ** 2, axis=1), dof))
+    return float(_surprise(np.sum(white.sum(axis=0) ** 2), dof)), _surprise(np.sum((signs @ white) ** 2, axis=1), dof)
+
+
+def _surprise(square: Floats, dof: int) -> Floats:
+    """Return −log p by χ²; ∞ where p is too small for a number."""
+    from scipy import special  # not scipy.stats, which takes a second to import
+
+    with np.errstate(divide="ignore"):
+        return -np.log(np.asarray(special.chdtrc(dof, square)))
 
 
 def _share(basis: Floats, value: Floats, weight: Floats, fold: NDArray[np.int64]) -> float:
