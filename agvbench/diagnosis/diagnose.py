@@ -22,6 +22,7 @@ from agvbench.diagnosis.next_experiment_propose import with_next_experiment
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.provenance import provenance, refuse_nothing
 from agvbench.diagnosis.reading import Readings, read_runs
+from agvbench.diagnosis.residual_spread import EndSpread, end_spread
 from agvbench.diagnosis.residual_table import with_residuals
 from agvbench.diagnosis.residuals import AT_THE_FLOOR, LACK_OF_FIT, Misses, floor, lack_of_fit, misses
 from agvbench.diagnosis.result import Diagnosis, HeldOut, Verdict
@@ -167,7 +168,7 @@ def _conclude(
     poses = every.predict(fit.parameters)
     static = Predictor(every.batch, selection.base.names).predict(selection.base.fit.parameters)
     before = static if vehicle is None else _believed_poses(vehicle, readings)
-    judged = _judge(readings, held, before, poses)
+    judged = _judge(readings, held, before, poses, end_spread(every, fit))
     if judged is None:
         why = "there are no repeats among the runs held out or fitted, and so no floor"
         return Diagnosis(Verdict.NOT_IDENTIFIABLE, why, provenance=_provenance(header, readings, seed))
@@ -218,13 +219,15 @@ def _believed_poses(vehicle: VehicleModel, readings: Readings) -> Floats:
     return np.array(poses)
 
 
-def _judge(readings: Readings, held: NDArray[np.bool_], before: Floats, after: Floats) -> _Judged | None:
+def _judge(
+    readings: Readings, held: NDArray[np.bool_], before: Floats, after: Floats, spread: EndSpread
+) -> _Judged | None:
     kept = readings.select(held)
     missed = misses(kept, after[held])
     least = floor(missed, kept.group) or floor(misses(readings, after), readings.group)
     if least is None:
         return None
-    return _Judged(misses(kept, before[held]), missed, least, lack_of_fit(missed, kept.group))
+    return _Judged(misses(kept, before[held]), missed, least, lack_of_fit(missed, kept.group, spread.select(held)))
 
 
 def _is_significant(judged: _Judged, rest: list[Dependence]) -> bool:

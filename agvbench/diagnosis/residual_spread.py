@@ -1,0 +1,50 @@
+"""How far runs may end from their prediction by scatter alone, each by its own commands.
+
+A long slalom ends ten times as far off as a short straight by the same scatter of the axles: what groups of repeats
+miss can only be compared in units of what each of them may miss.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.diagnosis.fitting import Fit, _priors
+from agvbench.diagnosis.prediction import Predictor
+from agvbench.types import Floats
+
+
+@dataclass(frozen=True)
+class EndSpread:
+    """Covariances (R, 3, 3) in each run's start frame [m, m, rad], at its last sample.
+
+    ``own``: of run and frame, drawn anew with each repeat; ``shared`` by all repeats of a command: what the fitted
+    parameters may be off by.
+    """
+
+    own: Floats
+    shared: Floats
+
+    def select(self, chosen: NDArray[np.bool_]) -> EndSpread:
+        """Return those of the runs that a mask chooses."""
+        return EndSpread(self.own[chosen], self.shared[chosen])
+
+
+def end_spread(every: Predictor, fitted: Fit) -> EndSpread:
+    """Return how far the runs of `every` may end from what it predicts with the parameters of `fitted`."""
+    readings = every.readings
+    linear = every.linearise(fitted.parameters, np.zeros((len(readings), 6)))
+    rows = np.arange(len(readings))
+    last = readings.seen.shape[1] - 1 - np.argmax(readings.seen[:, ::-1], axis=1)
+    turn = np.zeros((len(readings), 3, 3))
+    cos, sin = np.cos(readings.start[:, 2]), np.sin(readings.start[:, 2])
+    turn[:, 0, 0] = turn[:, 1, 1] = cos
+    turn[:, 0, 1], turn[:, 1, 0], turn[:, 2, 2] = sin, -sin, 1.0
+    a = turn @ linear.by_offsets[rows, last]
+    j = turn @ linear.by_parameters[rows, last]
+    scatter = fitted.scatter
+    frame = np.diag(np.square([scatter.position_m, scatter.position_m, scatter.heading_rad]))
+    own = (a * _priors(every, scatter)[:, None, :] ** 2) @ a.transpose(0, 2, 1) + frame
+    return EndSpread(own, j @ fitted.covariance @ j.transpose(0, 2, 1))
