@@ -78,7 +78,7 @@ class AgvHost(Host):
         return b""
 
     def _serve_commands(self) -> None:
-        receive, saw, lock, carry_out = self._subscriber.handler.recv, self.loss.saw, self._lock, self._carry_out
+        receive, loss, lock, carry_out = self._subscriber.handler.recv, self.loss, self._lock, self._carry_out
         while True:
             try:
                 payload = receive().payload.to_bytes()
@@ -89,7 +89,9 @@ class AgvHost(Host):
             except MessageError as error:
                 self._fail(error)
                 continue
-            if lost := saw(message.source, message.sequence):
+            if message.sequence == loss.expected and message.source == loss.source:
+                loss.expected += 1
+            elif lost := loss.saw(message.source, message.sequence):
                 self.event(Level.WARNING, "commands_lost", f"{lost} commands were lost before {message.sequence}")
             try:
                 with lock:

@@ -81,7 +81,11 @@ class Inbox:
             raise MessageError(
                 error.what, where=self._keys.reports, value=error.value, limit=error.limit, remedy=error.remedy
             ) from None
-        self.frames_loss.saw(message.source, message.sequence)
+        loss = self.frames_loss
+        if message.sequence == loss.expected and message.source == loss.source:
+            loss.expected += 1
+        else:
+            loss.saw(message.source, message.sequence)
         return message
 
     def _note(self, event: Event) -> Event:

@@ -30,31 +30,34 @@ class LossCounter:
     (2, 2, 5)
     """
 
-    received: int = 0
     lost: int = 0
     repeated: int = 0
     restarts: int = 0
-    _source: int | None = None
-    _last: int = 0
+    source: int = -1
+    """The sender that is being counted (-1: none yet)."""
+    expected: int = 0
+    """The number that comes next if nothing is lost."""
+    _uncounted: int = 0
+
+    @property
+    def received(self) -> int:
+        """How many messages were noted."""
+        return self.expected - self._uncounted
 
     def saw(self, source: int, sequence: int) -> int:
-        """Note a message; return how many before it are missing."""
-        self.received += 1
-        if source == self._source and sequence == self._last + 1:
-            self._last = sequence
-            return 0
-        return self._saw_other(source, sequence)
+        """Note a message; return how many before it are missing.
 
-    def _saw_other(self, source: int, sequence: int) -> int:
-        """Note a message that is not the next."""
-        if source != self._source:
-            self.restarts += self._source is not None
-            self._source, self._last = source, sequence
-            return 0
-        missing = sequence - self._last - 1
-        if missing < 0:
+        Where every call counts, the message that was expected is noted without one: ``counter.expected += 1``.
+        """
+        missing = sequence - self.expected if source == self.source else 0
+        received = self.received + 1
+        if source != self.source:
+            self.restarts += self.source >= 0
+            self.source, self.expected = source, sequence + 1
+        elif missing < 0:
             self.repeated += 1
-            return 0
-        self._last = sequence
-        self.lost += missing
-        return missing
+        else:
+            self.lost += missing
+            self.expected = sequence + 1
+        self._uncounted = self.expected - received
+        return max(missing, 0)
