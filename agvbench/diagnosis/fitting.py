@@ -26,6 +26,7 @@ EVIDENCE_POSES = 4.0
 
 _ITERATIONS = 8
 _HALVINGS = 4
+_DAMPINGS = (0.0, 0.1, 3.0)
 _LEAST_M, _LEAST_RAD = 1e-4, 2e-4
 _START_EXTRA_M = 2e-4
 _LEAST_SCATTER = np.array([2e-4, 2e-4, 2e-4, 2e-4])
@@ -347,34 +348,45 @@ def _step(
     scatter: Scatter,
     bounds: Floats,
 ) -> tuple[Floats, Floats, Floats]:
+    """Return parameters, offsets and residual after a step that does not make things worse, or as they are.
+
+    Where a whole step and parts of it do, the step is damped (Levenberg and Marquardt): a value that the runs hardly
+    depend on must not carry all others away.
+    """
     matrix = terms.information.sum(axis=0) + _ridge(predictor)
-    free = np.ones(len(parameters), dtype=np.bool_)
     maps = predictor.maps.size
+    now = _objective(predictor, residual, offsets, scatter)
+    for damping in _DAMPINGS:
+        damped = matrix + damping * np.diag(np.diagonal(matrix))
+        move = _move(damped, terms.gradient.sum(axis=0), parameters, bounds, maps)
+        move_offsets = np.einsum("rij,rj->ri", terms.inner_inverse, terms.pull - terms.mixed @ move)
+        share = 1.0
+        for _ in range(_HALVINGS):
+            new = parameters + share * move
+            new[maps:] = np.clip(new[maps:], bounds[:, 0], bounds[:, 1])
+            new_offsets = offsets + share * move_offsets
+            new_residual = _residual(predictor, predictor.predict(new, new_offsets))
+            if _objective(predictor, new_residual, new_offsets, scatter) <= now:
+                return new, new_offsets, new_residual
+            share *= 0.4
+    return parameters, offsets, residual
+
+
+def _move(matrix: Floats, gradient: Floats, parameters: Floats, bounds: Floats, maps: int) -> Floats:
+    """Return the step that `matrix` and `gradient` ask for; effects' parameters that are stuck at a bound stay."""
+    free = np.ones(len(parameters), dtype=np.bool_)
     for _ in range(3):
         move = np.zeros(len(parameters))
-        move[free] = np.linalg.lstsq(matrix[np.ix_(free, free)], terms.gradient.sum(axis=0)[free], rcond=1e-12)[0]
+        move[free] = np.linalg.lstsq(matrix[np.ix_(free, free)], gradient[free], rcond=1e-12)[0]
         wanted = parameters[maps:] + move[maps:]
         kept = np.clip(wanted, bounds[:, 0], bounds[:, 1])
         held = np.flatnonzero(kept != wanted)
-        if not len(held):
-            break
         # What meets its bound goes there; the others are solved for again without it.
         stuck = held[parameters[maps + held] == kept[held]]
         if not len(stuck):
             break
         free[maps + stuck] = False
-    move_offsets = np.einsum("rij,rj->ri", terms.inner_inverse, terms.pull - terms.mixed @ move)
-    now = _objective(predictor, residual, offsets, scatter)
-    share = 1.0
-    for _ in range(_HALVINGS):
-        new = parameters + share * move
-        new[maps:] = np.clip(new[maps:], bounds[:, 0], bounds[:, 1])
-        new_offsets = offsets + share * move_offsets
-        new_residual = _residual(predictor, predictor.predict(new, new_offsets))
-        if _objective(predictor, new_residual, new_offsets, scatter) <= now:
-            return new, new_offsets, new_residual
-        share *= 0.4
-    return parameters, offsets, residual
+    return move
 
 
 def _objective(predictor: Predictor, residual: Floats, offsets: Floats, scatter: Scatter) -> float:
