@@ -7,20 +7,18 @@ import threading
 
 import numpy as np
 
-from agvbench.adapters.contract import AdapterOptions, AgvAdapter, AgvReports
-from agvbench.adapters.seeding import run_seed
+from agvbench.adapters.contract import AdapterOptions, AgvReports
+from agvbench.adapters.simulated_agv import SimulatedAgv
 from agvbench.bus.clock import wait_until
 from agvbench.bus.command_message import CommandFlags, CommandMessage
 from agvbench.bus.event_message import Level
-from agvbench.bus.identity_message import AgvIdentity
-from agvbench.bus.request_message import Replay, Reset, Sampling
+from agvbench.bus.request_message import Replay, Reset
 from agvbench.bus.truth_message import TruthFlags
 from agvbench.errors import AgvbenchError
-from agvbench.simulator import load_plant
 from agvbench.types import Command, Plant
 
 
-class LiveAgv(AgvAdapter):
+class LiveAgv(SimulatedAgv):
     """A plant behind the bus that nobody waits for.
 
     A thread advances the plant from one of the camera's instants to the next, as they come in `AdapterOptions.clock`;
@@ -28,48 +26,24 @@ class LiveAgv(AgvAdapter):
     """
 
     scheme = "live"
+    lock_step = False
 
     def __init__(self, plant: Plant, options: AdapterOptions) -> None:
-        self._plant, self._options, self._clock = plant, options, options.clock
-        neutral = options.neutral_command
-        self._neutral = Command(neutral, neutral, neutral)
-        self._held = self._neutral
-        self._sampling: Sampling | None = None
-        self._plant_s = math.nan
+        super().__init__(plant, options)
+        self._clock = options.clock
         self._lock = threading.Lock()
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._move, name="agvbench-live", daemon=True)
 
-    @classmethod
-    def open(cls, address: str, options: AdapterOptions) -> LiveAgv:
-        """Make the plant that `address`, else the options, name."""
-        return cls(load_plant(address or options.plant)(options.seed), options)
-
-    def identity(self) -> AgvIdentity:
-        """Return who this is."""
-        return AgvIdentity(
-            vehicle=self._options.vehicle,
-            adapter=self.scheme,
-            firmware="simulated",
-            calibration_hash=self._options.calibration_hash,
-            command_unit=self._options.command_unit,
-            neutral=self._options.neutral_command,
-            simulated=True,
-            lock_step=False,
-            extra={"seed": str(self._options.seed), "plant": self._options.plant},
-        )
-
     def start(self, reports: AgvReports) -> None:
         """Begin to move."""
-        self._reports = reports
+        super().start(reports)
         self._thread.start()
 
     def reset(self, request: Reset) -> None:
         """Place the plant at rest."""
         with self._lock:
-            x_m, y_m, heading_rad = request.pose
-            self._plant.reset((x_m, y_m, heading_rad), seed=run_seed(self._options.seed, request.run_key, "plant"))
-            self._held, self._sampling = self._neutral, request.sampling
+            super().reset(request)
             self._plant_s = self._clock.now()
 
     def apply(self, message: CommandMessage) -> None:

@@ -6,21 +6,19 @@ import math
 
 import numpy as np
 
-from agvbench.adapters.contract import NO_POSES, AdapterOptions, AgvAdapter, AgvReports
-from agvbench.adapters.seeding import run_seed
+from agvbench.adapters.contract import NO_POSES, AdapterOptions
+from agvbench.adapters.simulated_agv import SimulatedAgv
 from agvbench.bus.command_message import CommandFlags, CommandMessage
-from agvbench.bus.identity_message import AgvIdentity
 from agvbench.bus.request_message import Replay, Reset, Sampling
 from agvbench.bus.truth_message import TruthFlags
 from agvbench.errors import LinkError
-from agvbench.simulator import load_plant
 from agvbench.types import Command, Floats, Plant
 
 _SLACK_S = 1e-9
 _NO_TIMES = np.empty(0)
 
 
-class SimAgv(AgvAdapter):
+class SimAgv(SimulatedAgv):
     """A plant behind the bus, in lock step.
 
     The plant is advanced to the instants at which the camera looks and to those at which the command changes, no
@@ -28,45 +26,17 @@ class SimAgv(AgvAdapter):
     """
 
     scheme = "sim"
+    lock_step = True
 
     def __init__(self, plant: Plant, options: AdapterOptions) -> None:
-        self._plant, self._options = plant, options
-        neutral = options.neutral_command
-        self._neutral = Command(neutral, neutral, neutral)
-        self._held = self._neutral
-        self._sampling: Sampling | None = None
-        self._plant_s = math.nan  # where the plant is, in the run's clock; NaN until the first command
+        super().__init__(plant, options)
+        # Where the plant is (`_plant_s`) and will be, in the run's clock; NaN until the first command.
         self._end_s = math.nan
         self._next_frame = 0
 
-    @classmethod
-    def open(cls, address: str, options: AdapterOptions) -> SimAgv:
-        """Make the plant that `address`, else the options, name."""
-        return cls(load_plant(address or options.plant)(options.seed), options)
-
-    def identity(self) -> AgvIdentity:
-        """Return who this is."""
-        return AgvIdentity(
-            vehicle=self._options.vehicle,
-            adapter=self.scheme,
-            firmware="simulated",
-            calibration_hash=self._options.calibration_hash,
-            command_unit=self._options.command_unit,
-            neutral=self._options.neutral_command,
-            simulated=True,
-            lock_step=True,
-            extra={"seed": str(self._options.seed), "plant": self._options.plant},
-        )
-
-    def start(self, reports: AgvReports) -> None:
-        """Keep what shows the camera true poses."""
-        self._reports = reports
-
     def reset(self, request: Reset) -> None:
         """Place the plant at rest."""
-        x_m, y_m, heading_rad = request.pose
-        self._plant.reset((x_m, y_m, heading_rad), seed=run_seed(self._options.seed, request.run_key, "plant"))
-        self._sampling, self._held = request.sampling, self._neutral
+        super().reset(request)
         self._plant_s = self._end_s = math.nan
 
     def apply(self, message: CommandMessage) -> None:
