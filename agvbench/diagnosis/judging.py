@@ -19,8 +19,10 @@ def cross_validated(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Flo
 
     About the optimum the loss is quadratic, run by run, so that leaving a fold out is a solution of the normal
     equations without its share: one Newton step from the parameters of all runs, exact as far as the loss is quadratic.
-    A parameter at its bound stays there. A value of a map that only the fold itself determines (a level driven
-    nowhere else) is calibration, and fitted to the fold.
+    A parameter at its bound stays there. What only the fold itself determines is fitted to the fold: a level driven
+    nowhere else is calibration, and a play that one group alone goes through both ways, which everywhere else
+    any levels make up for, cannot be foretold from there either. That is a matter of directions and not of single
+    parameters: those of which the other folds hold less than a hundredth of the information.
     """
     if fitted.predictor.readings.begins is not None:
         return _cross_validated_windows(fitted, fold, bounds)
@@ -30,19 +32,19 @@ def cross_validated(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Flo
     free[maps:] = (effects > bounds[:, 0]) & (effects < bounds[:, 1])
     information = fitted.information[:, free][:, :, free]
     gradient = fitted.gradient[:, free]
-    weak = 1e-6 * np.diag(np.diagonal(information.sum(axis=0)) + 1.0)
+    total = information.sum(axis=0)
+    weak = 1e-6 * np.diag(np.diagonal(total) + 1.0)
+    whiten = np.linalg.inv(np.linalg.cholesky(total + weak)).T
     loss = fitted.loss.copy()
     for k in np.unique(fold):
         out = fold == k
-        others = information[~out].sum(axis=0)
-        own = np.diagonal(others) < _OWN_SHARE * np.diagonal(information.sum(axis=0))
-        move = np.zeros(len(own))
-        known = np.ix_(~own, ~own)
-        move[~own] = np.linalg.lstsq((others + weak)[known], gradient[~out].sum(axis=0)[~own], rcond=1e-12)[0]
-        within, pull = information[out].sum(axis=0), gradient[out].sum(axis=0)
-        rest = pull[own] - within[np.ix_(own, ~own)] @ move[~own]
-        move[own] = np.linalg.lstsq((within + weak)[np.ix_(own, own)], rest, rcond=1e-12)[0]
-        loss[out] += -2.0 * gradient[out] @ move + np.einsum("rij,i,j->r", information[out], move, move)
+        # Where all runs together know each direction equally well, the fold knows what the others lack.
+        share, turn = np.linalg.eigh(whiten.T @ (information[~out].sum(axis=0) + weak) @ whiten)
+        turn = whiten @ turn
+        others, own = (turn.T @ gradient[chosen].sum(axis=0) for chosen in (~out, out))
+        known = share > _OWN_SHARE
+        move = turn @ np.where(known, others / np.maximum(share, _OWN_SHARE), own / np.maximum(1.0 - share, _OWN_SHARE))
+        loss[out] += -2.0 * gradient[out] @ move + np.einsum("rij,i,j->r", information[out], move, move, optimize=True)
     return loss
 
 

@@ -1,0 +1,51 @@
+"""Cross-validation by one Newton step, against least squares that really leave a fold out."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from agvbench.diagnosis.judging import cross_validated
+
+NO_BOUNDS = np.empty((0, 2))
+
+
+def linear_fit(design, measured):
+    """Return what `cross_validated` reads of a fit, of runs whose prediction is linear: design (R, K, P)."""
+    rows = design.reshape(-1, design.shape[-1])
+    best = np.linalg.lstsq(rows, measured.ravel(), rcond=None)[0]
+    miss = measured - design @ best
+    return SimpleNamespace(
+        predictor=SimpleNamespace(
+            readings=SimpleNamespace(begins=None), maps=SimpleNamespace(size=design.shape[-1])
+        ),
+        parameters=best,
+        loss=np.sum(miss**2, axis=1),
+        information=np.einsum("rki,rkj->rij", design, design),
+        gradient=np.einsum("rki,rk->ri", design, miss),
+    )  # fmt: skip
+
+
+def test_a_linear_model_is_foretold_as_if_it_were_fitted_without_the_fold():
+    rng = np.random.default_rng(3)
+    design, fold = rng.normal(size=(12, 5, 3)), np.repeat([0, 1, 2], 4)
+    measured = design @ [1.0, -2.0, 0.5] + rng.normal(size=(12, 5))
+    loss = cross_validated(linear_fit(design, measured), fold, NO_BOUNDS)
+    for k in range(3):
+        rest = design[fold != k].reshape(-1, 3)
+        left = np.linalg.lstsq(rest, measured[fold != k].ravel(), rcond=None)[0]
+        expected = np.sum((measured - design @ left) ** 2, axis=1)
+        assert loss[fold == k] == pytest.approx(expected[fold == k], rel=1e-4)
+
+
+def test_what_only_one_fold_knows_is_fitted_to_it_though_every_run_depends_on_it():
+    """A play shifts two levels that are only ever reached from one side; one group alone goes both ways."""
+    rng = np.random.default_rng(4)
+    level, play = np.tile([[1.0, 0.0, -0.5], [0.0, 1.0, 0.5]], (6, 1)), np.tile([[1.0, 0.0, 0.5]], (2, 1))
+    design = np.concatenate([level, play])[:, None, :] * np.ones((1, 4, 1))
+    measured = design @ [3.0, 2.0, 0.7] + 0.01 * rng.normal(size=(14, 4))
+    fold = np.r_[np.repeat([1, 2], 6), 0, 0]
+    loss = cross_validated(linear_fit(design, measured), fold, NO_BOUNDS)
+    assert loss.max() < 4 * 0.03**2
