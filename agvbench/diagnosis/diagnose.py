@@ -14,7 +14,7 @@ from agvbench.diagnosis.candidates import bounds_of, candidates, given_effects
 from agvbench.diagnosis.contradictions import refuse_contradictions
 from agvbench.diagnosis.empirical import Explained, described, explain, term_candidates, with_term_first
 from agvbench.diagnosis.estimates import named_effects
-from agvbench.diagnosis.forms import BEYOND, form_candidates, reform
+from agvbench.diagnosis.forms import BEYOND, form_candidates, reform, tried_beside
 from agvbench.diagnosis.grouping import held_out_runs
 from agvbench.diagnosis.levels import ROLES, FreeMaps, free_maps, start_values
 from agvbench.diagnosis.map_effects import map_effects
@@ -99,9 +99,9 @@ def diagnose(
     measured = _measured(fitted.runs, geometry, header.neutral)
     maps = free_maps(fitted.runs, header.neutral)
     start = start_values(maps, measured, _believed(maps, header, geometry, vehicle))
-    tried = candidates()
+    tried, kinds = tried_beside(vehicle)
     names, values = given_effects(vehicle, tried)
-    selector = settle(Selector(Batch(fitted, maps, geometry), tried, start, seed, tell, names, values))
+    selector = settle(Selector(Batch(fitted, maps, geometry, kinds=kinds), tried, start, seed, tell, names, values))
     chosen, selector = resettle(selector.select(), selector)
     selection = reform(chosen, selector)
     readings = replace(readings, stood=selector.batch.readings.stood)

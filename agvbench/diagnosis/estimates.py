@@ -9,7 +9,7 @@ from agvbench.diagnosis.judging import clustered_covariance
 from agvbench.diagnosis.result import Estimate, NamedEffect
 from agvbench.diagnosis.selection import RIVAL_MARGIN, Selection
 from agvbench.effects import Effect, effect_kinds
-from agvbench.effects.forms import effect_forms
+from agvbench.effects.forms import cause_of, effect_forms
 from agvbench.types import Floats
 
 _FLAT = 3.0
@@ -50,12 +50,6 @@ def named_effects(selection: Selection, bounds: Floats) -> tuple[NamedEffect, ..
             )
         )
     return tuple(found)
-
-
-def cause_of(name: str) -> str:
-    """Return what the library calls the cause whose law is called `name`."""
-    form = effect_forms().get(name)
-    return name if form is None else form.form_of
 
 
 def _note(value: float, stderr: float, bounds: Floats, scale: float) -> str:

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from agvbench.diagnosis.candidates import Candidate, bounds_of, candidate
+from agvbench.diagnosis.candidates import Candidate, bounds_of, candidate, candidates
 from agvbench.diagnosis.empirical_terms import TERMS
 from agvbench.diagnosis.fitting import fit
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.selection import LEAST_GAIN, RIVAL_MARGIN, Scored, Selection, Selector
 from agvbench.effects import Effect
-from agvbench.effects.forms import Form, effect_forms
+from agvbench.effects.forms import Form, cause_of, effect_forms
+from agvbench.model import VehicleModel
+from agvbench.types import Floats
 
 BEYOND: tuple[type[Effect], ...] = (*TERMS, *effect_forms().values())
 """What the widest simulation has beyond the library. One simulation for all, since each takes long to compile."""
 
 _SHORT = 3
+_HALF = 0.5  # of what an effect gains: another cause that gains less in its place is not tried in its other laws
 
 
 def form_candidates() -> dict[str, Candidate]:
@@ -25,20 +29,33 @@ def form_candidates() -> dict[str, Candidate]:
     return {name: candidate(form) for name, form in effect_forms().items()}
 
 
+def tried_beside(vehicle: VehicleModel | None) -> tuple[dict[str, Candidate], tuple[type[Effect], ...]]:
+    """Return the effects to be tried on a vehicle, and what its simulation needs beyond the library.
+
+    An effect that the vehicle has in another law is among them in that law, and not in the library's.
+    """
+    carried = {effect.name for effect in (vehicle.effects if vehicle else ()) if not effect.is_null}
+    laws = {name: law for name, law in form_candidates().items() if name in carried}
+    known = {effect_forms()[name].form_of for name in laws}
+    return candidates(exclude=known) | laws, BEYOND if laws else ()
+
+
 def wider(selector: Selector) -> Selector:
     """Return a selector of the same runs whose simulation has empirical terms and other laws, too."""
+    batch = selector.batch
     if selector.wide is None:
-        batch = selector.batch
-        selector.wide = Batch(batch.readings, batch.maps, batch.geometry, kinds=BEYOND)
-    return Selector(
-        selector.wide,
-        dict(selector.candidates),
-        selector.start,
-        selector.seed,
-        selector.tell,
-        selector.given,
-        selector.given_values,
-    )
+        whole = {*BEYOND} <= {*batch.kinds}
+        selector.wide = batch if whole else Batch(batch.readings, batch.maps, batch.geometry, kinds=BEYOND)
+    return selector.over(selector.wide)
+
+
+@dataclass(frozen=True)
+class _Law:
+    """A law that may take the place of the effect called ``out``, fitted from ``starts`` (n, p)."""
+
+    out: str
+    form: type[Form]
+    starts: Floats
 
 
 def reform(selection: Selection, selector: Selector) -> Selection:
@@ -47,42 +64,63 @@ def reform(selection: Selection, selector: Selector) -> Selection:
     An effect beside it that only made up for the wrong law loses its place. The names of laws are their own; a
     diagnosis calls them by what they are forms of.
     """
-    laws = [
-        (name, form)
-        for name in selection.chosen.names
-        for form in effect_forms().values()
-        if form.form_of == name and name not in selector.given
-    ]
+    found = [name for name in selection.chosen.names if name not in selector.given]
+    laws = [law for name in found for law in _laws(selection, selector, name)]
     if not laws:
         return selection
     wide, current = wider(selector), selection.chosen
-    for name in dict(laws):
-        offers = [_with_form(wide, selection, current, name, form) for cause, form in laws if cause == name]
-        current = min(offers, key=lambda offer: offer.total + LEAST_GAIN * len(offer.names))
+    offered: list[tuple[_Law, Scored]] = []
+    for name in found:
+        for law in laws:
+            if law.out == name and name in current.names:
+                offered += [(law, offer) for offer in _offers(wide, current, law)]
+        current = _best(wide, current, [offer for law, offer in offered if law.out == name])
     if current.names == selection.chosen.names:
         return selection
     current, gains = wide.pruned(selection.base, current)
     better = selection.chosen.total - current.total
-    rivals = {name: _rivals(selection, name, better) for name in gains}
+    rivals = {name: _rivals(selection, name, better) | _other_causes(current, name, offered) for name in gains}
     rejected = {n: g for n, g in selection.rejected.items() if n not in current.names}
     selector.candidates |= {n: c for n, c in form_candidates().items() if n in current.names}
     return Selection(selection.base, current, rivals, gains, rejected, selection.tried + wide.tried)
 
 
-def _with_form(wide: Selector, selection: Selection, current: Scored, name: str, form: type[Form]) -> Scored:
-    own = current.fit.effect_values()
-    fitted = {key.partition(".")[2]: value for key, value in own.items() if key.partition(".")[0] == name}
-    kind = candidate(form)
-    starts = np.clip(np.array(form.starts(fitted)), kind.bounds[:, 0], kind.bounds[:, 1])
-    wide.candidates[form.name] = replace(kind, starts=starts)
-    offers = [(_swapped(wide, current, {name}, form.name), LEAST_GAIN)]
-    # What stands beside a wrong law may only make up for it: the right law alone has to do as well, not better.
-    others = [other for other in current.names if other != name and other not in wide.given]
-    offers += [(_swapped(wide, current, {name, other}, form.name), -LEAST_GAIN) for other in others]
-    worthy = [offer for offer, least in offers if offer.total < current.total - least]
-    if not worthy:
+def _laws(selection: Selection, selector: Selector, name: str) -> Iterator[_Law]:
+    """Yield other laws of the cause `name`, and of others that do half as well in its place, be it in the wrong law."""
+    chosen = selection.chosen
+    rest = selector.shrunk(selection.base, chosen, name)
+    models = {name: chosen} | {
+        other: selector.grown(rest, other) for other in selector.candidates if other not in chosen.names
+    }
+    for cause, model in models.items():
+        if rest.total - model.total < _HALF * (rest.total - chosen.total):
+            continue
+        values = _values(model, cause)
+        for form in effect_forms().values():
+            if form.form_of == cause:
+                bounds = candidate(form).bounds
+                yield _Law(name, form, np.clip(np.array(form.starts(values)), bounds[:, 0], bounds[:, 1]))
+
+
+def _values(model: Scored, name: str) -> dict[str, float]:
+    own = model.fit.effect_values()
+    return {key.partition(".")[2]: value for key, value in own.items() if key.partition(".")[0] == name}
+
+
+def _offers(wide: Selector, current: Scored, law: _Law) -> list[Scored]:
+    """Return `current` with a law in its place, and with it in place of one effect more each."""
+    wide.candidates[law.form.name] = replace(candidate(law.form), starts=law.starts)
+    # What stands beside a wrong law may only make up for it.
+    others = [other for other in current.names if other != law.out and other not in wide.given]
+    return [_swapped(wide, current, {law.out, *more}, law.form.name) for more in ([], *([other] for other in others))]
+
+
+def _best(wide: Selector, current: Scored, offers: list[Scored]) -> Scored:
+    """Return the best offer; one with fewer effects than `current` has to do as well as it, not better."""
+    best = min((current, *offers), key=lambda offer: offer.total + LEAST_GAIN * len(offer.names))
+    fewer = len(best.names) < len(current.names)
+    if best is current or best.total >= current.total - (-LEAST_GAIN if fewer else LEAST_GAIN):
         return current
-    best = min(worthy, key=lambda offer: offer.total + LEAST_GAIN * len(offer.names))
     wide.tell(f"{' + '.join(best.names)}: another law gains {current.total - best.total:.0f}")
     return best
 
@@ -97,7 +135,7 @@ def _swapped(wide: Selector, current: Scored, out: set[str], form: str) -> Score
     tries = [
         fit(
             Predictor(wide.batch, names), np.r_[maps, kept, start], bounds_of(wide.candidates, names),
-            offsets=near.offsets, scatter=near.scatter, iterations=_SHORT,
+            offsets=near.offsets, scatter=near.scatter, iterations=_SHORT, near=near.linear,
         )
         for start in wide.candidates[form].starts
     ]  # fmt: skip
@@ -107,7 +145,17 @@ def _swapped(wide: Selector, current: Scored, out: set[str], form: str) -> Score
 
 def _rivals(selection: Selection, name: str, better: float) -> dict[str, float]:
     """Return who would still do in the place of the cause `name`, now that its law predicts better."""
-    forms = effect_forms()
-    cause = forms[name].form_of if name in forms else name
-    known = selection.rivals.get(cause, {})
+    known = selection.rivals.get(cause_of(name), {})
     return {other: worse + better for other, worse in known.items() if worse + better < RIVAL_MARGIN}
+
+
+def _other_causes(current: Scored, name: str, offered: list[tuple[_Law, Scored]]) -> dict[str, float]:
+    """Return other causes one of whose laws would do as well in the place of `name`."""
+    beside = {*current.names} - {name}
+    return {
+        law.form.form_of: offer.total - current.total
+        for law, offer in offered
+        if {*offer.names} - {law.form.name} == beside
+        and law.form.form_of != cause_of(name)
+        and offer.total - current.total < RIVAL_MARGIN
+    }

@@ -53,7 +53,7 @@ class Batch:
         kinds: Sequence[type[Effect]] = (),
     ) -> None:
         self.readings, self.maps, self.geometry = readings, maps, geometry
-        self.level_scatter, self.redundancy = level_scatter, redundancy
+        self.level_scatter, self.redundancy, self.kinds = level_scatter, redundancy, tuple(kinds)
         runs = readings.simulated()
         self.base = Simulation(geometry, maps.neutral, runs, kinds=kinds)
         self.commands: dict[str, Floats] = {role: getattr(self.base, role) for role in ROLES}

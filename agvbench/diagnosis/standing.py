@@ -12,6 +12,7 @@ from dataclasses import replace
 from agvbench.diagnosis.fitting import promised_gain
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.selection import LEAST_GAIN, Scored, Selection, Selector
+from agvbench.effects.forms import cause_of
 
 SLOW_STEERING = ("steering_lag", "steering_rate_limit", "steering_backlash")
 _LIKELY = 20.0
@@ -24,7 +25,7 @@ def settle(selector: Selector) -> Selector:
     """
     names = [name for name in SLOW_STEERING if name in selector.candidates]
     base, other = selector.base(), _stood(selector)
-    if set(SLOW_STEERING) & set(selector.given):
+    if set(SLOW_STEERING) & {cause_of(name) for name in selector.given}:
         return other if other.base().total < base.total - LEAST_GAIN else selector
     same = other.adopt(base)
     if max(_promise(other, same, name) for name in names) < _LIKELY:
@@ -37,7 +38,7 @@ def settle(selector: Selector) -> Selector:
 def resettle(selection: Selection, selector: Selector) -> tuple[Selection, Selector]:
     """Select again under the other belief where what was chosen predicts better by far under it."""
     chosen = selection.chosen
-    if not set(SLOW_STEERING) & set(chosen.names):
+    if not set(SLOW_STEERING) & {cause_of(name) for name in chosen.names}:
         return selection, selector
     other = _stood(selector)
     if other.score(chosen.names, chosen.fit.parameters, None).total >= chosen.total - LEAST_GAIN:
@@ -48,7 +49,7 @@ def resettle(selection: Selection, selector: Selector) -> tuple[Selection, Selec
 def _stood(selector: Selector) -> Selector:
     batch = selector.batch
     readings = replace(batch.readings, stood=not batch.readings.stood)
-    return selector.over(Batch(readings, batch.maps, batch.geometry))
+    return selector.over(Batch(readings, batch.maps, batch.geometry, kinds=batch.kinds))
 
 
 def _promise(selector: Selector, base: Scored, name: str) -> float:

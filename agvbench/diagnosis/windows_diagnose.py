@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.calibration.source import HeaderLike
-from agvbench.diagnosis.candidates import bounds_of, candidates, given_effects
+from agvbench.diagnosis.candidates import bounds_of, given_effects
 from agvbench.diagnosis.estimates import named_effects
 from agvbench.diagnosis.fitting import Fit, fit
+from agvbench.diagnosis.forms import tried_beside
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.provenance import provenance, refuse_nothing
 from agvbench.diagnosis.reading import Readings, read_windows
@@ -68,15 +69,15 @@ def diagnose_windows(
     fitted = readings.select(thinned(np.flatnonzero(~held), MOST_FITTED))
     tell(f"{len(fitted)} windows to fit, {np.count_nonzero(held)} held out")
     static = _static(fitted, geometry, header.neutral)
-    tried = candidates()
+    tried, kinds = tried_beside(vehicle)
     names, values = given_effects(vehicle, tried)
     several = len(np.unique(readings.begins.session)) > 1 if readings.begins else False
     scatter = level_scatter(static.predictor, static.parameters) if several else np.inf
     level = fit(Predictor(Batch(fitted, static.predictor.maps, geometry, scatter)), static.parameters, np.empty((0, 2)))
     alike = redundancy(level)
-    batch = Batch(fitted, static.predictor.maps, geometry, scatter, alike)
+    batch = Batch(fitted, static.predictor.maps, geometry, scatter, alike, kinds)
     aside = readings.select(thinned(np.flatnonzero(held), MOST_FITTED))
-    elsewhere = Batch(aside, static.predictor.maps, geometry, scatter)
+    elsewhere = Batch(aside, static.predictor.maps, geometry, scatter, kinds=kinds)
     selector = WindowSelector(batch, tried, level.parameters, seed, tell, names, values, elsewhere=elsewhere)
     selection = selector.select()
     tell("judging on what was held out")
@@ -188,7 +189,7 @@ class _Conclusion:
         """Return what `model` predicts for every window that is judged."""
         batch = self.selector.batch
         if not hasattr(self, "_every"):
-            self._every = Batch(self.judged, batch.maps, self.geometry, batch.level_scatter)
+            self._every = Batch(self.judged, batch.maps, self.geometry, batch.level_scatter, kinds=batch.kinds)
         return Predictor(self._every, model.fit.predictor.effects).predict(model.fit.parameters)
 
     def _held_out(self, before: Floats, after: Floats, shaken: Floats) -> HeldOut:

@@ -101,10 +101,11 @@ class Effect:
         Whether its hooks change over short times or ways, when the actuators rest (with place, time, distance): the
         simulation then keeps its steps short.
     arrive
-        ``arrive(state, time_s, …) -> time_s``: when a command given at `time_s` takes effect.
+        ``arrive(state, time_s, …) -> time_s``: when a command given at `time_s` takes effect; may change
+        ``DRIVE_WAIT``.
     aim
         Called when a command takes effect, which is in ``DRIVE_COMMAND`` …; may change where actuators settle and how
-        they get there: ``FRONT_AIM`` … ``BRAKE_LAG``.
+        they get there: ``FRONT_AIM`` … ``BRAKE_LAG``, ``STEERING_INERTIA`` … ``BRAKING_LIMIT``.
     steer
         Called at every moment, as all that follow; may change ``FRONT`` and ``REAR``.
     drive
@@ -116,7 +117,8 @@ class Effect:
     capture
         ``capture(state, time_s, …) -> time_s``: when the pose that is stamped `time_s` was true.
     see
-        Called for every frame; may change ``SEEN_X``, ``SEEN_Y`` and ``SEEN_HEADING``, given ``X``, ``Y``, ``HEADING``.
+        Called for every frame; may change ``SEEN_X``, ``SEEN_Y`` and ``SEEN_HEADING``, given ``X``, ``Y``, ``HEADING``,
+        and ``SEEN_LAG``.
     """
 
     name: ClassVar[str]

@@ -32,4 +32,13 @@ SEEN_X, SEEN_Y, SEEN_HEADING = range(29, 32)
 COS_FRONT, COS_REAR, KNOWN_FRONT, KNOWN_REAR = range(32, 36)
 # Where steering settled under the command before the one in force, for each axle whose command has changed.
 FRONT_BEFORE, REAR_BEFORE = range(36, 38)
-SIZE = 38
+# Servos of another order: with inertia, τ² δ̈ + lag δ̇ = aim − δ, where this is τ, and no rate is kept to; or with a
+# limit of |δ̈|, as fast as this and the rate allow, and no lag.
+STEERING_INERTIA, STEERING_ACCELERATION = range(38, 40)
+# What the lags of the drive ask for is limited: |v̇| while |v| grows, and while it falls.
+ACCELERATION_LIMIT, BRAKING_LIMIT = range(40, 42)
+# The drive's commands arrive so much later than those of the servos, or sooner if negative.
+DRIVE_WAIT = 42
+# What the camera reports follows what it sees with this lag.
+SEEN_LAG = 43
+SIZE = 44

@@ -2,8 +2,9 @@
 """Servos and drive while one command is in force, in closed form.
 
 A servo obeys δ̇ = (aim − δ) / lag within ± rate: it ramps as long as the lag asks for more than the rate, and then its
-gap decays. Its way is monotone, so the axle behind it, with play, is known from where it stood. The drive obeys
-v̇ = (aim − v) / lag; where it has to reverse it brakes to rest first. All of this is kept as a *plan*, an array.
+gap decays. Its way is monotone, so the axle behind it, with play, is known from where it stood. Servos of second order
+are in `agvbench.model.simulation_servos`. The drive obeys v̇ = (aim − v) / lag within limits of v̇, as a servo does;
+where it has to reverse it brakes to rest first. All of this is kept as a *plan*, an array.
 """
 
 from __future__ import annotations
@@ -12,7 +13,9 @@ import math
 
 from agvbench.effects.state import (
     ACCELERATE_LAG,
+    ACCELERATION_LIMIT,
     BRAKE_LAG,
+    BRAKING_LIMIT,
     FRONT,
     FRONT_AIM,
     PLAY,
@@ -20,63 +23,104 @@ from agvbench.effects.state import (
     REAR_AIM,
     SPEED,
     SPEED_AIM,
+    STEERING_ACCELERATION,
+    STEERING_INERTIA,
     STEERING_LAG,
     STEERING_RATE,
 )
 from agvbench.model.compiled import compiled
+from agvbench.model.simulation_servos import (
+    CRUISED_S,
+    FIRST_ORDER,
+    INERT,
+    LIMITED,
+    SETTLED_S,
+    SPED_S,
+    TURNS_EVERY_S,
+    TURNS_S,
+    WAY_SIZE,
+    longest_step,
+    plan_inert,
+    plan_limited,
+    way_at,
+)
 from agvbench.types import Floats
 
 # A plan: for each servo (from `SERVOS` on), then for the drive. Moments are seconds since the command took effect.
-_AIM, _DIRECTION, _GAP, _RAMPED_S, _RAMPED_GAP, _SETTLED_S, _AXLE = range(7)
-_FRONT, _REAR, _DRIVE = 0, 7, 14
-_FIRST_GAP, _FIRST_LAG, _RESTS_S, _SECOND_LAG, _DRIVE_SETTLED_S = range(14, 19)
-_LAG, _RATE, _HALF_PLAY, _SPEED_AIM = range(19, 23)
-_EVENTS = 23
-_EVENT_COUNT = 9
+# A gap closes by a ramp and a decay: its size, how fast the ramp and the decay are, when the ramp ends and with what
+# left, when it has settled.
+_GAP, _RATE, _LAG, _RAMPED_S, _RAMPED_GAP, _SETTLED_S = range(6)
+# A servo: such a gap, or a way of second order in the same place; then where it goes.
+_AIM, _DIRECTION, _AXLE = range(WAY_SIZE, WAY_SIZE + 3)
+_SERVO_SIZE = WAY_SIZE + 3
+_FRONT, _REAR = 0, _SERVO_SIZE
+# The drive: its gap at first, and if it reverses that from rest.
+_FIRST = 2 * _SERVO_SIZE
+_SECOND = _FIRST + 6
+_SPEED_AIM, _SPEED_DIRECTION, _RESTS_S = range(_SECOND + 6, _SECOND + 9)
+_HALF_PLAY, _ORDER = range(_SECOND + 9, _SECOND + 11)
+_EVENTS = _SECOND + 11
+_EVENT_COUNT = 11
 PLAN_SIZE = _EVENTS + _EVENT_COUNT
+
+# Servos and drive between commands: positions of the servos and of their axles, the drive's speed and that which
+# commands have made it lately, the servos' rates.
+SERVOS_SIZE = 8
 
 # What is left of a gap [rad, m/s] when it counts as settled.
 _SETTLED = 1e-9
 # How long a step may be in time constants: at first, and per time constant that has passed.
 _FIRST_STEP, _STEP_GROWTH = 0.5, 0.15
-# The longest step while a servo ramps, and how close to a kink counts as there [s].
+# The longest step while a servo or the drive ramps, and how close to a kink counts as there [s].
 _RAMP_STEP_S, _TOGETHER = 0.05, 1e-12
+# Where play and a way of second order meet, kinks are not looked for: steps are short [s].
+_PLAY_STEP_S = 0.005
 # Numbers that ask for shorter steps are nonsense, but must not hang the loop [s].
 _SHORTEST_S = 1e-6
 
 
 @compiled(inner=True)
-def _gap(plan: Floats, servo: int, tau: float) -> float:
-    """Return how far a servo still has to go, `tau` seconds after the command took effect."""
-    if tau >= plan[servo + _SETTLED_S]:
-        return 0.0
-    if tau < plan[servo + _RAMPED_S]:
-        return plan[servo + _GAP] - plan[_RATE] * tau
-    return plan[servo + _RAMPED_GAP] * math.exp((plan[servo + _RAMPED_S] - tau) / plan[_LAG])
-
-
-@compiled(inner=True)
-def _reaches(plan: Floats, servo: int, gap: float) -> float:
-    """Return when a servo has `gap` left to go; ∞ if it never has."""
-    if gap <= _SETTLED or gap >= plan[servo + _GAP]:
-        return math.inf
-    if gap >= plan[servo + _RAMPED_GAP]:
-        return (plan[servo + _GAP] - gap) / plan[_RATE]
-    return plan[servo + _RAMPED_S] + plan[_LAG] * math.log(plan[servo + _RAMPED_GAP] / gap)
-
-
-@compiled(inner=True)
-def _plan_servo(plan: Floats, servo: int, position: float, axle: float, aim: float) -> None:
-    gap, lag, rate = abs(aim - position), plan[_LAG], plan[_RATE]
-    plan[servo + _AIM], plan[servo + _DIRECTION], plan[servo + _GAP] = aim, math.copysign(1.0, aim - position), gap
-    plan[servo + _RAMPED_S], plan[servo + _RAMPED_GAP] = 0.0, gap if lag > 0.0 else 0.0
+def _plan_gap(plan: Floats, at: int, gap: float, lag: float, rate: float) -> None:
+    plan[at + _GAP], plan[at + _LAG], plan[at + _RATE] = gap, lag, rate
+    plan[at + _RAMPED_S], plan[at + _RAMPED_GAP] = 0.0, gap if lag > 0.0 else 0.0
     if rate < math.inf and gap > rate * lag:
-        plan[servo + _RAMPED_S], plan[servo + _RAMPED_GAP] = gap / rate - lag, rate * lag
-    ramped, left = plan[servo + _RAMPED_S], plan[servo + _RAMPED_GAP]
-    plan[servo + _SETTLED_S] = ramped + lag * math.log(left / _SETTLED) if left > _SETTLED else ramped
-    plan[servo + _AXLE] = axle
+        plan[at + _RAMPED_S], plan[at + _RAMPED_GAP] = gap / rate - lag, rate * lag
+    ramped, left = plan[at + _RAMPED_S], plan[at + _RAMPED_GAP]
+    plan[at + _SETTLED_S] = ramped + lag * math.log(left / _SETTLED) if left > _SETTLED else ramped
+
+
+@compiled(inner=True)
+def _gap(plan: Floats, at: int, tau: float) -> float:
+    """Return how much of a gap is left `tau` seconds after it began to close."""
+    if tau >= plan[at + _SETTLED_S]:
+        return 0.0
+    if tau < plan[at + _RAMPED_S]:
+        return plan[at + _GAP] - plan[at + _RATE] * tau
+    return plan[at + _RAMPED_GAP] * math.exp((plan[at + _RAMPED_S] - tau) / plan[at + _LAG])
+
+
+@compiled(inner=True)
+def _reaches(plan: Floats, at: int, gap: float) -> float:
+    """Return when `gap` is left of a gap; ∞ if it never is."""
+    if gap <= _SETTLED or gap >= plan[at + _GAP]:
+        return math.inf
+    if gap >= plan[at + _RAMPED_GAP]:
+        return (plan[at + _GAP] - gap) / plan[at + _RATE]
+    return plan[at + _RAMPED_S] + plan[at + _LAG] * math.log(plan[at + _RAMPED_GAP] / gap)
+
+
+@compiled(inner=True)
+def _kink(plan: Floats, at: int) -> float:
+    """Return when a ramp ends; ∞ if there is none."""
+    return plan[at + _RAMPED_S] if plan[at + _RAMPED_S] > 0.0 else math.inf
+
+
+@compiled(inner=True)
+def _plan_servo(plan: Floats, servo: int, position: float, axle: float, aim: float, lag: float, rate: float) -> None:
+    _plan_gap(plan, servo, abs(aim - position), lag, rate)
+    plan[servo + _AIM], plan[servo + _DIRECTION], plan[servo + _AXLE] = aim, math.copysign(1.0, aim - position), axle
     events, direction, half = _EVENTS + 4 * (servo > 0), plan[servo + _DIRECTION], plan[_HALF_PLAY]
-    plan[events] = ramped if ramped > 0.0 else math.inf
+    plan[events] = _kink(plan, servo)
     plan[events + 1] = plan[servo + _SETTLED_S]
     # The axle begins to follow; the axle passes the middle.
     plan[events + 2] = _reaches(plan, servo, direction * (aim - axle) - half) if half > 0.0 else math.inf
@@ -84,36 +128,59 @@ def _plan_servo(plan: Floats, servo: int, position: float, axle: float, aim: flo
 
 
 @compiled(inner=True)
-def _plan_drive(plan: Floats, speed: float, aim: float, accelerate: float, brake: float) -> None:
-    plan[_SPEED_AIM], plan[_FIRST_GAP], plan[_RESTS_S] = aim, speed - aim, math.inf
-    plan[_FIRST_LAG] = accelerate if abs(aim) > abs(speed) else brake
-    plan[_SECOND_LAG] = accelerate
-    gap, begin = abs(speed - aim), 0.0
-    lag = plan[_FIRST_LAG]
+def _plan_second_order(
+    plan: Floats, servo: int, position: float, turning: float, axle: float, aim: float, state: Floats
+) -> None:
+    events = _EVENTS + 4 * (servo > 0)
+    plan[servo + _AIM], plan[servo + _AXLE] = aim, axle
+    plan[events] = plan[events + 2] = math.inf
+    if plan[_ORDER] == INERT:
+        plan_inert(plan, servo, aim - position, -turning, state[STEERING_LAG], state[STEERING_INERTIA])
+    else:
+        limit = state[STEERING_ACCELERATION]
+        plan_limited(plan, servo, aim - position, -turning, state[STEERING_RATE], limit)
+        plan[events], plan[events + 2] = plan[servo + SPED_S], plan[servo + CRUISED_S]
+    plan[events + 1], plan[events + 3] = plan[servo + SETTLED_S], plan[servo + TURNS_S]
+
+
+@compiled(inner=True)
+def _plan_drive(
+    plan: Floats, speed: float, aim: float, accelerate: float, brake: float, speeding: float, braking: float
+) -> None:
+    plan[_SPEED_AIM], plan[_SPEED_DIRECTION], plan[_RESTS_S] = aim, math.copysign(1.0, aim - speed), math.inf
+    plan[_EVENTS + 10] = math.inf
+    if abs(aim) > abs(speed) and speed * aim >= 0.0:
+        _plan_gap(plan, _FIRST, abs(aim - speed), accelerate, speeding)
+    else:
+        _plan_gap(plan, _FIRST, abs(aim - speed), brake, braking)
     if speed * aim < 0.0:
-        plan[_FIRST_LAG] = brake
-        plan[_RESTS_S] = begin = brake * math.log((aim - speed) / aim)
-        gap, lag = abs(aim), accelerate
-    plan[_DRIVE_SETTLED_S] = begin + lag * math.log(gap / _SETTLED) if gap > _SETTLED and lag > 0.0 else begin
-    plan[_EVENTS + 8] = plan[_RESTS_S]
+        plan[_RESTS_S] = _reaches(plan, _FIRST, abs(aim))
+        _plan_gap(plan, _SECOND, abs(aim), accelerate, speeding)
+        plan[_EVENTS + 10] = plan[_RESTS_S] + _kink(plan, _SECOND)
+    plan[_EVENTS + 8], plan[_EVENTS + 9] = plan[_RESTS_S], _kink(plan, _FIRST)
 
 
 @compiled(inner=True)
 def plan_command(plan: Floats, state: Floats, servos: Floats) -> None:
-    """Plan how servos and drive go from where they are to the aims in `state`.
-
-    `servos` has shape (5,): positions of the servos front and rear, of their axles, and the speed of the drive.
-    """
-    plan[_LAG], plan[_RATE], plan[_HALF_PLAY] = state[STEERING_LAG], state[STEERING_RATE], 0.5 * state[PLAY]
-    _plan_servo(plan, _FRONT, servos[0], servos[2], state[FRONT_AIM])
-    _plan_servo(plan, _REAR, servos[1], servos[3], state[REAR_AIM])
-    _plan_drive(plan, servos[4], state[SPEED_AIM], state[ACCELERATE_LAG], state[BRAKE_LAG])
+    """Plan how servos and drive, of which `servos` says where they are, go to the aims in `state`."""
+    plan[_HALF_PLAY], plan[_ORDER] = 0.5 * state[PLAY], FIRST_ORDER
+    if state[STEERING_INERTIA] > 0.0 or state[STEERING_ACCELERATION] < math.inf:
+        plan[_ORDER] = INERT if state[STEERING_INERTIA] > 0.0 else LIMITED
+        _plan_second_order(plan, _FRONT, servos[0], servos[6], servos[2], state[FRONT_AIM], state)
+        _plan_second_order(plan, _REAR, servos[1], servos[7], servos[3], state[REAR_AIM], state)
+    else:
+        lag, rate = state[STEERING_LAG], state[STEERING_RATE]
+        _plan_servo(plan, _FRONT, servos[0], servos[2], state[FRONT_AIM], lag, rate)
+        _plan_servo(plan, _REAR, servos[1], servos[3], state[REAR_AIM], lag, rate)
+    accelerate, brake = state[ACCELERATE_LAG], state[BRAKE_LAG]
+    speeding, braking = state[ACCELERATION_LIMIT], state[BRAKING_LIMIT]
+    _plan_drive(plan, servos[4], state[SPEED_AIM], accelerate, brake, speeding, braking)
 
 
 @compiled(inner=True)
-def _axle(plan: Floats, servo: int, position: float) -> float:
+def _follow(plan: Floats, axle: float, position: float) -> float:
     half = plan[_HALF_PLAY]
-    return min(max(plan[servo + _AXLE], position - half), position + half)
+    return min(max(axle, position - half), position + half)
 
 
 @compiled(inner=True)
@@ -122,31 +189,61 @@ def _position(plan: Floats, servo: int, tau: float) -> float:
 
 
 @compiled(inner=True)
+def _way_position(plan: Floats, servo: int, tau: float) -> float:
+    return plan[servo + _AIM] - way_at(plan, servo, plan[_ORDER], tau)[0]
+
+
+@compiled(inner=True)
+def _way_axle(plan: Floats, servo: int, tau: float) -> float:
+    """Return where the axle is: a servo of second order took it along to wherever it turned back."""
+    axle = plan[servo + _AXLE]
+    if plan[_HALF_PLAY] > 0.0:
+        turns = plan[servo + TURNS_S]
+        while turns < min(tau, plan[servo + SETTLED_S]):
+            axle = _follow(plan, axle, _way_position(plan, servo, turns))
+            turns += plan[servo + TURNS_EVERY_S]
+    return _follow(plan, axle, _way_position(plan, servo, tau))
+
+
+@compiled(inner=True)
 def _speed(plan: Floats, tau: float) -> float:
-    aim = plan[_SPEED_AIM]
+    aim, direction = plan[_SPEED_AIM], plan[_SPEED_DIRECTION]
     if tau < plan[_RESTS_S]:
-        if tau >= plan[_DRIVE_SETTLED_S] and plan[_RESTS_S] == math.inf:
-            return aim
-        return aim + plan[_FIRST_GAP] * math.exp(-tau / plan[_FIRST_LAG])
-    if tau >= plan[_DRIVE_SETTLED_S]:
-        return aim
-    return -aim * math.expm1((plan[_RESTS_S] - tau) / plan[_SECOND_LAG])
+        return aim - direction * _gap(plan, _FIRST, tau)
+    return aim - direction * _gap(plan, _SECOND, tau - plan[_RESTS_S])
 
 
 @compiled(inner=True)
 def actuate(plan: Floats, tau: float, state: Floats) -> None:
     """Put the axles' angles and the drive's speed into `state`, `tau` seconds after the command took effect."""
-    state[FRONT] = _axle(plan, _FRONT, _position(plan, _FRONT, tau))
-    state[REAR] = _axle(plan, _REAR, _position(plan, _REAR, tau))
+    state[FRONT] = _follow(plan, plan[_FRONT + _AXLE], _position(plan, _FRONT, tau))
+    state[REAR] = _follow(plan, plan[_REAR + _AXLE], _position(plan, _REAR, tau))
+    state[SPEED] = _speed(plan, tau)
+
+
+@compiled(inner=True)
+def actuate_any_order(plan: Floats, tau: float, state: Floats) -> None:
+    """Do as `actuate` does, also with servos of second order: of its own, since the branch costs the others a tenth."""
+    if plan[_ORDER] == FIRST_ORDER:
+        actuate(plan, tau, state)
+        return
+    state[FRONT], state[REAR] = _way_axle(plan, _FRONT, tau), _way_axle(plan, _REAR, tau)
     state[SPEED] = _speed(plan, tau)
 
 
 @compiled(inner=True)
 def leave_command(plan: Floats, tau: float, servos: Floats) -> None:
-    """Put positions and speed at `tau`, where another command takes effect, into `servos`."""
-    servos[0], servos[1] = _position(plan, _FRONT, tau), _position(plan, _REAR, tau)
-    servos[2], servos[3] = _axle(plan, _FRONT, servos[0]), _axle(plan, _REAR, servos[1])
+    """Put positions, rates and speed at `tau`, where another command takes effect, into `servos`."""
     servos[4] = _speed(plan, tau)
+    if plan[_ORDER] == FIRST_ORDER:
+        servos[0], servos[1] = _position(plan, _FRONT, tau), _position(plan, _REAR, tau)
+        servos[2] = _follow(plan, plan[_FRONT + _AXLE], servos[0])
+        servos[3] = _follow(plan, plan[_REAR + _AXLE], servos[1])
+        return
+    servos[0], servos[1] = _way_position(plan, _FRONT, tau), _way_position(plan, _REAR, tau)
+    servos[2], servos[3] = _way_axle(plan, _FRONT, tau), _way_axle(plan, _REAR, tau)
+    servos[6] = -way_at(plan, _FRONT, plan[_ORDER], tau)[1]
+    servos[7] = -way_at(plan, _REAR, plan[_ORDER], tau)[1]
 
 
 @compiled(inner=True)
@@ -157,17 +254,33 @@ def _within(longest: float, lag: float, since: float) -> float:
 
 
 @compiled(inner=True)
+def _within_gap(plan: Floats, at: int, tau: float, longest: float) -> float:
+    if tau < plan[at + _RAMPED_S]:
+        return min(longest, _RAMP_STEP_S)
+    if tau < plan[at + _SETTLED_S]:
+        return _within(longest, plan[at + _LAG], tau - plan[at + _RAMPED_S])
+    return longest
+
+
+@compiled(inner=True)
+def _within_way(plan: Floats, servo: int, tau: float, longest: float) -> float:
+    if tau >= plan[servo + SETTLED_S]:
+        return longest
+    step = min(longest, _RAMP_STEP_S if plan[_HALF_PLAY] == 0.0 else _PLAY_STEP_S)
+    return max(_SHORTEST_S, longest_step(plan, servo, plan[_ORDER], tau, step))
+
+
+@compiled(inner=True)
 def step_length(plan: Floats, tau: float, longest: float) -> float:
     """Return how long a step from `tau` may be: to the next kink at most, and short while a lag is under way."""
-    step = longest
-    for servo in (_FRONT, _REAR):
-        if tau < plan[servo + _RAMPED_S]:
-            step = min(step, _RAMP_STEP_S)
-        elif tau < plan[servo + _SETTLED_S]:
-            step = _within(step, plan[_LAG], tau - plan[servo + _RAMPED_S])
-    if tau < plan[_DRIVE_SETTLED_S]:
-        rests = plan[_RESTS_S]
-        step = _within(step, plan[_FIRST_LAG], tau) if tau < rests else _within(step, plan[_SECOND_LAG], tau - rests)
+    if plan[_ORDER] == FIRST_ORDER:
+        step = _within_gap(plan, _REAR, tau, _within_gap(plan, _FRONT, tau, longest))
+    else:
+        step = _within_way(plan, _REAR, tau, _within_way(plan, _FRONT, tau, longest))
+    gap, since = _FIRST, tau
+    if tau >= plan[_RESTS_S]:
+        gap, since = _SECOND, tau - plan[_RESTS_S]
+    step = _within_gap(plan, gap, since, step)
     for i in range(_EVENT_COUNT):
         to_event = plan[_EVENTS + i] - tau
         if _TOGETHER < to_event < step:

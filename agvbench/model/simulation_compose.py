@@ -24,9 +24,11 @@ from agvbench.effects import HOOKS, TIME_HOOKS, Effect
 from agvbench.effects import state as state_module
 from agvbench.errors import FileError
 from agvbench.model import compiled as compiled_module
-from agvbench.model import simulation_actuators, simulation_loop
+from agvbench.model import simulation_actuators, simulation_loop, simulation_servos, simulation_smoothing
 
 _IMPORT = "from agvbench.model.simulation_stages import aim, arrive, capture, drift, drive, move, see, steer\n"
+_ACTUATE, _ACTUATE_ANY_ORDER = "    actuate,\n", "    actuate_any_order as actuate,\n"
+_SECOND_ORDER = {"STEERING_INERTIA", "STEERING_ACCELERATION"}
 
 
 @cache
@@ -71,6 +73,8 @@ def kernel_text(kinds: Sequence[type[Effect]]) -> str:
             first += count
         stages.append(_stage(stage, calls))
     head, found, tail = inspect.getsource(simulation_loop).partition(_IMPORT)
+    if any(_SECOND_ORDER & {*hook.__code__.co_names} for kind in kinds for hook in kind.hooks().values()):
+        head = head.replace(_ACTUATE, _ACTUATE_ANY_ORDER)
     assert found, "the loop imports its stages in one line"  # noqa: S101 - a contract between two files
     # Stages are defined where the imports end, before their first use.
     imported, marker, code = tail.partition("Integers = ")
@@ -86,7 +90,7 @@ def _stage(name: str, calls: Sequence[str]) -> str:
 
 def _digest(text: str, kinds: Sequence[type[Effect]]) -> str:
     """Return a hash over everything whose change must lead to compiling again."""
-    modules = [state_module, compiled_module, simulation_actuators]
+    modules = [state_module, compiled_module, simulation_actuators, simulation_servos, simulation_smoothing]
     modules += [sys.modules[kind.__module__] for kind in kinds]
     parts = [text, numba.__version__, *map(inspect.getsource, dict.fromkeys(modules))]
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]

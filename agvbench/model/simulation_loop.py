@@ -17,11 +17,14 @@ from numpy.typing import NDArray
 
 from agvbench.effects.state import (
     ACCELERATE_LAG,
+    ACCELERATION_LIMIT,
     BRAKE_LAG,
+    BRAKING_LIMIT,
     COS_FRONT,
     COS_REAR,
     DISTANCE,
     DRIVE_COMMAND,
+    DRIVE_WAIT,
     FORWARD,
     FRONT,
     FRONT_AIM,
@@ -40,11 +43,14 @@ from agvbench.effects.state import (
     REAR_COMMAND,
     REAR_SPEED,
     SEEN_HEADING,
+    SEEN_LAG,
     SEEN_X,
     SEEN_Y,
     SIZE,
     SPEED,
     SPEED_AIM,
+    STEERING_ACCELERATION,
+    STEERING_INERTIA,
     STEERING_LAG,
     STEERING_RATE,
     TAN_FRONT,
@@ -57,7 +63,15 @@ from agvbench.effects.state import (
     Y,
 )
 from agvbench.model.compiled import compiled
-from agvbench.model.simulation_actuators import PLAN_SIZE, actuate, leave_command, plan_command, step_length
+from agvbench.model.simulation_actuators import (
+    PLAN_SIZE,
+    SERVOS_SIZE,
+    actuate,
+    leave_command,
+    plan_command,
+    step_length,
+)
+from agvbench.model.simulation_smoothing import SMOOTH_SIZE, bend, smoothed
 from agvbench.model.simulation_stages import aim, arrive, capture, drift, drive, move, see, steer
 from agvbench.types import Floats
 
@@ -73,7 +87,10 @@ _WEIGHTS = _BASIS.sum(axis=1)
 
 # Work of one step: at the nodes, motion forward, left and turning, then velocity along x, y and turning.
 _AHEAD, _ASIDE, _TURN, _ALONG_X, _ALONG_Y, _TURNED = range(0, 6 * _COUNT, _COUNT)
-_WORK_SIZE = 6 * _COUNT
+_SMOOTH = 6 * _COUNT
+_WORK_SIZE = _SMOOTH + SMOOTH_SIZE
+# Where a step starts: pose, distance driven, and the pose that a smoothing camera reports.
+_START_SIZE = 7
 _SECONDS_PER_HOUR = 3600.0
 
 # Numbers of the vehicle: axles, longest step, when the run began in hours, and the scatter of the drive's level.
@@ -119,17 +136,22 @@ def _report(s: Floats, p: Floats, out: Floats, k: int) -> None:
 
 
 @compiled(inner=True)
-def _obey(s: Floats, p: Floats, commands: Floats, settled: Floats, row: int, lift: float) -> None:
-    """Put the command and what it aims at into `s`; a drive that is told to go goes faster by `lift`."""
+def _obey(s: Floats, p: Floats, commands: Floats, settled: Floats, driven: int, row: int, lift: float) -> None:
+    """Put the command and what it aims at into `s`; a drive that is told to go goes faster by `lift`.
+
+    The drive obeys the row `driven`, the servos `row`.
+    """
     if commands[row, 1] != s[FRONT_COMMAND]:
         s[FRONT_BEFORE] = s[FRONT_AIM]
     if commands[row, 2] != s[REAR_COMMAND]:
         s[REAR_BEFORE] = s[REAR_AIM]
-    s[DRIVE_COMMAND], s[FRONT_COMMAND], s[REAR_COMMAND] = commands[row, 0], commands[row, 1], commands[row, 2]
-    s[FRONT_AIM], s[REAR_AIM], s[SPEED_AIM] = settled[row, 0], settled[row, 1], settled[row, 2]
-    if settled[row, 2] != 0.0:
+    s[DRIVE_COMMAND], s[FRONT_COMMAND], s[REAR_COMMAND] = commands[driven, 0], commands[row, 1], commands[row, 2]
+    s[FRONT_AIM], s[REAR_AIM], s[SPEED_AIM] = settled[row, 0], settled[row, 1], settled[driven, 2]
+    if settled[driven, 2] != 0.0:
         s[SPEED_AIM] += lift
     s[STEERING_LAG], s[STEERING_RATE], s[PLAY], s[ACCELERATE_LAG], s[BRAKE_LAG] = 0.0, math.inf, 0.0, 0.0, 0.0
+    s[STEERING_INERTIA], s[STEERING_ACCELERATION] = 0.0, math.inf
+    s[ACCELERATION_LIMIT] = s[BRAKING_LIMIT] = math.inf
     aim(s, p)
 
 
@@ -183,6 +205,30 @@ def _step(
         work[_ALONG_X + i], work[_ALONG_Y + i], work[_TURNED + i] = s[X_RATE], s[Y_RATE], s[YAW_RATE]
 
 
+@compiled(inner=True)
+def _see_step(s: Floats, p: Floats, work: Floats, start: Floats, length: float) -> None:
+    """Note what a camera that smooths sees in a step."""
+    for i in range(_COUNT + 1):
+        x, y, heading = start[0], start[1], start[2]
+        if i > 0:
+            for j in range(_COUNT):
+                x += length * _TO_NODES[i - 1, j] * work[_ALONG_X + j]
+                y += length * _TO_NODES[i - 1, j] * work[_ALONG_Y + j]
+                heading += length * _TO_NODES[i - 1, j] * work[_TURNED + j]
+        s[X], s[Y], s[HEADING] = x, y, heading
+        _look(s, p)
+        for channel in range(3):
+            work[_SMOOTH + channel * (_COUNT + 1) + i] = s[SEEN_X + channel]
+    bend(work, _SMOOTH)
+
+
+@compiled(inner=True)
+def _follow_seen(s: Floats, work: Floats, start: Floats, length: float, share: float, out: Floats) -> None:
+    """Report what a camera that smooths makes of a share of a step."""
+    for i in range(3):
+        out[i] = smoothed(work, _SMOOTH + i * (_COUNT + 1), start[4 + i], length / s[SEEN_LAG], share)
+
+
 @compiled(inner=True, fast=True)
 def _frames(
     s: Floats, p: Floats, work: Floats, start: Floats, now: float, length: float, t_s: Floats, out: Floats, k: int,
@@ -200,7 +246,10 @@ def _frames(
             y += weight * work[_ALONG_Y + j]
             heading += weight * work[_TURNED + j]
         s[X], s[Y], s[HEADING] = start[0] + x, start[1] + y, start[2] + heading
-        _report(s, p, out, k)
+        if s[SEEN_LAG] > 0.0:
+            _follow_seen(s, work, start, length, share, out[k])
+        else:
+            _report(s, p, out, k)
         k += 1
         if k == stop:
             break
@@ -253,7 +302,11 @@ def _hold(
         if is_last:
             length = duration - tau
         _step(s, p, plan, work, vehicle, begin, tau, length, start)
+        if s[SEEN_LAG] > 0.0:
+            _see_step(s, p, work, start, length)
         k = _frames(s, p, work, start, begin + tau, length, t_s, out, k, stop)
+        if s[SEEN_LAG] > 0.0:
+            _follow_seen(s, work, start, length, 1.0, start[4:])
         _end_step(work, start, length)
         if is_last:
             break
@@ -298,6 +351,16 @@ def _lift(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, lat
 
 
 @compiled(inner=True)
+def _see_late(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, start: Floats) -> None:
+    """Move the start ahead of what a camera reports that smooths: it is behind as in a steady motion."""
+    _ahead(s, p, vehicle, servos, now, servos[4])
+    cosine, sine, lag = math.cos(start[2]), math.sin(start[2]), s[SEEN_LAG]
+    start[0] += lag * (cosine * s[FORWARD] - sine * s[LEFT])
+    start[1] += lag * (sine * s[FORWARD] + cosine * s[LEFT])
+    start[2] += lag * s[YAW_RATE]
+
+
+@compiled(inner=True)
 def _drive_run(
     s: Floats,
     p: Floats,
@@ -324,14 +387,17 @@ def _drive_run(
     # At first nothing was before.
     s[FRONT_COMMAND], s[REAR_COMMAND] = commands[first, 1], commands[first, 2]
     s[FRONT_BEFORE], s[REAR_BEFORE] = settled[first, 0], settled[first, 1]
-    for row in range(first, last + 1):
-        end = arrive(s, command_t_s[row + 1], p) if row < last else math.inf
-        _obey(s, p, commands, settled, row, lift)
-        if row == first:
+    driven = row = first
+    while now < math.inf:
+        steers = arrive(s, command_t_s[row + 1], p) if row < last else math.inf
+        drives = arrive(s, command_t_s[driven + 1], p) + s[DRIVE_WAIT] if driven < last else math.inf
+        end = min(steers, drives)
+        _obey(s, p, commands, settled, driven, row, lift)
+        if row == driven == first:
             # At rest at neutral, for as long as it may have been.
             servos[0] = servos[2] = s[FRONT_AIM]
             servos[1] = servos[3] = s[REAR_AIM]
-            servos[4] = servos[5] = 0.0
+            servos[4] = servos[5] = servos[6] = servos[7] = 0.0
             now = min(begin, end)
         elif now < begin:
             until = min(begin, end)
@@ -339,18 +405,22 @@ def _drive_run(
             leave_command(plan, until - now, servos)
             servos[5] += (servos[4] - servos[5]) * -math.expm1((now - until) / LATELY_S)
             now = until
-        if now >= end:
-            continue
-        if now == begin and not math.isnan(speed):
-            lift = _lift(s, p, vehicle, servos, now, lately, speed)
-            servos[4] = _drive_speed(s, p, vehicle, servos, now, speed)
-            _obey(s, p, commands, settled, row, lift)
-        plan_command(plan, s, servos)
-        k = _hold(s, p, plan, work, vehicle, now, end - now, start, t_s, out, k, stop)
-        if k == stop:
-            break
-        leave_command(plan, end - now, servos)
+        if now < end:
+            if now == begin:
+                if not math.isnan(speed):
+                    lift = _lift(s, p, vehicle, servos, now, lately, speed)
+                    servos[4] = _drive_speed(s, p, vehicle, servos, now, speed)
+                    _obey(s, p, commands, settled, driven, row, lift)
+                if s[SEEN_LAG] > 0.0:
+                    _see_late(s, p, vehicle, servos, now, start)
+            plan_command(plan, s, servos)
+            k = _hold(s, p, plan, work, vehicle, now, end - now, start, t_s, out, k, stop)
+            if k == stop:
+                break
+            leave_command(plan, end - now, servos)
         now = end
+        row += steers <= end
+        driven += drives <= end
 
 
 @compiled()
@@ -398,7 +468,7 @@ def simulate(
         (frames, 3): receives x, y, heading.
     """
     s, plan, work = np.zeros(SIZE), np.zeros(PLAN_SIZE), np.zeros(_WORK_SIZE)
-    servos, start = np.zeros(6), np.zeros(4)
+    servos, start = np.zeros(SERVOS_SIZE), np.zeros(_START_SIZE)
     s[KNOWN_FRONT] = math.nan
     for run in chosen:
         k, stop = starts[run], starts[run + 1]
@@ -409,7 +479,8 @@ def simulate(
         s[X_RATE] = s[Y_RATE] = 0.0
         _start(s, p, initial, run)
         start[0], start[1], start[2], start[3] = s[X], s[Y], s[HEADING], 0.0
-        begin = arrive(s, command_t_s[first + 1], p)
+        start[4], start[5], start[6] = initial[run, 0], initial[run, 1], initial[run, 2]
+        begin = arrive(s, command_t_s[first + 1], p) + min(0.0, s[DRIVE_WAIT])
         if not math.isnan(begins_s[run]):
             begin = capture(s, begins_s[run], p)
         k = _wait(s, p, start, begin, t_s, out, k, stop)

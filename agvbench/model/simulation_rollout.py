@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from agvbench.effects import effect_kinds
+from agvbench.effects import Effect, effect_kinds
+from agvbench.effects.forms import effect_forms
 from agvbench.model.batch import Batch
 from agvbench.model.rollout import settled_targets
 from agvbench.model.simulation import SimulatedRun, Simulation
@@ -53,9 +54,15 @@ def general_rollout(
     hours = np.zeros(len(commands)) if started_h is None else started_h
     times = [np.asarray(t, dtype=np.float64) for t in t_s]
     runs = [SimulatedRun(c, t, float(h)) for c, t, h in zip(commands, times, hours, strict=True)]
-    library = effect_kinds().values()
-    kinds = [type(effect) for effect in model.effects if type(effect) not in library]
+    kinds = _beyond_the_library([type(effect) for effect in model.effects])
     simulation = Simulation(model.geometry, model.neutral, runs, kinds=kinds)
     states = np.column_stack([batch.initial, np.zeros(len(runs))])
     settled = simulation.settled(model.front, model.rear, model.drive)
     return simulation.split(simulation.predict(settled, simulation.parameters(model.effects), states))
+
+
+def _beyond_the_library(kinds: Sequence[type[Effect]]) -> list[type[Effect]]:
+    """Return what a simulation needs for `kinds`: other laws all together, since each set takes long to compile."""
+    forms = list(effect_forms().values())
+    others = [kind for kind in kinds if kind not in effect_kinds().values() and kind not in forms]
+    return [*(forms if any(kind in forms for kind in kinds) else []), *others]

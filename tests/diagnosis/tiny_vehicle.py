@@ -35,6 +35,7 @@ class Tiny:
 
     delay_s: float = 0.0
     steering_lag_s: float = 0.0
+    steering_inertia_s: float = 0.0
     accelerate_s: float = 0.0
     brake_s: float = 0.0
     slip: float = 0.0
@@ -73,6 +74,7 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
     gain *= 1.0 - tiny.droop_per_hour * started_s / 3600.0
     x, y, heading = start
     front, rear, speed = front_of(NEUTRAL) + f_off, rear_of(NEUTRAL) + r_off, 0.0
+    turning = [0.0, 0.0]
     poses, times = [], []
     steps = round((commands.t_s[-1] + _AFTER_S + _BEFORE_S) / _STEP_S)
     for k in range(steps):
@@ -85,8 +87,14 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
         told = speed_of(c.drive) * gain
         away = 1.0 - math.exp(-_STEP_S / tiny.steering_lag_s) if tiny.steering_lag_s else 1.0
         was = front, rear, speed
-        front += (front_of(c.front) + f_off - front) * away
-        rear += (rear_of(c.rear) + r_off - rear) * away
+        if tiny.steering_inertia_s:
+            for axle, aim, at in ((0, front_of(c.front) + f_off, front), (1, rear_of(c.rear) + r_off, rear)):
+                push = (aim - at - tiny.steering_lag_s * turning[axle]) / tiny.steering_inertia_s**2
+                turning[axle] += push * _STEP_S
+            front, rear = front + turning[0] * _STEP_S, rear + turning[1] * _STEP_S
+        else:
+            front += (front_of(c.front) + f_off - front) * away
+            rear += (rear_of(c.rear) + r_off - rear) * away
         lag = tiny.accelerate_s if abs(told) > abs(speed) else tiny.brake_s
         speed += (told - speed) * (1.0 - math.exp(-_STEP_S / lag) if lag else 1.0)
         relief = 1.0 + tiny.reverse_gain if speed < 0.0 else 1.0

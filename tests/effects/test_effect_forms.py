@@ -45,7 +45,7 @@ def test_a_vehicle_file_keeps_it_and_drives_with_it(form: type[Form], tmp_path: 
     loaded = VehicleModel.load(tmp_path / "vehicle.toml")
     assert loaded.effects == (effect,)
     moved = drive(effect) - drive()
-    assert np.hypot(moved[-1, 0], moved[-1, 1]) > 1e-3
+    assert np.hypot(moved[:, 0], moved[:, 1]).max() > 1e-3
 
 
 @each_form
@@ -61,3 +61,12 @@ def test_at_the_librarys_exponent_a_power_is_the_librarys_law() -> None:
     np.testing.assert_allclose(drive(slip), drive(LateralSlip(0.8)), atol=1e-6)
     loss = FORMS["cornering_speed_loss_power"](loss=0.1, exponent=1.0)
     np.testing.assert_allclose(drive(loss), drive(CorneringSpeedLoss(0.1)), atol=1e-6)
+
+
+@each_form
+def test_at_null_it_leaves_the_librarys_law_alone(form: type[Form]) -> None:
+    library = effect_kinds()[form.form_of]
+    effect = library(**{p.name: p.scale for p in library.parameters()})
+    # Hardly anything, but in the simulation that has all laws.
+    laws = {law.name: law for law in (form(), FORMS["lateral_slip_power"](loss=1e-12))}
+    np.testing.assert_allclose(drive(effect, *laws.values()), drive(effect), atol=1e-6)

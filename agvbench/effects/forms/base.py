@@ -33,3 +33,9 @@ def effect_forms() -> Mapping[str, type[Form]]:
     """Return every other law by its own name, in alphabetical order."""
     found = {cls.name: cls for cls in classes_by_file("agvbench.effects.forms", Form)}  # type: ignore[type-abstract]
     return MappingProxyType(dict(sorted(found.items())))
+
+
+def cause_of(name: str) -> str:
+    """Return what the library calls the cause whose law is called `name`."""
+    form = effect_forms().get(name)
+    return name if form is None else form.form_of

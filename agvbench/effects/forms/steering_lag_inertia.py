@@ -1,0 +1,42 @@
+"""Axles have to be set turning."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from agvbench.effects.base import Stage, parameter
+from agvbench.effects.forms.base import Form
+from agvbench.effects.state import STEERING_INERTIA, STEERING_LAG
+from agvbench.types import Floats
+
+
+@dataclass(frozen=True)
+class SteeringLagInertia(Form):
+    """Lag of second order: ``inertia_s² δ̈ + time_constant_s δ̇ = δ_map − δ``; without inertia it is the library's.
+
+    Its natural frequency is 1 / inertia_s, its damping time_constant_s / (2 inertia_s): below 1 the axle swings.
+    """
+
+    name: ClassVar[str] = "steering_lag_inertia"
+    form_of: ClassVar[str] = "steering_lag"
+    stage: ClassVar[Stage] = Stage.SERVO
+    relaxes: ClassVar[str] = "axles rotate instantaneously (7.3)"
+    reference: ClassVar[str] = "second-order actuator, as in textbooks of control (Ogata 2010, section 5.3)"
+    limits: ClassVar[str] = "a linear servo: steering_rate_limit does not act beside it"
+
+    time_constant_s: float = parameter(unit="s", low=0.0, high=5.0, scale=0.1)
+    inertia_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.1)
+
+    @classmethod
+    def starts(cls, fitted: Mapping[str, float]) -> list[tuple[float, ...]]:
+        """Begin with critical damping, and with little inertia."""
+        lag = fitted["time_constant_s"]
+        return [(lag, 0.5 * lag), (lag, 0.2 * lag)]
+
+    @staticmethod
+    def aim(state: Floats, time_constant_s: float, inertia_s: float) -> None:
+        """Give the servos lag and inertia."""
+        state[STEERING_LAG] = max(state[STEERING_LAG], time_constant_s)
+        state[STEERING_INERTIA] = inertia_s

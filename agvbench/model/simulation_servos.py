@@ -1,0 +1,131 @@
+# mypy: warn-return-any=False
+"""Servos of second order while one command is in force, in closed form: with inertia, or with limited acceleration.
+
+A servo with inertia obeys τ² δ̈ + lag δ̇ = aim − δ, a linear equation. One with limited acceleration goes to its aim as
+fast as its rate and acceleration allow and stops there: three parabolas. Either may come in turning, and so go the
+wrong way at first; one with inertia may also swing about its aim. Where they turn back is known.
+"""
+
+from __future__ import annotations
+
+import math
+
+from agvbench.model.compiled import compiled
+from agvbench.types import Floats
+
+FIRST_ORDER, LIMITED, INERT = range(3)
+
+# A way: gap and its rate at first, when it has settled, when it first turns back and how often after that; then for
+# inertia the decay, the frequency squared (negative: overdamped) and the lag squared, for limits the ends of the first
+# two parabolas, the rate between them and the acceleration.
+GAP, GAP_RATE, SETTLED_S, TURNS_S, TURNS_EVERY_S, _DECAY, _SQUARE, _TAU = range(8)
+SPED_S, CRUISED_S, _CRUISE, _ACCELERATION = range(5, 9)
+WAY_SIZE = 9
+
+_SETTLED = 1e-9
+_LONG = 20.0
+
+
+@compiled(inner=True)
+def plan_inert(plan: Floats, way: int, gap: float, gap_rate: float, lag: float, tau: float) -> None:
+    """Plan the way of a servo with inertia; its `gap` is signed."""
+    decay, square = 0.5 * lag / (tau * tau), 1.0 / (tau * tau) - 0.25 * lag * lag / tau**4
+    plan[way + GAP], plan[way + GAP_RATE] = gap, gap_rate
+    plan[way + _DECAY], plan[way + _SQUARE], plan[way + _TAU] = decay, square, tau
+    slowest = decay
+    if square < 0.0:
+        slowest = 1.0 / (tau * tau * (decay + math.sqrt(-square)))
+    swing = abs(gap) + _LONG * tau * (abs(gap_rate) + decay * abs(gap))
+    plan[way + SETTLED_S] = 0.0
+    if swing > _SETTLED:
+        plan[way + SETTLED_S] = math.log(swing / _SETTLED) / slowest if slowest > 0.0 else math.inf
+    _plan_turns(plan, way)
+
+
+@compiled(inner=True)
+def _plan_turns(plan: Floats, way: int) -> None:
+    """Find when the rate, c g′ − s (decay g′ + g / τ²), is zero."""
+    tau, square = plan[way + _TAU], plan[way + _SQUARE]
+    rate = plan[way + GAP_RATE]
+    against = plan[way + _DECAY] * rate + plan[way + GAP] / (tau * tau)
+    plan[way + TURNS_S] = plan[way + TURNS_EVERY_S] = math.inf
+    frequency = math.sqrt(abs(square))
+    if square > 0.0:
+        angle = math.atan2(rate * frequency, against)
+        if angle <= 0.0:
+            angle += math.pi
+        plan[way + TURNS_S] = angle / frequency
+        plan[way + TURNS_EVERY_S] = math.pi / frequency
+    elif against != 0.0 and rate / against > 0.0 and frequency * rate / against < 1.0:
+        share = rate / against
+        plan[way + TURNS_S] = math.atanh(frequency * share) / frequency if frequency > 0.0 else share
+
+
+@compiled(inner=True)
+def _inert(plan: Floats, way: int, t: float) -> tuple[float, float]:
+    decay, square, tau = plan[way + _DECAY], plan[way + _SQUARE], plan[way + _TAU]
+    gap, rate = plan[way + GAP], plan[way + GAP_RATE]
+    frequency = math.sqrt(abs(square))
+    if square >= 0.0:
+        left = math.exp(-decay * t)
+        c = left * math.cos(frequency * t)
+        s = left * math.sin(frequency * t) / frequency if frequency > 0.0 else left * t
+    else:
+        left = math.exp(-t / (tau * tau * (decay + frequency)))
+        lost = math.expm1(-2.0 * frequency * t)
+        c, s = 0.5 * left * (2.0 + lost), -0.5 * left * lost / frequency
+    return c * gap + s * (rate + decay * gap), c * rate - s * (decay * rate + gap / (tau * tau))
+
+
+@compiled(inner=True)
+def plan_limited(plan: Floats, way: int, gap: float, gap_rate: float, rate: float, acceleration: float) -> None:
+    """Plan the way of a servo with limited rate and acceleration; its `gap` is signed."""
+    plan[way + GAP], plan[way + GAP_RATE] = gap, gap_rate
+    plan[way + TURNS_S] = plan[way + TURNS_EVERY_S] = math.inf
+    # It goes whither there is still a gap when it has stopped.
+    stopped = gap + 0.5 * gap_rate * abs(gap_rate) / acceleration
+    towards = math.copysign(1.0, stopped)
+    coming = -towards * gap_rate
+    fastest = max(coming, 0.0, min(rate, math.sqrt(max(0.0, acceleration * towards * gap + 0.5 * coming * coming))))
+    speeding = (fastest - coming) / acceleration
+    ways = 0.5 * (coming + fastest) * speeding + 0.5 * fastest * fastest / acceleration
+    cruising = max(0.0, towards * gap - ways) / fastest if fastest > 0.0 else 0.0
+    plan[way + SPED_S], plan[way + CRUISED_S] = speeding, speeding + cruising
+    plan[way + SETTLED_S] = speeding + cruising + fastest / acceleration
+    plan[way + _CRUISE], plan[way + _ACCELERATION] = -towards * fastest, towards * acceleration
+    if coming < 0.0:
+        plan[way + TURNS_S] = -coming / acceleration
+
+
+@compiled(inner=True)
+def _limited(plan: Floats, way: int, t: float) -> tuple[float, float]:
+    acceleration, cruise = plan[way + _ACCELERATION], plan[way + _CRUISE]
+    if t < plan[way + SPED_S]:
+        rate = plan[way + GAP_RATE] - acceleration * t
+        return plan[way + GAP] + 0.5 * (plan[way + GAP_RATE] + rate) * t, rate
+    left = plan[way + SETTLED_S] - t
+    if t > plan[way + CRUISED_S]:
+        return 0.5 * acceleration * left * left, -acceleration * left
+    ending = plan[way + SETTLED_S] - plan[way + CRUISED_S]
+    return -cruise * (left - 0.5 * ending), cruise
+
+
+@compiled(inner=True)
+def way_at(plan: Floats, way: int, order: int, t: float) -> tuple[float, float]:
+    """Return the signed gap and its rate `t` seconds after the command took effect."""
+    if t >= plan[way + SETTLED_S]:
+        return 0.0, 0.0
+    if order == INERT:
+        return _inert(plan, way, t)
+    return _limited(plan, way, t)
+
+
+@compiled(inner=True)
+def longest_step(plan: Floats, way: int, order: int, t: float, longest: float) -> float:
+    """Return how long a step from `t` may be for the motion to be smooth within it."""
+    if t >= plan[way + SETTLED_S] or order == LIMITED:
+        return longest
+    tau, decay, square = plan[way + _TAU], plan[way + _DECAY], plan[way + _SQUARE]
+    if square < 0.0:  # the fast decay first, then the slow one
+        return min(longest, 0.5 / (decay + math.sqrt(-square)) + 0.15 * t)
+    return min(longest, tau, 0.5 * tau + 0.15 * t)

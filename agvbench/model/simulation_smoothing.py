@@ -1,0 +1,58 @@
+# mypy: warn-return-any=False
+"""What a camera reports that smooths: m′ = (q − m) / lag, where q is what it sees.
+
+Within a step q is the polynomial through its values at the step's start and at the nodes; m follows in closed form,
+or where the step is much shorter than the lag, so that the closed form cancels, by quadrature.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from agvbench.model.compiled import compiled
+from agvbench.types import Floats
+
+_COUNT = 4
+_POWERS = _COUNT + 1
+_GAUSS = np.polynomial.legendre.leggauss(_COUNT)
+_NODES, _WEIGHTS = 0.5 + 0.5 * _GAUSS[0], 0.5 * _GAUSS[1]
+#: From values at a step's start and nodes to coefficients of 1, share, share² …
+_TO_POWERS = np.linalg.inv(np.vander(np.concatenate((np.zeros(1), _NODES)), _POWERS, increasing=True))
+
+# Coefficients of what is seen: x, y and heading, one after another.
+SMOOTH_SIZE = 3 * _POWERS
+# So long a step, in lags, that the closed form does not cancel.
+_LONG = 0.2
+
+
+@compiled(inner=True)
+def bend(work: Floats, at: int) -> None:
+    """Turn five values of what is seen, at the step's start and nodes, into coefficients, for x, y and heading."""
+    for channel in range(at, at + SMOOTH_SIZE, _POWERS):
+        first, a, b, c, d = work[channel], work[channel + 1], work[channel + 2], work[channel + 3], work[channel + 4]
+        a, b, c, d = a - first, b - first, c - first, d - first
+        for k in range(1, _POWERS):
+            row = _TO_POWERS[k]
+            work[channel + k] = row[1] * a + row[2] * b + row[3] * c + row[4] * d
+
+
+@compiled(inner=True)
+def smoothed(work: Floats, channel: int, before: float, lags: float, share: float) -> float:
+    """Return what is reported after a share of a step that is so many `lags` long, if `before` was at its start."""
+    decay = math.exp(-lags * share)
+    q0, q1, q2, q3, q4 = work[channel], work[channel + 1], work[channel + 2], work[channel + 3], work[channel + 4]
+    if lags >= _LONG:
+        p4 = q4
+        p3 = q3 - 4.0 / lags * p4
+        p2 = q2 - 3.0 / lags * p3
+        p1 = q1 - 2.0 / lags * p2
+        p0 = -p1 / lags
+        return q0 + p0 + share * (p1 + share * (p2 + share * (p3 + share * p4))) + decay * (before - q0 - p0)
+    lately = 0.0
+    for i in range(_COUNT):
+        u = share * _NODES[i]
+        seen = u * (q1 + u * (q2 + u * (q3 + u * q4)))
+        lately += _WEIGHTS[i] * math.exp(-lags * (share - u)) * seen
+    return q0 + lags * share * lately + decay * (before - q0)

@@ -1,0 +1,164 @@
+"""An independent truth for laws of another order: their equations as one prints them, integrated by DOP853."""
+
+from __future__ import annotations
+
+import bisect
+import math
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from simulation_truth import LF, LR, REST, RUN_TIMES, SETTLED
+
+from agvbench.types import Floats
+
+_TIGHT: dict[str, Any] = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-12}
+Path = Callable[[float], float]
+
+
+def at_once(values: Floats, moments: Floats) -> Path:
+    """Return the path of what jumps to `values` at `moments`; `values` begins with where it was before."""
+    steps, levels = moments.tolist(), values.tolist()
+    return lambda t: levels[bisect.bisect_right(steps, t)]
+
+
+def second_order(aim: Path, rest: float, moments: Floats, lag: float, tau: float, end: float) -> Path:
+    """Return the path of a servo with inertia: tau² δ̈ + lag δ̇ = aim − δ."""
+
+    def equation(aimed: float) -> Callable[[float, Floats], list[float]]:
+        return lambda _, y: [y[1], (aimed - y[0] - lag * y[1]) / tau**2]
+
+    return _pieces(equation, aim, np.array([rest, 0.0]), moments, end)
+
+
+def limited(aim: Path, rest: float, moments: Floats, rate: float, acceleration: float, end: float) -> Path:
+    """Return the path of a servo that speeds up until it has its rate or must brake, and stops on its aim."""
+    times, states = [moments[0]], [np.array([rest, 0.0])]
+    push = []
+    for begin, until in zip(moments, [*moments[1:], end], strict=True):
+        aimed, now, y = aim(begin + 1e-9), begin, states[-1]
+        while now < until - 1e-12:
+            stop = y[0] + y[1] * abs(y[1]) / (2.0 * acceleration)
+            ahead = math.copysign(1.0, aimed - stop)
+            if abs(aimed - y[0]) + abs(y[1]) < 1e-7:
+                pushed, done = 0.0, []
+            elif abs(aimed - stop) < 1e-9:
+                pushed, done = -math.copysign(acceleration, y[1]), [lambda _, z: z[1]]
+            elif ahead * y[1] > rate - 1e-9:
+                pushed, done = 0.0, [lambda _, z: z[0] + z[1] * abs(z[1]) / (2.0 * acceleration) - aimed]  # noqa: B023
+            else:
+                pushed = ahead * acceleration
+                done = [
+                    lambda _, z: z[0] + z[1] * abs(z[1]) / (2.0 * acceleration) - aimed,  # noqa: B023
+                    lambda _, z: ahead * z[1] - rate,  # noqa: B023
+                ]
+            for event in done:
+                event.terminal = True  # type: ignore[attr-defined]
+            found = solve_ivp(lambda _, z: [z[1], pushed], (now, until), y, events=done, **_TIGHT)  # noqa: B023
+            push.append(pushed)
+            now, y = found.t[-1], found.y[:, -1]
+            if pushed != 0.0 and abs(aimed - y[0]) + abs(y[1]) < 1e-7:
+                y = np.array([aimed, 0.0])
+            times.append(now)
+            states.append(y)
+    return lambda t: _parabola(t, times, states, push)
+
+
+def _parabola(t: float, times: list[float], states: list[Floats], push: list[float]) -> float:
+    i = max(0, min(bisect.bisect_right(times, t) - 1, len(push) - 1))
+    since = max(0.0, t - times[i])
+    return float(states[i][0] + states[i][1] * since + 0.5 * push[i] * since**2)
+
+
+def ramped(aim: Path, moments: Floats, speeding: float, braking: float, end: float) -> Path:
+    """Return the path of a speed that ramps, from rest."""
+    times, speeds = [moments[0]], [0.0]
+    for begin, until in zip(moments, [*moments[1:], end], strict=True):
+        aimed, now = aim(begin + 1e-9), begin
+        while now < until:
+            v = speeds[-1]
+            grows = v * aimed >= 0.0 and abs(aimed) > abs(v)
+            to = 0.0 if v * aimed < 0.0 else aimed
+            slope = speeding if grows else braking
+            now = min(until, now + abs(to - v) / slope) if to != v else until
+            done = abs(to - v) <= slope * (now - times[-1]) + 1e-12
+            speeds.append(to if done else v + math.copysign(slope * (now - times[-1]), to - v))
+            times.append(now)
+    moments, known = np.array(times), np.array(speeds)
+    return lambda t: float(np.interp(t, moments, known))
+
+
+def _pieces(equation: Any, aim: Path, state: Floats, moments: Floats, end: float) -> Path:
+    found = []
+    for begin, until in zip(moments, [*moments[1:], end], strict=True):
+        found.append(solve_ivp(equation(aim(begin + 1e-9)), (begin, until), state, dense_output=True, **_TIGHT))
+        state = found[-1].y[:, -1]
+    steps = moments.tolist()
+    return lambda t: float(found[max(0, bisect.bisect_right(steps, t) - 1)].sol(max(t, steps[0]))[0])
+
+
+def drive(
+    front: Path, rear: Path, speed: Path, start: Floats, times: Floats, kinks: Floats, smoothing: float
+) -> Floats:
+    """Return (n, 3) poses at `times`, from `start` (3,), smoothed if asked for."""
+
+    def motion(t: float, y: Floats) -> list[float]:
+        df, dr, v = front(t), rear(t), speed(t)
+        beta = math.atan((LF * math.tan(dr) + LR * math.tan(df)) / (LF + LR))
+        along = v * (math.cos(df) + math.cos(dr)) / (2.0 * math.cos(beta))
+        turn = along * math.cos(beta) * (math.tan(df) - math.tan(dr)) / (LF + LR)
+        true = [along * math.cos(y[2] + beta), along * math.sin(y[2] + beta), turn]
+        late = (y[:3] - y[3:]) / smoothing if smoothing > 0.0 else np.zeros(3)
+        return [*true, *late]
+
+    state, out = np.r_[start, start], np.tile(start, (len(times), 1))
+    column = slice(3, 6) if smoothing > 0.0 else slice(0, 3)
+    edges = np.unique(np.r_[kinks, times[-1] + 1.0])
+    for begin, until in pairwise(edges.tolist()):
+        found = solve_ivp(motion, (begin, until), state, dense_output=True, max_step=0.05, rtol=1e-7, atol=1e-9, method="DOP853")  # fmt: skip  # noqa: E501
+        inside = (times > begin) & (times <= until)
+        out[inside] = found.sol(times[inside])[column].T
+        state = found.y[:, -1]
+    return out
+
+
+def aims(channel: int, moments: Floats) -> Path:
+    """Return where channel 0 (front), 1 (rear) or 2 (speed) is to settle, its commands arriving at `moments`."""
+    rest = [*REST, 0.0][channel]
+    return at_once(np.r_[rest, SETTLED[:, channel]], moments)
+
+
+def servo_path(name: str, values: dict[str, float], channel: int, moments: Floats, end: float) -> Path:
+    """Return the path of a servo of second order, channel 0 (front) or 1 (rear)."""
+    aim, rest = aims(channel, moments), REST[channel]
+    if name == "steering_lag_inertia":
+        return second_order(aim, rest, moments, values["time_constant_s"], values["inertia_s"], end)
+    return limited(aim, rest, moments, values["rate_rad_per_s"], values["acceleration_rad_per_s2"], end)
+
+
+def with_play(servo: Path, rest: float, width: float, end: float) -> Path:
+    """Return the path of an axle behind a play, by following its servo in small steps."""
+    times = np.arange(0.0, end, 1e-3)
+    angles, angle = [], rest
+    for position in map(servo, times):
+        angle = min(max(angle, position - width / 2.0), position + width / 2.0)
+        angles.append(angle)
+    followed = np.array(angles)
+    return lambda t: float(np.interp(t, times, followed))
+
+
+def true_form(name: str, values: dict[str, float], start: tuple[float, float, float], times: Floats) -> Floats:
+    """Return (n, 3) measured poses with one law."""
+    end = times[-1] + 2.0
+    steering = RUN_TIMES + values.get("steering_s", 0.0)
+    drives = RUN_TIMES + values.get("drive_s", 0.0)
+    front, rear, speed = aims(0, steering), aims(1, steering), aims(2, drives)
+    if name in ("steering_lag_inertia", "steering_rate_limit_acceleration"):
+        front, rear = (servo_path(name, values, channel, steering, end) for channel in (0, 1))
+    if name == "speed_lag_ramp":
+        speed = ramped(speed, drives, values["acceleration_mps2"], values["braking_mps2"], end)
+    smoothing = values.get("time_constant_s", 0.0) if name == "mocap_latency_smoothing" else 0.0
+    seen = times - values.get("latency_s", 0.0)
+    return drive(front, rear, speed, np.array(start), seen, np.r_[steering, drives], smoothing)

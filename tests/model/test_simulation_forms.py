@@ -1,0 +1,113 @@
+"""Laws of another order against equations written out independently."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from simulation_forms_truth import aims, drive, servo_path, true_form, with_play
+from simulation_truth import COMMANDS, FRAMES, LF, LR, REST, RUN_TIMES, SETTLED
+
+from agvbench.effects import effect_kinds
+from agvbench.effects.forms import effect_forms
+from agvbench.model.simulation import SimulatedRun, Simulation
+from agvbench.model.simulation_compose import kernel_text
+from agvbench.types import Commands
+from agvbench.vehicle.geometry import Geometry
+
+START = (0.4, -0.3, 0.6)
+ROWS = np.vstack([[*REST, 0.0], SETTLED])
+INITIAL = np.array([[*START, 0.0]])
+DRIVEN = Commands(RUN_TIMES, 1500.0 + COMMANDS[:, 0], 1500.0 + COMMANDS[:, 1], 1500.0 + COMMANDS[:, 2])
+SIZES = [
+    ("steering_lag_inertia", {"time_constant_s": 0.2, "inertia_s": 0.1}),
+    ("steering_lag_inertia", {"time_constant_s": 0.12, "inertia_s": 0.15}),
+    ("steering_lag_inertia", {"time_constant_s": 0.4, "inertia_s": 0.1}),
+    ("steering_rate_limit_acceleration", {"rate_rad_per_s": 0.7, "acceleration_rad_per_s2": 4.0}),
+    ("steering_rate_limit_acceleration", {"rate_rad_per_s": 3.0, "acceleration_rad_per_s2": 1.5}),
+    ("speed_lag_ramp", {"acceleration_mps2": 0.5, "braking_mps2": 0.35}),
+    ("mocap_latency_smoothing", {"latency_s": 0.03, "time_constant_s": 0.12}),
+    ("mocap_latency_smoothing", {"latency_s": 0.0, "time_constant_s": 0.004}),
+    ("mocap_latency_smoothing", {"latency_s": 0.0, "time_constant_s": 1.5}),
+    ("actuation_delay_uneven", {"steering_s": 0.2, "drive_s": 0.08}),
+    ("actuation_delay_uneven", {"steering_s": 0.0, "drive_s": 0.95}),
+]
+each = pytest.mark.parametrize(("name", "values"), SIZES)
+
+
+def simulated(effects, *, begins_s=None, first=0, initial=INITIAL):
+    run = SimulatedRun(DRIVEN, FRAMES[first:], begins_s=begins_s)
+    simulation = Simulation(Geometry(LF, LR), 1500.0, [run], kinds=tuple(effect_forms().values()))
+    return simulation.predict(ROWS, simulation.parameters(effects), initial)
+
+
+@each
+def test_a_law_of_another_order(name, values):
+    predicted = simulated([effect_forms()[name](**values)])
+    np.testing.assert_allclose(predicted, true_form(name, values, START, FRAMES), atol=3e-6)
+
+
+# Where the true pose was behind smoothed ones is only known in a steady motion.
+@pytest.mark.parametrize(("name", "values"), [s for s in SIZES if s[0] != "mocap_latency_smoothing"])
+def test_a_window_goes_on_where_the_run_was(name, values):
+    whole = true_form(name, values, START, FRAMES)
+    for first in (20, 63, 90):
+        initial = np.array([[*whole[first], np.nan]])
+        predicted = simulated([effect_forms()[name](**values)], begins_s=FRAMES[first], first=first, initial=initial)
+        np.testing.assert_allclose(predicted, whole[first:], atol=2e-5)
+
+
+def test_a_window_of_smoothed_poses_begins_as_in_a_steady_motion():
+    law = effect_forms()["mocap_latency_smoothing"](0.0, 0.1)
+    whole = simulated([law])
+    first = int(np.searchsorted(FRAMES, 1.25))  # a second after the last change
+    initial = np.array([[*whole[first], np.nan]])
+    predicted = simulated([law], begins_s=FRAMES[first], first=first, initial=initial)
+    np.testing.assert_allclose(predicted, whole[first:], atol=3e-4)
+
+
+@pytest.mark.parametrize(
+    ("form", "library"),
+    [
+        (("steering_lag_inertia", (0.15, 0.0)), ("steering_lag", (0.15,))),
+        (("steering_lag_inertia", (0.15, 1e-3)), ("steering_lag", (0.15,))),
+        (("steering_rate_limit_acceleration", (1.2, math.inf)), ("steering_rate_limit", (1.2,))),
+        (("mocap_latency_smoothing", (0.07, 0.0)), ("mocap_latency", (0.07,))),
+        (("mocap_latency_smoothing", (0.0, 1e-4)), ("mocap_latency", (1e-4,))),
+        (("actuation_delay_uneven", (0.07, 0.07)), ("actuation_delay", (0.07,))),
+    ],
+)
+def test_it_has_the_librarys_law_for_a_limit(form, library):
+    ours = simulated([effect_forms()[form[0]](*form[1])])
+    np.testing.assert_allclose(ours, simulated([effect_kinds()[library[0]](*library[1])]), atol=1e-4)
+
+
+def test_critical_damping_is_no_edge():
+    near = [simulated([effect_forms()["steering_lag_inertia"](0.2, tau)]) for tau in (0.1 - 1e-9, 0.1, 0.1 + 1e-9)]
+    np.testing.assert_allclose(near[1] - near[0], near[2] - near[1], atol=1e-9)
+    np.testing.assert_allclose(near[0], near[2], atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        ("steering_lag_inertia", {"time_constant_s": 0.1, "inertia_s": 0.15}),
+        ("steering_rate_limit_acceleration", {"rate_rad_per_s": 3.0, "acceleration_rad_per_s2": 1.5}),
+    ],
+)
+def test_an_axle_with_play_is_taken_along_to_where_its_servo_turns_back(law):
+    name, values = law
+    width = 0.06
+    predicted = simulated([effect_forms()[name](**values), effect_kinds()["steering_backlash"](width)])
+    moments, end = RUN_TIMES, FRAMES[-1] + 2.0
+    paths = [servo_path(name, values, channel, moments, end) for channel in (0, 1)]
+    behind = [with_play(path, rest, width, end) for path, rest in zip(paths, REST, strict=True)]
+    truth = drive(behind[0], behind[1], aims(2, moments), np.array(START), FRAMES, moments, 0.0)
+    np.testing.assert_allclose(predicted, truth, atol=5e-5)
+
+
+def test_the_branch_for_servos_of_second_order_is_compiled_where_it_is_needed_only():
+    library, forms = tuple(effect_kinds().values()), tuple(effect_forms().values())
+    assert "actuate_any_order" not in kernel_text(library)
+    assert "actuate_any_order as actuate" in kernel_text((*library, *forms))
