@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import agvbench.effects
 from agvbench.effects import Effect, Parameter, Stage, effect_kinds
+from agvbench.effects.forms import Form, effect_forms
 from agvbench.errors import FileError, FlagError
 
 if TYPE_CHECKING:
@@ -32,6 +33,12 @@ time_constant_s = 0.12
 The chain is command → transport → servo and drive → wheels → body → floor → camera. Angles are counter-clockwise
 positive. At its null value an effect does nothing. `agvbench effects` lists all of them; `agvbench effects new NAME`
 writes the file of a new one, which is then simulated, tested, listed and fitted without another line elsewhere.
+"""
+_LAWS = """\
+# Other laws
+
+The same causes in laws of their own. A diagnosis tries them in place of what it has chosen, and calls them by their
+causes; a vehicle file has them under their own names.
 """
 
 
@@ -57,7 +64,7 @@ def effects_table() -> Table:
 
 def reference_page() -> str:
     """Return ``docs/reference/effects.md``."""
-    return "\n".join([_PREFACE, *(_section(kind) for kind in ordered_effects())])
+    return "\n".join([_PREFACE, *map(_section, ordered_effects()), _LAWS, *map(_section, effect_forms().values())])
 
 
 def write_template(name: str, directory: Path | None = None) -> Path:
@@ -97,7 +104,8 @@ def _section(kind: type[Effect]) -> str:
     lines += ["| parameter | unit | null | bounds | typical size |", "|---|---|---|---|---|"]
     for p in kind.parameters():
         lines.append(f"| `{p.name}` | {p.unit} | {_number(p.null)} | {_bounds(p)} | {_number(p.scale)} |")
-    lines += ["", f"- Stage: {kind.stage.value}", f"- Relaxes: {kind.relaxes}", f"- Reference: {kind.reference}"]
+    lines += ["", *([f"- Law of: {kind.form_of}"] if issubclass(kind, Form) else [])]
+    lines += [f"- Stage: {kind.stage.value}", f"- Relaxes: {kind.relaxes}", f"- Reference: {kind.reference}"]
     return "\n".join([*lines, f"- Limits: {kind.limits}", ""])
 
 
