@@ -146,7 +146,7 @@ def check_poses(poses: TimedTable, status: list[str], last_command_s: Floats) ->
         "t_s lies far outside the run",
         t_s,
         f"within {CLOCK_TOLERANCE_S:g} s of its commands",
-        "give poses and commands one clock, 0 at the first command",
+        "give poses and commands one clock in seconds, 0 at the first command",
     )
     for name in ("x_m", "y_m", "heading_rad"):
         values = poses.column(name)

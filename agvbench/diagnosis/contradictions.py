@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 
 from agvbench.diagnosis.reading import Readings
 from agvbench.diagnosis.residuals import misses
 from agvbench.errors import CampaignError
+from agvbench.types import Floats
 
 _FAR_SHARE, _FAR_M = 0.3, 0.15
 _MOST_GROUPS = 0.25
+_LEAST_WAY_M, _LEAST_SHARE, _FEWEST_PAIRS = 0.3, 0.15, 6
+_GAP, _FAR_APART, _TIMES_AS_FAR = 1.5, 0.02, 6.0
 
 
 def refuse_contradictions(readings: Readings, *, where: str) -> None:
@@ -38,7 +43,9 @@ def refuse_contradictions(readings: Readings, *, where: str) -> None:
         if off > max(_FAR_SHARE * way, _FAR_M):
             far += 1
             example = example or f"{readings.runs[own[0]].run_id} and its repeats end {off:.2f} m from their mean"
-    if far > _MOST_GROUPS * repeated:
+    if far <= _MOST_GROUPS * repeated:
+        _refuse_two_kinds(readings, path, where)
+    else:
         raise CampaignError(
             "runs with the same commands contradict each other",
             where=where,
@@ -46,3 +53,43 @@ def refuse_contradictions(readings: Readings, *, where: str) -> None:
             limit="a quarter of them",
             remedy="see that frames belong to their runs, and that one vehicle drove them all under one calibration",
         )
+
+
+def _refuse_two_kinds(readings: Readings, path: Floats, where: str) -> None:
+    """Raise an error if repeats agree closely or are off by one and the same amount, with nothing between.
+
+    Scatter, wear and places on the floor fill the gap between; two vehicles under one name, or two calibrations, do
+    not.
+    """
+    pairs = np.array(
+        [
+            (i, j)
+            for g in np.unique(readings.group)
+            for i, j in combinations(np.flatnonzero(readings.group == g).tolist(), 2)
+        ]
+    ).reshape(-1, 2)
+    seen = readings.seen[pairs[:, 0]] & readings.seen[pairs[:, 1]]
+    usable = seen.any(axis=1)
+    pairs, last = pairs[usable], seen.shape[1] - 1 - np.argmax(seen[usable][:, ::-1], axis=1)
+    ends = path[pairs, last[:, None]]
+    way = np.hypot(*np.moveaxis(ends, -1, 0)).mean(axis=1)
+    apart = np.hypot(*(ends[:, 0] - ends[:, 1]).T) / np.maximum(way, 1e-9)
+    drove = way > _LEAST_WAY_M
+    apart, pairs = np.sort(apart[drove]), pairs[drove][np.argsort(apart[drove])]
+    count = len(apart)
+    few = max(_FEWEST_PAIRS, int(_LEAST_SHARE * count))
+    if count < 2 * few:
+        return
+    gaps = apart[few : count - few + 1] / np.maximum(apart[few - 1 : count - few], 1e-9)
+    at = few + int(np.argmax(gaps))
+    near, far = apart[:at], apart[at:]
+    if gaps.max() < _GAP or far[0] < _FAR_APART or np.median(far) < _TIMES_AS_FAR * np.median(near):
+        return
+    i, j = pairs[at]
+    raise CampaignError(
+        "runs with the same commands are of two kinds",
+        where=where,
+        value=f"{len(far)} of {count} pairs of repeats end {far[0]:.0%} of the way apart or more, the others at most "
+        f"{near[-1]:.0%}; {readings.runs[i].run_id} and {readings.runs[j].run_id} differ",
+        remedy="see that one vehicle drove them all under one calibration, or diagnose its runs apart",
+    )

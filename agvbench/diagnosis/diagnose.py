@@ -14,11 +14,12 @@ from agvbench.diagnosis.candidates import bounds_of, candidates, given_effects
 from agvbench.diagnosis.contradictions import refuse_contradictions
 from agvbench.diagnosis.empirical import Explained, described, explain, term_candidates, with_term_first
 from agvbench.diagnosis.estimates import named_effects
-from agvbench.diagnosis.forms import BEYOND, form_candidates, reform, tried_beside
+from agvbench.diagnosis.forms import BEYOND, form_candidates, reform_and_resettle, tried_beside
 from agvbench.diagnosis.grouping import held_out_runs
 from agvbench.diagnosis.levels import ROLES, FreeMaps, free_maps, start_values
 from agvbench.diagnosis.map_effects import map_effects
 from agvbench.diagnosis.next_experiment_propose import with_next_experiment
+from agvbench.diagnosis.plausibility import refuse_clocks, refuse_units
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.provenance import provenance, refuse_nothing
 from agvbench.diagnosis.reading import Readings, read_runs
@@ -80,6 +81,7 @@ def diagnose(
     """
     header = campaign.header
     runs = list(campaign)
+    refuse_units(runs, header)
     if (horizon := horizon_of(header, runs)) is not None:
         return diagnose_windows(header, runs, horizon, vehicle=vehicle, seed=seed, tell=tell)
     geometry = Geometry(header.front_axle_m, header.rear_axle_m)
@@ -103,7 +105,7 @@ def diagnose(
     names, values = given_effects(vehicle, tried)
     selector = settle(Selector(Batch(fitted, maps, geometry, kinds=kinds), tried, start, seed, tell, names, values))
     chosen, selector = resettle(selector.select(), selector)
-    selection = reform(chosen, selector)
+    selection, selector = reform_and_resettle(chosen, selector)
     readings = replace(readings, stood=selector.batch.readings.stood)
     explained = explain(selection, selector)
     return _conclude(header, readings, held, selection, explained, vehicle, geometry, seed)
@@ -111,6 +113,7 @@ def diagnose(
 
 def _cannot_tell(readings: Readings, header: HeaderLike) -> str:
     """Return why this campaign cannot be diagnosed, or nothing."""
+    refuse_clocks(readings.refused, len(readings) + len(readings.refused), where=f"campaign {header.name}")
     refuse_nothing(readings, header)
     if len(readings) < FEWEST_RUNS:
         raise CampaignError(
@@ -120,6 +123,11 @@ def _cannot_tell(readings: Readings, header: HeaderLike) -> str:
             limit=f"at least {FEWEST_RUNS} that begin at rest",
             remedy="drive bench_calibration.py and bench_trajectories.py first",
         )
+    commands = [run.commands for run in readings.runs]
+    if all(np.all(c.drive == header.neutral) for c in commands):
+        return "the drive was never told anything but neutral"
+    if len({(f, r) for c in commands for f, r in zip(c.front.tolist(), c.rear.tolist(), strict=True)}) == 1:
+        return "steering was never excited: its commands are the same in all runs"
     _, sizes = np.unique(readings.group, return_counts=True)
     if np.count_nonzero(sizes >= 2) < FEWEST_REPEATED:
         return f"without repeats there is no floor: at least {FEWEST_REPEATED} commands must be driven twice or more"

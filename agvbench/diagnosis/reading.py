@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from agvbench.calibration import inspect_frames
 from agvbench.diagnosis.grouping import at_common_levels, group_runs
-from agvbench.diagnosis.resting import start_of
+from agvbench.diagnosis.resting import frame_noise, motion_of, start_of
 from agvbench.diagnosis.windows import Beginnings, Horizon, blocks, cut_windows, recording_of
 from agvbench.errors import FitError
 from agvbench.model.simulation import SimulatedRun
@@ -19,7 +19,11 @@ from agvbench.types import Commands, Floats, Frames, Run
 SAMPLES = 24
 """Poses per run: as many for a short run as for a long one, since a run is one piece of evidence."""
 
+BACK_IN_TIME = "frames go back in time"
+"""Why a run is refused in which frames are out of order and make no path when put in order."""
+
 _NEAR_S = 0.04
+_FEW, _MANY, _ROUGHER = 0.05, 0.25, 3.0
 _FEWEST_FRAMES = 20
 _FEWEST_SAMPLES = SAMPLES // 2
 
@@ -149,7 +153,7 @@ def _session_starts(runs: list[Run]) -> dict[str | None, float]:
 def _read(run: Run, neutral: float | None) -> tuple[Floats, Floats, Floats, Floats]:
     if not run.is_ok:
         raise FitError(run.status)
-    frames, _ = inspect_frames(run.frames)
+    frames = _in_order(run)
     if len(frames) < _FEWEST_FRAMES or not len(run.commands):
         raise FitError("too few frames", value=len(frames), limit=f"at least {_FEWEST_FRAMES}")
     start, stderr = start_of(run, frames, neutral)
@@ -159,6 +163,26 @@ def _read(run: Run, neutral: float | None) -> tuple[Floats, Floats, Floats, Floa
     turn = np.round((_heading_near_start(frames) - start[2]) / (2.0 * np.pi)) * 2.0 * np.pi
     poses[:, 2] -= turn
     return t_s, poses, start, stderr
+
+
+def _in_order(run: Run) -> Frames:
+    """Return the frames that show the vehicle, also where a table lists them in another order than that of time."""
+    frames, quality = inspect_frames(run.frames)
+    out_of_order = quality.bad_time + quality.late
+    if quality.bad_time <= _FEW * quality.frames and out_of_order <= _MANY * quality.frames:
+        return frames
+    ordered, put = inspect_frames(run.frames.select(np.argsort(run.frames.t_s, kind="stable")))
+    if put.jumps + put.doubled <= _FEW * put.frames and _as_smooth(ordered, frames):
+        return ordered
+    if out_of_order + quality.jumps > _MANY * quality.frames:
+        raise FitError(BACK_IN_TIME)
+    return frames
+
+
+def _as_smooth(ordered: Frames, arrived: Frames) -> bool:
+    """Whether frames in order of time make a path like those in order of arrival, and not two paths in turn."""
+    roughness = [float(frame_noise(motion_of(frames))[0]) for frames in (ordered, arrived)]
+    return roughness[0] <= _ROUGHER * roughness[1]
 
 
 def _heading_near_start(frames: Frames) -> float:

@@ -75,7 +75,7 @@ def start_of(run: Run, frames: Frames, neutral: float | None) -> tuple[Floats, F
         return _first_seen(run, frames)
     rest = start_pose(run)
     stderr = np.array([rest.stderr_x_m, rest.stderr_y_m, rest.stderr_heading_rad])
-    return np.array(rest.pose), np.where(np.isfinite(stderr), stderr, frame_noise(_motion(frames))[[0, 0, 1]])
+    return np.array(rest.pose), np.where(np.isfinite(stderr), stderr, frame_noise(motion_of(frames))[[0, 0, 1]])
 
 
 def _first_seen(run: Run, frames: Frames) -> tuple[Floats, Floats]:
@@ -83,13 +83,14 @@ def _first_seen(run: Run, frames: Frames) -> tuple[Floats, Floats]:
     late_s = float(frames.t_s[0])
     if late_s > _LATEST_S:
         raise FitError("not seen at rest nor within 0.1 s of the first command", where=run.run_id)
-    position, heading = frame_noise(_motion(frames))
+    position, heading = frame_noise(motion_of(frames))
     off = float(np.hypot(position, _LIKELY_MPS * late_s))
     pose = np.array([frames.x_m[0], frames.y_m[0], frames.heading_rad[0]])
     return pose, np.array([off, off, heading])
 
 
-def _motion(frames: Frames) -> Floats:
+def motion_of(frames: Frames) -> Floats:
+    """Return x, y and the continuous heading of each frame, (n, 3)."""
     return np.column_stack([frames.x_m, frames.y_m, np.unwrap(frames.heading_rad)])
 
 

@@ -1,0 +1,126 @@
+"""Campaigns whose numbers no vehicle drives: other units, a mirrored floor, clocks that go back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from agvbench.calibration.source import HeaderLike
+from agvbench.diagnosis.reading import BACK_IN_TIME
+from agvbench.errors import CampaignError
+from agvbench.types import Floats, Run
+
+_FASTEST_MPS = 20.0
+_RATE_FACTOR = 30.0
+_MOST_BACK = 0.25
+_EVERY_S = 0.3
+_LEAST_TURN_RAD, _FEWEST_STEPS, _FEWEST_TURNING = 0.15, 5, 5
+_SAME_TURN = (0.5, 2.0)
+_DEGREES = (20.0, 180.0)
+
+
+def refuse_clocks(refused: Mapping[str, str], runs: int, *, where: str) -> None:
+    """Raise an error if in many of so many `runs` time goes back; `refused` tells by run why it cannot be used.
+
+    Raises
+    ------
+    CampaignError
+        If in more than a quarter.
+    """
+    back = [run_id for run_id, why in refused.items() if why.startswith(BACK_IN_TIME)]
+    if len(back) > _MOST_BACK * runs:
+        raise CampaignError(
+            BACK_IN_TIME,
+            where=f"{where}: poses",
+            value=f"in {len(back)} of {runs} runs, as in {back[0]}",
+            limit="a quarter of the runs",
+            remedy="give the poses of a run one clock",
+        )
+
+
+def refuse_units(runs: Sequence[Run], header: HeaderLike) -> None:
+    """Raise an error if positions, headings or times are in other units than their columns say, or mirrored.
+
+    What is asked needs no model: how fast vehicles drive, how often the camera looks, and that who drives an arc turns
+    by as much as the path does.
+
+    Raises
+    ------
+    CampaignError
+        If so, naming the column.
+    """
+    where = f"campaign {header.name}: poses"
+    steps_s = [np.median(np.diff(np.sort(run.frames.t_s))) for run in runs if run.is_ok and len(run.frames) > 1]
+    if not steps_s:
+        return
+    step_s = max(float(np.median(steps_s)), 1e-9)
+    rate_hz = float(getattr(header, "mocap_rate_hz", 1.0 / step_s))
+    if not 1.0 / _RATE_FACTOR < step_s * rate_hz < _RATE_FACTOR:
+        raise CampaignError(
+            "t_s is not in seconds",
+            where=where,
+            value=f"a frame every {step_s:.3g}",
+            limit=f"about 1/{rate_hz:g} s, as mocap.rate_hz says",
+            remedy="convert t_s to seconds, or correct mocap.rate_hz",
+        )
+    tracks = list(_tracks(runs))
+    speed = _usual_speed(tracks)
+    if speed > _FASTEST_MPS:
+        raise CampaignError(
+            "x_m and y_m are not in metres",
+            where=where,
+            value=f"vehicles drive at {speed:.3g} m/s",
+            limit=f"{_FASTEST_MPS:g} m/s",
+            remedy="convert them to metres",
+        )
+    ratio = _turn_ratio(tracks)
+    if ratio is None or _SAME_TURN[0] < ratio < _SAME_TURN[1]:
+        return
+    value = f"the heading turns {ratio:.3g} times as far as the path"
+    if _DEGREES[0] < ratio < _DEGREES[1]:
+        what, remedy = "heading_rad is not in radians", "convert it to radians"
+    elif -_SAME_TURN[1] < ratio < -_SAME_TURN[0]:
+        what, remedy = "heading_rad and the floor are mirrored", "count headings counter-clockwise from x towards y"
+    else:
+        what, remedy = "heading_rad does not belong to x_m and y_m", "see that all three are of one body"
+    raise CampaignError(what, where=where, value=value, limit="once", remedy=remedy)
+
+
+def _tracks(runs: Sequence[Run]) -> Iterator[tuple[Floats, Floats]]:
+    """Yield times (n,) and poses (n, 3), with a continuous heading, of each run, a frame every 0.3 s."""
+    for run in runs:
+        f = run.frames
+        seen = f.tracked.astype(np.bool_) & np.isfinite(f.t_s + f.x_m + f.y_m + f.heading_rad)
+        order = np.flatnonzero(seen)[np.unique(f.t_s[seen], return_index=True)[1]]
+        if not run.is_ok or len(order) < 2:
+            continue
+        t_s = f.t_s[order]
+        poses = np.column_stack([f.x_m[order], f.y_m[order], np.unwrap(f.heading_rad[order])])
+        chosen = np.unique(np.searchsorted(t_s, np.arange(t_s[0], t_s[-1], _EVERY_S)))
+        yield t_s[chosen], poses[chosen]
+
+
+def _usual_speed(tracks: list[tuple[Floats, Floats]]) -> float:
+    """Return the speed that runs reach for a quarter of their time, in the median [m/s]."""
+    speeds = [
+        float(np.quantile(np.hypot(*np.diff(poses[:, :2], axis=0).T) / np.diff(t_s), 0.75))
+        for t_s, poses in tracks
+        if len(t_s) > 1
+    ]
+    return float(np.median(speeds)) if speeds else 0.0
+
+
+def _turn_ratio(tracks: list[tuple[Floats, Floats]]) -> float | None:
+    """Return how far headings turn while the direction of motion turns once, in the median of runs that turn."""
+    ratios = []
+    for _, poses in tracks:
+        step = np.diff(poses[:, :2], axis=0)
+        length = np.hypot(step[:, 0], step[:, 1])
+        moves = length > 0.3 * np.max(length, initial=0.0)
+        # Modulo half a turn: a vehicle that reverses goes the other way along the same line.
+        course = np.unwrap(np.arctan2(step[moves, 1], step[moves, 0]), period=np.pi)
+        heading = (0.5 * (poses[1:, 2] + poses[:-1, 2]))[moves]
+        if len(course) >= _FEWEST_STEPS and np.std(course) > _LEAST_TURN_RAD:
+            ratios.append(float(np.polyfit(course, heading, 1)[0]))
+    return float(np.median(ratios)) if len(ratios) >= _FEWEST_TURNING else None
