@@ -12,6 +12,7 @@ from agvbench.diagnosis.empirical_terms import TERMS
 from agvbench.diagnosis.fitting import fit
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.selection import LEAST_GAIN, RIVAL_MARGIN, Scored, Selection, Selector
+from agvbench.diagnosis.standing import SLOW_STEERING, otherwise
 from agvbench.effects import Effect
 from agvbench.effects.forms import Form, cause_of, effect_forms
 from agvbench.model import VehicleModel
@@ -85,6 +86,24 @@ def reform(selection: Selection, selector: Selector) -> Selection:
     return Selection(selection.base, current, rivals, gains, rejected, selection.tried + wide.tried)
 
 
+def reform_and_resettle(selection: Selection, selector: Selector) -> tuple[Selection, Selector]:
+    """Do as `reform` does, and select again under the other belief of where the steering stood if that is better now.
+
+    In the wrong law a slow servo may look as if it had stood elsewhere.
+    """
+    reformed = reform(selection, selector)
+    chosen = reformed.chosen
+    if reformed is selection or not {*SLOW_STEERING} & {cause_of(name) for name in chosen.names}:
+        return reformed, selector
+    there = otherwise(wider(selector)).score(chosen.names, chosen.fit.parameters, None)
+    if there.total >= chosen.total - LEAST_GAIN:
+        return reformed, selector
+    other = otherwise(selector)
+    other.candidates = {n: c for n, c in other.candidates.items() if n not in effect_forms() or n in selector.given}
+    again = reform(other.select(), other)
+    return (again, other) if again.chosen.total < chosen.total else (reformed, selector)
+
+
 def _laws(selection: Selection, selector: Selector, name: str) -> Iterator[_Law]:
     """Yield other laws of the cause `name`, and of others that do half as well in its place, be it in the wrong law."""
     chosen = selection.chosen
@@ -135,7 +154,7 @@ def _swapped(wide: Selector, current: Scored, out: set[str], form: str) -> Score
     tries = [
         fit(
             Predictor(wide.batch, names), np.r_[maps, kept, start], bounds_of(wide.candidates, names),
-            offsets=near.offsets, scatter=near.scatter, iterations=_SHORT, near=near.linear,
+            offsets=near.offsets, scatter=near.scatter, iterations=_SHORT,
         )
         for start in wide.candidates[form].starts
     ]  # fmt: skip

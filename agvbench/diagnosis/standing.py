@@ -24,7 +24,7 @@ def settle(selector: Selector) -> Selector:
     What is compared is the best of the effects to which it matters, as the first to be chosen.
     """
     names = [name for name in SLOW_STEERING if name in selector.candidates]
-    base, other = selector.base(), _stood(selector)
+    base, other = selector.base(), otherwise(selector)
     if set(SLOW_STEERING) & {cause_of(name) for name in selector.given}:
         return other if other.base().total < base.total - LEAST_GAIN else selector
     same = other.adopt(base)
@@ -40,13 +40,14 @@ def resettle(selection: Selection, selector: Selector) -> tuple[Selection, Selec
     chosen = selection.chosen
     if not set(SLOW_STEERING) & {cause_of(name) for name in chosen.names}:
         return selection, selector
-    other = _stood(selector)
+    other = otherwise(selector)
     if other.score(chosen.names, chosen.fit.parameters, None).total >= chosen.total - LEAST_GAIN:
         return selection, selector
     return other.select(), other
 
 
-def _stood(selector: Selector) -> Selector:
+def otherwise(selector: Selector) -> Selector:
+    """Return a selector of the same runs under the other belief."""
     batch = selector.batch
     readings = replace(batch.readings, stood=not batch.readings.stood)
     return selector.over(Batch(readings, batch.maps, batch.geometry, kinds=batch.kinds))
