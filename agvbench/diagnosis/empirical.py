@@ -70,10 +70,9 @@ def explain(selection: Selection, selector: Selector) -> Explained | None:
     models = [model for model in models if model[0].total < selection.chosen.total - selector.least_gain]
     if not models:
         return None
-    chosen, term, gains = min(models, key=lambda model: model[0].total)
+    chosen, term, gains, rivals = min(models, key=lambda model: model[0].total)
     without = wide.shrunk(selection.base, chosen, term.name)
     gain = without.loss - chosen.loss
-    rivals = {name: selection.rivals.get(name, {}) for name in gains}
     tried = selection.tried + wide.tried
     rejected = {n: g for n, g in selection.rejected.items() if n not in chosen.names}
     selector.tell(f"{' + '.join(chosen.names)}: an empirical term gains {gain.sum():.0f}")
@@ -125,22 +124,27 @@ def _best_term(wide: Selector, root: Scored, starts: list[Start]) -> tuple[Score
 
 def _settled(
     wide: Selector, selection: Selection, current: Scored, term: type[EmpiricalTerm]
-) -> tuple[Scored, type[EmpiricalTerm], dict[str, float]]:
-    """Return the model with the library's effects that earn their place beside the term, and their gains."""
+) -> tuple[Scored, type[EmpiricalTerm], dict[str, float], dict[str, dict[str, float]]]:
+    """Return the model with the library's effects that earn their place beside the term, their gains and rivals.
+
+    What was chosen without the term may only have been a rival of what is right beside it.
+    """
     base = selection.base
+    rivals: dict[str, dict[str, float]] = {}
     again = [n for n in selection.chosen.names if n not in current.names]
     again += sorted(selection.rejected, key=lambda n: -selection.rejected[n])[:_MOST_RETRIED]
     for name in again:
         offer = wide.grown(current, name)
         if name not in current.names and wide.earns(current, offer):
             current = offer
+    current, rivals = wide.exchanged(base, current, selection.rivals)
     while True:
         found = [n for n in current.names if n not in {*base.names, term.name}]
         smaller = {name: wide.shrunk(base, current, name) for name in found}
         gains = {name: model.total - current.total for name, model in smaller.items()}
         useless = [name for name, model in smaller.items() if not wide.earns(model, current)]
         if not useless:
-            return current, term, gains
+            return current, term, gains, {name: rivals.get(name, {}) for name in gains}
         current = smaller[min(useless, key=lambda name: gains[name])]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
@@ -126,8 +126,12 @@ class Selector:
             current = min(worthy.values(), key=lambda offer: offer.total)
             self.tell(f"{' + '.join(current.names)}: gains {base.total - current.total:.0f}")
         current, gains = self.pruned(base, current)
+        current, rivals = self.exchanged(base, current)
+        if set(current.names) != set(gains) | set(self.given):
+            current, gains = self.pruned(base, current)
+            rivals = {name: others for name, others in rivals.items() if name in gains}
         rejected = {name: gain for name, gain in rejected.items() if name not in current.names}
-        return Selection(base, current, self._rivals(base, current), gains, rejected, self.tried)
+        return Selection(base, current, rivals, gains, rejected, self.tried)
 
     def earns(self, without: Scored, with_it: Scored) -> bool:
         """Whether the larger model predicts better by enough, not in a few groups of runs alone, and to be noticed."""
@@ -167,17 +171,38 @@ class Selector:
             current = smaller[min(useless, key=lambda name: gains[name])]
         return current, {}
 
-    def _rivals(self, base: Scored, current: Scored) -> dict[str, dict[str, float]]:
-        found: dict[str, dict[str, float]] = {}
-        for name in self._found(current):
-            rest = self.shrunk(base, current, name)
+    def exchanged(
+        self, base: Scored, current: Scored, among: Mapping[str, Iterable[str]] | None = None
+    ) -> tuple[Scored, dict[str, dict[str, float]]]:
+        """Return the model with any effect replaced by another that predicts better in its place, and the rivals left.
+
+        What was chosen first was chosen in the place of all the others, too, and may only look like one of them.
+
+        Parameters
+        ----------
+        base, current
+            The model without effects, and the one to judge.
+        among
+            By effect, which others are tried in its place; by default every candidate.
+        """
+        for _ in range(_MOST_EFFECTS):
             swapped = {
-                other: self.grown(rest, other).total - current.total
-                for other in self.candidates
-                if other not in current.names
+                name: {
+                    other: self.grown(self.shrunk(base, current, name), other)
+                    for other in (self.candidates if among is None else among.get(name, ()))
+                    if other not in current.names
+                }
+                for name in self._found(current)
             }
-            found[name] = {other: worse for other, worse in swapped.items() if worse < RIVAL_MARGIN}
-        return found
+            better = [offer for offers in swapped.values() for offer in offers.values()]
+            best = min(better, key=lambda offer: offer.total, default=current)
+            if best.total >= current.total - LEAST_GAIN:
+                break
+            self.tell(f"{' + '.join(best.names)} in place of {' + '.join(current.names)}")
+            current = best
+        worse = {n: {o: offer.total - current.total for o, offer in offers.items()} for n, offers in swapped.items()}
+        rivals = {n: {o: w for o, w in others.items() if w < RIVAL_MARGIN} for n, others in worse.items()}
+        return current, {name: others for name, others in rivals.items() if name in current.names}
 
     def shrunk(self, base: Scored, current: Scored, name: str) -> Scored:
         """Return the model without the effect called `name`."""

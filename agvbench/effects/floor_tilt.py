@@ -10,14 +10,14 @@ from agvbench.effects.base import Effect, Stage, parameter
 from agvbench.effects.state import FORWARD, LEFT, X_RATE, Y_RATE
 from agvbench.types import Floats
 
-_MOVING_MPS = 0.02
+_MOVING_MPS = 0.003
 
 
 @dataclass(frozen=True)
 class FloorTilt(Effect):
     """A moving vehicle drifts down the slope: a constant velocity in the floor frame, wherever it heads.
 
-    Moving means faster than some 0.02 m/s, with a smooth share ``1 − exp(−(v / 0.02)²)``, so that a vehicle that comes
+    Moving means faster than some 3 mm/s, with a smooth share ``1 − exp(−(v / 0.003)²)``, so that a vehicle that comes
     to rest stops drifting.
     """
 
