@@ -8,6 +8,7 @@ is exactly a line.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -18,15 +19,17 @@ from numpy.typing import NDArray
 from agvbench.types import Floats
 from agvbench.vehicle.maps import StaticMap
 
-_MODEL_ERROR = 0.003
+_MODEL_ERROR = 0.002
 _LEAST_GAIN = 12.0
 _PER_PARAMETER = 2.0
-_LEAST_SHORT = 0.05
+_LEAST_SHORT = 0.015
 _CLEAR = 4.0
 _FEWEST_INSIDE = 3
 _MOST_AT_A_STOP = 0.4
 _UNKNOWN_RAD = 0.1
 _WIDTHS = 60
+_MOST_NEAR = 5
+_BENDS = np.geomspace(0.1, 4.0, 10)
 
 
 @dataclass(frozen=True)
@@ -199,41 +202,60 @@ def _between(side: RefittedMap, neutral: float, low: float, high: float) -> tupl
     middle, spread = 0.5 * (low + high), (high - low) / math.sqrt(12.0)
     if len(side.values) < _FEWEST_INSIDE:
         return middle, spread
-    found = _shifted(side, neutral, low, high)
+    found = _shifted(side.select(np.argsort(np.abs(side.commands - neutral))[:_MOST_NEAR]), neutral, low, high)
     if found is None:
         return middle, spread
     return found[1], min(max(found[2], 0.01 * (high - low)), spread)
 
 
 def _extrapolated(side: RefittedMap, neutral: float) -> _Edge | None:
-    """Return an edge to which the levels that move lead back, if that describes them better than a smooth curve."""
-    away = np.abs(side.commands - neutral)
-    if len(away) < _FEWEST_INSIDE:
-        return None
-    nearest = float(away.min())
+    """Return an edge to which the levels that move lead back, if no curve that begins at neutral does as well."""
+    side = side.select(np.argsort(np.abs(side.commands - neutral))[:_MOST_NEAR])
+    nearest = float(np.min(np.abs(side.commands - neutral)))
     found = _shifted(side, neutral, -0.5 * nearest, nearest)
     if found is None:
         return None
-    chi, edge, stderr, terms = found
-    smooth = side.fit(away[:, None] ** np.arange(1, terms + 2))[0]
-    if chi > smooth:
-        return _Edge(0.0, stderr, 0.0, stopped=False)
-    plain = side.fit(away[:, None] ** np.arange(1, terms + 1))[0]
-    return _Edge(edge, stderr, min(plain - chi, smooth - chi + _LEAST_GAIN), stopped=False)
+    chi, edge, stderr = found
+    rivals = [_misfit(side, basis, parameters) for basis, parameters in _curves(side, neutral, 0.0, most=3)]
+    gain = min((rival for rival in rivals if rival is not None), default=chi) - chi
+    return _Edge(edge, stderr, gain, stopped=False) if gain > 0.0 else _Edge(0.0, stderr, 0.0, stopped=False)
 
 
-def _shifted(side: RefittedMap, neutral: float, low: float, high: float) -> tuple[float, float, float, int] | None:
-    """Fit a curve that begins at an edge between `low` and `high`; return χ², edge, its error, and how many terms."""
-    away = np.abs(side.commands - neutral)
-    terms = 2 if len(away) > _FEWEST_INSIDE + 1 else 1
+def _curves(side: RefittedMap, neutral: float, edge: float, *, most: int) -> Iterator[tuple[Floats, int]]:
+    """Yield curves that begin at an edge, as bases (n, p), and how many parameters each has: powers, and others.
+
+    Drives rise straight, bend down towards full command, or up at first.
+    """
+    away = np.maximum(np.abs(side.commands - neutral) - edge, 0.0)
+    for count in range(1, most + 1):
+        yield away[:, None] ** np.arange(1, count + 1), count
+    for bend in _BENDS * float(away.max()):
+        yield (away / (away + bend))[:, None], 2
+        yield (-np.expm1(-away / bend))[:, None], 2
+
+
+def _misfit(side: RefittedMap, basis: Floats, parameters: int) -> float | None:
+    """Return χ² with what its parameters cost; None for a curve with so many that it says nothing."""
+    return None if parameters >= len(side.values) else side.fit(basis)[0] + _PER_PARAMETER * parameters
+
+
+def _shifted(side: RefittedMap, neutral: float, low: float, high: float) -> tuple[float, float, float] | None:
+    """Fit curves that begin at an edge between `low` and `high`; return misfit, edge and its error."""
     edges = np.linspace(low, high, _WIDTHS + 2)[1:-1]
-    chis = np.array([side.fit(np.maximum(away - e, 0.0)[:, None] ** np.arange(1, terms + 1))[0] for e in edges])
-    best = int(np.argmin(chis))
+    tried = [
+        [_misfit(side, basis, parameters + 1) for basis, parameters in _curves(side, neutral, e, most=2)]
+        for e in edges.tolist()
+    ]
+    misfits = np.array([min((m for m in row if m is not None), default=np.inf) for row in tried])
+    if not np.isfinite(misfits).any():
+        return None
+    best, step = int(np.argmin(misfits)), float(edges[1] - edges[0])
+    least = float(misfits[best])
+    # Misfit rises by one within a standard error.
+    within = edges[misfits <= least + 1.0]
+    stderr = max(0.5 * float(np.ptp(within)), step)
     if best in (0, len(edges) - 1):
-        return float(chis[best]), float(edges[best]), float(edges[1] - edges[0]), terms
-    # Near its least value χ² is a parabola in the edge; it rises by one within a standard error.
-    step = float(edges[1] - edges[0])
-    bend = float(chis[best - 1] - 2.0 * chis[best] + chis[best + 1]) / step**2
-    off = float(chis[best - 1] - chis[best + 1]) / (2.0 * bend * step) if bend > 0.0 else 0.0
-    stderr = math.sqrt(2.0 / bend) if bend > 0.0 else step
-    return float(chis[best]), float(edges[best] + off), stderr, terms
+        return least, float(edges[best]), stderr
+    sides = misfits[best - 1] - least, misfits[best + 1] - least
+    off = 0.5 * step * float((sides[0] - sides[1]) / max(sides[0] + sides[1], 1e-12))
+    return least, float(edges[best] + off), stderr

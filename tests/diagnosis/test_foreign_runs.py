@@ -1,0 +1,90 @@
+"""Habits of other benches: where steering stood, when frames and clocks begin, and how levels are rounded."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from tiny_vehicle import HEADER, Tiny, campaign_runs
+
+from agvbench.campaign import Campaign
+from agvbench.diagnosis import diagnose
+from agvbench.diagnosis.grouping import at_common_levels
+from agvbench.diagnosis.reading import read_runs
+from agvbench.diagnosis.resting import rests
+from agvbench.diagnosis.windows import horizon_of
+
+
+@dataclasses.dataclass
+class InMemory:
+    runs: list
+    header = HEADER
+
+    def __iter__(self):
+        return iter(self.runs)
+
+
+def late(run, seconds):
+    """Return the run as one who starts the clock so much later tells it: steering had been set long before."""
+    c = run.commands
+    row = int(np.searchsorted(c.t_s, seconds, side="right")) - 1
+    t_s = np.r_[0.0, c.t_s[row + 1 :] - seconds]
+    commands = dataclasses.replace(c, t_s=t_s, drive=c.drive[row:], front=c.front[row:], rear=c.rear[row:])
+    return dataclasses.replace(
+        run, commands=commands, frames=dataclasses.replace(run.frames, t_s=run.frames.t_s - seconds)
+    )
+
+
+@pytest.fixture(scope="module")
+def lagging():
+    # Steering set 0.4 s before driving has settled by then: told from 0.39 s on, it stood before the clock began.
+    return campaign_runs(Tiny(steering_lag_s=0.08))
+
+
+def test_steering_that_stood_before_its_first_command_is_found_out(lagging):
+    found = diagnose(InMemory([late(run, 0.39) for run in lagging]))
+    assert [effect.name for effect in found.effects] == ["steering_lag"]
+    assert found.effects[0].parameters["time_constant_s"].value == pytest.approx(0.08, abs=0.004)
+    assert found.provenance["steering_stood_at"] == "the first command"
+
+
+def test_runs_that_are_seen_from_their_first_command_on_are_runs_from_rest(tiny_campaign):
+    runs = tiny_campaign(Tiny()).runs[:30]
+    seen = [dataclasses.replace(run, frames=run.frames.select(run.frames.t_s >= 0.0)) for run in runs]
+    assert horizon_of(HEADER, seen) is None
+    assert all(rests(run, HEADER.neutral) for run in seen)
+    whole, part = read_runs(runs, HEADER.neutral), read_runs(seen, HEADER.neutral)
+    assert np.abs(part.start - whole.start).max() < 1e-3
+    # Driven at once, it is the first frame that counts, and it is as uncertain as a frame.
+    at_once = read_runs([late(run, 0.4) for run in seen], HEADER.neutral)
+    assert len(at_once) == len(seen)
+
+
+def test_clocks_that_begin_elsewhere_are_set_to_the_first_command(tmp_path, tiny_campaign, write_campaign):
+    runs = tiny_campaign(Tiny()).runs[:3]
+    path = write_campaign(tmp_path / "c", runs)
+    moved = tmp_path / "moved"
+    moved.mkdir()
+    (moved / "campaign.toml").write_bytes((path / "campaign.toml").read_bytes())
+    campaign = Campaign.open(path)
+    campaign.runs.to_parquet(moved / "runs.parquet")
+    for name in ("commands", "poses"):
+        table = getattr(campaign, name)
+        table.assign(t_s=table.t_s - 0.5).to_parquet(moved / f"{name}.parquet")
+    for a, b in zip(Campaign.open(moved).check(), campaign, strict=True):
+        np.testing.assert_allclose(a.commands.t_s, b.commands.t_s, atol=1e-12)
+        np.testing.assert_allclose(a.frames.t_s, b.frames.t_s, atol=1e-12)
+
+
+def test_levels_that_differ_by_rounding_are_one(tiny_campaign):
+    runs = tiny_campaign(Tiny()).runs[:10]
+    rounded = [
+        dataclasses.replace(
+            run, commands=dataclasses.replace(run.commands, front=run.commands.front * (1.0 + k * 1e-13))
+        )
+        for k, run in enumerate(runs)
+    ]
+    count = [
+        len(np.unique(np.concatenate([run.commands.front for run in told])))
+        for told in (runs, at_common_levels(rounded))
+    ]
+    assert count[0] == count[1]
