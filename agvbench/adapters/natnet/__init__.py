@@ -1,4 +1,4 @@
-"""NatNet, the protocol that OptiTrack's Motive streams in: what its packets say, and nothing about sockets."""
+"""NatNet, the protocol that OptiTrack's Motive streams in: packets, a client, and an emulated server."""
 
 from agvbench.adapters.natnet.capture import datagrams_of
 from agvbench.adapters.natnet.description import BodyDescription, decode_descriptions

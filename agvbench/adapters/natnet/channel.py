@@ -1,0 +1,164 @@
+"""The sockets between a client and a server: packets out, packets in, questions with an answer."""
+
+from __future__ import annotations
+
+import math
+import selectors
+import socket
+from dataclasses import dataclass
+
+from agvbench.adapters.natnet.packet import MAX_DATAGRAM_BYTES, Message, join, split
+from agvbench.adapters.natnet.version import Version
+from agvbench.bus.clock import Clock
+from agvbench.errors import AdapterGoneError, LinkError, MessageError
+
+COMMAND_PORT, DATA_PORT = 1510, 1511
+_RECEIVE_BUFFER_BYTES = 4 << 20
+_MOST_AT_ONCE = 256
+_POLL_S = 0.02
+_ATTEMPTS = 6
+
+
+@dataclass(frozen=True)
+class Connection:
+    """Where a server is, and how to talk to it.
+
+    ``local`` is the address of this machine's network interface ("" for the one that leads there), ``version`` the bit
+    stream to ask for (4.0 and later, unicast), None for the server's own. ``group`` and ``data_port`` are where a
+    multicast server sends to if it does not say so itself, as those before 3.0.
+    """
+
+    server: str
+    port: int = COMMAND_PORT
+    local: str = ""
+    version: Version | None = None
+    group: str | None = None
+    data_port: int | None = None
+    answer_limit_s: float = 3.0
+
+    def __str__(self) -> str:
+        return f"natnet:{self.server}:{self.port}"
+
+
+@dataclass
+class Counters:
+    """What happened on the way."""
+
+    frames: int = 0
+    lost: int = 0
+    """Frames whose numbers were passed over."""
+    repeated: int = 0
+    """Frames with a number that was there already, or an older one."""
+    malformed: int = 0
+    first_malformed: str = ""
+    foreign: int = 0
+    """Datagrams of somebody else than the server."""
+
+    def note(self, error: MessageError) -> None:
+        """Count what could not be decoded."""
+        self.malformed += 1
+        self.first_malformed = self.first_malformed or str(error)
+
+
+class Channel:
+    """Sockets that hear the server only.
+
+    Raises
+    ------
+    LinkError
+        If an address cannot be used.
+    """
+
+    def __init__(self, connection: Connection, clock: Clock, counters: Counters) -> None:
+        self._connection, self._clock, self._counters = connection, clock, counters
+        self._selector = selectors.DefaultSelector()
+        try:
+            self._server = (socket.gethostbyname(connection.server), connection.port)
+            self._local = connection.local or self._route()
+            self._command = self._open((self._local, 0))
+        except OSError as error:
+            raise self._unusable(error) from None
+
+    def _unusable(self, error: OSError) -> LinkError:
+        self.close()
+        return LinkError("address cannot be used", where=self._connection, value=error.strerror or error)
+
+    def _route(self) -> str:
+        """Return the address of the interface that leads to the server."""
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.connect(self._server)
+            return str(probe.getsockname()[0])
+
+    def _open(self, address: tuple[str, int], *, shared: bool = False) -> socket.socket:
+        opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._selector.register(opened, selectors.EVENT_READ)
+        # A burst of frames with many bodies must fit, or the kernel drops them and says nothing.
+        opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER_BYTES)
+        if shared:
+            opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        opened.setblocking(False)
+        opened.bind(address)
+        return opened
+
+    def join(self, group: str, port: int) -> None:
+        """Hear a multicast group, too."""
+        try:
+            data = self._open((group, port), shared=True)
+            member = socket.inet_aton(group) + socket.inet_aton(self._local)
+            data.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, member)
+        except OSError as error:
+            raise self._unusable(error) from None
+
+    def tell(self, message: Message, payload: bytes = b"") -> None:
+        """Send a packet; while the network is away, what is missing shows in what does not arrive."""
+        try:
+            self._command.sendto(join(message, payload), self._server)
+        except OSError:
+            return
+
+    def ask(self, message: Message, payload: bytes, wanted: Message) -> bytes:
+        """Return the payload of the answer; what else arrives meanwhile is left out.
+
+        Raises
+        ------
+        AdapterGoneError
+            If there is none in time.
+        """
+        limit_s = self._connection.answer_limit_s
+        deadline_s, again_s = self._clock.now() + limit_s, -math.inf
+        while (now_s := self._clock.now()) < deadline_s:
+            if now_s >= again_s:
+                self.tell(message, payload)
+                again_s = now_s + limit_s / _ATTEMPTS
+            for number, answer in self.arrived():
+                if number == wanted:
+                    return answer
+        raise AdapterGoneError(
+            "no NatNet server answers", where=self._connection, value=f"waited {limit_s:g} s",
+            remedy="see whether Motive runs, streams (Edit > Settings > Streaming), and the network lets UDP through",
+        )  # fmt: skip
+
+    def arrived(self) -> list[tuple[int, bytes]]:
+        """Return what the server sent; wait a moment for the first."""
+        packets = []
+        for key, _ in self._selector.select(_POLL_S):
+            opened: socket.socket = key.fileobj  # type: ignore[assignment]
+            for _ in range(_MOST_AT_ONCE):
+                try:
+                    datagram, who = opened.recvfrom(MAX_DATAGRAM_BYTES)
+                except (BlockingIOError, ConnectionError):
+                    break
+                if who[0] != self._server[0]:
+                    self._counters.foreign += 1
+                    continue
+                try:
+                    packets.append(split(datagram))
+                except MessageError as error:
+                    self._counters.note(error)
+        return packets
+
+    def close(self) -> None:
+        """Hear nothing any more."""
+        for key in list((self._selector.get_map() or {}).values()):
+            key.fileobj.close()  # type: ignore[union-attr]
+        self._selector.close()

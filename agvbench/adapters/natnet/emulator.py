@@ -1,0 +1,198 @@
+"""A server that speaks NatNet as Motive does: for tests, rehearsals and demonstrations without cameras.
+
+It answers on a command socket, and sends frames to every client that connected (unicast) or to a group (multicast),
+on loopback unless told otherwise.
+"""
+
+from __future__ import annotations
+
+import socket
+import struct
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from agvbench.adapters.natnet.encode import Model, encode_descriptions, encode_frame
+from agvbench.adapters.natnet.frame import FrameOfData
+from agvbench.adapters.natnet.packet import MAX_DATAGRAM_BYTES, Message, join, split
+from agvbench.adapters.natnet.server import ServerInfo, encode_server_info
+from agvbench.adapters.natnet.version import Version
+from agvbench.bus.clock import Clock, WallClock
+from agvbench.errors import LinkError, MessageError
+
+CLIENT_LIMIT_S = 10.0
+MAX_CLIENTS = 32
+_VERSION = Version(4, 1)
+_POLL_S = 0.05
+_TICKS = struct.Struct("<Q")
+_FLOAT = struct.Struct("<f")
+_BITSTREAM = "Bitstream,"
+
+Address = tuple[str, int]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What an emulated server is like.
+
+    ``port`` 0 takes any free one. ``multicast`` is the group that frames go to, None for unicast. The server's clock
+    runs at ``clock_hz`` [Hz], faster than the host's by ``drift`` [s/s], and was ahead by ``offset_s`` [s].
+    """
+
+    version: Version = _VERSION
+    host: str = "127.0.0.1"
+    port: int = 0
+    multicast: str | None = None
+    data_port: int = 0
+    rate_hz: float = 120.0
+    clock_hz: int = 10_000_000
+    drift: float = 0.0
+    offset_s: float = 1000.0
+
+
+class _Client(NamedTuple):
+    heard_s: float
+    version: Version
+
+
+class Emulator:
+    """A NatNet server in a thread of its own, until `close`.
+
+    Raises
+    ------
+    LinkError
+        If the port is taken, or the address is not this machine's.
+    """
+
+    def __init__(self, settings: Settings, models: Sequence[Model], clock: Clock | None = None) -> None:
+        self.settings, self._models, self._clock = settings, list(models), clock or WallClock()
+        self._clients: dict[Address, _Client] = {}
+        self._lock = threading.Lock()
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.settimeout(_POLL_S)
+        try:
+            self._socket.bind((settings.host, settings.port))
+            if settings.multicast is not None:
+                self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(settings.host))
+                self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 1)
+        except OSError as error:
+            self._socket.close()
+            where = f"natnet emulator {settings.host}:{settings.port}"
+            raise LinkError("address cannot be used", where=where, value=error.strerror or error) from None
+        self._closed = threading.Event()
+        self._thread = threading.Thread(target=self._serve, name="natnet-emulator", daemon=True)
+        self._thread.start()
+
+    @property
+    def address(self) -> Address:
+        """Host and command port."""
+        host, port = self._socket.getsockname()
+        return host, port
+
+    def ticks(self, host_s: float | None = None) -> int:
+        """Return what the server's clock shows when the host's shows `host_s` [s]; now if None."""
+        host_s = self._clock.now() if host_s is None else host_s
+        return int((host_s * (1.0 + self.settings.drift) + self.settings.offset_s) * self.settings.clock_hz)
+
+    def clients(self) -> list[Address]:
+        """Return who has connected and was heard of lately."""
+        oldest_s = self._clock.now() - CLIENT_LIMIT_S
+        with self._lock:
+            self._clients = {who: client for who, client in self._clients.items() if client.heard_s >= oldest_s}
+            return list(self._clients)
+
+    def describe(self, models: Sequence[Model]) -> None:
+        """Have other bodies from now on; clients hear of it by a flag of the frames."""
+        with self._lock:
+            self._models = list(models)
+
+    def send(self, frame: FrameOfData) -> None:
+        """Stream a frame."""
+        if self.settings.multicast is not None:
+            targets = [((self.settings.multicast, self.settings.data_port), self.settings.version)]
+        else:
+            self.clients()
+            with self._lock:
+                targets = [(who, client.version) for who, client in self._clients.items()]
+        packets = {version: join(Message.FRAMEOFDATA, self._encoded(frame, version)) for _, version in targets}
+        for who, version in targets:
+            self._send(packets[version], who)
+
+    def _encoded(self, frame: FrameOfData, version: Version) -> bytes:
+        return encode_frame(frame, version, self._models)
+
+    def _send(self, packet: bytes, who: Address) -> None:
+        try:
+            self._socket.sendto(packet, who)
+        except OSError:
+            # A client that went away is refused by its own machine: no reason for the others to see nothing.
+            return
+
+    def _serve(self) -> None:
+        while not self._closed.is_set():
+            try:
+                datagram, who = self._socket.recvfrom(MAX_DATAGRAM_BYTES)
+            except TimeoutError:
+                continue
+            except OSError:
+                if self._closed.is_set():
+                    return
+                continue
+            received_ticks = self.ticks()
+            try:
+                message, payload = split(datagram)
+            except MessageError:
+                continue
+            if (answer := self._answer(message, payload, who, received_ticks)) is not None:
+                self._send(answer, who)
+
+    def _answer(self, message: int, payload: bytes, who: Address, ticks: int) -> bytes | None:
+        self._heard_of(who, connects=message == Message.CONNECT)
+        if message == Message.CONNECT:
+            group, rate = self.settings.multicast, self.settings.clock_hz
+            info = ServerInfo("agvbench", "1.0.0.0", self.settings.version, rate, self.settings.data_port, group)
+            return join(Message.SERVERINFO, encode_server_info(info))
+        if message == Message.REQUEST_MODELDEF:
+            return join(Message.MODELDEF, encode_descriptions(self._models, self._version_of(who)))
+        if message == Message.REQUEST:
+            return self._requested(payload.split(b"\0")[0].decode("utf-8", "replace"), who)
+        if message == Message.ECHO_REQUEST and len(payload) == _TICKS.size:
+            return join(Message.ECHO_RESPONSE, payload + _TICKS.pack(ticks))
+        if message == Message.DISCONNECT:
+            with self._lock:
+                self._clients.pop(who, None)
+        return None if message in {Message.KEEPALIVE, Message.DISCONNECT} else join(Message.UNRECOGNIZED)
+
+    def _heard_of(self, who: Address, *, connects: bool) -> None:
+        with self._lock:
+            client = self._clients.get(who)
+            if client is not None:
+                self._clients[who] = client._replace(heard_s=self._clock.now())
+            elif connects and len(self._clients) < MAX_CLIENTS:
+                self._clients[who] = _Client(self._clock.now(), self.settings.version)
+
+    def _version_of(self, who: Address) -> Version:
+        with self._lock:
+            client = self._clients.get(who)
+        return self.settings.version if client is None else client.version
+
+    def _requested(self, text: str, who: Address) -> bytes:
+        if text == "FrameRate":
+            return join(Message.RESPONSE, _FLOAT.pack(self.settings.rate_hz))
+        if text.startswith(_BITSTREAM) and self.settings.version >= (4, 0) and self.settings.multicast is None:
+            try:
+                version = Version.parse(text.removeprefix(_BITSTREAM))
+            except MessageError:
+                return join(Message.UNRECOGNIZED)
+            with self._lock:
+                if who in self._clients:
+                    self._clients[who] = self._clients[who]._replace(version=version)
+            return join(Message.RESPONSE, f"{text}\0".encode())
+        return join(Message.UNRECOGNIZED)
+
+    def close(self) -> None:
+        """Stream no more; again does nothing."""
+        self._closed.set()
+        self._thread.join(timeout=2.0)
+        self._socket.close()
