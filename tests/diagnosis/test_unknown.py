@@ -89,7 +89,7 @@ def test_a_slow_disc_is_found_where_it_lies():
     rates.value[:, 0] -= 0.2 * inside
     (best, *_) = screened(rates)
     assert best.term is terms.SpeedInDisc
-    loss, x, y, radius = best.values
+    loss, x, y, radius = best.values[0]
     assert loss == pytest.approx(0.2, rel=0.2)
     assert math.hypot(x - 0.4, y + 0.3) < 0.25  # within reach of a fit: the grid is coarse
     assert radius == pytest.approx(0.5, abs=0.2)
@@ -101,7 +101,7 @@ def test_a_line_that_turns_is_found_where_it_lies():
     rates.value[:, 2] += 0.04 * crossed * rates.covariates["direction"] / rates.weight
     (best, *_) = screened(rates)
     assert best.term is terms.TurnAtLine
-    turn, place, direction = best.values
+    turn, place, direction = best.values[0]
     assert direction == pytest.approx(0.0, abs=0.01)
     assert place == pytest.approx(0.2, abs=0.06)
     assert turn == pytest.approx(0.04, rel=0.25)
