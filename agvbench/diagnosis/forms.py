@@ -9,7 +9,7 @@ import numpy as np
 
 from agvbench.diagnosis.candidates import Candidate, bounds_of, candidate, candidates
 from agvbench.diagnosis.empirical_terms import TERMS
-from agvbench.diagnosis.fitting import fit
+from agvbench.diagnosis.fitting import fit, promised_gain
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.selection import LEAST_GAIN, RIVAL_MARGIN, Scored, Selection, Selector
 from agvbench.diagnosis.standing import SLOW_STEERING, otherwise
@@ -66,10 +66,10 @@ def reform(selection: Selection, selector: Selector) -> Selection:
     diagnosis calls them by what they are forms of.
     """
     found = [name for name in selection.chosen.names if name not in selector.given]
-    laws = [law for name in found for law in _laws(selection, selector, name)]
-    if not laws:
+    if not found:
         return selection
     wide, current = wider(selector), selection.chosen
+    laws = [law for name in found for law in _laws(selection, selector, wide, name)]
     offered: list[tuple[_Law, Scored]] = []
     for name in found:
         for law in laws:
@@ -104,21 +104,26 @@ def reform_and_resettle(selection: Selection, selector: Selector) -> tuple[Selec
     return (again, other) if again.chosen.total < chosen.total else (reformed, selector)
 
 
-def _laws(selection: Selection, selector: Selector, name: str) -> Iterator[_Law]:
-    """Yield other laws of the cause `name`, and of others that do half as well in its place, be it in the wrong law."""
+def _laws(selection: Selection, selector: Selector, wide: Selector, name: str) -> Iterator[_Law]:
+    """Yield other laws of the cause `name`, and of others that do half as well in its place or promise to."""
     chosen = selection.chosen
     rest = selector.shrunk(selection.base, chosen, name)
     models = {name: chosen} | {
         other: selector.grown(rest, other) for other in selector.candidates if other not in chosen.names
     }
-    for cause, model in models.items():
-        if rest.total - model.total < _HALF * (rest.total - chosen.total):
+    for form in effect_forms().values():
+        if (model := models.get(form.form_of)) is None:
             continue
-        values = _values(model, cause)
-        for form in effect_forms().values():
-            if form.form_of == cause:
-                bounds = candidate(form).bounds
-                yield _Law(name, form, np.clip(np.array(form.starts(values)), bounds[:, 0], bounds[:, 1]))
+        kind = candidate(form)
+        if rest.total - model.total >= _HALF * (rest.total - chosen.total):
+            starts = np.array(form.starts(_values(model, form.form_of)))
+            yield _Law(name, form, np.clip(starts, kind.bounds[:, 0], kind.bounds[:, 1]))
+            continue
+        # The library's law may fail where another does not.
+        larger = Predictor(wide.batch, (*rest.names, form.name))
+        promises = [promised_gain(rest.fit, larger, start, kind.bounds) for start in kind.starts]
+        if max(promises) >= _HALF * float(rest.fit.loss.sum() - chosen.fit.loss.sum()):
+            yield _Law(name, form, kind.starts[[int(np.argmax(promises))]])
 
 
 def _values(model: Scored, name: str) -> dict[str, float]:
