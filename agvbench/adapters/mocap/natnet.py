@@ -7,6 +7,7 @@ import math
 from agvbench.adapters.contract import AdapterOptions, MocapAdapter, MocapReports
 from agvbench.adapters.natnet.axes import to_floor
 from agvbench.adapters.natnet.client import Client, Seen
+from agvbench.adapters.natnet.emulated import EMULATED, EmulatedNatNet
 from agvbench.adapters.natnet.layout import TRACKED
 from agvbench.adapters.natnet.options import NatNetOptions
 from agvbench.bus.event_message import Level
@@ -49,8 +50,10 @@ class NatNetMocap(MocapAdapter):
         return 1, wanted_hz
 
     @classmethod
-    def open(cls, address: str, options: AdapterOptions) -> NatNetMocap:
-        """Connect to the server at `address`."""
+    def open(cls, address: str, options: AdapterOptions) -> MocapAdapter:  # type: ignore[override]
+        """Connect to the server at `address`; ``emulated`` brings its own."""
+        if address == EMULATED:
+            return EmulatedNatNet.open("", options)
         return cls(NatNetOptions.parse(address, options.camera, options.vehicle), options)
 
     def identity(self) -> MocapIdentity:

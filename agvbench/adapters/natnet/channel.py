@@ -9,13 +9,13 @@ from dataclasses import dataclass
 
 from agvbench.adapters.natnet.packet import MAX_DATAGRAM_BYTES, Message, join, split
 from agvbench.adapters.natnet.version import Version
-from agvbench.bus.clock import Clock
+from agvbench.bus.clock import WallClock
 from agvbench.errors import AdapterGoneError, LinkError, MessageError
 
 COMMAND_PORT, DATA_PORT = 1510, 1511
 _RECEIVE_BUFFER_BYTES = 4 << 20
 _MOST_AT_ONCE = 256
-_POLL_S = 0.02
+POLL_S = 0.02
 _ATTEMPTS = 6
 
 
@@ -69,8 +69,9 @@ class Channel:
         If an address cannot be used.
     """
 
-    def __init__(self, connection: Connection, clock: Clock, counters: Counters) -> None:
-        self._connection, self._clock, self._counters = connection, clock, counters
+    def __init__(self, connection: Connection, counters: Counters) -> None:
+        # Networks are waited for in real time, even where everything else is simulated.
+        self._connection, self._clock, self._counters = connection, WallClock(), counters
         self._selector = selectors.DefaultSelector()
         try:
             self._server = (socket.gethostbyname(connection.server), connection.port)
@@ -138,10 +139,10 @@ class Channel:
             remedy="see whether Motive runs, streams (Edit > Settings > Streaming), and the network lets UDP through",
         )  # fmt: skip
 
-    def arrived(self) -> list[tuple[int, bytes]]:
-        """Return what the server sent; wait a moment for the first."""
+    def arrived(self, limit_s: float = POLL_S) -> list[tuple[int, bytes]]:
+        """Return what the server sent; wait for the first up to `limit_s` [s]."""
         packets = []
-        for key, _ in self._selector.select(_POLL_S):
+        for key, _ in self._selector.select(limit_s):
             opened: socket.socket = key.fileobj  # type: ignore[assignment]
             for _ in range(_MOST_AT_ONCE):
                 try:

@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable
 from typing import NamedTuple
 
-from agvbench.adapters.natnet.channel import DATA_PORT, Channel, Connection, Counters
+from agvbench.adapters.natnet.channel import DATA_PORT, POLL_S, Channel, Connection, Counters
 from agvbench.adapters.natnet.clock_sync import ClockSync, Stamp
 from agvbench.adapters.natnet.description import decode_descriptions
 from agvbench.adapters.natnet.frame import MODELS_CHANGED, FrameOfData, decode_frame
@@ -77,7 +77,7 @@ class Client:
         self._number: int | None = None
         self._keep_alive_s = self._echo_s = self._models_s = -math.inf
         self._closed, self._ready = threading.Event(), threading.Event()
-        self._channel = Channel(connection, clock, self.counters)
+        self._channel = Channel(connection, self.counters)
         try:
             self.info = self._connect()
             self.version = self._agree()
@@ -120,14 +120,23 @@ class Client:
 
     def _run(self) -> None:
         while not self._closed.is_set():
-            self._send_what_is_due()
-            if self.names and (self.info.clock_hz is None or self.sync.ready):
+            self.step()
+            if self.ready:
                 self._ready.set()
-            for message, payload in self._channel.arrived():
-                try:
-                    self._take(message, payload)
-                except MessageError as error:
-                    self.counters.note(error)
+
+    @property
+    def ready(self) -> bool:
+        """Whether names and clock are known."""
+        return bool(self.names) and (self.info.clock_hz is None or self.sync.ready)
+
+    def step(self, limit_s: float = POLL_S) -> None:
+        """Send what is due, take what arrives within `limit_s` [s]: what the thread does all the time."""
+        self._send_what_is_due()
+        for message, payload in self._channel.arrived(limit_s):
+            try:
+                self._take(message, payload)
+            except MessageError as error:
+                self.counters.note(error)
 
     def _send_what_is_due(self) -> None:
         now_s = self._clock.now()

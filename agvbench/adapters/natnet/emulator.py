@@ -57,7 +57,7 @@ class _Client(NamedTuple):
 
 
 class Emulator:
-    """A NatNet server in a thread of its own, until `close`.
+    """A NatNet server, until `close`; in a thread of its own, or answering in `step` only.
 
     Raises
     ------
@@ -65,12 +65,13 @@ class Emulator:
         If the port is taken, or the address is not this machine's.
     """
 
-    def __init__(self, settings: Settings, models: Sequence[Model], clock: Clock | None = None) -> None:
+    def __init__(
+        self, settings: Settings, models: Sequence[Model], clock: Clock | None = None, *, threaded: bool = True
+    ) -> None:
         self.settings, self._models, self._clock = settings, list(models), clock or WallClock()
         self._clients: dict[Address, _Client] = {}
         self._lock = threading.Lock()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.settimeout(_POLL_S)
         try:
             self._socket.bind((settings.host, settings.port))
             if settings.multicast is not None:
@@ -82,7 +83,8 @@ class Emulator:
             raise LinkError("address cannot be used", where=where, value=error.strerror or error) from None
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._serve, name="natnet-emulator", daemon=True)
-        self._thread.start()
+        if threaded:
+            self._thread.start()
 
     @property
     def address(self) -> Address:
@@ -131,21 +133,23 @@ class Emulator:
 
     def _serve(self) -> None:
         while not self._closed.is_set():
-            try:
-                datagram, who = self._socket.recvfrom(MAX_DATAGRAM_BYTES)
-            except TimeoutError:
-                continue
-            except OSError:
-                if self._closed.is_set():
-                    return
-                continue
-            received_ticks = self.ticks()
-            try:
-                message, payload = split(datagram)
-            except MessageError:
-                continue
-            if (answer := self._answer(message, payload, who, received_ticks)) is not None:
-                self._send(answer, who)
+            self.step(_POLL_S)
+
+    def step(self, limit_s: float = 0.0) -> bool:
+        """Answer the next packet, waiting up to `limit_s` [s]; return whether there was one."""
+        self._socket.settimeout(limit_s)
+        try:
+            datagram, who = self._socket.recvfrom(MAX_DATAGRAM_BYTES)
+        except OSError:
+            return False
+        received_ticks = self.ticks()
+        try:
+            message, payload = split(datagram)
+        except MessageError:
+            return True
+        if (answer := self._answer(message, payload, who, received_ticks)) is not None:
+            self._send(answer, who)
+        return True
 
     def _answer(self, message: int, payload: bytes, who: Address, ticks: int) -> bytes | None:
         self._heard_of(who, connects=message == Message.CONNECT)
@@ -194,5 +198,6 @@ class Emulator:
     def close(self) -> None:
         """Stream no more; again does nothing."""
         self._closed.set()
-        self._thread.join(timeout=2.0)
+        if self._thread.is_alive():
+            self._thread.join(timeout=2.0)
         self._socket.close()
