@@ -40,7 +40,7 @@ from agvbench.types import Floats
 
 _EDGE_M = 0.015
 _TURN = math.tau
-_START_S = 0.05
+_START_S = 0.1
 _PER_ROOT = 1.0 / math.sqrt(math.tau)
 
 
@@ -200,7 +200,7 @@ class TwistAtStart(EmpiricalTerm):
     local: ClassVar[bool] = True
 
     twist_rad: float = parameter(unit="rad", low=-0.5, high=0.5, scale=0.02)
-    lost_s: float = parameter(unit="s", low=0.0, high=0.25, scale=0.05)
+    lost_s: float = parameter(unit="s", low=0.0, high=0.8, scale=0.1)
 
     @staticmethod
     def move(state: Floats, twist_rad: float, lost_s: float) -> None:
