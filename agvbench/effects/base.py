@@ -102,7 +102,7 @@ class Effect:
         simulation then keeps its steps short.
     arrive
         ``arrive(state, time_s, …) -> time_s``: when a command given at `time_s` takes effect; may change
-        ``DRIVE_WAIT``.
+        ``REAR_WAIT`` and ``DRIVE_WAIT``.
     aim
         Called when a command takes effect, which is in ``DRIVE_COMMAND`` …; may change where actuators settle and how
         they get there: ``FRONT_AIM`` … ``BRAKE_LAG``, ``STEERING_INERTIA`` … ``BRAKING_LIMIT``.

@@ -37,8 +37,10 @@ FRONT_BEFORE, REAR_BEFORE = range(36, 38)
 STEERING_INERTIA, STEERING_ACCELERATION = range(38, 40)
 # What the lags of the drive ask for is limited: |v̇| while |v| grows, and while it falls.
 ACCELERATION_LIMIT, BRAKING_LIMIT = range(40, 42)
-# The drive's commands arrive so much later than those of the servos, or sooner if negative.
+# The drive's commands arrive so much later than those of the front servo, or sooner if negative; see `REAR_WAIT`.
 DRIVE_WAIT = 42
 # What the camera reports follows what it sees with this lag.
 SEEN_LAG = 43
-SIZE = 44
+# The rear servo's commands arrive so much later than those of the front servo, or sooner if negative.
+REAR_WAIT = 44
+SIZE = 45

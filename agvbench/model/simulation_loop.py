@@ -42,6 +42,7 @@ from agvbench.effects.state import (
     REAR_BEFORE,
     REAR_COMMAND,
     REAR_SPEED,
+    REAR_WAIT,
     SEEN_HEADING,
     SEEN_LAG,
     SEEN_X,
@@ -136,17 +137,19 @@ def _report(s: Floats, p: Floats, out: Floats, k: int) -> None:
 
 
 @compiled(inner=True)
-def _obey(s: Floats, p: Floats, commands: Floats, settled: Floats, driven: int, row: int, lift: float) -> None:
+def _obey(
+    s: Floats, p: Floats, commands: Floats, settled: Floats, driven: int, front: int, rear: int, lift: float
+) -> None:
     """Put the command and what it aims at into `s`; a drive that is told to go goes faster by `lift`.
 
-    The drive obeys the row `driven`, the servos `row`.
+    The drive obeys the row `driven`, the servos `front` and `rear`.
     """
-    if commands[row, 1] != s[FRONT_COMMAND]:
+    if commands[front, 1] != s[FRONT_COMMAND]:
         s[FRONT_BEFORE] = s[FRONT_AIM]
-    if commands[row, 2] != s[REAR_COMMAND]:
+    if commands[rear, 2] != s[REAR_COMMAND]:
         s[REAR_BEFORE] = s[REAR_AIM]
-    s[DRIVE_COMMAND], s[FRONT_COMMAND], s[REAR_COMMAND] = commands[driven, 0], commands[row, 1], commands[row, 2]
-    s[FRONT_AIM], s[REAR_AIM], s[SPEED_AIM] = settled[row, 0], settled[row, 1], settled[driven, 2]
+    s[DRIVE_COMMAND], s[FRONT_COMMAND], s[REAR_COMMAND] = commands[driven, 0], commands[front, 1], commands[rear, 2]
+    s[FRONT_AIM], s[REAR_AIM], s[SPEED_AIM] = settled[front, 0], settled[rear, 1], settled[driven, 2]
     if settled[driven, 2] != 0.0:
         s[SPEED_AIM] += lift
     s[STEERING_LAG], s[STEERING_RATE], s[PLAY], s[ACCELERATE_LAG], s[BRAKE_LAG] = 0.0, math.inf, 0.0, 0.0, 0.0
@@ -387,13 +390,14 @@ def _drive_run(
     # At first nothing was before.
     s[FRONT_COMMAND], s[REAR_COMMAND] = commands[first, 1], commands[first, 2]
     s[FRONT_BEFORE], s[REAR_BEFORE] = settled[first, 0], settled[first, 1]
-    driven = row = first
+    driven = front = rear = first
     while now < math.inf:
-        steers = arrive(s, command_t_s[row + 1], p) if row < last else math.inf
-        drives = arrive(s, command_t_s[driven + 1], p) + s[DRIVE_WAIT] if driven < last else math.inf
-        end = min(steers, drives)
-        _obey(s, p, commands, settled, driven, row, lift)
-        if row == driven == first:
+        to_front = arrive(s, command_t_s[front + 1], p) if front < last else math.inf
+        to_rear = arrive(s, command_t_s[rear + 1], p) + s[REAR_WAIT] if rear < last else math.inf
+        to_drive = arrive(s, command_t_s[driven + 1], p) + s[DRIVE_WAIT] if driven < last else math.inf
+        end = min(to_front, to_rear, to_drive)
+        _obey(s, p, commands, settled, driven, front, rear, lift)
+        if now == -math.inf:
             # At rest at neutral, for as long as it may have been.
             servos[0] = servos[2] = s[FRONT_AIM]
             servos[1] = servos[3] = s[REAR_AIM]
@@ -410,7 +414,7 @@ def _drive_run(
                 if not math.isnan(speed):
                     lift = _lift(s, p, vehicle, servos, now, lately, speed)
                     servos[4] = _drive_speed(s, p, vehicle, servos, now, speed)
-                    _obey(s, p, commands, settled, driven, row, lift)
+                    _obey(s, p, commands, settled, driven, front, rear, lift)
                 if s[SEEN_LAG] > 0.0:
                     _see_late(s, p, vehicle, servos, now, start)
             plan_command(plan, s, servos)
@@ -419,8 +423,9 @@ def _drive_run(
                 break
             leave_command(plan, end - now, servos)
         now = end
-        row += steers <= end
-        driven += drives <= end
+        front += to_front <= end
+        rear += to_rear <= end
+        driven += to_drive <= end
 
 
 @compiled()
@@ -480,7 +485,7 @@ def simulate(
         _start(s, p, initial, run)
         start[0], start[1], start[2], start[3] = s[X], s[Y], s[HEADING], 0.0
         start[4], start[5], start[6] = initial[run, 0], initial[run, 1], initial[run, 2]
-        begin = arrive(s, command_t_s[first + 1], p) + min(0.0, s[DRIVE_WAIT])
+        begin = arrive(s, command_t_s[first + 1], p) + min(0.0, s[REAR_WAIT], s[DRIVE_WAIT])
         if not math.isnan(begins_s[run]):
             begin = capture(s, begins_s[run], p)
         k = _wait(s, p, start, begin, t_s, out, k, stop)

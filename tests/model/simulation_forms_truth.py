@@ -152,13 +152,12 @@ def with_play(servo: Path, rest: float, width: float, end: float) -> Path:
 def true_form(name: str, values: dict[str, float], start: tuple[float, float, float], times: Floats) -> Floats:
     """Return (n, 3) measured poses with one law."""
     end = times[-1] + 2.0
-    steering = RUN_TIMES + values.get("steering_s", 0.0)
-    drives = RUN_TIMES + values.get("drive_s", 0.0)
-    front, rear, speed = aims(0, steering), aims(1, steering), aims(2, drives)
+    fronts, rears, drives = (RUN_TIMES + values.get(f"{channel}_s", 0.0) for channel in ("front", "rear", "drive"))
+    front, rear, speed = aims(0, fronts), aims(1, rears), aims(2, drives)
     if name in ("steering_lag_inertia", "steering_rate_limit_acceleration"):
-        front, rear = (servo_path(name, values, channel, steering, end) for channel in (0, 1))
+        front, rear = (servo_path(name, values, channel, RUN_TIMES, end) for channel in (0, 1))
     if name == "speed_lag_ramp":
         speed = ramped(speed, drives, values["acceleration_mps2"], values["braking_mps2"], end)
     smoothing = values.get("time_constant_s", 0.0) if name == "mocap_latency_smoothing" else 0.0
     seen = times - values.get("latency_s", 0.0)
-    return drive(front, rear, speed, np.array(start), seen, np.r_[steering, drives], smoothing)
+    return drive(front, rear, speed, np.array(start), seen, np.r_[fronts, rears, drives], smoothing)

@@ -30,8 +30,8 @@ SIZES = [
     ("mocap_latency_smoothing", {"latency_s": 0.03, "time_constant_s": 0.12}),
     ("mocap_latency_smoothing", {"latency_s": 0.0, "time_constant_s": 0.004}),
     ("mocap_latency_smoothing", {"latency_s": 0.0, "time_constant_s": 1.5}),
-    ("actuation_delay_uneven", {"steering_s": 0.2, "drive_s": 0.08}),
-    ("actuation_delay_uneven", {"steering_s": 0.0, "drive_s": 0.95}),
+    ("actuation_delay_uneven", {"front_s": 0.2, "rear_s": 0.13, "drive_s": 0.08}),
+    ("actuation_delay_uneven", {"front_s": 0.0, "rear_s": 0.0, "drive_s": 0.95}),
 ]
 each = pytest.mark.parametrize(("name", "values"), SIZES)
 
@@ -75,7 +75,7 @@ def test_a_window_of_smoothed_poses_begins_as_in_a_steady_motion():
         (("steering_rate_limit_acceleration", (1.2, math.inf)), ("steering_rate_limit", (1.2,))),
         (("mocap_latency_smoothing", (0.07, 0.0)), ("mocap_latency", (0.07,))),
         (("mocap_latency_smoothing", (0.0, 1e-4)), ("mocap_latency", (1e-4,))),
-        (("actuation_delay_uneven", (0.07, 0.07)), ("actuation_delay", (0.07,))),
+        (("actuation_delay_uneven", (0.07, 0.07, 0.07)), ("actuation_delay", (0.07,))),
     ],
 )
 def test_it_has_the_librarys_law_for_a_limit(form, library):

@@ -1,4 +1,4 @@
-"""Commands take time to arrive, those of the drive another time than those of the servos."""
+"""Commands take time to arrive, each channel its own."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import ClassVar
 
 from agvbench.effects.base import Stage, parameter
 from agvbench.effects.forms.base import Form
-from agvbench.effects.state import DRIVE_WAIT
+from agvbench.effects.state import DRIVE_WAIT, REAR_WAIT
 from agvbench.types import Floats
 
 
 @dataclass(frozen=True)
 class ActuationDelayUneven(Form):
-    """Servos obey at t the command given at t − steering_s, the drive that given at t − drive_s."""
+    """Each channel obeys at t the command given at t − its delay: front servo, rear servo and drive."""
 
     name: ClassVar[str] = "actuation_delay_uneven"
     form_of: ClassVar[str] = "actuation_delay"
@@ -23,19 +23,21 @@ class ActuationDelayUneven(Form):
     reference: ClassVar[str] = (
         "Bentvelsen 2015, section 9.2; servo pulses and motor controllers have frames of their own"
     )
-    limits: ClassVar[str] = "what both delays have in common cannot be told from mocap_latency where runs begin at rest"
+    limits: ClassVar[str] = "what all delays have in common cannot be told from mocap_latency where runs begin at rest"
 
-    steering_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.05)
+    front_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.05)
+    rear_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.05)
     drive_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.05)
 
     @classmethod
     def starts(cls, fitted: Mapping[str, float]) -> list[tuple[float, ...]]:
         """Begin with a drive that obeys a little sooner than the servos, and a little later."""
         delay = fitted["delay_s"]
-        return [(1.1 * delay, 0.9 * delay), (0.9 * delay, 1.1 * delay)]
+        return [(1.1 * delay, 1.1 * delay, 0.9 * delay), (0.9 * delay, 0.9 * delay, 1.1 * delay)]
 
     @staticmethod
-    def arrive(state: Floats, time_s: float, steering_s: float, drive_s: float) -> float:
-        """Let the servos' commands arrive, and say how much later those of the drive do."""
-        state[DRIVE_WAIT] = drive_s - steering_s
-        return time_s + steering_s
+    def arrive(state: Floats, time_s: float, front_s: float, rear_s: float, drive_s: float) -> float:
+        """Let the front servo's command arrive, and say how much later the others do."""
+        state[REAR_WAIT] = rear_s - front_s
+        state[DRIVE_WAIT] = drive_s - front_s
+        return time_s + front_s
