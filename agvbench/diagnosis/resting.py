@@ -67,8 +67,10 @@ def start_of(run: Run, frames: Frames, neutral: float | None) -> tuple[Floats, F
         If the vehicle was not seen before it was driven, nor shortly after.
     """
     go_s = 0.0 if neutral is None else goes_s(run, neutral)
-    before = int(np.count_nonzero(frames.t_s <= 0.0))
-    if before < _ENOUGH_FRAMES and np.count_nonzero(frames.t_s <= go_s) > before:
+    # Cleaning may leave out where the vehicle stood, if its pose jumps as it sets off: it stood there all the same.
+    seen_s = run.frames.t_s[run.frames.tracked.astype(np.bool_)]
+    before = int(np.count_nonzero(seen_s <= 0.0))
+    if before < _ENOUGH_FRAMES and np.count_nonzero(seen_s <= go_s) > before:
         later = min(go_s, float(frames.t_s[-1]))
         run = replace(run, frames=replace(run.frames, t_s=run.frames.t_s - later))
     elif before == 0 and neutral is not None:

@@ -59,6 +59,14 @@ def test_runs_that_are_seen_from_their_first_command_on_are_runs_from_rest(tiny_
     assert len(at_once) == len(seen)
 
 
+def test_a_start_that_cleaning_leaves_out_is_where_the_vehicle_stood(tiny_campaign):
+    run = next(run for run in tiny_campaign(Tiny()).runs if run.experiment == "drive")
+    f = run.frames
+    seam = dataclasses.replace(f, heading_rad=f.heading_rad + 0.8 * (f.t_s > 0.2))
+    (start,) = read_runs([dataclasses.replace(run, frames=seam)], HEADER.neutral).start
+    np.testing.assert_allclose(start, read_runs([run], HEADER.neutral).start[0])
+
+
 def test_clocks_that_begin_elsewhere_are_set_to_the_first_command(tmp_path, tiny_campaign, write_campaign):
     runs = tiny_campaign(Tiny()).runs[:3]
     path = write_campaign(tmp_path / "c", runs)
