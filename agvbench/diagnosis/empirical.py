@@ -11,6 +11,7 @@ from agvbench.diagnosis.candidates import Candidate, candidate
 from agvbench.diagnosis.empirical_screen import Start, screen, steering
 from agvbench.diagnosis.empirical_terms import TERMS, EmpiricalTerm
 from agvbench.diagnosis.forms import wider
+from agvbench.diagnosis.judging import without_best
 from agvbench.diagnosis.residuals import AT_THE_FLOOR, LACK_OF_FIT, floor, lack_of_fit, misses
 from agvbench.diagnosis.selection import Scored, Selection, Selector
 from agvbench.diagnosis.structure import Dependence, residual_rates
@@ -21,6 +22,7 @@ _LEAST_PROMISE = 4.0
 _LEAST_OF_BEST = 0.3
 _MOST_RETRIED = 3
 _FLIPS = 9999
+_FEW = 0.1
 
 
 @dataclass(frozen=True)
@@ -61,11 +63,14 @@ def explain(selection: Selection, selector: Selector) -> Explained | None:
     batch = selector.batch
     wide = wider(selector)
     starts = promising(wide, selection.chosen)
-    if not starts and not _lacks(selection.chosen):
-        return None
-    found = [_best_term(wide, selection.chosen, starts)]
-    if found[0] is None and selection.chosen.names != selection.base.names:
-        found.append(_best_term(wide, selection.base, promising(wide, selection.base)))
+    found: list[tuple[Scored, type[EmpiricalTerm]] | None] = []
+    if starts or _lacks(selection.chosen):
+        found.append(_best_term(wide, selection.chosen, starts))
+        if found[0] is None and selection.gains:
+            found.append(_best_term(wide, selection.base, promising(wide, selection.base)))
+            found.append(_in_place(wide, selection))
+    elif any(_rests_on_few(selector, selection, name) for name in selection.gains):
+        found.append(_in_place(wide, selection))
     models = [_settled(wide, selection, *pair) for pair in found if pair is not None]
     models = [model for model in models if model[0].total < selection.chosen.total - selector.least_gain]
     if not models:
@@ -119,6 +124,34 @@ def _best_term(wide: Selector, root: Scored, starts: list[Start]) -> tuple[Score
             continue  # a shape that runs away to where nothing can be predicted describes nothing
         if wide.earns(root, offer) and (best is None or offer.total < best[0].total):
             best = offer, start.term
+    return best
+
+
+def _rests_on_few(selector: Selector, selection: Selection, name: str) -> bool:
+    """Return whether some groups of runs hold most of what an effect gains."""
+    chosen = selection.chosen
+    rest = tuple(n for n in chosen.names if n != name)
+    without = selection.base if rest == selection.base.names else selector.known(rest)
+    if without is None:
+        return False
+    gain = without.loss - chosen.loss
+    return without_best(gain, selector.batch.readings.group, _FEW) < 0.5 * float(gain.sum())
+
+
+def _in_place(wide: Selector, selection: Selection) -> tuple[Scored, type[EmpiricalTerm]] | None:
+    """Return the term that predicts better in the place of an effect that was chosen, if one does.
+
+    An effect that few runs show is fitted to them and leaves nothing for a regression to find. Only terms that depend
+    on no place are tried, for they are simulated as fast as effects.
+    """
+    best: tuple[Scored, type[EmpiricalTerm]] | None = None
+    for name in selection.gains:
+        rest = wide.shrunk(selection.base, selection.chosen, name)
+        for term in (term for term in TERMS if not term.local):
+            wide.candidates[term.name] = candidate(term)
+            offer = wide.grown(rest, term.name)
+            if offer.total < (best[0] if best else selection.chosen).total and wide.earns(rest, offer):
+                best = offer, term
     return best
 
 

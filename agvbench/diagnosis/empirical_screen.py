@@ -192,7 +192,8 @@ def _options(
     short = stands.before - stands.tangent
     angle = np.arctan(stands.before) - np.arctan(stands.tangent)
     if np.any(short != 0.0):
-        yield terms.SteeringByHistory, iter([(_axles(angle[:, 0], angle[:, 1], stands, geometry), Values())])
+        both = _axles(angle[:, 0], angle[:, 1], stands, geometry)
+        yield terms.SteeringByHistory, iter([({k: v.sum(axis=1, keepdims=True) for k, v in both.items()}, Values())])
     yield terms.WaveByDistance, _waves(rates)
 
 

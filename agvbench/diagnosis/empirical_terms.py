@@ -279,21 +279,23 @@ class SteeringByDirection(EmpiricalTerm):
 
 @dataclass(frozen=True)
 class SteeringByHistory(EmpiricalTerm):
-    """Axles stop short of where they are sent, by a share of the way from where they stood."""
+    """Axles stop short of where they are sent, by a share of the way from where they stood, the same for both.
+
+    Few runs turn an axle back, and often one axle alone: two shares would leave the other's to chance.
+    """
 
     name: ClassVar[str] = "steering_by_history"
     stage: ClassVar[Stage] = Stage.SERVO
     covariates: ClassVar[tuple[str, ...]] = ("history", "curvature_per_m")
     through: ClassVar[str] = "steering"
 
-    front_share: float = parameter(unit="–", low=-0.5, high=0.7, scale=0.05)
-    rear_share: float = parameter(unit="–", low=-0.5, high=0.7, scale=0.05)
+    share: float = parameter(unit="–", low=-0.5, high=0.7, scale=0.05)
 
     @staticmethod
-    def aim(state: Floats, front_share: float, rear_share: float) -> None:
+    def aim(state: Floats, share: float) -> None:
         """Aim short."""
-        state[FRONT_AIM] -= front_share * (state[FRONT_AIM] - state[FRONT_BEFORE])
-        state[REAR_AIM] -= rear_share * (state[REAR_AIM] - state[REAR_BEFORE])
+        state[FRONT_AIM] -= share * (state[FRONT_AIM] - state[FRONT_BEFORE])
+        state[REAR_AIM] -= share * (state[REAR_AIM] - state[REAR_BEFORE])
 
 
 @dataclass(frozen=True)
