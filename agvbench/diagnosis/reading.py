@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from agvbench.calibration import inspect_frames
 from agvbench.diagnosis.grouping import at_common_levels, group_runs
-from agvbench.diagnosis.resting import frame_noise, motion_of, start_of
+from agvbench.diagnosis.resting import between_rows, frame_noise, motion_of, start_of
 from agvbench.diagnosis.windows import Beginnings, Horizon, blocks, cut_windows, recording_of
 from agvbench.errors import FitError
 from agvbench.model.simulation import SimulatedRun
@@ -97,7 +97,7 @@ def read_runs(runs: Iterable[Run], neutral: float | None = None) -> Readings:
 
     Where `neutral` is given, a vehicle is taken to rest while its drive is there, for runs not seen before they began.
     """
-    every = list(at_common_levels(list(runs)))
+    every = [between_rows(run) for run in at_common_levels(list(runs))]
     began = _session_starts(every)
     kept: list[Run] = []
     rows: list[tuple[Floats, Floats, Floats, Floats]] = []

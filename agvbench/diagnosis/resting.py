@@ -23,6 +23,19 @@ _LEAST_M, _LEAST_RAD = 1e-4, 2e-4
 _FEW_ROWS_PER_S = 3.0
 
 
+def between_rows(run: Run) -> Run:
+    """Return an imported run with its changes of command half a row earlier; any other run as it is.
+
+    A recording has the command beside the pose: what changes is first seen in the row after it changed. Taken at that
+    row's time, every camera would look half a period early.
+    """
+    if "source_row" not in run.extra or len(run.commands) < 2 or len(run.frames) < 2:
+        return run
+    t_s = run.commands.t_s.copy()
+    t_s[1:] -= 0.5 * float(np.median(np.diff(np.sort(run.frames.t_s))))
+    return replace(run, commands=replace(run.commands, t_s=np.maximum.accumulate(t_s)))
+
+
 def goes_s(run: Run, neutral: float) -> float:
     """Return when the first command is given that drives; ∞ where none does."""
     driven = np.flatnonzero(run.commands.drive != neutral)

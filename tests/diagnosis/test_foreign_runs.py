@@ -10,7 +10,7 @@ from agvbench.campaign import Campaign
 from agvbench.diagnosis import diagnose
 from agvbench.diagnosis.grouping import at_common_levels
 from agvbench.diagnosis.reading import read_runs
-from agvbench.diagnosis.resting import rests
+from agvbench.diagnosis.resting import between_rows, rests
 from agvbench.diagnosis.windows import horizon_of
 
 
@@ -81,6 +81,14 @@ def test_clocks_that_begin_elsewhere_are_set_to_the_first_command(tmp_path, tiny
     for a, b in zip(Campaign.open(moved).check(), campaign, strict=True):
         np.testing.assert_allclose(a.commands.t_s, b.commands.t_s, atol=1e-12)
         np.testing.assert_allclose(a.frames.t_s, b.frames.t_s, atol=1e-12)
+
+
+def test_imported_commands_changed_between_two_rows(tiny_campaign):
+    run = tiny_campaign(Tiny()).runs[0]
+    imported = dataclasses.replace(run, extra={"source_row": 1})
+    assert between_rows(run) is run
+    moved = between_rows(imported).commands.t_s - run.commands.t_s
+    np.testing.assert_allclose(moved, [0.0, *([-1.0 / 120.0] * (len(moved) - 1))], atol=1e-9)
 
 
 def test_levels_that_differ_by_rounding_are_one(tiny_campaign):
