@@ -120,7 +120,7 @@ class _Ground:
         runs = len(offsets)
         a = (fitted.linear.by_offsets * weight[..., None]).reshape(runs, -1, 6)
         j = (fitted.linear.by_parameters * weight[..., None]).reshape(runs, a.shape[1], -1)
-        prior = _priors(predictor, scatter)
+        prior = priors(predictor, scatter)
         inverse = _inner_inverse(a, prior)[1]
         mixed = inverse @ (a.transpose(0, 2, 1) @ j)
         drawn = offsets / prior**2
@@ -287,7 +287,8 @@ def _inner_inverse(a: Floats, prior: Floats) -> tuple[Floats, Floats]:
     return inner, np.asarray(np.linalg.inv(inner))
 
 
-def _priors(predictor: Predictor, scatter: Scatter) -> Floats:
+def priors(predictor: Predictor, scatter: Scatter) -> Floats:
+    """Return how far each run's offsets may be from none, (R, 6)."""
     start = np.hypot(predictor.readings.start_stderr, _START_EXTRA_M)
     out = np.empty((len(predictor.readings), 6))
     out[:, :2] = start[:, :2]
@@ -313,7 +314,7 @@ def _terms(
     j = np.take_along_axis(by_parameters, own[:, None, None, :], axis=-1)
     j = (j * weight[..., None]).reshape(runs, e.shape[1], -1)
     a = (by_offsets * weight[..., None]).reshape(runs, e.shape[1], 6)
-    prior = _priors(predictor, scatter)
+    prior = priors(predictor, scatter)
     at, jt = a.transpose(0, 2, 1), j.transpose(0, 2, 1)
     inner, inverse = _inner_inverse(a, prior)
     pull = (at @ e[..., None])[..., 0] - offsets / prior**2
@@ -393,7 +394,7 @@ def _objective(predictor: Predictor, residual: Floats, offsets: Floats, scatter:
     temper, _ = _temper(predictor)
     seen = predictor.readings.seen[:, :, None]
     e = residual * seen / _scale(scatter)
-    squares = temper * np.sum(e * e, axis=(1, 2)) + np.sum((offsets / _priors(predictor, scatter)) ** 2, axis=1)
+    squares = temper * np.sum(e * e, axis=(1, 2)) + np.sum((offsets / priors(predictor, scatter)) ** 2, axis=1)
     if predictor.readings.begins is not None:
         squares, _ = _student(predictor, squares)
     return float(squares.sum())

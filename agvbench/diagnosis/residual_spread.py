@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.diagnosis.fitting import Fit, _priors
+from agvbench.diagnosis.fitting import Fit, priors
 from agvbench.diagnosis.prediction import Predictor
 from agvbench.types import Floats
 
@@ -46,5 +46,5 @@ def end_spread(every: Predictor, fitted: Fit) -> EndSpread:
     j = turn @ linear.by_parameters[rows, last]
     scatter = fitted.scatter
     frame = np.diag(np.square([scatter.position_m, scatter.position_m, scatter.heading_rad]))
-    own = (a * _priors(every, scatter)[:, None, :] ** 2) @ a.transpose(0, 2, 1) + frame
+    own = (a * priors(every, scatter)[:, None, :] ** 2) @ a.transpose(0, 2, 1) + frame
     return EndSpread(own, j @ fitted.covariance @ j.transpose(0, 2, 1))
