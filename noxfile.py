@@ -5,6 +5,10 @@ Arguments after ``--`` go to the tool of the session: ``nox -s bench -- --repeat
 
 from __future__ import annotations
 
+import os
+import shutil
+from pathlib import Path
+
 import nox
 
 nox.needs_version = ">=2024.10"
@@ -13,6 +17,7 @@ nox.options.reuse_existing_virtualenvs = True
 nox.options.sessions = ["lint", "tests", "docs"]
 
 LOCK = "requirements.lock"
+FIRMWARE_PACKAGES = ["make", "gcc", "libc6-dev", "gcc-avr", "avr-libc", "simavr", "libsimavr-dev"]
 
 
 def install(session: nox.Session, *extras: str) -> None:
@@ -34,6 +39,18 @@ def tests(session: nox.Session) -> None:
     install(session, "test")
     arguments = session.posargs or ["--cov", "--cov-report=term:skip-covered", "-n", "2", "--dist", "worksteal"]
     session.run("pytest", *arguments)
+
+
+@nox.session(venv_backend="none")
+def firmware(session: nox.Session) -> None:
+    """Build the vehicle's firmware and the simulated microcontroller; install the tools first where that is allowed."""
+    if shutil.which("avr-gcc") is None or not Path("/usr/include/simavr/sim_avr.h").exists():
+        command = ["apt-get", "install", "--yes", "--quiet", "--no-install-recommends", *FIRMWARE_PACKAGES]
+        if shutil.which("apt-get") is None or os.geteuid() != 0:
+            session.error("tools are missing; as an administrator: " + " ".join(command))
+        session.run("apt-get", "update", "--quiet", external=True)
+        session.run(*command, external=True)
+    session.run("make", "-C", "firmware", *session.posargs, external=True)
 
 
 @nox.session

@@ -1,0 +1,94 @@
+"""The firmware and the conversation with it, in lock step: time passes only in `Microcontroller.run_until`."""
+
+from __future__ import annotations
+
+from agvbench.adapters.serial_line.conversation import Conversation
+from agvbench.adapters.serial_line.replies import Hello
+from agvbench.adapters.simavr.host import CYCLES_PER_S, Pulse, SimavrHost
+from agvbench.errors import LinkError
+from agvbench.types import Command
+
+BAUD = 115200
+_SETTLE_S = 0.02
+_ATTEMPTS = 10
+_READ_LIMIT_S = 5.0
+
+
+class Microcontroller:
+    """The firmware behind a real serial port, in simulated time.
+
+    Bytes are written to a pseudo-terminal and read from it as with hardware; the counts of bytes that both sides
+    exchange beside it say when all of them have arrived. So the same commands give the same pulses, to the cycle.
+
+    Parameters
+    ----------
+    version
+        Of the firmware, ``"1"`` or ``"2"``.
+    """
+
+    def __init__(self, version: str = "2") -> None:
+        import serial
+
+        self.host = SimavrHost(version)
+        try:
+            self._port = serial.Serial(self.host.port, BAUD, timeout=_READ_LIMIT_S)
+            self.hello: Hello = self.reset()
+        except BaseException:
+            self.host.close()
+            raise
+
+    def reset(self) -> Hello:
+        """Press the reset button, and wait until firmware and conversation have greeted each other."""
+        self.host.reset()
+        self._port.reset_input_buffer()
+        self._written = self._read = 0
+        self.now_s = 0.0
+        self.conversation = Conversation(self.host.port)
+        for attempt in range(_ATTEMPTS):
+            self._write(self.conversation.greeting(attempt))
+            self.run_until(self.now_s + _SETTLE_S)
+            if self.conversation.hello is not None:
+                break
+        # What answers the greeting may be on the wire yet.
+        self.run_until(self.now_s + _SETTLE_S)
+        return self.conversation.begin()
+
+    def say(self, command: Command) -> None:
+        """Send a command [µs] now."""
+        self._write(self.conversation.command(command, self.now_s))
+
+    def run_until(self, end_s: float) -> list[Pulse]:
+        """Let time pass until `end_s` [s] since the reset; return the pulses that ended.
+
+        Raises
+        ------
+        LinkError
+            If the firmware refuses a command or does not answer.
+        AdapterGoneError
+            If the process has ended.
+        """
+        ran = self.host.run(round(end_s * CYCLES_PER_S), self._written)
+        self.now_s = max(self.now_s, end_s)
+        count, self._read = ran.bytes_sent - self._read, ran.bytes_sent
+        data: bytes = self._port.read(count)
+        if len(data) != count:
+            raise LinkError(
+                "bytes were lost in the pseudo-terminal", where=self.host.port, value=len(data), limit=count
+            )
+        if again := self.conversation.receive(data, self.now_s):
+            self._write(again)
+        self.conversation.check(self.now_s)
+        return ran.pulses
+
+    def write(self, data: bytes) -> None:
+        """Send bytes as they are, past the conversation."""
+        self._write(data)
+
+    def _write(self, data: bytes) -> None:
+        self._port.write(data)
+        self._written += len(data)
+
+    def close(self) -> None:
+        """End the process."""
+        self._port.close()
+        self.host.close()
