@@ -14,7 +14,8 @@
     ├── PlantError                a plant that breaks the plant protocol
     └── LinkError                 bus, adapters and hardware
         ├── MessageError          a message that cannot be decoded
-        └── AdapterGoneError      an adapter that did not answer or vanished
+        ├── AdapterGoneError      an adapter that did not answer or vanished
+        └── SafetyStopError       a vehicle that was stopped: lost, frozen, jumping, or about to leave the floor
 
 A message names *what* is wrong, *where*, the *value*, the *limit* with its unit and the *remedy*.
 """
@@ -112,6 +113,10 @@ class LinkError(AgvbenchError):
 
 class MessageError(LinkError):
     """A message that cannot be decoded: wrong magic, version, kind, length or count."""
+
+
+class SafetyStopError(LinkError):
+    """A vehicle that was stopped while it drove, because something was not as it should be."""
 
 
 class AdapterGoneError(LinkError):

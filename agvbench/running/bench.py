@@ -8,12 +8,13 @@ from agvbench.bus.link import VehicleLink
 from agvbench.campaign import CampaignWriter
 from agvbench.errors import FlagError, LinkError, PlantError
 from agvbench.model import VehicleModel
-from agvbench.planning import Departure
+from agvbench.planning import Departure, Workspace
 from agvbench.running.campaign_time import CampaignTime
 from agvbench.running.drive import DEFAULT_TIMING, Drive, Timing, drive, exchanged
 from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess
 from agvbench.running.records import DriveOrder, aborted_run, free_name, recorded_run
 from agvbench.running.settings import BenchSettings
+from agvbench.running.supervision import Supervisor
 from agvbench.types import Command, Frames, Run
 
 
@@ -47,6 +48,7 @@ class Bench:
         self._identity = link.identity()
         self._failure: LinkError | PlantError | None = None
         self._recorded = recorded
+        self._supervisor = Supervisor(Workspace.parse(settings.workspace), nominal.neutral)
 
     def model(self, condition: str) -> VehicleModel:
         """Return the vehicle model that commands are computed with under `condition`.
@@ -130,6 +132,7 @@ class Bench:
             neutral=self._neutral(),
             start=order.start,
             run_key=run_id if self._identity.simulated else None,
+            supervisor=self._supervisor,
             timing=self._timing,
             seen=seen,
         )

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from agvbench.bus.link import VehicleLink
 from agvbench.running.rest import is_at_rest
+from agvbench.running.supervision import Supervisor
 from agvbench.types import Command, Commands, Frames, Pose
 
 
@@ -26,6 +29,7 @@ class Timing:
 
 
 DEFAULT_TIMING = Timing()
+_RECENT = 30
 
 
 @dataclass(frozen=True)
@@ -44,29 +48,34 @@ def drive(
     neutral: Command,
     start: Pose,
     run_key: str | None,
+    supervisor: Supervisor,
     timing: Timing = DEFAULT_TIMING,
     seen: list[Frames] | None = None,
 ) -> Drive:
     """Drive `commands` from `start` and return everything seen.
 
     The last row of `commands` stops the vehicle. `run_key` names a simulated run, whose randomness follows from it;
-    None is for real vehicles, which stand at `start` already. `seen` is filled batch by batch, for a caller who wants
-    to keep what was seen of a run that failed.
+    None is for real vehicles, which stand at `start` already. `supervisor` stops the vehicle when something is wrong.
+    `seen` is filled batch by batch, for a caller who wants to keep what was seen of a run that failed.
 
     Raises
     ------
+    SafetyStopError
+        If the supervisor stopped the vehicle.
     LinkError
         If the bus or an adapter fails; the vehicle has been told to stop.
     """
     batches = [] if seen is None else seen
+    watched = partial(supervisor.exchange, link, seen=batches)
+    supervisor.begin()
     try:
         if run_key is not None:
             link.reset(start, run_key=run_key)
-        batches.append(link.exchange(neutral, t_s=-timing.rest_before_s, hold_s=timing.rest_before_s))
+        watched(neutral, t_s=-timing.rest_before_s, hold_s=timing.rest_before_s)
         for i in range(len(commands) - 1):
             hold_s = float(commands.t_s[i + 1] - commands.t_s[i])
-            batches.append(link.exchange(commands.at(i), t_s=float(commands.t_s[i]), hold_s=hold_s))
-        end_s = _settle(link, commands, batches, timing)
+            watched(commands.at(i), t_s=float(commands.t_s[i]), hold_s=hold_s)
+        end_s = _settle(watched, commands, batches, timing)
         batches.append(link.flush())
     except BaseException:
         # Ctrl-C, a lost adapter, a bug: before anything else the vehicle stands still.
@@ -76,14 +85,14 @@ def drive(
     return Drive(commands, frames, timing.rest_before_s + end_s)
 
 
-def _settle(link: VehicleLink, commands: Commands, batches: list[Frames], timing: Timing) -> float:
+def _settle(watched: Callable[..., None], commands: Commands, batches: list[Frames], timing: Timing) -> float:
     """Hold the last command until the vehicle stands still; return when that was [s]."""
     last, t_s = commands.at(len(commands) - 1), float(commands.t_s[-1])
     limit_s = t_s + timing.settle_limit_s
-    batches.append(link.exchange(last, t_s=t_s, hold_s=timing.settle_s))
+    watched(last, t_s=t_s, hold_s=timing.settle_s)
     t_s += timing.settle_s
-    while t_s < limit_s and not is_at_rest(Frames.concatenate(batches[-3:]), until_s=t_s):
-        batches.append(link.exchange(last, t_s=t_s, hold_s=timing.settle_step_s))
+    while t_s < limit_s and not is_at_rest(Frames.concatenate(batches[-_RECENT:]), until_s=t_s):
+        watched(last, t_s=t_s, hold_s=timing.settle_step_s)
         t_s += timing.settle_step_s
     return t_s
 

@@ -1,0 +1,71 @@
+"""The supervisor: exchanges in short slices, and a stop as soon as a rule complains."""
+
+from __future__ import annotations
+
+import itertools
+
+from agvbench.bus.link import VehicleLink
+from agvbench.errors import SafetyStopError
+from agvbench.planning import Workspace
+from agvbench.registry import classes_by_file
+from agvbench.running.supervision import rules
+from agvbench.running.supervision.limits import DEFAULT_SAFETY, SafetyLimits
+from agvbench.running.supervision.rule import Rule, Slice
+from agvbench.types import Command, Frames
+
+_SLACK_S = 1e-9
+
+
+class Supervisor:
+    """Watches a run as it is driven.
+
+    A hold is exchanged in slices of ``watch_s``, and after each every rule looks at what was seen. How a hold is cut
+    makes no difference to what a simulated vehicle does.
+    """
+
+    def __init__(self, workspace: Workspace, neutral_drive: float, limits: SafetyLimits = DEFAULT_SAFETY) -> None:
+        self._workspace, self._neutral, self._limits = workspace, neutral_drive, limits
+        self._classes = classes_by_file(rules, Rule)  # type: ignore[type-abstract]
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget the last run."""
+        self._rules = [rule(self._limits, self._workspace) for rule in self._classes]
+        self._driving_since_s: float | None = None
+
+    def exchange(self, link: VehicleLink, command: Command, *, t_s: float, hold_s: float, seen: list[Frames]) -> None:
+        """Exchange a command as `VehicleLink.exchange` does, watching; add the frames of every slice to `seen`.
+
+        Raises
+        ------
+        SafetyStopError
+            If a rule complains; the vehicle was stopped before.
+        LinkError
+            As from the link.
+        """
+        begin_s, end_s = t_s, t_s + hold_s
+        if command.drive == self._neutral:
+            self._driving_since_s = None
+        elif self._driving_since_s is None:
+            self._driving_since_s = t_s
+        for number in itertools.count(1):
+            until_s = begin_s + number * self._limits.watch_s
+            if until_s > end_s - _SLACK_S:
+                until_s = end_s
+            seen.append(link.exchange(command, t_s=t_s, hold_s=until_s - t_s))
+            t_s = until_s
+            self._look(link, seen[-1], t_s)
+            if t_s == end_s:
+                return
+
+    def _look(self, link: VehicleLink, frames: Frames, now_s: float) -> None:
+        driving_s = 0.0 if self._driving_since_s is None else now_s - self._driving_since_s
+        seen = Slice.of(frames, now_s, driving_s)
+        for rule in self._rules:
+            if (complaint := rule.complaint(seen)) is not None:
+                link.stop()
+                what, value, limit = complaint
+                raise SafetyStopError(
+                    f"stopped {now_s:.1f} s into the run: {what}", where=link.keys.root, value=value, limit=limit,
+                    remedy="look at vehicle and camera, then go on with --resume",
+                )  # fmt: skip

@@ -1,0 +1,99 @@
+"""The supervisor: a vehicle is stopped when it is lost, frozen, somebody else, or about to leave the floor."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from agvbench.adapters import open_rig
+from agvbench.errors import SafetyStopError
+from agvbench.planning import Workspace
+from agvbench.running.drive import drive
+from agvbench.running.supervision import DEFAULT_SAFETY, Supervisor
+from agvbench.running.supervision.rule import Slice
+from agvbench.running.supervision.rules.frozen import Frozen
+from agvbench.running.supervision.rules.jump import Jump
+from agvbench.running.supervision.rules.lost import Lost
+from agvbench.running.supervision.rules.volume import Volume
+from agvbench.types import Command, Commands, Frames, Pose
+
+PLANTS = Path(__file__).with_name("runaway_plants.py")
+NEUTRAL = Command(1500.0, 1500.0, 1500.0)
+START = Pose(-1.5, 0.0, 0.0)
+ROOM = Workspace.circle(6.1)
+
+
+def stopped(plant: str, camera: dict[str, float] | None = None, room: Workspace = ROOM) -> tuple[str, Frames]:
+    """Drive straight on for fourteen seconds; return why it was stopped, and what was seen, also of the second after."""
+    commands = Commands(*np.array([[0.0, 14.0], [1900.0, 1500.0], [1500.0, 1500.0], [1500.0, 1500.0]]))
+    seen: list[Frames] = []
+    with open_rig("sim", plant=f"{PLANTS}:{plant}", camera=camera or {}) as link:
+        supervisor = Supervisor(room, 1500.0)
+        with pytest.raises(SafetyStopError) as caught:
+            drive(link, commands, neutral=NEUTRAL, start=START, run_key="a", supervisor=supervisor, seen=seen)
+        until_s = float(max(frames.t_s.max() for frames in seen if len(frames)))
+        seen.append(link.exchange(NEUTRAL, t_s=_end_s(str(caught.value)), hold_s=1.0))
+    frames = Frames.concatenate(seen)
+    assert until_s < 14.0
+    return str(caught.value), frames
+
+
+def _end_s(said: str) -> float:
+    return float(said.partition("stopped ")[2].partition(" s into")[0])
+
+
+def test_a_vehicle_comes_to_rest_before_the_edge() -> None:
+    said, frames = stopped("Straight")
+    assert "vehicle is leaving the capture volume: would come to rest" in said
+    assert 2.5 < np.nanmedian(frames.x_m[-20:]) < 3.05
+
+
+def test_a_vehicle_that_nobody_sees_is_stopped() -> None:
+    said, _ = stopped("Straight", {"untracked": 0.5, "burst_frames": 1e4})
+    assert "tracking was lost: not seen for 0." in said
+    assert _end_s(said) <= 0.7
+
+
+def test_a_vehicle_that_is_taken_for_another_is_stopped() -> None:
+    said, _ = stopped("Swapped")
+    assert "pose jumped: 0.80 m from where the vehicle was going (limit: 0.3 m)" in said
+    assert 1.0 <= _end_s(said) <= 1.3
+
+
+def seen_at(t_s: np.ndarray, x_m: np.ndarray, driving_s: float = 10.0) -> Slice:
+    """Return a slice along the x axis."""
+    return Slice(t_s, np.column_stack([x_m, np.zeros((len(t_s), 2))]), float(t_s[-1]) + 0.01, driving_s)
+
+
+def slices(x_m: np.ndarray, driving_s: float = 10.0) -> list[Slice]:
+    """Return slices of 0.1 s at 120 Hz."""
+    t_s = np.arange(len(x_m)) / 120.0
+    return [seen_at(t_s[i : i + 12], x_m[i : i + 12], driving_s) for i in range(0, len(x_m), 12)]
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.0, 1.0), st.floats(-1.0, 1.0), st.floats(1e-4, 2e-3))
+def test_a_vehicle_that_drives_about_is_not_stopped(seed: int, speed: float, start_m: float, noise_m: float) -> None:
+    rng = np.random.default_rng(seed)
+    t_s = np.arange(240) / 120.0
+    x_m = start_m + speed * np.where(t_s < 1.0, t_s, 2.0 - t_s) + noise_m * rng.standard_normal(240)
+    x_m[rng.integers(240, size=3)] += rng.uniform(-3.0, 3.0, 3)  # single wrong frames
+    for rule in (Lost, Frozen, Jump, Volume):
+        watching = rule(DEFAULT_SAFETY, Workspace.circle(8.0))
+        assert [watching.complaint(one) for one in slices(x_m)] == [None] * 20
+
+
+def test_a_camera_that_repeats_itself_is_noticed_if_it_flickered_before() -> None:
+    flicker = 1e-4 * np.random.default_rng(0).standard_normal(60)
+    frozen = np.concatenate([flicker, np.full(120, 0.5)])
+    watching = Frozen(DEFAULT_SAFETY, ROOM)
+    said = [watching.complaint(one) for one in slices(frozen)]
+    first = next(index for index, one in enumerate(said) if one)
+    assert 10 <= first <= 11  # half a second after it froze, and a slice
+    watching = Frozen(DEFAULT_SAFETY, ROOM)
+    assert not any(watching.complaint(one) for one in slices(np.full(240, 0.5)))
+    watching = Frozen(DEFAULT_SAFETY, ROOM)
+    assert not any(watching.complaint(one) for one in slices(frozen, driving_s=0.0))
