@@ -16,6 +16,7 @@ from rig_driving import NEUTRAL, START, TINY
 from agvbench.adapters import AdapterOptions
 from agvbench.adapters.contract import AgvAdapter
 from agvbench.adapters.registry import agv_adapters, mocap_adapters, open_agv, open_mocap, parse_spec
+from agvbench.adapters.simavr.built import why_not_built
 from agvbench.bus.command_message import CommandFlags, CommandMessage
 from agvbench.bus.identity_message import (
     decode_agv_identity,
@@ -31,7 +32,8 @@ from agvbench.types import Command, Commands, Frames
 OPTIONS = AdapterOptions(plant=TINY)
 RESET = Reset("a", START, Sampling(120.0, 0.001))
 # Adapters that need nothing but this machine; others need hardware, and are held to the contract where it is.
-AGV_HERE = [scheme for scheme, adapter in agv_adapters().items() if adapter.__module__.endswith((".sim", ".live"))]
+NEED_NOTHING = (".sim", ".live", ".simavr")
+AGV_HERE = [scheme for scheme, adapter in agv_adapters().items() if adapter.__module__.endswith(NEED_NOTHING)]
 MOCAP_HERE = [scheme for scheme, adapter in mocap_adapters().items() if adapter.__module__.endswith(".sim")]
 
 
@@ -56,6 +58,8 @@ class Heard:
 
 @pytest.fixture(params=AGV_HERE)
 def agv(request: pytest.FixtureRequest) -> Any:
+    if request.param == "simavr" and (why := why_not_built()):
+        pytest.skip(why)
     adapter = open_agv(request.param, OPTIONS)
     adapter.heard = Heard()  # type: ignore[attr-defined]
     adapter.start(adapter.heard)  # type: ignore[attr-defined]
