@@ -112,7 +112,7 @@ def unsealed(spec: str, seed: int, truth: SealedTruth, found: Diagnosis, seconds
     named = tuple(effect.name for effect in found.effects)
     others = {other for effect in found.effects for other in effect.confounded_with}
     doubtful = {*named, *others} - set(truth.library_names)
-    ask = len(truth.effects) == 1 and truth.library_names and doubtful
+    ask = truth.library_names and doubtful
     return Trial(
         spec,
         seed,
@@ -130,9 +130,15 @@ def unsealed(spec: str, seed: int, truth: SealedTruth, found: Diagnosis, seconds
         {e.name: {k: (p.value, p.stderr) for k, p in e.parameters.items()} for e in found.effects},
         {name: value**2 for name, value in held.items()},
         found.held_out.worse_on if found.held_out else (),
-        tuple(true_rivals(vehicle_of(seed), truth)) if ask else (),
+        _rivals(seed, truth) if ask else (),
         seconds,
     )
+
+
+def _rivals(seed: int, truth: SealedTruth) -> tuple[str, ...]:
+    """Return the true rivals of every hidden effect of the library, each as if it were hidden alone."""
+    alone = [effect.name for effect in truth.effects if effect.library_name]
+    return tuple(dict.fromkeys(r for name in alone for r in true_rivals(vehicle_of(seed), sealed_truth(name, seed))))
 
 
 def _drive(spec: str, seed: int, repeats: int, directory: Path) -> None:

@@ -34,7 +34,7 @@ class Trial:
     worse_on
         What the corrected model predicts worse.
     rivals
-        True rivals of a single hidden effect, where they were asked for.
+        True rivals of the hidden effects of the library, where they were asked for.
     seconds
         What the diagnosis took.
     """

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from agvbench.diagnosis import Dependence, Diagnosis, Estimate, HeldOut, NamedEffect, Verdict
 from agvbench.simulator.hidden import make_hidden_plant
+from agvbench.workflows import challenge
 from agvbench.workflows.challenge import hold_trial, unsealed
 
 
@@ -44,3 +47,19 @@ def test_a_blind_trial_from_drive_to_score():
     assert trial.verdict != "ERROR"
     assert "speed_lag" in trial.named
     assert trial.squares_mm2["after"] < 0.2 * trial.squares_mm2["before"]
+
+
+def test_a_pair_left_open_between_a_delay_and_its_true_rival_is_right(monkeypatch):
+    """Rivals are looked for per effect, as if it were hidden alone; driving plants for that takes minutes."""
+    alone = {"actuation_delay": {"mocap_latency": 0.1}, "battery_droop": {}}
+    monkeypatch.setattr(challenge, "true_rivals", lambda _, sealed: alone[sealed.effects[0].name])
+    spec = "actuation_delay_and_battery_droop"
+    found = Diagnosis(
+        Verdict.AMBIGUOUS,
+        "",
+        (NamedEffect("mocap_latency", {}, ("actuation_delay",), {}), NamedEffect("battery_droop", {}, (), {})),
+    )
+    trial = unsealed(spec, 4, truth(spec), found, 1.0)
+    assert trial.rivals == ("mocap_latency",)
+    assert trial.is_right
+    assert not unsealed(spec, 4, truth(spec), replace(found, effects=found.effects[:1]), 1.0).is_right
