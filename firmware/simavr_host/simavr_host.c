@@ -31,7 +31,7 @@ static avr_t *avr;
 static avr_uart_t *uart;
 static avr_irq_t *receive;
 static int port = -1;
-static avr_cycle_count_t base, rose[CHANNELS], byte_cycles;
+static avr_cycle_count_t base, rose[CHANNELS], byte_cycles = 1360; /* until the firmware sets its rate */
 static uint8_t waiting[MAX_WAITING]; /* read from the port, not yet on the wire */
 static unsigned first, last;
 static unsigned long long bytes_read, bytes_sent;
@@ -63,13 +63,16 @@ static void set_byte_time(void) {
     uart->cycles_per_byte = byte_cycles;
 }
 
-/* A byte has arrived whole: hand it to the receiver without a further wait, and go on with the next. */
+/* A byte has arrived whole: hand it to the receiver without a further wait, and go on with the next. A receiver that
+ * the firmware has not switched on yet hears nothing. */
 static avr_cycle_count_t feed(avr_t *avr, avr_cycle_count_t when, void *parameter) {
-    (void)avr;
     (void)parameter;
-    uart->cycles_per_byte = 1;
-    avr_raise_irq(receive, waiting[first++ % MAX_WAITING]);
-    uart->cycles_per_byte = byte_cycles;
+    uint8_t byte = waiting[first++ % MAX_WAITING];
+    if (avr_regbit_get(avr, uart->rxen)) {
+        uart->cycles_per_byte = 1;
+        avr_raise_irq(receive, byte);
+        uart->cycles_per_byte = byte_cycles;
+    }
     feeding = first != last;
     return feeding ? when + byte_cycles : 0;
 }

@@ -55,13 +55,13 @@ class SerialAgv(AgvAdapter):
         began_s = heard_s = clock.now()
         attempts = 0
         while (now_s := clock.now()) - began_s < GREETING_LIMIT_S:
-            if conversation.hello is None and now_s - began_s >= attempts * _ATTEMPT_S:
+            if not conversation.is_greeted and now_s - began_s >= attempts * _ATTEMPT_S:
                 self._port.write(conversation.greeting(attempts))
                 attempts += 1
             if data := self._port.read():
                 heard_s = clock.now()
                 conversation.receive(data, heard_s)
-            elif conversation.hello is not None and now_s - heard_s > _QUIET_S:
+            elif conversation.is_greeted and now_s - heard_s > _QUIET_S:
                 return
 
     @classmethod

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from agvbench.adapters.serial_line.dialect import Dialect, dialect_of
+from agvbench.adapters.serial_line.dialect import DIALECTS, Dialect, dialect_of
 from agvbench.adapters.serial_line.lines import LineSplitter, decode_line, encode_line
 from agvbench.adapters.serial_line.replies import Accepted, ErrorCode, Hello, Refused, Reply, WatchdogBit, parse_reply
 from agvbench.errors import LinkError
@@ -33,18 +33,27 @@ class Conversation:
         self.hello: Hello | None = None
         self.garbled = self.resent = self.watchdog_bites = 0
         self._where, self._splitter = where, LineSplitter()
+        self._checked = False  # whether the firmware has answered with a checksum: from then on it insists on them
         self._dialect: Dialect | None = None
         self._sequence, self._failures = 0, 0
         self._waiting: tuple[int, float] | None = None  # the oldest number without an answer, and when it was sent
         self._last: Command | None = None
         self._heard = b""
 
+    @property
+    def is_greeted(self) -> bool:
+        """Whether it is known who is there, and both ends use checksums if both know them."""
+        if self.hello is None:
+            return False
+        dialect = DIALECTS.get(self.hello.firmware_version)
+        return self._checked or dialect is None or not dialect.checksums
+
     def greeting(self, attempt: int) -> bytes:
         """Return the question who is there: with a checksum, then without, for a firmware that knows none.
 
         The newline before ends whatever half line the vehicle has kept from before.
         """
-        return b"\n" + encode_line("V", checksum=attempt % 2 == 0)
+        return b"\n" + encode_line("V", checksum=self.hello is not None or attempt % 2 == 0)
 
     def begin(self) -> Hello:
         """End the greeting; return who is there.
@@ -108,6 +117,7 @@ class Conversation:
             text = decode_line(line.removesuffix(b"\r"), checksum=self._dialect is not None and self._dialect.checksums)
             reply = None if text is None else parse_reply(text)
             if reply is not None:
+                self._checked |= b"*" in line
                 yield reply
             elif line:
                 self.garbled += 1

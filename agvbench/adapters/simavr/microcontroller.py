@@ -44,13 +44,12 @@ class Microcontroller:
         self._written = self._read = 0
         self.now_s = 0.0
         self.conversation = Conversation(self.host.port)
+        self.run_until(_SETTLE_S)  # what comes before the firmware listens is lost
         for attempt in range(_ATTEMPTS):
             self._write(self.conversation.greeting(attempt))
             self.run_until(self.now_s + _SETTLE_S)
-            if self.conversation.hello is not None:
+            if self.conversation.is_greeted:
                 break
-        # What answers the greeting may be on the wire yet.
-        self.run_until(self.now_s + _SETTLE_S)
         return self.conversation.begin()
 
     def say(self, command: Command) -> None:

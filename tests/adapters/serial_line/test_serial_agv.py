@@ -14,6 +14,7 @@ from agvbench.adapters import AdapterOptions
 from agvbench.adapters.agv import serial as module
 from agvbench.adapters.agv.serial import SerialAgv
 from agvbench.adapters.registry import open_agv
+from agvbench.adapters.serial_line import conversation
 from agvbench.bus.command_message import CommandMessage
 from agvbench.bus.event_message import Level
 from agvbench.bus.identity_message import decode_agv_identity, encode_agv_identity
@@ -57,9 +58,10 @@ def connected(vehicle: ScriptedVehicle) -> Iterator[tuple[SerialAgv, Events]]:
 
 
 @pytest.fixture(autouse=True)
-def short_greeting(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "GREETING_LIMIT_S", 1.0)
+def patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ask who is there more often than in a lab, and wait longer for answers: the machine may be busy."""
     monkeypatch.setattr(module, "_ATTEMPT_S", 0.1)
+    monkeypatch.setattr(conversation, "ANSWER_LIMIT_S", 1.0)
 
 
 def test_commands_are_sent_and_stop_is_neutral() -> None:
@@ -114,7 +116,10 @@ def foreign(line: bytes) -> Callable[[str], bytes]:
         (foreign(b"V agvbench 2 1 deg none\n"), "that this agvbench does not know"),
     ],
 )
-def test_whoever_else_is_there_is_one_line(answer: Callable[[str], bytes], line: str) -> None:
+def test_whoever_else_is_there_is_one_line(
+    answer: Callable[[str], bytes], line: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "GREETING_LIMIT_S", 1.0)
     with ScriptedVehicle(answer) as vehicle, pytest.raises(LinkError) as caught:
         open_agv(f"serial:{vehicle.port}", AdapterOptions())
     assert line in str(caught.value)

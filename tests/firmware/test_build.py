@@ -1,0 +1,42 @@
+"""The same sources give the same bytes, and the vehicle says which calibration it was built for."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+LARGEST_FLASH, LARGEST_MEMORY = 32 * 1024, 2 * 1024
+
+
+def build(source: Path, to: Path, *arguments: str) -> Path:
+    shutil.copytree(source, to, ignore=shutil.ignore_patterns("build"))
+    subprocess.run(["make", "-s", "-C", to, "firmware", *arguments], check=True, stdout=subprocess.DEVNULL)
+    return to / "build"
+
+
+@pytest.mark.parametrize("name", ["agv1.elf", "agv2.elf"])
+def test_builds_do_not_depend_on_where_and_when(firmware: Path, tmp_path: Path, name: str) -> None:
+    elsewhere = build(firmware, tmp_path / "some" / "other" / "place")
+    assert (elsewhere / name).read_bytes() == (firmware / "build" / name).read_bytes()
+
+
+def test_both_fit_the_microcontroller(firmware: Path) -> None:
+    for name in ("agv1.elf", "agv2.elf"):
+        said = subprocess.run(
+            ["avr-size", firmware / "build" / name], check=True, capture_output=True, text=True
+        ).stdout
+        text, data, bss = map(int, said.splitlines()[1].split()[:3])
+        assert text + data < LARGEST_FLASH
+        assert data + bss < LARGEST_MEMORY / 2  # the rest is the stack's
+
+
+def test_the_calibration_it_was_built_for_is_in_it(firmware: Path, tmp_path: Path) -> None:
+    header = tmp_path / "mine.h"
+    header.write_text('#define CALIBRATION_HASH "0123456789abcdef"\n')
+    assert (
+        b"V agvbench 2 1 us 0123456789abcdef"
+        in (build(firmware, tmp_path / "firmware", f"CALIBRATION={header}") / "agv2.elf").read_bytes()
+    )
