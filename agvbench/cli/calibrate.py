@@ -9,6 +9,7 @@ examples:
   agvbench calibrate campaigns/tonight                        look only
   agvbench calibrate campaigns/tonight --out vehicle.toml     keep the vehicle
   agvbench calibrate campaigns/tonight --maps thesis          the maps of the thesis, for comparison
+  agvbench calibrate campaigns/tonight --firmware calibration.h   for the vehicle's firmware to say which it has
   agvbench calibrate campaigns/dart --session 2024-09-16      one day of several
 """
 
@@ -23,6 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument("directory", metavar="DIR", help="a campaign directory")
     parser.add_argument("--out", metavar="vehicle.toml", help="write the calibrated vehicle there")
+    parser.add_argument("--firmware", metavar="FILE.h", help="write the calibration's hash for the vehicle's firmware")
     parser.add_argument(
         "--maps",
         choices=("default", "thesis"),
@@ -36,5 +38,11 @@ def run(arguments: argparse.Namespace) -> int:
     """Calibrate; return the exit code."""
     from agvbench.workflows.calibrate import run_calibrate
 
-    run_calibrate(arguments.directory, maps=arguments.maps, session=arguments.session, out=arguments.out)
+    run_calibrate(
+        arguments.directory,
+        maps=arguments.maps,
+        session=arguments.session,
+        out=arguments.out,
+        firmware=arguments.firmware,
+    )
     return 0

@@ -12,6 +12,7 @@ from rich.table import Table
 from agvbench.calibration import Calibration, MapFit, calibrate
 from agvbench.campaign import Campaign
 from agvbench.errors import FileError, FitError
+from agvbench.workflows.firmware_header import write_firmware_header
 
 _EXPLAINS = 0.5
 _CAPTION = (
@@ -20,15 +21,22 @@ _CAPTION = (
 )
 
 
-def run_calibrate(directory: str, *, maps: str = "default", session: str | None = None, out: str | None = None) -> None:
-    """Calibrate from the campaign in `directory`, print every fit, and write the model to `out` if given.
+def run_calibrate(
+    directory: str,
+    *,
+    maps: str = "default",
+    session: str | None = None,
+    out: str | None = None,
+    firmware: str | None = None,
+) -> None:
+    """Calibrate from the campaign in `directory`, print every fit; write the model to `out`, its hash to `firmware`.
 
     Raises
     ------
     CampaignError, FitError, VehicleError
         If the campaign cannot be read or does not determine the maps.
     FileError
-        If `out` cannot be written.
+        If `out` or `firmware` cannot be written.
     """
     errors = Console(stderr=True)
     with errors.status("measuring runs and fitting maps") if errors.is_terminal else _Silence():
@@ -40,7 +48,10 @@ def run_calibrate(directory: str, *, maps: str = "default", session: str | None 
     if out is not None:
         save(calibration, Path(out))
         console.print(f"{out}: calibration {calibration.model.calibration_hash}", soft_wrap=True)
-    else:
+    if firmware is not None:
+        write_firmware_header(calibration.model, Path(firmware))
+        console.print(f"{firmware}: calibration {calibration.model.calibration_hash}", soft_wrap=True)
+    if out is None and firmware is None:
         console.print("nothing written; --out vehicle.toml writes the vehicle model with the maps marked ●")
 
 
