@@ -6,6 +6,8 @@ examples:
   agvbench agv sim                                     a simulated vehicle, on tcp/127.0.0.1:7447
   agvbench mocap sim --connect tcp/127.0.0.1:7447      a camera that sees it, in another terminal
   agvbench bench --connect tcp/127.0.0.1:7447          drive it, in a third
+  agvbench agv serial:/dev/ttyACM0                     a vehicle with the project's firmware
+  agvbench agv simavr                                  that firmware in a simulated microcontroller, driving a plant
   agvbench agv sim:my_plant.py:make_plant --vehicle small_one
 """
 

@@ -8,8 +8,12 @@ from typing import Any
 # Not given is None everywhere, so that a resumed session can tell what was asked from what is usual.
 _FLAG: dict[str, Any] = {"action": "store_true", "default": None}
 OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
-    ("--agv", {"metavar": "ADAPTER"}, "vehicle adapter: sim (default), or live, the same in real time"),
-    ("--mocap", {"metavar": "ADAPTER"}, "motion capture adapter: sim (default)"),
+    (
+        "--agv",
+        {"metavar": "ADAPTER"},
+        "vehicle adapter: sim (default); live, the same in real time; serial:PORT; simavr, the firmware simulated",
+    ),
+    ("--mocap", {"metavar": "ADAPTER"}, "motion capture adapter: sim (default), natnet:HOST, natnet:emulated"),
     (
         "--plant",
         {"metavar": "PLANT"},

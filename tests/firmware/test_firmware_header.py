@@ -28,9 +28,9 @@ def test_what_cannot_be_written_is_one_line(tmp_path: Path) -> None:
 def test_the_compiler_takes_it(firmware: Path, tmp_path: Path) -> None:
     model, header = thesis_vehicle(), tmp_path / "vehicle.h"
     write_firmware_header(model, header)
-    compiler = "avr-gcc -mmcu=atmega328p -DVERSION=2 -DF_CPU=16000000UL -std=c99 -Os -S -o - -include".split()
+    compiler = ["avr-gcc", "-mmcu=atmega328p", "-DVERSION=2", "-DF_CPU=16000000UL", "-std=c99", "-Os", "-S", "-o", "-"]
     done = subprocess.run(
-        [*compiler, header, firmware / "src" / "protocol.c"],
+        [*compiler, "-include", header, firmware / "src" / "protocol.c"],
         check=True,
         capture_output=True,
         text=True,

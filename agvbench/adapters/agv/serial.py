@@ -103,6 +103,10 @@ class SerialAgv(AgvAdapter):
         """Begin to listen."""
         self._reports = reports
         self._thread.start()
+        built_for, believed = self.hello.calibration_hash, self._options.calibration_hash
+        if believed and built_for not in ("none", believed):
+            text = f"the vehicle's firmware was built for calibration {built_for}, the bench believes {believed}"
+            reports.event(Level.WARNING, "calibration_differs", text)
 
     def apply(self, message: CommandMessage) -> None:
         """Send the command; said again, it keeps the vehicle's watchdog quiet."""

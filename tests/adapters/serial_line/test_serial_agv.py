@@ -45,9 +45,9 @@ class Events:
 
 
 @contextmanager
-def connected(vehicle: ScriptedVehicle) -> Iterator[tuple[SerialAgv, Events]]:
+def connected(vehicle: ScriptedVehicle, **options: str) -> Iterator[tuple[SerialAgv, Events]]:
     with vehicle:
-        agv, events = open_agv(f"serial:{vehicle.port}", AdapterOptions()), Events()
+        agv, events = open_agv(f"serial:{vehicle.port}", AdapterOptions(**options)), Events()  # type: ignore[arg-type]
         assert isinstance(agv, SerialAgv)
         agv.start(events)
         try:
@@ -79,6 +79,15 @@ def test_commands_are_sent_and_stop_is_neutral() -> None:
         agv.stop()
         assert vehicle.wait_for("S 2 1500 1500 1500")
     assert events.heard == []
+
+
+def test_a_vehicle_built_for_another_calibration_is_told() -> None:
+    with connected(ScriptedVehicle(), calibration_hash="ffff0000") as (_, events):
+        said = events.wait_for("calibration_differs")
+    assert "0123abcd" in said
+    assert "ffff0000" in said
+    with connected(ScriptedVehicle(), calibration_hash="0123abcd") as (_, events):
+        assert events.heard == []
 
 
 def test_version_1_is_told_whole_degrees_and_no_checksum() -> None:
