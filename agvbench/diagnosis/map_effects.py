@@ -67,7 +67,9 @@ def _known(fitted: Fit, vehicle: VehicleModel) -> dict[str, _Known]:
 def _saturation(axles: dict[str, _Known]) -> Iterator[NamedEffect]:
     estimates, gain = {}, 0.0
     for role, known in axles.items():
-        stops = None if isinstance(known.believed, Fixed) else end_stops(known.refitted, known.believed)
+        if isinstance(known.believed, Fixed) or known.refitted.agrees_with(known.believed):
+            continue
+        stops = end_stops(known.refitted, known.believed)
         if stops is None:
             continue
         low, high = _believes_stops(known.believed, known.refitted.commands, rising=stops.rising)
@@ -100,7 +102,9 @@ def _believes_stops(believed: StaticMap, commands: Floats, *, rising: bool) -> t
 
 
 def _dead_band(drive: _Known, neutral: float) -> Iterator[NamedEffect]:
-    if _believes_dead_band(drive.believed, drive.refitted.commands, neutral):
+    if drive.refitted.agrees_with(drive.believed) or _believes_dead_band(
+        drive.believed, drive.refitted.commands, neutral
+    ):
         return
     band = dead_band(drive.refitted, drive.believed, neutral)
     if band is not None:

@@ -51,6 +51,12 @@ class RefittedMap:
         whole = self.covariance + np.eye(len(self.values)) * (_MODEL_ERROR * self.size) ** 2
         return np.asarray(np.linalg.cholesky(np.linalg.inv(whole)).T)
 
+    def agrees_with(self, believed: StaticMap) -> bool:
+        """Return whether a map goes through the values, as far as their errors say: then it lacks nothing there."""
+        off = self.root @ (self.values - np.asarray(believed(self.commands)))
+        count = len(self.values)
+        return float(off @ off) <= count + _CLEAR * math.sqrt(2.0 * count)
+
     def select(self, chosen: NDArray[np.int64]) -> RefittedMap:
         """Return the part of the map that an index chooses, its errors as they are with the rest unknown."""
         return RefittedMap(self.commands[chosen], self.values[chosen], self.covariance[np.ix_(chosen, chosen)])

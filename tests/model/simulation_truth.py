@@ -156,7 +156,7 @@ def _equations(get, aims, axles, servos, begin):  # type: ignore[no-untyped-def]
         curvature = math.cos(beta) * (math.tan(df) - math.tan(dr)) / (LF + LR)
         curvature /= 1.0 + get("lateral_slip", "gradient") * speed**2
         curvature += get("wheel_diameter_mismatch", "curvature_per_m")
-        drift = get("floor_tilt", "drift_mps") * (1.0 - math.exp(-((speed / 0.02) ** 2)))
+        drift = get("floor_tilt", "drift_mps") * (1.0 - math.exp(-((speed / 0.003) ** 2)))
         slope = get("floor_tilt", "direction_rad")
         growing = v * aims[2] >= 0.0 and abs(aims[2]) > abs(v)
         drive_lag = get("speed_lag", "accelerate_s" if growing else "brake_s")

