@@ -101,9 +101,15 @@ def test_version_1_is_told_whole_degrees_and_no_checksum() -> None:
 
 
 def test_a_reset_on_open_half_a_line_and_noise_before_the_banner_are_waited_out() -> None:
-    vehicle = ScriptedVehicle(lambda _: b"")
+    booted = threading.Event()
+    vehicle = ScriptedVehicle(lambda text: ScriptedVehicle.obey(text) if booted.is_set() else b"")
     vehicle.say(b"ok 3\xff\x00\x17boot\r\nok 41")
-    timer = threading.Timer(0.3, lambda: vehicle.say(b"2\n" + HELLO.encode() + b"\n"))
+
+    def boot() -> None:
+        vehicle.say(b"2\n" + HELLO.encode() + b"\n")
+        booted.set()
+
+    timer = threading.Timer(0.3, boot)
     timer.start()
     with connected(vehicle) as (agv, _):
         assert agv.hello.calibration_hash == "0123abcd"
