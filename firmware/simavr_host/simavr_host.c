@@ -234,7 +234,7 @@ int main(int count, char **arguments) {
     if (count < 2 || count > 3 || (count == 3 && strcmp(arguments[2], "--live")))
         fail("usage: simavr_host FIRMWARE.elf [--live]");
     answers = fdopen(dup(STDOUT_FILENO), "w");
-    if (!answers || dup2(STDERR_FILENO, STDOUT_FILENO) < 0)
+    if (!answers || !freopen("/dev/null", "w", stdout))
         fail("no standard output");
     load(arguments[1]);
     connect_pins();

@@ -54,6 +54,7 @@ class SimavrHost:
         if version not in VERSIONS:
             raise LinkError("no such firmware", where="simavr", value=repr(version), limit=" or ".join(VERSIONS))
         program, firmware = built(HOST), built(f"agv{version}.elf")
+        self._ended: AdapterGoneError | None = None
         self.process = _start(program, firmware, *(["--live"] if live else []))
         word, self.port = self._line()
         if word != "port":
@@ -71,7 +72,7 @@ class SimavrHost:
         """End the process."""
         for pipe in (self.process.stdin, self.process.stdout):
             if pipe is not None:
-                with suppress(BrokenPipeError):
+                with suppress(OSError):  # what is still to be written to a process that has ended
                     pipe.close()
         try:
             self.process.wait(5.0)
@@ -83,6 +84,8 @@ class SimavrHost:
 
     def _order(self, order: str) -> Ran:
         assert self.process.stdin is not None  # noqa: S101  (it is a pipe)
+        if self._ended is not None:
+            raise self._ended
         try:
             self.process.stdin.write(order + "\n")
             self.process.stdin.flush()
@@ -103,8 +106,16 @@ class SimavrHost:
         return words
 
     def _gone(self) -> AdapterGoneError:
+        """Return why nothing can be asked any more: the same words every time."""
+        if self._ended is None:
+            self._ended = self._end()
+        return self._ended
+
+    def _end(self) -> AdapterGoneError:
         self.process.kill()
-        said = self.process.communicate()[1].strip().splitlines()
+        self.process.wait()
+        assert self.process.stderr is not None  # noqa: S101  (it is a pipe)
+        said = self.process.stderr.read().strip().splitlines()
         return AdapterGoneError(
             "the simulated microcontroller has ended", where="simavr", value=said[-1] if said else None
         )
@@ -114,6 +125,9 @@ def _start(program: Path, *arguments: object) -> subprocess.Popen[str]:
     pipe = subprocess.PIPE
     command = [str(program), *map(str, arguments)]
     try:
-        return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True)  # noqa: S603  (our own program)
+        # A session of its own: Ctrl-C in a terminal is for us, and the vehicle is stopped before it ends.
+        return subprocess.Popen(  # noqa: S603  (our own program)
+            command, stdin=pipe, stdout=pipe, stderr=pipe, text=True, start_new_session=True
+        )
     except OSError as error:
         raise LinkError("cannot start the simulated microcontroller", where=program, value=error.strerror) from error
