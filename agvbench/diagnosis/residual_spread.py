@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.diagnosis.fitting import Fit, priors
+from agvbench.diagnosis.fitting import Fit
 from agvbench.diagnosis.prediction import Predictor
+from agvbench.diagnosis.scatter import priors
 from agvbench.types import Floats
 
 

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.diagnosis.candidates import Candidate, bounds_of
-from agvbench.diagnosis.fitting import Fit, fit, promised_gain
+from agvbench.diagnosis.fitting import Fit, fit
 from agvbench.diagnosis.grouping import folds
 from agvbench.diagnosis.judging import FOLDS, cross_validated, differs_from_nothing, without_best
 from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.promises import promised_gain
 from agvbench.diagnosis.residuals import misses
 from agvbench.diagnosis.windows_split import fold_groups
 from agvbench.types import Floats

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from agvbench.diagnosis.fitting import promised_gain
 from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.promises import promised_gain
 from agvbench.diagnosis.selection import LEAST_GAIN, Scored, Selection, Selector
 from agvbench.effects.forms import cause_of
 

@@ -1,0 +1,109 @@
+"""The likelihood of runs with their offsets integrated out: its value, and its quadratic form in the parameters.
+
+Each run's offsets (start pose, both axles, log of speed) are found anew about every prediction, not once about zero,
+and enter by Laplace's approximation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from agvbench.diagnosis.prediction import Predictor
+from agvbench.diagnosis.scatter import Scatter, priors, scale_of, student, tempering, weights
+from agvbench.types import Floats
+
+WEAK = 1e-4
+"""How little (as an inverse variance) is taken for granted of an effect's parameter."""
+
+
+@dataclass(frozen=True)
+class Terms:
+    """A likelihood about some parameters.
+
+    ``loss`` (R,): minus two log likelihood of each run; ``information`` (R, P, P) and ``gradient`` (R, P): its
+    quadratic form; ``inner_inverse`` (R, 6, 6): the offsets' covariance; ``mixed`` (R, 6, P) and ``pull`` (R, 6): how
+    they follow the parameters, and where they are drawn.
+    """
+
+    loss: Floats
+    information: Floats
+    gradient: Floats
+    inner_inverse: Floats
+    mixed: Floats
+    pull: Floats
+
+
+def terms_of(
+    predictor: Predictor,
+    residual: Floats,
+    by_parameters: Floats,
+    by_offsets: Floats,
+    offsets: Floats,
+    scatter: Scatter,
+) -> Terms:
+    """Return the likelihood of residuals (R, K, 3), derived by parameters (R, K, 3, P) and offsets (R, K, 3, 6)."""
+    runs = len(residual)
+    temper, count = tempering(predictor)
+    weight = weights(predictor, scatter)
+    e = (residual * weight).reshape(runs, -1)
+    # A run has a few of all levels: the rest of its columns are zero.
+    own = predictor.touched(by_parameters.shape[-1])
+    j = np.take_along_axis(by_parameters, own[:, None, None, :], axis=-1)
+    j = (j * weight[..., None]).reshape(runs, e.shape[1], -1)
+    a = (by_offsets * weight[..., None]).reshape(runs, e.shape[1], 6)
+    prior = priors(predictor, scatter)
+    at, jt = a.transpose(0, 2, 1), j.transpose(0, 2, 1)
+    inner, inverse = inner_inverse(a, prior)
+    pull = (at @ e[..., None])[..., 0] - offsets / prior**2
+    short = at @ j
+    rows = np.arange(runs)[:, None]
+    mixed = np.zeros((runs, 6, by_parameters.shape[-1]))
+    mixed[rows, :, own] = short.transpose(0, 2, 1)
+    information = np.zeros((runs, mixed.shape[2], mixed.shape[2]))
+    information[rows[..., None], own[:, :, None], own[:, None, :]] = jt @ j - short.transpose(0, 2, 1) @ inverse @ short
+    gradient = np.zeros((runs, mixed.shape[2]))
+    steep = (jt @ e[..., None])[..., 0] - (short.transpose(0, 2, 1) @ (inverse @ pull[..., None]))[..., 0]
+    gradient[rows, own] = steep
+    squares = np.sum(e * e, axis=1) + np.sum((offsets / prior) ** 2, axis=1)
+    # The offsets are a step away from their best values: what that step gains belongs to the loss.
+    squares -= np.einsum("ri,rij,rj->r", pull, inverse, pull)
+    logs = np.linalg.slogdet(inner)[1] + 2.0 * np.sum(np.log(prior), axis=1)
+    logs += temper * count * (4.0 * np.log(scatter.position_m) + 2.0 * np.log(scatter.heading_rad))
+    if predictor.readings.begins is not None:
+        logs += 6.0 * temper * (predictor.readings.seen * np.log(scatter.growth)).sum(axis=1)
+        squares, trust = student(predictor, squares)
+        information *= trust[:, None, None]
+        gradient = np.asarray(gradient * trust[:, None])
+    return Terms(squares + logs, information, gradient, inverse, mixed, pull)
+
+
+def inner_inverse(a: Floats, prior: Floats) -> tuple[Floats, Floats]:
+    """Return the information on each run's offsets (R, 6, 6), with its inverse."""
+    inner = a.transpose(0, 2, 1) @ a
+    inner[:, range(6), range(6)] += prior**-2.0
+    return inner, np.asarray(np.linalg.inv(inner))
+
+
+def objective(predictor: Predictor, residual: Floats, offsets: Floats, scatter: Scatter) -> float:
+    """Return the weighted squares of residuals and offsets: what a step must not make larger."""
+    temper, _ = tempering(predictor)
+    seen = predictor.readings.seen[:, :, None]
+    e = residual * seen / scale_of(scatter)
+    squares = temper * np.sum(e * e, axis=(1, 2)) + np.sum((offsets / priors(predictor, scatter)) ** 2, axis=1)
+    if predictor.readings.begins is not None:
+        squares, _ = student(predictor, squares)
+    return float(squares.sum())
+
+
+def residual_of(predictor: Predictor, poses: Floats) -> Floats:
+    """Return measured minus predicted poses (R, K, 3), 0 where nothing was measured."""
+    return np.asarray(np.nan_to_num(predictor.readings.poses - poses))
+
+
+def ridge(predictor: Predictor) -> Floats:
+    """Return a prior so weak that it only speaks where the data say nothing: 1 rad, 1 m/s, 100 for effects."""
+    strength = np.full(predictor.maps.size + len(predictor.parameter_names), 1.0)
+    strength[predictor.maps.size :] = WEAK
+    return np.diag(strength)
