@@ -6,7 +6,8 @@
  * Says "port PATH" first. In lock step it understands, a line each:
  *   run CYCLE BYTES   run until CYCLE, having read BYTES bytes from the port in all; answers every pulse that ended,
  *                     "pulse CHANNEL RISE FALL" (cycles), then "at CYCLE BYTES" with the bytes sent in all
- *   reset             press the reset button; cycles and bytes begin at 0 again; answers "at 0 0"
+ *   reset BYTES       drop what has not been run of the BYTES written so far, and press the reset button; cycles and
+ *                     bytes begin at 0 again; answers "at 0 0"
  * Cycles are those of 16 MHz. Ends with standard input.
  */
 #include <fcntl.h>
@@ -135,7 +136,6 @@ static void press_reset(void) {
     avr_cycle_timer_cancel(avr, feed, NULL);
     avr_cycle_timer_cancel(avr, halt, NULL);
     avr_reset(avr);
-    tcflush(port, TCIOFLUSH);
     first = last = 0;
     feeding = 0;
     bytes_read = bytes_sent = 0;
@@ -201,9 +201,10 @@ static void lock_step(void) {
         if (sscanf(line, "run %llu %llu", &cycle, &bytes) == 2) {
             wait_for_bytes(bytes);
             run_until(base + cycle);
-        } else if (!strcmp(line, "reset\n"))
+        } else if (sscanf(line, "reset %llu", &bytes) == 1) {
+            wait_for_bytes(bytes);
             press_reset();
-        else
+        } else
             fail("no such order");
         fprintf(answers, "at %llu %llu\n", (unsigned long long)(avr->cycle - base), bytes_sent);
         fflush(answers);

@@ -27,10 +27,4 @@ def is_near(widths: tuple[float, ...], wanted: tuple[float, ...]) -> bool:
 
 def ask(microcontroller: Microcontroller, data: bytes, during_s: float = 0.02) -> tuple[bytes, list[Pulse]]:
     """Send bytes as they are; return the bytes that came back and the pulses that ended."""
-    port, host = microcontroller._port, microcontroller.host
-    port.write(data)
-    microcontroller._written += len(data)
-    microcontroller.now_s += during_s
-    ran = host.run(round(microcontroller.now_s * 16e6), microcontroller._written)
-    count, microcontroller._read = ran.bytes_sent - microcontroller._read, ran.bytes_sent
-    return port.read(count), ran.pulses
+    return microcontroller.exchange(data, microcontroller.now_s + during_s)

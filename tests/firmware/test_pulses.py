@@ -107,6 +107,14 @@ def test_the_same_commands_give_the_same_pulses_to_the_cycle(version_2: Microcon
     assert pulses() == first
 
 
+def test_what_was_said_before_a_reset_is_not_heard_after_it(version_2: Microcontroller) -> None:
+    for _ in range(5):
+        version_2.say(Command(1800.0, 1300.0, 1700.0))
+        version_2.reset()
+        assert version_2.conversation.garbled == 0
+        assert all(is_near(widths, NEUTRAL) for widths in widths_by_frame(version_2.run_until(0.2)))
+
+
 @pytest.mark.parametrize("after_s", [0.0, 0.004, 0.009, 0.0131, 0.0199])
 def test_the_watchdog_bites_after_250_ms_of_silence(version_2: Microcontroller, after_s: float) -> None:
     version_2.run_until(version_2.now_s + after_s)

@@ -64,9 +64,9 @@ class SimavrHost:
         """Let time pass until `cycle`, once the port has taken `bytes_written` bytes since the reset."""
         return self._order(f"run {cycle} {bytes_written}")
 
-    def reset(self) -> None:
-        """Press the reset button: cycles and bytes count from 0 again."""
-        self._order("reset")
+    def reset(self, bytes_written: int = 0) -> None:
+        """Press the reset button: cycles and bytes count from 0 again, and what was written before is dropped."""
+        self._order(f"reset {bytes_written}")
 
     def close(self) -> None:
         """End the process."""

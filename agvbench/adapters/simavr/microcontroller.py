@@ -30,6 +30,7 @@ class Microcontroller:
         import serial
 
         self.host = SimavrHost(version)
+        self._written = 0
         try:
             self._port = serial.Serial(self.host.port, BAUD, timeout=_READ_LIMIT_S)
             self.hello: Hello = self.reset()
@@ -39,8 +40,7 @@ class Microcontroller:
 
     def reset(self) -> Hello:
         """Press the reset button, and wait until firmware and conversation have greeted each other."""
-        self.host.reset()
-        self._port.reset_input_buffer()
+        self.host.reset(self._written)
         self._written = self._read = 0
         self.now_s = 0.0
         self.conversation = Conversation(self.host.port)
@@ -66,22 +66,27 @@ class Microcontroller:
         AdapterGoneError
             If the process has ended.
         """
-        ran = self.host.run(round(end_s * CYCLES_PER_S), self._written)
-        self.now_s = max(self.now_s, end_s)
-        count, self._read = ran.bytes_sent - self._read, ran.bytes_sent
-        data: bytes = self._port.read(count)
-        if len(data) != count:
-            raise LinkError(
-                "bytes were lost in the pseudo-terminal", where=self.host.port, value=len(data), limit=count
-            )
+        data, pulses = self.exchange(b"", end_s)
         if again := self.conversation.receive(data, self.now_s):
             self._write(again)
         self.conversation.check(self.now_s)
-        return ran.pulses
+        return pulses
 
-    def write(self, data: bytes) -> None:
-        """Send bytes as they are, past the conversation."""
+    def exchange(self, data: bytes, end_s: float) -> tuple[bytes, list[Pulse]]:
+        """Send bytes as they are and let time pass until `end_s` [s]; return what came back, and the pulses that ended.
+
+        The conversation hears nothing of it.
+        """
         self._write(data)
+        ran = self.host.run(round(end_s * CYCLES_PER_S), self._written)
+        self.now_s = max(self.now_s, end_s)
+        count, self._read = ran.bytes_sent - self._read, ran.bytes_sent
+        heard: bytes = self._port.read(count)
+        if len(heard) != count:
+            raise LinkError(
+                "bytes were lost in the pseudo-terminal", where=self.host.port, value=len(heard), limit=count
+            )
+        return heard, ran.pulses
 
     def _write(self, data: bytes) -> None:
         self._port.write(data)
