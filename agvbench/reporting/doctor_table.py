@@ -1,0 +1,23 @@
+"""The findings of ``agvbench doctor`` on the console, a line each as they come."""
+
+from __future__ import annotations
+
+from rich.markup import escape
+
+from agvbench.reporting.console import wide_console
+from agvbench.workflows.doctor import Finding, State
+
+_COLOURS = {State.GOOD: "green", State.DOUBTFUL: "yellow", State.BAD: "bold red", State.IDLE: "dim"}
+_NAME_WIDTH = 13
+_STATE_WIDTH = max(len(state.value) for state in State)
+
+
+def tell(name: str, finding: Finding) -> State:
+    """Print a finding; return its state."""
+    colour = _COLOURS[finding.state]
+    state = f"[{colour}]{finding.state.value:<{_STATE_WIDTH}}[/{colour}]"
+    line = f"{name:<{_NAME_WIDTH}} {state}  {escape(finding.found)}"
+    if finding.remedy:
+        line += f"\n{'':<{_NAME_WIDTH + _STATE_WIDTH + 3}}→ {escape(finding.remedy)}"
+    wide_console().print(line)
+    return finding.state
