@@ -11,6 +11,7 @@ from agvbench.model import VehicleModel
 from agvbench.planning import Departure, Workspace
 from agvbench.running.campaign_time import CampaignTime
 from agvbench.running.drive import DEFAULT_TIMING, Drive, Timing, drive, exchanged
+from agvbench.running.placing import wait_for_start
 from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess
 from agvbench.running.records import DriveOrder, aborted_run, free_name, recorded_run
 from agvbench.running.settings import BenchSettings
@@ -126,6 +127,8 @@ class Bench:
         return Command(self.nominal.neutral, self.nominal.neutral, self.nominal.neutral)
 
     def _drive(self, order: DriveOrder, run_id: str, seen: list[Frames]) -> Drive:
+        if not self._identity.simulated:
+            wait_for_start(self.link, self._neutral(), order.start, limits=self._limits)
         return drive(
             self.link,
             order.commands,

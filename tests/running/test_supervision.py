@@ -28,7 +28,7 @@ ROOM = Workspace.circle(6.1)
 
 
 def stopped(plant: str, camera: dict[str, float] | None = None, room: Workspace = ROOM) -> tuple[str, Frames]:
-    """Drive straight on for fourteen seconds; return why it was stopped, and what was seen, also of the second after."""
+    """Drive straight on for 14 s; return why it was stopped, and what was seen, also in the second after."""
     commands = Commands(*np.array([[0.0, 14.0], [1900.0, 1500.0], [1500.0, 1500.0], [1500.0, 1500.0]]))
     seen: list[Frames] = []
     with open_rig("sim", plant=f"{PLANTS}:{plant}", camera=camera or {}) as link:

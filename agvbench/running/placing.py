@@ -1,0 +1,78 @@
+"""A real vehicle has to be put at the start: wait until it stands there, and say how far off it is."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from agvbench.bus.link import VehicleLink
+from agvbench.errors import LinkError
+from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits
+from agvbench.running.rest import is_at_rest, pose_before
+from agvbench.types import Command, Frames, Pose, wrap_angle
+
+LOOK_S = 0.5
+TELL_S = 2.0
+PATIENCE_S = 600.0
+
+
+@dataclass(frozen=True)
+class _Place:
+    """How far from the start the vehicle is, in words, and whether that will do."""
+
+    said: str
+    good: bool
+
+
+def say(text: str) -> None:
+    """Tell the operator, past whatever captures output."""
+    print(f"\r{text}", file=sys.__stderr__, flush=True)
+
+
+def wait_for_start(
+    link: VehicleLink,
+    neutral: Command,
+    start: Pose,
+    *,
+    limits: QualityLimits = DEFAULT_LIMITS,
+    patience_s: float = PATIENCE_S,
+    tell: Callable[[str], None] = say,
+) -> None:
+    """Wait until the vehicle is seen at rest at `start` (floor frame), within half of what a run may be off.
+
+    Raises
+    ------
+    LinkError
+        If it is not there after `patience_s` [s].
+    """
+    waited_s, told_s, place = 0.0, -math.inf, _Place("", False)
+    while waited_s < patience_s:
+        # The run's clock begins anew at its first exchange, which is before any of these.
+        frames = link.exchange(neutral, t_s=waited_s, hold_s=LOOK_S)
+        waited_s += LOOK_S
+        place = _place(frames, waited_s, start, limits)
+        if place.good:
+            return
+        if waited_s - told_s >= TELL_S:
+            x_m, y_m, heading_rad = start
+            where = f"x = {x_m:.3f} m, y = {y_m:.3f} m, heading {math.degrees(heading_rad):.1f}°"
+            tell(f"put {link.identity().vehicle} at {where}: {place.said}")
+            told_s = waited_s
+    raise LinkError(
+        "the vehicle was not put at the start", where=link.keys.root, value=place.said, limit=f"{patience_s:g} s",
+        remedy="go on with --resume",
+    )  # fmt: skip
+
+
+def _place(frames: Frames, now_s: float, start: Pose, limits: QualityLimits) -> _Place:
+    found = pose_before(frames, now_s)
+    if found is None:
+        return _Place("it is not seen", False)
+    off_m = math.dist(found[:2], start[:2])
+    off_rad = abs(wrap_angle(found.heading_rad - start.heading_rad))
+    said = f"it is {off_m * 1e3:.0f} mm and {math.degrees(off_rad):.1f}° off"
+    if not is_at_rest(frames, until_s=now_s):
+        return _Place(f"{said}, and moving", False)
+    return _Place(said, off_m <= limits.start_position_m / 2.0 and off_rad <= limits.start_heading_rad / 2.0)
