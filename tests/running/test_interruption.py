@@ -84,7 +84,7 @@ def test_killed_thirty_times_nothing_finished_is_lost_and_the_end_is_the_same(un
 def test_interrupt_stops_the_vehicle_keeps_the_run_as_aborted_and_can_be_resumed(uninterrupted, tmp_path):
     directory = tmp_path / "campaign"
     process = start(directory)
-    until_another_run_is_finished(process, directory, 5)
+    until_another_run_is_finished(process, directory, 1)
     process.send_signal(signal.SIGINT)
     output, _ = process.communicate(timeout=60)
     assert process.returncode == 2
