@@ -5,6 +5,8 @@ examples:
   agvbench mocap sim --camera rate_hz=240 --camera lost=0.01
   agvbench mocap --decode stream.pcapng               what a captured NatNet stream says, a JSON line a packet
   agvbench mocap --decode frame.bin --natnet-version 4.1
+  agvbench mocap --emulate                            a NatNet server on loopback, with a simulated vehicle in view
+  agvbench mocap --emulate --natnet-version 3.1 --multicast 239.255.42.99
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from pathlib import Path
 from agvbench.cli import _adapter_arguments as shared
 from agvbench.errors import FlagError
 
-HELP = "run a motion capture adapter as its own process, or decode a captured stream"
+HELP = "run a motion capture adapter as its own process; decode or emulate a NatNet stream"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,7 +32,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--natnet-version",
         metavar="MAJOR.MINOR",
-        help="of the captured stream (default: as its handshake says)",
+        help="of the captured stream (default: as its handshake says), or of the emulated one (default: 4.1)",
+    )
+    emulated = parser.add_argument_group("emulation")
+    emulated.add_argument(
+        "--emulate", action="store_true", help="be a NatNet server that sees a plant drive in circles"
+    )
+    emulated.add_argument("--multicast", metavar="GROUP", help="stream to this group (default: unicast)")
+    emulated.add_argument("--port", type=int, default=1510, help="command port, 0 for any (default: %(default)s)")
+    emulated.add_argument(
+        "--plant", default="agvbench.simulator:make_plant", metavar="MODULE_OR_FILE:FACTORY", help="what drives"
     )
     shared.add_seed_argument(parser)
     shared.add_camera_arguments(parser)
@@ -39,8 +50,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run until a signal ends it, or decode; return the exit code."""
-    if (arguments.adapter is None) == (arguments.decode is None):
-        raise FlagError("either an adapter runs or a file is decoded", remedy="name one of the two")
+    if (arguments.adapter is not None) + (arguments.decode is not None) + arguments.emulate != 1:
+        raise FlagError(
+            "either an adapter runs, a file is decoded or a stream emulated", remedy="name one of the three"
+        )
+    if arguments.emulate:
+        from agvbench.adapters.contract import AdapterOptions
+        from agvbench.workflows.natnet_emulation import emulate
+
+        camera = shared.camera_options(arguments.camera)
+        options = AdapterOptions(vehicle=arguments.vehicle, seed=arguments.seed, plant=arguments.plant, camera=camera)
+        return emulate(options, arguments.natnet_version or "4.1", arguments.multicast, arguments.port)
     if arguments.decode is not None:
         from agvbench.adapters.natnet.decode_file import print_packets
 

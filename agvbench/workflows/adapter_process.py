@@ -33,7 +33,7 @@ def run_adapters(
     """
     _warn_of_remote_access(listen)
     with (
-        _stop_signal() as stopped,
+        stop_signal() as stopped,
         open_session(listen=listen, connect=connect, allow_remote=True) as session,
         host_adapters(session, lab, options, agv=agv, mocap=mocap),
     ):
@@ -56,7 +56,8 @@ def _warn_of_remote_access(listen: Sequence[str]) -> None:
 
 
 @contextmanager
-def _stop_signal() -> Iterator[threading.Event]:
+def stop_signal() -> Iterator[threading.Event]:
+    """Give what SIGINT and SIGTERM set, in place of what they usually do."""
     stopped = threading.Event()
     before = {number: signal.signal(number, lambda *_: stopped.set()) for number in _SIGNALS}
     try:

@@ -1,0 +1,79 @@
+"""``agvbench mocap --emulate``: a NatNet server that sees a simulated vehicle drive in circles, in real time."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+
+from agvbench.adapters.contract import AdapterOptions
+from agvbench.adapters.natnet.axes import from_floor
+from agvbench.adapters.natnet.channel import DATA_PORT
+from agvbench.adapters.natnet.emulator import Emulator, Settings
+from agvbench.adapters.natnet.encode import Model
+from agvbench.adapters.natnet.frame import FrameOfData
+from agvbench.adapters.natnet.layout import BODY, MARKER, TRACKED
+from agvbench.adapters.natnet.version import Version
+from agvbench.bus.clock import WallClock, wait_until
+from agvbench.simulator import Camera, load_plant
+from agvbench.types import Command, Frames
+from agvbench.workflows.adapter_process import stop_signal
+
+_BODY = 1
+_HEIGHT_M = 0.1
+_CIRCLE = Command(1700.0, 1450.0, 1550.0)
+_NO_MARKERS = np.zeros(0, MARKER)
+
+
+def emulate(options: AdapterOptions, version: str, multicast: str | None, port: int) -> int:
+    """Stream until SIGINT or SIGTERM.
+
+    Raises
+    ------
+    AgvbenchError
+        If version, port, plant or camera cannot be used.
+    """
+    camera = Camera.from_options(options.camera)
+    settings = Settings(
+        Version.parse(version), port=port, multicast=multicast, data_port=DATA_PORT if multicast else 0,
+        rate_hz=camera.rate_hz,
+    )  # fmt: skip
+    server = Emulator(settings, [Model(_BODY, options.vehicle)])
+    try:
+        with stop_signal() as stopped:
+            host, own_port = server.address
+            where = f"to {multicast}" if multicast else "in unicast"
+            print(f"ready: NatNet {version} at {host}:{own_port}, streaming {where}; stop with Ctrl-C", flush=True)
+            _stream(server, camera, options, stopped)
+    finally:
+        server.close()
+    print("stopped", flush=True)
+    return 0
+
+
+def _stream(server: Emulator, camera: Camera, options: AdapterOptions, stopped: threading.Event) -> None:
+    plant = load_plant(options.plant)(options.seed)
+    plant.reset((0.0, 0.0, 0.0), seed=options.seed)
+    tracker = camera.tracker(np.random.default_rng(options.seed))
+    clock, period_s, number = WallClock(), 1.0 / camera.rate_hz, 0
+    began_s = clock.now()
+    while not stopped.is_set():
+        number += 1
+        pose = plant.advance(*_CIRCLE, period_s)
+        at_s = began_s + number * period_s
+        wait_until(clock, at_s)
+        for frame in _frames(tracker.observe(np.array([at_s]), np.array([pose])), server):
+            server.send(frame)
+
+
+def _frames(seen: Frames, server: Emulator) -> list[FrameOfData]:
+    """Return what the camera makes of a pose: one frame, none or two."""
+    bodies = np.zeros(len(seen), BODY)
+    bodies["id"], bodies["flags"], bodies["mean_error_m"] = _BODY, TRACKED * seen.tracked, seen.mean_error_m
+    poses = np.column_stack([seen.x_m, seen.y_m, seen.heading_rad])
+    bodies["position_m"], bodies["quaternion"] = from_floor(poses, "y", _HEIGHT_M)
+    now = server.ticks()
+    return [
+        FrameOfData(int(number) + 1, body[None], _NO_MARKERS, float(at_s), server.ticks(float(at_s)), now, now, 0)
+        for number, body, at_s in zip(seen.frame, bodies, seen.t_s, strict=True)
+    ]
