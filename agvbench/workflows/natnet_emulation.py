@@ -74,6 +74,15 @@ def _frames(seen: Frames, server: Emulator) -> list[FrameOfData]:
     bodies["position_m"], bodies["quaternion"] = from_floor(poses, "y", _HEIGHT_M)
     now = server.ticks()
     return [
-        FrameOfData(int(number) + 1, body[None], _NO_MARKERS, float(at_s), server.ticks(float(at_s)), now, now, 0)
-        for number, body, at_s in zip(seen.frame, bodies, seen.t_s, strict=True)
+        FrameOfData(
+            int(seen.frame[row]) + 1,
+            bodies[row : row + 1],
+            _NO_MARKERS,
+            float(at_s),
+            server.ticks(float(at_s)),
+            now,
+            now,
+            0,
+        )
+        for row, at_s in enumerate(seen.t_s)
     ]

@@ -77,10 +77,12 @@ class Emulator:
             if settings.multicast is not None:
                 self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(settings.host))
                 self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 1)
-        except OSError as error:
+        except (OSError, OverflowError) as error:
             self._socket.close()
             where = f"natnet emulator {settings.host}:{settings.port}"
-            raise LinkError("address cannot be used", where=where, value=error.strerror or error) from None
+            raise LinkError(
+                "address cannot be used", where=where, value=getattr(error, "strerror", None) or error
+            ) from None
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._serve, name="natnet-emulator", daemon=True)
         if threaded:

@@ -55,3 +55,5 @@ def test_a_vehicle_is_seen_to_drive() -> None:
 def test_what_cannot_be_emulated_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["mocap", "--emulate", "--natnet-version", "1.0"]) == 2
     assert "NatNet version is not supported: 1.0 (limit: 2.5 to 4.2)" in capsys.readouterr().err
+    assert main(["mocap", "--emulate", "--port", "70000"]) == 2
+    assert "address cannot be used" in capsys.readouterr().err
