@@ -6,8 +6,6 @@ import argparse
 from collections.abc import Callable
 from typing import Any
 
-from agvbench.errors import FlagError
-
 AGV_ENDPOINT = "tcp/127.0.0.1:7447"
 MOCAP_ENDPOINT = "tcp/127.0.0.1:7448"
 
@@ -58,28 +56,6 @@ def add_seed_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=0, help="of the simulation; the same as the bench's (default: 0)")
 
 
-def camera_options(pairs: list[str]) -> dict[str, str]:
-    """Return the camera's parameters by name.
-
-    >>> camera_options(["lost=0.01"])
-    {'lost': '0.01'}
-
-    Raises
-    ------
-    FlagError
-        If a pair has no ``=``.
-    """
-    options: dict[str, str] = {}
-    for pair in pairs:
-        name, equals, value = pair.partition("=")
-        if not (name and equals and value):
-            raise FlagError(
-                "not a parameter and its value", where="--camera", value=repr(pair), remedy="write NAME=VALUE"
-            )
-        options[name] = value
-    return options
-
-
 def endpoints(arguments: argparse.Namespace, default_listen: str) -> dict[str, list[str]]:
     """Return where to listen and connect."""
     connect = arguments.connect or []
@@ -89,6 +65,7 @@ def endpoints(arguments: argparse.Namespace, default_listen: str) -> dict[str, l
 
 def run_with(arguments: argparse.Namespace, default_listen: str, agv: str | None, mocap: str | None) -> int:
     """Run adapters as the arguments say."""
+    from agvbench.adapters.camera_options import camera_options
     from agvbench.adapters.contract import AdapterOptions
     from agvbench.workflows.adapter_process import run_adapters
 

@@ -31,11 +31,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print what every check finds; return the exit code."""
     from agvbench.adapters import check_specs
+    from agvbench.adapters.camera_options import camera_options
     from agvbench.reporting.doctor_table import tell
     from agvbench.workflows.doctor import Lab, State, examine
 
     check_specs(arguments.agv, arguments.mocap)
-    camera = shared.camera_options(arguments.camera)
+    camera = camera_options(arguments.camera)
     lab = Lab(arguments.agv, arguments.mocap, camera, arguments.vehicle, arguments.workspace)
     states = [tell(name, finding) for name, finding in examine(lab)]
     return 1 if State.BAD in states else 0

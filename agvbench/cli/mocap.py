@@ -55,10 +55,11 @@ def run(arguments: argparse.Namespace) -> int:
             "either an adapter runs, a file is decoded or a stream emulated", remedy="name one of the three"
         )
     if arguments.emulate:
+        from agvbench.adapters.camera_options import camera_options
         from agvbench.adapters.contract import AdapterOptions
         from agvbench.workflows.natnet_emulation import emulate
 
-        camera = shared.camera_options(arguments.camera)
+        camera = camera_options(arguments.camera)
         options = AdapterOptions(vehicle=arguments.vehicle, seed=arguments.seed, plant=arguments.plant, camera=camera)
         return emulate(options, arguments.natnet_version or "4.1", arguments.multicast, arguments.port)
     if arguments.decode is not None:

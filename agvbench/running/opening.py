@@ -12,6 +12,7 @@ from typing import Any
 import pandas as pd
 
 from agvbench.adapters import check_specs, open_rig
+from agvbench.adapters.camera_options import camera_options
 from agvbench.bus.link import VehicleLink
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
 from agvbench.errors import VehicleError
@@ -55,6 +56,7 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
         agv=settings.agv,
         mocap=settings.mocap,
         plant=settings.plant,
+        camera=camera_options(filter(None, settings.camera.split(","))),
         seed=settings.seed,
         connect=settings.connect or None,
         lab=settings.lab,

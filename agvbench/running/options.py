@@ -15,6 +15,11 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
     ),
     ("--mocap", {"metavar": "ADAPTER"}, "motion capture adapter: sim (default), natnet:HOST, natnet:emulated"),
     (
+        "--camera",
+        {"metavar": "NAME=VALUE"},
+        "options of the camera, several with commas, such as body=blue,up=z or rate_hz=240",
+    ),
+    (
         "--plant",
         {"metavar": "PLANT"},
         "simulated plant, MODULE_OR_FILE:FACTORY (default: a vehicle like the thesis')",

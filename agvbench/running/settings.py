@@ -24,15 +24,16 @@ _FREE_ON_RESUME = frozenset({"connect", "lab"})
 class BenchSettings:
     """The options that decide what is driven.
 
-    ``agv``, ``mocap`` and ``plant`` name adapters and the simulated plant; ``vehicle`` and ``calibration`` are
-    vehicle files ("" for the shipped nominal vehicle, and for calibrating in this session), ``corrected`` the one with
-    the effects that a diagnosis found ("" for none: the condition is not driven) and ``remainders``
-    what that model still misses; ``repeats`` 0 means what each
-    benchmark declares; ``order`` is one of `ORDERS`; ``full`` drives every pulse of the thesis.
+    ``agv``, ``mocap`` and ``plant`` name adapters and the simulated plant, ``camera`` its options; ``vehicle`` and
+    ``calibration`` are vehicle files ("" for the shipped nominal vehicle, and for calibrating in this session),
+    ``corrected`` the one with the effects that a diagnosis found ("" for none: the condition is not driven) and
+    ``remainders`` what that model still misses; ``repeats`` 0 means what each benchmark declares; ``order`` is one of
+    `ORDERS`; ``full`` drives every pulse of the thesis.
     """
 
     agv: str = "sim"
     mocap: str = "sim"
+    camera: str = ""
     plant: str = "agvbench.simulator:make_plant"
     vehicle: str = ""
     calibration: str = ""

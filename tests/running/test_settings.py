@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from agvbench.errors import AgvbenchError, FileError, FlagError
+from agvbench.running.opening import open_session
 from agvbench.running.settings import SETTINGS_FILE, BenchSettings, settings_for_resume
 
 
@@ -52,3 +53,16 @@ def test_resume_keeps_what_was_begun_and_refuses_contradictions():
     assert settings_for_resume(saved, {"seed": 7, "connect": "tcp/127.0.0.1:1"}).connect == "tcp/127.0.0.1:1"
     with pytest.raises(FlagError, match=r"--seed: .*: 8 \(limit: 7\)"):
         settings_for_resume(saved, {"seed": 8})
+
+
+def test_cameras_are_told_what_is_wanted_of_them(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    given = {"camera": "rate_hz=60,lost=0"}
+    with open_session(given, out=str(tmp_path / "c"), resume=False, dry_run=False) as session:
+        assert session._bench.link.identity().mocap_rate_hz == 60.0
+    given = {"camera": "lost"}
+    with (
+        pytest.raises(FlagError, match="--camera: not a parameter and its value: 'lost'; write NAME=VALUE"),
+        open_session(given, out=str(tmp_path / "d"), resume=False, dry_run=False),
+    ):
+        pass
