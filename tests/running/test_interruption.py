@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,15 @@ OPTIONS = ["--repeats=1", "--seed=11", "--no-report"]
 
 def start(directory: Path, *more: str) -> subprocess.Popen[str]:
     command = [sys.executable, "-c", PROGRAM, "bench", *OPTIONS, f"--out={directory}", *more]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=directory.parent)
+    return subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        cwd=directory.parent,
+        # Who runs the tests in the background of a shell has SIGINT ignored, and so would what they start.
+        preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509  (nothing else forks)
+    )
 
 
 def finish(process: subprocess.Popen[str]) -> str:
