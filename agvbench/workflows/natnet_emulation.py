@@ -7,12 +7,12 @@ import threading
 import numpy as np
 
 from agvbench.adapters.contract import AdapterOptions
-from agvbench.adapters.natnet.axes import from_floor
+from agvbench.adapters.natnet.axes import bodies_of
 from agvbench.adapters.natnet.channel import DATA_PORT
 from agvbench.adapters.natnet.emulator import Emulator, Settings
 from agvbench.adapters.natnet.encode import Model
 from agvbench.adapters.natnet.frame import FrameOfData
-from agvbench.adapters.natnet.layout import BODY, MARKER, TRACKED
+from agvbench.adapters.natnet.layout import MARKER
 from agvbench.adapters.natnet.version import Version
 from agvbench.bus.clock import WallClock, wait_until
 from agvbench.simulator import Camera, load_plant
@@ -20,7 +20,6 @@ from agvbench.types import Command, Frames
 from agvbench.workflows.adapter_process import stop_signal
 
 _BODY = 1
-_HEIGHT_M = 0.1
 _CIRCLE = Command(1700.0, 1450.0, 1550.0)
 _NO_MARKERS = np.zeros(0, MARKER)
 
@@ -68,11 +67,7 @@ def _stream(server: Emulator, camera: Camera, options: AdapterOptions, stopped: 
 
 def _frames(seen: Frames, server: Emulator) -> list[FrameOfData]:
     """Return what the camera makes of a pose: one frame, none or two."""
-    bodies = np.zeros(len(seen), BODY)
-    bodies["id"], bodies["flags"], bodies["mean_error_m"] = _BODY, TRACKED * seen.tracked, seen.mean_error_m
-    poses = np.column_stack([seen.x_m, seen.y_m, seen.heading_rad])
-    bodies["position_m"], bodies["quaternion"] = from_floor(poses, "y", _HEIGHT_M)
-    now = server.ticks()
+    bodies, now = bodies_of(seen, _BODY), server.ticks()
     return [
         FrameOfData(
             int(seen.frame[row]) + 1,

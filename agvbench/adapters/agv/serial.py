@@ -6,6 +6,7 @@ import threading
 
 from agvbench.adapters.contract import AdapterOptions, AgvAdapter, AgvReports
 from agvbench.adapters.serial_line.conversation import Conversation
+from agvbench.adapters.serial_line.dialect import check_unit
 from agvbench.adapters.serial_line.port import SerialPort
 from agvbench.bus.clock import Clock
 from agvbench.bus.command_message import CommandFlags, CommandMessage
@@ -69,10 +70,7 @@ class SerialAgv(AgvAdapter):
         """Open the port `address` and greet the vehicle."""
         if not address:
             raise LinkError("which serial port?", where=cls.scheme, remedy="write serial:/dev/ttyACM0")
-        if options.command_unit != "us":
-            raise LinkError(
-                "the firmware takes microseconds", where=cls.scheme, value=options.command_unit, limit="command unit us"
-            )
+        check_unit(options.command_unit, where=cls.scheme)
         port = SerialPort(address)
         try:
             return cls(port, options)

@@ -13,6 +13,7 @@ import numpy as np
 from agvbench.adapters.agv.sim import SimAgv
 from agvbench.adapters.contract import AdapterOptions
 from agvbench.adapters.seeding import run_seed
+from agvbench.adapters.serial_line.dialect import check_unit
 from agvbench.adapters.simavr.built import VERSIONS
 from agvbench.adapters.simavr.host import CYCLES_PER_S, Pulse
 from agvbench.adapters.simavr.microcontroller import Microcontroller
@@ -46,13 +47,7 @@ class SimavrAgv(SimAgv):
     scheme = "simavr"
 
     def __init__(self, plant: Plant, options: AdapterOptions, version: str = "2") -> None:
-        if options.command_unit != "us":
-            raise LinkError(
-                "the firmware takes microseconds",
-                where=self.scheme,
-                value=options.command_unit,
-                limit="command unit us",
-            )
+        check_unit(options.command_unit, where=self.scheme)
         super().__init__(plant, options)
         self._controller = Microcontroller(version)
         self._said: Command | None = None

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.adapters.natnet.layout import BODY, TRACKED
 from agvbench.calibration.quaternion import Up, quaternion_to_heading
-from agvbench.types import Floats
+from agvbench.types import Floats, Frames
 
 
 def to_floor(position_m: NDArray[np.float32], quaternion: NDArray[np.float32], up: Up) -> Floats:
@@ -33,3 +36,12 @@ def from_floor(poses: Floats, up: Up, height_m: float = 0.0) -> tuple[NDArray[np
     quaternion[:, 1 if up == "y" else 2] = np.sin(poses[:, 2] / 2.0)
     quaternion[:, 3] = np.cos(poses[:, 2] / 2.0)
     return position, quaternion
+
+
+def bodies_of(frames: Frames, body: int, height_m: float = 0.1) -> NDArray[Any]:
+    """Return the records (n,) of a rigid body, y up, that a server streams of what a simulated camera saw."""
+    bodies = np.zeros(len(frames), BODY)
+    bodies["id"], bodies["flags"], bodies["mean_error_m"] = body, TRACKED * frames.tracked, frames.mean_error_m
+    poses = np.column_stack([frames.x_m, frames.y_m, frames.heading_rad])
+    bodies["position_m"], bodies["quaternion"] = from_floor(poses, "y", height_m)
+    return bodies

@@ -10,12 +10,14 @@ from __future__ import annotations
 import math
 import threading
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agvbench.adapters.contract import AdapterOptions, MocapAdapter, MocapReports
 from agvbench.adapters.mocap.sim import SimMocap
-from agvbench.adapters.natnet.axes import from_floor, to_floor
+from agvbench.adapters.natnet.axes import bodies_of, to_floor
 from agvbench.adapters.natnet.channel import Connection
 from agvbench.adapters.natnet.client import Client, Seen
 from agvbench.adapters.natnet.emulator import Emulator, Settings
@@ -34,7 +36,6 @@ from agvbench.types import Frames
 
 EMULATED = "emulated"
 _BODY = 1
-_HEIGHT_M = 0.1
 _BETWEEN_RUNS_S = 10.0
 _PATIENCE_S = 5.0
 _NO_MARKERS = np.zeros(0, MARKER)
@@ -118,18 +119,19 @@ class EmulatedNatNet(MocapAdapter):
         """Publish what arrives of the camera's frames at the other end of the network."""
         self._seen.clear()
         arrived_s = np.maximum.accumulate(np.append(self._last_s, frames.received_s + self._base_s))[1:]
+        bodies = bodies_of(frames, _BODY)
         for index in range(len(frames)):
-            self._transmit(frames, index, float(arrived_s[index]))
+            self._transmit(frames, index, bodies[index : index + 1], float(arrived_s[index]))
         self._reports.frames(self._published(), clock=clock, acknowledged=acknowledged)
 
-    def _transmit(self, frames: Frames, index: int, now_s: float) -> None:
+    def _transmit(self, frames: Frames, index: int, body: NDArray[Any], now_s: float) -> None:
         self._clock.sleep(now_s - self._clock.now())
         self._last_s = now_s
         self._client.step(0.0)
         while self._server.step():
             pass
         handled = self._handled()
-        self._server.send(self._as_sent(frames, index))
+        self._server.send(self._as_sent(frames, index, body))
         deadline_s = WallClock.now() + _PATIENCE_S
         while self._handled() == handled:
             self._client.step(_PATIENCE_S / 10.0)
@@ -140,12 +142,7 @@ class EmulatedNatNet(MocapAdapter):
         counters = self._client.counters
         return counters.frames + counters.repeated + counters.malformed
 
-    def _as_sent(self, frames: Frames, index: int) -> FrameOfData:
-        body = np.zeros(1, BODY)
-        pose = np.array([[frames.x_m[index], frames.y_m[index], frames.heading_rad[index]]])
-        body["id"], body["flags"] = _BODY, TRACKED * bool(frames.tracked[index])
-        body["position_m"], body["quaternion"] = from_floor(pose, "y", _HEIGHT_M)
-        body["mean_error_m"] = frames.mean_error_m[index]
+    def _as_sent(self, frames: Frames, index: int, body: NDArray[Any]) -> FrameOfData:
         exposed_s = float(frames.t_s[index]) + self._base_s
         sent = self._server.ticks(exposed_s), self._server.ticks(), self._server.ticks()
         number = int(frames.frame[index]) + self._offset

@@ -55,6 +55,12 @@ DIALECTS = {1: Dialect("deg", 30, 150, checksums=False), 2: Dialect("us", 600, 2
 """By version of the firmware."""
 
 
+def check_unit(command_unit: str, *, where: object = None) -> None:
+    """Raise `LinkError` unless a bench's commands are in what the firmware is talked to in: microseconds."""
+    if command_unit != "us":
+        raise LinkError("the firmware takes microseconds", where=where, value=command_unit, limit="command unit us")
+
+
 def dialect_of(hello: Hello, *, where: object = None) -> Dialect:
     """Return how to talk to the firmware that said `hello`.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -35,8 +36,9 @@ class Slice:
     def __len__(self) -> int:
         return len(self.t_s)
 
+    @cached_property
     def place(self) -> tuple[float, Floats]:
-        """Return the middle time [s] and place (2,) [m]: medians, which single wrong frames do not move."""
+        """The middle time [s] and place (2,) [m]: medians, which single wrong frames do not move."""
         return float(np.median(self.t_s)), np.median(self.poses[:, :2], axis=0)
 
 

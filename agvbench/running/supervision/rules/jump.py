@@ -20,7 +20,7 @@ class Jump(Rule):
         """Compare the median place with the one that the last two promise."""
         if not len(seen):
             return None
-        t_s, place = seen.place()
+        t_s, place = seen.place
         before, self._before = self._before, (t_s, place)
         if before is None or t_s <= before[0]:
             return None

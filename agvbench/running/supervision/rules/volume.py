@@ -17,7 +17,7 @@ class Volume(Rule):
         """Add the stopping distance to the place, in the direction of motion."""
         if not len(seen):
             return None
-        t_s, place = seen.place()
+        t_s, place = seen.place
         before, self._before = self._before, (t_s, place)
         velocity = np.zeros(2)
         if before is not None and t_s > before[0]:
