@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from agvbench.diagnosis import Diagnosis
-from agvbench.errors import FileError
 from agvbench.reporting.content import Content, plain
 from agvbench.reporting.html import to_html
 from agvbench.reporting.sections.diagnosis import DiagnosisSection, diagnosis_blocks
 from agvbench.workflows.diagnosis_files import shown
+from agvbench.workflows.writing import write_file
 
 
 def write_diagnosis_report(found: Diagnosis, path: str | Path) -> Path:
@@ -24,10 +24,5 @@ def write_diagnosis_report(found: Diagnosis, path: str | Path) -> Path:
     section = Content(DiagnosisSection.slug, DiagnosisSection.title, tuple(diagnosis_blocks(shown(found))))
     title = plain(str(found.provenance.get("campaign", "diagnosis")))
     text = to_html(title, f"{found.verdict}: diagnosis of {found.provenance.get('runs_used', 0)} runs", [section])
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        remedy = "give --report a place you may write to"
-        raise FileError("cannot be written", where=path, value=error.strerror, remedy=remedy) from None
+    write_file("--report", path, lambda page: page.write_text(text, encoding="utf-8"))
     return path

@@ -11,8 +11,9 @@ from rich.table import Table
 
 from agvbench.calibration import Calibration, MapFit, calibrate
 from agvbench.campaign import Campaign
-from agvbench.errors import FileError, FitError
+from agvbench.errors import FitError
 from agvbench.workflows.firmware_header import write_firmware_header
+from agvbench.workflows.writing import write_file
 
 _EXPLAINS = 0.5
 _CAPTION = (
@@ -63,13 +64,7 @@ def save(calibration: Calibration, path: Path) -> None:
     FileError
         If the file cannot be written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        calibration.model.save(path)
-    except OSError as error:
-        raise FileError(
-            "cannot be written", where=path, value=error.strerror, remedy="give --out a place you may write to"
-        ) from None
+    write_file("--out", path, calibration.model.save)
 
 
 def fits_table(calibration: Calibration) -> Table:

@@ -11,6 +11,7 @@ from typing import Any
 
 from agvbench.errors import FileError
 from agvbench.workflows.challenge_scores import Trial, plain, score
+from agvbench.workflows.writing import write_file
 
 SCHEMA = 1
 
@@ -27,14 +28,12 @@ def write_trials(path: Path, repeats: int, trials: Sequence[Trial]) -> None:
     content: dict[str, Any] = {"schema": SCHEMA, "repeats": repeats, **score(ordered).to_json()}
     content["each"] = [plain(asdict(trial)) for trial in ordered]
     part = path.with_name(f"{path.name}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+
+    def write(whole: Path) -> None:
         part.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-        part.replace(path)
-    except OSError as error:
-        raise FileError(
-            "cannot be written", where=path, value=error.strerror, remedy="give --json a place you may write to"
-        ) from None
+        part.replace(whole)
+
+    write_file("--json", path, write)
 
 
 def known_trials(path: Path, repeats: int) -> dict[tuple[str, int], Trial]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +14,11 @@ from rich.table import Table
 from agvbench.campaign import Campaign
 from agvbench.diagnosis import Diagnosis, NamedEffect, diagnose
 from agvbench.diagnosis.next_experiment_propose import with_first_experiment
-from agvbench.errors import FileError, FlagError
+from agvbench.errors import FlagError
 from agvbench.model import VehicleModel
 from agvbench.workflows.diagnosis_files import keep
 from agvbench.workflows.windows_table import windows_table
+from agvbench.workflows.writing import write_file
 
 _TITLES = {
     "position_rms_mm": "position along the way, mm",
@@ -64,15 +65,15 @@ def run_diagnose(
     if next_file is not None and found.next_experiment is not None:
         trajectory = found.next_experiment.trajectory
         text = tomli_w.dumps(trajectory.to_table())
-        _write("--next", Path(next_file), lambda path: path.write_text(text, encoding="utf-8"))
+        write_file("--next", Path(next_file), lambda path: path.write_text(text, encoding="utf-8"))
     if drive_next:
         found = _decided(campaign, found, model, seed, next_out, rig or {})
     if json_file is not None:
         text = found.to_text()
-        _write("--json", Path(json_file), lambda path: path.write_text(text, encoding="utf-8"))
+        write_file("--json", Path(json_file), lambda path: path.write_text(text, encoding="utf-8"))
         keep(found, Path(json_file))
     if out is not None and found.model is not None:
-        _write("--out", Path(out), found.model.save)
+        write_file("--out", Path(out), found.model.save)
     return found
 
 
@@ -158,12 +159,3 @@ def errors_table(found: Diagnosis) -> Table:
     for name, errors in (held.errors if held else {}).items():
         table.add_row(_TITLES[name], *(f"{errors[column]:.2f}" for column in ("before", "after", "floor")))
     return table
-
-
-def _write(flag: str, path: Path, write: Callable[[Path], object]) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write(path)
-    except OSError as error:
-        remedy = f"give {flag} a place you may write to"
-        raise FileError("cannot be written", where=path, value=error.strerror, remedy=remedy) from None

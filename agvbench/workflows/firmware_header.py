@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from agvbench.errors import FileError
 from agvbench.model import VehicleModel
+from agvbench.workflows.writing import write_file
 
 
 def firmware_header(model: VehicleModel) -> str:
@@ -25,10 +25,5 @@ def write_firmware_header(model: VehicleModel, path: Path) -> None:
     FileError
         If the file cannot be written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(firmware_header(model), encoding="ascii", errors="replace")
-    except OSError as error:
-        raise FileError(
-            "cannot be written", where=path, value=error.strerror, remedy="give --firmware a place you may write to"
-        ) from None
+    text = firmware_header(model)
+    write_file("--firmware", path, lambda header: header.write_text(text, encoding="ascii", errors="replace"))
