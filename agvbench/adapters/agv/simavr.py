@@ -7,6 +7,7 @@ serial protocol and a pseudo-terminal to the same program that is flashed into t
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 
 import numpy as np
 
@@ -54,6 +55,11 @@ class SimavrAgv(SimAgv):
         self._said_s = self._base_s = math.nan
         self._pulses: list[Pulse] = []
 
+    @property
+    def line(self) -> Microcontroller:
+        """The line, for faults to rehearse with."""
+        return self._controller
+
     @classmethod
     def open(cls, address: str, options: AdapterOptions) -> SimavrAgv:
         """Start the firmware of version `address` with the plant that the options name."""
@@ -78,6 +84,12 @@ class SimavrAgv(SimAgv):
         wait = run_seed(self._options.seed, request.run_key, "servo frame") / 2.0**32
         self._controller.run_until(self._controller.now_s + wait * FRAME_S)
         self._said, self._base_s, self._pulses = None, math.nan, []
+
+    def stop(self) -> None:
+        """Say neutral: the vehicle heeds it as soon as time passes, if it still hears anything."""
+        with suppress(LinkError, OSError):
+            self._controller.say(self._neutral)
+        self._said = None
 
     def close(self) -> None:
         """End the simulated microcontroller."""
