@@ -65,6 +65,11 @@ class SerialAgv(AgvAdapter):
             elif conversation.is_greeted and now_s - heard_s > _QUIET_S:
                 return
 
+    @property
+    def line(self) -> SerialPort:
+        """The line, for faults to rehearse with."""
+        return self._port
+
     @classmethod
     def open(cls, address: str, options: AdapterOptions) -> SerialAgv:
         """Open the port `address` and greet the vehicle."""

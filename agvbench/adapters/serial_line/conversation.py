@@ -114,14 +114,22 @@ class Conversation:
 
     def _replies(self, data: bytes) -> Iterator[Reply]:
         for line in self._splitter.feed(data):
-            text = decode_line(line.removesuffix(b"\r"), checksum=self._dialect is not None and self._dialect.checksums)
-            reply = None if text is None else parse_reply(text)
+            reply = self._reply(line.removesuffix(b"\r"))
             if reply is not None:
                 self._checked |= b"*" in line
                 yield reply
             elif line:
                 self.garbled += 1
                 self._heard = line
+
+    def _reply(self, line: bytes) -> Reply | None:
+        text = decode_line(line, checksum=self._dialect is not None and self._dialect.checksums)
+        if text is not None:
+            return parse_reply(text)
+        # A firmware that has just been reset knows of no checksums, and its greeting must not be taken for noise.
+        bare = decode_line(line, checksum=False)
+        reply = None if bare is None else parse_reply(bare)
+        return reply if isinstance(reply, Hello) else None
 
     def _take(self, reply: Reply, now_s: float) -> bytes:
         if self._dialect is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+from collections.abc import Callable
 from typing import Any
 
 from agvbench.errors import LinkError
@@ -23,12 +24,18 @@ class SerialPort:
     ------
     LinkError
         If there is no such port, it may not be opened, or somebody else has it.
+
+    Attributes
+    ----------
+    wire
+        What becomes of bytes on their way to the vehicle: nothing, unless somebody rehearses a bad line.
     """
 
     def __init__(self, path: str) -> None:
         import serial
 
         self.path = path
+        self.wire: Callable[[bytes], bytes] = bytes
         try:
             self._port: Any = serial.Serial(
                 path, BAUD, timeout=READ_LIMIT_S, write_timeout=10 * READ_LIMIT_S, exclusive=True
@@ -48,9 +55,21 @@ class SerialPort:
     def write(self, data: bytes) -> None:
         """Send `data`."""
         try:
-            self._port.write(data)
+            self._port.write(self.wire(data))
         except self._broken as error:
             raise self._gone() from error
+
+    def press_reset(self) -> None:
+        """Reset the board, as most do when this line of the port falls."""
+        try:
+            self._port.dtr = False
+            self._port.dtr = True
+        except self._broken as error:
+            raise self._gone() from error
+
+    def pull(self) -> None:
+        """Close the port behind everybody's back, as a cable that is pulled out does."""
+        self._port.close()
 
     def close(self) -> None:
         """Give the port back."""

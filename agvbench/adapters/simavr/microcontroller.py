@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from agvbench.adapters.serial_line.conversation import Conversation
 from agvbench.adapters.serial_line.replies import Hello
 from agvbench.adapters.simavr.host import CYCLES_PER_S, Pulse, SimavrHost
@@ -24,13 +26,20 @@ class Microcontroller:
     ----------
     version
         Of the firmware, ``"1"`` or ``"2"``.
+
+    Attributes
+    ----------
+    wire
+        What becomes of bytes on their way to the firmware: nothing, unless somebody rehearses a bad line.
     """
 
     def __init__(self, version: str = "2") -> None:
         import serial
 
         self.host = SimavrHost(version)
-        self._written = 0
+        self.wire: Callable[[bytes], bytes] = bytes
+        self._written = self._read = 0
+        self._began_cycle = 0
         try:
             self._port = serial.Serial(self.host.port, BAUD, timeout=_READ_LIMIT_S)
             self.hello: Hello = self.reset()
@@ -40,9 +49,8 @@ class Microcontroller:
 
     def reset(self) -> Hello:
         """Press the reset button, and wait until firmware and conversation have greeted each other."""
-        self.host.reset(self._written)
-        self._written = self._read = 0
-        self.now_s = 0.0
+        self._press()
+        self.now_s, self._began_cycle = 0.0, 0
         self.conversation = Conversation(self.host.port)
         self.run_until(_SETTLE_S)  # what comes before the firmware listens is lost
         for attempt in range(_ATTEMPTS):
@@ -51,6 +59,19 @@ class Microcontroller:
             if self.conversation.is_greeted:
                 break
         return self.conversation.begin()
+
+    def press_reset(self) -> None:
+        """Press the reset button and nothing else: time goes on, the conversation has to find out."""
+        self._began_cycle = round(self.now_s * CYCLES_PER_S)
+        self._press()
+
+    def _press(self) -> None:
+        self.host.reset(self._written)
+        self._written = self._read = 0
+
+    def pull(self) -> None:
+        """End the process, as a cable that is pulled out ends a port."""
+        self.host.process.kill()
 
     def say(self, command: Command) -> None:
         """Send a command [µs] now."""
@@ -78,7 +99,7 @@ class Microcontroller:
         The conversation hears nothing of it.
         """
         self._write(data)
-        ran = self.host.run(round(end_s * CYCLES_PER_S), self._written)
+        ran = self.host.run(round(end_s * CYCLES_PER_S) - self._began_cycle, self._written)
         self.now_s = max(self.now_s, end_s)
         count, self._read = ran.bytes_sent - self._read, ran.bytes_sent
         heard: bytes = self._port.read(count)
@@ -86,11 +107,15 @@ class Microcontroller:
             raise LinkError(
                 "bytes were lost in the pseudo-terminal", where=self.host.port, value=len(heard), limit=count
             )
-        return heard, ran.pulses
+        return heard, [self._since_run_began(pulse) for pulse in ran.pulses] if self._began_cycle else ran.pulses
+
+    def _since_run_began(self, pulse: Pulse) -> Pulse:
+        return pulse._replace(rise=pulse.rise + self._began_cycle, fall=pulse.fall + self._began_cycle)
 
     def _write(self, data: bytes) -> None:
-        self._port.write(data)
-        self._written += len(data)
+        arriving = self.wire(data)
+        self._port.write(arriving)
+        self._written += len(arriving)
 
     def close(self) -> None:
         """End the process."""

@@ -1,0 +1,94 @@
+"""``impaired:FAULTS:ADAPTER``: another vehicle, and what goes wrong with it: to rehearse faults, never by itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from agvbench.adapters.contract import AdapterOptions, AgvAdapter, AgvReports
+from agvbench.adapters.impairment.fault import Line, vehicle_fault
+from agvbench.adapters.impairment.spec import SCHEME, Impairment, parse_address
+from agvbench.adapters.registry import open_agv
+from agvbench.adapters.seeding import run_seed
+from agvbench.bus.command_message import CommandFlags, CommandMessage
+from agvbench.bus.identity_message import AgvIdentity
+from agvbench.bus.request_message import Replay, Reset
+from agvbench.errors import LinkError
+
+
+class ImpairedAgv(AgvAdapter):
+    """A vehicle with faults, which befall it before its commands.
+
+    Runs of a simulated vehicle are counted; a real one's are all the first.
+    """
+
+    scheme = SCHEME
+
+    def __init__(self, vehicle: AgvAdapter, impairments: list[Impairment], options: AdapterOptions) -> None:
+        self.vehicle, self._seed = vehicle, options.seed
+        self._faults = [(when, vehicle_fault(when)) for when in impairments]
+        line = getattr(vehicle, "line", None)
+        self._line = line if isinstance(line, Line) else None
+        for when, fault in self._faults:
+            if fault.needs_line and self._line is None:
+                raise LinkError("vehicle has no serial line", where=f"{SCHEME}:{when.name}", value=vehicle.scheme)
+        self._run, self._runs_begun = 1, 0
+
+    @classmethod
+    def open(cls, address: str, options: AdapterOptions) -> ImpairedAgv:
+        """Open the vehicle behind the faults."""
+        impairments, spec = parse_address(address)
+        vehicle = open_agv(spec, options)
+        try:
+            return cls(vehicle, impairments, options)
+        except BaseException:
+            vehicle.close()
+            raise
+
+    def identity(self) -> AgvIdentity:
+        """Return who the vehicle is, and that it is impaired."""
+        identity = self.vehicle.identity()
+        faults = " ".join(when.name for when, _ in self._faults)
+        return replace(identity, extra={**identity.extra, "impaired": faults})
+
+    def start(self, reports: AgvReports) -> None:
+        """Let the vehicle report."""
+        self.vehicle.start(reports)
+
+    def apply(self, message: CommandMessage) -> None:
+        """Let the faults strike that hold by now, and then the vehicle have its command."""
+        if not message.flags & CommandFlags.FLUSH:
+            for when, fault in self._faults:
+                if when.holds(self._run, message.t_s):
+                    fault.strike(self._line)
+        self.vehicle.apply(message)
+
+    def reset(self, request: Reset) -> None:
+        """Place a simulated vehicle; what was wrong with the line is mended."""
+        self._begin(request)
+        self.vehicle.reset(request)
+
+    def replay(self, request: Replay) -> None:
+        """Drive a recorded run again; faults strike the first time only."""
+        self._begin(request.reset)
+        self.vehicle.replay(request)
+
+    def _begin(self, request: Reset) -> None:
+        self._runs_begun += 1
+        self._run = self._runs_begun
+        rng = np.random.default_rng(run_seed(self._seed, request.run_key, "impairment", bits=128))
+        if self._line is not None:
+            self._line.wire = bytes
+        for _, fault in self._faults:
+            fault.begin(rng)
+
+    def stop(self) -> None:
+        """Stop the vehicle, as far as the faults let it hear of that."""
+        self.vehicle.stop()
+
+    def close(self) -> None:
+        """Close the vehicle."""
+        for _, fault in self._faults:
+            fault.cease()
+        self.vehicle.close()

@@ -1,0 +1,1 @@
+"""Faults of frames, a file each."""

@@ -1,0 +1,20 @@
+"""``guessed``: frames say that the vehicle is not tracked, and show a plausible pose all the same."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from agvbench.adapters.impairment.fault import FrameFault
+from agvbench.types import Frames
+
+
+class Guessed(FrameFault):
+    """Motion capture software that extrapolates: the pose is as good as ever, only nobody saw it."""
+
+    name = "guessed"
+
+    def change(self, frames: Frames) -> Frames:
+        """Keep the poses, and admit that they are guesses."""
+        return replace(frames, tracked=np.zeros(len(frames), np.bool_))

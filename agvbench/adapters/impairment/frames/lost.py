@@ -1,0 +1,17 @@
+"""``lost=SHARE``: that share of the frames never arrives."""
+
+from __future__ import annotations
+
+from agvbench.adapters.impairment.fault import FrameFault
+from agvbench.types import Frames
+
+
+class Lost(FrameFault):
+    """Leaves frames out, each by chance."""
+
+    name = "lost"
+    usual = 0.1
+
+    def change(self, frames: Frames) -> Frames:
+        """Keep the others."""
+        return frames.select(self.rng.random(len(frames)) >= self.value)

@@ -1,0 +1,22 @@
+"""``reordered=SHARE``: that share of the frames is overtaken by the next."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from agvbench.adapters.impairment.fault import FrameFault
+from agvbench.types import Frames
+
+
+class Reordered(FrameFault):
+    """Swaps neighbours, each pair by chance."""
+
+    name = "reordered"
+    usual = 0.1
+
+    def change(self, frames: Frames) -> Frames:
+        """Let frames be overtaken."""
+        order = np.arange(len(frames))
+        for index in np.flatnonzero(self.rng.random(max(0, len(frames) - 1)) < self.value):
+            order[[index, index + 1]] = order[[index + 1, index]]
+        return frames.select(order)

@@ -1,0 +1,1 @@
+"""Faults of vehicles and of the line to them, a file each."""

@@ -1,0 +1,15 @@
+"""``fails``: the adapter raises what nobody thought of."""
+
+from __future__ import annotations
+
+from agvbench.adapters.impairment.fault import Line, VehicleFault
+
+
+class Fails(VehicleFault):
+    """A mistake in an adapter."""
+
+    name = "fails"
+
+    def strike(self, line: Line | None) -> None:
+        """Raise."""
+        raise RuntimeError("impaired on purpose")

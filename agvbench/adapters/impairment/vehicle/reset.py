@@ -1,0 +1,26 @@
+"""``reset``: the vehicle's microcontroller is reset, once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from agvbench.adapters.impairment.fault import Line, VehicleFault
+
+
+class Reset(VehicleFault):
+    """A drop in voltage when the motor starts, or somebody at the button."""
+
+    name = "reset"
+    needs_line = True
+
+    def begin(self, rng: np.random.Generator) -> None:
+        """Not yet."""
+        super().begin(rng)
+        self._is_done = False
+
+    def strike(self, line: Line | None) -> None:
+        """Press the button."""
+        assert line is not None  # noqa: S101  (the adapter was asked)
+        if not self._is_done:
+            line.press_reset()
+        self._is_done = True

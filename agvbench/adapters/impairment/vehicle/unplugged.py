@@ -1,0 +1,17 @@
+"""``unplugged``: the serial port is gone."""
+
+from __future__ import annotations
+
+from agvbench.adapters.impairment.fault import Line, VehicleFault
+
+
+class Unplugged(VehicleFault):
+    """A cable that was pulled out."""
+
+    name = "unplugged"
+    needs_line = True
+
+    def strike(self, line: Line | None) -> None:
+        """Pull it."""
+        assert line is not None  # noqa: S101  (the adapter was asked)
+        line.pull()

@@ -1,0 +1,108 @@
+"""``impaired:FAULTS:ADAPTER``: another camera, and what goes wrong with it: to rehearse faults, never by itself."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from agvbench.adapters.contract import AdapterOptions, MocapAdapter, MocapReports
+from agvbench.adapters.impairment.fault import frame_fault
+from agvbench.adapters.impairment.spec import SCHEME, Impairment, parse_address
+from agvbench.adapters.registry import open_mocap
+from agvbench.adapters.seeding import run_seed
+from agvbench.bus.event_message import Level
+from agvbench.bus.frames_message import FrameClock
+from agvbench.bus.identity_message import MocapIdentity
+from agvbench.bus.request_message import Reset, Sampling
+from agvbench.bus.truth_message import Truth
+from agvbench.types import Frames
+
+
+class ImpairedMocap(MocapAdapter):
+    """A camera with faults, which befall its frames by their capture times.
+
+    A simulated camera's times are those of its run; a real one's count from its first frame, and are all one run.
+    """
+
+    scheme = SCHEME
+
+    def __init__(self, camera: MocapAdapter, impairments: list[Impairment], options: AdapterOptions) -> None:
+        self._camera, self._seed = camera, options.seed
+        self._faults = [(when, frame_fault(when)) for when in impairments]
+        self._run, self._origin_s = 1, math.nan
+        self._runs_begun = 0
+
+    @classmethod
+    def open(cls, address: str, options: AdapterOptions) -> ImpairedMocap:
+        """Open the camera behind the faults."""
+        impairments, spec = parse_address(address)
+        for impairment in impairments:
+            frame_fault(impairment)
+        return cls(open_mocap(spec, options), impairments, options)
+
+    def identity(self) -> MocapIdentity:
+        """Return who the camera is, and that it is impaired."""
+        identity = self._camera.identity()
+        faults = " ".join(when.name for when, _ in self._faults)
+        return replace(identity, extra={**identity.extra, "impaired": faults})
+
+    def start(self, reports: MocapReports) -> None:
+        """Stand between the camera and `reports`."""
+        self._reports = reports
+        self._camera.start(self)
+
+    def reset(self, request: Reset) -> Sampling:
+        """Begin a run."""
+        self._runs_begun += 1
+        self._run = self._runs_begun
+        rng = np.random.default_rng(run_seed(self._seed, request.run_key, "impairment", bits=128))
+        for _, fault in self._faults:
+            fault.begin(rng)
+        return self._camera.reset(request)
+
+    def see(self, truth: Truth) -> None:
+        """Let the camera look."""
+        self._camera.see(truth)
+
+    def event(self, level: Level, kind: str, text: str, *, acknowledged: int = 0) -> None:
+        """Pass on what the camera says."""
+        self._reports.event(level, kind, text, acknowledged=acknowledged)
+
+    def frames(self, frames: Frames, *, clock: FrameClock, acknowledged: int = 0) -> None:
+        """Publish what the faults leave of the camera's frames."""
+        for when, fault in self._faults:
+            struck = self._struck(when, frames, clock)
+            if struck.any():
+                frames = Frames.concatenate([frames.select(~struck), fault.change(frames.select(struck))])
+        self._reports.frames(frames, clock=clock, acknowledged=acknowledged)
+
+    def _struck(self, when: Impairment, frames: Frames, clock: FrameClock) -> np.ndarray:
+        if clock is FrameClock.RUN:
+            return np.array([when.holds(self._run, t_s) for t_s in frames.t_s.tolist()], np.bool_)
+        if math.isnan(self._origin_s) and len(frames):
+            self._origin_s = float(frames.t_s[0])
+        return np.array([when.holds(self._run, t_s - self._origin_s) for t_s in frames.t_s.tolist()], np.bool_)
+
+    def frame(
+        self,
+        t_s: float,
+        x_m: float,
+        y_m: float,
+        heading_rad: float,
+        *,
+        clock: FrameClock,
+        tracked: bool = True,
+        frame: int = -1,
+        mean_error_m: float = math.nan,
+        received_s: float = math.nan,
+        acknowledged: int = 0,
+    ) -> None:
+        """Publish what the faults leave of one frame."""
+        columns = (t_s, x_m, y_m, heading_rad, tracked, frame, mean_error_m, received_s)
+        self.frames(Frames(*(np.array([value]) for value in columns)), clock=clock, acknowledged=acknowledged)
+
+    def close(self) -> None:
+        """Close the camera."""
+        self._camera.close()
