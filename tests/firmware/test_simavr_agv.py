@@ -76,6 +76,16 @@ def test_a_run_does_not_depend_on_what_was_driven_before() -> None:
     assert ends[0] == ends[2] != ends[1]
 
 
+def test_a_phase_that_is_given_is_the_same_in_every_run() -> None:
+    ends = [drive("simavr:2,phase_ms=3", (1.0,), key=key).x_m[-1] for key in ("a", "b")]
+    assert ends[0] == pytest.approx(ends[1], abs=1e-5)  # neutral is wide by 0.3 µs, and the camera looks when it looks
+    # 1.01 s are half a frame more than whole frames: the drive lasts 51 frames of 20 ms or 50, by the phase alone.
+    moved_m = [
+        float(np.ptp(drive(f"simavr:2,phase_ms={phase_ms}", (1.01,)).x_m)) for phase_ms in (0, 5, 10, 15)
+    ]  # fmt: skip
+    assert {round(one / 0.3 / 0.02) for one in moved_m} == {50, 51}
+
+
 def test_the_camera_may_speak_natnet() -> None:
     frames = drive("simavr", (0.5,), mocap="natnet:emulated")
     assert float(frames.x_m[-1] - frames.x_m[0]) == pytest.approx(0.15, abs=0.01)
@@ -85,6 +95,9 @@ def test_the_camera_may_speak_natnet() -> None:
     ("spec", "options", "line"),
     [
         ("simavr:3", AdapterOptions(plant=PLANT), "simavr: no such firmware: '3' (limit: 1 or 2)"),
+        ("simavr:1,9", AdapterOptions(plant=PLANT), "simavr: no such firmware: '9' (limit: 1 or 2)"),
+        ("simavr:2,phase_ms=20", AdapterOptions(plant=PLANT), "phase_ms=20 (limit: 0 to below 20 ms)"),
+        ("simavr:2,phase_ms=x", AdapterOptions(plant=PLANT), "no such phase of the servo frame: phase_ms=x"),
         ("simavr", AdapterOptions(plant=PLANT, command_unit="normalised"), "takes microseconds"),
     ],
 )

@@ -37,8 +37,8 @@ def test_the_runner_hears_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[SimavrAgv] = []
     begin = SimavrAgv.__init__
 
-    def remember(self: SimavrAgv, plant: object, options: AdapterOptions, version: str = "2") -> None:
-        begin(self, plant, options, version)  # type: ignore[arg-type]
+    def remember(self: SimavrAgv, plant: object, options: AdapterOptions, *more: object) -> None:
+        begin(self, plant, options, *more)  # type: ignore[arg-type]
         opened.append(self)
 
     monkeypatch.setattr(SimavrAgv, "__init__", remember)

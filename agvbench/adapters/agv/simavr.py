@@ -1,7 +1,8 @@
 """``simavr``: the vehicle's firmware in a simulated microcontroller, its servo pulses driving a plant, in lock step.
 
 ``simavr:1`` and ``simavr:2`` are the two versions of the firmware; ``simavr`` is the second. Commands go through the
-serial protocol and a pseudo-terminal to the same program that is flashed into the vehicle.
+serial protocol and a pseudo-terminal to the same program that is flashed into the vehicle. ``simavr:2,phase_ms=5``
+begins every run at the same phase of the servo frame, to see what that phase makes.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from agvbench.adapters.agv.sim import SimAgv
 from agvbench.adapters.contract import AdapterOptions
 from agvbench.adapters.seeding import run_seed
 from agvbench.adapters.serial_line.dialect import check_unit
-from agvbench.adapters.simavr.built import VERSIONS
+from agvbench.adapters.simavr.address import FRAME_S, FirmwareAddress
 from agvbench.adapters.simavr.host import CYCLES_PER_S, Pulse
 from agvbench.adapters.simavr.microcontroller import Microcontroller
 from agvbench.bus.identity_message import AgvIdentity
@@ -25,8 +26,8 @@ from agvbench.simulator import load_plant
 from agvbench.types import Command, Floats, Plant
 
 KEEP_ALIVE_S = 0.1
-FRAME_S = 0.02
 _SLACK_S = 1e-9
+_DEFAULT = FirmwareAddress()
 
 
 class SimavrAgv(SimAgv):
@@ -41,16 +42,17 @@ class SimavrAgv(SimAgv):
         Each pulse is what it holds, from the pulse's falling edge to that of the channel's next.
     options
         Its ``command_unit`` is ``"us"``.
-    version
-        Of the firmware.
+    address
+        Which firmware, and at which phase of its frame runs begin.
     """
 
     scheme = "simavr"
 
-    def __init__(self, plant: Plant, options: AdapterOptions, version: str = "2") -> None:
+    def __init__(self, plant: Plant, options: AdapterOptions, address: FirmwareAddress = _DEFAULT) -> None:
         check_unit(options.command_unit, where=self.scheme)
         super().__init__(plant, options)
-        self._controller = Microcontroller(version)
+        self._phase_s = address.phase_s
+        self._controller = Microcontroller(address.version)
         self._said: Command | None = None
         self._said_s = self._base_s = math.nan
         self._pulses: list[Pulse] = []
@@ -62,10 +64,9 @@ class SimavrAgv(SimAgv):
 
     @classmethod
     def open(cls, address: str, options: AdapterOptions) -> SimavrAgv:
-        """Start the firmware of version `address` with the plant that the options name."""
-        if address not in ("", *VERSIONS):
-            raise LinkError("no such firmware", where=cls.scheme, value=repr(address), limit=" or ".join(VERSIONS))
-        return cls(load_plant(options.plant)(options.seed), options, address or VERSIONS[-1])
+        """Start the firmware of `address` with the plant that the options name."""
+        firmware = FirmwareAddress.parse(address, where=cls.scheme)
+        return cls(load_plant(options.plant)(options.seed), options, firmware)
 
     def identity(self) -> AgvIdentity:
         """Return who this is."""
@@ -81,9 +82,14 @@ class SimavrAgv(SimAgv):
         """Place the plant at rest, and reset the microcontroller."""
         super().reset(request)
         self._controller.reset()
-        wait = run_seed(self._options.seed, request.run_key, "servo frame") / 2.0**32
-        self._controller.run_until(self._controller.now_s + wait * FRAME_S)
+        self._controller.run_until(self._controller.now_s + self._wait_s(request.run_key))
         self._said, self._base_s, self._pulses = None, math.nan, []
+
+    def _wait_s(self, run_key: str) -> float:
+        """Return how long after its reset the vehicle is left alone: this decides on the phase of its frames."""
+        if self._phase_s is not None:
+            return self._phase_s
+        return FRAME_S * run_seed(self._options.seed, run_key, "servo frame") / 2.0**32
 
     def stop(self) -> None:
         """Say neutral: the vehicle heeds it as soon as time passes, if it still hears anything."""
