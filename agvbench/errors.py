@@ -7,6 +7,7 @@
     │   ├── FlagError             a command line option
     │   ├── FileError             a file that is missing, unreadable or of the wrong form
     │   └── CampaignError         a campaign whose tables contradict themselves or the schema
+    │       └── RecordingError    a campaign that cannot be written: the disk is full, the folder gone
     ├── VehicleError              a vehicle description or static map that cannot be used
     ├── PlanError                 a trajectory that this vehicle cannot drive here
     ├── FitError                  data that do not determine what is fitted
@@ -85,6 +86,10 @@ class FileError(InputError):
 
 class CampaignError(InputError):
     """A campaign whose tables contradict themselves or the schema."""
+
+
+class RecordingError(CampaignError):
+    """A campaign that cannot be written any more: the disk is full, its folder is gone."""
 
 
 class VehicleError(AgvbenchError):

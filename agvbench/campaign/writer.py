@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -17,11 +18,14 @@ from agvbench.campaign.parts import part_name, parts_of, run_id_of
 from agvbench.campaign.schema import TABLES
 from agvbench.campaign.source import parts
 from agvbench.campaign.timed import TimedTable, blank_untracked
-from agvbench.errors import CampaignError
+from agvbench.errors import CampaignError, RecordingError
 from agvbench.types import CommandUnit, Run
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+_FULL = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EFBIG))
 
 
 class CampaignWriter:
@@ -115,8 +119,10 @@ class CampaignWriter:
         Raises
         ------
         CampaignError
-            If there is a run of that id already, its id cannot name a file, it contradicts the schema (nothing is
-            written then), or the disk refuses.
+            If there is a run of that id already, its id cannot name a file, or it contradicts the schema: nothing is
+            written then.
+        RecordingError
+            If the disk refuses.
         """
         if run.run_id in self._finished:
             raise CampaignError(
@@ -129,9 +135,11 @@ class CampaignWriter:
             for table, part in tables.items():
                 write_atomically(self.path / f"{table}.parquet" / name, to_parquet(part), durable=self._durable)
         except OSError as error:
-            raise CampaignError(
-                f"cannot be written ({error.strerror})", where=self.path, remedy="free some space"
-            ) from None
+            full = error.errno in _FULL
+            raise RecordingError(
+                f"cannot be written ({error.strerror})", where=self.path,
+                remedy=f"{'free some space' if full else 'bring the folder back'}, then go on with --resume",
+            ) from None  # fmt: skip
         self._finished[run.run_id] = None
 
     def write_table(self, name: str, table: pd.DataFrame) -> None:

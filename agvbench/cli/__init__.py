@@ -89,9 +89,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except AgvbenchError as error:
         print(f"agvbench {arguments.command}: {error}", file=sys.stderr)
         return error.exit_code
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as interrupt:
         print(f"agvbench {arguments.command}: interrupted", file=sys.stderr)
-        return 130
+        return int(getattr(interrupt, "exit_code", 130))  # another signal than Ctrl-C brings its own
     except BrokenPipeError:
         # The reader (head, less) has gone: nothing is left to say, and nobody to say it to.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -19,7 +19,7 @@ from agvbench.pytest_plugin.collecting import (
     pytest_collection_modifyitems,
     pytest_generate_tests,
 )
-from agvbench.pytest_plugin.fixtures import agvbench_repeat, bench, drive, pytest_runtestloop
+from agvbench.pytest_plugin.fixtures import agvbench_repeat, bench, drive, pytest_runtestloop, pytest_sessionfinish
 from agvbench.pytest_plugin.options import pytest_addoption, pytest_configure
 from agvbench.pytest_plugin.telling import (
     pytest_pyfunc_call,
@@ -43,5 +43,6 @@ __all__ = [
     "pytest_runtest_makereport",
     "pytest_runtest_protocol",
     "pytest_runtestloop",
+    "pytest_sessionfinish",
     "pytest_terminal_summary",
 ]

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from agvbench.running.driver import Driver
     from agvbench.running.session import BenchSession
 
+INTERRUPT = pytest.StashKey[KeyboardInterrupt]()
+"""What ended the session before its time."""
 SESSION = pytest.StashKey["BenchSession"]()
 
 
@@ -49,7 +51,21 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
         if reporter is not None:
             for notice in bench_session.notices:
                 reporter.write_line(notice)
-        return (yield)
+        try:
+            return (yield)
+        except KeyboardInterrupt as interrupt:
+            config.stash[INTERRUPT] = interrupt
+            raise
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """End with the exit code that shells know of the signal that ended the session."""
+    interrupt = session.config.stash.get(INTERRUPT, None)
+    if interrupt is not None:
+        from agvbench.running.signals import exit_code
+
+        session.exitstatus = exit_code(interrupt)
 
 
 @pytest.fixture(scope="session")

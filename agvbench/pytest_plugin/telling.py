@@ -9,7 +9,7 @@ import pytest
 
 from agvbench.errors import AgvbenchError
 from agvbench.pytest_plugin.collecting import is_bench
-from agvbench.pytest_plugin.fixtures import SESSION
+from agvbench.pytest_plugin.fixtures import INTERRUPT, SESSION
 
 _BAR = 24
 _PROGRESS = pytest.StashKey["Progress"]()
@@ -115,7 +115,15 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
     if _PROGRESS in config.stash:
         config.stash[_PROGRESS].end()
     session = config.stash.get(SESSION, None)
-    if session is None or (config.getoption("no_summary") and not session.is_dry):
+    if session is None:
+        return
+    if INTERRUPT in config.stash:
+        why = str(config.stash[INTERRUPT]) or "Ctrl-C"
+        terminalreporter.write_line(
+            f"ended by {why}, the vehicle was stopped; go on with --resume --out {session.directory}"
+        )
+        return
+    if config.getoption("no_summary") and not session.is_dry:
         return
     from agvbench.reporting.after_bench import conclude
     from agvbench.reporting.dry_run import dry_run_table

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import itertools
+import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 
 from agvbench.bus.link import VehicleLink
 from agvbench.campaign import CampaignWriter
-from agvbench.errors import FlagError, LinkError, PlantError
+from agvbench.errors import CampaignError, FlagError, LinkError, PlantError, RecordingError
 from agvbench.model import VehicleModel
 from agvbench.planning import Departure, Workspace
 from agvbench.running.campaign_time import CampaignTime
 from agvbench.running.drive import DEFAULT_TIMING, Drive, Timing, drive, exchanged
+from agvbench.running.pausing import Pause
 from agvbench.running.placing import wait_for_start
 from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess
 from agvbench.running.records import DriveOrder, aborted_run, free_name, recorded_run
 from agvbench.running.settings import BenchSettings
 from agvbench.running.supervision import Supervisor
 from agvbench.types import Command, Frames, Run
+
+_STAND_S = 0.25
 
 
 class Bench:
@@ -47,7 +53,8 @@ class Bench:
         self._corrected = corrected
         self._time, self._timing, self._limits = campaign_time, timing, limits
         self._identity = link.identity()
-        self._failure: LinkError | PlantError | None = None
+        self._failure: LinkError | PlantError | RecordingError | None = None
+        self.pause = Pause(writer.path)
         self._recorded = recorded
         self._supervisor = Supervisor(Workspace.parse(settings.workspace), nominal.neutral)
 
@@ -84,13 +91,10 @@ class Bench:
         ------
         LinkError
             If hardware failed, now or earlier in this session: a bench that failed once drives no more.
+        RecordingError
+            If the run was driven and cannot be recorded; the bench drives no more, either.
         """
-        if self._failure is not None:
-            raise LinkError(
-                "the bench drives no more after the first failure",
-                value=self._failure,
-                remedy="mend it and go on with --resume",
-            )
+        self._refuse_after_failure()
         run = self._attempt(order, 1)
         for attempt in range(2, self.settings.attempts + 1):
             if run.is_ok:
@@ -98,10 +102,16 @@ class Bench:
             run = self._attempt(order, attempt)
         return run
 
+    def _refuse_after_failure(self) -> None:
+        if self._failure is not None:
+            remedy = None if self._failure.remedy else "mend it and go on with --resume"
+            raise LinkError("the bench drives no more after the first failure", value=self._failure, remedy=remedy)
+
     def _attempt(self, order: DriveOrder, attempt: int) -> Run:
         run_id = order.run_id if attempt == 1 else f"{order.run_id}-attempt{attempt}"
         if run_id in self._recorded:
             return self._repeat_unseen(order, self._recorded[run_id])
+        self._pause(run_id)
         started_s = self._time.now_s()
         seen: list[Frames] = []
         try:
@@ -110,9 +120,33 @@ class Bench:
             self._note_failure(order, run_id, started_s, seen, error)
             raise
         run = recorded_run(order, run_id, started_s, self._status(order, driven), driven, self._identity.firmware)
-        self.writer.append(run)
+        self._record(run)
         self._time.has_run(started_s, driven.duration_s)
         return run
+
+    def _record(self, run: Run) -> None:
+        try:
+            self.writer.append(run)
+        except RecordingError as error:
+            # A disk that is full now is full for the next run, too: driving on would wear the vehicle for nothing.
+            self._failure = error
+            raise
+
+    def _pause(self, run_id: str) -> None:
+        """Wait as long as somebody asks for a pause; the vehicle stands at neutral, and everybody is still heard."""
+        waited_s = itertools.count(0.0, _STAND_S)
+
+        def stand() -> None:
+            if self._identity.lock_step:
+                time.sleep(_STAND_S)
+            else:
+                self.link.exchange(self._neutral(), t_s=next(waited_s), hold_s=_STAND_S)
+
+        try:
+            self.pause.wait(run_id, stand)
+        except LinkError as error:
+            self._failure = error
+            raise
 
     def _repeat_unseen(self, order: DriveOrder, run: Run) -> Run:
         if self._identity.simulated:
@@ -161,4 +195,6 @@ class Bench:
         frames = Frames.concatenate(seen)
         if len(frames):
             name = free_name(f"{run_id}-aborted", self.writer.finished_ids)
-            self.writer.append(aborted_run(order, name, started_s, f"aborted: {why}", frames, self._identity.firmware))
+            aborted = aborted_run(order, name, started_s, f"aborted: {why}", frames, self._identity.firmware)
+            with suppress(CampaignError):  # the failure is what has to be told, not that it could not be recorded
+                self.writer.append(aborted)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import Protocol
 
 # In simulation, what driving back to the start and settling there would take between two runs.
@@ -36,14 +37,26 @@ class SimulatedCampaignTime:
 
 
 class WallCampaignTime:
-    """The wall clock, since `began_unix_s`."""
+    """Real time since `began_unix_s`, which never goes back.
 
-    def __init__(self, began_unix_s: float) -> None:
-        self._began_unix_s = began_unix_s
+    The wall clock is asked once, when the session opens: it may be set while runs are driven. If it was set back since
+    the last session, time goes on at `last_s` [s], when that session's last run ended.
+    """
+
+    def __init__(
+        self,
+        began_unix_s: float,
+        last_s: float = 0.0,
+        *,
+        wall: Callable[[], float] = time.time,
+        steady: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._steady, self._opened_s = steady, steady()
+        self._before_s = max(wall() - began_unix_s, last_s)
 
     def now_s(self) -> float:
         """Return the time since the campaign began [s]."""
-        return time.time() - self._began_unix_s
+        return self._before_s + self._steady() - self._opened_s
 
     def has_run(self, started_s: float, duration_s: float) -> None:
         """Wall time needs no telling."""

@@ -26,6 +26,7 @@ from agvbench.running.provenance import provenance
 from agvbench.running.remainders import read_remainders
 from agvbench.running.session import BenchSession
 from agvbench.running.settings import SETTINGS_FILE, BenchSettings, settings_for_resume
+from agvbench.running.signals import interruptible
 from agvbench.running.vehicles import uncalibrated_vehicle
 from agvbench.types import Run
 
@@ -52,24 +53,28 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
         models.setdefault("calibrated", thesis_vehicle())
         yield BenchSession(directory, models=models, workspace=workspace, bench=None, remainders=remainders)
         return
-    with open_rig(
-        agv=settings.agv,
-        mocap=settings.mocap,
-        plant=settings.plant,
-        camera=camera_options(filter(None, settings.camera.split(","))),
-        seed=settings.seed,
-        connect=settings.connect or None,
-        lab=settings.lab,
-        command_unit=models["uncalibrated"].command_unit,
-        neutral=models["uncalibrated"].neutral,
-    ) as link:
+    with (
+        interruptible(),
+        open_rig(
+            agv=settings.agv,
+            mocap=settings.mocap,
+            plant=settings.plant,
+            camera=camera_options(filter(None, settings.camera.split(","))),
+            seed=settings.seed,
+            connect=settings.connect or None,
+            lab=settings.lab,
+            command_unit=models["uncalibrated"].command_unit,
+            neutral=models["uncalibrated"].neutral,
+        ) as link,
+    ):
         _check_unit(models["uncalibrated"], link)
         header = _header(directory.name, models["uncalibrated"], link)
         writer = _writer(directory, settings, header, resume=resume, simulated=link.identity().simulated)
         bench = _bench(settings, models, link, writer)
         session = BenchSession(directory, models=models, workspace=workspace, bench=bench, remainders=remainders)
         session.notices = _notices(settings, given, resume=resume, resumed=bool(writer.finished_ids), where=directory)
-        yield session
+        with bench.pause.by_signal():
+            yield session
 
 
 def _settings(given: Mapping[str, Any], directory: Path, *, resume: bool) -> BenchSettings:
@@ -146,15 +151,16 @@ def _bench(
     def calibrated() -> VehicleModel:
         return models.get("calibrated") or calibrate_campaign(writer, maps=settings.maps)
 
+    recorded = _recorded(writer)
     return Bench(
         settings,
         nominal=models["uncalibrated"],
         corrected=models.get("corrected"),
         link=link,
         writer=writer,
-        campaign_time=_campaign_time(link, writer),
+        campaign_time=_campaign_time(link, writer, recorded),
         calibrate=calibrated,
-        recorded=_recorded(writer),
+        recorded=recorded,
     )
 
 
@@ -165,9 +171,12 @@ def _recorded(writer: CampaignWriter) -> dict[str, Run]:
     return {run_id: campaign.run(run_id) for run_id in writer.finished_ids}
 
 
-def _campaign_time(link: VehicleLink, writer: CampaignWriter) -> CampaignTime:
+def _campaign_time(link: VehicleLink, writer: CampaignWriter, recorded: Mapping[str, Run]) -> CampaignTime:
     if link.identity().simulated:
         return SimulatedCampaignTime()
     table = pd.read_parquet(os.fspath(writer.path / f"{PROVENANCE_TABLE}.parquet"))
     began = dict(zip(table["name"], table["value"], strict=True))["began"]
-    return WallCampaignTime(datetime.fromisoformat(began).timestamp())
+    last_s = max(
+        (run.started_s + float(str(run.extra.get("duration_s", 0.0))) for run in recorded.values()), default=0.0
+    )
+    return WallCampaignTime(datetime.fromisoformat(began).timestamp(), last_s)

@@ -10,6 +10,7 @@ from typing import Any
 
 import tomli_w
 
+from agvbench.adapters.impairment.spec import unimpaired
 from agvbench.errors import FileError, FlagError
 
 SETTINGS_FILE = "bench.toml"
@@ -18,6 +19,8 @@ MAPS = ("default", "thesis")
 _LARGEST_SEED = 2**63 - 1
 # What may differ between a session and the one that resumes it: none of these changes what is driven.
 _FREE_ON_RESUME = frozenset({"connect", "lab"})
+# A fault that was rehearsed may be taken away, or another one put in.
+_ADAPTERS = frozenset({"agv", "mocap"})
 
 
 @dataclass(frozen=True)
@@ -109,6 +112,8 @@ def settings_for_resume(saved: BenchSettings, given: Mapping[str, Any]) -> Bench
         if name not in known or name in _FREE_ON_RESUME:
             continue
         before = getattr(saved, name)
+        if name in _ADAPTERS and unimpaired(value) == unimpaired(before):
+            continue
         if value != before:
             raise FlagError(
                 "a resumed session drives what it began with",
@@ -117,7 +122,7 @@ def settings_for_resume(saved: BenchSettings, given: Mapping[str, Any]) -> Bench
                 limit=before,
                 remedy=f"leave --{name} out, or start anew without --resume",
             )
-    return replace(saved, **{name: given[name] for name in _FREE_ON_RESUME if name in given})
+    return replace(saved, **{name: given[name] for name in _FREE_ON_RESUME | _ADAPTERS if name in given})
 
 
 def _check(condition: bool, flag: str, value: object, limit: str, remedy: str) -> None:

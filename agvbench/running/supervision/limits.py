@@ -11,7 +11,8 @@ class SafetyLimits:
 
     ``watch_s`` [s] is how often frames are looked at, ``lost_s`` [s] how long the vehicle may go unseen, ``frozen_s``
     [s] how long a camera that is never quite still may say the very same pose of a vehicle that was told to drive,
-    ``jump_m`` [m] how far a vehicle may be from where it was going. ``braking_s`` [s] is how long it takes to come to
+    ``jump_m`` [m] how far a vehicle may be from where it was going,
+    ``clock_s`` [s] how far a camera's clock may be off. ``braking_s`` [s] is how long it takes to come to
     rest (thesis 8.1: 0.59 s), at half its speed on average: so far ahead of the edge it is told to.
     """
 
@@ -19,6 +20,7 @@ class SafetyLimits:
     lost_s: float = 0.5
     frozen_s: float = 0.5
     jump_m: float = 0.3
+    clock_s: float = 0.1
     braking_s: float = 0.59
 
 

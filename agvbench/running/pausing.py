@@ -1,0 +1,72 @@
+"""Pause between runs, with the vehicle at neutral, and go on: by a file in the campaign directory, or Ctrl-Z.
+
+The file is the one state there is: whoever can write the directory can pause, over ssh, in tmux, from a script. Ctrl-Z
+writes and removes it; it does not suspend the program, which has to keep listening to vehicle and camera.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import FrameType
+
+from agvbench.running.placing import say
+
+PAUSE_FILE = "pause"
+
+
+class Pause:
+    """Whether the campaign in `directory` is to pause; `tell` tells the operator."""
+
+    def __init__(self, directory: Path, tell: Callable[[str], None] = say) -> None:
+        self._file, self._tell = directory / PAUSE_FILE, tell
+        self._by_signal = False
+
+    def is_asked(self) -> bool:
+        """Whether somebody asked for a pause."""
+        return self._file.exists()
+
+    def wait(self, before: str, stand: Callable[[], None]) -> None:
+        """Return at once, or when nobody asks for a pause any more; the run `before` is next.
+
+        `stand` lets the vehicle stand at neutral for a moment; what it raises ends the pause.
+        """
+        if not self.is_asked():
+            return
+        self._tell(f"paused before {before}, the vehicle at neutral: press Ctrl-Z or remove {self._file} to go on")
+        while self.is_asked():
+            stand()
+        self._tell("going on")
+
+    @contextmanager
+    def by_signal(self) -> Iterator[None]:
+        """While the context lasts, SIGTSTP (Ctrl-Z) asks for a pause and, a second time, to go on.
+
+        So does SIGCONT: a shell that suspended the program around this one (nox) sends it with ``fg``. It ends only a
+        pause that SIGTSTP began. Elsewhere than in the main thread, and where SIGTSTP is ignored, nothing is changed.
+        """
+        in_main = threading.current_thread() is threading.main_thread()
+        if not in_main or signal.getsignal(signal.SIGTSTP) is signal.SIG_IGN:
+            yield
+            return
+        before = {number: signal.getsignal(number) for number in (signal.SIGTSTP, signal.SIGCONT)}
+        for number in before:
+            signal.signal(number, self._signalled)
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    def _signalled(self, number: int, _: FrameType | None) -> None:
+        with suppress(OSError):  # without its directory the session ends by itself
+            if number == signal.SIGTSTP and not self.is_asked():
+                self._file.touch()
+                self._by_signal = True
+                self._tell("pausing when this run is finished; Ctrl-Z again goes on")
+            elif number == signal.SIGTSTP or self._by_signal:
+                self._file.unlink(missing_ok=True)
+                self._by_signal = False

@@ -1,0 +1,30 @@
+"""The camera's clock was set, or is not understood: what was seen cannot be told from what will be."""
+
+from __future__ import annotations
+
+import math
+
+from agvbench.running.supervision.rule import Rule, Slice
+
+
+class Clock(Rule):
+    """Stops on poses from the future, and on capture times that go back.
+
+    A stepped clock makes old poses look new: every other rule would judge by them.
+    """
+
+    _before_s = math.nan
+
+    def complaint(self, seen: Slice) -> tuple[str, str, str] | None:
+        """Compare the median capture time with the run's clock, and with the one before."""
+        if not len(seen):
+            return None
+        t_s, _ = seen.place
+        before_s, self._before_s = self._before_s, t_s
+        ahead_s, back_s = t_s - seen.now_s, before_s - t_s
+        limit = f"{self.limits.clock_s:g} s"
+        if ahead_s > self.limits.clock_s:
+            return "camera's clock is ahead", f"poses from {ahead_s:.2f} s in the future", limit
+        if back_s > self.limits.clock_s:
+            return "camera's clock was set back", f"poses {back_s:.2f} s older than those before", limit
+        return None
