@@ -16,6 +16,7 @@
     └── LinkError                 bus, adapters and hardware
         ├── MessageError          a message that cannot be decoded
         ├── AdapterGoneError      an adapter that did not answer or vanished
+        ├── PlacingError          a vehicle that was not brought to its start
         └── SafetyStopError       a vehicle that was stopped: lost, frozen, jumping, or about to leave the floor
 
 A message names *what* is wrong, *where*, the *value*, the *limit* with its unit and the *remedy*.
@@ -122,6 +123,10 @@ class MessageError(LinkError):
 
 class SafetyStopError(LinkError):
     """A vehicle that was stopped while it drove, because something was not as it should be."""
+
+
+class PlacingError(LinkError):
+    """A vehicle that was not brought to its start, by itself or by an operator."""
 
 
 class AdapterGoneError(LinkError):

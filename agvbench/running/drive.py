@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from agvbench.bus.link import VehicleLink
+from agvbench.running.links import RunnerLink
 from agvbench.running.rest import is_at_rest
 from agvbench.running.supervision import Supervisor
 from agvbench.types import Command, Commands, Frames, Pose
@@ -42,7 +42,7 @@ class Drive:
 
 
 def drive(
-    link: VehicleLink,
+    link: RunnerLink,
     commands: Commands,
     *,
     neutral: Command,

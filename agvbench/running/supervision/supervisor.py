@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import itertools
 
-from agvbench.bus.link import VehicleLink
 from agvbench.errors import SafetyStopError
 from agvbench.planning import Workspace
 from agvbench.registry import classes_by_file
+from agvbench.running.links import RunnerLink
 from agvbench.running.supervision import rules
 from agvbench.running.supervision.limits import DEFAULT_SAFETY, SafetyLimits
 from agvbench.running.supervision.rule import Rule, Slice
@@ -33,7 +33,7 @@ class Supervisor:
         self._rules = [rule(self._limits, self._workspace) for rule in self._classes]
         self._driving_since_s: float | None = None
 
-    def exchange(self, link: VehicleLink, command: Command, *, t_s: float, hold_s: float, seen: list[Frames]) -> None:
+    def exchange(self, link: RunnerLink, command: Command, *, t_s: float, hold_s: float, seen: list[Frames]) -> None:
         """Exchange a command as `VehicleLink.exchange` does, watching; add the frames of every slice to `seen`.
 
         Raises
@@ -58,7 +58,7 @@ class Supervisor:
             if t_s == end_s:
                 return
 
-    def _look(self, link: VehicleLink, frames: Frames, now_s: float) -> None:
+    def _look(self, link: RunnerLink, frames: Frames, now_s: float) -> None:
         driving_s = 0.0 if self._driving_since_s is None else now_s - self._driving_since_s
         seen = Slice.of(frames, now_s, driving_s)
         for rule in self._rules:

@@ -1,0 +1,137 @@
+"""Drive one leg of a way back: steer, go, keep to it, and come to rest at its end."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from agvbench.errors import PlacingError
+from agvbench.planning.way_back import Guided, Leg
+from agvbench.running.returning.follower import Follower, Guidance
+from agvbench.running.returning.habits import Habits
+from agvbench.running.returning.helm import Helm
+from agvbench.running.returning.limits import ReturnLimits
+from agvbench.running.returning.reins import Reins
+from agvbench.running.returning.throttle import Throttle
+
+TICK_S = 0.1
+_SHORTEST_TICK_S = 0.05
+"""Shorter looks hold too few frames for a median."""
+_LATE_TICKS = 2
+"""Servo and camera show a command about so late."""
+_REST_MPS = 0.004
+_REST_TICKS = 4
+_STUCK_S = 2.0
+_WRONG_WAY_MPS = -0.08
+
+
+class LegDrive:
+    """One leg, driven once; `goal_crab_rad` is what it was planned with if it ends at the goal."""
+
+    def __init__(
+        self,
+        leg: Leg,
+        reins: Reins,
+        helm: Helm,
+        habits: Habits,
+        limits: ReturnLimits,
+        *,
+        goal_crab_rad: float | None,
+    ) -> None:
+        self._leg, self._reins, self._helm, self._limits = leg, reins, helm, limits
+        self._steering, self._drive = habits.steering(leg.backward), habits.drive(leg.backward)
+        self._sign, self._is_last = -1.0 if leg.backward else 1.0, goal_crab_rad is not None
+        self._fast_mps = limits.mean_mps if self._is_last else limits.fast_mps
+        length_m = max(0.5 * helm.model.geometry.wheelbase_m, self._fast_mps * limits.die_off_s)
+        self._follower = Follower(leg, length_m, goal_crab_rad=goal_crab_rad)
+        self._asked = 0.0
+        self._past: deque[float] = deque([0.0] * _LATE_TICKS, maxlen=_LATE_TICKS)
+
+    def run(self) -> bool:
+        """Drive the leg; return whether the vehicle kept to it.
+
+        Raises
+        ------
+        PlacingError
+            If the vehicle does not move, or moves the other way.
+        """
+        reins = self._reins
+        reins.begin()
+        self._steer(self._guide())
+        reins.hold(self._helm.command(0.0, self._asked), self._limits.steer_first_s)
+        throttle = Throttle(self._drive, self._fast_mps)
+        until_s = reins.now_s + self._limits.patience_s + self._leg.length_m / (0.5 * self._limits.slow_mps)
+        tick_s, stuck_s, kept = TICK_S, 0.0, True
+        while kept:
+            guidance = self._guide()
+            tick_s = self._tick(guidance)
+            if tick_s == 0.0:
+                break
+            throttle.want(self._speed(guidance))
+            self._steer(guidance)
+            share = throttle.step(self._speed_seen, tick_s)
+            self._hold(share, tick_s)
+            stuck_s = stuck_s + tick_s if share == 1.0 and self._speed_seen < 2.0 * _REST_MPS else 0.0
+            self._check(stuck_s)
+            kept = abs(guidance.offset_m) < self._limits.astray_m and reins.now_s < until_s
+        self._roll_out()
+        return kept
+
+    @property
+    def _speed_seen(self) -> float:
+        return self._sign * self._reins.sight.speed_mps
+
+    def _guide(self) -> Guidance:
+        pose = self._reins.sight.pose
+        assert pose is not None  # noqa: S101  (a way back begins where the vehicle was seen)
+        crab_rad = self._steering.crab_rad
+        return self._follower.guide(
+            Guided(self._helm.model.geometry, self._helm.ahead_m, crab_rad).pose(pose), crab_rad
+        )
+
+    def _steer(self, guidance: Guidance) -> None:
+        self._asked = self._helm.curvature(self._steering.asked_for(guidance.curvature_per_m))
+
+    def _speed(self, guidance: Guidance) -> float:
+        """Return the speed wanted [m/s]: slow at the end of the last leg, and from a distance that allows for it."""
+        brakes_m = self._drive.coast_s * max(0.0, self._speed_seen - self._limits.slow_mps)
+        if self._is_last and guidance.left_m < self._limits.slow_m + brakes_m:
+            return self._limits.slow_mps
+        return self._fast_mps
+
+    def _tick(self, guidance: Guidance) -> float:
+        """Return how long to hold the next command [s], so that the stop comes when it should; 0 is now."""
+        speed = max(self._speed_seen, 0.02)
+        to_stop_s = (guidance.left_m - self._drive.coast_s * max(0.0, self._speed_seen)) / speed
+        if to_stop_s >= 1.5 * TICK_S:
+            return TICK_S
+        if to_stop_s >= TICK_S:
+            return 0.5 * to_stop_s
+        return max(_SHORTEST_TICK_S, to_stop_s) if to_stop_s > 0.5 * _SHORTEST_TICK_S else 0.0
+
+    def _hold(self, share: float, tick_s: float) -> None:
+        late = self._past[0]
+        self._past.append(self._asked)
+        self._reins.hold(self._helm.command(self._sign * share, self._asked), tick_s)
+        if self._reins.step is not None:
+            self._steering.learn(late, self._reins.step, ahead_m=self._helm.ahead_m)
+
+    def _check(self, stuck_s: float) -> None:
+        if stuck_s > _STUCK_S:
+            raise PlacingError(
+                "the vehicle does not move", where=self._reins.where, value=f"full drive for {stuck_s:.0f} s",
+                remedy="see to its battery and wheels, then go on with --resume",
+            )  # fmt: skip
+        if self._speed_seen < _WRONG_WAY_MPS:
+            raise PlacingError(
+                "the vehicle drives the other way than it is told", where=self._reins.where,
+                remedy="give the right file with --vehicle",
+            )  # fmt: skip
+
+    def _roll_out(self) -> None:
+        """Stop, wait until the vehicle rests, and learn how far it rolled."""
+        left_m, speed_mps = self._guide().left_m, self._speed_seen
+        until_s, rested = self._reins.now_s + self._limits.settle_limit_s, 0
+        while rested < _REST_TICKS and self._reins.now_s < until_s:
+            self._reins.hold(self._helm.command(0.0, self._asked), TICK_S)
+            rested = rested + 1 if abs(self._speed_seen) < _REST_MPS else 0
+        self._drive.rolled(left_m - self._guide().left_m, speed_mps)

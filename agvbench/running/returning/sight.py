@@ -1,0 +1,80 @@
+"""Where the vehicle is now, how fast it goes and what it did since the last look: from frames, wrong ones or none."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from agvbench.types import Floats, Frames, Pose, wrap_angle
+
+_WINDOW_S = 0.1
+_FEWEST_FRAMES = 3
+_SMOOTHING = 0.6
+
+
+@dataclass(frozen=True)
+class Step:
+    """What a vehicle did between two looks: how far it went ahead and to its left [m], how far it turned [rad]."""
+
+    ahead_m: float
+    left_m: float
+    turn_rad: float
+
+
+class Sight:
+    """Medians of the last tenth of a second, carried on to the present at the speed seen.
+
+    Single wrong frames, metres off, move no median; a camera that says nothing for a while is believed to see what it
+    saw before.
+    """
+
+    def __init__(self) -> None:
+        self._recent = Frames.empty()
+        self._median: tuple[float, Floats] | None = None
+        self._velocity = np.zeros(3)
+        self._now_s = 0.0
+        self.speed_mps = 0.0
+
+    def see(self, frames: Frames, now_s: float) -> Step | None:
+        """Take in `frames`, the time being `now_s` [s]; return the step since the last look.
+
+        None if too little was seen.
+        """
+        both = Frames.concatenate([self._recent, frames])
+        self._recent = both.select(np.asarray(both.tracked & (both.t_s > now_s - _WINDOW_S)))
+        self._now_s = now_s
+        if len(self._recent) < _FEWEST_FRAMES:
+            return None
+        before, self._median = self._median, _median(self._recent)
+        if before is None or self._median[0] - before[0] < 0.25 * _WINDOW_S:
+            self._median = self._median if before is None else before
+            return None
+        return self._moved(before, self._median)
+
+    def _moved(self, before: tuple[float, Floats], after: tuple[float, Floats]) -> Step:
+        moved = after[1] - before[1]
+        moved[2] = wrap_angle(moved[2])
+        since_s = after[0] - before[0]
+        self._velocity += _SMOOTHING * (moved / since_s - self._velocity)
+        middle = before[1][2] + 0.5 * moved[2]
+        ahead, left = math.cos(middle), math.sin(middle)
+        step = Step(ahead * moved[0] + left * moved[1], ahead * moved[1] - left * moved[0], float(moved[2]))
+        self.speed_mps += _SMOOTHING * (step.ahead_m / since_s - self.speed_mps)
+        return step
+
+    @property
+    def pose(self) -> Pose | None:
+        """The pose now (floor frame), None before anything was seen."""
+        if self._median is None:
+            return None
+        x_m, y_m, heading_rad = self._median[1] + self._velocity * (self._now_s - self._median[0])
+        return Pose(float(x_m), float(y_m), float(heading_rad))
+
+
+def _median(frames: Frames) -> tuple[float, Floats]:
+    reference = float(frames.heading_rad[-1])
+    turned = np.median(np.angle(np.exp(1j * (frames.heading_rad - reference))))
+    pose = np.array([np.median(frames.x_m), np.median(frames.y_m), reference + turned])
+    return float(np.median(frames.t_s)), pose
