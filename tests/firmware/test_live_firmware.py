@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import numpy as np
 import pytest
 
-from agvbench.adapters import AdapterOptions
+from agvbench.adapters import AdapterOptions, open_rig
 from agvbench.adapters.agv.serial import SerialAgv
 from agvbench.adapters.serial_line import conversation
 from agvbench.adapters.simavr.host import Pulse, SimavrHost
 from agvbench.bus.command_message import CommandMessage
-from agvbench.types import Command
+from agvbench.errors import LinkError
+from agvbench.types import Command, Pose
 
 pytestmark = pytest.mark.usefixtures("firmware")
 
@@ -40,12 +46,7 @@ def live(version: str) -> Iterator[SimavrHost]:
 
 def pulses_until(host: SimavrHost, wanted_us: float) -> Pulse:
     """Read drive pulses until one is as wide as wanted."""
-    while True:
-        word, *numbers = host._line()
-        assert word == "pulse"
-        pulse = Pulse(*map(int, numbers))
-        if pulse.channel == 0 and abs(pulse.width_us - wanted_us) <= 1.0:
-            return pulse
+    return next(pulse for pulse in host.pulses() if pulse.channel == 0 and abs(pulse.width_us - wanted_us) <= 1.0)
 
 
 @pytest.mark.parametrize(("version", "driven_us"), [("1", 1606.67), ("2", 1600.0)])
@@ -78,3 +79,63 @@ def test_a_vehicle_whose_host_is_gone_stops_itself() -> None:
         again = SerialAgv.open(host.port, AdapterOptions())
         assert again.hello.firmware_version == 2
         again.close()
+
+
+HOST_TO_KILL = """
+import sys, time
+from agvbench.adapters import AdapterOptions
+from agvbench.adapters.agv.serial import SerialAgv
+from agvbench.bus.command_message import CommandMessage
+from agvbench.types import Command
+
+agv = SerialAgv.open(sys.argv[1], AdapterOptions())
+for number in range(1, 1000):
+    agv.apply(CommandMessage(number, 0.0, Command(1600.0, 1500.0, 1500.0), 0.1))
+    time.sleep(0.05)
+"""
+
+
+@pytest.mark.parametrize("version", ["1", "2"])
+def test_a_host_that_was_killed_is_noticed_by_version_2_alone(version: str) -> None:
+    driven_us = {"1": 1606.67, "2": 1600.0}[version]
+    with live(version) as host, subprocess.Popen([sys.executable, "-c", HOST_TO_KILL, host.port]) as killed:
+        pulses_until(host, driven_us)
+        killed.kill()
+        killed.wait()
+        pulses = (pulse for pulse in host.pulses() if pulse.channel == 0)
+        # As many frames as one second has, on the firmware's own clock.
+        after = [next(pulses).width_us for _ in range(50)]
+    assert (after[-1] == pytest.approx(1500.0, abs=1.0)) is (version == "2")
+    assert after[0] == pytest.approx(driven_us, abs=1.0)
+
+
+def test_a_campaigns_link_drives_the_firmware_in_real_time() -> None:
+    start, perfect = Pose(0.5, 0.0, 0.0), dict.fromkeys(("lost", "doubled", "late", "wrong", "untracked"), 0.0)
+    with open_rig("simavr-live:2", camera=perfect) as link:
+        identity = link.identity()
+        assert identity.simulated
+        assert not identity.lock_step
+        assert identity.agv.extra["firmware_unit"] == "us"
+        for key in ("a", "b"):
+            link.reset(start, run_key=key)
+            rest = link.exchange(Command(1500.0, 1500.0, 1500.0), t_s=-0.2, hold_s=0.2)
+            moved = link.exchange(Command(900.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.5)
+            at_rest_m = rest.x_m[rest.t_s > -0.15]  # frames of before it was placed may come late
+            assert np.nanmax(np.abs(at_rest_m - start.x_m)) < 0.01
+            assert moved.x_m[-1] - start.x_m > 0.03
+
+
+def test_a_microcontroller_that_dies_while_it_is_driven_stops_the_run() -> None:
+    with open_rig("simavr-live") as link:
+        link.reset(Pose(0.0, 0.0, 0.0), run_key="a")
+        link.exchange(Command(900.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.2)
+        [pid] = _children("simavr_host")
+        os.kill(pid, signal.SIGKILL)
+        with pytest.raises(LinkError, match="serial port is gone"):
+            link.exchange(Command(900.0, 1500.0, 1500.0), t_s=0.2, hold_s=5.0)
+
+
+def _children(name: str) -> list[int]:
+    """Return the processes of this name that this one has started."""
+    said = subprocess.run(["pgrep", "-P", str(os.getpid()), name], capture_output=True, text=True, check=False)
+    return [int(line) for line in said.stdout.split()]

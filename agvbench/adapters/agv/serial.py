@@ -44,10 +44,10 @@ class SerialAgv(AgvAdapter):
         self._lock, self._closed = threading.Lock(), threading.Event()
         self._failure: AgvbenchError | None = None
         self._reports: AgvReports | None = None
-        self._told = (0, 0, 0)
         self._conversation = Conversation(port.path)
         self._greet()
         self.hello = self._conversation.begin()
+        self._told = self._counts()  # half a line of a banner, heard while greeting, is nothing to tell
         self._thread = threading.Thread(target=self._listen, name="agvbench-serial", daemon=True)
 
     def _greet(self) -> None:
@@ -166,8 +166,7 @@ class SerialAgv(AgvAdapter):
 
     def _tell(self) -> None:
         """Report what went wrong and was made good, once for each time."""
-        conversation = self._conversation
-        now = (conversation.garbled, conversation.resent, conversation.watchdog_bites)
+        now = self._counts()
         if now == self._told or self._reports is None:
             return
         kinds = (
@@ -179,3 +178,7 @@ class SerialAgv(AgvAdapter):
             if count > before:
                 self._reports.event(Level.WARNING, kind, text)
         self._told = now
+
+    def _counts(self) -> tuple[int, int, int]:
+        conversation = self._conversation
+        return conversation.garbled, conversation.resent, conversation.watchdog_bites

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -42,7 +43,7 @@ class SimavrHost:
     version
         ``"1"`` or ``"2"``.
     live
-        Whether time passes by itself, as real time does, rather than in `run`; pulses are then in `process`'s output.
+        Whether time passes by itself, as real time does, rather than in `run`; then `pulses` come as they end.
 
     Raises
     ------
@@ -67,6 +68,14 @@ class SimavrHost:
     def reset(self, bytes_written: int = 0) -> None:
         """Press the reset button: cycles and bytes count from 0 again, and what was written before is dropped."""
         self._order(f"reset {bytes_written}")
+
+    def pulses(self) -> Iterator[Pulse]:
+        """Yield the pulses of a `live` microcontroller as they end, until it does."""
+        assert self.process.stdout is not None  # noqa: S101  (it is a pipe)
+        for line in self.process.stdout:
+            if line.endswith("\n"):  # not cut off by the process's end
+                _, *numbers = line.split()
+                yield Pulse(*map(int, numbers))
 
     def close(self) -> None:
         """End the process."""
