@@ -6,16 +6,18 @@ import itertools
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import replace
 
-from agvbench.bus.link import VehicleLink
 from agvbench.campaign import CampaignWriter
 from agvbench.errors import CampaignError, FlagError, LinkError, PlantError, RecordingError
 from agvbench.model import VehicleModel
 from agvbench.planning import Departure, Workspace
 from agvbench.running.campaign_time import CampaignTime
 from agvbench.running.drive import DEFAULT_TIMING, Drive, Timing, drive, exchanged
+from agvbench.running.links import RunnerLink
 from agvbench.running.pausing import Pause
-from agvbench.running.placing import wait_for_start
+from agvbench.running.placers.choosing import make_placer
+from agvbench.running.placers.placer import Rig
 from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess
 from agvbench.running.records import DriveOrder, aborted_run, free_name, recorded_run
 from agvbench.running.settings import BenchSettings
@@ -37,7 +39,7 @@ class Bench:
         settings: BenchSettings,
         *,
         nominal: VehicleModel,
-        link: VehicleLink,
+        link: RunnerLink,
         writer: CampaignWriter,
         campaign_time: CampaignTime,
         calibrate: Callable[[], VehicleModel],
@@ -56,7 +58,9 @@ class Bench:
         self._failure: LinkError | PlantError | RecordingError | None = None
         self.pause = Pause(writer.path)
         self._recorded = recorded
-        self._supervisor = Supervisor(Workspace.parse(settings.workspace), nominal.neutral)
+        workspace = Workspace.parse(settings.workspace)
+        self._supervisor = Supervisor(workspace, nominal.neutral)
+        self._placer = make_placer(settings.place, Rig(link, nominal, workspace, self._supervisor, limits))
 
     def model(self, condition: str) -> VehicleModel:
         """Return the vehicle model that commands are computed with under `condition`.
@@ -112,6 +116,7 @@ class Bench:
         if run_id in self._recorded:
             return self._repeat_unseen(order, self._recorded[run_id])
         self._pause(run_id)
+        order = self._placed(order, run_id)
         started_s = self._time.now_s()
         seen: list[Frames] = []
         try:
@@ -153,22 +158,33 @@ class Bench:
             duration_s = float(str(run.extra["duration_s"]))
             commands, until_s = exchanged(run.commands, self._neutral(), duration_s, self._timing)
             self.link.replay(run.run_id, commands, pose=order.start, until_s=until_s)
+            self._placer.was_moved()
             self._time.has_run(run.started_s, duration_s)
         return run
+
+    def _placed(self, order: DriveOrder, run_id: str) -> DriveOrder:
+        """Bring the vehicle to the start; return the order with what the campaign is to say of that."""
+        try:
+            placing = self._placer.place(order.start, run_id)
+        except (LinkError, PlantError) as error:
+            self._failure = error
+            raise
+        if placing is None:
+            return order
+        self._time.has_placed(placing.duration_s)
+        return replace(order, extra={**order.extra, **placing.columns()})
 
     def _neutral(self) -> Command:
         """Return the command before a run: everything neutral, since a run's first command is the first recorded."""
         return Command(self.nominal.neutral, self.nominal.neutral, self.nominal.neutral)
 
     def _drive(self, order: DriveOrder, run_id: str, seen: list[Frames]) -> Drive:
-        if not self._identity.simulated:
-            wait_for_start(self.link, self._neutral(), order.start, limits=self._limits)
         return drive(
             self.link,
             order.commands,
             neutral=self._neutral(),
             start=order.start,
-            run_key=run_id if self._identity.simulated else None,
+            run_key=self._placer.run_key(run_id),
             supervisor=self._supervisor,
             timing=self._timing,
             seen=seen,

@@ -20,12 +20,18 @@ class CampaignTime(Protocol):
     def has_run(self, started_s: float, duration_s: float) -> None:
         """Take note of a run that was driven, now or before an interruption."""
 
+    def has_placed(self, duration_s: float) -> None:
+        """Take note of a vehicle that drove itself to its start."""
+
 
 class SimulatedCampaignTime:
-    """Runs one after another with a fixed turnaround: the same campaign whether or not it was interrupted."""
+    """Runs one after another with a fixed turnaround: the same campaign whether or not it was interrupted.
 
-    def __init__(self) -> None:
-        self._now_s = 0.0
+    A vehicle that drives itself to its start needs no turnaround: it takes the time it takes.
+    """
+
+    def __init__(self, turnaround_s: float = TURNAROUND_S) -> None:
+        self._now_s, self._turnaround_s = 0.0, turnaround_s
 
     def now_s(self) -> float:
         """Return the simulated time since the campaign began [s]."""
@@ -33,7 +39,11 @@ class SimulatedCampaignTime:
 
     def has_run(self, started_s: float, duration_s: float) -> None:
         """Advance to when the next run can start."""
-        self._now_s = started_s + duration_s + TURNAROUND_S
+        self._now_s = started_s + duration_s + self._turnaround_s
+
+    def has_placed(self, duration_s: float) -> None:
+        """Advance by what it took."""
+        self._now_s += duration_s
 
 
 class WallCampaignTime:
@@ -60,3 +70,6 @@ class WallCampaignTime:
 
     def has_run(self, started_s: float, duration_s: float) -> None:
         """Wall time needs no telling."""
+
+    def has_placed(self, duration_s: float) -> None:
+        """Nor this."""

@@ -20,13 +20,15 @@ from agvbench.model import VehicleModel, thesis_vehicle
 from agvbench.planning import Workspace
 from agvbench.running.bench import Bench
 from agvbench.running.calibrating import calibrate_campaign
-from agvbench.running.campaign_time import CampaignTime, SimulatedCampaignTime, WallCampaignTime
+from agvbench.running.campaign_time import TURNAROUND_S, CampaignTime, SimulatedCampaignTime, WallCampaignTime
 from agvbench.running.directory import choose_directory
+from agvbench.running.placers.choosing import choose_placer
 from agvbench.running.provenance import provenance
 from agvbench.running.remainders import read_remainders
 from agvbench.running.session import BenchSession
 from agvbench.running.settings import SETTINGS_FILE, BenchSettings, settings_for_resume
 from agvbench.running.signals import interruptible
+from agvbench.running.unbroken import UnbrokenLink
 from agvbench.running.vehicles import uncalibrated_vehicle
 from agvbench.types import Run
 
@@ -68,6 +70,7 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
         ) as link,
     ):
         _check_unit(models["uncalibrated"], link)
+        choose_placer(settings.place, simulated=link.identity().simulated)
         header = _header(directory.name, models["uncalibrated"], link)
         writer = _writer(directory, settings, header, resume=resume, simulated=link.identity().simulated)
         bench = _bench(settings, models, link, writer)
@@ -151,14 +154,14 @@ def _bench(
     def calibrated() -> VehicleModel:
         return models.get("calibrated") or calibrate_campaign(writer, maps=settings.maps)
 
-    recorded = _recorded(writer)
+    recorded, drives_back = _recorded(writer), settings.place == "auto"
     return Bench(
         settings,
         nominal=models["uncalibrated"],
         corrected=models.get("corrected"),
-        link=link,
+        link=UnbrokenLink(link) if drives_back and link.identity().lock_step else link,
         writer=writer,
-        campaign_time=_campaign_time(link, writer, recorded),
+        campaign_time=_campaign_time(link, writer, recorded, turnaround_s=0.0 if drives_back else TURNAROUND_S),
         calibrate=calibrated,
         recorded=recorded,
     )
@@ -171,9 +174,11 @@ def _recorded(writer: CampaignWriter) -> dict[str, Run]:
     return {run_id: campaign.run(run_id) for run_id in writer.finished_ids}
 
 
-def _campaign_time(link: VehicleLink, writer: CampaignWriter, recorded: Mapping[str, Run]) -> CampaignTime:
+def _campaign_time(
+    link: VehicleLink, writer: CampaignWriter, recorded: Mapping[str, Run], *, turnaround_s: float
+) -> CampaignTime:
     if link.identity().simulated:
-        return SimulatedCampaignTime()
+        return SimulatedCampaignTime(turnaround_s)
     table = pd.read_parquet(os.fspath(writer.path / f"{PROVENANCE_TABLE}.parquet"))
     began = dict(zip(table["name"], table["value"], strict=True))["began"]
     last_s = max(

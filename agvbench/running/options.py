@@ -47,6 +47,11 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
     ("--full", _FLAG, "every pulse, configuration and repeat of the thesis' calibration"),
     ("--attempts", {"type": int, "metavar": "N"}, "attempts at a run that is rejected (default: 3)"),
     (
+        "--place",
+        {"choices": ("auto", "operator", "teleport")},
+        "who brings it to its start: auto (itself), operator (real: default) or teleport (simulated: default)",
+    ),
+    (
         "--workspace",
         {"metavar": "SHAPE"},
         "floor that the cameras see [m], such as circle:6.1 (default) or rectangle:7x5",

@@ -7,8 +7,8 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from agvbench.bus.link import VehicleLink
-from agvbench.errors import LinkError
+from agvbench.errors import PlacingError
+from agvbench.running.links import RunnerLink
 from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits
 from agvbench.running.rest import is_at_rest, pose_before
 from agvbench.types import Command, Frames, Pose, wrap_angle
@@ -32,7 +32,7 @@ def say(text: str) -> None:
 
 
 def wait_for_start(
-    link: VehicleLink,
+    link: RunnerLink,
     neutral: Command,
     start: Pose,
     *,
@@ -44,7 +44,7 @@ def wait_for_start(
 
     Raises
     ------
-    LinkError
+    PlacingError
         If it is not there after `patience_s` [s].
     """
     waited_s, told_s, place = 0.0, -math.inf, _Place("", False)
@@ -60,7 +60,7 @@ def wait_for_start(
             where = f"x = {x_m:.3f} m, y = {y_m:.3f} m, heading {math.degrees(heading_rad):.1f}°"
             tell(f"put {link.identity().vehicle} at {where}: {place.said}")
             told_s = waited_s
-    raise LinkError(
+    raise PlacingError(
         "the vehicle was not put at the start", where=link.keys.root, value=place.said, limit=f"{patience_s:g} s",
         remedy="go on with --resume",
     )  # fmt: skip

@@ -15,6 +15,7 @@ from agvbench.errors import FileError, FlagError
 
 SETTINGS_FILE = "bench.toml"
 ORDERS = ("interleaved", "blocked", "shuffled")
+PLACES = ("auto", "operator", "teleport")
 MAPS = ("default", "thesis")
 _LARGEST_SEED = 2**63 - 1
 # What may differ between a session and the one that resumes it: none of these changes what is driven.
@@ -31,7 +32,8 @@ class BenchSettings:
     ``calibration`` are vehicle files ("" for the shipped nominal vehicle, and for calibrating in this session),
     ``corrected`` the one with the effects that a diagnosis found ("" for none: the condition is not driven) and
     ``remainders`` what that model still misses; ``repeats`` 0 means what each benchmark declares; ``order`` is one of
-    `ORDERS`; ``full`` drives every pulse of the thesis.
+    `ORDERS`; ``place``, one of `PLACES`, is how the vehicle comes to its starts ("" for the usual way); ``full`` drives
+    every pulse of the thesis.
     """
 
     agv: str = "sim"
@@ -48,6 +50,7 @@ class BenchSettings:
     seed: int = 0
     full: bool = False
     attempts: int = 3
+    place: str = ""
     workspace: str = "circle:6.1"
     connect: str = ""
     lab: str = "lab"
@@ -57,6 +60,7 @@ class BenchSettings:
         _check(self.attempts >= 1, "--attempts", self.attempts, "at least 1", "give a whole number of attempts")
         _check(0 <= self.seed <= _LARGEST_SEED, "--seed", self.seed, f"0 to {_LARGEST_SEED}", "choose another seed")
         _check(self.order in ORDERS, "--order", self.order, ", ".join(ORDERS), "choose one of these")
+        _check(self.place in ("", *PLACES), "--place", self.place, ", ".join(PLACES), "choose one of these")
         _check(self.maps in MAPS, "--maps", self.maps, ", ".join(MAPS), "choose one of these")
 
     @classmethod

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from agvbench.errors import PlacingError, PlanError
 from agvbench.model import VehicleModel
@@ -15,6 +14,7 @@ from agvbench.running.returning.habits import Habits
 from agvbench.running.returning.helm import Helm
 from agvbench.running.returning.leg_drive import LegDrive
 from agvbench.running.returning.limits import DEFAULT_RETURN, ReturnLimits
+from agvbench.running.returning.placing import Placing
 from agvbench.running.returning.reins import Reins
 from agvbench.running.supervision import Supervisor
 from agvbench.types import Pose, wrap_angle
@@ -23,16 +23,6 @@ _RADII = (1.5, 1.0, 0.75)
 """Of the radius to plan with, widest first: turns as gentle as the floor allows."""
 _LEADS = (2.7, 2.0, 1.4)
 """Of the wheelbase: the straight into the start, on which errors die off."""
-
-
-@dataclass(frozen=True)
-class Placing:
-    """How a vehicle came to its start: time taken [s], ways driven, and how far off it was seen at rest [m, rad]."""
-
-    duration_s: float
-    attempts: int
-    position_error_m: float
-    heading_error_rad: float
 
 
 class Returner:
@@ -68,8 +58,8 @@ class Returner:
         SafetyStopError
             If the supervisor stopped the vehicle.
         PlacingError
-            If there is no way inside the workspace, if the vehicle is not there after all attempts, or if it does not do
-            what it is told.
+            If there is no way inside the workspace, or the vehicle is not there after all attempts, or does not do what
+            it is told.
         LinkError
             If the bus or an adapter fails.
         """

@@ -1,0 +1,1 @@
+"""How a vehicle comes to the start of a run: one file each."""

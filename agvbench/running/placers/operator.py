@@ -1,0 +1,19 @@
+"""An operator puts a real vehicle at the start of each run."""
+
+from __future__ import annotations
+
+from agvbench.running.placers.placer import Placer
+from agvbench.running.placing import wait_for_start
+from agvbench.types import Command, Pose
+
+
+class Operator(Placer):
+    """Says how far off the vehicle is until it stands at the start."""
+
+    places_simulated, places_real = False, True
+
+    def place(self, start: Pose, run_id: str) -> None:
+        """Wait."""
+        rig = self._rig
+        neutral = Command(rig.model.neutral, rig.model.neutral, rig.model.neutral)
+        wait_for_start(rig.link, neutral, start, limits=rig.limits)
