@@ -1,6 +1,6 @@
 """A vehicle without scatter whose static maps are known: what its runs differ in, firmware and line have done.
 
-``make_plant`` is the vehicle for ``--plant benchmarks/perf/firmware_vehicle.py:make_plant``, `believed` the model that
+`make_plant` is the vehicle for ``--plant benchmarks/perf/firmware_vehicle.py:make_plant``, `believed` the model that
 equals it. Its pulses take effect at once: it adds no servo frame of its own to that of the firmware.
 """
 
@@ -13,11 +13,22 @@ from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import DeadBandWithSaturation, LineWithEndStops
 
 NO_PLAY = (0.0, 0.0, 0.0)
+THESIS_PLAY = (0.0021, 0.0021, 0.003)
+"""Standard deviations between runs: 0.12° of each axle, 0.3 % of speed (tables 7.1 and 8.3–8.6)."""
 
 
 def make_plant(seed: int) -> HiddenPlant:
     """Return the vehicle: 0.32 m/s at full command, 48° of steering per 600 µs, nothing at random."""
-    return HiddenPlant(dict(BASE), NO_PLAY, seed, SealedTruth("nothing", constants=dict(BASE)))
+    return _plant(seed, NO_PLAY)
+
+
+def make_scattering_plant(seed: int) -> HiddenPlant:
+    """Return it with a scatter between runs like that of the thesis' vehicle."""
+    return _plant(seed, THESIS_PLAY)
+
+
+def _plant(seed: int, play: tuple[float, float, float]) -> HiddenPlant:
+    return HiddenPlant(dict(BASE), play, seed, SealedTruth("nothing", constants=dict(BASE)))
 
 
 def believed() -> VehicleModel:

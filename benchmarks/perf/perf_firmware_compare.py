@@ -2,10 +2,11 @@
 
 The same campaign (the eight trajectories, the same seed, a vehicle without scatter whose maps are known) is driven
 through the whole loop: without firmware, with either version, and with version 2 always at the same phase of its frame.
-Version 1 is then compared with version 2 by ``agvbench compare``. Rides of single trajectories add what no host's command
-can do: the worst duration there is, and version 2 timing the segments on board.
+Version 1 is then compared with version 2 by ``agvbench compare``. Single rides add what no campaign has: the worst
+duration there is, and version 2 timing the segments on board.
 
-``--repeats N`` (default 30), ``--out DIR`` (default: a new one under the temporary directory); needs ``nox -s firmware``.
+``--repeats N`` (default 20), ``--out DIR`` (default: a new one under the temporary directory); needs
+``nox -s firmware``.
 """
 
 from __future__ import annotations
@@ -135,7 +136,7 @@ def spreads(errors: dict[str, pd.DataFrame], ridden: dict[int, dict[str, dict[st
 def explains_all(ridden: dict[int, dict[str, dict[str, Floats]]]) -> None:
     """Print over how many ms each command's delay would have to vary to make all of the thesis' spread.
 
-    Two delays that vary evenly over w differ by w / √6 (standard deviation); the frame's differ by half a frame at most.
+    Two delays that vary evenly over w differ by w / √6 (standard deviation), those of a frame by half of it at most.
     """
     print("\na delay that varies evenly over so many ms would make the thesis' spread")
     for (case, quantity), published in thesis_sd().items():
@@ -153,7 +154,7 @@ def _values(table: pd.DataFrame, case: int, quantity: str) -> Floats:
 def main() -> int:
     """Drive, compare, print; return 2 where that cannot be."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--repeats", type=int, default=30, metavar="N")
+    parser.add_argument("--repeats", type=int, default=20, metavar="N")
     parser.add_argument("--out", type=Path, metavar="DIR")
     arguments, _ = parser.parse_known_args()
     if why := why_not_built():
