@@ -53,7 +53,7 @@ class AgvHost(Host):
         self._answers |= {RESET: self._reset, REPLAY: self._replay}
         self._subscriber = session.declare_subscriber(keys.command, zenoh.handlers.FifoChannel(_COMMANDS_WAITING))
         self._closed, self._left = threading.Event(), False
-        self._outdated = (0, 0)
+        self._outdated: dict[int, int] = {}  # by source: the last command sent before the vehicle was placed anew
         adapter.start(self)
         self._run("commands", self._serve_commands)
         if not self._lock_step:
@@ -66,19 +66,22 @@ class AgvHost(Host):
     def _reset(self, payload: bytes) -> bytes:
         request = decode_reset(payload)
         with self._lock:
-            self._outdated = (request.source, request.after)
+            self._outdated = {request.source: request.after}
             self._adapter.reset(request)
         return b""
 
     def _replay(self, payload: bytes) -> bytes:
         request = decode_replay(payload)
         with self._lock:
-            self._outdated = (request.reset.source, request.reset.after)
+            self._outdated = {request.reset.source: request.reset.after}
             self._adapter.replay(request)
         return b""
 
     def _serve_commands(self) -> None:
-        receive, loss, lock, carry_out = self._subscriber.handler.recv, self.loss, self._lock, self._carry_out
+        # One function from the command to the adapter, and the adapter first, the book-keeping after: the thread has
+        # just been woken, so that each further function, name and object is fetched from memory while the runner waits.
+        receive, apply, lock = self._subscriber.handler.recv, self._adapter.apply, self._lock
+        loss, watched, now = self.loss, not self._lock_step, self._clock.now
         while True:
             try:
                 payload = receive().payload.to_bytes()
@@ -89,28 +92,28 @@ class AgvHost(Host):
             except MessageError as error:
                 self._fail(error)
                 continue
-            if message.sequence == loss.expected and message.source == loss.source:
-                loss.expected += 1
-            elif lost := loss.saw(message.source, message.sequence):
-                self.event(Level.WARNING, "commands_lost", f"{lost} commands were lost before {message.sequence}")
+            sequence, source = message.sequence, message.source
             try:
                 with lock:
-                    carry_out(message)
+                    if message.flags & _STOP or self._left or sequence <= self._outdated.get(source, 0):
+                        self._refrain(message)
+                    else:
+                        if watched:
+                            self._heard_s = now()
+                        apply(message)
             except Exception as error:  # noqa: BLE001  (whatever the adapter raises, the runner must hear of it)
-                self._fail(error, message.sequence)
+                self._fail(error, sequence)
+            if sequence == loss.expected and source == loss.source:
+                loss.expected += 1
+            elif lost := loss.saw(source, sequence):
+                self.event(Level.WARNING, "commands_lost", f"{lost} commands were lost before {sequence}")
 
-    def _carry_out(self, message: CommandMessage) -> None:
-        source, after = self._outdated
-        if message.sequence <= after and message.source == source:
+    def _refrain(self, message: CommandMessage) -> None:
+        """Stop, unless the command came too late for that, too."""
+        if self._left or message.sequence <= self._outdated.get(message.source, 0):
             return  # the vehicle was placed anew after this was sent: a runner was interrupted in between
-        if self._left:
-            return
-        if message.flags & _STOP:
-            self._heard_s = None
-            self._adapter.stop()
-        else:
-            self._heard_s = self._clock.now()
-            self._adapter.apply(message)
+        self._heard_s = None
+        self._adapter.stop()
 
     def _watch(self) -> None:
         """Stop a vehicle whose runner has fallen silent."""

@@ -102,7 +102,7 @@ class Host(ABC):
         with self._lock:
             sequence = self._events.take()
             event = Event(sequence, self._role, level, kind, text, acknowledged, self._clock.now(), self._events.source)
-            self._put(self._keys.event, encode_event(event))
+            self._put(self._keys.report, encode_event(event))
 
     def _put(self, key: str, payload: bytes) -> None:
         import zenoh

@@ -10,7 +10,7 @@ import numpy as np
 from agvbench.adapters.contract import MocapAdapter
 from agvbench.adapters.hosting import Host
 from agvbench.bus.clock import Clock
-from agvbench.bus.frames_message import FrameClock, FramesFlags, pack_columns, pack_frames, pack_single
+from agvbench.bus.frames_message import FrameClock, FramesFlags, pack_batch, pack_single
 from agvbench.bus.identity_message import encode_mocap_identity
 from agvbench.bus.keys import MOCAP, RESET, Keys
 from agvbench.bus.request_message import decode_reset, encode_sampling
@@ -21,6 +21,7 @@ from agvbench.errors import LinkError, MessageError
 from agvbench.types import Frames
 
 _TRUTHS_WAITING = 64
+_FIRST_ROWS = np.arange(MAX_ROWS)
 
 
 class MocapHost(Host):
@@ -50,7 +51,7 @@ class MocapHost(Host):
         self._identity_bytes = encode_mocap_identity(adapter.identity())
         self._answers |= {RESET: self._reset}
         self._publisher = session.declare_publisher(
-            keys.frames,
+            keys.report,
             congestion_control=zenoh.CongestionControl.BLOCK,
             priority=zenoh.Priority.REAL_TIME,
             express=True,
@@ -95,14 +96,10 @@ class MocapHost(Host):
 
     def frames(self, frames: Frames, *, clock: FrameClock, acknowledged: int = 0) -> None:
         """Publish frames, in as many messages as they need."""
-        if len(frames.t_s) <= MAX_ROWS:
-            self._publish(pack_columns(frames), clock, acknowledged, FramesFlags.LAST)
-            return
-        starts = range(0, len(frames), MAX_ROWS)
-        for start in starts:
-            part = frames.select(np.arange(start, min(start + MAX_ROWS, len(frames))))
-            flags = FramesFlags.LAST if start == starts[-1] else FramesFlags.NONE
-            self._publish(pack_columns(part), clock, acknowledged, flags)
+        while len(frames.t_s) > MAX_ROWS:
+            self._publish(frames.select(_FIRST_ROWS), clock, acknowledged, FramesFlags.NONE)
+            frames = frames.select(np.arange(MAX_ROWS, len(frames)))
+        self._publish(frames, clock, acknowledged, FramesFlags.LAST)
 
     def frame(
         self,
@@ -129,9 +126,9 @@ class MocapHost(Host):
             except self._zenoh_error:
                 return
 
-    def _publish(self, columns: bytes, clock: FrameClock, acknowledged: int, flags: int) -> None:
+    def _publish(self, frames: Frames, clock: FrameClock, acknowledged: int, flags: int) -> None:
         with self._lock:
-            message = pack_frames(self._take(), columns, acknowledged, clock, self._now(), flags, self._source)
+            message = pack_batch(self._take(), frames, acknowledged, clock, self._now(), flags, self._source)
             try:
                 self._put_frames(message)
             except self._zenoh_error:

@@ -12,7 +12,8 @@ import struct
 from collections.abc import Sequence
 from enum import IntEnum
 from functools import partial
-from typing import Final, NamedTuple
+from operator import attrgetter
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,13 +26,17 @@ from agvbench.types import Floats, Frames
 _HEAD = struct.Struct("<6sHIIQQB7xd")
 _PREFIX = prefix(Kind.FRAMES)
 # Bound once, and named tuples without their Python constructor, for the same reason.
-_pack, _unpack, _tuple = _HEAD.pack, _HEAD.unpack_from, tuple.__new__
+_pack, _unpack, _tuple, _join = _HEAD.pack, _HEAD.unpack_from, tuple.__new__, b"".join
 _ROWS_AT = _HEAD.size
 _FIELDS = ("t_s", "x_m", "y_m", "heading_rad", "mean_error_m", "received_s")
 _ROWS = np.dtype([*((name, "<f8") for name in _FIELDS), ("frame", "<i8"), ("tracked", "u1")])
 _ROW_BYTES = _ROWS.itemsize
-_DTYPES = [*[FLOAT] * 6, INTEGER, BOOLEAN]
+_DTYPES = (*[FLOAT] * 6, INTEGER, BOOLEAN)
 _FRAME_AT, _TRACKED_AT = 48, 56
+# All columns, and what there is to check about them, in one call each: to ask them one by one takes longer.
+_columns_of, _dtypes_of, _sizes_of = (
+    attrgetter(*(name + what for name in _ROWS.names or ())) for what in ("", ".dtype", ".size")
+)
 
 
 class FrameClock(IntEnum):
@@ -55,7 +60,8 @@ _LAST = FramesFlags.LAST
 pack_single = partial(struct.Struct(_HEAD.format + "6dq?").pack, _PREFIX, _LAST)
 """Returns the bytes of a last message with one frame, from plain numbers: source, 1 (frame), sequence, acknowledged,
 clock, now_s, t_s, x_m, y_m, heading_rad, mean_error_m, received_s, frame, tracked."""
-_CLOCKS = {int(clock): clock for clock in FrameClock}
+_CLOCKS = tuple(FrameClock)
+_LATEST_CLOCK = max(FrameClock).value
 
 
 class FramesMessage(NamedTuple):
@@ -91,16 +97,21 @@ def pack_columns(frames: Frames) -> bytes:
     MessageError
         If columns differ in length.
     """
-    columns = [
-        frames.t_s, frames.x_m, frames.y_m, frames.heading_rad, frames.mean_error_m, frames.received_s, frames.frame,
-        frames.tracked,
-    ]  # fmt: skip
-    count, *others = lengths = [*map(len, columns)]
-    if others != [count] * 7:
-        raise MessageError("columns of frames differ in length", value=lengths)
-    if [column.dtype for column in columns] != _DTYPES or not all(column.flags.contiguous for column in columns):
-        columns = [np.ascontiguousarray(column, dtype) for column, dtype in zip(columns, _DTYPES, strict=True)]
-    return b"".join(columns)  # type: ignore[arg-type]  # (arrays are buffers)
+    return _append_columns(b"", frames)
+
+
+def _append_columns(head: bytes, frames: Frames) -> bytes:
+    """Return `head` and behind it the columns, copied once."""
+    sizes = _sizes_of(frames)
+    if sizes != (sizes[0],) * 8:
+        raise MessageError("columns of frames differ in length", value=[*sizes])
+    columns: tuple[Any, ...] = _columns_of(frames)
+    if _dtypes_of(frames) == _DTYPES:
+        try:
+            return _join((head, *columns))
+        except TypeError:
+            pass  # a column whose values do not lie side by side is no buffer
+    return head + _join(np.asarray(column, dtype).tobytes() for column, dtype in zip(columns, _DTYPES, strict=True))
 
 
 def unpack_columns(parts: Sequence[bytes]) -> Frames:
@@ -122,7 +133,7 @@ def unpack_columns(parts: Sequence[bytes]) -> Frames:
     t_s, x_m, y_m, heading_rad, mean_error_m, received_s = floats
     if not np.isfinite(t_s).all():
         raise MessageError("frames without a finite capture time", value=float(t_s[~np.isfinite(t_s)][0]))
-    if (tracked > 1).any():
+    if tracked.tobytes().strip(b"\0\1"):
         raise MessageError("tracked is neither 0 nor 1", value=int(tracked.max()))
     return Frames(t_s, x_m, y_m, heading_rad, tracked.view(np.bool_), frame, mean_error_m, received_s)
 
@@ -150,8 +161,25 @@ def pack_frames(
     """
     count = len(columns) // _ROW_BYTES
     if count > MAX_ROWS:
-        raise MessageError("too many frames for one message", value=count, limit=f"at most {MAX_ROWS}")
+        raise _too_many(count)
     return _pack(_PREFIX, flags, source, count, sequence, acknowledged, clock, now_s) + columns
+
+
+def pack_batch(
+    sequence: int, frames: Frames, acknowledged: int, clock: FrameClock, now_s: float, flags: int, source: int
+) -> bytes:
+    """Return what `pack_frames` would of the frames' columns, which are copied only once.
+
+    Raises
+    ------
+    MessageError
+        If columns differ in length, or there are more than `MAX_ROWS` frames.
+    """
+    count = len(frames.t_s)
+    if count > MAX_ROWS:
+        raise _too_many(count)
+    head = _pack(_PREFIX, flags, source, count, sequence, acknowledged, clock, now_s)
+    return _append_columns(head, frames)
 
 
 def encode_frames(message: FramesMessage) -> bytes:
@@ -170,10 +198,19 @@ def decode_frames(payload: bytes) -> FramesMessage:
     if len(payload) < _ROWS_AT:
         raise _refusal(payload)
     found, flags, source, count, sequence, acknowledged, clock, now_s = _unpack(payload)
-    good = found == _PREFIX and flags <= _LAST and count <= MAX_ROWS and clock in _CLOCKS
-    if not good or len(payload) != _ROWS_AT + _ROW_BYTES * count:
+    if (
+        found != _PREFIX
+        or len(payload) != _ROWS_AT + _ROW_BYTES * count
+        or flags > _LAST
+        or count > MAX_ROWS
+        or clock > _LATEST_CLOCK
+    ):
         raise _refusal(payload)
     return _tuple(FramesMessage, (sequence, payload[_ROWS_AT:], acknowledged, _CLOCKS[clock], now_s, flags, source))
+
+
+def _too_many(count: int) -> MessageError:
+    return MessageError("too many frames for one message", value=count, limit=f"at most {MAX_ROWS}")
 
 
 def _refusal(payload: bytes) -> MessageError:

@@ -40,13 +40,13 @@ class Inbox:
         self.event_losses: dict[str, LossCounter] = {}
         self.events: deque[Event] = deque(maxlen=_EVENTS_KEPT)
         self._keys = keys
-        self._subscriber = session.declare_subscriber(keys.reports, zenoh.handlers.FifoChannel(_CAPACITY))
+        self._subscriber = session.declare_subscriber(keys.report, zenoh.handlers.FifoChannel(_CAPACITY))
         # The subscriber itself is locked while a thread waits in it; its handler is not.
         self._recv = self._subscriber.handler.recv
         self._closed_error = zenoh.ZError
         self._wake_lock = threading.Lock()
         self._waker: Any = session.declare_publisher(
-            keys.wake,
+            keys.report,
             congestion_control=zenoh.CongestionControl.DROP,
             allowed_destination=zenoh.Locality.SESSION_LOCAL,
         )
@@ -71,16 +71,10 @@ class Inbox:
             payload: bytes = self._recv().payload.to_bytes()
         except self._closed_error:
             raise LinkError("the bus was closed", where=self._keys.root) from None
-        if not payload:
-            return None
         try:
-            if len(payload) >= HEADER_BYTES and payload[_KIND_AT] == _EVENT:
-                return self._note(decode_event(payload))
             message = decode_frames(payload)
         except MessageError as error:
-            raise MessageError(
-                error.what, where=self._keys.reports, value=error.value, limit=error.limit, remedy=error.remedy
-            ) from None
+            return self._read_other(payload, error)
         loss = self.frames_loss
         if message.sequence == loss.expected and message.source == loss.source:
             loss.expected += 1
@@ -88,7 +82,18 @@ class Inbox:
             loss.saw(message.source, message.sequence)
         return message
 
-    def _note(self, event: Event) -> Event:
+    def _read_other(self, payload: bytes, error: MessageError) -> Event | None:
+        """Return what is no frames: nothing, which is a call to wake up, or an event; else raise what is wrong."""
+        if not payload:
+            return None
+        try:
+            if len(payload) < HEADER_BYTES or payload[_KIND_AT] != _EVENT:
+                raise error
+            event = decode_event(payload)
+        except MessageError as why:
+            raise MessageError(
+                why.what, where=self._keys.report, value=why.value, limit=why.limit, remedy=why.remedy
+            ) from None
         self.event_losses.setdefault(event.role, LossCounter()).saw(event.source, event.sequence)
         self.events.append(event)
         return event

@@ -87,7 +87,7 @@ class LockStep:
                 self._check_waiting()
         if self._inbox.frames_loss.lost != lost:
             lost = self._inbox.frames_loss.lost - lost
-            raise LinkError("frames were lost on the bus", where=self._keys.frames, value=f"{lost} messages")
+            raise LinkError("frames were lost on the bus", where=self._keys.report, value=f"{lost} messages")
         return batches[0] if len(batches) == 1 else Frames.concatenate(batches)
 
     def _check_waiting(self) -> None:

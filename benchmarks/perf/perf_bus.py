@@ -28,7 +28,7 @@ import numpy as np
 import zenoh
 
 from agvbench.adapters.agv_host import AgvHost
-from agvbench.adapters.contract import AdapterOptions, AgvAdapter, MocapAdapter
+from agvbench.adapters.contract import AdapterOptions, AgvAdapter, MocapAdapter, MocapReports
 from agvbench.adapters.mocap_host import MocapHost
 from agvbench.bus.clock import WallClock
 from agvbench.bus.command_message import CommandMessage
@@ -51,6 +51,7 @@ QOS = {
     "express": True,
 }
 VEHICLES = 25
+RUN = FrameClock.RUN
 
 
 def frames_of(count: int) -> Frames:
@@ -67,17 +68,17 @@ def frames_bytes(count: int) -> int:
 
 
 class EchoAgv(AgvAdapter):
-    """Answers a command at once: its ``front`` says how many frames the camera is to return."""
+    """Has a camera answer a command at once: its ``front`` says with how many frames, which were made before."""
 
     scheme = "echo"
 
-    def __init__(self, answer: Callable[[float, int], None]) -> None:
-        self._answer = answer
+    def __init__(self, camera: MocapReports) -> None:
+        self._frame, self._frames, self._batch = camera.frame, camera.frames, frames_of(96)
 
     @classmethod
     def open(cls, address: str, options: AdapterOptions) -> EchoAgv:
-        """Return one that answers nothing."""
-        return cls(lambda *_: None)
+        """Refuse: it needs a camera."""
+        raise NotImplementedError
 
     def identity(self) -> AgvIdentity:
         """Return who this is."""
@@ -85,7 +86,10 @@ class EchoAgv(AgvAdapter):
 
     def apply(self, message: CommandMessage) -> None:
         """Have the camera publish."""
-        self._answer(message.command.front, message.sequence)
+        if message.command.front == 1.0:
+            self._frame(0.0, 0.0, 0.0, 0.0, clock=RUN, acknowledged=message.sequence)
+        else:
+            self._frames(self._batch, clock=RUN, acknowledged=message.sequence)
 
     def reset(self, request: Reset) -> None:
         """Do nothing."""
@@ -98,12 +102,9 @@ class EchoAgv(AgvAdapter):
 
 
 class EchoMocap(MocapAdapter):
-    """Publishes frames that were made before."""
+    """Publishes nothing by itself."""
 
     scheme = "echo"
-
-    def __init__(self) -> None:
-        self._ready = {count: frames_of(count) for count in (1, 96)}
 
     @classmethod
     def open(cls, address: str, options: AdapterOptions) -> EchoMocap:
@@ -115,19 +116,11 @@ class EchoMocap(MocapAdapter):
         return MocapIdentity("echo", 120.0, simulated=True)
 
     def start(self, reports: Any) -> None:
-        """Keep what publishes."""
-        self.reports = reports
+        """Do nothing."""
 
     def reset(self, request: Reset) -> Sampling:
         """Begin a run."""
         return Sampling(120.0, 0.0)
-
-    def publish(self, count: float, acknowledged: int) -> None:
-        """Publish some of them."""
-        if count == 1:
-            self.reports.frame(0.0, 0.0, 0.0, 0.0, clock=FrameClock.RUN, acknowledged=acknowledged)
-        else:
-            self.reports.frames(self._ready[int(count)], clock=FrameClock.RUN, acknowledged=acknowledged)
 
     def close(self) -> None:
         """Do nothing."""
@@ -145,9 +138,8 @@ def echo_node(session: zenoh.Session, *, bare_first: bool = False) -> Iterator[N
 def our_echo(session: zenoh.Session) -> Iterator[None]:
     """Host adapters that answer at once."""
     keys, clock = Keys("perf", "agv1"), WallClock()
-    camera = EchoMocap()
-    camera_host = MocapHost(session, keys, camera, clock, listens_for_truth=False)
-    vehicle_host = AgvHost(session, keys, EchoAgv(camera.publish), clock, camera_host.see)
+    camera_host = MocapHost(session, keys, EchoMocap(), clock, listens_for_truth=False)
+    vehicle_host = AgvHost(session, keys, EchoAgv(camera_host), clock, camera_host.see)
     try:
         yield
     finally:

@@ -84,7 +84,7 @@ class Silent(AgvAdapter):
 def test_a_vehicle_whose_runner_falls_silent_is_stopped() -> None:
     adapter, keys = Silent(), Keys("lab", "agv1")
     with open_session() as session:
-        events = session.declare_subscriber(keys.event)
+        events = session.declare_subscriber(keys.report)
         host = AgvHost(session, keys, adapter, WallClock(), show=lambda _: None)
         session.put(keys.command, encode_command(CommandMessage(1, 0.0, NEUTRAL, 10.0)))
         assert adapter.stopped.wait(10.0)
@@ -98,7 +98,7 @@ def test_a_vehicle_whose_runner_falls_silent_is_stopped() -> None:
 def test_lost_commands_and_nonsense_are_told_and_do_not_stop_the_host() -> None:
     adapter, keys = Silent(), Keys("lab", "agv1")
     with open_session() as session:
-        events = session.declare_subscriber(keys.event)
+        events = session.declare_subscriber(keys.report)
         host = AgvHost(session, keys, adapter, WallClock(), show=lambda _: None)
         session.put(keys.command, b"nonsense")
         assert b"message is cut off" in events.recv().payload.to_bytes()
@@ -114,7 +114,7 @@ def test_lost_commands_and_nonsense_are_told_and_do_not_stop_the_host() -> None:
 def test_the_offset_of_another_clock_is_found() -> None:
     here, ahead_s = SimulatedClock(50.0), 1234.5
     with open_session() as session:
-        clock = session.declare_queryable("agvbench/v1/lab/agv1/mocap/time")
+        clock = session.declare_queryable("agvbench/v2/lab/agv1/mocap/time")
 
         def answer() -> None:
             for _ in range(8):
@@ -124,7 +124,7 @@ def test_the_offset_of_another_clock_is_found() -> None:
 
         thread = threading.Thread(target=answer)
         thread.start()
-        offset_s = measure_offset(session, "agvbench/v1/lab/agv1/mocap/time", here)
+        offset_s = measure_offset(session, "agvbench/v2/lab/agv1/mocap/time", here)
         thread.join()
     assert abs(offset_s + ahead_s) <= 0.005 + 1e-9
 
