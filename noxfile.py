@@ -81,6 +81,13 @@ def perf(session: nox.Session) -> None:
 
 
 @nox.session
+def fuzz(session: nox.Session) -> None:
+    """Feed every decoder inputs that nobody would write, for half an hour of processor time."""
+    install(session, "fuzz")
+    session.run("python", "-m", "fuzz", *session.posargs)
+
+
+@nox.session
 def challenge(session: nox.Session) -> None:
     """Hold blind trials of the diagnosis; again goes on where it was interrupted."""
     install(session)

@@ -12,7 +12,8 @@ import msgspec
 
 from agvbench.campaign.atomic import write_atomically
 from agvbench.campaign.explain import explain
-from agvbench.errors import CampaignError
+from agvbench.errors import CampaignError, FileError
+from agvbench.text_files import read_toml
 from agvbench.types import CommandUnit
 
 SCHEMA = 1
@@ -166,7 +167,9 @@ def _read_toml(path: Path) -> dict[str, Any]:
     try:
         if path.stat().st_size > _MAX_BYTES:
             raise CampaignError("is too large for a campaign's head", where=path, limit=f"{_MAX_BYTES} bytes")
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return read_toml(path)
+    except FileError as error:
+        raise CampaignError(error.what, where=path, limit=error.limit, remedy=error.remedy) from None
     except OSError as error:
         raise CampaignError(
             f"cannot be read ({error.strerror})",

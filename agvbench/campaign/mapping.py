@@ -13,6 +13,7 @@ from agvbench.campaign.explain import explain
 from agvbench.campaign.header import SCHEMA
 from agvbench.campaign.mapping_schema import ISO_8601, TABLES, Mapping, Quantity
 from agvbench.errors import FileError
+from agvbench.text_files import read_toml
 
 _SHIPPED = Path(__file__).parent / "mappings"
 
@@ -48,7 +49,7 @@ def load_mapping(name: str | Path) -> Mapping:
     """
     path = find_mapping(name)
     try:
-        mapping = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Mapping)
+        mapping = msgspec.convert(read_toml(path), Mapping)
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise FileError(f"is not TOML ({error})", where=path, remedy="correct the line") from None
     except OSError as error:

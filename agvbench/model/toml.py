@@ -43,6 +43,7 @@ import tomli_w
 from agvbench.effects import Effect, effect_from_toml
 from agvbench.errors import FileError, VehicleError
 from agvbench.model.vehicle_model import VehicleModel
+from agvbench.text_files import read_toml
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import StaticMap, map_from_toml
 from agvbench.vehicle.tables import check_keys, from_table, number, to_table
@@ -64,8 +65,7 @@ def load_vehicle(path: Path) -> VehicleModel:
         If its content is no vehicle of schema 1, naming file, key and what is wrong.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-        content = tomllib.loads(text)
+        content = read_toml(path)
     except OSError as error:
         raise FileError("cannot read the vehicle file", where=path, value=error.strerror) from None
     except UnicodeDecodeError:

@@ -14,6 +14,7 @@ from agvbench.errors import FileError
 from agvbench.planning.trajectory import Trajectory
 from agvbench.planning.validation import convert, suggest
 from agvbench.resources import resource_directory
+from agvbench.text_files import read_toml
 
 
 def load_trajectory(name_or_path: str | Path, *, directory: Path | None = None) -> Trajectory:
@@ -112,15 +113,13 @@ def trajectory_from_table(table: Mapping[str, object], *, where: str = "trajecto
 
 def _read(path: Path) -> Trajectory:
     try:
-        text = path.read_text(encoding="utf-8")
+        table = read_toml(path)
     except FileNotFoundError:
         raise FileError("no such file", where=path) from None
     except OSError as error:
         raise FileError(f"cannot be read: {error.strerror}", where=path) from None
     except UnicodeDecodeError as error:
         raise FileError(f"is not UTF-8 text: byte {error.start}", where=path) from None
-    try:
-        table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise FileError(f"is not TOML: {error}", where=path) from None
     return trajectory_from_table(table, where=str(path))

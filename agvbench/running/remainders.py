@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
 from agvbench.errors import FileError
+from agvbench.text_files import read_json
 from agvbench.types import Pose
 
 NO_REMAINDERS: Mapping[str, Pose] = MappingProxyType({})
@@ -27,7 +27,7 @@ def read_remainders(path: str) -> Mapping[str, Pose]:
     if not path:
         return NO_REMAINDERS
     try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
+        content = read_json(Path(path))
         made = {str(name): Pose(*(float(entry[key]) for key in _KEYS)) for name, entry in content["remainders"].items()}
     except OSError as error:
         raise FileError("cannot be read", where=path, value=error.strerror) from None

@@ -12,6 +12,7 @@ import tomli_w
 
 from agvbench.adapters.impairment.spec import unimpaired
 from agvbench.errors import FileError, FlagError
+from agvbench.text_files import read_toml
 
 SETTINGS_FILE = "bench.toml"
 ORDERS = ("interleaved", "blocked", "shuffled")
@@ -92,7 +93,7 @@ class BenchSettings:
         """
         path = directory / SETTINGS_FILE
         try:
-            table = tomllib.loads(path.read_text(encoding="utf-8"))
+            table = read_toml(path)
             return cls(**table)
         except FileNotFoundError:
             raise FileError("no bench session to resume", where=path, remedy="start anew without --resume") from None

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from agvbench.errors import FileError
+from agvbench.text_files import read_json
 from agvbench.workflows.challenge_scores import Trial, plain, score
 from agvbench.workflows.writing import write_file
 
@@ -47,7 +48,7 @@ def known_trials(path: Path, repeats: int) -> dict[tuple[str, int], Trial]:
     import msgspec
 
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = read_json(path)
         found = msgspec.convert(_with_nan(content["each"]), list[Trial])
         was = content["repeats"]
     except (OSError, ValueError, KeyError, TypeError) as error:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from agvbench.errors import FileError
+from agvbench.text_files import read_json
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,8 +51,8 @@ def read_diagnosis(directory: Path) -> ShownDiagnosis | None:
     if not path.exists():
         return None
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        content = read_json(path)
+    except (OSError, ValueError, FileError) as error:
         return ShownDiagnosis({}, None, (f"{JSON} cannot be read: {error}.",))
     if not isinstance(content, dict) or content.get("schema") != 1:
         return ShownDiagnosis({}, None, (f"{JSON} is not a diagnosis of schema 1.",))

@@ -16,6 +16,7 @@ from agvbench.errors import AgvbenchError, FileError, FitError
 from agvbench.model import VehicleModel
 from agvbench.running.remainders import read_remainders
 from agvbench.running.settings import BenchSettings
+from agvbench.text_files import read_json
 from agvbench.workflows.loop_driving import Tell, drive, moved
 from agvbench.workflows.loop_plans import plans_of
 from agvbench.workflows.loop_settings import (
@@ -190,7 +191,7 @@ def _planned(directory: Path, settings: BenchSettings, learned: str, tell: Tell)
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        content: dict[str, Any] = read_json(path)
     except (OSError, ValueError) as error:
         raise FileError(
             "cannot be read", where=path, value=error, remedy="delete it; --resume makes it again"

@@ -15,6 +15,7 @@ import tomli_w
 from agvbench.errors import FileError, FlagError
 from agvbench.running.directory import CAMPAIGNS
 from agvbench.running.settings import BenchSettings, settings_for_resume
+from agvbench.text_files import read_toml
 
 SETTINGS = "loop.toml"
 BEFORE, DIAGNOSIS, VEHICLE, PLANS, AFTER = "before", "diagnosis.json", "vehicle.toml", "plans.json", "after"
@@ -74,7 +75,7 @@ def _newest() -> Path:
 
 def _load(path: Path) -> BenchSettings:
     try:
-        return BenchSettings(**tomllib.loads(path.read_text(encoding="utf-8")))
+        return BenchSettings(**read_toml(path))
     except FileNotFoundError:
         raise FileError("no loop to resume", where=path, remedy="start anew without --resume") from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, TypeError) as error:
