@@ -1,4 +1,4 @@
-"""Files that ship with the package: benchmarks, trajectories, reports."""
+"""Files that ship with the package: benchmarks, trajectories, reports, the firmware's sources."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ from pathlib import Path
 
 from agvbench.errors import FileError
 
+INSTALLED = "_lab"
+"""The directory inside an installed package that carries them."""
 _PACKAGE = Path(__file__).resolve().parent
 
 
 def resource_directory(name: str) -> Path:
-    """Return the directory `name` (``"benchmarks"``, ``"trajectories"`` or ``"reports"``) that ships with agvbench.
+    """Return the directory `name` that ships with agvbench: benchmarks, trajectories, reports or firmware.
 
     An installed wheel carries them inside the package, a checkout at its top level.
 
@@ -19,7 +21,7 @@ def resource_directory(name: str) -> Path:
     FileError
         If the installation lacks the directory.
     """
-    for root in (_PACKAGE / "_lab", _PACKAGE.parent):
+    for root in (_PACKAGE / INSTALLED, _PACKAGE.parent):
         if (root / name).is_dir():
             return root / name
     raise FileError(

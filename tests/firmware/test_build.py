@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from agvbench.errors import FileError, LinkError
+
 LARGEST_FLASH, LARGEST_MEMORY = 32 * 1024, 2 * 1024
 
 
@@ -40,3 +42,19 @@ def test_the_calibration_it_was_built_for_is_in_it(firmware: Path, tmp_path: Pat
         b"V agvbench 2 1 us 0123456789abcdef"
         in (build(firmware, tmp_path / "firmware", f"CALIBRATION={header}") / "agv2.elf").read_bytes()
     )
+
+
+def test_what_cannot_be_built_is_one_line(firmware: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from agvbench.workflows import firmware_build
+
+    with pytest.raises(FileError, match=r"none\.h: no such file; agvbench calibrate DIR --firmware FILE\.h writes one"):
+        firmware_build.build_firmware(tmp_path / "none.h", tmp_path / "out")
+    (bad := tmp_path / "bad.h").write_text("#error not a header of ours\n")
+    with pytest.raises(LinkError, match=r"the sources cannot be built: .*not a header of ours"):
+        firmware_build.build_firmware(bad, tmp_path / "out")
+    (file := tmp_path / "file").touch()
+    with pytest.raises(FileError, match=r"cannot be written: .*; give --out"):
+        firmware_build.build_firmware(None, file)
+    monkeypatch.setattr(firmware_build, "missing_packages", lambda: ["gcc-avr", "avr-libc"])
+    with pytest.raises(LinkError, match="tools are missing: gcc-avr avr-libc; on Debian: sudo apt-get install gcc-avr"):
+        firmware_build.build_firmware(None, tmp_path / "out")

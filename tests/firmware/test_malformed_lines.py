@@ -5,15 +5,27 @@ from __future__ import annotations
 import re
 
 import pytest
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 from pulse_frames import NEUTRAL, ask, is_near, widths_by_frame
 
 from agvbench.adapters.serial_line.lines import encode_line
 from agvbench.adapters.simavr.microcontroller import Microcontroller
+from agvbench.types import Command
 
 COMMAND, SYNTAX, RANGE, LENGTH, BYTES, CHECKSUM = 1, 2, 3, 5, 6, 7
 MAY_BE_RIGHT = re.compile(rb"V|S( [0-9]{1,5}){4}")
+MAY_BE_RIGHT_2 = re.compile(r"[VQ]|S( [0-9]{1,5}){4}|M( [0-9]{1,5}){5}")
+LINES = st.one_of(
+    st.binary(max_size=60).map(lambda data: data.replace(b"\n", b" ")),
+    st.from_regex(rb"[SMVQ]( [0-9]{0,6}){0,6}[ *]?", fullmatch=True),
+)
+TEXTS = st.one_of(
+    st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=43),
+    st.from_regex(r"[SMVQsq]?( {0,2}[0-9]{0,6}){0,6} ?", fullmatch=True).filter(lambda text: len(text) <= 43),
+)
+DRIVEN = (1700.0, 1300.0, 1540.0)
+"""Whole degrees, so that either version holds it."""
 
 
 def stands_still(microcontroller: Microcontroller, data: bytes) -> bytes:
@@ -126,13 +138,8 @@ def test_a_flood_of_noise_is_survived(microcontroller: Microcontroller) -> None:
     ask(microcontroller, b"\n", 0.02)
 
 
-@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(
-    st.one_of(
-        st.binary(max_size=60).map(lambda data: data.replace(b"\n", b" ")),
-        st.from_regex(rb"[SMVQ]( [0-9]{0,6}){0,6}[ *]?", fullmatch=True),
-    )
-)
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(LINES)
 @example(b"S 1 1700 1500 1500 \x00")
 def test_no_malformed_line_moves_anything(microcontroller: Microcontroller, line: bytes) -> None:
     version = str(microcontroller.hello.firmware_version)
@@ -141,7 +148,7 @@ def test_no_malformed_line_moves_anything(microcontroller: Microcontroller, line
     assert len(codes(stands_still(microcontroller, line + b"\n"))) == 1
 
 
-@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, 24), st.integers(1, 255))
 def test_no_flipped_bits_in_a_good_line_are_believed(version_2: Microcontroller, at: int, flip: int) -> None:
     good = bytearray(encode_line("S 7 1700 1300 1550", checksum=True)[:-1])
@@ -149,3 +156,25 @@ def test_no_flipped_bits_in_a_good_line_are_believed(version_2: Microcontroller,
     if b"\n" in good:
         return
     assert codes(stands_still(version_2, bytes(good) + b"\n"))[0] in (BYTES, CHECKSUM)
+
+
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(TEXTS)
+@example("M 1 1700 1500 1500 100 ")
+@example("S 1 1700 1500 1500*31C3")
+def test_no_malformed_line_moves_anything_though_its_checksum_is_right(version_2: Microcontroller, text: str) -> None:
+    assume(not MAY_BE_RIGHT_2.fullmatch(text))
+    assert len(codes(stands_still(version_2, encode_line(text, checksum=True)))) == 1
+
+
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(LINES)
+def test_no_malformed_line_disturbs_what_is_driven(microcontroller: Microcontroller, line: bytes) -> None:
+    assume(not MAY_BE_RIGHT.fullmatch(line))
+    microcontroller.say(Command(*DRIVEN))
+    microcontroller.run_until(microcontroller.now_s + 0.05)
+    said, pulses = ask(microcontroller, line + b"\n", 0.08)
+    widths = widths_by_frame(pulses)
+    assert widths
+    assert all(is_near(one, DRIVEN) for one in widths), (line, widths)
+    assert len(codes(said)) == 1

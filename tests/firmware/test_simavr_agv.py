@@ -57,13 +57,14 @@ def test_the_vehicle_moves_as_far_as_its_pulses_say_and_as_late(agv: str) -> Non
     assert 0.0 < began_s < 0.035
 
 
-def test_seed_and_key_decide_everything_and_the_cut_of_a_hold_nothing() -> None:
-    first = drive("simavr", (1.0,))
-    for again in (drive("simavr", (1.0,)), drive("simavr", (0.3, 0.05, 0.65))):
+@pytest.mark.parametrize("agv", ["simavr:1", "simavr:2"])
+def test_seed_and_key_decide_everything_and_the_cut_of_a_hold_nothing(agv: str) -> None:
+    first = drive(agv, (1.0,))
+    for again in (drive(agv, (1.0,)), drive(agv, (0.3, 0.05, 0.65))):
         assert np.array_equal(again.x_m, first.x_m)
         assert np.array_equal(again.t_s, first.t_s)
-    assert not np.array_equal(drive("simavr", (1.0,), key="b").x_m, first.x_m)
-    assert not np.array_equal(drive("simavr", (1.0,), seed=1).x_m, first.x_m)
+    assert not np.array_equal(drive(agv, (1.0,), key="b").x_m, first.x_m)
+    assert not np.array_equal(drive(agv, (1.0,), seed=1).x_m, first.x_m)
 
 
 def test_a_run_does_not_depend_on_what_was_driven_before() -> None:
@@ -121,9 +122,9 @@ def test_a_pulse_out_of_range_is_one_line_and_the_rig_goes_on() -> None:
 def test_without_the_built_firmware_the_line_says_what_to_do(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     from agvbench.adapters.simavr import built
 
-    monkeypatch.setattr(built, "resource_directory", lambda _: tmp_path)
-    with pytest.raises(LinkError, match=r"not built: simavr_host; run nox -s firmware"):
+    monkeypatch.setattr(built, "build_directory", lambda: tmp_path)
+    with pytest.raises(LinkError, match=r"not built: simavr_host; run agvbench firmware"):
         open_agv("simavr", AdapterOptions(plant=PLANT))
     monkeypatch.setattr(built, "PACKAGES", {"/nowhere/io.h": "avr-libc"})
-    with pytest.raises(LinkError, match="install avr-libc, then run nox -s firmware"):
+    with pytest.raises(LinkError, match="install avr-libc, then run agvbench firmware"):
         open_agv("simavr", AdapterOptions(plant=PLANT))

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from agvbench.adapters.simavr.built import missing_packages
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -57,7 +59,21 @@ def test_the_wheel_carries_what_people_edit_and_no_more(wheel):
     )
     assert "agvbench/_lab/benchmarks/bench_trajectories.py" in names
     assert "agvbench/py.typed" in names
+    assert {f"agvbench/_lab/firmware/{name}" for name in ("Makefile", "src/main.c", "simavr_host/simavr_host.c")} <= {
+        *names
+    }
+    assert not [name for name in names if name.endswith((".elf", ".o")) or "/firmware/build" in name]
     assert not [name for name in names if name.startswith("tests/") or "__pycache__" in name]
+
+
+@pytest.mark.skipif(bool(missing_packages()), reason=f"not installed: {' '.join(missing_packages())}")
+def test_what_is_installed_can_build_the_firmware(agvbench, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    made = agvbench("firmware", cwd=tmp_path)
+    assert made.returncode == 0, made.stderr
+    [built] = (tmp_path / "cache" / "agvbench").iterdir()
+    assert {"agv1.elf", "agv2.elf", "simavr_host"} <= {path.name for path in built.iterdir()}
+    assert "built, and can be simulated" in " ".join(agvbench("doctor", "--agv=simavr", cwd=tmp_path).stdout.split())
 
 
 def test_init_and_bench_work_in_an_empty_folder(agvbench, tmp_path):

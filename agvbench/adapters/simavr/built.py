@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from pathlib import Path
 
-from agvbench.errors import AgvbenchError, FileError, LinkError
-from agvbench.resources import resource_directory
+from agvbench import __version__
+from agvbench.errors import AgvbenchError, LinkError
+from agvbench.resources import INSTALLED, resource_directory
 
 PACKAGES = {
     "make": "make",
@@ -27,26 +29,33 @@ def missing_packages() -> list[str]:
     return [package for sign, package in PACKAGES.items() if not (shutil.which(sign) or Path(sign).exists())]
 
 
+def firmware_sources() -> Path:
+    """Return the directory of the sources that ship with agvbench."""
+    return resource_directory("firmware")
+
+
+def build_directory() -> Path:
+    """Return where the firmware is built to: beside its sources in a checkout, else in the user's cache."""
+    sources = firmware_sources()
+    if sources.parent.name != INSTALLED:
+        return sources / "build"
+    cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(cache) / "agvbench" / f"firmware-{__version__}"
+
+
 def built(name: str) -> Path:
-    """Return the file `name` (``"agv2.elf"``, ``"simavr_host"``) that ``make`` leaves in ``firmware/build``.
+    """Return the file `name` (``"agv2.elf"``, ``"simavr_host"``) as ``agvbench firmware`` built it.
 
     Raises
     ------
     LinkError
         If it is not built, naming the system packages that this lacks, if any.
     """
-    try:
-        path = resource_directory("firmware") / "build" / name
-    except FileError as error:
-        raise LinkError(
-            "this installation comes without the firmware's sources",
-            where="simavr",
-            remedy="run from a checkout of agvbench",
-        ) from error
+    path = build_directory() / name
     if path.is_file():
         return path
     lacking = missing_packages()
-    remedy = f"install {' '.join(lacking)}, then run nox -s firmware" if lacking else "run nox -s firmware"
+    remedy = f"install {' '.join(lacking)}, then run agvbench firmware" if lacking else "run agvbench firmware"
     raise LinkError("the firmware or its host is not built", where="simavr", value=path.name, remedy=remedy)
 
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from agvbench.adapters.registry import parse_spec
+from agvbench.adapters.simavr.address import FirmwareAddress
 from agvbench.adapters.simavr.built import missing_packages, why_not_built
 from agvbench.workflows.doctor.finding import Check, Finding, Lab, State
+
+_SCHEMES = ("simavr", "simavr-live")
 
 
 class Firmware(Check):
@@ -14,12 +17,16 @@ class Firmware(Check):
 
     def examine(self, lab: Lab) -> Finding:
         """Fail only where ``simavr`` is asked for."""
-        scheme, version = parse_spec(lab.agv)
-        why = why_not_built(version or "2") if scheme == "simavr" else why_not_built()
+        scheme, address = parse_spec(lab.agv)
+        asked = scheme in _SCHEMES
+        why = why_not_built(FirmwareAddress.parse(address, where=scheme).version) if asked else why_not_built()
         if not why:
             return Finding(State.GOOD, "built, and can be simulated: --agv simavr")
-        if scheme == "simavr":
+        if asked:
             return Finding(State.BAD, why)
         missing = missing_packages()
-        lacks = f"without {' '.join(missing)}" if missing else "not built"
-        return Finding(State.IDLE, f"simulated firmware: {lacks}", "for --agv simavr: nox -s firmware")
+        if not missing:
+            return Finding(State.IDLE, "simulated firmware: not built", "for --agv simavr: agvbench firmware")
+        lacks = " ".join(missing)
+        remedy = f"for --agv simavr: apt-get install {lacks}, then agvbench firmware"
+        return Finding(State.IDLE, f"simulated firmware: without {lacks}", remedy)
