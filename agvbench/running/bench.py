@@ -99,12 +99,18 @@ class Bench:
             If the run was driven and cannot be recorded; the bench drives no more, either.
         """
         self._refuse_after_failure()
-        run = self._attempt(order, 1)
-        for attempt in range(2, self.settings.attempts + 1):
+        for attempt in range(1, self._attempts(order) + 1):
+            run = self._attempt(order, attempt)
             if run.is_ok:
                 break
-            run = self._attempt(order, attempt)
         return run
+
+    def _attempts(self, order: DriveOrder) -> int:
+        """Return how many attempts there are: as many again where all of an earlier session's were rejected."""
+        limit = self.settings.attempts
+        while _attempt_id(order, limit) in self._recorded and not self._recorded[_attempt_id(order, limit)].is_ok:
+            limit += self.settings.attempts
+        return limit
 
     def _refuse_after_failure(self) -> None:
         if self._failure is not None:
@@ -112,7 +118,7 @@ class Bench:
             raise LinkError("the bench drives no more after the first failure", value=self._failure, remedy=remedy)
 
     def _attempt(self, order: DriveOrder, attempt: int) -> Run:
-        run_id = order.run_id if attempt == 1 else f"{order.run_id}-attempt{attempt}"
+        run_id = _attempt_id(order, attempt)
         if run_id in self._recorded:
             return self._repeat_unseen(order, self._recorded[run_id])
         self._pause(run_id)
@@ -214,3 +220,7 @@ class Bench:
             aborted = aborted_run(order, name, started_s, f"aborted: {why}", frames, self._identity.firmware)
             with suppress(CampaignError):  # the failure is what has to be told, not that it could not be recorded
                 self.writer.append(aborted)
+
+
+def _attempt_id(order: DriveOrder, attempt: int) -> str:
+    return order.run_id if attempt == 1 else f"{order.run_id}-attempt{attempt}"

@@ -10,7 +10,7 @@ from typing import Any
 
 import tomli_w
 
-from agvbench.adapters.impairment.spec import unimpaired
+from agvbench.adapters.impairment.spec import unimpaired, without_packet_faults
 from agvbench.errors import FileError, FlagError
 from agvbench.text_files import read_toml
 
@@ -20,9 +20,9 @@ PLACES = ("auto", "operator", "teleport")
 MAPS = ("default", "thesis")
 _LARGEST_SEED = 2**63 - 1
 # What may differ between a session and the one that resumes it: none of these changes what is driven.
-_FREE_ON_RESUME = frozenset({"connect", "lab"})
+_FREE_ON_RESUME = frozenset({"connect", "bus_config", "lab"})
 # A fault that was rehearsed may be taken away, or another one put in.
-_ADAPTERS = frozenset({"agv", "mocap"})
+_WITHOUT_FAULTS = {"agv": unimpaired, "mocap": unimpaired, "camera": without_packet_faults}
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,7 @@ class BenchSettings:
     place: str = ""
     workspace: str = "circle:6.1"
     connect: str = ""
+    bus_config: str = ""
     lab: str = "lab"
 
     def __post_init__(self) -> None:
@@ -117,7 +118,7 @@ def settings_for_resume(saved: BenchSettings, given: Mapping[str, Any]) -> Bench
         if name not in known or name in _FREE_ON_RESUME:
             continue
         before = getattr(saved, name)
-        if name in _ADAPTERS and unimpaired(value) == unimpaired(before):
+        if name in _WITHOUT_FAULTS and _WITHOUT_FAULTS[name](value) == _WITHOUT_FAULTS[name](before):
             continue
         if value != before:
             raise FlagError(
@@ -127,7 +128,7 @@ def settings_for_resume(saved: BenchSettings, given: Mapping[str, Any]) -> Bench
                 limit=before,
                 remedy=f"leave --{name} out, or start anew without --resume",
             )
-    return replace(saved, **{name: given[name] for name in _FREE_ON_RESUME | _ADAPTERS if name in given})
+    return replace(saved, **{name: given[name] for name in (*_FREE_ON_RESUME, *_WITHOUT_FAULTS) if name in given})
 
 
 def _check(condition: bool, flag: str, value: object, limit: str, remedy: str) -> None:

@@ -13,6 +13,7 @@ from agvbench.adapters.natnet.emulator import Emulator, Settings
 from agvbench.adapters.natnet.encode import Model
 from agvbench.adapters.natnet.frame import FrameOfData
 from agvbench.adapters.natnet.layout import MARKER
+from agvbench.adapters.natnet.network import PacketFaults
 from agvbench.adapters.natnet.version import Version
 from agvbench.bus.clock import WallClock, wait_until
 from agvbench.simulator import Camera, load_plant
@@ -32,10 +33,11 @@ def emulate(options: AdapterOptions, version: str, multicast: str | None, port: 
     AgvbenchError
         If version, port, plant or camera cannot be used.
     """
-    camera = Camera.from_options(options.camera)
+    faults, seen_with = PacketFaults.split(options.camera)
+    camera = Camera.from_options(seen_with)
     settings = Settings(
         Version.parse(version), port=port, multicast=multicast, data_port=DATA_PORT if multicast else 0,
-        rate_hz=camera.rate_hz,
+        rate_hz=camera.rate_hz, network=faults, seed=options.seed,
     )  # fmt: skip
     server = Emulator(settings, [Model(_BODY, options.vehicle)])
     try:

@@ -34,6 +34,7 @@ class ImpairedAgv(AgvAdapter):
             if fault.needs_line and self._line is None:
                 raise LinkError("vehicle has no serial line", where=f"{SCHEME}:{when.name}", value=vehicle.scheme)
         self._run, self._runs_begun = 1, 0
+        self._neutral = options.neutral_command
 
     @classmethod
     def open(cls, address: str, options: AdapterOptions) -> ImpairedAgv:
@@ -62,6 +63,7 @@ class ImpairedAgv(AgvAdapter):
             for when, fault in self._faults:
                 if when.holds(self._run, message.t_s):
                     fault.strike(self._line)
+                    message = message._replace(command=fault.alter(message.command, self._neutral))
         self.vehicle.apply(message)
 
     def reset(self, request: Reset) -> None:

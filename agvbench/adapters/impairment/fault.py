@@ -13,7 +13,7 @@ import numpy as np
 from agvbench.adapters.impairment.spec import SCHEME, Impairment
 from agvbench.errors import LinkError
 from agvbench.registry import classes_by_file
-from agvbench.types import Frames
+from agvbench.types import Command, Frames
 
 _FRAMES, _VEHICLE = "agvbench.adapters.impairment.frames", "agvbench.adapters.impairment.vehicle"
 
@@ -66,9 +66,12 @@ class VehicleFault(Fault):
 
     needs_line: ClassVar[bool] = False
 
-    @abstractmethod
     def strike(self, line: Line | None) -> None:
         """Do it; called before every command from when the fault begins. `line` is None where there is none."""
+
+    def alter(self, command: Command, neutral: float) -> Command:
+        """Return what the vehicle is told in place of `command`; `neutral` is what moves nothing."""
+        return command
 
     def cease(self) -> None:
         """Let go of whoever is held; the adapter is closed."""

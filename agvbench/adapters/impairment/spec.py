@@ -70,6 +70,15 @@ def parse_address(address: str) -> tuple[list[Impairment], str]:
     return [Impairment.parse(text) for text in faults.split("+")], adapter
 
 
+def without_packet_faults(camera: str) -> str:
+    """Return the camera options without those of a bad network.
+
+    >>> without_packet_faults("packet_lost=0.1,rate_hz=60")
+    'rate_hz=60'
+    """
+    return ",".join(option for option in camera.split(",") if not option.startswith("packet_"))
+
+
 def unimpaired(spec: str) -> str:
     """Return the adapter specification without its faults.
 

@@ -24,6 +24,7 @@ from agvbench.adapters.natnet.emulator import Emulator, Settings
 from agvbench.adapters.natnet.encode import Model
 from agvbench.adapters.natnet.frame import FrameOfData
 from agvbench.adapters.natnet.layout import BODY, MARKER, TRACKED
+from agvbench.adapters.natnet.network import PacketFaults
 from agvbench.adapters.natnet.version import Version
 from agvbench.bus.clock import SimulatedClock, WallClock
 from agvbench.bus.event_message import Level
@@ -47,14 +48,15 @@ class EmulatedNatNet(MocapAdapter):
     scheme = "natnet:emulated"
 
     def __init__(self, options: AdapterOptions) -> None:
-        camera = {name: value for name, value in options.camera.items() if name != "version"}
+        faults, camera = PacketFaults.split(options.camera)
+        camera.pop("version", None)
         version = Version.parse(str(options.camera.get("version", "4.1")))
         self._camera = SimMocap.open("", replace(options, camera=camera))
         self._rate_hz = self._camera.identity().rate_hz
         self._clock, self._base_s, self._last_s = SimulatedClock(), 0.0, 0.0
         self._seen: list[Seen] = []
         self._number = self._offset = 0
-        settings = Settings(version, rate_hz=self._rate_hz)
+        settings = Settings(version, rate_hz=self._rate_hz, network=faults, seed=options.seed)
         self._server = Emulator(settings, [Model(_BODY, options.vehicle)], self._clock, threaded=False)
         self._client = self._connected(options.vehicle)
 
@@ -131,9 +133,9 @@ class EmulatedNatNet(MocapAdapter):
         while self._server.step():
             pass
         handled = self._handled()
-        self._server.send(self._as_sent(frames, index, body))
+        sent = self._server.send(self._as_sent(frames, index, body))
         deadline_s = WallClock.now() + _PATIENCE_S
-        while self._handled() == handled:
+        while self._handled() < handled + sent:
             self._client.step(_PATIENCE_S / 10.0)
             if WallClock.now() > deadline_s:
                 raise LinkError("a NatNet packet was lost on loopback", where=self.scheme)

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 from agvbench.adapters.natnet.encode import Model, encode_descriptions, encode_frame
 from agvbench.adapters.natnet.frame import FrameOfData
+from agvbench.adapters.natnet.network import Network, PacketFaults
 from agvbench.adapters.natnet.packet import MAX_DATAGRAM_BYTES, Message, join, split
 from agvbench.adapters.natnet.server import ServerInfo, encode_server_info
 from agvbench.adapters.natnet.version import Version
@@ -23,7 +24,7 @@ from agvbench.errors import LinkError, MessageError
 
 CLIENT_LIMIT_S = 10.0
 MAX_CLIENTS = 32
-_VERSION = Version(4, 1)
+_VERSION, _GOOD = Version(4, 1), PacketFaults()
 _POLL_S = 0.05
 _TICKS = struct.Struct("<Q")
 _FLOAT = struct.Struct("<f")
@@ -37,7 +38,8 @@ class Settings:
     """What an emulated server is like.
 
     ``port`` 0 takes any free one. ``multicast`` is the group that frames go to, None for unicast. The server's clock
-    runs at ``clock_hz`` [Hz], faster than the host's by ``drift`` [s/s], and was ahead by ``offset_s`` [s].
+    runs at ``clock_hz`` [Hz], faster than the host's by ``drift`` [s/s], and was ahead by ``offset_s`` [s]. The way to
+    the clients has the faults ``network``, by chance, which ``seed`` decides on.
     """
 
     version: Version = _VERSION
@@ -49,6 +51,8 @@ class Settings:
     clock_hz: int = 10_000_000
     drift: float = 0.0
     offset_s: float = 1000.0
+    network: PacketFaults = _GOOD
+    seed: int = 0
 
 
 class _Client(NamedTuple):
@@ -70,6 +74,7 @@ class Emulator:
     ) -> None:
         self.settings, self._models, self._clock = settings, list(models), clock or WallClock()
         self._clients: dict[Address, _Client] = {}
+        self._network = Network(settings.network, settings.seed)
         self._lock = threading.Lock()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
@@ -111,8 +116,8 @@ class Emulator:
         with self._lock:
             self._models = list(models)
 
-    def send(self, frame: FrameOfData) -> None:
-        """Stream a frame."""
+    def send(self, frame: FrameOfData) -> int:
+        """Stream a frame; return how many packets went out: a bad network has its own idea of that."""
         if self.settings.multicast is not None:
             targets = [((self.settings.multicast, self.settings.data_port), self.settings.version)]
         else:
@@ -120,8 +125,10 @@ class Emulator:
             with self._lock:
                 targets = [(who, client.version) for who, client in self._clients.items()]
         packets = {version: join(Message.FRAMEOFDATA, self._encoded(frame, version)) for _, version in targets}
-        for who, version in targets:
-            self._send(packets[version], who)
+        sent = [(packet, who) for who, version in targets for packet in self._network.carry(packets[version])]
+        for packet, who in sent:
+            self._send(packet, who)
+        return len(sent)
 
     def _encoded(self, frame: FrameOfData, version: Version) -> bytes:
         return encode_frame(frame, version, self._models)

@@ -1,0 +1,18 @@
+"""``faster=FACTOR``: the drive is told that much more than it should be."""
+
+from __future__ import annotations
+
+from agvbench.adapters.impairment.fault import VehicleFault
+from agvbench.types import Command
+
+
+class Faster(VehicleFault):
+    """A speed controller that was exchanged, or set up anew: neutral is still neutral."""
+
+    name = "faster"
+    usual = 1.5
+    highest = 10.0
+
+    def alter(self, command: Command, neutral: float) -> Command:
+        """Take the drive further from neutral."""
+        return command._replace(drive=neutral + self.value * (command.drive - neutral))
