@@ -92,10 +92,10 @@ class AgvHost(Host):
             except MessageError as error:
                 self._fail(error)
                 continue
-            sequence, source = message.sequence, message.source
+            sequence, _, _, _, flags, source = message
             try:
                 with lock:
-                    if message.flags & _STOP or self._left or sequence <= self._outdated.get(source, 0):
+                    if flags & _STOP or self._left or sequence <= self._outdated.get(source, 0):
                         self._refrain(message)
                     else:
                         if watched:

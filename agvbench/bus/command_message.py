@@ -19,7 +19,7 @@ MAX_HOLD_S = 3600.0
 _MESSAGE = struct.Struct("<6sHIIQ5d")
 _PREFIX = prefix(Kind.COMMAND)
 # Bound once, and named tuples without their Python constructor: a process just woken fetches all from memory.
-_pack, _unpack, _isfinite, _tuple = _MESSAGE.pack, _MESSAGE.unpack, math.isfinite, tuple.__new__
+_pack, _unpack, _tuple, _INFINITE = _MESSAGE.pack, _MESSAGE.unpack, tuple.__new__, math.inf
 
 
 class CommandFlags:
@@ -62,7 +62,7 @@ def pack_command(sequence: int, t_s: float, command: Command, hold_s: float, fla
     """
     drive, front, rear = command
     # A sum is finite only if all its terms are; where it overflows, the terms are looked at one by one.
-    if not (_isfinite(t_s + drive + front + rear) and 0.0 <= hold_s <= MAX_HOLD_S):
+    if not (-_INFINITE < t_s + drive + front + rear < _INFINITE and 0.0 <= hold_s <= MAX_HOLD_S):
         _check(t_s, command, hold_s)
     return _pack(_PREFIX, flags, source, 1, sequence, t_s, drive, front, rear, hold_s)
 
@@ -86,7 +86,7 @@ def decode_command(payload: bytes) -> CommandMessage:
     if found != _PREFIX or count != 1 or flags > _KNOWN:
         raise _refusal(payload)
     command = _tuple(Command, (drive, front, rear))
-    if not (_isfinite(t_s + drive + front + rear) and 0.0 <= hold_s <= MAX_HOLD_S):
+    if not (-_INFINITE < t_s + drive + front + rear < _INFINITE and 0.0 <= hold_s <= MAX_HOLD_S):
         _check(t_s, command, hold_s)
     return _tuple(CommandMessage, (sequence, t_s, command, hold_s, flags, source))
 

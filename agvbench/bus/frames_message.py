@@ -12,8 +12,7 @@ import struct
 from collections.abc import Sequence
 from enum import IntEnum
 from functools import partial
-from operator import attrgetter
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,10 +32,6 @@ _ROWS = np.dtype([*((name, "<f8") for name in _FIELDS), ("frame", "<i8"), ("trac
 _ROW_BYTES = _ROWS.itemsize
 _DTYPES = (*[FLOAT] * 6, INTEGER, BOOLEAN)
 _FRAME_AT, _TRACKED_AT = 48, 56
-# All columns, and what there is to check about them, in one call each: to ask them one by one takes longer.
-_columns_of, _dtypes_of, _sizes_of = (
-    attrgetter(*(name + what for name in _ROWS.names or ())) for what in ("", ".dtype", ".size")
-)
 
 
 class FrameClock(IntEnum):
@@ -102,13 +97,23 @@ def pack_columns(frames: Frames) -> bytes:
 
 def _append_columns(head: bytes, frames: Frames) -> bytes:
     """Return `head` and behind it the columns, copied once."""
-    sizes = _sizes_of(frames)
-    if sizes != (sizes[0],) * 8:
-        raise MessageError("columns of frames differ in length", value=[*sizes])
-    columns: tuple[Any, ...] = _columns_of(frames)
-    if _dtypes_of(frames) == _DTYPES:
+    t_s, x_m, y_m, heading_rad = frames.t_s, frames.x_m, frames.y_m, frames.heading_rad
+    error_m, received_s, frame, tracked = frames.mean_error_m, frames.received_s, frames.frame, frames.tracked
+    columns = (t_s, x_m, y_m, heading_rad, error_m, received_s, frame, tracked)
+    # Spelled out, since loops over columns take longer than all the rest.
+    count = t_s.size
+    if not (
+        count == x_m.size == y_m.size == heading_rad.size == error_m.size == received_s.size
+        and count == frame.size == tracked.size
+    ):
+        raise MessageError("columns of frames differ in length", value=[column.size for column in columns])
+    if (
+        FLOAT is t_s.dtype is x_m.dtype is y_m.dtype is heading_rad.dtype is error_m.dtype is received_s.dtype
+        and frame.dtype is INTEGER
+        and tracked.dtype is BOOLEAN
+    ):
         try:
-            return _join((head, *columns))
+            return _join((head, *columns))  # type: ignore[arg-type]  # (arrays are buffers)
         except TypeError:
             pass  # a column whose values do not lie side by side is no buffer
     return head + _join(np.asarray(column, dtype).tobytes() for column, dtype in zip(columns, _DTYPES, strict=True))

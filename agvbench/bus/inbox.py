@@ -76,10 +76,11 @@ class Inbox:
         except MessageError as error:
             return self._read_other(payload, error)
         loss = self.frames_loss
-        if message.sequence == loss.expected and message.source == loss.source:
+        sequence, _, _, _, _, _, source = message
+        if sequence == loss.expected and source == loss.source:
             loss.expected += 1
         else:
-            loss.saw(message.source, message.sequence)
+            loss.saw(source, sequence)
         return message
 
     def _read_other(self, payload: bytes, error: MessageError) -> Event | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -291,3 +291,11 @@ def test_a_command_takes_64_bytes_and_a_frame_57() -> None:
     one = np.zeros(1)
     frames = Frames(one, one, one, one, one.astype(bool), one.astype(int), one, one)
     assert len(encode_frames(FramesMessage(1, pack_columns(frames)))) == 48 + 57
+
+
+def test_columns_of_other_types_and_strides_travel_as_the_same_bytes() -> None:
+    plain = Frames(*(np.arange(4.0) + k for k in range(4)), np.ones(4, bool), np.arange(4), np.zeros(4), np.ones(4))
+    table = np.column_stack([plain.t_s, plain.x_m])
+    odd = replace(plain, t_s=table[:, 0], x_m=table[:, 1], y_m=plain.y_m.astype(np.float32), frame=np.arange(4, dtype=np.int32))  # fmt: skip  # noqa: E501
+    assert pack_columns(odd) == pack_columns(plain)
+    assert pack_columns(replace(plain, t_s=table[:, 0])) == pack_columns(plain)
