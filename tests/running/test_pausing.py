@@ -1,0 +1,98 @@
+"""A session pauses between runs for a file or Ctrl-Z, the vehicle at neutral, and goes on as if nothing had been."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agvbench.campaign import Campaign
+from agvbench.running.opening import open_session
+from agvbench.running.pausing import PAUSE_FILE, Pause
+from agvbench.running.session import BenchSession
+
+OPTIONS = {"vehicle": "", "seed": 2}
+
+
+@contextmanager
+def session(path: Path) -> Iterator[BenchSession]:
+    with open_session(OPTIONS, out=str(path), resume=False, dry_run=False) as opened:
+        yield opened
+
+
+def drive(opened: BenchSession, name: str) -> None:
+    opened.driver(name, experiment="free", repeat=1).hold(for_s=0.5, drive=0.5)
+
+
+@pytest.fixture
+def told(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    said: list[str] = []
+    monkeypatch.setattr(Pause.__init__, "__defaults__", (said.append,))
+    return said
+
+
+def test_a_file_pauses_and_its_absence_goes_on(tmp_path: Path, told: list[str]) -> None:
+    path = tmp_path / "campaign"
+    with session(path) as opened:
+        drive(opened, "one")
+        (path / PAUSE_FILE).touch()
+        finish = threading.Timer(0.6, (path / PAUSE_FILE).unlink)
+        finish.start()
+        drive(opened, "two")
+        finish.join()
+    assert told[0].startswith("paused before two, the vehicle at neutral: press Ctrl-Z or remove ")
+    assert told[1:] == ["going on"]
+    undisturbed = tmp_path / "undisturbed"
+    with session(undisturbed) as opened:
+        drive(opened, "one")
+        drive(opened, "two")
+    for paused, other in zip(Campaign.open(path), Campaign.open(undisturbed), strict=True):
+        assert np.array_equal(paused.frames.x_m, other.frames.x_m, equal_nan=True)
+        assert paused.started_s == other.started_s
+
+
+def test_ctrl_z_pauses_and_again_goes_on(tmp_path: Path, told: list[str]) -> None:
+    path = tmp_path / "campaign"
+    before = signal.getsignal(signal.SIGTSTP)
+    with session(path) as opened:
+        signal.raise_signal(signal.SIGTSTP)
+        assert (path / PAUSE_FILE).exists()
+        again = threading.Timer(0.4, os.kill, (os.getpid(), signal.SIGTSTP))
+        again.start()
+        drive(opened, "one")
+        again.join()
+    assert signal.getsignal(signal.SIGTSTP) is before
+    assert [line.partition(" ")[0] for line in told] == ["pausing", "paused", "going"]
+    assert Campaign.open(path).run_ids == ["one"]
+
+
+def test_fg_goes_on_after_ctrl_z_but_ends_nobody_elses_pause(tmp_path: Path) -> None:
+    pause = Pause(tmp_path, lambda _: None)
+    with pause.by_signal():
+        signal.raise_signal(signal.SIGTSTP)
+        signal.raise_signal(signal.SIGCONT)
+        assert not pause.is_asked()
+        (tmp_path / PAUSE_FILE).touch()
+        signal.raise_signal(signal.SIGCONT)
+        assert pause.is_asked()
+
+
+def test_ctrl_c_ends_a_pause(tmp_path: Path, told: list[str]) -> None:
+    path = tmp_path / "campaign"
+
+    def pause_and_interrupt() -> None:
+        with session(path) as opened:
+            (path / PAUSE_FILE).touch()
+            threading.Timer(0.4, os.kill, (os.getpid(), signal.SIGINT)).start()
+            drive(opened, "one")
+
+    with pytest.raises(KeyboardInterrupt):
+        pause_and_interrupt()
+    assert len(told) == 1
+    assert not list((path / "runs.parquet").iterdir())
