@@ -91,6 +91,7 @@ def way_back(
     *,
     radii_m: Sequence[float],
     leads_m: Sequence[float],
+    gears: Sequence[bool] = (False, True),
 ) -> list[Leg]:
     """Return the legs of the quickest way from `seen` to `start` (floor frame); the last ends with a straight.
 
@@ -100,6 +101,8 @@ def way_back(
         Radii to turn at, tightest last: the first with which any way fits is taken.
     leads_m
         Lengths of the straight, longest first: likewise.
+    gears
+        Whether to come backward, forward, or as is quicker.
 
     Raises
     ------
@@ -113,7 +116,7 @@ def way_back(
         raise _no_way(workspace, f"the vehicle stands {-limit_m:.2f} m outside")
     for lead_m in leads_m:
         for radius_m in radii_m:
-            for pieces in _by_cost(here, there, radius_m, lead_m):
+            for pieces in _by_cost(here, there, radius_m, lead_m, gears):
                 path = _leg(pieces, here, _CHECK_M, backward=False).points
                 if guided.clearance_m(path, workspace) >= limit_m - 1e-6:
                     return _legs(pieces, here)
@@ -127,9 +130,9 @@ def _no_way(workspace: Workspace, value: str) -> PlanError:
     )  # fmt: skip
 
 
-def _by_cost(here: Pose, there: Pose, radius_m: float, lead_m: float) -> list[list[Piece]]:
+def _by_cost(here: Pose, there: Pose, radius_m: float, lead_m: float, gears: Sequence[bool]) -> list[list[Piece]]:
     ways = []
-    for backward in (False, True):
+    for backward in gears:
         lead = Piece("straight", lead_m, backward=backward)
         begin = lead.reversed_gear().end(there)
         ways += [[*pieces, lead] for pieces in paths_by_length(here, begin, radius_m)]

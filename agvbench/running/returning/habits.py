@@ -11,11 +11,13 @@ import numpy as np
 
 from agvbench.running.returning.sight import Step
 
-_TURN_NOISE_RAD = 0.002
-_SIDE_NOISE_M = 0.0004
-_GAIN_WANDER, _OFFSET_WANDER, _CRAB_WANDER = 0.05, 0.2, 0.06
+_BLOCK_M = 0.08
+"""Steps are taken together until they are so long: delays and noise matter less."""
+_TURN_NOISE_RAD, _SIDE_NOISE_M = 0.004, 0.0008
+_GAIN_GUESS, _OFFSET_GUESS_PER_M, _CRAB_GUESS_RAD = 0.15, 0.4, 0.06
+"""Standard deviations of what is believed of a vehicle that has not driven yet."""
+_GAIN_WANDER, _OFFSET_WANDER, _CRAB_WANDER = 0.02, 0.2, 0.06
 """How far each may change per square root of a metre driven: (–), [1/m], [rad]."""
-_SHORTEST_STEP_M = 0.002
 
 
 class SteeringHabit:
@@ -23,9 +25,10 @@ class SteeringHabit:
 
     def __init__(self) -> None:
         self._state = np.array([1.0, 0.0])
-        self._covariance = np.diag([0.15**2, 0.4**2])
+        self._covariance = np.diag([_GAIN_GUESS**2, _OFFSET_GUESS_PER_M**2])
         self.crab_rad = 0.0
-        self._crab_variance = 0.06**2
+        self._crab_variance = _CRAB_GUESS_RAD**2
+        self._block = np.zeros(4)
 
     def as_guess(self) -> SteeringHabit:
         """Return a habit that begins where this one is, and is as ready to learn as a new one."""
@@ -33,34 +36,40 @@ class SteeringHabit:
         guess._state, guess.crab_rad = self._state.copy(), self.crab_rad
         return guess
 
-    @property
-    def gain(self) -> float:
-        """Curvature per curvature asked for, near what is believed."""
-        return float(np.clip(self._state[0], 0.3, 2.0))
-
     def asked_for(self, curvature_per_m: float) -> float:
         """Return the curvature [1/m] to ask for so that the vehicle turns at `curvature_per_m`."""
-        return (curvature_per_m - float(self._state[1])) / self.gain
+        gain, offset = self._state.tolist()
+        return (curvature_per_m - offset) / float(np.clip(gain, 0.4, 2.0))
+
+    def begin(self) -> None:
+        """Leave out what was begun to be taken together: the vehicle has stood."""
+        self._block[:] = 0.0
 
     def learn(self, asked_per_m: float, step: Step, *, ahead_m: float) -> None:
         """Take in a step driven while `asked_per_m` was asked for.
 
         `ahead_m` is how far ahead of the markers' centroid the guided point lies, whose crab angle is meant.
         """
-        if abs(step.ahead_m) < _SHORTEST_STEP_M:
-            return
-        went = abs(step.ahead_m)
-        self._covariance += went * np.diag([_GAIN_WANDER**2, _OFFSET_WANDER**2])
-        row = step.ahead_m * np.array([asked_per_m, 1.0])
+        side_m = step.left_m + ahead_m * step.turn_rad
+        self._block += (step.ahead_m, asked_per_m * step.ahead_m, step.turn_rad, side_m)
+        if abs(self._block[0]) >= _BLOCK_M:
+            self._turned(*self._block[:3].tolist())
+            self._crabbed(float(self._block[0]), float(self._block[3]))
+            self._block[:] = 0.0
+
+    def _turned(self, ahead_m: float, asked_rad: float, turn_rad: float) -> None:
+        self._covariance += abs(ahead_m) * np.diag([_GAIN_WANDER**2, _OFFSET_WANDER**2])
+        row = np.array([asked_rad, ahead_m])
         spread = self._covariance @ row
         share = spread / (row @ spread + _TURN_NOISE_RAD**2)
-        self._state += share * (step.turn_rad - row @ self._state)
+        self._state += share * (turn_rad - row @ self._state)
         self._covariance -= np.outer(share, spread)
-        self._crab_variance += went * _CRAB_WANDER**2
-        side = step.left_m + ahead_m * step.turn_rad
-        weight = self._crab_variance * step.ahead_m / (self._crab_variance * went**2 + _SIDE_NOISE_M**2)
-        self.crab_rad += weight * (side - self.crab_rad * step.ahead_m)
-        self._crab_variance *= 1.0 - weight * step.ahead_m
+
+    def _crabbed(self, ahead_m: float, side_m: float) -> None:
+        self._crab_variance += abs(ahead_m) * _CRAB_WANDER**2
+        share = self._crab_variance * ahead_m / (self._crab_variance * ahead_m**2 + _SIDE_NOISE_M**2)
+        self.crab_rad += share * (side_m - self.crab_rad * ahead_m)
+        self._crab_variance *= 1.0 - share * ahead_m
 
 
 class DriveHabit:

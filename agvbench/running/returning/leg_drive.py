@@ -56,6 +56,7 @@ class LegDrive:
         """
         reins = self._reins
         reins.begin()
+        self._steering.begin()
         self._steer(self._guide())
         reins.hold(self._helm.command(0.0, self._asked), self._limits.steer_first_s)
         throttle = Throttle(self._drive, self._fast_mps)

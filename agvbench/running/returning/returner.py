@@ -10,6 +10,7 @@ from agvbench.planning import Workspace
 from agvbench.planning.way_back import Guided, Leg, way_back
 from agvbench.running.links import RunnerLink
 from agvbench.running.rest import is_at_rest, pose_before
+from agvbench.running.returning.aim import Aim
 from agvbench.running.returning.habits import Habits
 from agvbench.running.returning.helm import Helm
 from agvbench.running.returning.leg_drive import LegDrive
@@ -72,14 +73,15 @@ class Returner:
             raise
 
     def _bring_to(self, start: Pose, reins: Reins) -> Placing:
-        limits = self._limits
+        limits, aim = self._limits, Aim(start)
         for attempt in range(limits.most_attempts + 1):
             seen = self._look(reins)
             off_m, off_rad = math.dist(seen[:2], start[:2]), abs(wrap_angle(seen.heading_rad - start.heading_rad))
             if max(off_m / limits.position_m, off_rad / limits.heading_rad) <= limits.reserve:
                 return Placing(reins.now_s, attempt, off_m, off_rad)
+            aim.came_to(seen)
             if attempt < limits.most_attempts:
-                self._drive_way(seen, start, reins)
+                self._drive_way(seen, aim, reins)
         raise PlacingError(
             "the vehicle did not come to its start", where=self._link.keys.root,
             value=f"{off_m * 1e3:.1f} mm and {math.degrees(off_rad):.2f}° off after {limits.most_attempts} attempts",
@@ -100,23 +102,24 @@ class Returner:
                 raise PlacingError("the vehicle does not come to rest", where=self._link.keys.root,
                                 limit=f"{self._limits.settle_limit_s:g} s")  # fmt: skip
 
-    def _drive_way(self, seen: Pose, start: Pose, reins: Reins) -> None:
+    def _drive_way(self, seen: Pose, aim: Aim, reins: Reins) -> None:
         """Drive a way until its end, or until the vehicle is astray."""
         crab_rad = self._habits.crab_rad
-        legs = self._way(seen, start, crab_rad)
+        legs = self._way(seen, aim, crab_rad)
+        kept = True
         for leg in legs:
             goal_crab_rad = crab_rad if leg is legs[-1] else None
             drive = LegDrive(leg, reins, self._helm, self._habits, self._limits, goal_crab_rad=goal_crab_rad)
-            if not drive.run():
-                return
+            kept = kept and drive.run()
+        aim.took(legs[-1].backward if kept else None)
 
-    def _way(self, seen: Pose, start: Pose, crab_rad: float) -> list[Leg]:
+    def _way(self, seen: Pose, aim: Aim, crab_rad: float) -> list[Leg]:
         geometry, radius_m = self._helm.model.geometry, self._helm.radius_m
         guided = Guided(geometry, self._helm.ahead_m, crab_rad)
         radii_m = [share * radius_m for share in _RADII]
         leads_m = [share * geometry.wheelbase_m for share in _LEADS]
         try:
-            return way_back(seen, start, guided, self._workspace, radii_m=radii_m, leads_m=leads_m)
+            return way_back(seen, aim.pose, guided, self._workspace, radii_m=radii_m, leads_m=leads_m, gears=aim.gears)
         except PlanError as error:
             raise PlacingError(
                 error.what, where=error.where, value=error.value, limit=error.limit, remedy=error.remedy

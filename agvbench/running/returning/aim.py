@@ -1,0 +1,41 @@
+"""Where to aim so as to come to a start: what one attempt missed, the next aims off."""
+
+from __future__ import annotations
+
+from agvbench.types import Pose, wrap_angle
+
+_SHARE = 0.5
+_FARTHEST_M, _FARTHEST_RAD = 0.03, 0.06
+"""What was missed by more says nothing of the next attempt."""
+
+
+class Aim:
+    """The pose to aim at for a start, learned over the attempts of one return.
+
+    What a vehicle misses again and again in one place (a slope, a camera's distortion, a drive that pulls to one side)
+    is made up for, whatever its cause; so every attempt after the first comes in the same gear.
+    """
+
+    def __init__(self, start: Pose) -> None:
+        self._start, self.pose = start, start
+        self._backward: bool | None = None
+
+    @property
+    def gears(self) -> tuple[bool, ...]:
+        """The gears to come in: backward or not."""
+        return (False, True) if self._backward is None else (self._backward,)
+
+    def took(self, backward: bool | None) -> None:
+        """Note the gear of an attempt that was driven to its end, None for one that was not."""
+        self._backward = backward
+
+    def came_to(self, seen: Pose) -> None:
+        """Aim off by a share of what was missed."""
+        missed = seen.relative_to(self._start)
+        if self._backward is None or max(abs(missed.x_m), abs(missed.y_m)) > _FARTHEST_M:
+            return
+        if abs(missed.heading_rad) > _FARTHEST_RAD:
+            return
+        off = self.pose.relative_to(self._start)
+        x_m, y_m, heading_rad = (was - _SHARE * now for was, now in zip(off, missed, strict=True))
+        self.pose = self._start.compose(Pose(x_m, y_m, wrap_angle(heading_rad)))
