@@ -16,12 +16,13 @@ from agvbench.bus.keys import AGV, REPLAY, RESET, Keys
 from agvbench.bus.request_message import decode_replay, decode_reset
 from agvbench.bus.sequence import LossCounter, Sequence
 from agvbench.bus.truth_message import Truth, TruthFlags
-from agvbench.errors import MessageError
+from agvbench.errors import AdapterGoneError, MessageError
 from agvbench.types import Floats
 
 SILENCE_LIMIT_S = 0.5
 _COMMANDS_WAITING = 256
 _STOP_PATIENCE_S = 0.5
+_HANG_PATIENCE_S = 0.1
 _STOP = CommandFlags.STOP
 
 
@@ -116,14 +117,27 @@ class AgvHost(Host):
         self._adapter.stop()
 
     def _watch(self) -> None:
-        """Stop a vehicle whose runner has fallen silent."""
+        """Stop a vehicle whose runner has fallen silent, or whose adapter does not come back from a command."""
         while not self._clock.wait(self._closed, SILENCE_LIMIT_S / 5.0):
             heard_s = self._heard_s
             if heard_s is not None and self._clock.now() - heard_s > SILENCE_LIMIT_S:
                 self._heard_s = None
-                with self._lock:
+                if self._lock.acquire(timeout=_HANG_PATIENCE_S):
+                    try:
+                        self._adapter.stop()
+                    finally:
+                        self._lock.release()
+                    self.event(Level.WARNING, "runner_silent", f"no command for {SILENCE_LIMIT_S} s: vehicle stopped")
+                else:
+                    self._tell_of_hanging()
                     self._adapter.stop()
-                self.event(Level.WARNING, "runner_silent", f"no command for {SILENCE_LIMIT_S} s: vehicle stopped")
+
+    def _tell_of_hanging(self) -> None:
+        error = AdapterGoneError(
+            "does not come back from a command", value=f"{SILENCE_LIMIT_S + _HANG_PATIENCE_S:g} s",
+            remedy="see the vehicle and its cable, and start the adapter again",
+        )  # fmt: skip
+        self._fail(error)
 
     def truth(
         self, t_s: Floats, poses: Floats, *, end_s: float, acknowledged: int = 0, flags: int = TruthFlags.LAST

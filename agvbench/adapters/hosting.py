@@ -49,7 +49,7 @@ class Host(ABC):
         self._session, self._keys, self._role, self._clock = session, keys, role, clock
         self._zenoh_error = zenoh.ZError
         self._lock = threading.RLock()
-        self._events = Sequence()
+        self._events, self._telling = Sequence(), threading.Lock()
         self._threads: list[threading.Thread] = []
         self._questions = session.declare_queryable(
             keys.question(role, "*"), zenoh.handlers.FifoChannel(_QUESTIONS_WAITING)
@@ -98,8 +98,8 @@ class Host(ABC):
             query.reply_err(refusal(self._role, as_agvbench_error(error, self._role)))
 
     def event(self, level: Level, kind: str, text: str, *, acknowledged: int = 0) -> None:
-        """Publish an event."""
-        with self._lock:
+        """Publish an event; also while the adapter hangs."""
+        with self._telling:
             sequence = self._events.take()
             event = Event(sequence, self._role, level, kind, text, acknowledged, self._clock.now(), self._events.source)
             self._put(self._keys.report, encode_event(event))

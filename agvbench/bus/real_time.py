@@ -14,6 +14,7 @@ from agvbench.bus.clock_offset import measure_offset
 from agvbench.bus.command_message import CommandFlags
 from agvbench.bus.event_message import Event, Level
 from agvbench.bus.frames_message import FramesMessage, unpack_columns
+from agvbench.bus.heartbeat import Heartbeat
 from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import AGV, MOCAP, TIME, Keys
 from agvbench.bus.outbox import CommandOutbox
@@ -54,6 +55,10 @@ class RealTime:
         self._offset_s = 0.0
         self._thread = threading.Thread(target=self._receive, name="agvbench-inbox", daemon=True)
         self._thread.start()
+        self._heartbeat = Heartbeat(session, keys.question(AGV, TIME), clock, self._fail)
+
+    def _fail(self, error: AgvbenchError) -> None:
+        self._failure = self._failure or error
 
     def _receive(self) -> None:
         while True:
@@ -106,6 +111,7 @@ class RealTime:
 
     def close(self) -> None:
         """Wait for the thread, which ends with its inbox."""
+        self._heartbeat.close()
         self._thread.join(timeout=2.0)
 
     def _check(self) -> None:
