@@ -8,6 +8,7 @@ from typing import Any
 
 from agvbench.adapters.contract import DEFAULT_PLANT, AdapterOptions
 from agvbench.adapters.node import host_adapters
+from agvbench.bus.bus_config import BusConfig
 from agvbench.bus.clock import Clock
 from agvbench.bus.identity_message import Identity
 from agvbench.bus.link import VehicleLink
@@ -24,6 +25,7 @@ def open_rig(
     plant: str = DEFAULT_PLANT,
     seed: int = 0,
     connect: str | Sequence[str] | None = None,
+    bus_config: BusConfig | None = None,
     lab: str = "lab",
     vehicle: str = "agv1",
     command_unit: CommandUnit = "us",
@@ -45,6 +47,8 @@ def open_rig(
     connect
         Endpoints of adapters that run as their own processes, as ``"tcp/127.0.0.1:7447"``; None hosts them here, with
         nothing open to the network.
+    bus_config
+        Certificates and rules of a secured bus; endpoints of TLS and QUIC need one.
     lab, vehicle
         Names on the bus.
     clock
@@ -59,7 +63,7 @@ def open_rig(
     """
     endpoints = [connect] if isinstance(connect, str) else list(connect or ())
     with ExitStack() as stack:
-        session: Any = stack.enter_context(open_session(connect=endpoints))
+        session: Any = stack.enter_context(open_session(connect=endpoints, config=bus_config))
         if not endpoints:
             options = AdapterOptions(
                 vehicle=vehicle,

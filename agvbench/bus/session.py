@@ -12,6 +12,8 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from agvbench.bus.bus_config import BusConfig
+from agvbench.bus.certificates import why_not
 from agvbench.bus.wire import MAX_MESSAGE_BYTES
 from agvbench.errors import LinkError
 
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 DEFAULT_PORT = 7447
 _ENDPOINT = re.compile(r"(?P<protocol>[a-z]+)/(?P<host>\[[^\]]+\]|[^\s/:\[\]]+):(?P<port>[0-9]{1,5})")
 _PROTOCOLS = ("tcp", "tls", "quic")
+_SECURED = ("tls", "quic")
 _LIKELY = f"tcp/HOST:PORT, for example tcp/127.0.0.1:{DEFAULT_PORT}"
 
 
@@ -62,8 +65,23 @@ def is_loopback(host: str) -> bool:
         return False
 
 
+def is_open_to_anybody(endpoint: str, config: BusConfig | None = None) -> bool:
+    """Whether other machines reach an endpoint that is listened on, and nobody is asked who they are.
+
+    >>> is_open_to_anybody("tcp/0.0.0.0:7447"), is_open_to_anybody("tcp/127.0.0.1:7447")
+    (True, False)
+    """
+    protocol, host, _ = parse_endpoint(endpoint, "listen")
+    return not (is_loopback(host) or (protocol in _SECURED and config is not None and config.asks_who))
+
+
 def open_session(
-    *, listen: Sequence[str] = (), connect: Sequence[str] = (), allow_remote: bool = False, timeout_s: float = 5.0
+    *,
+    listen: Sequence[str] = (),
+    connect: Sequence[str] = (),
+    allow_remote: bool = False,
+    timeout_s: float = 5.0,
+    config: BusConfig | None = None,
 ) -> zenoh.Session:
     """Open a session that talks over these endpoints and no others; without any it stays in this process.
 
@@ -72,21 +90,24 @@ def open_session(
     listen, connect
         Endpoints to wait on and to call, as ``tcp/127.0.0.1:7447``.
     allow_remote
-        Whether other machines may reach the endpoints that are listened on. There is no authentication: whoever
-        reaches them can drive the vehicle.
+        Whether other machines may reach endpoints that ask nobody who they are: whoever does can drive the vehicle.
     timeout_s
         How long [s] to try to connect.
+    config
+        The lab's certificates and rules; endpoints of TLS and QUIC need one.
 
     Raises
     ------
     LinkError
         If an endpoint cannot be parsed, listened on or reached, or is open to other machines unasked.
     """
-    for endpoint in connect:
-        parse_endpoint(endpoint, "connect")
-    for endpoint in listen:
-        _, host, _ = parse_endpoint(endpoint, "listen")
-        if not (allow_remote or is_loopback(host)):
+    for where, endpoint in [*(("connect", one) for one in connect), *(("listen", one) for one in listen)]:
+        protocol, host, _ = parse_endpoint(endpoint, where)
+        if protocol in _SECURED and config is None:
+            raise LinkError(
+                "needs certificates", where=f"{where} {endpoint}", remedy="name them with --bus-config FILE"
+            )
+        if where == "listen" and not allow_remote and is_open_to_anybody(endpoint, config):
             raise LinkError(
                 "would let other machines drive the vehicle",
                 where=f"listen {endpoint}",
@@ -94,7 +115,7 @@ def open_session(
                 limit="127.0.0.1, ::1 or localhost unless remote access is allowed",
                 remedy="pass allow_remote=True, on a network that you trust",
             )
-    return _open(_config(listen, connect, timeout_s), listen, connect, timeout_s)
+    return _open(_settings(listen, connect, timeout_s), listen, connect, timeout_s, config)
 
 
 def _reason(text: str) -> str:
@@ -103,7 +124,7 @@ def _reason(text: str) -> str:
     return (system[1] if system else text.partition(" at /")[0]).strip()
 
 
-def _config(listen: Sequence[str], connect: Sequence[str], timeout_s: float) -> dict[str, Any]:
+def _settings(listen: Sequence[str], connect: Sequence[str], timeout_s: float) -> dict[str, Any]:
     return {
         "mode": "client" if len(connect) == 1 and not listen else "peer",
         "scouting/multicast/enabled": False,
@@ -122,22 +143,36 @@ def _config(listen: Sequence[str], connect: Sequence[str], timeout_s: float) -> 
     }
 
 
-def _open(config: dict[str, Any], listen: Sequence[str], connect: Sequence[str], timeout_s: float) -> zenoh.Session:
+def _open(
+    ours: dict[str, Any], listen: Sequence[str], connect: Sequence[str], timeout_s: float, config: BusConfig | None
+) -> zenoh.Session:
     import zenoh
 
-    settings = zenoh.Config()
-    for key, value in config.items():
+    settings = zenoh.Config() if config is None else config.settings()
+    for key, value in ours.items():
         settings.insert_json5(key, json.dumps(value))
     try:
         return zenoh.open(settings)
     except zenoh.ZError as error:
         reason = _reason(str(error))
         if connect and "connect" in reason.lower():
-            raise LinkError(
-                "nobody answers",
-                where=f"connect {' '.join(connect)}",
-                value=f"tried for {timeout_s:g} s",
-                remedy="start the adapter there first, or correct the endpoint",
-            ) from None
+            raise _nobody(connect, timeout_s, config) from None
         where = " ".join([*(f"listen {e}" for e in listen), *(f"connect {e}" for e in connect)])
         raise LinkError("endpoint cannot be used", where=where, value=reason) from None
+
+
+def _nobody(connect: Sequence[str], timeout_s: float, config: BusConfig | None) -> LinkError:
+    """Return why a session could not connect, as far as that can be found out."""
+    for endpoint in connect:
+        protocol, host, port = parse_endpoint(endpoint, "connect")
+        if protocol == "tls" and config is not None and (reason := why_not(config.certificates, host, port)):
+            return LinkError(
+                "refused", where=f"connect {endpoint}", value=reason,
+                remedy=f"see the certificates of both ends; here {config.path}",
+            )  # fmt: skip
+    return LinkError(
+        "nobody answers",
+        where=f"connect {' '.join(connect)}",
+        value=f"tried for {timeout_s:g} s",
+        remedy="start the adapter there first, or correct the endpoint",
+    )

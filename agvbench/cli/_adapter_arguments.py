@@ -18,9 +18,15 @@ def add_bus_arguments(parser: argparse.ArgumentParser, default_listen: str) -> N
         action="append",
         metavar="ENDPOINT",
         help=f"wait for others here (default: {default_listen} unless --connect is given); "
-        "tcp/0.0.0.0:PORT lets other machines in, and nobody asks them who they are",
+        "tcp/0.0.0.0:PORT lets other machines in, and nobody asks them who they are; tls/0.0.0.0:PORT with "
+        "--bus-config does ask",
     )
     group.add_argument("--connect", action="append", metavar="ENDPOINT", help="connect to a process that listens there")
+    group.add_argument(
+        "--bus-config",
+        metavar="FILE",
+        help="certificates and rules of a secured bus, as Zenoh writes them (docs/how-to/secure-the-bus.md)",
+    )
     group.add_argument("--lab", default="lab", help="name of the lab on the bus (default: %(default)s)")
     group.add_argument("--vehicle", default="agv1", help="name of the vehicle on the bus (default: %(default)s)")
 
@@ -74,5 +80,6 @@ def run_with(arguments: argparse.Namespace, default_listen: str, agv: str | None
     given |= {name: read(getattr(arguments, name)) for name, read in readers.items() if hasattr(arguments, name)}
     given["neutral"] = getattr(arguments, "neutral", None)
     return run_adapters(
-        AdapterOptions(**given), agv=agv, mocap=mocap, lab=arguments.lab, **endpoints(arguments, default_listen)
-    )
+        AdapterOptions(**given), agv=agv, mocap=mocap, lab=arguments.lab, bus_config=arguments.bus_config,
+        **endpoints(arguments, default_listen),
+    )  # fmt: skip

@@ -13,6 +13,7 @@ import pandas as pd
 
 from agvbench.adapters import check_specs, open_rig
 from agvbench.adapters.camera_options import camera_options
+from agvbench.bus.bus_config import BusConfig
 from agvbench.bus.link import VehicleLink
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
 from agvbench.errors import VehicleError
@@ -64,6 +65,7 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
             camera=camera_options(filter(None, settings.camera.split(","))),
             seed=settings.seed,
             connect=settings.connect or None,
+            bus_config=BusConfig.load(settings.bus_config) if settings.bus_config else None,
             lab=settings.lab,
             command_unit=models["uncalibrated"].command_unit,
             neutral=models["uncalibrated"].neutral,

@@ -61,6 +61,11 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
         {"metavar": "ENDPOINT"},
         "where the adapters run, such as tcp/127.0.0.1:7447 (default: in process)",
     ),
+    (
+        "--bus-config",
+        {"metavar": "FILE"},
+        "certificates and rules of a secured bus, as Zenoh writes them (default: none)",
+    ),
     ("--lab", {"metavar": "NAME"}, "name of the lab on the bus (default: lab)"),
 )
 SESSION_OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (

@@ -10,7 +10,8 @@ from contextlib import contextmanager
 
 from agvbench.adapters.contract import AdapterOptions
 from agvbench.adapters.node import host_adapters
-from agvbench.bus.session import is_loopback, open_session, parse_endpoint
+from agvbench.bus.bus_config import BusConfig
+from agvbench.bus.session import is_open_to_anybody, open_session
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
@@ -23,18 +24,20 @@ def run_adapters(
     lab: str,
     listen: Sequence[str],
     connect: Sequence[str],
+    bus_config: str | None = None,
 ) -> int:
     """Host adapters until SIGINT or SIGTERM; stop the vehicle first, then leave the bus.
 
     Raises
     ------
     AgvbenchError
-        If an endpoint, a name, an adapter or its plant cannot be used.
+        If an endpoint, a name, an adapter or its plant, or the bus's configuration cannot be used.
     """
-    _warn_of_remote_access(listen)
+    config = BusConfig.load(bus_config) if bus_config else None
+    _warn_of_remote_access(listen, config)
     with (
         stop_signal() as stopped,
-        open_session(listen=listen, connect=connect, allow_remote=True) as session,
+        open_session(listen=listen, connect=connect, allow_remote=True, config=config) as session,
         host_adapters(session, lab, options, agv=agv, mocap=mocap),
     ):
         what = " and ".join(f"{role} {spec}" for role, spec in (("agv", agv), ("mocap", mocap)) if spec is not None)
@@ -45,10 +48,9 @@ def run_adapters(
     return 0
 
 
-def _warn_of_remote_access(listen: Sequence[str]) -> None:
+def _warn_of_remote_access(listen: Sequence[str], config: BusConfig | None) -> None:
     for endpoint in listen:
-        _, host, _ = parse_endpoint(endpoint, "--listen")
-        if not is_loopback(host):
+        if is_open_to_anybody(endpoint, config):
             print(
                 f"warning: whoever reaches {endpoint} can drive the vehicle; nobody is asked who they are",
                 file=sys.stderr,

@@ -1,0 +1,119 @@
+"""A bus with certificates and rules, set up as the how-to says: who is known drives, others do not, some only watch."""
+
+from __future__ import annotations
+
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from rig_driving import NEUTRAL, START, TINY, process
+from secured_lab import set_up
+
+from agvbench.adapters import open_rig
+from agvbench.bus.bus_config import BusConfig
+from agvbench.bus.command_message import CommandFlags, pack_command
+from agvbench.bus.event_message import Event, Level, encode_event
+from agvbench.bus.keys import AGV, IDENTITY, Keys
+from agvbench.bus.link import VehicleLink
+from agvbench.bus.questions import ask
+from agvbench.bus.session import open_session
+from agvbench.campaign import Campaign
+from agvbench.errors import AdapterGoneError, LinkError, PlantError
+
+KEYS = Keys("lab", "agv1")
+pytestmark = pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificates")
+
+
+@pytest.fixture(scope="module")
+def machines(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    return set_up(tmp_path_factory.mktemp("lab"))
+
+
+@pytest.fixture
+def endpoint() -> str:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tls/127.0.0.1:{probe.getsockname()[1]}"
+
+
+def until(condition: Callable[[], bool], limit_s: float = 10.0) -> bool:
+    deadline_s = time.monotonic() + limit_s
+    while not condition() and time.monotonic() < deadline_s:
+        time.sleep(0.01)
+    return condition()
+
+
+def stand(link: VehicleLink, steps: range) -> None:
+    for step in steps:
+        link.exchange(NEUTRAL, t_s=0.1 * step, hold_s=0.1)
+
+
+def test_a_campaign_with_vehicle_camera_and_bench_on_a_secured_bus(
+    machines: dict[str, Path], endpoint: str, tmp_path: Path
+) -> None:
+    vehicle, camera = ("agv", "sim", "--listen", endpoint), ("mocap", "sim", "--connect", endpoint)
+    bench = [
+        sys.executable, "-c", "from agvbench.cli import main; raise SystemExit(main())", "bench", "trajectories",
+        "-k", "uncalibrated and 5-", "--repeats", "1", "--no-report", "--connect", endpoint,
+        "--bus-config", str(machines["bench-pc"]), "--out", str(tmp_path / "secured"),
+    ]  # fmt: skip
+    with (
+        process(*vehicle, "--bus-config", str(machines["vehicle-pc"])),
+        process(*camera, "--bus-config", str(machines["camera-pc"])),
+    ):
+        done = subprocess.run(bench, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (run,) = Campaign.open(tmp_path / "secured").select()
+    assert len(run.frames) > 100
+
+
+def test_who_shows_no_certificate_or_a_strangers_is_refused(
+    machines: dict[str, Path], endpoint: str, tmp_path: Path
+) -> None:
+    strangers = set_up(tmp_path)
+    nameless = tmp_path / "nameless.json5"
+    authority = machines["bench-pc"].parent / "authority.pem"
+    nameless.write_text(f'{{transport: {{link: {{tls: {{root_ca_certificate: "{authority}"}}}}}}}}')
+    known = BusConfig.load(machines["vehicle-pc"])
+    with open_session(listen=[endpoint], config=known):
+        for config, reason in ((nameless, "certificate required"), (strangers["bench-pc"], "its certificate: ")):
+            with pytest.raises(LinkError, match=f"connect {endpoint}: refused: .*{reason}"):
+                open_session(connect=[endpoint], config=BusConfig.load(config), timeout_s=0.5)
+        plain = endpoint.replace("tls", "tcp")
+        with pytest.raises(LinkError, match="nobody answers"):
+            open_session(connect=[plain], timeout_s=0.5)
+        with open_session(connect=[endpoint], config=BusConfig.load(machines["bench-pc"])) as session:
+            assert list(session.info.links())
+
+
+def test_who_may_only_listen_hears_everything_and_commands_nothing(machines: dict[str, Path], endpoint: str) -> None:
+    heard: list[str] = []
+    made_up = encode_event(Event(1, AGV, Level.ERROR, "PlantError", "made up"))
+    bench = BusConfig.load(machines["bench-pc"])
+    with (
+        process("sim", "--plant", TINY, "--listen", endpoint, "--bus-config", str(machines["vehicle-pc"])),
+        open_session(connect=[endpoint], config=BusConfig.load(machines["hall-display"])) as display,
+        open_session(connect=[endpoint], config=bench) as second_bench,
+        open_rig(connect=endpoint, bus_config=bench) as link,
+    ):
+        subscriber = display.declare_subscriber(KEYS.report, lambda sample: heard.append(str(sample.key_expr)))
+        link.reset(START, run_key="a")
+        link.exchange(NEUTRAL, t_s=0.0, hold_s=0.1)
+        assert until(lambda: KEYS.report in heard)
+        subscriber.undeclare()
+        # It reaches neither the vehicle (a command that leaps in time is answered by an error) nor the bench.
+        display.put(KEYS.command, pack_command(1, 9.0, NEUTRAL, 0.1, CommandFlags.NONE, 77))
+        display.put(KEYS.report, made_up)
+        with pytest.raises(AdapterGoneError, match="no answer"):
+            ask(display, KEYS.question(AGV, IDENTITY), b"", 0.3)
+        stand(link, range(1, 20))
+        # The rules kept them away, not the way they were sent.
+        assert ask(second_bench, KEYS.question(AGV, IDENTITY), b"", 5.0)
+        second_bench.put(KEYS.report, made_up)
+        with pytest.raises(PlantError, match="made up"):
+            stand(link, range(20, 500))
