@@ -12,17 +12,14 @@ from functools import cached_property
 
 import numpy as np
 
-from agvbench.diagnosis.likelihood import Terms, objective, residual_of, ridge, terms_of
+from agvbench.diagnosis.descent import Descent, State
+from agvbench.diagnosis.likelihood import residual_of, ridge, terms_of
 from agvbench.diagnosis.prediction import Linearised, Predictor
 from agvbench.diagnosis.promises import Ground
-from agvbench.diagnosis.scatter import Scatter, first_scatter, rescatter, scatter_of_windows
+from agvbench.diagnosis.scatter import Scatter, first_scatter, scatter_of_windows
 from agvbench.types import Floats
 
 _ITERATIONS = 8
-_HALVINGS = 4
-_DAMPINGS = (0.0, 0.1, 3.0)
-_ENOUGH = 0.05
-_CLOSE = 1.0
 
 
 @dataclass(frozen=True)
@@ -70,7 +67,7 @@ def fit(
     iterations: int = _ITERATIONS,
     near: Linearised | None = None,
 ) -> Fit:
-    """Fit by Gauss–Newton with halved steps, the scatter by expectation maximisation between steps.
+    """Fit by Gauss–Newton with safe steps, the scatter by expectation maximisation between steps.
 
     Parameters
     ----------
@@ -91,24 +88,17 @@ def fit(
     readings = predictor.readings
     offsets = np.zeros((len(readings), 6)) if offsets is None else offsets.copy()
     scatter = scatter or (first_scatter() if predictor.readings.begins is None else scatter_of_windows(readings))
-    parameters = parameters.copy()
-    before = np.inf
-    for step in range(iterations):
-        linear = predictor.linearise(parameters, offsets, near)
-        residual = residual_of(predictor, linear.poses)
-        terms = terms_of(predictor, residual, linear.by_parameters, linear.by_offsets, offsets, scatter)
-        parameters, offsets, residual = _step(predictor, parameters, offsets, residual, terms, scatter, bounds)
-        scatter = rescatter(predictor, residual, offsets, terms.inner_inverse, scatter)
-        after = float(terms.loss.sum())
-        if near is not None and (before - after < _CLOSE or step >= iterations // 2):
-            near = None
-        elif abs(before - after) < _ENOUGH:
-            break
-        before = after
-    linear = predictor.linearise(parameters, offsets)
-    residual = residual_of(predictor, linear.poses)
-    terms = terms_of(predictor, residual, linear.by_parameters, linear.by_offsets, offsets, scatter)
-    return Fit(predictor, parameters, offsets, scatter, terms.loss, terms.information, terms.gradient, residual, linear)
+    descent = Descent(predictor, bounds)
+    state, creeps = descent.go(State(parameters.copy(), offsets, scatter), iterations, near)
+    # Only a fit that is to be believed is worth the way across a bend.
+    if creeps and iterations > _ITERATIONS and (beyond := descent.excursion(state)) is not None:
+        state, _ = descent.go(beyond, iterations)
+    view = descent.look(state)
+    terms = view.terms
+    return Fit(
+        predictor, state.parameters, state.offsets, state.scatter,
+        terms.loss, terms.information, terms.gradient, view.residual, view.linear,
+    )  # fmt: skip
 
 
 def loss_at(fitted: Fit, parameters: Floats) -> Floats:
@@ -117,53 +107,3 @@ def loss_at(fitted: Fit, parameters: Floats) -> Floats:
     residual = residual_of(predictor, predictor.predict(parameters, fitted.offsets))
     none = fitted.linear.by_parameters[..., :0]
     return terms_of(predictor, residual, none, fitted.linear.by_offsets, fitted.offsets, fitted.scatter).loss
-
-
-def _step(
-    predictor: Predictor,
-    parameters: Floats,
-    offsets: Floats,
-    residual: Floats,
-    terms: Terms,
-    scatter: Scatter,
-    bounds: Floats,
-) -> tuple[Floats, Floats, Floats]:
-    """Return parameters, offsets and residual after a step that does not make things worse, or as they are.
-
-    Where a whole step and parts of it do, the step is damped (Levenberg and Marquardt): a value that the runs hardly
-    depend on must not carry all others away.
-    """
-    matrix = terms.information.sum(axis=0) + ridge(predictor)
-    maps = predictor.maps.size
-    now = objective(predictor, residual, offsets, scatter)
-    for damping in _DAMPINGS:
-        damped = matrix + damping * np.diag(np.diagonal(matrix))
-        move = _move(damped, terms.gradient.sum(axis=0), parameters, bounds, maps)
-        move_offsets = np.einsum("rij,rj->ri", terms.inner_inverse, terms.pull - terms.mixed @ move)
-        share = 1.0
-        for _ in range(_HALVINGS):
-            new = parameters + share * move
-            new[maps:] = np.clip(new[maps:], bounds[:, 0], bounds[:, 1])
-            new_offsets = offsets + share * move_offsets
-            new_residual = residual_of(predictor, predictor.predict(new, new_offsets))
-            if objective(predictor, new_residual, new_offsets, scatter) <= now:
-                return new, new_offsets, new_residual
-            share *= 0.4
-    return parameters, offsets, residual
-
-
-def _move(matrix: Floats, gradient: Floats, parameters: Floats, bounds: Floats, maps: int) -> Floats:
-    """Return the step that `matrix` and `gradient` ask for; effects' parameters that are stuck at a bound stay."""
-    free = np.ones(len(parameters), dtype=np.bool_)
-    for _ in range(3):
-        move = np.zeros(len(parameters))
-        move[free] = np.linalg.lstsq(matrix[np.ix_(free, free)], gradient[free], rcond=1e-12)[0]
-        wanted = parameters[maps:] + move[maps:]
-        kept = np.clip(wanted, bounds[:, 0], bounds[:, 1])
-        held = np.flatnonzero(kept != wanted)
-        # What meets its bound goes there; the others are solved for again without it.
-        stuck = held[parameters[maps + held] == kept[held]]
-        if not len(stuck):
-            break
-        free[maps + stuck] = False
-    return move

@@ -36,6 +36,8 @@ _SHORT, _LONG = 3, 10
 _HOPELESS = 3.0  # what promises less, to first order, is not fitted
 _LIKELY = 40.0  # what promises more is fitted to the end
 _MOST_EFFECTS = 4
+_MOST_STARTS = 2
+_WORSE = 20.0  # a fit that has not ended yet may still be so much worse than without the effect
 
 
 @dataclass(frozen=True)
@@ -195,10 +197,15 @@ class Selector:
                 }
                 for name in self._found(current)
             }
-            better = [offer for offers in swapped.values() for offer in offers.values()]
-            best = min(better, key=lambda offer: offer.total, default=current)
-            if best.total >= current.total - LEAST_GAIN:
+            better = [
+                offer
+                for name, offers in swapped.items()
+                for offer in offers.values()
+                if offer.total < current.total - LEAST_GAIN and self.earns(self.shrunk(base, current, name), offer)
+            ]
+            if not better:
                 break
+            best = min(better, key=lambda offer: offer.total)
             self.tell(f"{' + '.join(best.names)} in place of {' + '.join(current.names)}")
             current = best
         worse = {n: {o: offer.total - current.total for o, offer in offers.items()} for n, offers in swapped.items()}
@@ -228,20 +235,44 @@ class Selector:
         best = int(np.argmax(promises))
         if promises[best] < _HOPELESS:
             return replace(current, names=names)  # as good as without it, and never chosen
-        short = fit(
-            predictor,
-            np.r_[now.parameters, candidate.starts[best]],
-            bounds,
-            offsets=now.offsets,
-            scatter=now.scatter,
-            iterations=_SHORT,
-            near=now.linear,
-        )
+        short = self._begun(current, predictor, [candidate.starts[k] for k in np.argsort(promises)[::-1]], bounds)
         # What promises much may have to climb first: maps that took up a cause must give it back before it shows.
         if promises[best] < _LIKELY and float(now.loss.sum() - short.loss.sum()) < _HOPELESS:
             self.tried += 1
             self._known[key] = Scored(names, short, cross_validated(short, self._fold, bounds))
         return self.score(names, short.parameters, short)
+
+    def _begun(self, current: Scored, predictor: Predictor, starts: list[Floats], bounds: Floats) -> Fit:
+        """Return a fit of some steps from the first of `starts`, or from where it does not end worse than without.
+
+        A start is far from the valley, for the maps have taken up what it adds, and the way down may end anywhere: then
+        the maps are first fitted beside it, held where it starts.
+        """
+        best = self._first_steps(current, predictor, starts[0], bounds)
+        for start in starts[:_MOST_STARTS]:
+            if best.loss.sum() < current.fit.loss.sum() + _WORSE:
+                break
+            held = bounds.copy()
+            held[-len(start) :] = start[:, None]
+            beside = self._first_steps(current, predictor, start, held)
+            found = self._first_steps(current, predictor, start, bounds, beside)
+            best = min(best, found, key=lambda one: float(one.loss.sum()))
+        return best
+
+    @staticmethod
+    def _first_steps(
+        current: Scored, predictor: Predictor, start: Floats, bounds: Floats, beside: Fit | None = None
+    ) -> Fit:
+        now = current.fit
+        return fit(
+            predictor,
+            np.r_[now.parameters, start] if beside is None else beside.parameters,
+            bounds,
+            offsets=(beside or now).offsets,
+            scatter=(beside or now).scatter,
+            iterations=_SHORT,
+            near=now.linear,
+        )
 
     def score(self, names: tuple[str, ...], parameters: Floats, near: Fit | None) -> Scored:
         """Fit the model with the effects `names` and cross-validate it; what was fitted before is remembered."""

@@ -139,3 +139,14 @@ def test_a_disc_beside_a_lag_is_counted_in_what_is_predicted_after(tiny_campaign
     assert term["parameters"]["radius_m"] == pytest.approx(0.7, rel=0.1)
     position = found.held_out.errors["position_rms_mm"]
     assert position["after"] < 1.5 * position["floor"] < 0.2 * position["before"]
+
+
+@pytest.mark.slow
+def test_steering_that_warms_up_within_the_session_is_described_by_campaign_time(tiny_campaign):
+    found = diagnose(tiny_campaign(Tiny(warm_gain=0.2)))
+    assert found.verdict is Verdict.UNKNOWN
+    assert found.effects == ()
+    assert found.depends_on[0].covariate == "campaign_time_h"
+    assert found.provenance["empirical_term"]["parameters"]["gain"] == pytest.approx(0.2, rel=0.1)
+    position = found.held_out.errors["position_rms_mm"]
+    assert position["after"] < 0.3 * position["before"]

@@ -43,6 +43,8 @@ def test_a_steering_lag_is_named_with_its_size(tiny_campaign):
         ),
         (Tiny(cornering_loss=0.05), "cornering_speed_loss", {"loss": 0.05}),
         (Tiny(reverse_gain=0.04), "reverse_steering_gain", {"gain": 0.04}),
+        # The maps take up most of it, and give it back along a bend that whole steps leave.
+        (Tiny(axle_ratio=0.3), "axle_speed_mismatch", {"ratio": 0.3}),
     ],
 )
 def test_an_effect_is_named_with_its_size(tiny_campaign, tiny, name, parameters):

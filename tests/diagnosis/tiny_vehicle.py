@@ -46,6 +46,9 @@ class Tiny:
     rear_from_front: float = 0.0
     cornering_loss: float = 0.0
     reverse_gain: float = 0.0
+    axle_ratio: float = 0.0
+    warm_gain: float = 0.0
+    warm_h: float = 0.4
     slow_patch: float = 0.0
     axle_scatter_rad: float = 0.001
     speed_scatter: float = 0.002
@@ -72,6 +75,7 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
     f_off, r_off = rng.normal(0.0, tiny.axle_scatter_rad, 2)
     gain = 1.0 + rng.normal(0.0, tiny.speed_scatter)
     gain *= 1.0 - tiny.droop_per_hour * started_s / 3600.0
+    warm = 1.0 + tiny.warm_gain * -math.expm1(-started_s / 3600.0 / tiny.warm_h)
     x, y, heading = start
     front, rear, speed = front_of(NEUTRAL) + f_off, rear_of(NEUTRAL) + r_off, 0.0
     turning = [0.0, 0.0]
@@ -104,12 +108,12 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
                 was, (front, rear, speed), (tiny.steering_lag_s, tiny.steering_lag_s, lag), strict=True
             )
         )
-        df = (f + tiny.front_from_rear * r) * relief
-        dr = (r + tiny.rear_from_front * f) * relief
+        df = (f + tiny.front_from_rear * r) * relief * warm
+        dr = (r + tiny.rear_from_front * f) * relief * warm
         v = s * (1.0 - tiny.cornering_loss * (abs(math.tan(df)) + abs(math.tan(dr))))
         if math.hypot(x - 0.6, y - 0.3) < 0.7:
             v *= 1.0 - tiny.slow_patch
-        forward = v * (math.cos(df) + math.cos(dr)) / 2.0
+        forward = v * (math.cos(df) + (1.0 + tiny.axle_ratio) * math.cos(dr)) / 2.0
         beta = math.atan((FRONT_M * math.tan(dr) + REAR_M * math.tan(df)) / (FRONT_M + REAR_M))
         pace = forward / math.cos(beta)
         yaw = forward * (math.tan(df) - math.tan(dr)) / (FRONT_M + REAR_M) / (1.0 + tiny.slip * pace * pace)
