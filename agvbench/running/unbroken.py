@@ -9,6 +9,7 @@ from agvbench.bus.identity_message import Identity
 from agvbench.bus.link import VehicleLink
 from agvbench.types import Command, Commands, Frames, Pose
 
+_SLACK_S = 1e-9
 _ORIGIN = Pose(0.0, 0.0, 0.0)
 
 
@@ -22,7 +23,7 @@ class UnbrokenLink:
     def __init__(self, link: VehicleLink) -> None:
         self._link, self.keys = link, link.keys
         self._passed_s = self._offset_s = 0.0
-        self._last_s = math.inf
+        self._end_s = math.inf
 
     def identity(self) -> Identity:
         """Return who drives and who sees."""
@@ -36,15 +37,15 @@ class UnbrokenLink:
     def reset(self, pose: Pose, *, run_key: str) -> None:
         """Place the vehicle at rest at `pose`."""
         self._link.reset(pose, run_key=run_key)
-        self._passed_s, self._last_s = 0.0, math.inf
+        self._passed_s, self._end_s = 0.0, math.inf
 
     def exchange(self, command: Command, *, t_s: float, hold_s: float) -> Frames:
         """Exchange as `VehicleLink.exchange` does."""
-        if t_s < self._last_s:
+        if t_s < self._end_s - _SLACK_S:
             self._offset_s = self._passed_s - t_s
-        self._last_s = t_s
-        frames = self._link.exchange(command, t_s=self._passed_s, hold_s=t_s + hold_s + self._offset_s - self._passed_s)
-        self._passed_s = t_s + hold_s + self._offset_s
+        self._end_s = t_s + hold_s
+        frames = self._link.exchange(command, t_s=t_s + self._offset_s, hold_s=hold_s)
+        self._passed_s = self._end_s + self._offset_s
         return self._told(frames)
 
     def flush(self) -> Frames:

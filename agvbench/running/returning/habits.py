@@ -11,6 +11,8 @@ import numpy as np
 
 from agvbench.running.returning.sight import Step
 
+_GAINS = (0.4, 2.0)
+"""What is believed of a gain: beyond, it was learned from too little."""
 _BLOCK_M = 0.08
 """Steps are taken together until they are so long: delays and noise matter less."""
 _TURN_NOISE_RAD, _SIDE_NOISE_M = 0.004, 0.0008
@@ -38,8 +40,8 @@ class SteeringHabit:
 
     def asked_for(self, curvature_per_m: float) -> float:
         """Return the curvature [1/m] to ask for so that the vehicle turns at `curvature_per_m`."""
-        gain, offset = self._state.tolist()
-        return (curvature_per_m - offset) / float(np.clip(gain, 0.4, 2.0))
+        gain, offset = float(self._state[0]), float(self._state[1])
+        return (curvature_per_m - offset) / min(_GAINS[1], max(_GAINS[0], gain))
 
     def begin(self) -> None:
         """Leave out what was begun to be taken together: the vehicle has stood."""

@@ -19,7 +19,7 @@ class ReturnLimits:
     position_m: float = 0.005
     heading_rad: float = math.radians(1.0)
     reserve: float = 0.8
-    most_attempts: int = 8
+    most_attempts: int = 12
     fast_mps: float = 0.20
     mean_mps: float = 0.14
     slow_mps: float = 0.06

@@ -105,21 +105,28 @@ class Returner:
     def _drive_way(self, seen: Pose, aim: Aim, reins: Reins) -> None:
         """Drive a way until its end, or until the vehicle is astray."""
         crab_rad = self._habits.crab_rad
-        legs = self._way(seen, aim, crab_rad)
-        kept = True
+        try:
+            legs = self._way(seen, aim, crab_rad)
+        except PlanError:
+            aim.begin_anew()
+            legs = self._only_way(seen, aim, crab_rad)
         for leg in legs:
             goal_crab_rad = crab_rad if leg is legs[-1] else None
             drive = LegDrive(leg, reins, self._helm, self._habits, self._limits, goal_crab_rad=goal_crab_rad)
-            kept = kept and drive.run()
-        aim.took(legs[-1].backward if kept else None)
+            if not drive.run():
+                return aim.begin_anew()
+        return aim.took(legs[-1].backward)
 
     def _way(self, seen: Pose, aim: Aim, crab_rad: float) -> list[Leg]:
         geometry, radius_m = self._helm.model.geometry, self._helm.radius_m
         guided = Guided(geometry, self._helm.ahead_m, crab_rad)
         radii_m = [share * radius_m for share in _RADII]
         leads_m = [share * geometry.wheelbase_m for share in _LEADS]
+        return way_back(seen, aim.pose, guided, self._workspace, radii_m=radii_m, leads_m=leads_m, gears=aim.gears)
+
+    def _only_way(self, seen: Pose, aim: Aim, crab_rad: float) -> list[Leg]:
         try:
-            return way_back(seen, aim.pose, guided, self._workspace, radii_m=radii_m, leads_m=leads_m, gears=aim.gears)
+            return self._way(seen, aim, crab_rad)
         except PlanError as error:
             raise PlacingError(
                 error.what, where=error.where, value=error.value, limit=error.limit, remedy=error.remedy

@@ -60,7 +60,8 @@ class Sight:
         self._velocity += _SMOOTHING * (moved / since_s - self._velocity)
         middle = before[1][2] + 0.5 * moved[2]
         ahead, left = math.cos(middle), math.sin(middle)
-        step = Step(ahead * moved[0] + left * moved[1], ahead * moved[1] - left * moved[0], float(moved[2]))
+        dx, dy, turn = moved.tolist()
+        step = Step(ahead * dx + left * dy, ahead * dy - left * dx, turn)
         self.speed_mps += _SMOOTHING * (step.ahead_m / since_s - self.speed_mps)
         return step
 
