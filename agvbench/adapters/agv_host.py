@@ -15,12 +15,14 @@ from agvbench.bus.identity_message import encode_agv_identity
 from agvbench.bus.keys import AGV, REPLAY, RESET, Keys
 from agvbench.bus.request_message import decode_replay, decode_reset
 from agvbench.bus.sequence import LossCounter, Sequence
+from agvbench.bus.tally import Tally
 from agvbench.bus.truth_message import Truth, TruthFlags
 from agvbench.errors import AdapterGoneError, MessageError
 from agvbench.types import Floats
 
 SILENCE_LIMIT_S = 0.5
 _COMMANDS_WAITING = 256
+_OVERTAKEN_TOLD = 10
 _STOP_PATIENCE_S = 0.5
 _HANG_PATIENCE_S = 0.1
 _STOP = CommandFlags.STOP
@@ -48,6 +50,7 @@ class AgvHost(Host):
         self._adapter, self._show = adapter, show
         self._truths = Sequence()
         self.loss = LossCounter()
+        self.malformed, self.overtaken = Tally(), Tally(first=_OVERTAKEN_TOLD)
         self._heard_s: float | None = None
         self._identity_bytes = encode_agv_identity(adapter.identity())
         self._lock_step = adapter.identity().lock_step
@@ -86,12 +89,14 @@ class AgvHost(Host):
         while True:
             try:
                 payload = receive().payload.to_bytes()
+                if watched:
+                    payload = self._newest(payload)
             except self._zenoh_error:
                 return
             try:
                 message = decode_command(payload)
             except MessageError as error:
-                self._fail(error)
+                self._fail_malformed(error)
                 continue
             sequence, _, _, _, flags, source = message
             try:
@@ -106,8 +111,49 @@ class AgvHost(Host):
                 self._fail(error, sequence)
             if sequence == loss.expected and source == loss.source:
                 loss.expected += 1
-            elif lost := loss.saw(source, sequence):
-                self.event(Level.WARNING, "commands_lost", f"{lost} commands were lost before {sequence}")
+            else:
+                self._note(source, sequence)
+
+    def _newest(self, payload: bytes) -> bytes:
+        """Return the last of the commands that wait, in real time: older ones are of no use to anybody, but stops are.
+
+        A flood, or an adapter that is slower than its runner, therefore never holds up a stop by what waits before it.
+        """
+        try_receive = self._subscriber.handler.try_recv
+        for _ in range(_COMMANDS_WAITING):
+            sample = try_receive()
+            if sample is None:
+                break
+            self._pass_over(payload)
+            payload = sample.payload.to_bytes()
+        return payload
+
+    def _pass_over(self, payload: bytes) -> None:
+        try:
+            message = decode_command(payload)
+        except MessageError as error:
+            self._fail_malformed(error)
+            return
+        self._note(message.source, message.sequence)
+        if message.flags & _STOP:
+            try:
+                with self._lock:
+                    self._refrain(message)
+            except Exception as error:  # noqa: BLE001  (as for every command)
+                self._fail(error, message.sequence)
+        elif self.overtaken.add():
+            text = f"commands that were overtaken by newer ones: {self.overtaken}"
+            self.event(Level.WARNING, "commands_overtaken", text)
+
+    def _note(self, source: int, sequence: int) -> None:
+        if lost := self.loss.saw(source, sequence):
+            self.event(Level.WARNING, "commands_lost", f"{lost} commands were lost before {sequence}")
+
+    def _fail_malformed(self, error: MessageError) -> None:
+        """Tell of a message that cannot be decoded, seldom where there are many."""
+        if self.malformed.add():
+            what = error.what if self.malformed.count == 1 else f"{error.what} ({self.malformed})"
+            self._fail(MessageError(what, value=error.value, limit=error.limit, remedy=error.remedy))
 
     def _refrain(self, message: CommandMessage) -> None:
         """Stop, unless the command came too late for that, too."""

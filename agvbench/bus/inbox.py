@@ -11,12 +11,13 @@ from typing import Any
 
 from agvbench.bus.event_message import Event, Level, decode_event
 from agvbench.bus.frames_message import FramesMessage, decode_frames
-from agvbench.bus.keys import Keys
+from agvbench.bus.keys import AGV, MOCAP, Keys
 from agvbench.bus.sequence import LossCounter
+from agvbench.bus.tally import Tally
 from agvbench.bus.wire import HEADER_BYTES, Kind
 from agvbench.errors import LinkError, MessageError
 
-_CAPACITY = 4096
+_CAPACITY = 1024
 _EVENTS_KEPT = 1000
 _KIND_AT = 5
 _EVENT = Kind.EVENT.value
@@ -31,13 +32,16 @@ class Inbox:
         What was lost of the frames messages.
     events
         The last thousand events, oldest first; whoever reads them may clear them.
+    malformed
+        How many messages could not be decoded.
     """
 
     def __init__(self, session: Any, keys: Keys) -> None:
         import zenoh
 
         self.frames_loss = LossCounter()
-        self.event_losses: dict[str, LossCounter] = {}
+        self.event_losses = {role: LossCounter() for role in (AGV, MOCAP)}
+        self.malformed = Tally()
         self.events: deque[Event] = deque(maxlen=_EVENTS_KEPT)
         self._keys = keys
         self._subscriber = session.declare_subscriber(keys.report, zenoh.handlers.FifoChannel(_CAPACITY))
@@ -95,13 +99,15 @@ class Inbox:
             raise MessageError(
                 why.what, where=self._keys.report, value=why.value, limit=why.limit, remedy=why.remedy
             ) from None
-        self.event_losses.setdefault(event.role, LossCounter()).saw(event.source, event.sequence)
+        if event.role in self.event_losses:
+            self.event_losses[event.role].saw(event.source, event.sequence)
         self.events.append(event)
         return event
 
     def note_malformed(self, error: MessageError) -> None:
-        """Keep an event of a message that could not be decoded."""
-        self.events.append(Event(0, "runner", Level.WARNING, "MessageError", str(error)))
+        """Count a message that could not be decoded; keep an event of some."""
+        if self.malformed.add():
+            self.events.append(Event(0, "runner", Level.WARNING, "MessageError", f"{error} ({self.malformed})"))
 
     def close(self) -> None:
         """Receive no more; a thread that waits in `receive` gets its `LinkError`."""

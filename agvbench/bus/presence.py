@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from agvbench.bus.clock import Clock
-from agvbench.bus.keys import RUNNER, Keys
+from agvbench.bus.keys import AGV, MOCAP, Keys
 from agvbench.errors import AdapterGoneError
 
 
@@ -37,7 +37,7 @@ class Presence:
         import zenoh
 
         role = str(sample.key_expr).rpartition("/")[2]
-        if role == RUNNER:
+        if role not in (AGV, MOCAP):
             return
         if sample.kind == zenoh.SampleKind.PUT:
             self._present[role] = True

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from typing import Any
 
 from agvbench.bus.event_message import Event, Level, decode_event, encode_event
 from agvbench.errors import AdapterGoneError, AgvbenchError, LinkError
+
+_ANSWERS_READ = 16
 
 
 def ask(session: Any, key: str, payload: bytes, limit_s: float) -> bytes:
@@ -21,12 +24,10 @@ def ask(session: Any, key: str, payload: bytes, limit_s: float) -> bytes:
     import zenoh
 
     try:
-        replies = list(
-            session.get(key, payload=payload, timeout=limit_s, congestion_control=zenoh.CongestionControl.BLOCK)
-        )
+        replies = session.get(key, payload=payload, timeout=limit_s, congestion_control=zenoh.CongestionControl.BLOCK)
     except zenoh.ZError as error:
         raise LinkError("the bus cannot be used", where=key, value=str(error).split(" at /")[0]) from None
-    for reply in replies:
+    for reply in islice(replies, _ANSWERS_READ):
         if reply.ok is not None:
             return bytes(reply.ok.payload.to_bytes())
         refusal = bytes(reply.err.payload.to_bytes())

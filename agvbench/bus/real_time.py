@@ -19,12 +19,14 @@ from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import AGV, MOCAP, TIME, Keys
 from agvbench.bus.outbox import CommandOutbox
 from agvbench.bus.presence import Presence
+from agvbench.bus.tally import Tally
 from agvbench.errors import AgvbenchError, LinkError, MessageError
 from agvbench.types import Command, Frames
 
 KEEP_ALIVE_S = 0.1
 LATE_FRAMES_S = 0.1
-_BATCHES_KEPT = 100_000
+_BYTES_KEPT = 16 << 20
+_BYTES_EACH = 48
 
 
 class RealTime:
@@ -48,7 +50,10 @@ class RealTime:
         self._inbox, self._outbox, self._presence = inbox, outbox, presence
         self._session, self._keys, self._clock = session, keys, clock
         self._neutral = Command(neutral, neutral, neutral)
-        self._arrived: deque[tuple[float, FramesMessage]] = deque(maxlen=_BATCHES_KEPT)
+        self._arrived: deque[tuple[float, FramesMessage]] = deque()
+        # One is counted by the thread that receives, the other by the one that takes: no lock between them.
+        self._came = self._gone = 0
+        self.dropped = Tally()
         self._failure: AgvbenchError | None = None
         self._start_s: float | None = None
         self._last_t_s = -np.inf
@@ -70,9 +75,19 @@ class RealTime:
             except LinkError:
                 return
             if isinstance(report, FramesMessage):
-                self._arrived.append((self._clock.now(), report))
+                self._keep(report)
             elif isinstance(report, Event) and report.level == Level.ERROR:
                 self._failure = report.as_error()
+
+    def _keep(self, message: FramesMessage) -> None:
+        """Keep frames until they are taken; where nobody takes them for long, what comes then is dropped."""
+        size = len(message.columns) + _BYTES_EACH
+        if self._came - self._gone + size <= _BYTES_KEPT:
+            self._came += size
+            self._arrived.append((self._clock.now(), message))
+        elif self.dropped.add():
+            text = f"frames that nobody took were dropped: {self.dropped}"
+            self._inbox.events.append(Event(0, "runner", Level.WARNING, "frames_dropped", text))
 
     def start(self) -> None:
         """Forget the last run's clock and what went wrong in it."""
@@ -97,7 +112,8 @@ class RealTime:
 
     def _begin(self, t_s: float) -> None:
         self._offset_s = measure_offset(self._session, self._keys.question(MOCAP, TIME), self._clock)
-        self._arrived.clear()
+        while self._arrived:
+            self._next()
         self._start_s = self._clock.now() - t_s
 
     def flush(self) -> Frames:
@@ -119,11 +135,16 @@ class RealTime:
         if self._failure is not None:
             raise self._failure
 
+    def _next(self) -> tuple[float, FramesMessage]:
+        at_s, message = self._arrived.popleft()
+        self._gone += len(message.columns) + _BYTES_EACH
+        return at_s, message
+
     def _take(self) -> Frames:
         """Return what has arrived, with its times in the run's clock."""
         start_s, arrived_s, messages = self._start_s or 0.0, [], []
         while self._arrived:
-            at_s, message = self._arrived.popleft()
+            at_s, message = self._next()
             arrived_s.append(at_s)
             messages.append(message)
         frames = unpack_columns([message.columns for message in messages])

@@ -24,6 +24,7 @@ DEFAULT_PORT = 7447
 _ENDPOINT = re.compile(r"(?P<protocol>[a-z]+)/(?P<host>\[[^\]]+\]|[^\s/:\[\]]+):(?P<port>[0-9]{1,5})")
 _PROTOCOLS = ("tcp", "tls", "quic")
 _SECURED = ("tls", "quic")
+_ENVELOPE_BYTES = 4096
 _LIKELY = f"tcp/HOST:PORT, for example tcp/127.0.0.1:{DEFAULT_PORT}"
 
 
@@ -65,13 +66,13 @@ def is_loopback(host: str) -> bool:
         return False
 
 
-def is_open_to_anybody(endpoint: str, config: BusConfig | None = None) -> bool:
+def is_open_to_anybody(endpoint: str, config: BusConfig | None = None, where: str = "listen") -> bool:
     """Whether other machines reach an endpoint that is listened on, and nobody is asked who they are.
 
     >>> is_open_to_anybody("tcp/0.0.0.0:7447"), is_open_to_anybody("tcp/127.0.0.1:7447")
     (True, False)
     """
-    protocol, host, _ = parse_endpoint(endpoint, "listen")
+    protocol, host, _ = parse_endpoint(endpoint, where)
     return not (is_loopback(host) or (protocol in _SECURED and config is not None and config.asks_who))
 
 
@@ -138,7 +139,7 @@ def _settings(listen: Sequence[str], connect: Sequence[str], timeout_s: float) -
         "transport/link/tx/lease": 3000,
         # How long a flooded receiver may hold up a sender before its connection is given up.
         "transport/link/tx/queue/congestion_control/block/wait_before_close": 60_000_000,
-        "transport/link/rx/max_message_size": 4 * MAX_MESSAGE_BYTES,
+        "transport/link/rx/max_message_size": MAX_MESSAGE_BYTES + _ENVELOPE_BYTES,
         "transport/shared_memory/enabled": False,
     }
 

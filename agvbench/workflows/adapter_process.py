@@ -50,7 +50,7 @@ def run_adapters(
 
 def _warn_of_remote_access(listen: Sequence[str], config: BusConfig | None) -> None:
     for endpoint in listen:
-        if is_open_to_anybody(endpoint, config):
+        if is_open_to_anybody(endpoint, config, "--listen"):
             print(
                 f"warning: whoever reaches {endpoint} can drive the vehicle; nobody is asked who they are",
                 file=sys.stderr,

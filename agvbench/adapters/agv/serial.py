@@ -12,6 +12,7 @@ from agvbench.bus.clock import Clock
 from agvbench.bus.command_message import CommandFlags, CommandMessage
 from agvbench.bus.event_message import Level
 from agvbench.bus.identity_message import AgvIdentity
+from agvbench.bus.tally import Tally
 from agvbench.errors import AgvbenchError, LinkError
 from agvbench.types import Command
 
@@ -47,6 +48,7 @@ class SerialAgv(AgvAdapter):
         self._conversation = Conversation(port.path)
         self._greet()
         self.hello = self._conversation.begin()
+        self._tallies = (Tally(), Tally(), Tally())
         self._told = self._counts()  # half a line of a banner, heard while greeting, is nothing to tell
         self._thread = threading.Thread(target=self._listen, name="agvbench-serial", daemon=True)
 
@@ -165,7 +167,7 @@ class SerialAgv(AgvAdapter):
             self._reports.event(Level.ERROR, type(error).__name__, str(error))
 
     def _tell(self) -> None:
-        """Report what went wrong and was made good, once for each time."""
+        """Report what went wrong and was made good, seldom where there is much of it."""
         now = self._counts()
         if now == self._told or self._reports is None:
             return
@@ -174,9 +176,9 @@ class SerialAgv(AgvAdapter):
             ("command_resent", "the vehicle heard something garbled; the command was sent again"),
             ("vehicle_stopped_itself", "the vehicle heard nothing for 250 ms and went to neutral"),
         )
-        for (kind, text), count, before in zip(kinds, now, self._told, strict=True):
-            if count > before:
-                self._reports.event(Level.WARNING, kind, text)
+        for (kind, text), tally, count, before in zip(kinds, self._tallies, now, self._told, strict=True):
+            if count > before and tally.add(count - before):
+                self._reports.event(Level.WARNING, kind, f"{text} ({tally})")
         self._told = now
 
     def _counts(self) -> tuple[int, int, int]:

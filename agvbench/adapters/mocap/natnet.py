@@ -30,11 +30,11 @@ class NatNetMocap(MocapAdapter):
 
     def __init__(self, options: NatNetOptions, adapter: AdapterOptions) -> None:
         self._options, self._clock = options, adapter.clock
-        self._client = Client(options.connection, adapter.clock, self._see)
+        self._told_s, self._told = -math.inf, (0, 0, 0)
+        self._client = Client(options.connection, adapter.clock, self._see, self._tell_what_went_wrong)
         self._every, self._rate_hz = self._decimation(self._client.rate_hz)
         self._body: int | None = None
         self._began_s = adapter.clock.now()
-        self._told_s, self._told = -math.inf, (0, 0)
 
     def _decimation(self, camera_hz: float) -> tuple[int, float]:
         """Return how many frames are one published, and the rate [Hz] that makes."""
@@ -71,7 +71,6 @@ class NatNetMocap(MocapAdapter):
         self._client.start()
 
     def _see(self, seen: Seen) -> None:
-        self._tell_what_went_wrong(seen.received_s)
         number = seen.frame.number
         if number % self._every:
             return
@@ -108,12 +107,15 @@ class NatNetMocap(MocapAdapter):
 
     def _tell_what_went_wrong(self, now_s: float) -> None:
         counters = self._client.counters
-        now = (counters.lost, counters.malformed)
+        now = (counters.lost, counters.malformed, counters.foreign)
         if now != self._told and now_s - self._told_s > _QUIET_S:
-            lost, malformed = (new - old for new, old in zip(now, self._told, strict=True))
+            lost, malformed, foreign = (new - old for new, old in zip(now, self._told, strict=True))
             self._told, self._told_s = now, now_s
-            why = f": {counters.first_malformed}" if malformed else ""
-            text = f"{lost} camera frames were lost, {malformed} packets could not be decoded{why}"
+            text = f"{lost} camera frames were lost"
+            if malformed:
+                text += f", {malformed} packets could not be decoded: {counters.first_malformed}"
+            if foreign:
+                text += f", {foreign} packets were not the server's"
             self._reports.event(Level.WARNING, "frames_lost", text)
 
     def close(self) -> None:

@@ -22,6 +22,8 @@ from agvbench.bus.clock import Clock
 from agvbench.errors import AdapterGoneError, LinkError, MessageError
 
 KEEP_ALIVE_S, ECHO_S, FAST_ECHO_S, MODELS_S = 4.0, 1.0, 0.05, 0.5
+MAX_RATE_HZ = 10_000.0
+"""No camera is as fast; a server that says more is not believed."""
 _FAST_ECHOES = 8
 _RESTART_FRAMES = 1000  # a number lower by more than this is that of a server that began anew, not a late frame
 _NEVER_S = math.inf
@@ -47,6 +49,8 @@ class Client:
         The host's.
     seen
         Gets every frame in order, once, in the client's thread.
+    idle
+        Called in that thread with the time [s] whenever what had arrived was taken, frames or not.
 
     Attributes
     ----------
@@ -69,8 +73,14 @@ class Client:
         If an address cannot be used, or the server does not stream in the version asked for.
     """
 
-    def __init__(self, connection: Connection, clock: Clock, seen: Callable[[Seen], None]) -> None:
-        self._connection, self._clock, self._seen = connection, clock, seen
+    def __init__(
+        self,
+        connection: Connection,
+        clock: Clock,
+        seen: Callable[[Seen], None],
+        idle: Callable[[float], None] = lambda _: None,
+    ) -> None:
+        self._connection, self._clock, self._seen, self._idle = connection, clock, seen, idle
         self.counters, self.sync = Counters(), ClockSync()
         self.names: dict[str, int] = {}
         self._bodies, self._echoes = -1, 0
@@ -111,7 +121,8 @@ class Client:
             answer = self._channel.ask(Message.REQUEST, b"FrameRate\0", Message.RESPONSE)
         except AdapterGoneError:
             return math.nan
-        return float(_FLOAT.unpack(answer)[0]) if len(answer) == _FLOAT.size else math.nan
+        rate_hz = float(_FLOAT.unpack(answer)[0]) if len(answer) == _FLOAT.size else math.nan
+        return rate_hz if 0.0 < rate_hz <= MAX_RATE_HZ else math.nan
 
     def start(self) -> None:
         """Hand on frames from now on, in a thread; return when names and clock are known, or after a while."""
@@ -137,6 +148,7 @@ class Client:
                 self._take(message, payload)
             except MessageError as error:
                 self.counters.note(error)
+        self._idle(self._clock.now())
 
     def _send_what_is_due(self) -> None:
         now_s = self._clock.now()
