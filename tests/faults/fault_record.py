@@ -14,6 +14,8 @@ from pathlib import Path
 
 import fault_cases
 
+_LATCHED = "the bench drives no more after the first failure: "
+
 
 class Then(StrEnum):
     """What comes of a fault."""
@@ -32,14 +34,30 @@ class Outcome:
     ``reaction_s`` [s] is how long the vehicle was told to drive after the fault began (None: to the end of its run),
     ``said`` what the run that it befell failed with, ``later`` what the next failed with. ``intact`` is whether the run
     that was finished before stayed as it was, byte by byte, ``resumed`` whether a session without the fault then drove
-    all that was missing.
+    all that was missing; None is for what was not tried.
     """
 
     reaction_s: float | None
     said: str
-    later: str
-    intact: bool
-    resumed: bool
+    later: str | None = None
+    intact: bool | None = None
+    resumed: bool | None = None
+
+    def breaks(self, fault: Fault) -> list[str]:
+        """Return which promises of `fault` are broken, in words."""
+        late = fault.limit_s is not None and (self.reaction_s is None or self.reaction_s > fault.limit_s)
+        latched = self.later is None or (fault.then is Then.STOPS) == self.later.startswith(_LATCHED)
+        promises = {
+            f"stopped within {fault.limit_s} s, not {self.reaction_s} s": not late,
+            f"says {fault.message!r}, not {self.said!r}": fault.message in self.said
+            if fault.message
+            else not self.said,
+            "says so in one line": "\n" not in self.said,
+            f"later runs fail with the same cause or not at all, not {self.later!r}": latched,
+            "finished runs stay as they are": self.intact is not False,
+            "can be resumed": self.resumed is not False,
+        }
+        return [promise for promise, kept in promises.items() if not kept]
 
 
 @dataclass(frozen=True)
@@ -47,7 +65,8 @@ class Fault:
     """A fault and what is promised.
 
     ``limit_s`` [s] is within which time the vehicle is stopped, ``message`` a part of the line that says why; ``play``
-    injects it, in a directory for its campaign, on one of ``rigs``.
+    injects it, in a directory for its campaign, on one of ``rigs``. What takes real time and is much like another fault
+    is not ``tested`` with every change, only measured.
     """
 
     name: str
@@ -58,7 +77,7 @@ class Fault:
     message: str = ""
     limit_s: float | None = None
     rigs: tuple[str, ...] = ("sim", "simavr")
-    slow: bool = False
+    tested: bool = True
 
 
 def all_faults() -> list[Fault]:

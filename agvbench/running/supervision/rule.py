@@ -17,13 +17,15 @@ from agvbench.types import Floats, Frames
 class Slice:
     """What was seen lately: times (n,) [s] and poses (n, 3) [m, m, rad] of the tracked frames, in order of capture.
 
-    ``now_s`` [s] is the run's clock, ``driving_s`` [s] for how long the vehicle has been told to drive.
+    ``now_s`` [s] is when the slice should have ended in the run's clock, ``driving_s`` [s] for how long the vehicle has
+    been told to drive, ``ahead_s`` [s] by how much the middle frame was captured later than it arrived.
     """
 
     t_s: Floats
     poses: Floats
     now_s: float
     driving_s: float
+    ahead_s: float = 0.0
 
     @classmethod
     def of(cls, frames: Frames, now_s: float, driving_s: float) -> Slice:
@@ -31,7 +33,9 @@ class Slice:
         order = np.argsort(frames.t_s, kind="stable")
         order = order[frames.tracked[order]]
         poses = np.column_stack([frames.x_m[order], frames.y_m[order], frames.heading_rad[order]])
-        return cls(frames.t_s[order], poses, now_s, driving_s)
+        ahead = (frames.t_s - frames.received_s)[order]
+        known = ahead[np.isfinite(ahead)]
+        return cls(frames.t_s[order], poses, now_s, driving_s, float(middle(known)) if len(known) else 0.0)
 
     def __len__(self) -> int:
         return len(self.t_s)
@@ -39,7 +43,14 @@ class Slice:
     @cached_property
     def place(self) -> tuple[float, Floats]:
         """The middle time [s] and place (2,) [m]: medians, which single wrong frames do not move."""
-        return float(np.median(self.t_s)), np.median(self.poses[:, :2], axis=0)
+        t_s, *place = middle(np.column_stack([self.t_s, self.poses[:, :2]])).tolist()
+        return t_s, np.array(place)
+
+
+def middle(values: Floats) -> Floats:
+    """Return the medians of columns; numpy's own takes ten times as long for a dozen rows, ten times a second."""
+    ordered = np.sort(values, axis=0)
+    return np.asarray(0.5 * (ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2]))
 
 
 class Rule(ABC):

@@ -16,15 +16,18 @@ class Clock(Rule):
     _before_s = math.nan
 
     def complaint(self, seen: Slice) -> tuple[str, str, str] | None:
-        """Compare the median capture time with the run's clock, and with the one before."""
+        """Compare the median capture time with that of arrival, and with the one before.
+
+        Arrival, not the slice's end: a runner that was held up looks late, at frames that came meanwhile.
+        """
         if not len(seen):
             return None
         t_s, _ = seen.place
         before_s, self._before_s = self._before_s, t_s
-        ahead_s, back_s = t_s - seen.now_s, before_s - t_s
+        back_s = before_s - t_s
         limit = f"{self.limits.clock_s:g} s"
-        if ahead_s > self.limits.clock_s:
-            return "camera's clock is ahead", f"poses from {ahead_s:.2f} s in the future", limit
+        if seen.ahead_s > self.limits.clock_s:
+            return "camera's clock is ahead", f"poses from {seen.ahead_s:.2f} s in the future", limit
         if back_s > self.limits.clock_s:
             return "camera's clock was set back", f"poses {back_s:.2f} s older than those before", limit
         return None

@@ -1,0 +1,86 @@
+"""Faults of the processes that share the loop: killed, suspended, or gone."""
+
+import os
+import signal
+from functools import partial
+
+from fault_live import Live, Orphaned, in_processes
+from fault_record import Fault, Then
+from lab_processes import Processes
+
+_LIVE = ("live",)
+
+
+def _sent(name: str, number: signal.Signals) -> Live:
+    def befall(running: Processes) -> None:
+        os.kill(getattr(running, name).pid, number)
+
+    return Live(open=partial(in_processes, befall=befall))
+
+
+FAULTS = (
+    Fault(
+        "vehicle killed",
+        "bus",
+        "the process of the vehicle's adapter is killed; the firmware's watchdog stops the vehicle",
+        Then.STOPS,
+        _sent("agv", signal.SIGKILL),
+        "the agv adapter vanished",
+        0.4,
+        _LIVE,
+        tested=False,
+    ),
+    Fault(
+        "vehicle suspended",
+        "bus",
+        "the process of the vehicle's adapter hangs",
+        Then.STOPS,
+        _sent("agv", signal.SIGSTOP),
+        "adapter does not answer any more",
+        0.4,
+        _LIVE,
+    ),
+    Fault(
+        "camera killed",
+        "bus",
+        "the process of the camera's adapter is killed",
+        Then.STOPS,
+        _sent("mocap", signal.SIGKILL),
+        "the mocap adapter vanished",
+        0.75,
+        _LIVE,
+        tested=False,
+    ),
+    Fault(
+        "camera suspended",
+        "bus",
+        "the process of the camera's adapter hangs",
+        Then.STOPS,
+        _sent("mocap", signal.SIGSTOP),
+        "tracking was lost",
+        0.75,
+        _LIVE,
+        tested=False,
+    ),
+    Fault(
+        "runner killed",
+        "runner",
+        "SIGKILL of the program that drives",
+        Then.ENDS,
+        Orphaned(signal.SIGKILL),
+        "",
+        0.4,
+        _LIVE,
+    ),
+    Fault(
+        "runner suspended",
+        "runner",
+        "the program that drives is suspended",
+        Then.ENDS,
+        Orphaned(signal.SIGSTOP),
+        "",
+        0.4,
+        _LIVE,
+        tested=False,
+    ),
+)
