@@ -38,6 +38,7 @@ _LIKELY = 40.0  # what promises more is fitted to the end
 _MOST_EFFECTS = 4
 _MOST_STARTS = 2
 _WORSE = 20.0  # a fit that has not ended yet may still be so much worse than without the effect
+_KEPT = 0.5  # of what is promised: a fit that gains less has lost its way
 
 
 @dataclass(frozen=True)
@@ -235,22 +236,25 @@ class Selector:
         best = int(np.argmax(promises))
         if promises[best] < _HOPELESS:
             return replace(current, names=names)  # as good as without it, and never chosen
-        short = self._begun(current, predictor, [candidate.starts[k] for k in np.argsort(promises)[::-1]], bounds)
+        least = _KEPT * promises[best] if promises[best] > _LIKELY else -_WORSE
+        short = self._begun(
+            current, predictor, [candidate.starts[k] for k in np.argsort(promises)[::-1]], bounds, least
+        )
         # What promises much may have to climb first: maps that took up a cause must give it back before it shows.
         if promises[best] < _LIKELY and float(now.loss.sum() - short.loss.sum()) < _HOPELESS:
             self.tried += 1
             self._known[key] = Scored(names, short, cross_validated(short, self._fold, bounds))
         return self.score(names, short.parameters, short)
 
-    def _begun(self, current: Scored, predictor: Predictor, starts: list[Floats], bounds: Floats) -> Fit:
-        """Return a fit of some steps from the first of `starts`, or from where it does not end worse than without.
+    def _begun(self, current: Scored, predictor: Predictor, starts: list[Floats], bounds: Floats, least: float) -> Fit:
+        """Return a fit of some steps from the first of `starts`, or the best of them where it gains less than `least`.
 
         A start is far from the valley, for the maps have taken up what it adds, and the way down may end anywhere: then
         the maps are first fitted beside it, held where it starts.
         """
         best = self._first_steps(current, predictor, starts[0], bounds)
         for start in starts[:_MOST_STARTS]:
-            if best.loss.sum() < current.fit.loss.sum() + _WORSE:
+            if current.fit.loss.sum() - best.loss.sum() > least:
                 break
             held = bounds.copy()
             held[-len(start) :] = start[:, None]
