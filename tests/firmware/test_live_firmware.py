@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from agvbench.adapters import AdapterOptions, open_rig
+from agvbench.adapters.agv import serial
 from agvbench.adapters.agv.serial import SerialAgv
 from agvbench.adapters.serial_line import conversation
 from agvbench.adapters.simavr.host import Pulse, SimavrHost
@@ -27,6 +28,7 @@ pytestmark = pytest.mark.usefixtures("firmware")
 def patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """A machine that is busy may keep the simulated vehicle waiting, which is not what is tested."""
     monkeypatch.setattr(conversation, "ANSWER_LIMIT_S", 10.0)
+    monkeypatch.setattr(serial, "GREETING_LIMIT_S", 30.0)
 
 
 class Silent:
@@ -40,8 +42,10 @@ class Silent:
 @contextmanager
 def live(version: str) -> Iterator[SimavrHost]:
     host = SimavrHost(version, live=True)
-    yield host
-    host.close()
+    try:
+        yield host
+    finally:
+        host.close()
 
 
 def pulses_until(host: SimavrHost, wanted_us: float) -> Pulse:
@@ -119,10 +123,14 @@ def test_a_campaigns_link_drives_the_firmware_in_real_time() -> None:
         for key in ("a", "b"):
             link.reset(start, run_key=key)
             rest = link.exchange(Command(1500.0, 1500.0, 1500.0), t_s=-0.2, hold_s=0.2)
-            moved = link.exchange(Command(900.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.5)
             at_rest_m = rest.x_m[rest.t_s > -0.15]  # frames of before it was placed may come late
-            assert np.nanmax(np.abs(at_rest_m - start.x_m)) < 0.01
-            assert moved.x_m[-1] - start.x_m > 0.03
+            assert np.all(np.abs(at_rest_m - start.x_m) < 0.01)
+            for index in range(40):  # a busy machine may be late with pulses, frames and all else
+                seen = link.exchange(Command(900.0, 1500.0, 1500.0), t_s=0.25 * index, hold_s=0.25)
+                if np.any(seen.x_m - start.x_m > 0.03):
+                    break
+            else:
+                pytest.fail("the vehicle did not move")
 
 
 def test_a_microcontroller_that_dies_while_it_is_driven_stops_the_run() -> None:
