@@ -8,6 +8,7 @@ examples:
   agvbench bench --dry-run                        what would be driven, for how long, on how much floor
   agvbench bench --repeats 3 --out tonight        fewer repeats, into the directory tonight/
   agvbench bench --resume --out tonight           go on where it stopped
+  agvbench bench --place auto                     between runs the vehicle drives itself back to the start
   agvbench bench --plant my_plant.py:make_plant   your own simulated plant
   agvbench bench endurance                        another benchmark: bench_endurance.py
 """

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agvbench.errors import PlanError
@@ -35,6 +35,7 @@ def driven(leg: Leg, start: np.ndarray) -> np.ndarray:
     return np.array([x, y, course])
 
 
+@settings(max_examples=30)
 @given(POSES, POSES, st.sampled_from([0.0, -0.121]), st.floats(-0.1, 0.1))
 def test_a_way_leads_to_the_start_along_a_straight_and_inside(
     seen: Pose, start: Pose, ahead_m: float, crab_rad: float
@@ -63,6 +64,7 @@ def _inside(pose: Pose) -> float:
     return min(min(2.5 - abs(pose.x_m + axle_m * c), 2.0 - abs(pose.y_m + axle_m * s)) for axle_m in (0.181, -0.121))
 
 
+@settings(max_examples=30)
 @given(POSES, POSES)
 def test_every_word_reaches_the_goal_and_the_first_is_the_shortest(start: Pose, goal: Pose) -> None:
     paths = paths_by_length(start, goal, 0.5)

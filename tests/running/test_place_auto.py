@@ -1,0 +1,54 @@
+"""A session that needs nobody: driven over the command line, twice the same, and resumed."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from agvbench.errors import FlagError
+from agvbench.running.placers.choosing import PLACERS, choose_placer
+from agvbench.running.settings import PLACES
+
+PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
+
+
+def bench(out: Path, *more: str) -> pd.DataFrame:
+    command = [sys.executable, "-c", PROGRAM, "bench", "trajectories", "-k", "1-uncalibrated or 5-uncalibrated"]
+    command += ["--place=auto", "--repeats=1", "--seed=5", "--no-report", f"--out={out}", *more]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=out.parent, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return pd.read_parquet(out / "runs.parquet").set_index("trajectory")
+
+
+def test_a_session_is_driven_without_anybody_and_resumed(tmp_path: Path) -> None:
+    runs = bench(tmp_path / "first")
+    assert runs["status"].tolist() == ["ok", "ok"]
+    assert runs.loc["1", "placing_attempts"] == 0
+    assert runs.loc["5", "placing_attempts"] >= 1
+    assert (runs["placing_position_error_m"] <= 0.004).all()
+    # Time goes on while the vehicle drives back.
+    first, second = runs.loc["1"], runs.loc["5"]
+    between_s = second["started_s"] - first["started_s"] - first["duration_s"]
+    assert between_s == pytest.approx(second["placing_duration_s"])
+
+    again = bench(tmp_path / "second")
+    pd.testing.assert_frame_equal(again, runs)
+
+    [lost] = (tmp_path / "second" / "runs.parquet").glob("*trajectory-5*")
+    lost.unlink()
+    resumed = bench(tmp_path / "second", "--resume")
+    assert resumed["status"].tolist() == ["ok", "ok"]
+    assert resumed.loc["5", "placing_attempts"] == 0
+
+
+def test_who_can_place_what() -> None:
+    assert tuple(PLACERS) == PLACES
+    assert choose_placer("", simulated=True) is PLACERS["teleport"]
+    assert choose_placer("", simulated=False) is PLACERS["operator"]
+    assert choose_placer("auto", simulated=True) is choose_placer("auto", simulated=False)
+    with pytest.raises(FlagError, match=r"--place: a real vehicle cannot be placed so: teleport \(limit: auto or oper"):
+        choose_placer("teleport", simulated=False)
