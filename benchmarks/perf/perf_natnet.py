@@ -2,8 +2,9 @@
 
 The frame has 25 rigid bodies of five markers, version 4.1. The peer (natnet 0.3) always decodes all that is there, so
 it gets the frame with markers where markers are wanted, and one with bodies only where bodies are wanted; ours is
-timed on the same bytes, and on the frame with markers when only bodies are wanted, too. Ours and the peer take turns
-in blocks; the ratio is the median of the blocks' ratios.
+timed on the same bytes, and on the frame with markers when only bodies are wanted, too. The other peer (optirx 1.9)
+ends with version 2.10: both are timed on 2.9, where ours walks through every section, since none says its size. Ours
+and the peer take turns in blocks; the ratio is the median of the blocks' ratios.
 
 The stream comes from another process at 360 Hz over UDP on loopback, by default for 10 s (``--full``: 60 s).
 """
@@ -21,6 +22,7 @@ import natnet.data_frame
 import natnet.packet_buffer
 import natnet.version
 import numpy as np
+import optirx
 
 from agvbench.adapters.natnet.channel import Connection
 from agvbench.adapters.natnet.client import Client, Seen
@@ -28,11 +30,12 @@ from agvbench.adapters.natnet.emulator import Emulator, Settings
 from agvbench.adapters.natnet.encode import Model, encode_frame
 from agvbench.adapters.natnet.frame import FrameOfData, decode_frame
 from agvbench.adapters.natnet.layout import BODY, MARKER
+from agvbench.adapters.natnet.packet import Message, join
 from agvbench.adapters.natnet.version import Version
 from agvbench.bus.clock import WallClock
 
 BODIES, MARKERS, RATE_HZ = 25, 5, 360.0
-VERSION = Version(4, 1)
+VERSION, OLD = Version(4, 1), Version(2, 9)
 BOUND = 10.0
 BLOCKS, TIMES = 15, 200
 
@@ -74,10 +77,28 @@ def decoding() -> None:
         return lambda: natnet.data_frame.DataFrame.read_from_buffer(natnet.packet_buffer.PacketBuffer(payload), wanted)
 
     full, bare = encode_frame(*_swap(example(MARKERS))), encode_frame(*_swap(example(0)))
-    print(f"{'25 bodies, version 4.1':52s} {'ours':>11s} {'natnet':>11s}  ratio  bound met?")
+    print(f"{'25 bodies, version 4.1 (but for the last two)':52s} {'ours':>11s} {'peer':>11s}  ratio  bound met?")
     compare("markers wanted", lambda: decode_frame(full, VERSION, markers=True), peer(full))
     compare("bodies wanted, frame of bodies only", lambda: decode_frame(bare, VERSION), peer(bare))
     compare("bodies wanted, frame with markers (peer reads all)", lambda: decode_frame(full, VERSION), peer(full))
+    old_decoding()
+
+
+def old_decoding() -> None:
+    """Print what decoding costs in a version that both peers read."""
+    wanted, markers = natnet.version.Version(*OLD), example(MARKERS)
+    payload = encode_frame(markers[0], OLD, markers[1])
+    packet = join(Message.FRAMEOFDATA, payload)
+
+    def peer() -> object:
+        return natnet.data_frame.DataFrame.read_from_buffer(natnet.packet_buffer.PacketBuffer(payload), wanted)
+
+    compare("2.9, markers wanted, beside natnet", lambda: decode_frame(payload, OLD, markers=True), peer)
+    compare(
+        "2.9, markers wanted, beside optirx",
+        lambda: decode_frame(payload, OLD, markers=True),
+        lambda: optirx.unpack(packet, (*OLD, 0, 0)),
+    )
 
 
 def _swap(made: tuple[FrameOfData, list[Model]]) -> tuple[FrameOfData, Version, list[Model]]:

@@ -8,11 +8,11 @@ from __future__ import annotations
 from functools import cache
 
 import pytest
-from fuzz.target import Target, targets
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agvbench.errors import AgvbenchError
+from fuzz.target import Target, targets
 
 NAMES = sorted(targets())
 every_target = pytest.mark.parametrize("name", NAMES)

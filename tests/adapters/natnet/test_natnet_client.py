@@ -17,7 +17,7 @@ from streams import VERSIONS, drawn
 from agvbench.adapters.natnet.channel import Connection
 from agvbench.adapters.natnet.client import Client, Seen
 from agvbench.adapters.natnet.clock_sync import MAX_DRIFT, ClockSync
-from agvbench.adapters.natnet.emulator import Emulator, Settings
+from agvbench.adapters.natnet.emulator import MAX_CLIENTS, Emulator, Settings
 from agvbench.adapters.natnet.frame import MODELS_CHANGED
 from agvbench.adapters.natnet.packet import Message, join
 from agvbench.adapters.natnet.version import Version
@@ -165,6 +165,40 @@ def test_foreign_and_malformed_packets_are_counted_and_do_no_harm(lab: Lab) -> N
     until(lambda: len(lab.seen) == 1 and lab.client.counters.foreign == 1)
     assert lab.client.counters.malformed == 2
     assert lab.client.counters.first_malformed
+
+
+def test_a_flood_of_datagrams_is_counted_and_frames_go_on(lab: Lab) -> None:
+    lab.open(Settings())
+    (address,) = lab.server.clients()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        stranger.bind(("127.0.0.2", 0))
+        for number in range(1, 11):
+            for _ in range(200):
+                stranger.sendto(b"\xff" * 100, address)
+                lab.server._send(b"\x07\x00\xff\xff", address)
+            lab.send(number)
+    until(lambda: len(lab.seen) == 10)
+    until(lambda: (lab.client.counters.foreign, lab.client.counters.malformed) == (2000, 2000))
+    assert lab.client.counters.lost == 0
+
+
+def test_a_server_remembers_so_many_clients_and_no_more() -> None:
+    server = Emulator(Settings(), MODELS, threaded=False)
+    connect = join(Message.CONNECT, b"Ping\0")
+    strangers = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(MAX_CLIENTS + 5)]
+    for stranger in strangers:
+        stranger.sendto(connect, server.address)
+        assert server.step(5.0)
+    assert len(server.clients()) == MAX_CLIENTS
+    for stranger in strangers:
+        stranger.close()
+    server.close()
+
+
+@pytest.mark.parametrize("rate_hz", [float("inf"), float("nan"), -1.0, 0.0, 1e9])
+def test_a_frame_rate_that_cannot_be_is_not_believed(lab: Lab, rate_hz: float) -> None:
+    lab.open(Settings(rate_hz=rate_hz))
+    assert np.isnan(lab.client.rate_hz)
 
 
 @pytest.mark.parametrize("payload", [b"Ping\0", b"", bytes(264), bytes(269), bytes(271)])

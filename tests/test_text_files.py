@@ -1,0 +1,59 @@
+"""Files of text: what is too long, or nested too deep for a parser's stack, is one line for every reader."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from agvbench.campaign.header import CampaignHeader
+from agvbench.campaign.mapping import load_mapping
+from agvbench.errors import AgvbenchError, FileError
+from agvbench.model import VehicleModel
+from agvbench.planning.reading import load_trajectory
+from agvbench.running.remainders import read_remainders
+from agvbench.running.settings import BenchSettings
+from agvbench.text_files import MAX_BYTES, MAX_DEPTH, read_json, read_text, read_toml
+
+READERS: dict[str, Callable[[Path], object]] = {
+    "vehicle.toml": VehicleModel.load,
+    "trajectory.toml": load_trajectory,
+    "campaign.toml": CampaignHeader.load,
+    "mapping.toml": load_mapping,
+    "remainders.json": lambda path: read_remainders(str(path)),
+    "bench.toml": lambda path: BenchSettings.load(path.parent),
+}
+TOO_MUCH = {
+    "too long": "#" * (MAX_BYTES + 1),
+    "nested too deep": "a = " + "[" * 5000 + "]" * 5000,
+}
+
+
+@pytest.mark.parametrize("what", TOO_MUCH)
+@pytest.mark.parametrize("name", READERS)
+def test_every_reader_refuses_what_is_too_much(name: str, what: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    path.write_text(TOO_MUCH[what])
+    with pytest.raises(AgvbenchError, match=r"is too l|is nested too deep") as caught:
+        READERS[name](path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_dotted_keys_nest_too(tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    path.write_text(".".join("a" * (MAX_DEPTH + 1)) + " = 1")
+    with pytest.raises(FileError, match="is nested too deep"):
+        read_toml(path)
+    path.write_text(".".join("a" * 50) + " = 1")
+    assert read_toml(path)
+
+
+def test_many_brackets_side_by_side_are_no_depth(tmp_path: Path) -> None:
+    path = tmp_path / "a.json"
+    path.write_text("[" + ",".join("[1]" for _ in range(1000)) + "]")
+    assert len(read_json(path)) == 1000
+    assert read_text(path, max_bytes=10_000)
+    with pytest.raises(FileError, match="is too long"):
+        read_text(path, max_bytes=1000)
