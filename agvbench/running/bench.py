@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-import itertools
-import time
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import replace
 
 from agvbench.campaign import CampaignWriter
-from agvbench.errors import CampaignError, FlagError, LinkError, PlantError, RecordingError
+from agvbench.errors import FlagError
 from agvbench.model import VehicleModel
 from agvbench.planning import Departure, Workspace
 from agvbench.running.campaign_time import CampaignTime
 from agvbench.running.drive import DEFAULT_TIMING, Drive, Timing, drive, exchanged
+from agvbench.running.latch import Latch
 from agvbench.running.links import RunnerLink
-from agvbench.running.pausing import Pause
+from agvbench.running.pausing import Pause, standing
 from agvbench.running.placers.choosing import make_placer
 from agvbench.running.placers.placer import Rig
 from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess
-from agvbench.running.records import DriveOrder, aborted_run, free_name, recorded_run
+from agvbench.running.records import DriveOrder, record_aborted, recorded_run
 from agvbench.running.settings import BenchSettings
 from agvbench.running.supervision import Supervisor
 from agvbench.types import Command, Frames, Run
-
-_STAND_S = 0.25
 
 
 class Bench:
@@ -55,8 +51,7 @@ class Bench:
         self._corrected = corrected
         self._time, self._timing, self._limits = campaign_time, timing, limits
         self._identity = link.identity()
-        self._failure: LinkError | PlantError | RecordingError | None = None
-        self.pause = Pause(writer.path)
+        self._latch, self.pause = Latch(), Pause(writer.path)
         self._recorded = recorded
         workspace = Workspace.parse(settings.workspace)
         self._supervisor = Supervisor(workspace, nominal.neutral)
@@ -98,11 +93,12 @@ class Bench:
         RecordingError
             If the run was driven and cannot be recorded; the bench drives no more, either.
         """
-        self._refuse_after_failure()
-        for attempt in range(1, self._attempts(order) + 1):
-            run = self._attempt(order, attempt)
-            if run.is_ok:
-                break
+        self._latch.check()
+        with self._latch.remembering():
+            for attempt in range(1, self._attempts(order) + 1):
+                run = self._attempt(order, attempt)
+                if run.is_ok:
+                    break
         return run
 
     def _attempts(self, order: DriveOrder) -> int:
@@ -112,52 +108,23 @@ class Bench:
             limit += self.settings.attempts
         return limit
 
-    def _refuse_after_failure(self) -> None:
-        if self._failure is not None:
-            remedy = None if self._failure.remedy else "mend it and go on with --resume"
-            raise LinkError("the bench drives no more after the first failure", value=self._failure, remedy=remedy)
-
     def _attempt(self, order: DriveOrder, attempt: int) -> Run:
         run_id = _attempt_id(order, attempt)
         if run_id in self._recorded:
             return self._repeat_unseen(order, self._recorded[run_id])
-        self._pause(run_id)
+        self.pause.wait(run_id, standing(self.link, self._neutral()))
         order = self._placed(order, run_id)
         started_s = self._time.now_s()
         seen: list[Frames] = []
         try:
             driven = self._drive(order, run_id, seen)
         except BaseException as error:
-            self._note_failure(order, run_id, started_s, seen, error)
+            record_aborted(self.writer, order, run_id, started_s, seen, error, self._identity.firmware)
             raise
         run = recorded_run(order, run_id, started_s, self._status(order, driven), driven, self._identity.firmware)
-        self._record(run)
+        self.writer.append(run)
         self._time.has_run(started_s, driven.duration_s)
         return run
-
-    def _record(self, run: Run) -> None:
-        try:
-            self.writer.append(run)
-        except RecordingError as error:
-            # A disk that is full now is full for the next run, too: driving on would wear the vehicle for nothing.
-            self._failure = error
-            raise
-
-    def _pause(self, run_id: str) -> None:
-        """Wait as long as somebody asks for a pause; the vehicle stands at neutral, and everybody is still heard."""
-        waited_s = itertools.count(0.0, _STAND_S)
-
-        def stand() -> None:
-            if self._identity.lock_step:
-                time.sleep(_STAND_S)
-            else:
-                self.link.exchange(self._neutral(), t_s=next(waited_s), hold_s=_STAND_S)
-
-        try:
-            self.pause.wait(run_id, stand)
-        except LinkError as error:
-            self._failure = error
-            raise
 
     def _repeat_unseen(self, order: DriveOrder, run: Run) -> Run:
         if self._identity.simulated:
@@ -170,11 +137,7 @@ class Bench:
 
     def _placed(self, order: DriveOrder, run_id: str) -> DriveOrder:
         """Bring the vehicle to the start; return the order with what the campaign is to say of that."""
-        try:
-            placing = self._placer.place(order.start, run_id)
-        except (LinkError, PlantError) as error:
-            self._failure = error
-            raise
+        placing = self._placer.place(order.start, run_id)
         if placing is None:
             return order
         self._time.has_placed(placing.duration_s)
@@ -206,20 +169,6 @@ class Bench:
             rate_hz=self._identity.mocap_rate_hz,
         )
         return quality.status(self._limits)
-
-    def _note_failure(
-        self, order: DriveOrder, run_id: str, started_s: float, seen: list[Frames], error: BaseException
-    ) -> None:
-        """Keep what was seen of a run that failed, and remember a failure of the hardware."""
-        if isinstance(error, LinkError | PlantError):
-            self._failure = error
-        why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error) or type(error).__name__
-        frames = Frames.concatenate(seen)
-        if len(frames):
-            name = free_name(f"{run_id}-aborted", self.writer.finished_ids)
-            aborted = aborted_run(order, name, started_s, f"aborted: {why}", frames, self._identity.firmware)
-            with suppress(CampaignError):  # the failure is what has to be told, not that it could not be recorded
-                self.writer.append(aborted)
 
 
 def _attempt_id(order: DriveOrder, attempt: int) -> str:

@@ -6,16 +6,34 @@ writes and removes it; it does not suspend the program, which has to keep listen
 
 from __future__ import annotations
 
+import itertools
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
+from agvbench.running.links import RunnerLink
 from agvbench.running.placing import say
+from agvbench.types import Command
 
 PAUSE_FILE = "pause"
+_STAND_S = 0.25
+
+
+def standing(link: RunnerLink, neutral: Command) -> Callable[[], None]:
+    """Return what lets a vehicle stand at `neutral` for a moment, everybody being heard; simulated time stops."""
+    waited_s = itertools.count(0.0, _STAND_S)
+
+    def stand() -> None:
+        if link.identity().lock_step:
+            time.sleep(_STAND_S)
+        else:
+            link.exchange(neutral, t_s=next(waited_s), hold_s=_STAND_S)
+
+    return stand
 
 
 class Pause:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from agvbench.campaign import CampaignWriter
+from agvbench.errors import CampaignError
 from agvbench.running.drive import Drive
 from agvbench.types import Commands, Frames, Pose, Run
 
@@ -39,6 +42,25 @@ def aborted_run(order: DriveOrder, run_id: str, started_s: float, status: str, f
     commands = Commands(*(column[sent] for column in vars(order.commands).values()))
     extra = {**order.extra, "duration_s": last_s - float(np.min(frames.t_s))}
     return _run(order, run_id, started_s, status, commands, frames, firmware, extra)
+
+
+def record_aborted(
+    writer: CampaignWriter,
+    order: DriveOrder,
+    run_id: str,
+    started_s: float,
+    seen: list[Frames],
+    error: BaseException,
+    firmware: str,
+) -> None:
+    """Keep what was `seen` of a run that `error` ended; nothing where nothing was seen."""
+    why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error) or type(error).__name__
+    frames = Frames.concatenate(seen)
+    if not len(frames):
+        return
+    name = free_name(f"{run_id}-aborted", writer.finished_ids)
+    with suppress(CampaignError):  # what ended the run has to be told, not that it could not be recorded
+        writer.append(aborted_run(order, name, started_s, f"aborted: {why}", frames, firmware))
 
 
 def free_name(stem: str, taken: Collection[str]) -> str:

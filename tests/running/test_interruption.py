@@ -92,12 +92,14 @@ def test_killed_thirty_times_nothing_finished_is_lost_and_the_end_is_the_same(un
 @pytest.mark.slow
 def test_interrupt_stops_the_vehicle_keeps_the_run_as_aborted_and_can_be_resumed(uninterrupted, tmp_path):
     directory = tmp_path / "campaign"
-    process = start(directory)
-    until_another_run_is_finished(process, directory, 1)
-    process.send_signal(signal.SIGINT)
-    output, _ = process.communicate(timeout=60)
-    assert process.returncode == 2
-    assert "Traceback" not in output
+    for number, more, code in ((signal.SIGINT, [], 130), (signal.SIGTERM, ["--resume"], 143)):
+        process = start(directory, *more)
+        until_another_run_is_finished(process, directory, len(run_parts(directory)) + 1)
+        process.send_signal(number)
+        output, _ = process.communicate(timeout=60)
+        assert process.returncode == code
+        assert "Traceback" not in output
+        assert f"the vehicle was stopped; go on with --resume --out {directory}" in output
     finish(start(directory, "--resume"))
     successful = {name: data for name, data in parts(directory).items() if "-aborted" not in name}
     assert successful == uninterrupted

@@ -136,8 +136,9 @@ class EmulatedNatNet(MocapAdapter):
         sent = self._server.send(self._as_sent(frames, index, body))
         deadline_s = WallClock.now() + _PATIENCE_S
         while self._handled() < handled + sent:
+            is_late = WallClock.now() > deadline_s  # on a machine that stood still, what has come is taken first
             self._client.step(_PATIENCE_S / 10.0)
-            if WallClock.now() > deadline_s:
+            if is_late and self._handled() < handled + sent:
                 raise LinkError("a NatNet packet was lost on loopback", where=self.scheme)
 
     def _handled(self) -> int:
