@@ -5,13 +5,27 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pandas as pd
 import pytest
 
+from agvbench.adapters import open_rig
 from agvbench.errors import FlagError
+from agvbench.model import nominal_model
+from agvbench.planning import Workspace
+from agvbench.running.placers.auto import Auto
 from agvbench.running.placers.choosing import PLACERS, choose_placer
+from agvbench.running.placers.placer import Rig
+from agvbench.running.quality import DEFAULT_LIMITS
 from agvbench.running.settings import PLACES
+from agvbench.running.supervision import Supervisor
+from agvbench.running.unbroken import UnbrokenLink
+from agvbench.types import Pose
+from agvbench.vehicle.geometry import Geometry
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
 
@@ -52,3 +66,25 @@ def test_who_can_place_what() -> None:
     assert choose_placer("auto", simulated=True) is choose_placer("auto", simulated=False)
     with pytest.raises(FlagError, match=r"--place: a real vehicle cannot be placed so: teleport \(limit: auto or oper"):
         choose_placer("teleport", simulated=False)
+
+
+class Real(UnbrokenLink):
+    """A link to a simulated vehicle that passes for a real one."""
+
+    def identity(self) -> Any:
+        """Return who drives."""
+        return SimpleNamespace(simulated=False, vehicle="agv1")
+
+
+def test_an_operator_is_asked_where_a_real_vehicle_does_not_come(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
+    monkeypatch.setattr("agvbench.running.placers.auto.say", told.append)
+    model, room = nominal_model("agv", Geometry(0.181, 0.121), "us", 1500.0), Workspace.circle(6.1)
+    with open_rig("sim", plant="returning_plants:Dead") as direct:
+        link = Real(direct)
+        # Nobody puts a real vehicle anywhere by software: it stands where it stands, 8 mm off.
+        link.reset(Pose(0.008, 0.0, 0.0), run_key="a")
+        placer = Auto(Rig(link, model, room, Supervisor(room, 1500.0), DEFAULT_LIMITS))
+        assert placer.place(Pose(0.0, 0.0, 0.0), "run") is None
+    assert len(told) == 1
+    assert told[0].startswith("agvbench/v2/lab/agv1: the vehicle does not move: full drive for 2 s; see to its battery")
