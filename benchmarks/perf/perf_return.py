@@ -131,8 +131,9 @@ def _plants(given: argparse.Namespace) -> Iterator[tuple[str, str, int]]:
         for name in given.only:
             yield f"{name} {given.first_seed}", f"agvbench.simulator.hidden:{name}", given.first_seed
         return
-    yield "default", "agvbench.simulator:make_plant", 0
-    yield "small, front-steered", SMALL, 0
+    if not given.drawn_only:
+        yield "default", "agvbench.simulator:make_plant", 0
+        yield "small, front-steered", SMALL, 0
     for seed in range(given.first_seed, given.first_seed + given.plants):
         yield f"{drawn_spec(seed)} {seed}", "agvbench.simulator.hidden:make_plant", seed
 
@@ -148,6 +149,7 @@ def main() -> None:
     parser.add_argument("--returns", type=int, default=100, help="consecutive repeats of each (default 100)")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
     parser.add_argument("--only", nargs="+", metavar="NAME", help="hide these instead, each with the first seed")
+    parser.add_argument("--drawn-only", action="store_true", help="leave out the plants that ship")
     parser.add_argument("--bus", action="store_true", help="drive over the bus")
     given = parser.parse_args()
     print(f"{'':44s} {'within':12s} {'mm':>5s} {'worst':>6s} {'deg':>6s} {'worst':>5s} "
