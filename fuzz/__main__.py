@@ -78,7 +78,9 @@ def main() -> int:
     arguments = parser.parse_args()
     if unknown := set(arguments.targets) - set(known):
         parser.error(f"no such target: {' '.join(sorted(unknown))} (limit: {' '.join(known)})")
-    chosen = arguments.targets or list(known)
+    chosen = [name for name in arguments.targets or known if not known[name].missing()]
+    for name in sorted(set(arguments.targets or known) - set(chosen)):
+        print(f"{name}: left out: {known[name].missing()}", file=sys.stderr)
     outcomes = []
     print(f"{'target':20s} {'inputs':>12s} {'a second':>9s} {'CPU s':>7s} {'MB':>5s}  result", flush=True)
     for name in chosen:

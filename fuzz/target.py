@@ -29,6 +29,11 @@ class Target(ABC):
     longest: ClassVar[int] = 2048
     """How many bytes [B] a fuzzer's input has at most."""
 
+    @classmethod
+    def missing(cls) -> str:
+        """Say what this machine lacks for the target; "" if nothing."""
+        return ""
+
     @abstractmethod
     def seeds(self) -> Iterable[bytes]:
         """Return inputs that are right, to begin with."""

@@ -20,6 +20,8 @@ every_target = pytest.mark.parametrize("name", NAMES)
 
 @cache
 def target(name: str) -> Target:
+    if missing := targets()[name].missing():
+        pytest.skip(missing)
     return targets()[name]()
 
 

@@ -170,3 +170,25 @@ def test_a_datagram_that_is_cut_off_is_refused(tmp_path: Path, capsys: pytest.Ca
     code, lines, err = decode(path, capsys, "--natnet-version", "4.1")
     assert (code, lines) == (2, [])
     assert err == f"agvbench mocap: {path}: NatNet packet is cut off: 100 B (limit: 6067 B)\n"
+
+
+def test_a_capture_that_is_too_long_is_not_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "long.pcap"
+    with path.open("wb") as file:
+        file.truncate((2 << 30) + 1)  # takes no room on the disk
+    code, lines, error = decode(path, capsys)
+    assert (code, lines) == (2, [])
+    assert "long.pcap: capture is too long" in error
+
+
+def test_pieces_that_never_become_whole_are_let_go(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    first_pieces = []
+    for number in range(1000):
+        ip = dpkt.ip.IP(src=SERVER, dst=CLIENT, p=17, id=number, data=bytes(64), len=84)
+        ip.offset, ip.mf = 0, 1
+        first_pieces.append(bytes(ip))
+    whole = internet(session()[:2])
+    path = written(tmp_path / "pieces.pcap", dpkt.pcap.Writer, 101, [*first_pieces, *whole])
+    code, lines, _ = decode(path, capsys)
+    assert code == 0
+    assert [line["message"] for line in lines] == ["CONNECT", "SERVERINFO"]

@@ -1,0 +1,3 @@
+/* There are no interrupts here. */
+#define ATOMIC_RESTORESTATE
+#define ATOMIC_BLOCK(how)
