@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from agvbench.errors import SafetyStopError
 from agvbench.running.links import RunnerLink
 from agvbench.running.rest import is_at_rest
 from agvbench.running.supervision import Supervisor
@@ -72,6 +73,7 @@ def drive(
         if run_key is not None:
             link.reset(start, run_key=run_key)
         watched(neutral, t_s=-timing.rest_before_s, hold_s=timing.rest_before_s)
+        _check_seen(batches, timing, where=link.keys.root)
         for i in range(len(commands) - 1):
             hold_s = float(commands.t_s[i + 1] - commands.t_s[i])
             watched(commands.at(i), t_s=float(commands.t_s[i]), hold_s=hold_s)
@@ -83,6 +85,16 @@ def drive(
         raise
     frames = _until(Frames.concatenate(batches), end_s)
     return Drive(commands, frames, timing.rest_before_s + end_s)
+
+
+def _check_seen(batches: list[Frames], timing: Timing, *, where: str) -> None:
+    """Refuse to drive a vehicle that was never seen at rest: nobody would know where it goes."""
+    if not any(frames.tracked.any() for frames in batches):
+        raise SafetyStopError(
+            "stopped 0.0 s into the run: tracking was lost", where=where,
+            value=f"not seen for {timing.rest_before_s:.2f} s, at rest",
+            remedy="look at vehicle and camera, then go on with --resume",
+        )  # fmt: skip
 
 
 def _settle(watched: Callable[..., None], commands: Commands, batches: list[Frames], timing: Timing) -> float:

@@ -6,7 +6,7 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ NEUTRAL = Command(1500.0, 1500.0, 1500.0)
 START = Pose(0.0, 0.0, 0.0)
 FROM_S, HOLD_S = 0.6, 2.6
 _AFTERWARDS_S = 0.4
-_TIMING = Timing(rest_before_s=0.3, settle_s=0.2, settle_limit_s=0.2)
+_TIMING = Timing(settle_s=0.2, settle_limit_s=0.2)
 _COMMANDS = Commands(*np.array([[0.0, HOLD_S], [1700.0, 1500.0], [1500.0, 1500.0], [1500.0, 1500.0]]))
 
 
@@ -59,24 +59,34 @@ class Live:
     do: Callable[[LiveLab], None] = lambda _: None
     open: Callable[[LiveLab], AbstractContextManager[VehicleLink]] = in_process
     described: bool = True
+    rest_s: float = 0.3
 
     def __call__(self, directory: Path, rig: str) -> Outcome:
         """Play the fault; return what came of it."""
         with live_lab(described=self.described) as lab:
             struck_s: list[float] = []
+            opened_s = WallClock.now()
             with self.open(lab) as link:
                 _trip(link, lambda: (struck_s.append(WallClock.now()), self.do(lab), lab.befall()))
-                said = _driven(link)
+                said = _driven(link, self.rest_s)
                 time.sleep(_AFTERWARDS_S)
-                began_s = struck_s[0] if struck_s else WallClock.now()
+                began_s = struck_s[0] if struck_s else opened_s
                 reaction_s = max(0.0, lab.last_driven_s - began_s) if said else None
         return Outcome(reaction_s, said)
 
 
-def _driven(link: VehicleLink) -> str:
+def _driven(link: VehicleLink, rest_s: float) -> str:
     supervisor = Supervisor(Workspace.circle(12.0), NEUTRAL.drive)
     try:
-        drive(link, _COMMANDS, neutral=NEUTRAL, start=START, run_key=None, supervisor=supervisor, timing=_TIMING)
+        drive(
+            link,
+            _COMMANDS,
+            neutral=NEUTRAL,
+            start=START,
+            run_key=None,
+            supervisor=supervisor,
+            timing=replace(_TIMING, rest_before_s=rest_s),
+        )
     except AgvbenchError as error:
         return str(error)
     return ""

@@ -23,6 +23,7 @@ class Then(StrEnum):
     STOPS = "stopped; the session drives no more"
     ENDS = "stopped; the program ends"
     REJECTS = "driven to its end, rejected, driven again"
+    FAILS = "stopped; its run fails, the session goes on"
     GOES_ON = "driven to its end, and counts"
     REFUSES = "never moves: the session does not begin"
 
@@ -66,7 +67,8 @@ class Fault:
 
     ``limit_s`` [s] is within which time the vehicle is stopped, ``message`` a part of the line that says why; ``play``
     injects it, in a directory for its campaign, on one of ``rigs``. What takes real time and is much like another fault
-    is not ``tested`` with every change, only measured.
+    is not ``tested`` with every change, only measured. ``instead`` stands in place of a time where none
+    counts.
     """
 
     name: str
@@ -78,6 +80,7 @@ class Fault:
     limit_s: float | None = None
     rigs: tuple[str, ...] = ("sim", "simavr")
     tested: bool = True
+    instead: str = "not stopped"
 
 
 def all_faults() -> list[Fault]:

@@ -74,5 +74,6 @@ FAULTS = (
         Then.STOPS,
         Campaign(agv="faster=4", workspace="circle:1.6", hold_s=4.0, share=0.15),
         "vehicle is leaving the capture volume",
+        instead="before the edge",
     ),
 )

@@ -17,9 +17,9 @@ FAULTS = (
         _FIRMWARE,
     ),
     Fault(
-        "bytes corrupt 1 %",
+        "bytes corrupt 0.2 %",
         "serial line",
-        "1 % of the bytes have a wrong bit",
+        "0.2 % of the bytes have a wrong bit: said again",
         Then.GOES_ON,
         Campaign(agv="corrupt=0.002"),
         rigs=_FIRMWARE,

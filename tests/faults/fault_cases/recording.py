@@ -50,6 +50,7 @@ FAULTS = (
         Then.STOPS,
         Campaign(do=_fill, undo=_free),
         "cannot be written (File too large); free some space",
+        instead="at rest by then",
     ),
     Fault(
         "folder gone",
@@ -58,6 +59,7 @@ FAULTS = (
         Then.STOPS,
         Campaign(do=_take_away, undo=_bring_back),
         "cannot be written (No such file or directory); bring the folder back",
+        instead="at rest by then",
     ),
     Fault(
         "folder unwritable",
@@ -66,5 +68,6 @@ FAULTS = (
         Then.STOPS,
         Campaign(do=_block, undo=_unblock),
         "cannot be written (Not a directory); bring the folder back",
+        instead="at rest by then",
     ),
 )

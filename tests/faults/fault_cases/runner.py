@@ -20,7 +20,7 @@ FAULTS = (
         "exception",
         "runner",
         "an exception in the middle of a run",
-        Then.GOES_ON,
+        Then.FAILS,
         Campaign(do=_raise),
         "a mistake in the bench",
         0.1,
