@@ -28,6 +28,11 @@ class Aim:
         """The gears to come in: backward or not."""
         return (False, True) if self._backward is None else (self._backward,)
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether the aim is the start itself, in any gear."""
+        return self._backward is None and self.pose == self._start
+
     def begin_anew(self) -> None:
         """Aim at the start itself, in any gear."""
         self.pose, self._backward, self._attempts = self._start, None, 0

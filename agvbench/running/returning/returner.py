@@ -107,9 +107,12 @@ class Returner:
         crab_rad = self._habits.crab_rad
         try:
             legs = self._way(seen, aim, crab_rad)
-        except PlanError:
-            aim.begin_anew()
-            legs = self._only_way(seen, aim, crab_rad)
+        except PlanError as error:
+            if aim.is_plain:
+                raise PlacingError(
+                    error.what, where=error.where, value=error.value, limit=error.limit, remedy=error.remedy
+                ) from None
+            return aim.begin_anew()
         for leg in legs:
             goal_crab_rad = crab_rad if leg is legs[-1] else None
             drive = LegDrive(leg, reins, self._helm, self._habits, self._limits, goal_crab_rad=goal_crab_rad)
@@ -123,11 +126,3 @@ class Returner:
         radii_m = [share * radius_m for share in _RADII]
         leads_m = [share * geometry.wheelbase_m for share in _LEADS]
         return way_back(seen, aim.pose, guided, self._workspace, radii_m=radii_m, leads_m=leads_m, gears=aim.gears)
-
-    def _only_way(self, seen: Pose, aim: Aim, crab_rad: float) -> list[Leg]:
-        try:
-            return self._way(seen, aim, crab_rad)
-        except PlanError as error:
-            raise PlacingError(
-                error.what, where=error.where, value=error.value, limit=error.limit, remedy=error.remedy
-            ) from None

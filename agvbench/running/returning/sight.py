@@ -12,6 +12,8 @@ from agvbench.types import Floats, Frames, Pose, wrap_angle
 _WINDOW_S = 0.1
 _FEWEST_FRAMES = 3
 _SMOOTHING = 0.6
+_FARTHEST_S = 0.5
+"""Nobody is believed to go on as seen for longer."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +44,7 @@ class Sight:
 
         None if too little was seen.
         """
-        both = Frames.concatenate([self._recent, frames])
-        self._recent = both.select(np.asarray(both.tracked & (both.t_s > now_s - _WINDOW_S)))
+        self._recent = _latest(Frames.concatenate([self._recent, frames.select(frames.tracked)]))
         self._now_s = now_s
         if len(self._recent) < _FEWEST_FRAMES:
             return None
@@ -70,8 +71,17 @@ class Sight:
         """The pose now (floor frame), None before anything was seen."""
         if self._median is None:
             return None
-        x_m, y_m, heading_rad = self._median[1] + self._velocity * (self._now_s - self._median[0])
+        since_s = min(_FARTHEST_S, self._now_s - self._median[0])
+        x_m, y_m, heading_rad = self._median[1] + self._velocity * since_s
         return Pose(float(x_m), float(y_m), float(heading_rad))
+
+
+def _latest(frames: Frames) -> Frames:
+    """Return the frames of the last tenth of a second that was seen, maybe a while ago; of a slow camera, three."""
+    order = np.argsort(frames.t_s, kind="stable")
+    since_s = frames.t_s[order[-1]] - _WINDOW_S if len(order) else 0.0
+    count = max(_FEWEST_FRAMES, int((frames.t_s > since_s).sum()))
+    return frames.select(order[-count:])
 
 
 def _median(frames: Frames) -> tuple[float, Floats]:
