@@ -21,13 +21,15 @@ from agvbench.bus.link import VehicleLink
 from agvbench.errors import AgvbenchError
 from agvbench.planning import Workspace
 from agvbench.running.drive import Timing, drive
-from agvbench.running.supervision import Supervisor
+from agvbench.running.supervision import DEFAULT_SAFETY, SafetyLimits, Supervisor
 from agvbench.types import Command, Commands, Pose
 
 NEUTRAL = Command(1500.0, 1500.0, 1500.0)
 START = Pose(0.0, 0.0, 0.0)
 FROM_S, HOLD_S = 0.6, 2.6
 _AFTERWARDS_S = 0.4
+PATIENT = SafetyLimits(lost_s=5.0, frozen_s=5.0)
+"""For faults that have nothing to do with the camera: a machine that is busy may not show it for a while."""
 _TIMING = Timing(settle_s=0.2, settle_limit_s=0.2)
 _COMMANDS = Commands(*np.array([[0.0, HOLD_S], [1700.0, 1500.0], [1500.0, 1500.0], [1500.0, 1500.0]]))
 
@@ -60,6 +62,7 @@ class Live:
     open: Callable[[LiveLab], AbstractContextManager[VehicleLink]] = in_process
     described: bool = True
     rest_s: float = 0.3
+    limits: SafetyLimits = DEFAULT_SAFETY
 
     def __call__(self, directory: Path, rig: str) -> Outcome:
         """Play the fault; return what came of it."""
@@ -68,15 +71,15 @@ class Live:
             opened_s = WallClock.now()
             with self.open(lab) as link:
                 _trip(link, lambda: (struck_s.append(WallClock.now()), self.do(lab), lab.befall()))
-                said = _driven(link, self.rest_s)
+                said = _driven(link, self.rest_s, self.limits)
                 time.sleep(_AFTERWARDS_S)
                 began_s = struck_s[0] if struck_s else opened_s
                 reaction_s = max(0.0, lab.last_driven_s - began_s) if said else None
         return Outcome(reaction_s, said)
 
 
-def _driven(link: VehicleLink, rest_s: float) -> str:
-    supervisor = Supervisor(Workspace.circle(12.0), NEUTRAL.drive)
+def _driven(link: VehicleLink, rest_s: float, limits: SafetyLimits) -> str:
+    supervisor = Supervisor(Workspace.circle(12.0), NEUTRAL.drive, limits)
     try:
         drive(
             link,

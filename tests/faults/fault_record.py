@@ -44,9 +44,9 @@ class Outcome:
     intact: bool | None = None
     resumed: bool | None = None
 
-    def breaks(self, fault: Fault) -> list[str]:
-        """Return which promises of `fault` are broken, in words."""
-        late = fault.limit_s is not None and (self.reaction_s is None or self.reaction_s > fault.limit_s)
+    def breaks(self, fault: Fault, slack: float = 1.0) -> list[str]:
+        """Return which promises of `fault` are broken, in words; times may be `slack` times as long."""
+        late = fault.limit_s is not None and (self.reaction_s is None or self.reaction_s > slack * fault.limit_s)
         latched = self.later is None or (fault.then is Then.STOPS) == self.later.startswith(_LATCHED)
         promises = {
             f"stopped within {fault.limit_s} s, not {self.reaction_s} s": not late,

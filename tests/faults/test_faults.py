@@ -26,4 +26,6 @@ def test_fault(fault: Fault, tmp_path: Path) -> None:
         if len(fault.rigs) == 1:
             pytest.skip(why)
         rig = fault.rigs[0]
-    assert fault.play(tmp_path, rig).breaks(fault) == []
+    # Real time is not measured where other programs run, too.
+    slack = 5.0 if rig == "live" else 1.0
+    assert fault.play(tmp_path, rig).breaks(fault, slack) == []

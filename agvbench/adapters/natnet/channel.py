@@ -61,7 +61,7 @@ class Counters:
 
 
 class Channel:
-    """Sockets that hear the server only.
+    """Sockets that hear the server only; ``told`` counts the packets that were sent to it.
 
     Raises
     ------
@@ -73,6 +73,7 @@ class Channel:
         # Networks are waited for in real time, even where everything else is simulated.
         self._connection, self._clock, self._counters = connection, WallClock(), counters
         self._selector = selectors.DefaultSelector()
+        self.told = 0
         try:
             self._server = (socket.gethostbyname(connection.server), connection.port)
             self._local = connection.local or self._route()
@@ -116,6 +117,7 @@ class Channel:
             self._command.sendto(join(message, payload), self._server)
         except OSError:
             return
+        self.told += 1
 
     def ask(self, message: Message, payload: bytes, wanted: Message) -> bytes:
         """Return the payload of the answer; what else arrives meanwhile is left out.

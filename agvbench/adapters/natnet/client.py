@@ -136,6 +136,11 @@ class Client:
                 self._ready.set()
 
     @property
+    def told(self) -> int:
+        """How many packets the server was sent."""
+        return self._channel.told
+
+    @property
     def ready(self) -> bool:
         """Whether names and clock are known."""
         return bool(self.names) and (self.info.clock_hz is None or self.sync.ready)

@@ -130,7 +130,8 @@ class EmulatedNatNet(MocapAdapter):
         self._clock.sleep(now_s - self._clock.now())
         self._last_s = now_s
         self._client.step(0.0)
-        while self._server.step():
+        # A busy kernel may take its time even on loopback; what was said at this instant is answered at this instant.
+        while self._server.heard < self._client.told and self._server.step(_PATIENCE_S):
             pass
         handled = self._handled()
         sent = self._server.send(self._as_sent(frames, index, body))

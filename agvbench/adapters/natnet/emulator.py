@@ -61,7 +61,7 @@ class _Client(NamedTuple):
 
 
 class Emulator:
-    """A NatNet server, until `close`; in a thread of its own, or answering in `step` only.
+    """A NatNet server, until `close`; in a thread of its own, or answering in `step` only. ``heard`` counts packets.
 
     Raises
     ------
@@ -75,6 +75,7 @@ class Emulator:
         self.settings, self._models, self._clock = settings, list(models), clock or WallClock()
         self._clients: dict[Address, _Client] = {}
         self._network = Network(settings.network, settings.seed)
+        self.heard = 0
         self._lock = threading.Lock()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
@@ -151,6 +152,7 @@ class Emulator:
             datagram, who = self._socket.recvfrom(MAX_DATAGRAM_BYTES)
         except OSError:
             return False
+        self.heard += 1
         received_ticks = self.ticks()
         try:
             message, payload = split(datagram)

@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from fault_live import Live, in_process
+from fault_live import PATIENT, Live, in_process
 from fault_record import Fault, Then
 from live_lab import OTHER, LiveLab
 
@@ -60,7 +60,7 @@ FAULTS = (
         "serial line",
         "the serial port is gone",
         Then.STOPS,
-        Live(_end),
+        Live(_end, limits=PATIENT),
         "the serial port is gone",
         0.3,
         _LIVE,
@@ -71,7 +71,7 @@ FAULTS = (
         "serial line",
         "the line breaks, in real time",
         Then.STOPS,
-        Live(open=partial(in_process, faults="cut")),
+        Live(open=partial(in_process, faults="cut"), limits=PATIENT),
         "the vehicle does not answer any more",
         0.4,
         _LIVE,
@@ -82,7 +82,7 @@ FAULTS = (
         "adapter",
         "the vehicle's adapter does not come back from a command",
         Then.STOPS,
-        Live(open=partial(in_process, faults="hangs")),
+        Live(open=partial(in_process, faults="hangs"), limits=PATIENT),
         "does not come back from a command",
         0.4,
         _LIVE,

@@ -4,9 +4,11 @@ import os
 import signal
 from functools import partial
 
-from fault_live import Live, Orphaned, in_processes
+from fault_live import PATIENT, Live, Orphaned, in_processes
 from fault_record import Fault, Then
 from lab_processes import Processes
+
+from agvbench.running.supervision import DEFAULT_SAFETY
 
 _LIVE = ("live",)
 
@@ -15,7 +17,9 @@ def _sent(name: str, number: signal.Signals) -> Live:
     def befall(running: Processes) -> None:
         os.kill(getattr(running, name).pid, number)
 
-    return Live(open=partial(in_processes, befall=befall))
+    # Who kills the camera's process is to hear of that; who suspends it sees nothing more.
+    limits = DEFAULT_SAFETY if (name, number) == ("mocap", signal.SIGSTOP) else PATIENT
+    return Live(open=partial(in_processes, befall=befall), limits=limits)
 
 
 FAULTS = (
