@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import socket
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +15,7 @@ import pytest
 from rig_driving import FAILING, NEUTRAL, START, TINY
 
 from agvbench.adapters import AdapterOptions, host_adapters, open_rig
+from agvbench.bus.bus_config import BusConfig
 from agvbench.bus.command_message import CommandMessage, decode_command, encode_command
 from agvbench.bus.frames_message import FramesMessage, decode_frames, encode_frames, pack_columns, unpack_columns
 from agvbench.bus.identity_message import AgvIdentity, Identity, MocapIdentity
@@ -78,6 +80,13 @@ def damaged(payload: bytes, decode: Callable[[bytes], object]) -> Callable[[], o
     return lambda: decode(payload)
 
 
+def a_configuration_that_listens() -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "listens.json5"
+        path.write_text('{listen: {endpoints: ["tcp/0.0.0.0:7447"]}}')
+        BusConfig.load(path)
+
+
 COMMAND = encode_command(CommandMessage(1, 0.0, NEUTRAL, 0.1))
 FRAMES = encode_frames(FramesMessage(1, b""))
 NAN_TIME = pack_columns(Frames(*(np.full(1, np.nan),) * 4, np.ones(1, bool), np.zeros(1, int), *(np.zeros(1),) * 2))
@@ -89,6 +98,9 @@ MISTAKES: dict[str, Callable[[], object]] = {
     "nobody listens there": lambda: open_session(connect=["tcp/127.0.0.1:9"], timeout_s=0.1),
     "address of another machine": command_line("mocap", "sim", "--listen", "tcp/192.0.2.1:7448"),
     "open to others unasked": lambda: open_session(listen=["tcp/0.0.0.0:7447"]),
+    "certificates are not named": command_line("sim", "--listen", "tls/192.0.2.1:7447"),
+    "configuration of the bus is missing": command_line("sim", "--bus-config", "no.json5"),
+    "configuration says where to listen": a_configuration_that_listens,
     "vehicle's name with a slash": command_line("sim", "--vehicle", "blue/one"),
     "lab's name is empty": command_line("agv", "sim", "--lab", ""),
     "no such adapter": command_line("agv", "simm"),
