@@ -252,16 +252,14 @@ class Selector:
         A start is far from the valley, for the maps have taken up what it adds, and the way down may end anywhere: then
         the maps are first fitted beside it, held where it starts.
         """
-        best = self._first_steps(current, predictor, starts[0], bounds)
-        for start in starts[:_MOST_STARTS]:
-            if current.fit.loss.sum() - best.loss.sum() > least:
-                break
-            held = bounds.copy()
-            held[-len(start) :] = start[:, None]
-            beside = self._first_steps(current, predictor, start, held)
-            found = self._first_steps(current, predictor, start, bounds, beside)
-            best = min(best, found, key=lambda one: float(one.loss.sum()))
-        return best
+        found = [self._first_steps(current, predictor, starts[0], bounds)]
+        if current.fit.loss.sum() - found[0].loss.sum() <= least:
+            for start in starts[:_MOST_STARTS]:
+                held = bounds.copy()
+                held[-len(start) :] = start[:, None]
+                beside = self._first_steps(current, predictor, start, held)
+                found.append(self._first_steps(current, predictor, start, bounds, beside))
+        return min(found, key=lambda one: float(one.loss.sum()))
 
     @staticmethod
     def _first_steps(
