@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from fault_record import Outcome
-from lab_processes import Processes, processes, runner
+from lab_processes import Processes, processes, runner, slow_consumer
 from live_lab import LiveLab, live_lab
 
 from agvbench.adapters import open_rig
@@ -48,6 +48,13 @@ def in_processes(lab: LiveLab, befall: Callable[[Processes], None]) -> Iterator[
     """Open each adapter of `lab` in a process of its own; `befall` does what it does to them."""
     with processes(lab) as running, open_rig(connect=running.endpoints) as link:
         lab.befall = lambda: befall(running)
+        yield link
+
+
+@contextmanager
+def beside_a_slow_consumer(lab: LiveLab) -> Iterator[VehicleLink]:
+    """Open the adapters in processes, while somebody else listens to all they say and never takes it."""
+    with processes(lab) as running, slow_consumer(running.endpoints), open_rig(connect=running.endpoints) as link:
         yield link
 
 

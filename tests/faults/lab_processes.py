@@ -61,12 +61,25 @@ def processes(lab: LiveLab) -> Iterator[Processes]:
 @contextmanager
 def runner(endpoints: list[str]) -> Iterator[subprocess.Popen[str]]:
     """Drive straight on from a process of its own; it says so when it begins."""
-    script = Path(__file__).with_name("drive_on.py")
+    with _script("drive_on.py", endpoints, "driving\n") as process:
+        time.sleep(0.5)
+        yield process
+
+
+@contextmanager
+def slow_consumer(endpoints: list[str]) -> Iterator[subprocess.Popen[str]]:
+    """Let a process listen to everything, and never take it."""
+    with _script("never_take.py", endpoints, "listening\n") as process:
+        yield process
+
+
+@contextmanager
+def _script(name: str, endpoints: list[str], ready: str) -> Iterator[subprocess.Popen[str]]:
+    script = Path(__file__).with_name(name)
     process = subprocess.Popen([sys.executable, str(script), *endpoints], stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None
-        assert process.stdout.readline() == "driving\n"
-        time.sleep(0.5)
+        assert process.stdout.readline() == ready
         yield process
     finally:
         os.kill(process.pid, signal.SIGKILL)

@@ -4,7 +4,7 @@ import os
 import signal
 from functools import partial
 
-from fault_live import PATIENT, Live, Orphaned, in_processes
+from fault_live import PATIENT, Live, Orphaned, beside_a_slow_consumer, in_processes
 from fault_record import Fault, Then
 from lab_processes import Processes
 
@@ -23,6 +23,15 @@ def _sent(name: str, number: signal.Signals) -> Live:
 
 
 FAULTS = (
+    Fault(
+        "slow consumer",
+        "bus",
+        "somebody listens to all messages, and never takes one",
+        Then.GOES_ON,
+        Live(open=beside_a_slow_consumer, limits=PATIENT),
+        rigs=_LIVE,
+        tested=False,
+    ),
     Fault(
         "vehicle killed",
         "bus",
