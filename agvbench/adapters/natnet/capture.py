@@ -79,7 +79,8 @@ def _udp_of(packet: bytes, link: int, unfinished: dict[Any, dict[int, tuple[bool
 
     try:
         inner = _network_layer(packet, link)
-    except dpkt.UnpackError:
+    except (dpkt.UnpackError, struct.error, AttributeError, IndexError, KeyError, TypeError):
+        # One packet that cannot be taken apart (dpkt says so in many ways) does not spoil the capture.
         return None
     if isinstance(inner, dpkt.ip6.IP6):
         return _payload(bytes(inner.data)) if inner.nxt == _UDP_PROTOCOL else None
