@@ -23,12 +23,16 @@ _LIMIT_STARTS = (0.3, 1.0, 3.0)
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect to try: its ``bounds`` (p, 2), ``scale`` (p,) of its parameters and ``starts`` (n, p) of fits."""
+    """An effect to try: its ``bounds`` (p, 2), ``scale`` (p,) of its parameters and ``starts`` (n, p) of fits.
+
+    ``screened`` says that a regression chose the starts: one of them is near if there is anything to find.
+    """
 
     name: str
     bounds: Floats
     scale: Floats
     starts: Floats
+    screened: bool = False
 
 
 def candidates(exclude: Iterable[str] = ()) -> dict[str, Candidate]:

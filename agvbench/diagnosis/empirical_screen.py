@@ -26,10 +26,12 @@ _ALONG_WAY = (0.1, 0.3, 0.5, 0.7, 0.9)
 _RADII_M = (0.2, 0.35, 0.5, 0.8)
 _DISC_STEP, _LINE_STEP = 18, 40
 _LINE_DIRECTIONS = 16
+_BLUR_M, _SHARP_M, _BEST_LINES, _FINE, _FEWEST_CROSSINGS = 0.1, 0.01, 4, 9, 5
 _RUN_TIMES_S = (0.4, 0.8, 1.6, 3.2, 6.4)
 _HOURS = (0.1, 0.2, 0.4, 0.8, 2.0)
 _WAVES_M = np.geomspace(0.12, 1.5, 50)
 _LEAST = 1e-9
+_STRAY, _NEARLY_ALL = 3.0, 0.99
 _SMALL = 0.1
 
 
@@ -85,7 +87,7 @@ def screen(rates: Rates, stands: Steering, geometry: Geometry, group: NDArray[np
     """Return for each term its best start, the most promising term first; terms without promise are left out."""
     judge = _Judge(rates, stands, folds(group, _FOLDS, seed)[rates.run])
     found = []
-    for term, options in _options(rates, stands, geometry):
+    for term, options in _options(rates, stands, geometry, judge):
         best: Start | None = None
         for columns, values in options:
             gain, sizes = judge.gain(columns)
@@ -107,7 +109,7 @@ class _Judge:
         self.fold, self.root = fold, np.sqrt(rates.weight)
         drive, axles = _dummies(stands.levels[:, 0]), [_dummies(stands.levels[:, k]) for k in (1, 2)]
         self.known = [self._orthogonal([drive]), *[self._orthogonal(axles)] * 2]
-        self.values = [self._clean(k, rates.value[:, k]) for k in range(3)]
+        self.values = [self._clean(k, _without_strays(rates.value[:, k])) for k in range(3)]
         self.size = [max(float(np.sqrt(np.mean(v * v))), _LEAST) for v in self.values]
         self.values = [v / s for v, s in zip(self.values, self.size, strict=True)]
         self.count = len(np.unique(rates.run))
@@ -142,6 +144,12 @@ class _Judge:
         return 0.5 * self.count * gain, np.linalg.lstsq(matrix + ridge, pull, rcond=None)[0]
 
 
+def _without_strays(value: Floats) -> Floats:
+    """Return the values (n,), those far beyond nearly all others cut: one run gone astray must not drown the rest."""
+    limit = _STRAY * float(np.quantile(np.abs(value - np.median(value)), _NEARLY_ALL))
+    return np.clip(value, np.median(value) - limit, np.median(value) + limit)
+
+
 def _dummies(level: NDArray[np.int64]) -> Floats:
     return np.asarray((level[:, None] == np.unique(level)[None, :]).astype(np.float64))
 
@@ -174,12 +182,12 @@ class _Wave(Values):
 
 
 def _options(
-    rates: Rates, stands: Steering, geometry: Geometry
+    rates: Rates, stands: Steering, geometry: Geometry, judge: _Judge
 ) -> Iterator[tuple[type[terms.EmpiricalTerm], Iterator[Option]]]:
     c = rates.covariates
     sine = np.column_stack([np.cos(c["heading_rad"]), np.sin(c["heading_rad"])])
     yield terms.SpeedInDisc, _discs(rates)
-    yield terms.TurnAtLine, _lines(rates)
+    yield terms.TurnAtLine, _lines(rates, judge)
     yield terms.BentPicture, _pictures(rates)
     yield terms.SpeedByHeading, iter([({0: sine}, Values())])
     yield terms.TurnByHeading, iter([({2: sine}, Values())])
@@ -247,15 +255,38 @@ def _discs(rates: Rates) -> Iterator[Option]:
                     yield {0: -inside[:, None]}, Values(float(x), float(y), radius)
 
 
-def _lines(rates: Rates) -> Iterator[Option]:
+def _lines(rates: Rates, judge: _Judge) -> Iterator[Option]:
+    """Yield lines that turn what crosses them: blurred ones over the whole floor, then sharp ones near the best.
+
+    A sharp line that is off by a hand's breadth is crossed at other samples, and explains nothing.
+    """
+    coarse = []
     for direction in np.arange(_LINE_DIRECTIONS) * math.pi / _LINE_DIRECTIONS:
-        across = np.array([math.cos(direction), math.sin(direction)])
-        a, b = rates.begin[:, :2] @ across, rates.end[:, :2] @ across
-        low, high = float(a.min()), float(a.max())
+        low, high = (float(f(rates.begin[:, :2] @ _across(direction))) for f in (np.min, np.max))
         for place in np.linspace(low, high, _LINE_STEP)[1:-1]:
-            crossed = np.sign((b > place).astype(float) - (a > place)) * rates.covariates["direction"] / rates.weight
-            if np.count_nonzero(crossed) >= 5:
-                yield {2: crossed[:, None]}, Values(float(place), float(direction))
+            crossed = _crossed(rates, direction, place, _BLUR_M)
+            if crossed is not None:
+                coarse.append((judge.gain({2: crossed})[0], direction, place))
+    best = sorted(coarse, reverse=True)[:_BEST_LINES]
+    for _, direction, place in best:
+        for turned in direction + np.linspace(-1.0, 1.0, _FINE) * 0.5 * math.pi / _LINE_DIRECTIONS:
+            for moved in place + np.linspace(-1.0, 1.0, _FINE) * _BLUR_M:
+                crossed = _crossed(rates, turned, moved, _SHARP_M)
+                if crossed is not None:
+                    yield {2: crossed}, Values(float(moved), float(turned))
+
+
+def _across(direction: float) -> Floats:
+    return np.array([math.cos(direction), math.sin(direction)])
+
+
+def _crossed(rates: Rates, direction: float, place: float, blur_m: float) -> Floats | None:
+    """Return by how much of a line each step crosses (n, 1), per metre; None where hardly any does."""
+    before, after = ((p[:, :2] @ _across(direction) - place) / blur_m for p in (rates.begin, rates.end))
+    if np.count_nonzero((before > 0.0) != (after > 0.0)) < _FEWEST_CROSSINGS:
+        return None
+    part = 0.5 * (np.tanh(after) - np.tanh(before))
+    return np.asarray((part * rates.covariates["direction"] / rates.weight)[:, None])
 
 
 def _pictures(rates: Rates) -> Iterator[Option]:

@@ -23,6 +23,8 @@ BEYOND: tuple[type[Effect], ...] = (*TERMS, *effect_forms().values())
 """What the widest simulation has beyond the library. One simulation for all, since each takes long to compile."""
 
 _SHORT = 3
+_LIKELY = 40.0  # a cause that fits so much better is tried in its other laws even if it predicts no better
+_MOST_ALONE = 3
 _HALF = 0.5  # of what an effect gains: another cause that gains less in its place is not tried in its other laws
 
 
@@ -68,7 +70,7 @@ def reform(selection: Selection, selector: Selector) -> Selection:
     """
     found = [name for name in selection.chosen.names if name not in selector.given]
     if not found:
-        return selection
+        return _another_law_alone(selection, selector)
     wide, current = wider(selector), selection.chosen
     laws = [law for name in found for law in _laws(selection, selector, wide, name)]
     offered: list[tuple[_Law, Scored]] = []
@@ -85,6 +87,42 @@ def reform(selection: Selection, selector: Selector) -> Selection:
     rejected = {n: g for n, g in selection.rejected.items() if n not in current.names}
     selector.candidates |= {n: c for n, c in form_candidates().items() if n in current.names}
     return Selection(selection.base, current, rivals, gains, rejected, selection.tried + wide.tried)
+
+
+def _another_law_alone(selection: Selection, selector: Selector) -> Selection:
+    """Return the selection with a law whose cause fits much better in the library's law, and predicts no better.
+
+    A cause that is strong, and of another law, pulls the maps along: what they then say of runs left out is far off.
+    """
+    base = selection.base
+    alone = {form: selector.known((*base.names, form.form_of)) for form in effect_forms().values()}
+    fitted = {form: float((base.fit.loss - model.fit.loss).sum()) for form, model in alone.items() if model}
+    likely = sorted((form for form, gain in fitted.items() if gain > _LIKELY), key=lambda form: -fitted[form])
+    if not likely:
+        return selection
+    wide, offers = wider(selector), []
+    for form in likely[:_MOST_ALONE]:
+        kind, model = candidate(form), alone[form]
+        assert model is not None  # noqa: S101  (for the type checker)
+        starts = np.clip(np.array(form.starts(_values(model, form.form_of))), kind.bounds[:, 0], kind.bounds[:, 1])
+        wide.candidates[form.name] = replace(kind, starts=starts)
+        offers.append(_swapped(wide, model, {form.form_of}, form.name))
+    worthy = [offer for offer in offers if wide.earns(base, offer)]
+    if not worthy:
+        return selection
+    best = min(worthy, key=lambda offer: offer.total)
+    (name,) = {*best.names} - {*base.names}
+    wide.tell(f"{name}: gains {base.total - best.total:.0f}")
+    selector.candidates[name] = form_candidates()[name]
+    rejected = {n: g for n, g in selection.rejected.items() if n != cause_of(name)}
+    rivals = {
+        cause_of(other): offer.total - best.total
+        for offer in worthy
+        for other in {*offer.names} - {*best.names}
+        if offer.total - best.total < RIVAL_MARGIN and cause_of(other) != cause_of(name)
+    }
+    gains = {name: base.total - best.total}
+    return Selection(base, best, {name: rivals}, gains, rejected, selection.tried + wide.tried)
 
 
 def reform_and_resettle(selection: Selection, selector: Selector) -> tuple[Selection, Selector]:

@@ -236,34 +236,43 @@ class Selector:
         best = int(np.argmax(promises))
         if promises[best] < _HOPELESS:
             return replace(current, names=names)  # as good as without it, and never chosen
-        least = _KEPT * promises[best] if promises[best] > _LIKELY else -_WORSE
-        short = self._begun(
-            current, predictor, [candidate.starts[k] for k in np.argsort(promises)[::-1]], bounds, least
-        )
+        ordered = [candidate.starts[k] for k in np.argsort(promises)[::-1]]
+        believed = candidate.screened and promises[best] > _LIKELY
+        short = self._begun(current, predictor, ordered, bounds, _KEPT * promises[best] if believed else None)
         # What promises much may have to climb first: maps that took up a cause must give it back before it shows.
         if promises[best] < _LIKELY and float(now.loss.sum() - short.loss.sum()) < _HOPELESS:
             self.tried += 1
             self._known[key] = Scored(names, short, cross_validated(short, self._fold, bounds))
         return self.score(names, short.parameters, short)
 
-    def _begun(self, current: Scored, predictor: Predictor, starts: list[Floats], bounds: Floats, least: float) -> Fit:
+    def _begun(
+        self, current: Scored, predictor: Predictor, starts: list[Floats], bounds: Floats, least: float | None
+    ) -> Fit:
         """Return a fit of some steps from the first of `starts`, or the best of them where it gains less than `least`.
 
         A start is far from the valley, for the maps have taken up what it adds, and the way down may end anywhere: then
-        the maps are first fitted beside it, held where it starts.
+        the maps are first fitted beside it, held where it starts. Where nothing can be expected (`least` is None), that
+        is done if the fit ends worse than without, and for a few steps only.
         """
         found = [self._first_steps(current, predictor, starts[0], bounds)]
-        if current.fit.loss.sum() - found[0].loss.sum() <= least:
+        iterations = _SHORT if least is None else _LONG
+        if current.fit.loss.sum() - found[0].loss.sum() <= (-_WORSE if least is None else least):
             for start in starts[:_MOST_STARTS]:
                 held = bounds.copy()
                 held[-len(start) :] = start[:, None]
-                beside = self._first_steps(current, predictor, start, held)
-                found.append(self._first_steps(current, predictor, start, bounds, beside))
+                beside = self._first_steps(current, predictor, start, held, iterations=iterations)
+                found.append(self._first_steps(current, predictor, start, bounds, beside, iterations=iterations))
         return min(found, key=lambda one: float(one.loss.sum()))
 
     @staticmethod
     def _first_steps(
-        current: Scored, predictor: Predictor, start: Floats, bounds: Floats, beside: Fit | None = None
+        current: Scored,
+        predictor: Predictor,
+        start: Floats,
+        bounds: Floats,
+        beside: Fit | None = None,
+        *,
+        iterations: int = _SHORT,
     ) -> Fit:
         now = current.fit
         return fit(
@@ -272,7 +281,7 @@ class Selector:
             bounds,
             offsets=(beside or now).offsets,
             scatter=(beside or now).scatter,
-            iterations=_SHORT,
+            iterations=iterations,
             near=now.linear,
         )
 

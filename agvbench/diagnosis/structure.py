@@ -23,6 +23,7 @@ _PERIODS_M = np.geomspace(0.1, 1.0, 25)
 _FLIPS = 4999
 _SWINGS_M = np.geomspace(0.15, 1.0, 48)
 _SHUFFLES, _LEAST_STEPS, _STEPS_PER_SWING, _LEAST_SWING = 999, 12, 1.6, 0.3
+_SWING_ALPHA = 5e-3  # as many shuffles resolve
 
 
 @dataclass(frozen=True)
@@ -175,7 +176,7 @@ def swing(rates: Rates, seed: int) -> Dependence | None:
             chance += _explained(rng.permuted(np.tile(rest, (_SHUFFLES, 1)), axis=1), waves)
         p_value = (1.0 + float(np.count_nonzero(chance.max(axis=1) >= size[period]))) / (_SHUFFLES + 1.0)
         best = Dependence(RANDOM_PHASE, feature, p_value, float(share[period]))
-    return best
+    return best if best is not None and best.p_value < _SWING_ALPHA else None
 
 
 def _bent(distance: Floats, weight: Floats, value: Floats) -> tuple[Floats, Floats]:

@@ -141,6 +141,26 @@ def test_a_disc_beside_a_lag_is_counted_in_what_is_predicted_after(tiny_campaign
     assert position["after"] < 1.5 * position["floor"] < 0.2 * position["before"]
 
 
+def seam(rates: Rates, *, turn_rad: float, place_m: float, direction_rad: float) -> Rates:
+    across = np.array([math.cos(direction_rad), math.sin(direction_rad)])
+    before, after = (p[:, :2] @ across > place_m for p in (rates.begin, rates.end))
+    kicks = np.zeros_like(rates.value)
+    kicks[:, 2] = turn_rad * (after.astype(float) - before) * rates.covariates["direction"] / rates.weight
+    return dataclasses.replace(rates, value=rates.value + kicks)
+
+
+def test_a_seam_between_the_directions_tried_is_found_though_one_run_went_astray():
+    rates = seam(drives(3), turn_rad=0.06, place_m=0.3, direction_rad=-0.14)
+    rates.value[100, 2] += 20.0
+    found = next(start for start in screened(rates) if start.term is terms.TurnAtLine)
+    turn_rad, place_m, direction_rad = found.values[0]
+    if math.cos(direction_rad) < 0.0:
+        turn_rad, place_m, direction_rad = -turn_rad, -place_m, direction_rad - math.pi
+    assert turn_rad == pytest.approx(0.06, abs=0.02)
+    assert place_m == pytest.approx(0.3, abs=0.05)
+    assert math.remainder(direction_rad + 0.14, math.tau) == pytest.approx(0.0, abs=0.1)
+
+
 @pytest.mark.slow
 def test_steering_that_warms_up_within_the_session_is_described_by_campaign_time(tiny_campaign):
     found = diagnose(tiny_campaign(Tiny(warm_gain=0.2)))
