@@ -10,7 +10,7 @@ from agvbench.adapters.contract import AgvAdapter
 from agvbench.adapters.hosting import Host
 from agvbench.bus.clock import Clock
 from agvbench.bus.command_message import CommandFlags, CommandMessage, decode_command
-from agvbench.bus.event_message import Level
+from agvbench.bus.event_message import RUNNER_SILENT, Level
 from agvbench.bus.identity_message import encode_agv_identity
 from agvbench.bus.keys import AGV, REPLAY, RESET, Keys
 from agvbench.bus.request_message import decode_replay, decode_reset
@@ -58,6 +58,7 @@ class AgvHost(Host):
         self._subscriber = session.declare_subscriber(keys.command, zenoh.handlers.FifoChannel(_COMMANDS_WAITING))
         self._closed, self._left = threading.Event(), False
         self._outdated: dict[int, int] = {}  # by source: the last command sent before the vehicle was placed anew
+        self._told_of_hanging = False
         adapter.start(self)
         self._run("commands", self._serve_commands)
         if not self._lock_step:
@@ -165,18 +166,35 @@ class AgvHost(Host):
     def _watch(self) -> None:
         """Stop a vehicle whose runner has fallen silent, or whose adapter does not come back from a command."""
         while not self._clock.wait(self._closed, SILENCE_LIMIT_S / 5.0):
-            heard_s = self._heard_s
-            if heard_s is not None and self._clock.now() - heard_s > SILENCE_LIMIT_S:
-                self._heard_s = None
-                if self._lock.acquire(timeout=_HANG_PATIENCE_S):
-                    try:
-                        self._adapter.stop()
-                    finally:
-                        self._lock.release()
-                    self.event(Level.WARNING, "runner_silent", f"no command for {SILENCE_LIMIT_S} s: vehicle stopped")
-                else:
-                    self._tell_of_hanging()
-                    self._adapter.stop()
+            if not self._is_silent():
+                continue
+            try:
+                self._stop_unheard()
+            except Exception as error:  # noqa: BLE001  (whoever watches must go on watching, whatever a stop raises)
+                self._fail(error)
+
+    def _is_silent(self) -> bool:
+        heard_s = self._heard_s
+        return heard_s is not None and self._clock.now() - heard_s > SILENCE_LIMIT_S
+
+    def _stop_unheard(self) -> None:
+        if not self._lock.acquire(timeout=_HANG_PATIENCE_S):
+            # Neither may wait for the other: a stop may need what the command holds, and so may an event. Silence lasts
+            # until there was a stop with nothing else under way: what hangs may come back, and drive.
+            if not self._told_of_hanging:
+                self._told_of_hanging = True
+                threading.Thread(target=self._tell_of_hanging, daemon=True).start()
+            self._adapter.stop()
+            return
+        try:
+            self._told_of_hanging = False
+            if not self._is_silent():
+                return
+            self._adapter.stop()
+            self._heard_s = None
+        finally:
+            self._lock.release()
+        self.event(Level.WARNING, RUNNER_SILENT, f"no command for {SILENCE_LIMIT_S} s: vehicle stopped")
 
     def _tell_of_hanging(self) -> None:
         error = AdapterGoneError(

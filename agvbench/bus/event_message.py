@@ -14,6 +14,9 @@ from agvbench.bus.wire import MAX_TEXT_BYTES, Kind, Reader, pack_header, pack_te
 
 _BODY = struct.Struct("<QdB")
 
+RUNNER_SILENT = "runner_silent"
+"""The kind of the event by which a vehicle says that it stopped itself, having heard nothing."""
+
 
 class Level(IntEnum):
     """How grave an event is."""

@@ -77,8 +77,8 @@ class Presence:
         if not self._gone_since_s:
             return
         for role in roles:
-            if role in self._gone_since_s:
-                gone_s = self._clock.now() - self._gone_since_s[role]
+            if (since_s := self._gone_since_s.get(role)) is not None:
+                gone_s = self._clock.now() - since_s
                 raise AdapterGoneError(
                     f"the {role} adapter vanished",
                     where=self._keys.root,

@@ -12,7 +12,7 @@ import numpy as np
 from agvbench.bus.clock import Clock, wait_until
 from agvbench.bus.clock_offset import measure_offset
 from agvbench.bus.command_message import CommandFlags
-from agvbench.bus.event_message import Event, Level
+from agvbench.bus.event_message import RUNNER_SILENT, Event, Level
 from agvbench.bus.frames_message import FramesMessage, unpack_columns
 from agvbench.bus.heartbeat import Heartbeat
 from agvbench.bus.inbox import Inbox
@@ -58,6 +58,7 @@ class RealTime:
         self._start_s: float | None = None
         self._last_t_s = -np.inf
         self._offset_s = 0.0
+        self._driven = False
         self._thread = threading.Thread(target=self._receive, name="agvbench-inbox", daemon=True)
         self._thread.start()
         self._heartbeat = Heartbeat(session, keys.question(AGV, TIME), clock, self._fail)
@@ -76,8 +77,21 @@ class RealTime:
                 return
             if isinstance(report, FramesMessage):
                 self._keep(report)
-            elif isinstance(report, Event) and report.level == Level.ERROR:
-                self._failure = report.as_error()
+            elif isinstance(report, Event):
+                self._hear(report)
+
+    def _hear(self, event: Event) -> None:
+        if event.level == Level.ERROR:
+            self._failure = event.as_error()
+        elif event.kind == RUNNER_SILENT and self._driven:
+            self._fail(
+                LinkError(
+                    "the vehicle stopped itself while it was driven",
+                    where=self._keys.root,
+                    value=event.text,
+                    remedy="keep this machine free of other work; the run does not count",
+                )
+            )
 
     def _keep(self, message: FramesMessage) -> None:
         """Keep frames until they are taken; where nobody takes them for long, what comes then is dropped."""
@@ -101,6 +115,7 @@ class RealTime:
         self._last_t_s = t_s
         wait_until(self._clock, self._start_s + t_s)
         self._check()
+        self._driven = command.drive != self._neutral.drive
         self._outbox.send(command, t_s, hold_s)
         end_s = self._start_s + t_s + hold_s
         while (left_s := end_s - self._clock.now()) > KEEP_ALIVE_S:
@@ -123,6 +138,7 @@ class RealTime:
 
     def stop(self) -> None:
         """Command neutral, and wait for nothing."""
+        self._driven = False
         self._outbox.send(self._neutral, 0.0, 0.0, CommandFlags.STOP)
 
     def close(self) -> None:

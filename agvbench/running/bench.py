@@ -19,7 +19,7 @@ from agvbench.running.placers.placer import Rig
 from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess
 from agvbench.running.records import DriveOrder, record_aborted, recorded_run
 from agvbench.running.settings import BenchSettings
-from agvbench.running.supervision import Supervisor
+from agvbench.running.supervision import DEFAULT_SAFETY, Supervisor
 from agvbench.types import Command, Frames, Run
 
 
@@ -54,7 +54,8 @@ class Bench:
         self._latch, self.pause = Latch(), Pause(writer.path)
         self._recorded = recorded
         workspace = Workspace.parse(settings.workspace)
-        self._supervisor = Supervisor(workspace, nominal.neutral)
+        safety = replace(DEFAULT_SAFETY, flickers=not self._identity.simulated)
+        self._supervisor = Supervisor(workspace, nominal.neutral, safety)
         self._placer = make_placer(settings.place, Rig(link, nominal, workspace, self._supervisor, limits))
 
     def model(self, condition: str) -> VehicleModel:

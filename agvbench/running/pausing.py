@@ -57,6 +57,7 @@ class Pause:
         self._tell(f"paused before {before}, the vehicle at neutral: press Ctrl-Z or remove {self._file} to go on")
         while self.is_asked():
             stand()
+        self._by_signal = False
         self._tell("going on")
 
     @contextmanager
@@ -80,7 +81,8 @@ class Pause:
                 signal.signal(number, handler)
 
     def _signalled(self, number: int, _: FrameType | None) -> None:
-        with suppress(OSError):  # without its directory the session ends by itself
+        # Without its directory the session ends by itself; and what is just being printed cannot be printed into.
+        with suppress(OSError, RuntimeError):
             if number == signal.SIGTSTP and not self.is_asked():
                 self._file.touch()
                 self._by_signal = True

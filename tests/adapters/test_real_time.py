@@ -6,6 +6,7 @@ import threading
 import time
 
 import numpy as np
+import pytest
 from rig_driving import NEUTRAL, START, TINY
 
 from agvbench.adapters import AdapterOptions, open_rig
@@ -18,6 +19,7 @@ from agvbench.bus.identity_message import AgvIdentity
 from agvbench.bus.keys import Keys
 from agvbench.bus.request_message import encode_time
 from agvbench.bus.session import open_session
+from agvbench.errors import LinkError
 from agvbench.types import Command, Frames
 
 
@@ -93,6 +95,62 @@ def test_a_vehicle_whose_runner_falls_silent_is_stopped() -> None:
         adapter.stopped.clear()
         host.close()
         assert adapter.stopped.is_set()
+
+
+class Jammed(Silent):
+    """Cannot be stopped the first time."""
+
+    def stop(self) -> None:
+        if not self.stopped.is_set():
+            self.stopped.set()
+            raise RuntimeError("jammed")
+        self.fourth_came.set()
+
+
+def test_a_stop_that_fails_is_told_and_tried_again() -> None:
+    adapter, keys = Jammed(), Keys("lab", "agv1")
+    with open_session() as session:
+        events = session.declare_subscriber(keys.report)
+        host = AgvHost(session, keys, adapter, WallClock(), show=lambda _: None)
+        session.put(keys.command, encode_command(CommandMessage(1, 0.0, NEUTRAL, 10.0)))
+        assert b"jammed" in events.recv().payload.to_bytes()
+        assert adapter.fourth_came.wait(10.0)
+        host.close()
+
+
+class Hanging(Silent):
+    """Does not come back from its first command until it is let go, and drives then."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.let_go, self.stops_after = threading.Event(), threading.Event()
+
+    def apply(self, message: CommandMessage) -> None:
+        self.let_go.wait(10.0)
+        super().apply(message)
+
+    def stop(self) -> None:
+        (self.stops_after if self.applied else self.stopped).set()
+
+
+def test_what_hangs_and_comes_back_driving_is_stopped_again() -> None:
+    adapter, keys = Hanging(), Keys("lab", "agv1")
+    with open_session() as session:
+        host = AgvHost(session, keys, adapter, WallClock(), show=lambda _: None)
+        session.put(keys.command, encode_command(CommandMessage(1, 0.0, NEUTRAL, 10.0)))
+        assert adapter.stopped.wait(10.0)
+        adapter.let_go.set()
+        assert adapter.stops_after.wait(10.0)
+        host.close()
+
+
+def test_a_run_in_which_the_vehicle_stopped_itself_does_not_count() -> None:
+    with open_rig("live", plant=TINY) as link:
+        link.reset(START, run_key="a")
+        link.exchange(Command(1900.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.1)
+        time.sleep(1.2)
+        with pytest.raises(LinkError, match="stopped itself while it was driven"):
+            link.exchange(Command(1900.0, 1500.0, 1500.0), t_s=0.1, hold_s=0.1)
 
 
 def test_lost_commands_and_nonsense_are_told_and_do_not_stop_the_host() -> None:

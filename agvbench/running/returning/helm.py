@@ -31,6 +31,11 @@ class Helm:
         self.ahead_m = centre_ahead(_mode(model), model.geometry)
         self._levers = (model.geometry.front_axle_m - self.ahead_m, -model.geometry.rear_axle_m - self.ahead_m)
         self._most_per_m = self._curvature_at(_STEERED)
+        if not self._most_per_m > 0.0:
+            raise PlanError(
+                "a vehicle that cannot steer both ways cannot drive itself back", where=f"vehicle {model.name}",
+                value=f"a radius of {math.inf:g} m", remedy="bench with --place operator, or mend its steering maps",
+            )  # fmt: skip
 
     @property
     def radius_m(self) -> float:

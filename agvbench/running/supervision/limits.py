@@ -13,7 +13,8 @@ class SafetyLimits:
     [s] how long a camera that is never quite still may say the very same pose of a vehicle that was told to drive,
     ``jump_m`` [m] how far a vehicle may be from where it was going,
     ``clock_s`` [s] how far a camera's clock may be off. ``braking_s`` [s] is how long it takes to come to
-    rest (thesis 8.1: 0.59 s), at half its speed on average: so far ahead of the edge it is told to.
+    rest (thesis 8.1: 0.59 s), at half its speed on average: so far ahead of the edge it is told to. ``flickers`` says
+    that the camera is known to be never quite still, as every real one is.
     """
 
     watch_s: float = 0.1
@@ -22,6 +23,7 @@ class SafetyLimits:
     jump_m: float = 0.3
     clock_s: float = 0.1
     braking_s: float = 0.59
+    flickers: bool = False
 
 
 DEFAULT_SAFETY = SafetyLimits()

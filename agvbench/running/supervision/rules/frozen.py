@@ -12,11 +12,11 @@ from agvbench.running.supervision.rule import Rule, Slice
 class Frozen(Rule):
     """Stops on a stream that repeats itself: a real camera is never quite still.
 
-    A camera without noise says the same pose of a vehicle that stands still; so this holds only for one that was seen
-    to flicker in this run.
+    A simulated camera without noise says the same pose of a vehicle that stands still; so this holds only for one that
+    is known to flicker, or was seen to in this run.
     """
 
-    _flickers = False
+    _seen_to_flicker = False
     _pose: tuple[float, ...] = ()
     _since_s = math.nan
 
@@ -29,12 +29,13 @@ class Frozen(Rule):
         moved = bool(changed.any())
         if self._pose:
             moved = moved or last != self._pose
-            self._flickers = self._flickers or moved
+            self._seen_to_flicker = self._seen_to_flicker or moved
         if moved or not self._pose:
             after = int(np.flatnonzero(changed)[-1]) + 1 if changed.any() else 0
             self._since_s = float(seen.t_s[after])
         self._pose = last
         still_s = float(seen.t_s[-1]) - self._since_s
-        if not self._flickers or min(still_s, seen.driving_s) <= self.limits.frozen_s:
+        flickers = self.limits.flickers or self._seen_to_flicker
+        if not flickers or min(still_s, seen.driving_s) <= self.limits.frozen_s:
             return None
         return "tracking is frozen", f"the same pose for {still_s:.2f} s", f"{self.limits.frozen_s:g} s"
