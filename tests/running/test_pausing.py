@@ -83,6 +83,15 @@ def test_fg_goes_on_after_ctrl_z_but_ends_nobody_elses_pause(tmp_path: Path) -> 
         assert pause.is_asked()
 
 
+@pytest.fixture
+def ctrl_c() -> Iterator[None]:
+    """Hear Ctrl-C though whatever started the tests, in the background of a shell, has them ignore it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_ends_a_pause(tmp_path: Path, told: list[str]) -> None:
     path = tmp_path / "campaign"
 
