@@ -20,10 +20,11 @@ def test_there_are_many_faults_each_with_its_own_name() -> None:
 
 @pytest.fixture(autouse=True)
 def heard() -> Iterator[None]:
-    """Hear signals that whatever started the tests has them ignore, as ``nohup`` does SIGHUP."""
-    ignored = [number for number in (signal.SIGHUP, signal.SIGTERM) if signal.getsignal(number) is signal.SIG_IGN]
+    """Hear signals that whatever started the tests has them ignore, as ``nohup`` does SIGHUP and ``&`` SIGINT."""
+    heard = {signal.SIGINT: signal.default_int_handler, signal.SIGHUP: signal.SIG_DFL, signal.SIGTERM: signal.SIG_DFL}
+    ignored = [number for number in heard if signal.getsignal(number) is signal.SIG_IGN]
     for number in ignored:
-        signal.signal(number, signal.SIG_DFL)
+        signal.signal(number, heard[number])
     yield
     for number in ignored:
         signal.signal(number, signal.SIG_IGN)
