@@ -73,15 +73,14 @@ class Descent:
             before = view.loss
         return state, not (whole or ended)
 
-    def excursion(self, state: State) -> State | None:
-        """Return a better state that lies across a bend, or None.
+    def excursion(self, state: State, view: View) -> State | None:
+        """Return a better state that lies across a bend, or None; `view` is what is seen from `state`.
 
         Maps that took up a cause give it back along a curved and narrow valley: every whole step leaves it, and short
         ones creep. So whole steps are taken for a while, however much worse they are at first; the scatter grows with
         the residual, which widens the valley (the watchdog technique of Chamberlain and others, Mathematical
         Programming Study 16, 1982).
         """
-        view = self.look(state)
         start, near = view.loss, view.linear
         point = self._stepper(state, view).whole(self._point(state, view), view.terms)
         now = self._arrive(point, state, view)

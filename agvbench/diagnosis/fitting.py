@@ -90,10 +90,11 @@ def fit(
     scatter = scatter or (first_scatter() if predictor.readings.begins is None else scatter_of_windows(readings))
     descent = Descent(predictor, bounds)
     state, creeps = descent.go(State(parameters.copy(), offsets, scatter), iterations, near)
-    # Only a fit that is to be believed is worth the way across a bend.
-    if creeps and iterations > _ITERATIONS and (beyond := descent.excursion(state)) is not None:
-        state, _ = descent.go(beyond, iterations)
     view = descent.look(state)
+    # Only a fit that is to be believed is worth the way across a bend.
+    if creeps and iterations > _ITERATIONS and (beyond := descent.excursion(state, view)) is not None:
+        state, _ = descent.go(beyond, iterations)
+        view = descent.look(state)
     terms = view.terms
     return Fit(
         predictor, state.parameters, state.offsets, state.scatter,

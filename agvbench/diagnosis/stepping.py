@@ -39,9 +39,10 @@ class Stepper:
         Where no part of a step does, it is damped (Levenberg and Marquardt): a value that the runs hardly depend on
         must not carry all others away.
         """
-        now = self._objective(point)
+        now, (matrix, gradient) = self._objective(point), self._normal_equations(terms)
         for damping in _DAMPINGS:
-            move, move_offsets = self._move(point, terms, damping)
+            damped = matrix + damping * np.diag(np.diagonal(matrix))
+            move, move_offsets = self._move(point, terms, damped, gradient)
             for share in _SHARES:
                 tried = self._at(point, share * move, share * move_offsets)
                 if self._objective(tried) <= now:
@@ -50,7 +51,7 @@ class Stepper:
 
     def whole(self, point: Point, terms: Terms) -> Point:
         """Return the point after a whole step, be it worse."""
-        return self._at(point, *self._move(point, terms, 0.0))
+        return self._at(point, *self._move(point, terms, *self._normal_equations(terms)))
 
     def _at(self, point: Point, move: Floats, move_offsets: Floats) -> Point:
         maps = self.predictor.maps.size
@@ -61,10 +62,11 @@ class Stepper:
     def _objective(self, point: Point) -> float:
         return objective(self.predictor, point.residual, point.offsets, self.scatter)
 
-    def _move(self, point: Point, terms: Terms, damping: float) -> tuple[Floats, Floats]:
-        matrix = terms.information.sum(axis=0) + ridge(self.predictor)
-        damped = matrix + damping * np.diag(np.diagonal(matrix))
-        move = self._bounded(damped, terms.gradient.sum(axis=0), point.parameters)
+    def _normal_equations(self, terms: Terms) -> tuple[Floats, Floats]:
+        return terms.information.sum(axis=0) + ridge(self.predictor), terms.gradient.sum(axis=0)
+
+    def _move(self, point: Point, terms: Terms, matrix: Floats, gradient: Floats) -> tuple[Floats, Floats]:
+        move = self._bounded(matrix, gradient, point.parameters)
         return move, np.einsum("rij,rj->ri", terms.inner_inverse, terms.pull - terms.mixed @ move)
 
     def _bounded(self, matrix: Floats, gradient: Floats, parameters: Floats) -> Floats:
