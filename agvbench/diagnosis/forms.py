@@ -95,34 +95,27 @@ def _another_law_alone(selection: Selection, selector: Selector) -> Selection:
     A cause that is strong, and of another law, pulls the maps along: what they then say of runs left out is far off.
     """
     base = selection.base
-    alone = {form: selector.known((*base.names, form.form_of)) for form in effect_forms().values()}
-    fitted = {form: float((base.fit.loss - model.fit.loss).sum()) for form, model in alone.items() if model}
-    likely = sorted((form for form, gain in fitted.items() if gain > _LIKELY), key=lambda form: -fitted[form])
+    known = ((form, selector.known((*base.names, form.form_of))) for form in effect_forms().values())
+    fitted = [(float((base.fit.loss - model.fit.loss).sum()), form, model) for form, model in known if model]
+    likely = sorted((one for one in fitted if one[0] > _LIKELY), key=lambda one: -one[0])[:_MOST_ALONE]
     if not likely:
         return selection
-    wide, offers = wider(selector), []
-    for form in likely[:_MOST_ALONE]:
-        kind, model = candidate(form), alone[form]
-        assert model is not None  # noqa: S101  (for the type checker)
-        starts = np.clip(np.array(form.starts(_values(model, form.form_of))), kind.bounds[:, 0], kind.bounds[:, 1])
-        wide.candidates[form.name] = replace(kind, starts=starts)
-        offers.append(_swapped(wide, model, {form.form_of}, form.name))
-    worthy = [offer for offer in offers if wide.earns(base, offer)]
+    wide = wider(selector)
+    worthy = [
+        (law, offer)
+        for law, model in ((_Law(form.form_of, form, _starts_near(form, model)), model) for _, form, model in likely)
+        for offer in _offers(wide, model, law)
+        if wide.earns(base, offer)
+    ]
     if not worthy:
         return selection
-    best = min(worthy, key=lambda offer: offer.total)
-    (name,) = {*best.names} - {*base.names}
-    wide.tell(f"{name}: gains {base.total - best.total:.0f}")
+    law, best = min(worthy, key=lambda pair: pair[1].total)
+    name, gain = law.form.name, base.total - best.total
+    wide.tell(f"{name}: gains {gain:.0f}")
     selector.candidates[name] = form_candidates()[name]
-    rejected = {n: g for n, g in selection.rejected.items() if n != cause_of(name)}
-    rivals = {
-        cause_of(other): offer.total - best.total
-        for offer in worthy
-        for other in {*offer.names} - {*best.names}
-        if offer.total - best.total < RIVAL_MARGIN and cause_of(other) != cause_of(name)
-    }
-    gains = {name: base.total - best.total}
-    return Selection(base, best, {name: rivals}, gains, rejected, selection.tried + wide.tried)
+    rejected = {n: g for n, g in selection.rejected.items() if n != law.out}
+    rivals = {name: _other_causes(best, name, worthy)}
+    return Selection(base, best, rivals, {name: gain}, rejected, selection.tried + wide.tried)
 
 
 def reform_and_resettle(selection: Selection, selector: Selector) -> tuple[Selection, Selector]:
@@ -155,14 +148,19 @@ def _laws(selection: Selection, selector: Selector, wide: Selector, name: str) -
             continue
         kind = candidate(form)
         if rest.total - model.total >= _HALF * (rest.total - chosen.total):
-            starts = np.array(form.starts(_values(model, form.form_of)))
-            yield _Law(name, form, np.clip(starts, kind.bounds[:, 0], kind.bounds[:, 1]))
+            yield _Law(name, form, _starts_near(form, model))
             continue
         # The library's law may fail where another does not.
         larger = Predictor(wide.batch, (*rest.names, form.name))
         promises = [promised_gain(rest.fit, larger, start, kind.bounds) for start in kind.starts]
         if max(promises) >= _HALF * float(rest.fit.loss.sum() - chosen.fit.loss.sum()):
             yield _Law(name, form, kind.starts[[int(np.argmax(promises))]])
+
+
+def _starts_near(form: type[Form], model: Scored) -> Floats:
+    """Return starts (n, p) of a law near the library's, as `model` has it."""
+    bounds = candidate(form).bounds
+    return np.clip(np.array(form.starts(_values(model, form.form_of))), bounds[:, 0], bounds[:, 1])
 
 
 def _values(model: Scored, name: str) -> dict[str, float]:
