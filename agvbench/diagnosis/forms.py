@@ -160,7 +160,8 @@ def _laws(selection: Selection, selector: Selector, wide: Selector, name: str) -
 def _starts_near(form: type[Form], model: Scored) -> Floats:
     """Return starts (n, p) of a law near the library's, as `model` has it."""
     bounds = candidate(form).bounds
-    return np.clip(np.array(form.starts(_values(model, form.form_of))), bounds[:, 0], bounds[:, 1])
+    starts: Floats = np.clip(np.array(form.starts(_values(model, form.form_of))), bounds[:, 0], bounds[:, 1])
+    return starts
 
 
 def _values(model: Scored, name: str) -> dict[str, float]:
