@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from agvbench.adapters.contract import AdapterOptions, AgvAdapter, AgvReports
 from agvbench.adapters.impairment.fault import Line, vehicle_fault
+from agvbench.adapters.impairment.faults import Faults
 from agvbench.adapters.impairment.spec import SCHEME, Impairment, parse_address
 from agvbench.adapters.registry import open_agv
-from agvbench.adapters.seeding import run_seed
 from agvbench.bus.command_message import CommandFlags, CommandMessage
 from agvbench.bus.identity_message import AgvIdentity
 from agvbench.bus.request_message import Replay, Reset
@@ -26,14 +24,12 @@ class ImpairedAgv(AgvAdapter):
     scheme = SCHEME
 
     def __init__(self, vehicle: AgvAdapter, impairments: list[Impairment], options: AdapterOptions) -> None:
-        self.vehicle, self._seed = vehicle, options.seed
-        self._faults = [(when, vehicle_fault(when)) for when in impairments]
+        self.vehicle, self._faults = vehicle, Faults(impairments, vehicle_fault, seed=options.seed)
         line = getattr(vehicle, "line", None)
         self._line = line if isinstance(line, Line) else None
         for when, fault in self._faults:
             if fault.needs_line and self._line is None:
                 raise LinkError("vehicle has no serial line", where=f"{SCHEME}:{when.name}", value=vehicle.scheme)
-        self._run, self._runs_begun = 1, 0
         self._neutral = options.neutral_command
 
     @classmethod
@@ -50,8 +46,7 @@ class ImpairedAgv(AgvAdapter):
     def identity(self) -> AgvIdentity:
         """Return who the vehicle is, and that it is impaired."""
         identity = self.vehicle.identity()
-        faults = " ".join(when.name for when, _ in self._faults)
-        return replace(identity, extra={**identity.extra, "impaired": faults})
+        return replace(identity, extra={**identity.extra, "impaired": self._faults.names})
 
     def start(self, reports: AgvReports) -> None:
         """Let the vehicle report."""
@@ -61,7 +56,7 @@ class ImpairedAgv(AgvAdapter):
         """Let the faults strike that hold by now, and then the vehicle have its command."""
         if not message.flags & CommandFlags.FLUSH:
             for when, fault in self._faults:
-                if when.holds(self._run, message.t_s):
+                if when.holds(self._faults.run, message.t_s):
                     fault.strike(self._line)
                     message = message._replace(command=fault.alter(message.command, self._neutral))
         self.vehicle.apply(message)
@@ -77,13 +72,9 @@ class ImpairedAgv(AgvAdapter):
         self.vehicle.replay(request)
 
     def _begin(self, request: Reset) -> None:
-        self._runs_begun += 1
-        self._run = self._runs_begun
-        rng = np.random.default_rng(run_seed(self._seed, request.run_key, "impairment", bits=128))
         if self._line is not None:
             self._line.wire = bytes
-        for _, fault in self._faults:
-            fault.begin(rng)
+        self._faults.begin(request.run_key)
 
     def stop(self) -> None:
         """Stop the vehicle, as far as the faults let it hear of that."""

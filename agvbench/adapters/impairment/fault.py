@@ -77,6 +77,21 @@ class VehicleFault(Fault):
         """Let go of whoever is held; the adapter is closed."""
 
 
+class LineFault(VehicleFault):
+    """Befalls the bytes on their way to a vehicle with a serial line."""
+
+    needs_line = True
+
+    def strike(self, line: Line | None) -> None:
+        """Take over the wire."""
+        assert line is not None  # noqa: S101  (the adapter was asked)
+        line.wire = self.carry
+
+    @abstractmethod
+    def carry(self, data: bytes) -> bytes:
+        """Return what arrives of `data`."""
+
+
 def frame_fault(impairment: Impairment) -> FrameFault:
     """Return the fault of frames that `impairment` names, or raise `LinkError`."""
     fault = _make(impairment, _FRAMES)

@@ -9,9 +9,9 @@ import numpy as np
 
 from agvbench.adapters.contract import AdapterOptions, MocapAdapter, MocapReports
 from agvbench.adapters.impairment.fault import frame_fault
+from agvbench.adapters.impairment.faults import Faults
 from agvbench.adapters.impairment.spec import SCHEME, Impairment, parse_address
 from agvbench.adapters.registry import open_mocap
-from agvbench.adapters.seeding import run_seed
 from agvbench.bus.event_message import Level
 from agvbench.bus.frames_message import FrameClock
 from agvbench.bus.identity_message import MocapIdentity
@@ -29,10 +29,8 @@ class ImpairedMocap(MocapAdapter):
     scheme = SCHEME
 
     def __init__(self, camera: MocapAdapter, impairments: list[Impairment], options: AdapterOptions) -> None:
-        self._camera, self._seed = camera, options.seed
-        self._faults = [(when, frame_fault(when)) for when in impairments]
-        self._run, self._origin_s = 1, math.nan
-        self._runs_begun = 0
+        self._camera, self._origin_s = camera, math.nan
+        self._faults = Faults(impairments, frame_fault, seed=options.seed)
 
     @classmethod
     def open(cls, address: str, options: AdapterOptions) -> ImpairedMocap:
@@ -45,8 +43,7 @@ class ImpairedMocap(MocapAdapter):
     def identity(self) -> MocapIdentity:
         """Return who the camera is, and that it is impaired."""
         identity = self._camera.identity()
-        faults = " ".join(when.name for when, _ in self._faults)
-        return replace(identity, extra={**identity.extra, "impaired": faults})
+        return replace(identity, extra={**identity.extra, "impaired": self._faults.names})
 
     def start(self, reports: MocapReports) -> None:
         """Stand between the camera and `reports`."""
@@ -55,11 +52,7 @@ class ImpairedMocap(MocapAdapter):
 
     def reset(self, request: Reset) -> Sampling:
         """Begin a run."""
-        self._runs_begun += 1
-        self._run = self._runs_begun
-        rng = np.random.default_rng(run_seed(self._seed, request.run_key, "impairment", bits=128))
-        for _, fault in self._faults:
-            fault.begin(rng)
+        self._faults.begin(request.run_key)
         return self._camera.reset(request)
 
     def see(self, truth: Truth) -> None:
@@ -80,10 +73,10 @@ class ImpairedMocap(MocapAdapter):
 
     def _struck(self, when: Impairment, frames: Frames, clock: FrameClock) -> np.ndarray:
         if clock is FrameClock.RUN:
-            return np.array([when.holds(self._run, t_s) for t_s in frames.t_s.tolist()], np.bool_)
+            return np.array([when.holds(self._faults.run, t_s) for t_s in frames.t_s.tolist()], np.bool_)
         if math.isnan(self._origin_s) and len(frames):
             self._origin_s = float(frames.t_s[0])
-        return np.array([when.holds(self._run, t_s - self._origin_s) for t_s in frames.t_s.tolist()], np.bool_)
+        return np.array([when.holds(self._faults.run, t_s - self._origin_s) for t_s in frames.t_s.tolist()], np.bool_)
 
     def frame(
         self,

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from agvbench.adapters.impairment.fault import Line, VehicleFault
+from agvbench.adapters.impairment.fault import LineFault
 
 
-class Halved(VehicleFault):
+class Halved(LineFault):
     """A buffer that overflows: what is left of a line runs into the next."""
 
     name = "halved"
     usual = 0.1
-    needs_line = True
 
-    def strike(self, line: Line | None) -> None:
-        """Put the loss into the wire."""
-        assert line is not None  # noqa: S101  (the adapter was asked)
-        line.wire = self._half
-
-    def _half(self, data: bytes) -> bytes:
+    def carry(self, data: bytes) -> bytes:
+        """Keep the first half of some."""
         return data[: len(data) // 2] if self.rng.random() < self.value else data
