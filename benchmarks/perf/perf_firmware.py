@@ -17,12 +17,11 @@ import sys
 import time
 
 import numpy as np
+from firmware_needed import exit_code
 
 from agvbench.adapters import open_rig
-from agvbench.adapters.simavr.built import why_not_built
 from agvbench.adapters.simavr.host import CYCLES_PER_S, Pulse
 from agvbench.adapters.simavr.microcontroller import Microcontroller
-from agvbench.errors import AgvbenchError
 from agvbench.types import Command, Pose
 
 CHANNELS = ("drive", "front", "rear")
@@ -122,16 +121,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--commands", type=int, default=1000, metavar="N")
     arguments, _ = parser.parse_known_args()
-    if why := why_not_built():
-        print(f"perf_firmware: {why}", file=sys.stderr)
-        return 2
-    try:
+
+    def measure() -> None:
         responses(max(10, arguments.commands))
         speed()
-    except AgvbenchError as error:
-        print(f"perf_firmware: {error}", file=sys.stderr)
-        return 2
-    return 0
+
+    return exit_code(measure)
 
 
 if __name__ == "__main__":

@@ -19,12 +19,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from firmware_needed import exit_code
 from firmware_rides import FRAME_S, Rides
 from firmware_vehicle import believed
 
-from agvbench.adapters.simavr.built import why_not_built
 from agvbench.campaign import Campaign
-from agvbench.errors import AgvbenchError
 from agvbench.planning import load_trajectory, plan
 from agvbench.statistics import pose_errors
 from agvbench.statistics.published import CASES, published_end_poses
@@ -157,23 +156,19 @@ def main() -> int:
     parser.add_argument("--repeats", type=int, default=20, metavar="N")
     parser.add_argument("--out", type=Path, metavar="DIR")
     arguments, _ = parser.parse_known_args()
-    if why := why_not_built():
-        print(f"perf_firmware_compare: {why}", file=sys.stderr)
-        return 2
-    folder = arguments.out or Path(tempfile.mkdtemp(prefix="agvbench-firmware-"))
-    folder.mkdir(parents=True, exist_ok=True)
-    believed().save(vehicle := folder / "vehicle.toml")
-    try:
+
+    def measure() -> None:
+        folder = arguments.out or Path(tempfile.mkdtemp(prefix="agvbench-firmware-"))
+        folder.mkdir(parents=True, exist_ok=True)
+        believed().save(vehicle := folder / "vehicle.toml")
         campaigns = drive(folder, vehicle, arguments.repeats)
         print("\n── firmware 1 against firmware 2", flush=True)
         agvbench("compare", str(campaigns["1"]), str(campaigns["2"]), "--fail-on=never")
         ridden = rides("2")
         spreads({arm: pose_errors(Campaign.open(path)) for arm, path in campaigns.items()}, ridden)
         explains_all(ridden)
-    except AgvbenchError as error:
-        print(f"perf_firmware_compare: {error}", file=sys.stderr)
-        return 2
-    return 0
+
+    return exit_code(measure)
 
 
 if __name__ == "__main__":

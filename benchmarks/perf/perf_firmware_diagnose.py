@@ -18,13 +18,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from firmware_needed import exit_code
 from perf_firmware import CHANNELS, commands, respond
 from perf_firmware_compare import PROGRAM
 
-from agvbench.adapters.simavr.built import why_not_built
 from agvbench.campaign import Campaign
 from agvbench.diagnosis import diagnose
-from agvbench.errors import AgvbenchError
 
 if TYPE_CHECKING:
     from agvbench.diagnosis import Diagnosis
@@ -96,18 +95,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--only", default="", metavar="WORD")
     arguments, _ = parser.parse_known_args()
-    if why := why_not_built():
-        print(f"perf_firmware_diagnose: {why}", file=sys.stderr)
-        return 2
-    try:
+
+    def measure() -> None:
         measured_ms()
         for case in (case for case in CASES if arguments.only in case.name):
             with tempfile.TemporaryDirectory(prefix="agvbench-firmware-") as folder:
                 tell(case, diagnose(driven(case, Path(folder) / "campaign")))
-    except AgvbenchError as error:
-        print(f"perf_firmware_diagnose: {error}", file=sys.stderr)
-        return 2
-    return 0
+
+    return exit_code(measure)
 
 
 if __name__ == "__main__":

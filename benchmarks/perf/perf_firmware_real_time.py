@@ -16,9 +16,9 @@ import subprocess
 import sys
 import time
 
-from agvbench.adapters.simavr.built import why_not_built
+from firmware_needed import exit_code
+
 from agvbench.adapters.simavr.host import CYCLES_PER_S, Pulse, SimavrHost
-from agvbench.errors import AgvbenchError
 
 NEUTRAL_US, DRIVEN_US, TOLERANCE_US = 1500.0, 1700.0, 10.0
 LISTENED_S, GIVEN_UP_S = 5.0, 2.0
@@ -108,19 +108,15 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--kills", type=int, default=10, metavar="N")
     arguments, _ = parser.parse_known_args()
-    if why := why_not_built():
-        print(f"perf_firmware_real_time: {why}", file=sys.stderr)
-        return 2
-    try:
+
+    def measure() -> None:
         for version in ("1", "2"):
             pace, late_ms = pulses_on_time(version)
             row(f"firmware {version}: its seconds in a second", f"{pace:.5f}, pulses late by up to {late_ms:.1f} ms")
         killed("1", 2)
         killed("2", max(2, arguments.kills))
-    except AgvbenchError as error:
-        print(f"perf_firmware_real_time: {error}", file=sys.stderr)
-        return 2
-    return 0
+
+    return exit_code(measure)
 
 
 if __name__ == "__main__":
