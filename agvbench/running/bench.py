@@ -54,7 +54,7 @@ class Bench:
         self._latch, self.pause = Latch(), Pause(writer.path)
         self._recorded = recorded
         workspace = Workspace.parse(settings.workspace)
-        safety = replace(DEFAULT_SAFETY, flickers=not self._identity.simulated)
+        safety = replace(DEFAULT_SAFETY, flickers=not self._identity.simulated, exchange_s=settings.exchange)
         self._supervisor = Supervisor(workspace, nominal.neutral, safety)
         self._placer = make_placer(settings.place, Rig(link, nominal, workspace, self._supervisor, limits))
 

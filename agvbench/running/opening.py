@@ -16,7 +16,7 @@ from agvbench.adapters.camera_options import camera_options
 from agvbench.bus.bus_config import BusConfig
 from agvbench.bus.link import VehicleLink
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
-from agvbench.errors import VehicleError
+from agvbench.errors import FlagError, VehicleError
 from agvbench.model import VehicleModel, thesis_vehicle
 from agvbench.planning import Workspace
 from agvbench.running.bench import Bench
@@ -29,6 +29,7 @@ from agvbench.running.remainders import read_remainders
 from agvbench.running.session import BenchSession
 from agvbench.running.settings import SETTINGS_FILE, BenchSettings, settings_for_resume
 from agvbench.running.signals import interruptible
+from agvbench.running.supervision.limits import DEFAULT_SAFETY
 from agvbench.running.unbroken import UnbrokenLink
 from agvbench.running.vehicles import uncalibrated_vehicle
 from agvbench.types import Run
@@ -73,6 +74,7 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
     ):
         _check_unit(models["uncalibrated"], link)
         choose_placer(settings.place, simulated=link.identity().simulated)
+        _check_exchange(settings, link)
         header = _header(directory.name, models["uncalibrated"], link)
         writer = _writer(directory, settings, header, resume=resume, simulated=link.identity().simulated)
         bench = _bench(settings, models, link, writer)
@@ -119,6 +121,17 @@ def _check_unit(nominal: VehicleModel, link: VehicleLink) -> None:
             value=nominal.command_unit,
             limit=identity.command_unit,
             remedy="give the right file with --vehicle",
+        )
+
+
+def _check_exchange(settings: BenchSettings, link: VehicleLink) -> None:
+    if settings.exchange > DEFAULT_SAFETY.exchange_s and not link.identity().lock_step:
+        raise FlagError(
+            "a vehicle in real time must be watched while it drives",
+            where="--exchange",
+            value=f"{settings.exchange:g} s",
+            limit=f"{DEFAULT_SAFETY.exchange_s:g} s",
+            remedy="leave it out",
         )
 
 

@@ -66,6 +66,11 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
         {"metavar": "FILE"},
         "certificates and rules of a secured bus, as Zenoh writes them (default: none)",
     ),
+    (
+        "--exchange",
+        {"type": float, "metavar": "S"},
+        "tell a simulated vehicle for S seconds at a time: sooner driven, later stopped (default: 0.1, as a real one)",
+    ),
     ("--lab", {"metavar": "NAME"}, "name of the lab on the bus (default: lab)"),
 )
 SESSION_OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
@@ -12,6 +13,7 @@ import tomli_w
 
 from agvbench.adapters.impairment.spec import unimpaired, without_packet_faults
 from agvbench.errors import FileError, FlagError
+from agvbench.running.supervision.limits import DEFAULT_SAFETY
 from agvbench.text_files import read_toml
 
 SETTINGS_FILE = "bench.toml"
@@ -20,7 +22,7 @@ PLACES = ("auto", "operator", "teleport")
 MAPS = ("default", "thesis")
 _LARGEST_SEED = 2**63 - 1
 # What may differ between a session and the one that resumes it: none of these changes what is driven.
-_FREE_ON_RESUME = frozenset({"connect", "bus_config", "lab"})
+_FREE_ON_RESUME = frozenset({"connect", "bus_config", "lab", "exchange"})
 # A fault that was rehearsed may be taken away, or another one put in.
 _WITHOUT_FAULTS = {"agv": unimpaired, "mocap": unimpaired, "camera": without_packet_faults}
 
@@ -34,7 +36,7 @@ class BenchSettings:
     ``corrected`` the one with the effects that a diagnosis found ("" for none: the condition is not driven) and
     ``remainders`` what that model still misses; ``repeats`` 0 means what each benchmark declares; ``order`` is one of
     `ORDERS`; ``place``, one of `PLACES`, is how the vehicle comes to its starts ("" for the usual way); ``full`` drives
-    every pulse of the thesis.
+    every pulse of the thesis; ``exchange`` [s] is for how long a vehicle is told what to do at a time.
     """
 
     agv: str = "sim"
@@ -56,6 +58,7 @@ class BenchSettings:
     connect: str = ""
     bus_config: str = ""
     lab: str = "lab"
+    exchange: float = DEFAULT_SAFETY.exchange_s
 
     def __post_init__(self) -> None:
         _check(self.repeats >= 0, "--repeats", self.repeats, "at least 1", "give a whole number of repeats")
@@ -63,6 +66,8 @@ class BenchSettings:
         _check(0 <= self.seed <= _LARGEST_SEED, "--seed", self.seed, f"0 to {_LARGEST_SEED}", "choose another seed")
         _check(self.order in ORDERS, "--order", self.order, ", ".join(ORDERS), "choose one of these")
         _check(self.place in ("", *PLACES), "--place", self.place, ", ".join(PLACES), "choose one of these")
+        least = DEFAULT_SAFETY.watch_s
+        _check(least <= self.exchange < math.inf, "--exchange", self.exchange, f"from {least:g} s", "leave it out")
         _check(self.maps in MAPS, "--maps", self.maps, ", ".join(MAPS), "choose one of these")
 
     @classmethod

@@ -142,7 +142,13 @@ def _rivals(seed: int, truth: SealedTruth) -> tuple[str, ...]:
 
 
 def _drive(spec: str, seed: int, repeats: int, directory: Path) -> None:
-    options = [f"--plant=agvbench.simulator.hidden:{spec}", f"--seed={seed}", f"--repeats={repeats}", "--no-report"]
+    options = [
+        f"--plant=agvbench.simulator.hidden:{spec}",
+        f"--seed={seed}",
+        f"--repeats={repeats}",
+        "--no-report",
+        "--exchange=2",
+    ]
     command = [sys.executable, "-c", _PROGRAM, "bench", *BENCHMARKS, *options, f"--out={directory}"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - our own program
     if done.returncode not in {0, 1}:

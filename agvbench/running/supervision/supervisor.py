@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
+
+import numpy as np
 
 from agvbench.errors import SafetyStopError
 from agvbench.planning import Workspace
@@ -19,8 +22,8 @@ _SLACK_S = 1e-9
 class Supervisor:
     """Watches a run as it is driven.
 
-    A hold is exchanged in slices of ``watch_s``, and after each every rule looks at what was seen. How a hold is cut
-    makes no difference to what a simulated vehicle does.
+    A hold is exchanged in parts of ``exchange_s``, and every rule looks at what was seen in each ``watch_s`` of them.
+    How a hold is cut makes no difference to what a simulated vehicle does.
     """
 
     def __init__(self, workspace: Workspace, neutral_drive: float, limits: SafetyLimits = DEFAULT_SAFETY) -> None:
@@ -43,20 +46,25 @@ class Supervisor:
         LinkError
             As from the link.
         """
-        begin_s, end_s = t_s, t_s + hold_s
+        end_s = t_s + hold_s
         if command.drive == self._neutral:
             self._driving_since_s = None
         elif self._driving_since_s is None:
             self._driving_since_s = t_s
-        for number in itertools.count(1):
-            until_s = begin_s + number * self._limits.watch_s
-            if until_s > end_s - _SLACK_S:
-                until_s = end_s
+        for until_s in _parts(t_s, end_s, self._limits.exchange_s):
             seen.append(link.exchange(command, t_s=t_s, hold_s=until_s - t_s))
+            self._look_through(link, seen[-1], t_s, until_s)
             t_s = until_s
-            self._look(link, seen[-1], t_s)
-            if t_s == end_s:
-                return
+
+    def _look_through(self, link: RunnerLink, frames: Frames, begin_s: float, end_s: float) -> None:
+        """Look at what arrived in [begin_s, end_s), one ``watch_s`` after another."""
+        ends_s = list(_parts(begin_s, end_s, self._limits.watch_s))
+        if len(ends_s) == 1:
+            self._look(link, frames, end_s)
+            return
+        number = np.searchsorted(ends_s[:-1], np.where(np.isfinite(frames.received_s), frames.received_s, frames.t_s))
+        for k, until_s in enumerate(ends_s):
+            self._look(link, frames.select(number == k), until_s)
 
     def _look(self, link: RunnerLink, frames: Frames, now_s: float) -> None:
         driving_s = 0.0 if self._driving_since_s is None else now_s - self._driving_since_s
@@ -69,3 +77,13 @@ class Supervisor:
                     f"stopped {now_s:.1f} s into the run: {what}", where=link.keys.root, value=value, limit=limit,
                     remedy="look at vehicle and camera, then go on with --resume",
                 )  # fmt: skip
+
+
+def _parts(begin_s: float, end_s: float, length_s: float) -> Iterator[float]:
+    """Yield where the parts of [begin_s, end_s) end that are `length_s` long, the last perhaps shorter [s]."""
+    for number in itertools.count(1):
+        until_s = begin_s + number * length_s
+        if until_s > end_s - _SLACK_S:
+            break
+        yield until_s
+    yield end_s
