@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum, auto
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from agvbench.diagnosis.scatter import Scatter, rescatter
 from agvbench.diagnosis.stepping import Point, Stepper
 from agvbench.types import Floats
 
-_EXCURSION = 6
+_EXCURSION, _ROUNDS = 6, 4
 _WORTH = 10.0
 _ENOUGH = 0.05
 _CLOSE = 1.0
@@ -41,6 +42,14 @@ class View:
         return float(self.terms.loss.sum())
 
 
+class Pace(Enum):
+    """How a way goes when its steps are used up: it has come to a stand, or goes on by parts of steps or whole ones."""
+
+    STANDS = auto()
+    CREEPS = auto()
+    STRIDES = auto()
+
+
 @dataclass(frozen=True)
 class Descent:
     """Goes down for one model; ``bounds`` (effects' parameters, 2)."""
@@ -57,21 +66,38 @@ class Descent:
         )
         return View(linear, residual, terms)
 
-    def go(self, state: State, iterations: int, near: Linearised | None = None) -> tuple[State, bool]:
-        """Return the state after at most so many steps, and whether it still crept at the end, by parts of steps.
+    def go(self, state: State, iterations: int, near: Linearised | None = None) -> tuple[State, Pace]:
+        """Return the state after at most so many steps, and how it went at the end.
 
         With `near` the first steps are taken with the maps' derivatives from there.
         """
-        before, whole, ended = np.inf, True, False
+        before, whole = np.inf, True
         for step in range(iterations):
             view = self.look(state, near)
             state, whole = self._follow(state, view)
             if near is not None and (before - view.loss < _CLOSE or step >= iterations // 2):
                 near = None
-            elif ended := abs(before - view.loss) < _ENOUGH:
-                break
+            elif abs(before - view.loss) < _ENOUGH:
+                return state, Pace.STANDS
             before = view.loss
-        return state, not (whole or ended)
+        return state, Pace.STRIDES if whole else Pace.CREEPS
+
+    def arrive(self, state: State, pace: Pace, iterations: int, *, patient: bool) -> tuple[State, View]:
+        """Return the end of the way, and what is seen from there.
+
+        A creeping fit tries an excursion. One that is `patient` goes on also where that leads nowhere, and round after
+        round as long as they are worth their steps.
+        """
+        view = self.look(state)
+        for _ in range(_ROUNDS if patient else 1):
+            beyond = self.excursion(state, view) if pace is Pace.CREEPS else None
+            if pace is Pace.STANDS or (beyond is None and not patient):
+                break
+            state, pace = self.go(state if beyond is None else beyond, iterations)
+            before, view = view.loss, self.look(state)
+            if before - view.loss < _WORTH:
+                break
+        return state, view
 
     def excursion(self, state: State, view: View) -> State | None:
         """Return a better state that lies across a bend, or None; `view` is what is seen from `state`.
@@ -83,7 +109,7 @@ class Descent:
         """
         start, near = view.loss, view.linear
         point = self._stepper(state, view).whole(self._point(state, view), view.terms)
-        now = self._arrive(point, state, view)
+        now = self._reach(point, state, view)
         for _ in range(_EXCURSION):
             view = self.look(now, near)
             if view.loss < start - _WORTH:
@@ -94,7 +120,7 @@ class Descent:
     def _follow(self, state: State, view: View) -> tuple[State, bool]:
         """Return a state that is no worse for the scatter at hand, and whether a whole step led there."""
         point, whole = self._stepper(state, view).step(self._point(state, view), view.terms)
-        return self._arrive(point, state, view), whole
+        return self._reach(point, state, view), whole
 
     def _stepper(self, state: State, view: View) -> Stepper:
         return Stepper(self.predictor, view.linear, state.scatter, self.bounds)
@@ -103,6 +129,6 @@ class Descent:
     def _point(state: State, view: View) -> Point:
         return Point(state.parameters, state.offsets, view.residual)
 
-    def _arrive(self, point: Point, state: State, view: View) -> State:
+    def _reach(self, point: Point, state: State, view: View) -> State:
         scatter = rescatter(self.predictor, point.residual, point.offsets, view.terms.inner_inverse, state.scatter)
         return State(point.parameters, point.offsets, scatter)

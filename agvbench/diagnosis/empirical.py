@@ -12,6 +12,7 @@ from agvbench.diagnosis.empirical_screen import Start, screen, steering
 from agvbench.diagnosis.empirical_terms import TERMS, EmpiricalTerm
 from agvbench.diagnosis.forms import wider
 from agvbench.diagnosis.judging import without_best
+from agvbench.diagnosis.likelihood import residual_of
 from agvbench.diagnosis.residuals import AT_THE_FLOOR, LACK_OF_FIT, floor, lack_of_fit, misses
 from agvbench.diagnosis.selection import Scored, Selection, Selector
 from agvbench.diagnosis.structure import Dependence, residual_rates
@@ -216,6 +217,12 @@ def with_term_first(rest: list[Dependence], explained: Explained) -> list[Depend
     if own:
         first = replace(own[0], p_value=min(own[0].p_value, explained.p_value))
         return [first, *(d for d in rest if d is not own[0])]
-    loss = explained.without.fit.residual
-    share = 1.0 - float(np.sum(explained.selection.chosen.fit.residual**2) / max(np.sum(loss**2), 1e-300))
+    with_term, without = (_missed(model) for model in (explained.selection.chosen, explained.without))
+    share = 1.0 - with_term / max(without, 1e-300)
     return [Dependence(explained.term.covariates[0], explained.term.through, explained.p_value, share), *rest]
+
+
+def _missed(model: Scored) -> float:
+    """Return the sum of squares that a model misses, no run's own offsets helping."""
+    predictor = model.fit.predictor
+    return float(np.nansum(residual_of(predictor, predictor.predict(model.fit.parameters)) ** 2))

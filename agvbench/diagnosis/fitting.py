@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from agvbench.diagnosis.descent import Descent, State
+from agvbench.diagnosis.descent import Descent, Pace, State
 from agvbench.diagnosis.likelihood import residual_of, ridge, terms_of
 from agvbench.diagnosis.prediction import Linearised, Predictor
 from agvbench.diagnosis.promises import Ground
@@ -65,6 +65,7 @@ def fit(
     offsets: Floats | None = None,
     scatter: Scatter | None = None,
     iterations: int = _ITERATIONS,
+    patient: bool = False,
     near: Linearised | None = None,
 ) -> Fit:
     """Fit by Gauss–Newton with safe steps, the scatter by expectation maximisation between steps.
@@ -81,6 +82,8 @@ def fit(
         Where to start; by default none and generous.
     iterations
         At most this many steps.
+    patient
+        Whether to go on for some rounds of as many steps while they are worth it.
     near
         Derivatives of the same maps at parameters close by. By far the most time goes into those by the maps' values,
         and they change little: the first steps are taken with these, the last ones and the result with one's own.
@@ -89,12 +92,10 @@ def fit(
     offsets = np.zeros((len(readings), 6)) if offsets is None else offsets.copy()
     scatter = scatter or (first_scatter() if predictor.readings.begins is None else scatter_of_windows(readings))
     descent = Descent(predictor, bounds)
-    state, creeps = descent.go(State(parameters.copy(), offsets, scatter), iterations, near)
-    view = descent.look(state)
-    # Only a fit that is to be believed is worth the way across a bend.
-    if creeps and iterations > _ITERATIONS and (beyond := descent.excursion(state, view)) is not None:
-        state, _ = descent.go(beyond, iterations)
-        view = descent.look(state)
+    state, pace = descent.go(State(parameters.copy(), offsets, scatter), iterations, near)
+    # Only a fit that is to be believed is worth the way to its end.
+    pace = pace if iterations > _ITERATIONS else Pace.STANDS
+    state, view = descent.arrive(state, pace, iterations, patient=patient)
     terms = view.terms
     return Fit(
         predictor, state.parameters, state.offsets, state.scatter,

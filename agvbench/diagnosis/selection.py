@@ -243,7 +243,7 @@ class Selector:
         if promises[best] < _LIKELY and float(now.loss.sum() - short.loss.sum()) < _HOPELESS:
             self.tried += 1
             self._known[key] = Scored(names, short, cross_validated(short, self._fold, bounds))
-        return self.score(names, short.parameters, short)
+        return self.score(names, short.parameters, short, patient=believed)
 
     def _begun(
         self, current: Scored, predictor: Predictor, starts: list[Floats], bounds: Floats, least: float | None
@@ -285,8 +285,11 @@ class Selector:
             near=now.linear,
         )
 
-    def score(self, names: tuple[str, ...], parameters: Floats, near: Fit | None) -> Scored:
-        """Fit the model with the effects `names` and cross-validate it; what was fitted before is remembered."""
+    def score(self, names: tuple[str, ...], parameters: Floats, near: Fit | None, *, patient: bool = False) -> Scored:
+        """Fit the model with the effects `names` and cross-validate it; what was fitted before is remembered.
+
+        A `patient` fit is given more steps while they are worth it.
+        """
         key = tuple(sorted(names))
         if key not in self._known:
             bounds = bounds_of(self.candidates, names)
@@ -297,6 +300,7 @@ class Selector:
                 offsets=None if near is None else near.offsets,
                 scatter=None if near is None else near.scatter,
                 iterations=_LONG,
+                patient=patient,
                 near=None if near is None else near.linear,
             )
             self.tried += 1
