@@ -17,6 +17,8 @@ _SPEED_MARGIN = 3.0
 _NOISE_MARGIN = 8.0
 _SLOWEST_LIMIT_MPS = 0.5
 _SLOWEST_LIMIT_RADPS = 3.0
+# A step that stays, with this much of the path before and after it, is the vehicle's own if it is no larger.
+_KICK_S, _KICK_M, _KICK_RAD = 0.25, 0.05, 0.1
 _FARTHEST = 1e6  # m or rad: numbers beyond are no poses
 _LONGEST_S = 1e12
 _PIECES = 1000  # a piece of the path is linked to one of so many before it
@@ -52,7 +54,8 @@ def clean_frames(frames: Frames, *, max_speed_mps: float | None = None) -> Frame
     Untracked and doubled frames and those with an impossible time go; late frames go where they belong. Wildly
     wrong poses (a tracker that jumps metres for a frame or for many, or takes the body the wrong way round) are told
     from right ones by what the vehicle can do: the kept poses are the longest chain in which each follows from the one
-    before at no more than `max_speed_mps`, give or take noise, and with a turn to match.
+    before at no more than `max_speed_mps`, give or take noise, and with a turn to match. A small step after which the
+    path goes on from there, such as a seam of the floor makes, is no jump.
 
     Parameters
     ----------
@@ -160,10 +163,13 @@ def _longest_chain(frames: Frames, max_speed_mps: float | None) -> NDArray[np.in
     speed, wander = _limits(frames.t_s, positions, max_speed_mps, _SLOWEST_LIMIT_MPS)
     yaw, turn = _limits(frames.t_s, headings[:, None], None, _SLOWEST_LIMIT_RADPS)
 
-    def follows(earlier: NDArray[np.int64], later: NDArray[np.int64] | int) -> NDArray[np.bool_]:
+    def follows(
+        earlier: NDArray[np.int64], later: NDArray[np.int64] | int, kicked: NDArray[np.bool_] | bool = False
+    ) -> NDArray[np.bool_]:
         dt = frames.t_s[later] - frames.t_s[earlier]
-        moved = np.hypot(*(positions[later] - positions[earlier]).T)
+        moved = np.hypot(*(positions[later] - positions[earlier]).T) - np.where(kicked, _KICK_M, 0.0)
         turned = np.abs((headings[later] - headings[earlier] + np.pi) % (2.0 * np.pi) - np.pi)
+        turned -= np.where(kicked, _KICK_RAD, 0.0)
         return np.asarray((moved <= speed * dt + wander) & (turned <= yaw * dt + turn))
 
     every = np.arange(len(frames))
@@ -171,11 +177,13 @@ def _longest_chain(frames: Frames, max_speed_mps: float | None) -> NDArray[np.in
     if not len(breaks):
         return every
     starts, ends = np.r_[0, breaks], np.r_[breaks, len(frames)]
+    lasting = frames.t_s[ends - 1] - frames.t_s[starts] >= _KICK_S
     best, previous = (ends - starts).astype(np.int64), np.full(len(starts), -1)
     for k in range(1, len(starts)):
         # What comes before this piece: the best chain whose last pose this piece's first pose follows from.
         first = max(0, k - _PIECES)
-        length = np.where(follows(ends[first:k] - 1, int(starts[k])), best[first:k], 0)
+        linked = follows(ends[first:k] - 1, int(starts[k]), lasting[first:k] & lasting[k])
+        length = np.where(linked, best[first:k], 0)
         if length.max() > 0:
             previous[k] = first + int(np.argmax(length))
             best[k] += length.max()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agvbench.diagnosis.reading import Readings
 from agvbench.diagnosis.residuals import misses
@@ -12,6 +13,7 @@ from agvbench.errors import CampaignError
 from agvbench.types import Floats
 
 _FAR_SHARE, _FAR_M = 0.3, 0.15
+_AS_LONG = 0.05
 _MOST_GROUPS = 0.25
 _LEAST_WAY_M, _LEAST_SHARE, _FEWEST_PAIRS = 0.3, 0.15, 6
 _GAP, _FAR_APART, _TIMES_AS_FAR = 1.5, 0.02, 6.0
@@ -33,6 +35,7 @@ def refuse_contradictions(readings: Readings, *, where: str) -> None:
     far, repeated, example = 0, 0, ""
     for g in np.unique(readings.group):
         own = np.flatnonzero(readings.group == g)
+        own = own[_as_long(readings, own, int(own[0]))]
         both = readings.seen[own].all(axis=0)
         if len(own) < 2 or not both.any():
             continue
@@ -55,6 +58,11 @@ def refuse_contradictions(readings: Readings, *, where: str) -> None:
         )
 
 
+def _as_long(readings: Readings, runs: NDArray[np.int64], others: NDArray[np.int64] | int) -> NDArray[np.bool_]:
+    """Whether runs were seen for as long as others: else their samples are of other times, and cannot be compared."""
+    return np.asarray(np.isclose(readings.t_s[runs, -1], readings.t_s[others, -1], rtol=_AS_LONG))
+
+
 def _refuse_two_kinds(readings: Readings, path: Floats, where: str) -> None:
     """Raise an error if repeats agree closely or are off by one and the same amount, with nothing between.
 
@@ -69,7 +77,7 @@ def _refuse_two_kinds(readings: Readings, path: Floats, where: str) -> None:
         ]
     ).reshape(-1, 2)
     seen = readings.seen[pairs[:, 0]] & readings.seen[pairs[:, 1]]
-    usable = seen.any(axis=1)
+    usable = seen.any(axis=1) & _as_long(readings, pairs[:, 0], pairs[:, 1])
     pairs, last = pairs[usable], seen.shape[1] - 1 - np.argmax(seen[usable][:, ::-1], axis=1)
     ends = path[pairs, last[:, None]]
     way = np.hypot(*np.moveaxis(ends, -1, 0)).mean(axis=1)

@@ -54,6 +54,17 @@ def test_a_jump_of_a_hand_s_breadth_and_a_body_the_wrong_way_round_are_seen():
     assert inspect_frames(with_wrong(drive(), range(200, 220), dx=0.0, turn=np.pi))[1].jumps == 20
 
 
+@pytest.mark.parametrize("kick_rad", [0.02, 0.05, -0.1])
+def test_a_seam_that_turns_the_vehicle_a_little_costs_none_of_the_run(kick_rad):
+    kept, quality = inspect_frames(with_wrong(drive(), range(300, len(T)), dx=0.0, turn=kick_rad))
+    assert (quality.jumps, len(kept)) == (0, len(T))
+
+
+def test_a_body_that_was_seen_askew_for_a_moment_is_still_a_jump():
+    assert inspect_frames(with_wrong(drive(), range(200, 220), dx=0.0, turn=0.1))[1].jumps == 20
+    assert inspect_frames(with_wrong(drive(), range(300, len(T)), dx=0.0, turn=0.6))[1].jumps > 0
+
+
 def test_one_frame_in_ten_wrong_at_random():
     rng = np.random.default_rng(3)
     where = np.flatnonzero(rng.random(len(T)) < 0.1)

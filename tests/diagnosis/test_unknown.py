@@ -127,6 +127,16 @@ def test_frames_that_do_not_belong_to_their_commands_are_one_line():
     assert "\n" not in str(error.value)
 
 
+def test_repeats_that_were_lost_half_way_do_not_contradict_the_others():
+    runs = campaign_runs(Tiny())
+    ends = [0.5 * float(run.frames.t_s[-1]) if k % 2 else np.inf for k, run in enumerate(runs)]
+    cut = [
+        dataclasses.replace(run, frames=run.frames.select(run.frames.t_s < end))
+        for run, end in zip(runs, ends, strict=True)
+    ]
+    refuse_contradictions(read_runs(cut), where="campaign tiny")
+
+
 @pytest.mark.slow
 def test_a_disc_beside_a_lag_is_counted_in_what_is_predicted_after(tiny_campaign):
     found = diagnose(tiny_campaign(Tiny(slow_patch=0.15, steering_lag_s=0.15)))
