@@ -77,6 +77,8 @@ _RAMP_STEP_S, _TOGETHER = 0.05, 1e-12
 _PLAY_STEP_S = 0.005
 # Numbers that ask for shorter steps are nonsense, but must not hang the loop [s].
 _SHORTEST_S = 1e-6
+# Less swings faster than any camera sees, undamped for ever, and would be simulated swing by swing.
+_LEAST_INERTIA_S = 1e-3
 
 
 @compiled(inner=True)
@@ -164,8 +166,9 @@ def _plan_drive(
 def plan_command(plan: Floats, state: Floats, servos: Floats) -> None:
     """Plan how servos and drive, of which `servos` says where they are, go to the aims in `state`."""
     plan[_HALF_PLAY], plan[_ORDER] = 0.5 * state[PLAY], FIRST_ORDER
-    if state[STEERING_INERTIA] > 0.0 or state[STEERING_ACCELERATION] < math.inf:
-        plan[_ORDER] = INERT if state[STEERING_INERTIA] > 0.0 else LIMITED
+    inert = state[STEERING_INERTIA] >= _LEAST_INERTIA_S
+    if inert or state[STEERING_ACCELERATION] < math.inf:
+        plan[_ORDER] = INERT if inert else LIMITED
         _plan_second_order(plan, _FRONT, servos[0], servos[6], servos[2], state[FRONT_AIM], state)
         _plan_second_order(plan, _REAR, servos[1], servos[7], servos[3], state[REAR_AIM], state)
     else:

@@ -30,6 +30,8 @@ SIZES = [
     ("mocap_latency_smoothing", {"latency_s": 0.03, "time_constant_s": 0.12}),
     ("mocap_latency_smoothing", {"latency_s": 0.0, "time_constant_s": 0.004}),
     ("mocap_latency_smoothing", {"latency_s": 0.0, "time_constant_s": 1.5}),
+    ("actuation_delay_servos", {"steering_s": 0.2, "drive_s": 0.08}),
+    ("actuation_delay_servos", {"steering_s": 0.0, "drive_s": 0.95}),
     ("actuation_delay_uneven", {"front_s": 0.2, "rear_s": 0.13, "drive_s": 0.08}),
     ("actuation_delay_uneven", {"front_s": 0.0, "rear_s": 0.0, "drive_s": 0.95}),
 ]
@@ -75,12 +77,19 @@ def test_a_window_of_smoothed_poses_begins_as_in_a_steady_motion():
         (("steering_rate_limit_acceleration", (1.2, math.inf)), ("steering_rate_limit", (1.2,))),
         (("mocap_latency_smoothing", (0.07, 0.0)), ("mocap_latency", (0.07,))),
         (("mocap_latency_smoothing", (0.0, 1e-4)), ("mocap_latency", (1e-4,))),
+        (("actuation_delay_servos", (0.07, 0.07)), ("actuation_delay", (0.07,))),
         (("actuation_delay_uneven", (0.07, 0.07, 0.07)), ("actuation_delay", (0.07,))),
     ],
 )
 def test_it_has_the_librarys_law_for_a_limit(form, library):
     ours = simulated([effect_forms()[form[0]](*form[1])])
     np.testing.assert_allclose(ours, simulated([effect_kinds()[library[0]](*library[1])]), atol=1e-4)
+
+
+def test_an_axle_that_swings_faster_than_anybody_sees_costs_no_more_than_one_that_does_not():
+    """Swing by swing, 8 s of a thousandth of this inertia would be millions of steps."""
+    ours = simulated([effect_forms()["steering_lag_inertia"](0.0, 1e-6)])
+    np.testing.assert_allclose(ours, simulated([]), atol=1e-4)
 
 
 def test_critical_damping_is_no_edge():
