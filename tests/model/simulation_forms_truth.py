@@ -152,7 +152,8 @@ def with_play(servo: Path, rest: float, width: float, end: float) -> Path:
 def true_form(name: str, values: dict[str, float], start: tuple[float, float, float], times: Floats) -> Floats:
     """Return (n, 3) measured poses with one law."""
     end = times[-1] + 2.0
-    fronts, rears, drives = (RUN_TIMES + values.get(f"{channel}_s", 0.0) for channel in ("front", "rear", "drive"))
+    late = {"front_s": values.get("steering_s", 0.0), "rear_s": values.get("steering_s", 0.0), **values}
+    fronts, rears, drives = (RUN_TIMES + late.get(f"{channel}_s", 0.0) for channel in ("front", "rear", "drive"))
     front, rear, speed = aims(0, fronts), aims(1, rears), aims(2, drives)
     if name in ("steering_lag_inertia", "steering_rate_limit_acceleration"):
         front, rear = (servo_path(name, values, channel, RUN_TIMES, end) for channel in (0, 1))

@@ -38,6 +38,8 @@ class ActuationDelayUneven(Form):
     @staticmethod
     def arrive(state: Floats, time_s: float, front_s: float, rear_s: float, drive_s: float) -> float:
         """Let the front servo's command arrive, and say how much later the others do."""
-        state[REAR_WAIT] = rear_s - front_s
-        state[DRIVE_WAIT] = drive_s - front_s
+        # Where it does nothing it leaves what the other law of delays has said.
+        if front_s != 0.0 or rear_s != 0.0 or drive_s != 0.0:
+            state[REAR_WAIT] = rear_s - front_s
+            state[DRIVE_WAIT] = drive_s - front_s
         return time_s + front_s

@@ -1,0 +1,42 @@
+"""Commands take time to arrive: both servos the same, the drive another."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from agvbench.effects.base import Stage, parameter
+from agvbench.effects.forms.base import Form
+from agvbench.effects.state import DRIVE_WAIT, REAR_WAIT
+from agvbench.types import Floats
+
+
+@dataclass(frozen=True)
+class ActuationDelayServos(Form):
+    """Both servos obey at t the command given at t − steering_s, the drive the one given at t − drive_s."""
+
+    name: ClassVar[str] = "actuation_delay_servos"
+    form_of: ClassVar[str] = "actuation_delay"
+    stage: ClassVar[Stage] = Stage.TRANSPORT
+    relaxes: ClassVar[str] = "no variable delay in the controller (9.2)"
+    reference: ClassVar[str] = (
+        "Bentvelsen 2015, section 9.2; servos of one make have the same delay, a motor controller its own"
+    )
+    limits: ClassVar[str] = "what all delays have in common cannot be told from mocap_latency where runs begin at rest"
+
+    steering_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.05)
+    drive_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.05)
+
+    @classmethod
+    def starts(cls, fitted: Mapping[str, float]) -> list[tuple[float, ...]]:
+        """Begin with a drive that obeys a little sooner than the servos, and a little later."""
+        delay = fitted["delay_s"]
+        return [(1.1 * delay, 0.9 * delay), (0.9 * delay, 1.1 * delay)]
+
+    @staticmethod
+    def arrive(state: Floats, time_s: float, steering_s: float, drive_s: float) -> float:
+        """Let the servos' command arrive, and say how much later the drive's does."""
+        state[REAR_WAIT] = 0.0
+        state[DRIVE_WAIT] = drive_s - steering_s
+        return time_s + steering_s
