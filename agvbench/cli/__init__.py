@@ -25,6 +25,10 @@ shell completion: eval "$(register-python-argcomplete agvbench)"
 """
 
 
+# Our matrices have a hundred rows: more threads only wait for one another, and add up in another order.
+_ONE_THREAD = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
 class _CommandList(argparse.RawDescriptionHelpFormatter):
     """Leaves room for the longest command's name: argparse forgets that commands are indented."""
 
@@ -76,6 +80,8 @@ def _unknown_option(parser: argparse.ArgumentParser, command: str, given: str) -
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code."""
+    for name in _ONE_THREAD:
+        os.environ.setdefault(name, "1")  # read when numpy is imported, which no command has done yet
     parser = build_parser()
     if "_ARGCOMPLETE" in os.environ:
         import argcomplete

@@ -159,7 +159,8 @@ class Scores:
 
     ``shares`` by question; ``confusion`` by what was hidden, then by answer; ``list_length`` the mean number of
     effects in an AMBIGUOUS answer; ``coverage`` of 95 % intervals where the forms agree; ``removed`` quantiles of the
-    share of excess held-out error removed (0, 0.5), by group; ``worse_on`` trials with something predicted worse.
+    share of excess held-out error removed (0, 0.5), by group, where free maps leave an excess; ``worse_on`` trials with
+    something predicted worse.
     """
 
     trials: int
@@ -190,7 +191,9 @@ def score(trials: Sequence[Trial]) -> Scores:
         sum(lists) / len(lists) if lists else math.nan,
         Share.of(covered for trial in trials for covered in coverings(trial)),
         {
-            "inside the library": _worst_and_median(t.removed for t in trials if t.library_names and not t.outside),
+            "inside the library": _worst_and_median(
+                t.removed for t in trials if t.library_names and not t.outside and not t.absorbed
+            ),
             "outside, without random phase": _worst_and_median(
                 t.removed for t in trials if _outside(t) and not t.random_phase
             ),

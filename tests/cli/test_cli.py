@@ -89,3 +89,10 @@ def test_a_reader_that_left_is_no_error():
 def test_an_option_that_is_not_there_is_one_line(arguments, told, capsys):
     assert main(arguments) == 2
     assert capsys.readouterr().err == f"agvbench {arguments[0]}: {told}\n"
+
+
+def test_one_thread_for_small_matrices_unless_told_otherwise(monkeypatch):
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "3")
+    monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
+    assert main(["effects"]) == 0
+    assert (os.environ["OPENBLAS_NUM_THREADS"], os.environ["MKL_NUM_THREADS"]) == ("3", "1")

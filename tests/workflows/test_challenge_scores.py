@@ -99,6 +99,12 @@ def test_removed_error_is_what_lies_above_the_floor():
     assert score([good, level]).removed["inside the library"] == pytest.approx((0.99, 0.99))
 
 
+def test_removed_error_is_not_asked_for_where_free_maps_leave_none():
+    good = trial(["steering_lag"], squares_mm2={"before": 101.0, "after": 2.0, "floor": 1.0})
+    taken_up = trial(["mocap_scale"], absorbed=True, squares_mm2={"before": 2.0, "after": 2.0, "floor": 1.0})
+    assert score([good, taken_up]).removed["inside the library"] == pytest.approx((0.99, 0.99))
+
+
 def test_json_has_no_nan():
     text = json.dumps(score([trial()]).to_json(), allow_nan=False)
     assert json.loads(text)["confusion"] == {"nothing": {"ADEQUATE": 1}}
