@@ -96,7 +96,7 @@ def _another_law_alone(selection: Selection, selector: Selector) -> Selection:
     """
     base = selection.base
     known = ((form, selector.known((*base.names, form.form_of))) for form in effect_forms().values())
-    fitted = [(float((base.fit.loss - model.fit.loss).sum()), form, model) for form, model in known if model]
+    fitted = [(_explained(base, model), form, model) for form, model in known if model]
     likely = sorted((one for one in fitted if one[0] > _LIKELY), key=lambda one: -one[0])[:_MOST_ALONE]
     if not likely:
         return selection
@@ -146,15 +146,23 @@ def _laws(selection: Selection, selector: Selector, wide: Selector, name: str) -
     for form in effect_forms().values():
         if (model := models.get(form.form_of)) is None:
             continue
-        kind = candidate(form)
-        if rest.total - model.total >= _HALF * (rest.total - chosen.total):
+        kind, explained = candidate(form), _explained(rest, chosen)
+        # A strong cause of another law fits well, and predicts badly.
+        if rest.total - model.total >= _HALF * (rest.total - chosen.total) or (
+            _explained(rest, model) >= _HALF * explained
+        ):
             yield _Law(name, form, _starts_near(form, model))
             continue
         # The library's law may fail where another does not.
         larger = Predictor(wide.batch, (*rest.names, form.name))
         promises = [promised_gain(rest.fit, larger, start, kind.bounds) for start in kind.starts]
-        if max(promises) >= _HALF * float(rest.fit.loss.sum() - chosen.fit.loss.sum()):
+        if max(promises) >= _HALF * explained:
             yield _Law(name, form, kind.starts[[int(np.argmax(promises))]])
+
+
+def _explained(without: Scored, model: Scored) -> float:
+    """Return by how much `model` fits better, whatever it predicts."""
+    return float(without.fit.loss.sum() - model.fit.loss.sum())
 
 
 def _starts_near(form: type[Form], model: Scored) -> Floats:
