@@ -83,6 +83,10 @@ def test_again_in_process(in_process, tmp_path):
     assert bench(tmp_path / "campaign") == in_process
 
 
+def test_told_for_longer_at_a_time(in_process, tmp_path):
+    assert bench(tmp_path / "campaign", "--exchange=2") == in_process
+
+
 def test_another_seed_differs(in_process, tmp_path):
     other = bench(tmp_path / "campaign", "--seed=6")
     assert other.keys() == in_process.keys()

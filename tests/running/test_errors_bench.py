@@ -78,6 +78,8 @@ CASES = {
     "`--maps spline`": opened(maps="spline"),
     "`--place operator`": opened(place="operator"),
     "`--place crane`": opened(place="crane"),
+    "`--exchange 0.01`": opened(exchange=0.01),
+    "`--agv live --exchange 2`": opened(agv="live", exchange=2.0),
     "`--vehicle nope.toml`": opened(vehicle="nope.toml"),
     "`--calibration nope.toml`": opened(calibration="nope.toml"),
     "`--plant nope.py:x`": opened(plant="nope.py:x"),

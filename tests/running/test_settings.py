@@ -18,6 +18,8 @@ from agvbench.running.settings import SETTINGS_FILE, BenchSettings, settings_for
         ("seed", 2**64, "--seed"),
         ("order", "random", "interleaved, blocked, shuffled"),
         ("maps", "spline", "default, thesis"),
+        ("exchange", 0.05, "--exchange"),
+        ("exchange", float("nan"), "--exchange"),
     ],
 )
 def test_values_that_cannot_be_used_name_flag_value_and_limit(option, value, words):

@@ -13,7 +13,7 @@ from agvbench.adapters import open_rig
 from agvbench.errors import SafetyStopError
 from agvbench.planning import Workspace
 from agvbench.running.drive import drive
-from agvbench.running.supervision import DEFAULT_SAFETY, Supervisor
+from agvbench.running.supervision import DEFAULT_SAFETY, SafetyLimits, Supervisor
 from agvbench.running.supervision.rule import Slice
 from agvbench.running.supervision.rules.frozen import Frozen
 from agvbench.running.supervision.rules.jump import Jump
@@ -27,16 +27,22 @@ START = Pose(-1.5, 0.0, 0.0)
 ROOM = Workspace.circle(6.1)
 
 
-def stopped(plant: str, camera: dict[str, float] | None = None, room: Workspace = ROOM) -> tuple[str, Frames]:
+def stopped(
+    plant: str,
+    camera: dict[str, float] | None = None,
+    room: Workspace = ROOM,
+    limits: SafetyLimits = DEFAULT_SAFETY,
+) -> tuple[str, Frames]:
     """Drive straight on for 14 s; return why it was stopped, and what was seen, also in the second after."""
     commands = Commands(*np.array([[0.0, 14.0], [1900.0, 1500.0], [1500.0, 1500.0], [1500.0, 1500.0]]))
     seen: list[Frames] = []
     with open_rig("sim", plant=f"{PLANTS}:{plant}", camera=camera or {}) as link:
-        supervisor = Supervisor(room, 1500.0)
+        supervisor = Supervisor(room, 1500.0, limits)
         with pytest.raises(SafetyStopError) as caught:
             drive(link, commands, neutral=NEUTRAL, start=START, run_key="a", supervisor=supervisor, seen=seen)
         until_s = float(max(frames.t_s.max() for frames in seen if len(frames)))
-        seen.append(link.exchange(NEUTRAL, t_s=_end_s(str(caught.value)), hold_s=1.0))
+        simulated_s = max(_end_s(str(caught.value)), limits.exchange_s)
+        seen.append(link.exchange(NEUTRAL, t_s=simulated_s, hold_s=1.0))
     frames = Frames.concatenate(seen)
     assert until_s < 14.0
     return str(caught.value), frames
@@ -62,6 +68,11 @@ def test_a_vehicle_that_is_taken_for_another_is_stopped() -> None:
     said, _ = stopped("Swapped")
     assert "pose jumped: 0.80 m from where the vehicle was going (limit: 0.3 m)" in said
     assert 1.0 <= _end_s(said) <= 1.3
+
+
+def test_what_is_exchanged_for_longer_is_judged_just_as_often() -> None:
+    told = {exchange_s: stopped("Swapped", limits=SafetyLimits(exchange_s=exchange_s))[0] for exchange_s in (0.1, 5.0)}
+    assert told[0.1] == told[5.0]
 
 
 def seen_at(t_s: np.ndarray, x_m: np.ndarray, driving_s: float = 10.0) -> Slice:
