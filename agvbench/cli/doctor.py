@@ -25,6 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workspace", default="circle:6.1", metavar="SHAPE", help="floor to drive on (default: %(default)s m)"
     )
+    parser.add_argument("--bus-config", default="", metavar="FILE", help="certificates and rules of a secured bus")
     shared.add_camera_arguments(parser)
 
 
@@ -37,6 +38,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     check_specs(arguments.agv, arguments.mocap)
     camera = camera_options(arguments.camera)
-    lab = Lab(arguments.agv, arguments.mocap, camera, arguments.vehicle, arguments.workspace)
+    lab = Lab(
+        arguments.agv, arguments.mocap, camera, arguments.vehicle, arguments.workspace, bus_config=arguments.bus_config
+    )
     states = [tell(name, finding) for name, finding in examine(lab)]
     return 1 if State.BAD in states else 0

@@ -15,8 +15,6 @@ from agvbench.running.options import OPTIONS, SESSION_OPTIONS, destination
 DEFAULT = ("calibration", "trajectories")
 # The command line has imported agvbench before pytest looks for plugins, which does no harm here.
 _IN_PROCESS = "ignore:Module already imported:pytest.PytestAssertRewriteWarning"
-# pytest's own exit codes that mean "bad input": usage error, and nothing collected.
-_BAD_INPUT = {pytest.ExitCode.USAGE_ERROR: 2, pytest.ExitCode.NO_TESTS_COLLECTED: 2}
 
 
 def run_benchmarks(
@@ -29,7 +27,7 @@ def run_benchmarks(
     Raises
     ------
     FlagError
-        If a benchmark does not exist.
+        If a benchmark does not exist, or no run is chosen.
     """
     files = [str(find_benchmark(name)) for name in names or DEFAULT]
     arguments = [*files, "-q", "--strict-markers", "-p", "no:cacheprovider", "-W", _IN_PROCESS, *_flags(options)]
@@ -38,7 +36,10 @@ def run_benchmarks(
     if not summary:
         arguments += ["--no-summary", "-q"]
     code = pytest.main(arguments)
-    return int(_BAD_INPUT.get(pytest.ExitCode(code), code)) if code in list(pytest.ExitCode) else int(code)
+    if code == pytest.ExitCode.NO_TESTS_COLLECTED:
+        where, value = ("-k", only) if only else ("agvbench bench", " ".join(names))
+        raise FlagError("no run to drive", where=where, value=value, remedy="see what there is with --dry-run")
+    return 2 if code == pytest.ExitCode.USAGE_ERROR else int(code)
 
 
 def find_benchmark(name: str) -> Path:

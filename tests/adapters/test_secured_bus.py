@@ -24,6 +24,7 @@ from agvbench.bus.questions import ask
 from agvbench.bus.session import open_session
 from agvbench.campaign import Campaign
 from agvbench.errors import AdapterGoneError, LinkError, PlantError
+from agvbench.workflows.doctor import Lab, State, examine
 
 KEYS = Keys("lab", "agv1")
 pytestmark = pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificates")
@@ -70,6 +71,18 @@ def test_a_campaign_with_vehicle_camera_and_bench_on_a_secured_bus(
     assert done.returncode == 0, done.stdout + done.stderr
     (run,) = Campaign.open(tmp_path / "secured").select()
     assert len(run.frames) > 100
+
+
+def test_the_doctor_looks_at_certificates_before_anybody_is_called(tmp_path: Path) -> None:
+    lab = Lab(folder=tmp_path, bus_config=str(set_up(tmp_path)["bench-pc"]))
+    finding = dict(examine(lab))["certificates"]
+    assert finding.state is State.GOOD
+    assert "takes those with a certificate of the lab's; its authority ends in" in finding.found
+    for file in tmp_path.rglob("*bench-pc*"):
+        if file.suffix not in (".json5",):
+            file.write_text("nothing of use")
+    finding = dict(examine(lab))["certificates"]
+    assert (finding.state, "certificate and key cannot be used" in finding.found) == (State.BAD, True)
 
 
 def test_who_shows_no_certificate_or_a_strangers_is_refused(

@@ -96,3 +96,9 @@ def test_one_thread_for_small_matrices_unless_told_otherwise(monkeypatch):
     monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
     assert main(["effects"]) == 0
     assert (os.environ["OPENBLAS_NUM_THREADS"], os.environ["MKL_NUM_THREADS"]) == ("3", "1")
+
+
+def test_a_choice_of_no_run_is_said_in_one_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["bench", "-k", "nosuchrun"]) == 2
+    assert "agvbench bench: -k: no run to drive: nosuchrun; see what there is with --dry-run" in capsys.readouterr().err

@@ -30,7 +30,17 @@ def test_a_simulation_is_ready(
     monkeypatch.chdir(tmp_path)
     assert main(["doctor"]) == 0
     said = capsys.readouterr().out
-    for name in ("bus", "calibration", "clock", "disk", "firmware", "mocap", "serial ports", "workspace"):
+    for name in (
+        "bus",
+        "calibration",
+        "certificates",
+        "clock",
+        "disk",
+        "firmware",
+        "mocap",
+        "serial ports",
+        "workspace",
+    ):
         assert f"\n{name}" in f"\n{said}"
     assert "no calibrated vehicle here" in said
 
@@ -65,6 +75,12 @@ def test_a_port_is_looked_at_and_not_opened(tmp_path: Path) -> None:
         os.close(slave)
     state, said = found(Lab(agv="serial:/dev/none", folder=tmp_path))["serial ports"]
     assert (state, "no port '/dev/none'" in said) == (State.BAD, True)
+
+
+def test_a_bus_that_is_not_secured_has_no_certificates(tmp_path: Path) -> None:
+    assert found(Lab(folder=tmp_path))["certificates"][0] is State.IDLE
+    state, said = found(Lab(folder=tmp_path, bus_config=str(tmp_path / "none.json5")))["certificates"]
+    assert (state, "none.json5: cannot be read" in said) == (State.BAD, True)
 
 
 def test_a_folder_that_is_not_there_is_said(tmp_path: Path) -> None:

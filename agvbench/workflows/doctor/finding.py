@@ -30,7 +30,10 @@ class Finding:
 
 @dataclass(frozen=True)
 class Lab:
-    """What is to be used: adapters as on the bench, the camera's options, workspace, and the folder to record into."""
+    """What is to be used: adapters as on the bench, the camera's options, workspace, and the folder to record into.
+
+    ``bus_config`` is the file of a secured bus, "" for none.
+    """
 
     agv: str = "sim"
     mocap: str = "sim"
@@ -38,6 +41,7 @@ class Lab:
     vehicle: str = "agv1"
     workspace: str = "circle:6.1"
     folder: Path = Path()
+    bus_config: str = ""
 
 
 class Check(ABC):

@@ -1,0 +1,36 @@
+"""Whether the files of a secured bus can be used, and for how long."""
+
+from __future__ import annotations
+
+import ssl
+import time
+
+from agvbench.bus.bus_config import BusConfig
+from agvbench.workflows.doctor.finding import Check, Finding, Lab, State
+
+_SOON_DAYS = 30.0
+_DAY_S = 86_400.0
+
+
+class Certificates(Check):
+    """Reads what ``--bus-config`` names: the configuration, its certificates and keys."""
+
+    name = "certificates"
+
+    def examine(self, lab: Lab) -> Finding:
+        """Compare what is left of the authority's certificate with a month: it outlives those that it signed."""
+        if not lab.bus_config:
+            return Finding(State.IDLE, "the bus is not secured", "give --bus-config FILE where it is to be")
+        config = BusConfig.load(lab.bus_config)
+        who = "takes those with a certificate of the lab's" if config.asks_who else "does not ask who calls"
+        if (authority := config.certificates.root_ca_certificate) is None:
+            return Finding(State.DOUBTFUL, f"{lab.bus_config} names no authority", "see docs/how-to/secure-the-bus.md")
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+        context.load_verify_locations(authority)
+        ends_s = min(ssl.cert_time_to_seconds(str(known["notAfter"])) for known in context.get_ca_certs())
+        days = (ends_s - time.time()) / _DAY_S
+        said = f"{lab.bus_config} {who}; its authority ends in {days:.0f} days"
+        if days < _SOON_DAYS:
+            state = State.BAD if days < 0.0 else State.DOUBTFUL
+            return Finding(state, f"{said} (limit: {_SOON_DAYS:g})", "make new certificates")
+        return Finding(State.GOOD, said)
