@@ -52,7 +52,8 @@ def explain(selection: Selection, selector: Selector) -> Explained | None:
     """Return the best empirical term, with the effects that earn their place beside it; None if no term earns its own.
 
     Terms are tried beside the effects chosen, and where none helps there beside none: an effect that only mimics the
-    unknown cause loses its place as soon as the term is there.
+    unknown cause loses its place as soon as the term is there. Where they promise more beside none than beside what was
+    chosen, they are tried so first, and what was chosen is tried again beside them.
 
     Parameters
     ----------
@@ -66,10 +67,13 @@ def explain(selection: Selection, selector: Selector) -> Explained | None:
     starts = promising(wide, selection.chosen)
     found: list[tuple[Scored, type[EmpiricalTerm]] | None] = []
     if starts or _lacks(selection.chosen):
-        found.append(_best_term(wide, selection.chosen, starts))
-        if found[0] is None and selection.gains:
-            found.append(_best_term(wide, selection.base, promising(wide, selection.base)))
-            found.append(_in_place(wide, selection))
+        alone = promising(wide, selection.base) if selection.gains else []
+        if alone and alone[0].gain > max((start.gain for start in starts), default=0.0):
+            found.append(_best_term(wide, selection.base, alone))
+        if not any(pair is not None and pair[0].total < selection.chosen.total for pair in found):
+            found.append(_best_term(wide, selection.chosen, starts))
+            if selection.gains and not any(found):
+                found += [_best_term(wide, selection.base, alone), _in_place(wide, selection)]
     elif any(_rests_on_few(selector, selection, name) for name in selection.gains):
         found.append(_in_place(wide, selection))
     models = [_settled(wide, selection, *pair) for pair in found if pair is not None]
