@@ -25,7 +25,8 @@ _LIMIT_STARTS = (0.3, 1.0, 3.0)
 class Candidate:
     """An effect to try: its ``bounds`` (p, 2), ``scale`` (p,) of its parameters and ``starts`` (n, p) of fits.
 
-    ``screened`` says that a regression chose the starts: one of them is near if there is anything to find.
+    ``screened`` says that a regression chose the starts: one of them is near if there is anything to find. ``foremost``
+    says that it promises more than others do: its fit is given all the steps that it takes.
     """
 
     name: str
@@ -33,6 +34,7 @@ class Candidate:
     scale: Floats
     starts: Floats
     screened: bool = False
+    foremost: bool = False
 
 
 def candidates(exclude: Iterable[str] = ()) -> dict[str, Candidate]:

@@ -122,7 +122,8 @@ def _best_term(wide: Selector, root: Scored, starts: list[Start]) -> tuple[Score
     for start in starts:
         kind = candidate(start.term)
         values = np.clip(start.values, kind.bounds[:, 0], kind.bounds[:, 1])
-        wide.candidates[start.term.name] = replace(kind, starts=values, screened=True)
+        foremost = start is starts[0]
+        wide.candidates[start.term.name] = replace(kind, starts=values, screened=True, foremost=foremost)
         try:
             offer = wide.grown(root, start.term.name)
         except np.linalg.LinAlgError:

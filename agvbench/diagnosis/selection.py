@@ -243,7 +243,7 @@ class Selector:
         if promises[best] < _LIKELY and float(now.loss.sum() - short.loss.sum()) < _HOPELESS:
             self.tried += 1
             self._known[key] = Scored(names, short, cross_validated(short, self._fold, bounds))
-        return self.score(names, short.parameters, short, patient=believed)
+        return self.score(names, short.parameters, short, patient=believed and candidate.foremost)
 
     def _begun(
         self, current: Scored, predictor: Predictor, starts: list[Floats], bounds: Floats, least: float | None
