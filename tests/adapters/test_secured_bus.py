@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import socket
 import subprocess
@@ -73,16 +74,27 @@ def test_a_campaign_with_vehicle_camera_and_bench_on_a_secured_bus(
     assert len(run.frames) > 100
 
 
+def _name_a_certificate_that_signs_nothing(config: Path, folder: Path) -> None:
+    text = config.read_text()
+    authority = re.search(r'root_ca_certificate:\s*"([^"]+)"', text)
+    own = next(file for file in folder.rglob("*bench-pc*") if "BEGIN CERT" in file.read_text())
+    assert authority is not None
+    config.write_text(text.replace(authority[1], str(own)))
+
+
 def test_the_doctor_looks_at_certificates_before_anybody_is_called(tmp_path: Path) -> None:
     lab = Lab(folder=tmp_path, bus_config=str(set_up(tmp_path)["bench-pc"]))
     finding = dict(examine(lab))["certificates"]
     assert finding.state is State.GOOD
     assert "takes those with a certificate of the lab's; its authority ends in" in finding.found
+    _name_a_certificate_that_signs_nothing(Path(lab.bus_config), tmp_path)
+    finding = dict(examine(lab))["certificates"]
+    assert (finding.state, "is no authority's" in finding.found) == (State.DOUBTFUL, True)
     for file in tmp_path.rglob("*bench-pc*"):
         if file.suffix not in (".json5",):
             file.write_text("nothing of use")
     finding = dict(examine(lab))["certificates"]
-    assert (finding.state, "certificate and key cannot be used" in finding.found) == (State.BAD, True)
+    assert (finding.state, "cannot be used" in finding.found) == (State.BAD, True)
 
 
 def test_who_shows_no_certificate_or_a_strangers_is_refused(

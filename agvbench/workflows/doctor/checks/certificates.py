@@ -27,8 +27,10 @@ class Certificates(Check):
             return Finding(State.DOUBTFUL, f"{lab.bus_config} names no authority", "see docs/how-to/secure-the-bus.md")
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
         context.load_verify_locations(authority)
-        ends_s = min(ssl.cert_time_to_seconds(str(known["notAfter"])) for known in context.get_ca_certs())
-        days = (ends_s - time.time()) / _DAY_S
+        ends_s = [ssl.cert_time_to_seconds(str(known["notAfter"])) for known in context.get_ca_certs()]
+        if not ends_s:
+            return Finding(State.DOUBTFUL, f"{authority} is no authority's", "see docs/how-to/secure-the-bus.md")
+        days = (min(ends_s) - time.time()) / _DAY_S
         said = f"{lab.bus_config} {who}; its authority ends in {days:.0f} days"
         if days < _SOON_DAYS:
             state = State.BAD if days < 0.0 else State.DOUBTFUL
