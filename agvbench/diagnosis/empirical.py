@@ -68,12 +68,14 @@ def explain(selection: Selection, selector: Selector) -> Explained | None:
     found: list[tuple[Scored, type[EmpiricalTerm]] | None] = []
     if starts or _lacks(selection.chosen):
         alone = promising(wide, selection.base) if selection.gains else []
-        if alone and alone[0].gain > max((start.gain for start in starts), default=0.0):
-            found.append(_best_term(wide, selection.base, alone))
-        if not any(pair is not None and pair[0].total < selection.chosen.total for pair in found):
+        promises_more = bool(alone) and alone[0].gain > max((start.gain for start in starts), default=0.0)
+        first = _best_term(wide, selection.base, alone) if promises_more else None
+        if first is not None and first[0].total < selection.chosen.total:
+            found.append(first)
+        else:
             found.append(_best_term(wide, selection.chosen, starts))
-            if selection.gains and not any(found):
-                found += [_best_term(wide, selection.base, alone), _in_place(wide, selection)]
+            if found[0] is None and selection.gains:
+                found += [first or _best_term(wide, selection.base, alone), _in_place(wide, selection)]
     elif any(_rests_on_few(selector, selection, name) for name in selection.gains):
         found.append(_in_place(wide, selection))
     models = [_settled(wide, selection, *pair) for pair in found if pair is not None]
