@@ -61,9 +61,7 @@ class Descent:
         """Return what is seen from `state`, with the maps' derivatives from `near` where given."""
         linear = self.predictor.linearise(state.parameters, state.offsets, near)
         residual = residual_of(self.predictor, linear.poses)
-        terms = terms_of(
-            self.predictor, residual, linear.by_parameters, linear.by_offsets, state.offsets, state.scatter
-        )
+        terms = terms_of(self.predictor, residual, linear, state.offsets, state.scatter)
         return View(linear, residual, terms)
 
     def go(self, state: State, iterations: int, near: Linearised | None = None) -> tuple[State, Pace]:

@@ -142,9 +142,10 @@ class SpeedByHeading(EmpiricalTerm):
     @staticmethod
     def drive(state: Floats, cosine: float, sine: float) -> None:
         """Change the speed of both axles."""
-        left = 1.0 + cosine * math.cos(state[HEADING]) + sine * math.sin(state[HEADING])
-        state[FRONT_SPEED] *= left
-        state[REAR_SPEED] *= left
+        if cosine != 0.0 or sine != 0.0:
+            left = 1.0 + cosine * math.cos(state[HEADING]) + sine * math.sin(state[HEADING])
+            state[FRONT_SPEED] *= left
+            state[REAR_SPEED] *= left
 
 
 @dataclass(frozen=True)
@@ -163,8 +164,9 @@ class TurnByHeading(EmpiricalTerm):
     @staticmethod
     def move(state: Floats, cosine: float, sine: float) -> None:
         """Turn with the way driven."""
-        bend = cosine * math.cos(state[HEADING]) + sine * math.sin(state[HEADING])
-        state[YAW_RATE] += bend * state[FORWARD]
+        if cosine != 0.0 or sine != 0.0:
+            bend = cosine * math.cos(state[HEADING]) + sine * math.sin(state[HEADING])
+            state[YAW_RATE] += bend * state[FORWARD]
 
 
 @dataclass(frozen=True)

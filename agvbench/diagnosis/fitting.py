@@ -107,5 +107,4 @@ def loss_at(fitted: Fit, parameters: Floats) -> Floats:
     """Return each run's loss (R,) at other parameters, by simulation, with the scatter of `fitted`."""
     predictor = fitted.predictor
     residual = residual_of(predictor, predictor.predict(parameters, fitted.offsets))
-    none = fitted.linear.by_parameters[..., :0]
-    return terms_of(predictor, residual, none, fitted.linear.by_offsets, fitted.offsets, fitted.scatter).loss
+    return terms_of(predictor, residual, fitted.linear.by_first(0), fitted.offsets, fitted.scatter).loss

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agvbench.diagnosis.prediction import Predictor
+from agvbench.diagnosis.prediction import Linearised, Predictor
 from agvbench.diagnosis.scatter import Scatter, priors, scale_of, student, tempering, weights
 from agvbench.types import Floats
 
@@ -35,31 +35,22 @@ class Terms:
     pull: Floats
 
 
-def terms_of(
-    predictor: Predictor,
-    residual: Floats,
-    by_parameters: Floats,
-    by_offsets: Floats,
-    offsets: Floats,
-    scatter: Scatter,
-) -> Terms:
-    """Return the likelihood of residuals (R, K, 3), derived by parameters (R, K, 3, P) and offsets (R, K, 3, 6)."""
+def terms_of(predictor: Predictor, residual: Floats, linear: Linearised, offsets: Floats, scatter: Scatter) -> Terms:
+    """Return the likelihood of residuals (R, K, 3) of predictions with these derivatives."""
     runs = len(residual)
     temper, count = tempering(predictor)
     weight = weights(predictor, scatter)
     e = (residual * weight).reshape(runs, -1)
-    # A run has a few of all levels: the rest of its columns are zero.
-    own = predictor.touched(by_parameters.shape[-1])
-    j = np.take_along_axis(by_parameters, own[:, None, None, :], axis=-1)
-    j = (j * weight[..., None]).reshape(runs, e.shape[1], -1)
-    a = (by_offsets * weight[..., None]).reshape(runs, e.shape[1], 6)
+    own = linear.own
+    j = (linear.by_own * weight[..., None]).reshape(runs, e.shape[1], own.shape[1])
+    a = (linear.by_offsets * weight[..., None]).reshape(runs, e.shape[1], 6)
     prior = priors(predictor, scatter)
     at, jt = a.transpose(0, 2, 1), j.transpose(0, 2, 1)
     inner, inverse = inner_inverse(a, prior)
     pull = (at @ e[..., None])[..., 0] - offsets / prior**2
     short = at @ j
     rows = np.arange(runs)[:, None]
-    mixed = np.zeros((runs, 6, by_parameters.shape[-1]))
+    mixed = np.zeros((runs, 6, linear.count))
     mixed[rows, :, own] = short.transpose(0, 2, 1)
     information = np.zeros((runs, mixed.shape[2], mixed.shape[2]))
     information[rows[..., None], own[:, :, None], own[:, None, :]] = jt @ j - short.transpose(0, 2, 1) @ inverse @ short

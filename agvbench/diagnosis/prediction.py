@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -26,11 +26,39 @@ _FARTHEST_RAD = 1.4
 
 @dataclass(frozen=True)
 class Linearised:
-    """Predicted ``poses`` (R, K, 3), derivatives ``by_parameters`` (R, K, 3, P) and ``by_offsets`` (R, K, 3, 6)."""
+    """Predicted poses and their derivatives, of which only those are kept that may differ from zero.
+
+    ``poses`` (R, K, 3); ``own`` (R, m): the numbers of the parameters that each run depends on at most, of ``count``
+    (P); ``by_own`` (R, K, 3, m): derivatives by these; ``by_offsets`` (R, K, 3, 6).
+    """
 
     poses: Floats
-    by_parameters: Floats
+    own: NDArray[np.int64]
+    by_own: Floats
     by_offsets: Floats
+    count: int
+
+    @property
+    def by_parameters(self) -> Floats:
+        """The derivatives by all parameters (R, K, 3, P), zeros and all."""
+        out = np.zeros((*self.poses.shape, self.count))
+        np.put_along_axis(out, self.own[:, None, None, :], self.by_own, axis=-1)
+        return out
+
+    def with_last(self, slopes: Floats) -> Linearised:
+        """Return these and derivatives (R, K, 3, q) by further parameters, which come last."""
+        more = np.arange(self.count, self.count + slopes.shape[-1])
+        own = np.concatenate([self.own, np.broadcast_to(more, (len(self.own), len(more)))], axis=1)
+        by_own = np.concatenate([self.by_own, slopes], axis=-1)
+        return replace(self, own=own, by_own=by_own, count=self.count + len(more))
+
+    def by_first(self, count: int) -> Linearised:
+        """Return these without the derivatives by the last parameters: by the maps' values alone, or by none.
+
+        In ``own`` the effects come last, and every run depends on each.
+        """
+        kept = self.own.shape[1] - (self.count - count) if count else 0
+        return replace(self, own=self.own[:, :kept], by_own=self.by_own[..., :kept], count=count)
 
 
 class Batch:
@@ -74,6 +102,7 @@ class Batch:
         self.lane_run, self.lane_kind, self.lane_row = np.array(run), np.array(kind), np.array(row)
         self.lanes = Simulation(geometry, maps.neutral, [runs[i] for i in run], kinds=kinds)
         self.touched = self._touched(owns)
+        self.column = self._column()
         self.rows = np.concatenate([owns[i] for i in run])
         self.row_change = np.concatenate(changed)
 
@@ -83,6 +112,12 @@ class Batch:
             [np.concatenate([(self.weights[role][own] != 0.0).any(axis=0) for role in ROLES]) for own in owns]
         )
         return np.argsort(~used, axis=1, kind="stable")[:, : max(1, int(used.sum(axis=1).max()))]
+
+    def _column(self) -> NDArray[np.int64]:
+        """Return in which column of `touched` each run has each of the maps' values (R, values), -1 for none."""
+        column = np.full((len(self.touched), self.maps.size), -1)
+        np.put_along_axis(column, self.touched, np.arange(self.touched.shape[1])[None, :], axis=1)
+        return column
 
     def _count_levels(self, own: NDArray[np.int64]) -> int:
         drives = self.drives[own]
@@ -128,13 +163,6 @@ class Predictor:
         self.nulls: Floats = batch.base.nulls[self._own]
         self._steps = _STEP_SHARE * batch.base.scales[self._own]
 
-    def touched(self, count: int) -> NDArray[np.int64]:
-        """Return which of `count` parameters each run depends on at most (R, m): some of the maps, and every effect."""
-        if not count:
-            return np.empty((len(self.readings), 0), dtype=np.int64)
-        effects = np.broadcast_to(np.arange(self.maps.size, count), (len(self.readings), count - self.maps.size))
-        return np.concatenate([self.batch.touched, effects], axis=1)
-
     def settled(self, parameters: Floats) -> tuple[Floats, Floats]:
         """Return settled angles and speed of every row (rows, 3), and initial states (R, 5)."""
         return self._inputs(parameters, np.zeros((len(self.readings), len(OFFSETS))))
@@ -179,22 +207,19 @@ class Predictor:
         settled, initial = self._inputs(parameters, offsets)
         own = parameters[self.maps.size :]
         if near is None:
-            base, by_maps, by_offsets = self._by_lanes(parameters, offsets, settled, initial)
+            by_maps = self._by_lanes(parameters, offsets, settled, initial)
         else:
-            base = self._simulate(settled, own, initial)
-            by_maps, by_offsets = near.by_parameters[..., : self.maps.size], near.by_offsets
-        slopes = [self._slope(settled, own, initial, base, k)[..., None] for k in range(len(own))]
-        return Linearised(base, np.concatenate([by_maps, *slopes], axis=-1), by_offsets)
+            by_maps = replace(near.by_first(self.maps.size), poses=self._simulate(settled, own, initial))
+        return by_maps.with_last(self._slopes(settled, own, initial, by_maps.poses, range(len(own))))
 
-    def _by_lanes(
-        self, parameters: Floats, offsets: Floats, settled: Floats, initial: Floats
-    ) -> tuple[Floats, Floats, Floats]:
-        """Return poses (R, K, 3) and their derivatives by the maps' values and by offsets."""
+    def _by_lanes(self, parameters: Floats, offsets: Floats, settled: Floats, initial: Floats) -> Linearised:
+        """Return poses and their derivatives by the maps' values and by offsets."""
         own = parameters[self.maps.size :]
         batch = self.batch
         lanes = self._simulate_lanes(settled, initial, own)
         base = lanes[batch.lane_kind == "base"]
-        by_parameters = np.zeros((*base.shape, self.maps.size))
+        by_own = np.zeros((*base.shape, batch.touched.shape[1]))
+        columns = by_own.transpose(0, 3, 1, 2)
         by_offsets = np.zeros((*base.shape, len(OFFSETS)))
         by_offsets[:, :, 0, 0] = by_offsets[:, :, 1, 1] = 1.0
         by_offsets[..., 2] = (lanes[batch.lane_kind == "heading"] - base) / _STEP
@@ -208,16 +233,16 @@ class Predictor:
                 scale = np.exp(offsets[run, 5]) if drives else np.ones(len(run))
                 own_value = scale * parameters[where[role]][row] if drives else scale
                 np.add.at(by_offsets[..., 3 + k], run, change * own_value[:, None, None])
-                by_parameters[run, :, :, where[role].start + row] = change * scale[:, None, None]
+                columns[run, batch.column[run, where[role].start + row]] = change * scale[:, None, None]
                 continue
             factor = settled[row, 2] if drives else np.ones(len(row))
             np.add.at(by_offsets[..., 3 + k], run, change * factor[:, None, None])
             weights = batch.weights[role][row] * (np.exp(offsets[run, 5]) if drives else np.ones(len(row)))[:, None]
-            target = by_parameters[..., where[role]]
             for node in range(weights.shape[1]):
                 used = weights[:, node] != 0.0
-                np.add.at(target[..., node], run[used], change[used] * weights[used, node][:, None, None])
-        return base, by_parameters, by_offsets
+                own_column = batch.column[run[used], where[role].start + node]
+                np.add.at(columns, (run[used], own_column), change[used] * weights[used, node][:, None, None])
+        return Linearised(base, batch.touched, by_own, by_offsets, self.maps.size)
 
     def by_last(self, parameters: Floats, offsets: Floats, count: int) -> tuple[Floats, Floats]:
         """Return poses (R, K, 3), and their derivatives by the last `count` parameters (R, K, 3, count)."""
@@ -225,12 +250,16 @@ class Predictor:
         own = parameters[self.maps.size :]
         base = self._simulate(settled, own, initial)
         last = range(len(own) - count, len(own))
-        return base, np.stack([self._slope(settled, own, initial, base, k) for k in last], axis=-1)
+        return base, self._slopes(settled, own, initial, base, last)
 
-    def _slope(self, settled: Floats, own: Floats, initial: Floats, base: Floats, k: int) -> Floats:
-        moved = own.copy()
-        moved[k] += self._steps[k]
-        return np.asarray((self._simulate(settled, moved, initial) - base) / self._steps[k])
+    def _slopes(self, settled: Floats, own: Floats, initial: Floats, base: Floats, which: range) -> Floats:
+        """Return the derivatives (R, K, 3, q) of poses `base` by some of the effects' parameters."""
+        slopes = np.empty((*base.shape, len(which)))
+        for column, k in enumerate(which):
+            moved = own.copy()
+            moved[k] += self._steps[k]
+            slopes[..., column] = (self._simulate(settled, moved, initial) - base) / self._steps[k]
+        return slopes
 
     def _simulate_lanes(self, settled: Floats, initial: Floats, own: Floats) -> Floats:
         batch = self.batch

@@ -86,8 +86,7 @@ def promised_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floats)
     residual = residual_of(larger, poses)
     if larger.readings.begins is None:
         return fitted.ground.promise(residual, fitted.residual, slopes, start, bounds)
-    by_parameters = np.concatenate([fitted.linear.by_parameters, slopes], axis=-1)
-    terms = terms_of(larger, residual, by_parameters, fitted.linear.by_offsets, fitted.offsets, fitted.scatter)
+    terms = terms_of(larger, residual, fitted.linear.with_last(slopes), fitted.offsets, fitted.scatter)
     gradient, matrix = terms.gradient.sum(axis=0), terms.information.sum(axis=0) + ridge(larger)
     move = np.linalg.lstsq(matrix, gradient, rcond=1e-12)[0]
     # What would go beyond its bound stops there, and the rest is solved for again.

@@ -16,8 +16,9 @@ FAST = frozenset({"contract", "nsz", "arcp", "reassoc"})
 def compiled(*, fast: bool = False, inner: bool = False, inline: bool = False) -> Callable[[F], F]:
     """Return numba's decorator for a function at module level: cached on disk, without the interpreter's lock.
 
-    An `inner` function is called from compiled functions only, which saves compiling its wrapper;
-    with `inline` its body goes into the caller before types are known, so that constants reach it.
+    An `inner` function is called from compiled functions only, which saves compiling its wrapper, and becomes a part
+    of them: left to itself the compiler stops doing so at some size, and the simulation takes a third longer. With
+    `inline` its body goes into the caller before types are known, so that constants reach it.
     Division by zero gives an infinity as in NumPy: a check for it would keep loops from being vectorised.
     """
     decorator: Callable[[F], F] = njit(
@@ -26,6 +27,7 @@ def compiled(*, fast: bool = False, inner: bool = False, inline: bool = False) -
         error_model="numpy",
         fastmath=set(FAST) if fast else False,
         inline="always" if inline else "never",
+        forceinline=inner,
         no_cpython_wrapper=inner,
         no_cfunc_wrapper=inner,
     )

@@ -229,7 +229,12 @@ def actuate_any_order(plan: Floats, tau: float, state: Floats) -> None:
     """Do as `actuate` does, also with servos of second order: of its own, since the branch costs the others a tenth."""
     if plan[_ORDER] == FIRST_ORDER:
         actuate(plan, tau, state)
-        return
+    else:
+        _actuate_second(plan, tau, state)
+
+
+@compiled(inner=True)
+def _actuate_second(plan: Floats, tau: float, state: Floats) -> None:
     state[FRONT], state[REAR] = _way_axle(plan, _FRONT, tau), _way_axle(plan, _REAR, tau)
     state[SPEED] = _speed(plan, tau)
 

@@ -35,6 +35,7 @@ class BatteryDroopExponential(Form):
     @staticmethod
     def drive(state: Floats, share: float, time_constant_h: float) -> None:
         """Slow both axles by the hours that have passed."""
-        left = 1.0 + share * math.expm1(-state[HOURS] / time_constant_h)
-        state[FRONT_SPEED] *= left
-        state[REAR_SPEED] *= left
+        if share != 0.0:
+            left = 1.0 + share * math.expm1(-state[HOURS] / time_constant_h)
+            state[FRONT_SPEED] *= left
+            state[REAR_SPEED] *= left
