@@ -29,14 +29,26 @@ class Certificates:
         return getattr(self, f"{end}_certificate"), getattr(self, f"{end}_private_key")
 
 
-def check_certificates(certificates: Certificates) -> None:
-    """Raise `FileError` if a file is missing or no certificate, or a key is not that of its certificate."""
+def trusting(authority: Path | None) -> ssl.SSLContext:
+    """Return what trusts the authority with this certificate, and nobody else.
+
+    Raises
+    ------
+    FileError
+        If the file is missing, or no certificate.
+    """
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-    if (authority := certificates.root_ca_certificate) is not None:
+    if authority is not None:
         try:
             context.load_verify_locations(authority)
-        except OSError as error:
+        except (OSError, ValueError) as error:
             raise _unusable("certificate of the authority", authority, error) from None
+    return context
+
+
+def check_certificates(certificates: Certificates) -> None:
+    """Raise `FileError` if a file is missing or no certificate, or a key is not that of its certificate."""
+    context = trusting(certificates.root_ca_certificate)
     for end in _ENDS:
         certificate, key = certificates.pair(end)
         if (certificate is None) != (key is None):
@@ -50,9 +62,7 @@ def check_certificates(certificates: Certificates) -> None:
 
 def why_not(certificates: Certificates, host: str, port: int) -> str:
     """Return why a server at `host` does not take us, or we not it; "" if nothing is wrong with the handshake."""
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-    if certificates.root_ca_certificate is not None:
-        context.load_verify_locations(certificates.root_ca_certificate)
+    context = trusting(certificates.root_ca_certificate)
     certificate, key = certificates.pair("connect")
     if certificate is not None:
         _load(context, certificate, key)
@@ -76,7 +86,7 @@ def _load(context: ssl.SSLContext, certificate: Path, key: Path | None) -> None:
     try:
         # A key that is encrypted cannot be used by Zenoh; without an answer here, Python would ask for its password.
         context.load_cert_chain(certificate, key, password=lambda: "")
-    except OSError as error:
+    except (OSError, ValueError) as error:
         where = f"{certificate} and {key}"
         for file in filter(None, (certificate, key)):
             if not file.is_file():
@@ -84,8 +94,13 @@ def _load(context: ssl.SSLContext, certificate: Path, key: Path | None) -> None:
         raise _unusable("certificate and key", where, error) from None
 
 
-def _unusable(what: str, where: object, error: OSError) -> FileError:
-    reason = _in_words(error) if isinstance(error, ssl.SSLError) else error.strerror
+def _unusable(what: str, where: object, error: OSError | ValueError) -> FileError:
+    reason = str(error)  # of a ValueError: no path has a zero byte in it
+    if isinstance(error, ssl.SSLError):
+        reason = _in_words(error)
+    elif isinstance(error, OSError):
+        reason = error.strerror or reason
+    where = str(where).replace("\0", "\\0")
     return FileError(f"{what} cannot be used", where=where, value=reason, remedy="see docs/how-to/secure-the-bus.md")
 
 

@@ -33,6 +33,7 @@ def written(folder: Path, text: str | bytes) -> Path:
         ("{scouting: {multicast: {enabled: true}}}", "belongs on the command line: scouting"),
         ('{transport: {link: {tls: {root_ca_certificate: "no.pem"}}}}', "no.pem: .*cannot be used: No such file"),
         ('{transport: {link: {tls: {root_ca_certificate: "bus.json5"}}}}', "authority cannot be used: no certificate"),
+        ('{transport: {link: {tls: {root_ca_certificate: "a\\u0000.pem"}}}}', r"a\\0.pem: .*embedded null byte"),
         ('{transport: {link: {tls: {connect_certificate: "a.pem"}}}}', "certificate without its key"),
         (
             '{transport: {link: {tls: {listen_certificate: "a.pem", listen_private_key: "a.key"}}}}',

@@ -6,6 +6,7 @@ import ssl
 import time
 
 from agvbench.bus.bus_config import BusConfig
+from agvbench.bus.certificates import trusting
 from agvbench.workflows.doctor.finding import Check, Finding, Lab, State
 
 _SOON_DAYS = 30.0
@@ -25,9 +26,8 @@ class Certificates(Check):
         who = "takes those with a certificate of the lab's" if config.asks_who else "does not ask who calls"
         if (authority := config.certificates.root_ca_certificate) is None:
             return Finding(State.DOUBTFUL, f"{lab.bus_config} names no authority", "see docs/how-to/secure-the-bus.md")
-        context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-        context.load_verify_locations(authority)
-        ends_s = [ssl.cert_time_to_seconds(str(known["notAfter"])) for known in context.get_ca_certs()]
+        known = trusting(authority).get_ca_certs()
+        ends_s = [ssl.cert_time_to_seconds(str(certificate["notAfter"])) for certificate in known]
         if not ends_s:
             return Finding(State.DOUBTFUL, f"{authority} is no authority's", "see docs/how-to/secure-the-bus.md")
         days = (min(ends_s) - time.time()) / _DAY_S
