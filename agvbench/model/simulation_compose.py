@@ -1,12 +1,14 @@
 """Make one compiled kernel of the loop and the hooks of all effects.
 
-The kernel is a real module file, so that numba can keep its machine code: the text of `simulation_loop`, with one
-function per stage that calls the hooks in turn. The file's name has a hash of everything that goes into it, for numba
-itself does not notice a changed function in another file. It lies in ``$AGVBENCH_CACHE``, else in the user's cache.
+The kernel is a real module file, so that numba can keep its machine code: the text of `simulation_loop`, and of the
+files that it calls and that know of stages, with one function per stage that calls the hooks in turn. The file's name
+has a hash of everything that goes into it, for numba itself does not notice a changed function in another file. It lies
+in ``$AGVBENCH_CACHE``, else in the user's cache.
 """
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import importlib.util
 import inspect
@@ -24,10 +26,22 @@ from agvbench.effects import HOOKS, TIME_HOOKS, Effect
 from agvbench.effects import state as state_module
 from agvbench.errors import FileError
 from agvbench.model import compiled as compiled_module
-from agvbench.model import simulation_actuators, simulation_loop, simulation_servos, simulation_smoothing
+from agvbench.model import (
+    simulation_actuators,
+    simulation_frames,
+    simulation_layout,
+    simulation_level,
+    simulation_loop,
+    simulation_servos,
+    simulation_smoothing,
+    simulation_stages,
+    simulation_step,
+)
 
-_IMPORT = "from agvbench.model.simulation_stages import aim, arrive, capture, drift, drive, move, see, steer\n"
-_ACTUATE, _ACTUATE_ANY_ORDER = "    actuate,\n", "    actuate_any_order as actuate,\n"
+# The files of the kernel that call stages, or what calls them, each after those that it imports.
+_PARTS = (simulation_frames, simulation_step, simulation_level, simulation_loop)
+_INSIDE = {simulation_stages.__name__, *(part.__name__ for part in _PARTS)}
+_ACTUATE, _ACTUATE_ANY_ORDER = "actuate", "actuate_any_order"
 _SECOND_ORDER = {"STEERING_INERTIA", "STEERING_ACCELERATION"}
 
 
@@ -58,6 +72,33 @@ def kernel(kinds: tuple[type[Effect], ...]) -> Callable[..., None]:
 
 def kernel_text(kinds: Sequence[type[Effect]]) -> str:
     """Return the source of the kernel with the hooks of `kinds`."""
+    hook_imports, stages = _stages(kinds)
+    second_order = any(_SECOND_ORDER & {*hook.__code__.co_names} for kind in kinds for hook in kind.hooks().values())
+    imports, bodies = [], []
+    for part in _PARTS:
+        source = inspect.getsource(part)
+        head = [node for node in ast.parse(source).body if isinstance(node, ast.Import | ast.ImportFrom)]
+        imports += [ast.unparse(_chosen(node, second_order)) for node in head if not _is_inside(node)]
+        bodies.append("".join(source.splitlines(keepends=True)[head[-1].end_lineno :]))
+    lines = dict.fromkeys([*imports, *hook_imports])
+    return "".join(f"{line}\n" for line in lines) + "\n" + "\n".join([*stages, *bodies])
+
+
+def _is_inside(node: ast.Import | ast.ImportFrom) -> bool:
+    """Whether what is imported is in the kernel itself: another part of it, or a stage."""
+    return isinstance(node, ast.ImportFrom) and node.module in _INSIDE
+
+
+def _chosen(node: ast.Import | ast.ImportFrom, second_order: bool) -> ast.Import | ast.ImportFrom:
+    """Return the import with servos of any order in place of those of first order, where one has to be."""
+    for alias in node.names:
+        if alias.name == _ACTUATE and second_order:
+            alias.name, alias.asname = _ACTUATE_ANY_ORDER, _ACTUATE
+    return node
+
+
+def _stages(kinds: Sequence[type[Effect]]) -> tuple[list[str], list[str]]:
+    """Return the imports of effects, and one function for each stage that calls their hooks."""
     imports, stages = [], []
     for stage in HOOKS:
         calls, first = [], 0
@@ -72,13 +113,7 @@ def kernel_text(kinds: Sequence[type[Effect]]) -> str:
                 calls.append(f"    {'time_s = ' if time else ''}{alias}(s{time}{values})\n")
             first += count
         stages.append(_stage(stage, calls))
-    head, found, tail = inspect.getsource(simulation_loop).partition(_IMPORT)
-    if any(_SECOND_ORDER & {*hook.__code__.co_names} for kind in kinds for hook in kind.hooks().values()):
-        head = head.replace(_ACTUATE, _ACTUATE_ANY_ORDER)
-    assert found, "the loop imports its stages in one line"  # noqa: S101 - a contract between two files
-    # Stages are defined where the imports end, before their first use.
-    imported, marker, code = tail.partition("Integers = ")
-    return head + "".join(f"{line}\n" for line in dict.fromkeys(imports)) + imported + "\n".join(stages) + marker + code
+    return imports, stages
 
 
 def _stage(name: str, calls: Sequence[str]) -> str:
@@ -90,7 +125,8 @@ def _stage(name: str, calls: Sequence[str]) -> str:
 
 def _digest(text: str, kinds: Sequence[type[Effect]]) -> str:
     """Return a hash over everything whose change must lead to compiling again."""
-    modules = [state_module, compiled_module, simulation_actuators, simulation_servos, simulation_smoothing]
+    modules = [state_module, compiled_module, simulation_layout]
+    modules += [simulation_actuators, simulation_servos, simulation_smoothing]
     modules += [sys.modules[kind.__module__] for kind in kinds]
     parts = [text, numba.__version__, *map(inspect.getsource, dict.fromkeys(modules))]
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]

@@ -1,0 +1,26 @@
+"""Collocation at four Gauss–Legendre nodes, and how the general simulation's kernel lays out its arrays."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from agvbench.model.simulation_smoothing import SMOOTH_SIZE
+
+# Gauss–Legendre nodes on [0, 1]; ∫₀^c of the polynomial through values at the nodes is the values times
+# c (BASIS[j, 0] + c BASIS[j, 1] + …).
+COUNT = 4
+NODES = 0.5 + 0.5 * np.polynomial.legendre.leggauss(COUNT)[0]
+BASIS = np.linalg.inv(np.vander(NODES, COUNT, increasing=True)).T / np.arange(1.0, COUNT + 1.0)
+TO_NODES = np.stack([c * (BASIS @ c ** np.arange(COUNT)) for c in NODES])
+WEIGHTS = BASIS.sum(axis=1)
+
+# Work of one step: at the nodes, motion forward, left and turning, then velocity along x, y and turning.
+AHEAD, ASIDE, TURN, ALONG_X, ALONG_Y, TURNED = range(0, 6 * COUNT, COUNT)
+SMOOTH = 6 * COUNT
+WORK_SIZE = SMOOTH + SMOOTH_SIZE
+# Where a step starts: pose, distance driven, and the pose that a smoothing camera reports.
+START_SIZE = 7
+
+# Numbers of the vehicle: axles, longest step, when the run began in hours, and the scatter of the drive's level.
+FRONT_AXLE, REAR_AXLE, LONGEST_STEP, STARTED, LEVEL_SCATTER = range(5)
+SECONDS_PER_HOUR = 3600.0

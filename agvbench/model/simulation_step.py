@@ -1,0 +1,117 @@
+"""One step of the general simulation: nothing in it jumps.
+
+The motion is taken at the four Gauss–Legendre nodes; heading and position follow by collocation (Hairer, Nørsett and
+Wanner 1993, section II.7). A part of the kernel; see `agvbench.model.simulation_compose`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from agvbench.effects.state import (
+    COS_FRONT,
+    COS_REAR,
+    DISTANCE,
+    FORWARD,
+    FRONT,
+    FRONT_SPEED,
+    HEADING,
+    HOURS,
+    KNOWN_FRONT,
+    KNOWN_REAR,
+    LEFT,
+    REAR,
+    REAR_SPEED,
+    SPEED,
+    TAN_FRONT,
+    TAN_REAR,
+    TIME,
+    X_RATE,
+    Y_RATE,
+    YAW_RATE,
+    X,
+    Y,
+)
+from agvbench.model.compiled import compiled
+from agvbench.model.simulation_actuators import actuate
+from agvbench.model.simulation_layout import (
+    AHEAD,
+    ALONG_X,
+    ALONG_Y,
+    ASIDE,
+    COUNT,
+    FRONT_AXLE,
+    NODES,
+    REAR_AXLE,
+    SECONDS_PER_HOUR,
+    STARTED,
+    TO_NODES,
+    TURN,
+    TURNED,
+    WEIGHTS,
+)
+from agvbench.model.simulation_stages import drift, drive, move, steer
+from agvbench.types import Floats
+
+
+@compiled(inner=True, fast=True)
+def set_motion(s: Floats, p: Floats, front_axle_m: float, rear_axle_m: float) -> None:
+    """Turn angles and speed in `s` into the body's motion (thesis eq. 5.6–5.8, corrected)."""
+    steer(s, p)
+    front, rear = s[FRONT], s[REAR]
+    if front != s[KNOWN_FRONT] or rear != s[KNOWN_REAR]:
+        s[KNOWN_FRONT], s[KNOWN_REAR] = front, rear
+        s[COS_FRONT], s[COS_REAR] = math.cos(front), math.cos(rear)
+        s[TAN_FRONT], s[TAN_REAR] = math.sin(front) / s[COS_FRONT], math.sin(rear) / s[COS_REAR]
+    s[FRONT_SPEED] = s[REAR_SPEED] = s[SPEED]
+    drive(s, p)
+    forward = 0.5 * (s[FRONT_SPEED] * s[COS_FRONT] + s[REAR_SPEED] * s[COS_REAR])
+    per_wheelbase = forward / (front_axle_m + rear_axle_m)
+    s[FORWARD] = forward
+    s[LEFT] = per_wheelbase * (front_axle_m * s[TAN_REAR] + rear_axle_m * s[TAN_FRONT])
+    s[YAW_RATE] = per_wheelbase * (s[TAN_FRONT] - s[TAN_REAR])
+    move(s, p)
+
+
+@compiled(inner=True, fast=True)
+def take_step(
+    s: Floats, p: Floats, plan: Floats, work: Floats, vehicle: Floats, begin: float, tau: float, length: float,
+    start: Floats,
+) -> None:  # fmt: skip
+    """Fill `work` for a step of `length` from `tau` after `begin`; `start` is the pose there and the distance."""
+    x_rate, y_rate = s[X_RATE], s[Y_RATE]
+    for i in range(COUNT):
+        elapsed = NODES[i] * length
+        actuate(plan, tau + elapsed, s)
+        s[TIME] = begin + tau + elapsed
+        s[HOURS] = vehicle[STARTED] + s[TIME] / SECONDS_PER_HOUR
+        # Good enough for what depends on the place: the velocity at the last node.
+        s[X], s[Y], s[HEADING] = start[0] + elapsed * x_rate, start[1] + elapsed * y_rate, start[2]
+        s[DISTANCE] = start[3] + elapsed * abs(s[SPEED])
+        set_motion(s, p, vehicle[FRONT_AXLE], vehicle[REAR_AXLE])
+        work[AHEAD + i], work[ASIDE + i], work[TURN + i] = s[FORWARD], s[LEFT], s[YAW_RATE]
+    for i in range(COUNT):
+        turned = 0.0
+        for j in range(COUNT):
+            turned += TO_NODES[i, j] * work[TURN + j]
+        heading = start[2] + length * turned
+        cosine, sine = math.cos(heading), math.sin(heading)
+        s[HEADING] = heading
+        s[FORWARD], s[LEFT], s[YAW_RATE] = work[AHEAD + i], work[ASIDE + i], work[TURN + i]
+        s[X_RATE] = cosine * s[FORWARD] - sine * s[LEFT]
+        s[Y_RATE] = sine * s[FORWARD] + cosine * s[LEFT]
+        drift(s, p)
+        work[ALONG_X + i], work[ALONG_Y + i], work[TURNED + i] = s[X_RATE], s[Y_RATE], s[YAW_RATE]
+
+
+@compiled(inner=True, fast=True)
+def end_step(work: Floats, start: Floats, length: float) -> None:
+    """Move `start`, pose and distance, to the end of the step."""
+    ahead = 0.0
+    for j in range(COUNT):
+        weight = WEIGHTS[j] * length
+        start[0] += weight * work[ALONG_X + j]
+        start[1] += weight * work[ALONG_Y + j]
+        start[2] += weight * work[TURNED + j]
+        ahead += weight * abs(work[AHEAD + j])
+    start[3] += ahead
