@@ -30,6 +30,7 @@ from agvbench.diagnosis.result import Diagnosis, HeldOut, Verdict
 from agvbench.diagnosis.selection import Selection, Selector
 from agvbench.diagnosis.standing import resettle, settle
 from agvbench.diagnosis.structure import RANDOM_PHASE, Dependence, dependences, residual_rates, swing
+from agvbench.diagnosis.thinning import MOST_RUNS, measured_in_all, some_repeats
 from agvbench.diagnosis.vehicle import corrected_vehicle
 from agvbench.diagnosis.windows import horizon_of
 from agvbench.diagnosis.windows_diagnose import diagnose_windows
@@ -98,16 +99,20 @@ def diagnose(
         )
     fitted, kept = readings.select(~held), readings.select(held)
     tell(f"{len(fitted)} runs to fit, {len(kept)} held out")
-    measured = _measured(fitted.runs, geometry, header.neutral)
-    maps = free_maps(fitted.runs, header.neutral)
+    some = fitted.select(some_repeats(fitted.group, MOST_RUNS))
+    measured = _measured(some.runs, geometry, header.neutral)
+    maps = free_maps(some.runs, header.neutral)
     start = start_values(maps, measured, _believed(maps, header, geometry, vehicle))
     tried, kinds = tried_beside(vehicle)
     names, values = given_effects(vehicle, tried)
-    selector = settle(Selector(Batch(fitted, maps, geometry, kinds=kinds), tried, start, seed, tell, names, values))
+    selector = settle(Selector(Batch(some, maps, geometry, kinds=kinds), tried, start, seed, tell, names, values))
     chosen, selector = resettle(selector.select(), selector)
     selection, selector = reform_and_resettle(chosen, selector)
     readings = replace(readings, stood=selector.batch.readings.stood)
     explained = explain(selection, selector)
+    if len(some) < len(fitted):
+        tell(f"causes were looked for in {len(some)} runs; now they are measured in all {len(fitted)}")
+        selection, explained = measured_in_all(selection, explained, selector, fitted)
     return _conclude(header, readings, held, selection, explained, vehicle, geometry, seed)
 
 
@@ -207,6 +212,7 @@ def _conclude(
         _provenance(header, readings, seed)
         | {
             "fit_runs": int((~held).sum()),
+            "searched_runs": int(some_repeats(readings.group[~held], MOST_RUNS).sum()),
             "models_fitted": selection.tried,
             "steering_stood_at": "the first command" if readings.stood else "neutral",
             "lack_of_fit_p_value": judged.lack_of_fit,
