@@ -185,16 +185,7 @@ def _conclude(
     if judged is None:
         why = "there are no repeats among the runs held out or fitted, and so no floor"
         return Diagnosis(Verdict.NOT_IDENTIFIABLE, why, provenance=_provenance(header, readings, seed))
-    unexplained = poses
-    if explained is not None:
-        without = explained.without
-        unexplained = Predictor(every.batch, without.names).predict(without.fit.parameters)
-    rest = dependences(residual_rates(readings, unexplained), readings.group, seed)
-    # A place passed through in every run can look like a swing: it is looked for in what the term leaves.
-    if (swings := swing(residual_rates(readings, poses), seed)) is not None:
-        rest = [swings, *(d for d in rest if d.covariate != RANDOM_PHASE)]
-    if explained is not None:
-        rest = with_term_first(rest, explained)
+    rest = _what_is_left(every.batch, poses, explained, seed)
     known = candidates() | term_candidates() | form_candidates()
     effects = named_effects(selection, bounds_of(known, selection.chosen.names)) + map_effects(fit, vehicle)
     significant = explained is not None or _is_significant(judged, rest)
@@ -210,22 +201,40 @@ def _conclude(
         model,
         selection.rejected,
         _provenance(header, readings, seed)
-        | {
-            "fit_runs": int((~held).sum()),
-            "searched_runs": int(some_repeats(readings.group[~held], MOST_RUNS).sum()),
-            "models_fitted": selection.tried,
-            "steering_stood_at": "the first command" if readings.stood else "neutral",
-            "lack_of_fit_p_value": judged.lack_of_fit,
-            "scatter": {
-                "front_deg": float(np.degrees(fit.scatter.offsets[1])),
-                "rear_deg": float(np.degrees(fit.scatter.offsets[2])),
-                "speed_percent": 100.0 * float(fit.scatter.offsets[3]),
-            },
-        }
+        | _how_it_was_fitted(selection, readings, held)
+        | {"lack_of_fit_p_value": judged.lack_of_fit}
         | ({"empirical_term": described(explained)} if explained else {}),
     )
     found = with_residuals(found, readings, held, before, poses)
     return found if explained or reformed else with_next_experiment(found, selection, readings, header, seed)
+
+
+def _what_is_left(batch: Batch, poses: Floats, explained: Explained | None, seed: int) -> list[Dependence]:
+    """Return what the rest depends on: that of the model without an empirical term, whose own covariate comes first."""
+    readings, unexplained = batch.readings, poses
+    if explained is not None:
+        without = explained.without
+        unexplained = Predictor(batch, without.names).predict(without.fit.parameters)
+    rest = dependences(residual_rates(readings, unexplained), readings.group, seed)
+    # A place passed through in every run can look like a swing: it is looked for in what the term leaves.
+    if (swings := swing(residual_rates(readings, poses), seed)) is not None:
+        rest = [swings, *(d for d in rest if d.covariate != RANDOM_PHASE)]
+    return rest if explained is None else with_term_first(rest, explained)
+
+
+def _how_it_was_fitted(selection: Selection, readings: Readings, held: NDArray[np.bool_]) -> dict[str, object]:
+    offsets = selection.chosen.fit.scatter.offsets
+    return {
+        "fit_runs": int((~held).sum()),
+        "searched_runs": int(some_repeats(readings.group[~held], MOST_RUNS).sum()),
+        "models_fitted": selection.tried,
+        "steering_stood_at": "the first command" if readings.stood else "neutral",
+        "scatter": {
+            "front_deg": float(np.degrees(offsets[1])),
+            "rear_deg": float(np.degrees(offsets[2])),
+            "speed_percent": 100.0 * float(offsets[3]),
+        },
+    }
 
 
 def _believed_poses(vehicle: VehicleModel, readings: Readings) -> Floats:
