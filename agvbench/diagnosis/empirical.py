@@ -83,7 +83,9 @@ def explain(selection: Selection, selector: Selector) -> Explained | None:
     if not models:
         return None
     chosen, term, gains, rivals = min(models, key=lambda model: model[0].total)
-    without = wide.shrunk(selection.base, chosen, term.name)
+    without = wide.retried(wide.shrunk(selection.base, chosen, term.name), chosen)
+    if not wide.earns(without, chosen):
+        return None
     gain = without.loss - chosen.loss
     tried = selection.tried + wide.tried
     rejected = {n: g for n, g in selection.rejected.items() if n not in chosen.names}

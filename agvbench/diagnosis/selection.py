@@ -55,6 +55,10 @@ class Scored:
         return float(self.loss.sum())
 
 
+def _total(model: Scored) -> float:
+    return model.total
+
+
 @dataclass(frozen=True)
 class Selection:
     """What was chosen.
@@ -306,6 +310,21 @@ class Selector:
             self.tried += 1
             self._known[key] = Scored(names, fitted, cross_validated(fitted, self._fold, bounds))
         return self._known[key]
+
+    def retried(self, model: Scored, beyond: Scored) -> Scored:
+        """Return `model` fitted again, patiently, from where the larger model `beyond` stands, if it predicts better.
+
+        What a larger model gains may be nothing but the way that its fit went on.
+        """
+        own = beyond.fit.effect_values()
+        kept = [value for name in model.names for key, value in own.items() if key.partition(".")[0] == name]
+        bounds = bounds_of(self.candidates, model.names)
+        again = fit(
+            self._predictor(model.names), np.r_[beyond.fit.parameters[: self.batch.maps.size], kept], bounds,
+            offsets=beyond.fit.offsets, scatter=beyond.fit.scatter, iterations=_LONG, patient=True,
+        )  # fmt: skip
+        self.tried += 1
+        return min(model, Scored(model.names, again, cross_validated(again, self._fold, bounds)), key=_total)
 
     def known(self, names: tuple[str, ...]) -> Scored | None:
         """Return the model with the effects `names` if it was fitted."""

@@ -1,0 +1,44 @@
+"""A larger model must not be credited with the way that its fit went on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tiny_vehicle import FRONT_M, HEADER, NEUTRAL, REAR_M, Tiny
+
+from agvbench.calibration import measure_run
+from agvbench.diagnosis.candidates import bounds_of, candidates
+from agvbench.diagnosis.fitting import fit
+from agvbench.diagnosis.levels import ROLES, free_maps, start_values
+from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.reading import read_runs
+from agvbench.diagnosis.selection import Scored, Selector
+from agvbench.vehicle.geometry import Geometry
+
+
+@pytest.fixture(scope="module")
+def selector(tiny_campaign):
+    runs = list(tiny_campaign(Tiny(steering_lag_s=0.15)))
+    readings, geometry = read_runs(runs, HEADER.neutral), Geometry(FRONT_M, REAR_M)
+    maps = free_maps(readings.runs, NEUTRAL)
+    believed = {role: np.zeros(len(maps.nodes[role])) for role in ROLES}
+    start = start_values(maps, [measure_run(run, geometry, neutral=NEUTRAL) for run in runs], believed)
+    return Selector(Batch(readings, maps, geometry), candidates(), start, 0, lambda _: None)
+
+
+def test_a_model_left_half_way_is_fitted_again_from_where_the_larger_one_stands(selector):
+    lag = selector.grown(selector.base(), "steering_lag")
+    bounds = bounds_of(selector.candidates, lag.names)
+    begun = fit(Predictor(selector.batch, lag.names), np.r_[selector.start, 0.02], bounds, iterations=1)
+    early = Scored(lag.names, begun, begun.loss)
+    larger = selector.grown(lag, "lateral_slip")
+    again = selector.retried(early, larger)
+    assert again.names == lag.names
+    assert again.total < early.total - 100.0
+    assert again.fit.effect_values()["steering_lag.time_constant_s"] == pytest.approx(0.15, rel=0.03)
+
+
+def test_a_model_that_is_at_its_best_stays(selector):
+    lag = selector.grown(selector.base(), "steering_lag")
+    again = selector.retried(lag, selector.grown(lag, "lateral_slip"))
+    assert lag.total - 1.0 < again.total <= lag.total
