@@ -97,7 +97,8 @@ def _tracks(runs: Sequence[Run]) -> Iterator[tuple[Floats, Floats]]:
             continue
         t_s = f.t_s[order]
         poses = np.column_stack([f.x_m[order], f.y_m[order], np.unwrap(f.heading_rad[order])])
-        chosen = np.unique(np.searchsorted(t_s, np.arange(t_s[0], t_s[-1], _EVERY_S)))
+        # Rounding may put the last moment past the last frame.
+        chosen = np.unique(np.searchsorted(t_s[:-1], np.arange(t_s[0], t_s[-1], _EVERY_S)))
         yield t_s[chosen], poses[chosen]
 
 

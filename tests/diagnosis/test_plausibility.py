@@ -1,0 +1,27 @@
+"""Whether numbers are plausible is asked of runs of any length."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from hypothesis import example, given
+from hypothesis import strategies as st
+from tiny_vehicle import HEADER, Tiny, campaign_runs
+
+from agvbench.diagnosis.plausibility import refuse_units
+from agvbench.types import Frames
+
+RATE_HZ = 120.0
+RUN = campaign_runs(Tiny())[0]
+
+
+# Of three in a thousand lengths, the last of the moments looked at is rounded past the last frame.
+@given(st.integers(-200, 0), st.integers(0, 2400))
+@example(-142, 1476)
+def test_a_run_of_any_length(first, count):
+    t_s = first / RATE_HZ + np.arange(count + 1) / RATE_HZ
+    still, nan = np.zeros(count + 1), np.full(count + 1, np.nan)
+    tracked, number = np.ones(count + 1, dtype=np.bool_), np.full(count + 1, -1)
+    frames = Frames(t_s, 0.3 * t_s, still, still, tracked, number, nan, nan)
+    refuse_units([replace(RUN, frames=frames)], HEADER)
