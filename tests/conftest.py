@@ -6,6 +6,9 @@ import os
 
 from hypothesis import HealthCheck, settings
 
+# A mistake of agvbench itself is to be seen, not told in one line.
+os.environ.setdefault("AGVBENCH_DEBUG", "1")
+
 settings.register_profile(
     "agvbench",
     deadline=None,

@@ -20,7 +20,8 @@ from agvbench.errors import AgvbenchError, FlagError
 
 _EPILOG = """\
 exit codes: 0 done; 1 the answer is "no" (a regression, not adequate);
-2 bad input or set-up, with one line that says what to do.
+2 bad input or set-up, with one line that says what to do;
+70 a mistake of agvbench itself, with the file to report.
 shell completion: eval "$(register-python-argcomplete agvbench)"
 """
 
@@ -102,3 +103,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         # The reader (head, less) has gone: nothing is left to say, and nobody to say it to.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except Exception as error:  # noqa: BLE001 - whatever it is, who runs a lab should not have to read a traceback
+        from agvbench.cli._own_mistake import tell_own_mistake
+
+        return tell_own_mistake(arguments.command, error)

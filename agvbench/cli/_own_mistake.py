@@ -1,0 +1,44 @@
+"""A mistake of agvbench itself is told in one line, too; who mends it needs the traceback, and finds it in a file."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import traceback
+
+EXIT_CODE = 70
+"""Software error, as ``sysexits.h`` calls it: neither a bad input (2) nor a failed run (1)."""
+
+DEBUG = "AGVBENCH_DEBUG"
+
+
+def tell_own_mistake(command: str, error: Exception) -> int:
+    """Print one line about an exception that nobody expected, keep its traceback in a file, and return the exit code.
+
+    Raises
+    ------
+    Exception
+        The exception itself where the environment variable ``AGVBENCH_DEBUG`` is set.
+    """
+    if os.environ.get(DEBUG):
+        raise error
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    what = " ".join(f"{type(error).__name__} {error}".split())
+    print(
+        f"agvbench {command}: {what} at {last.filename}:{last.lineno}: a mistake of agvbench itself; "
+        f"please report it with {_kept(error)}",
+        file=sys.stderr,
+    )
+    return EXIT_CODE
+
+
+def _kept(error: Exception) -> str:
+    lines = traceback.format_exception(error)
+    try:
+        handle, path = tempfile.mkstemp(prefix="agvbench-", suffix=".traceback.txt")
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.writelines(lines)
+    except OSError:
+        return f"its traceback ({DEBUG}=1 shows it)"
+    return path
