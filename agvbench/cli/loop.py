@@ -1,16 +1,18 @@
 """Close the loop: find what the model lacks, correct for it, and show every trajectory before and after.
 
-Four stages, each with its result in the loop's directory:
+Five stages, each with its result in the loop's directory:
 
   before/          a bench session that excites the vehicle: calibration, the eight trajectories, step responses, free
                    driving
   diagnosis.json   what the calibrated model lacks (agvbench diagnose), and vehicle.toml, the model with the effects
+  trial/           corrected plans of the eight trajectories, for what they still miss (remainders.json)
   plans.json       what plans with that model make up for, and what they cannot
   after/           the eight trajectories uncalibrated, calibrated and corrected, driven in turns
   report.html      before and after, trajectory by trajectory, with an equivalence test of the bias
 
 The corrected model may still miss where a trajectory ends, where an effect is in no library or of another form. What
-stood out of the scatter in before/ is taken off the aim (remainders.json); --model-only leaves it.
+stood out of the scatter in before/ and in trial/ is taken off the aim; --no-trial learns from before/ alone, and
+--model-only leaves the aim where it is.
 
 Corrected plans change steering and durations as little as brings the model to rest on the target. Scatter from run to
 run cannot be corrected, nor what the diagnosis could not name. Simulated by default: a vehicle like the thesis', which
@@ -39,11 +41,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for flag, keywords, text in OPTIONS:
         if flag not in _DECIDED:
             parser.add_argument(flag, help=text, **keywords)
-    parser.add_argument(
+    less = parser.add_mutually_exclusive_group()
+    less.add_argument(
         "--model-only",
         action="store_true",
         help="correct with the model alone, not what it missed of these trajectories",
     )
+    less.add_argument("--no-trial", action="store_true", help="do not try corrected plans before they are compared")
     parser.add_argument("--out", metavar="DIR", help="the loop's directory (default: a new one under campaigns/)")
     parser.add_argument(
         "--resume", action="store_true", help="go on with an interrupted loop: the one in --out, or the last"
@@ -54,11 +58,11 @@ def run(arguments: argparse.Namespace) -> int:
     """Go round the loop and write its report; return the exit code."""
     from agvbench.reporting.console import wide_console
     from agvbench.workflows.loop import run_loop
-    from agvbench.workflows.loop_settings import MODEL_ONLY
+    from agvbench.workflows.loop_settings import MODEL_ONLY, NO_TRIAL
 
     console = wide_console()
     given = {destination(flag): getattr(arguments, destination(flag), None) for flag, _, _ in OPTIONS}
-    given["remainders"] = MODEL_ONLY if arguments.model_only else None
+    given["remainders"] = MODEL_ONLY if arguments.model_only else NO_TRIAL if arguments.no_trial else None
     loop = run_loop(
         given,
         out=arguments.out,

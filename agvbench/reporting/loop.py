@@ -141,7 +141,7 @@ def _headline(loop: Loop, rows: Sequence[BeforeAfter]) -> Iterator[str]:
         turned = max(abs(left["heading_deg"]) for left in moved)
         yield (
             f"Not all of it is the model's merit: on {len(moved)} trajectories the aim was moved, by up to "
-            f"{farthest:.1f} mm and {turned:.2f} deg, by what the model missed there in the first session "
+            f"{farthest:.1f} mm and {turned:.2f} deg, by what the model missed there before "
             "(--model-only leaves that out)."
         )
     verdict = str(loop.diagnosis.get("verdict"))

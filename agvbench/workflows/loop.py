@@ -1,4 +1,4 @@
-"""What ``agvbench loop`` does: bench, diagnose, correct the model, plan with it, bench again.
+"""What ``agvbench loop`` does: bench, diagnose, correct the model, plan with it, try the plans, bench again.
 
 Each stage leaves its result in the loop's directory, and a stage whose result is there is not done again.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,10 +23,13 @@ from agvbench.workflows.loop_settings import (
     AFTER,
     BEFORE,
     DIAGNOSIS,
+    FIRST_REMAINDERS,
     MODEL_ONLY,
+    NO_TRIAL,
     PLANS,
     REMAINDERS,
     SETTINGS,
+    TRIAL,
     VEHICLE,
     opened,
     write,
@@ -37,6 +40,8 @@ if TYPE_CHECKING:
 
 EXCITING = ("calibration", "trajectories", "step_response", "free_driving")
 """What the first session drives: the second and third tell lags, which steady driving hides."""
+TRYING = ("trial",)
+"""What is driven between the sessions: corrected plans, for what they still miss."""
 SHOWING = ("trajectories",)
 """What the second session drives."""
 
@@ -93,23 +98,30 @@ def run_loop(given: Mapping[str, Any], *, out: str | None, resume: bool, tell: T
         If an option, the plant, a campaign or a file cannot be used.
     """
     directory, settings = opened(given, out, resume=resume)
-    tell(f"1/4 driving to diagnose: {', '.join(EXCITING)} → {directory / BEFORE}")
+    tell(f"1/5 driving to diagnose: {', '.join(EXCITING)} → {directory / BEFORE}")
     if not (directory / DIAGNOSIS).exists():
         _first_bench(directory, settings, tell)
-    tell(f"2/4 diagnosing → {directory / DIAGNOSIS}, {VEHICLE}")
+    tell(f"2/5 diagnosing → {directory / DIAGNOSIS}, {VEHICLE}")
     diagnosis = _diagnosed(directory, settings.seed, tell)
-    tell(f"3/4 planning with what was found → {directory / PLANS}")
-    learned = "" if settings.remainders == MODEL_ONLY else _learned(directory)
+    learned = _learned(directory, settings, tell)
+    tell(f"4/5 planning with what was found → {directory / PLANS}")
     plans = _planned(directory, settings, learned, tell)
-    tell(f"4/4 driving uncalibrated, calibrated and corrected in turns → {directory / AFTER}")
+    tell(f"5/5 driving uncalibrated, calibrated and corrected in turns → {directory / AFTER}")
+    _drive_corrected(directory, AFTER, SHOWING, settings, learned, tell)
+    return Loop(directory, settings, diagnosis, plans)
+
+
+def _drive_corrected(
+    directory: Path, session: str, names: Sequence[str], settings: BenchSettings, learned: str, tell: Tell
+) -> None:
+    """Drive a session with what was found and learned."""
     models = {
         "calibration": str((directory / BEFORE / VEHICLE).resolve()),
         "corrected": str((directory / VEHICLE).resolve()),
         "remainders": str(Path(learned).resolve()) if learned else "",
     }
-    moved(directory / AFTER, models)
-    drive(directory / AFTER, SHOWING, settings, models, tell)
-    return Loop(directory, settings, diagnosis, plans)
+    moved(directory / session, models)
+    drive(directory / session, names, settings, models, tell)
 
 
 def _first_bench(directory: Path, settings: BenchSettings, tell: Tell) -> None:
@@ -162,16 +174,32 @@ def _in_words(found: Diagnosis) -> list[str]:
     return lines
 
 
-def _learned(directory: Path) -> str:
-    """Return the file of what the corrected model missed in the first session, after writing it unless it is there."""
+def _learned(directory: Path, settings: BenchSettings, tell: Tell) -> str:
+    """Return the file of what the corrected model missed so far, after learning it unless it is there; "" for nothing.
+
+    First from the calibrated runs of the first session; then corrected plans are tried, for an effect that the model
+    lacks does something else on another way.
+    """
     from agvbench.campaign import Campaign
     from agvbench.workflows.loop_remainders import remainders
 
-    path = directory / REMAINDERS
-    if not path.exists():
-        content = remainders(Campaign.open(directory / BEFORE), VehicleModel.load(directory / VEHICLE))
-        write(path, json.dumps({"schema": 1, "remainders": content}, indent=2, allow_nan=False) + "\n")
+    path, model = directory / REMAINDERS, VehicleModel.load(directory / VEHICLE)
+    if settings.remainders == MODEL_ONLY:
+        return ""
+    if path.exists():
+        return str(path)
+    known = remainders(Campaign.open(directory / BEFORE), model, "calibrated")
+    if settings.remainders != NO_TRIAL:
+        tell(f"3/5 trying corrected plans, for what they still miss → {directory / TRIAL}")
+        _write_remainders(directory / FIRST_REMAINDERS, known)
+        _drive_corrected(directory, TRIAL, TRYING, settings, str(directory / FIRST_REMAINDERS), tell)
+        known |= remainders(Campaign.open(directory / TRIAL), model, "corrected")
+    _write_remainders(path, known)
     return str(path)
+
+
+def _write_remainders(path: Path, known: Mapping[str, Mapping[str, float]]) -> None:
+    write(path, json.dumps({"schema": 1, "remainders": known}, indent=2, allow_nan=False) + "\n")
 
 
 def _planned(directory: Path, settings: BenchSettings, learned: str, tell: Tell) -> dict[str, Any]:

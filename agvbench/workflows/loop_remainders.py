@@ -1,7 +1,7 @@
-"""What the corrected model missed in the first session, trajectory by trajectory: the last thing there is to correct.
+"""What the corrected model missed in earlier sessions, trajectory by trajectory: the last thing there is to correct.
 
-An effect that is not in the library, or has another form than the library's, leaves a bias on each trajectory that the
-first session has measured. What of it stands out of the scatter is taken off the aim of the corrected plan. That is
+An effect that is not in the library, or has another form than the library's, leaves a bias on each trajectory that was
+measured. What of it stands out of the scatter is taken off the aim of the corrected plan. That is
 learning, not understanding: it holds for this trajectory, driven from this place, and says nothing about any other.
 """
 
@@ -22,16 +22,15 @@ from agvbench.types import Floats, Pose, Run
 
 FEWEST = 3
 """Fewer runs than this do not tell a bias from scatter."""
-_LEARN_FROM = "calibrated"
 
 
-def remainders(campaign: Campaign, model: VehicleModel) -> dict[str, dict[str, float]]:
+def remainders(campaign: Campaign, model: VehicleModel, condition: str) -> dict[str, dict[str, float]]:
     """Return, by trajectory, what `model` missed in the mean: the measured end pose in the frame of the predicted one.
 
-    Learned from the runs whose commands are nearest to corrected ones, the calibrated. Each component is shrunk by the
-    share of its square that its standard error explains, so that scatter is not learned.
+    Learned from the runs of one condition: those with commands nearest to what will be driven. Each component is shrunk
+    by the share of its square that its standard error explains, so that scatter is not learned.
     """
-    runs = [run for run in campaign.select(condition=_LEARN_FROM) if run.target.is_finite]
+    runs = [run for run in campaign.select(condition=condition) if run.target.is_finite]
     out = {}
     for name in dict.fromkeys(run.trajectory for run in runs):
         missed = np.array(list(_missed((run for run in runs if run.trajectory == name), model))).reshape(-1, 3)

@@ -19,7 +19,9 @@ from agvbench.text_files import read_toml
 
 SETTINGS = "loop.toml"
 BEFORE, DIAGNOSIS, VEHICLE, PLANS, AFTER = "before", "diagnosis.json", "vehicle.toml", "plans.json", "after"
-REMAINDERS, MODEL_ONLY = "remainders.json", "none"
+TRIAL, REMAINDERS, FIRST_REMAINDERS = "trial", "remainders.json", "remainders-before.json"
+MODEL_ONLY, NO_TRIAL = "none", "before"
+"""What `BenchSettings.remainders` says of a loop: plans of the model alone, or learned from the first session alone."""
 
 
 def opened(given: Mapping[str, Any], out: str | None, *, resume: bool) -> tuple[Path, BenchSettings]:

@@ -10,8 +10,10 @@ import sys
 
 import pytest
 
+from agvbench.campaign import Campaign
 from agvbench.errors import FileError, FlagError
 from agvbench.model import VehicleModel
+from agvbench.running.remainders import read_remainders
 from agvbench.workflows.loop_settings import opened, write
 
 PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
@@ -99,7 +101,8 @@ def test_the_correction_takes_the_bias_away(driven):
             for c in ("calibrated", "corrected")
         }
         assert max(biases["corrected"]) < 0.2 * max(biases["calibrated"])
-    for line in ("1/4 driving", "2/4 diagnosing", "3/4 planning", "4/4 driving", "report: it/report.html"):
+    stages = ("1/5 driving", "2/5 diagnosing", "3/5 trying", "4/5 planning", "5/5 driving")
+    for line in (*stages, "report: it/report.html"):
         assert line in said
     assert "lateral_slip" in said
 
@@ -117,6 +120,19 @@ def test_everything_is_there_and_fits_together(driven):
     for heading in ("Before and after", "What the calibrated model lacks", "What corrected plans make up for"):
         assert heading in html
     assert not list(directory.glob(".*"))
+
+
+@pytest.mark.slow
+def test_what_is_tried_is_not_what_is_compared(driven):
+    directory, _ = driven
+    tried, compared = (list(Campaign.open(directory / name)) for name in ("trial", "after"))
+    assert {run.condition for run in tried} == {"corrected"}
+    assert len(tried) == 8 * 3
+    # All randomness of a simulated run follows from its name: the same names would mean the same scatter.
+    assert not {run.run_id for run in tried} & {run.run_id for run in compared}
+    first, then = (read_remainders(str(directory / f"{name}.json")) for name in ("remainders-before", "remainders"))
+    assert set(first) == set(then)
+    assert first != then
 
 
 @pytest.mark.slow
