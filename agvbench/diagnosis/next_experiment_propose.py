@@ -8,8 +8,10 @@ import numpy as np
 
 from agvbench.calibration.source import HeaderLike
 from agvbench.diagnosis.candidates import candidates
-from agvbench.diagnosis.next_experiment import LEAST_REPEATS, NextExperiment, pin, separate
+from agvbench.diagnosis.next_experiment import pin, separate
 from agvbench.diagnosis.next_experiment_pins import unpinned
+from agvbench.diagnosis.next_experiment_result import NextExperiment
+from agvbench.diagnosis.next_experiment_search import LEAST_REPEATS
 from agvbench.diagnosis.reading import Readings
 from agvbench.diagnosis.result import Diagnosis, Verdict
 from agvbench.diagnosis.selection import Selection

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
-from agvbench.diagnosis.next_experiment import NextExperiment
+from agvbench.diagnosis.next_experiment_result import NextExperiment
 from agvbench.diagnosis.structure import Dependence
 from agvbench.model import VehicleModel
 

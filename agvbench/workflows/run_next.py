@@ -14,7 +14,7 @@ from typing import Any
 
 from agvbench.campaign import Campaign, CampaignWriter
 from agvbench.diagnosis.grouping import held_out_runs
-from agvbench.diagnosis.next_experiment import NextExperiment
+from agvbench.diagnosis.next_experiment_result import NextExperiment
 from agvbench.diagnosis.reading import read_runs
 from agvbench.errors import FileError, PlanError
 from agvbench.model import VehicleModel
