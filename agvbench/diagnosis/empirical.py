@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.diagnosis.candidates import Candidate, candidate
-from agvbench.diagnosis.empirical_screen import Start, screen, steering
+from agvbench.diagnosis.empirical_regression import steering
+from agvbench.diagnosis.empirical_screen import Start, screen
 from agvbench.diagnosis.empirical_terms import TERMS, EmpiricalTerm
 from agvbench.diagnosis.forms import wider
 from agvbench.diagnosis.judging import without_best

@@ -1,37 +1,23 @@
 """Which empirical terms look promising, and from where to fit them: linear regressions on residual rates.
 
-A shape's numbers that are not linear (a place, a radius, a time constant) come from a grid; its sizes follow by least
-squares, judged by groups of runs that they were not fitted to. What the maps' own levels can take up is taken
-out first, and residuals are weighted by the misfit itself: by the cameras' noise everything would look certain.
+Each option's sizes follow by least squares and are judged by groups of runs that they were not fitted to.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.diagnosis import empirical_terms as terms
+from agvbench.diagnosis.empirical_options import options
+from agvbench.diagnosis.empirical_regression import FOLDS, Judge, Steering
+from agvbench.diagnosis.empirical_terms import EmpiricalTerm
 from agvbench.diagnosis.grouping import folds
-from agvbench.diagnosis.prediction import Batch
 from agvbench.diagnosis.structure import Rates
 from agvbench.types import Floats
 from agvbench.vehicle.geometry import Geometry
 
-_FOLDS = 5
-_ALONG_WAY = (0.1, 0.3, 0.5, 0.7, 0.9)
-_RADII_M = (0.2, 0.35, 0.5, 0.8)
-_DISC_STEP, _LINE_STEP = 18, 40
-_LINE_DIRECTIONS = 16
-_BLUR_M, _SHARP_M, _BEST_LINES, _FINE, _FEWEST_CROSSINGS = 0.1, 0.01, 4, 9, 5
-_RUN_TIMES_S = (0.4, 0.8, 1.6, 3.2, 6.4)
-_HOURS = (0.1, 0.2, 0.4, 0.8, 2.0)
-_WAVES_M = np.geomspace(0.12, 1.5, 50)
-_LEAST = 1e-9
-_STRAY, _NEARLY_ALL = 3.0, 0.99
 _SMALL = 0.1
 
 
@@ -43,271 +29,21 @@ class Start:
     give it back bit by bit.
     """
 
-    term: type[terms.EmpiricalTerm]
+    term: type[EmpiricalTerm]
     values: Floats
     gain: float
 
 
-@dataclass(frozen=True)
-class Steering:
-    """Tangents of both axles' settled angles (n, 2) at each residual rate, ``before`` under the command before.
-
-    ``levels`` (n, 3): which level of drive, front and rear was in force.
-    """
-
-    tangent: Floats
-    before: Floats
-    levels: NDArray[np.int64]
-
-
-def steering(batch: Batch, parameters: Floats, rates: Rates) -> Steering:
-    """Return how the axles stood at each rate, by the maps' values in `parameters`."""
-    where = batch.maps.slices()
-    settled = np.column_stack([batch.weights[role] @ parameters[where[role]] for role in ("front", "rear")])
-    tangent = np.tan(np.clip(settled, -1.4, 1.4))
-    before = tangent.copy()
-    for k, role in enumerate(("front", "rear")):
-        command = batch.commands[role]
-        for row in range(1, len(command)):
-            if batch.base.row_runs[row] == batch.base.row_runs[row - 1]:
-                same = command[row] == command[row - 1]
-                before[row, k] = before[row - 1, k] if same else tangent[row - 1, k]
-    rows = np.empty(len(rates.run), dtype=np.int64)
-    for r in np.unique(rates.run):
-        own = rates.run == r
-        at = np.searchsorted(batch.readings.runs[r].commands.t_s, rates.covariates["time_in_run_s"][own], side="right")
-        rows[own] = batch.base.row_starts[r] + at
-    levels = np.column_stack(
-        [np.unique(batch.commands[role], return_inverse=True)[1][rows] for role in ("drive", "front", "rear")]
-    )
-    return Steering(tangent[rows], before[rows], levels)
-
-
 def screen(rates: Rates, stands: Steering, geometry: Geometry, group: NDArray[np.int64], seed: int) -> list[Start]:
     """Return for each term its best start, the most promising term first; terms without promise are left out."""
-    judge = _Judge(rates, stands, folds(group, _FOLDS, seed)[rates.run])
+    judge = Judge(rates, stands, folds(group, FOLDS, seed)[rates.run])
     found = []
-    for term, options in _options(rates, stands, geometry, judge):
+    for term, shapes in options(rates, stands, geometry, judge):
         best: Start | None = None
-        for columns, values in options:
+        for columns, values in shapes:
             gain, sizes = judge.gain(columns)
             if gain > (best.gain if best else 0.0):
                 best = Start(term, np.array([values(sizes), values(_SMALL * sizes)], dtype=np.float64), gain)
         if best is not None:
             found.append(best)
     return sorted(found, key=lambda start: -start.gain)
-
-
-Columns = dict[int, Floats]
-"""Regressors (n, q) by feature: 0 along, 1 sideways, 2 turning."""
-
-
-class _Judge:
-    """Residual rates ready for regression: what maps take up removed, each feature in units of its misfit."""
-
-    def __init__(self, rates: Rates, stands: Steering, fold: NDArray[np.int64]) -> None:
-        self.fold, self.root = fold, np.sqrt(rates.weight)
-        drive, axles = _dummies(stands.levels[:, 0]), [_dummies(stands.levels[:, k]) for k in (1, 2)]
-        self.known = [self._orthogonal([drive]), *[self._orthogonal(axles)] * 2]
-        self.values = [self._clean(k, _without_strays(rates.value[:, k])) for k in range(3)]
-        self.size = [max(float(np.sqrt(np.mean(v * v))), _LEAST) for v in self.values]
-        self.values = [v / s for v, s in zip(self.values, self.size, strict=True)]
-        self.count = len(np.unique(rates.run))
-
-    def _orthogonal(self, blocks: Sequence[Floats]) -> Floats:
-        matrix = np.column_stack([np.ones(len(self.root)), *blocks]) * self.root[:, None]
-        left, singular, _ = np.linalg.svd(matrix, full_matrices=False)
-        return np.asarray(left[:, singular > 1e-8 * singular[0]])
-
-    def _clean(self, k: int, columns: Floats) -> Floats:
-        weighted = (columns.T * self.root).T
-        return np.asarray(weighted - self.known[k] @ (self.known[k].T @ weighted))
-
-    def gain(self, columns: Columns) -> tuple[float, Floats]:
-        """Return the log likelihood that `columns` gain in folds left out, and their sizes fitted to all."""
-        clean = {k: self._clean(k, c) / self.size[k] for k, c in columns.items()}
-        parts = []
-        for f in range(_FOLDS):
-            own = self.fold == f
-            parts.append([(c[own].T @ c[own], c[own].T @ self.values[k][own], k) for k, c in clean.items()])
-        matrix = sum(g for part in parts for g, _, _ in part)
-        pull = sum(b for part in parts for _, b, _ in part)
-        ridge = 1e-9 * np.trace(matrix) * np.eye(len(pull)) + 1e-300 * np.eye(len(pull))
-        change = dict.fromkeys(clean, 0.0)
-        for part in parts:
-            out, out_pull = sum(g for g, _, _ in part), sum(b for _, b, _ in part)
-            c = np.linalg.lstsq(matrix - out + ridge, pull - out_pull, rcond=None)[0]
-            for g, b, k in part:
-                change[k] += float(c @ g @ c - 2.0 * b @ c)
-        total = len(self.root)
-        gain = sum(-math.log(max(1.0 + change[k] / total, _LEAST)) for k in change)
-        return 0.5 * self.count * gain, np.linalg.lstsq(matrix + ridge, pull, rcond=None)[0]
-
-
-def _without_strays(value: Floats) -> Floats:
-    """Return the values (n,), those far beyond nearly all others cut: one run gone astray must not drown the rest."""
-    limit = _STRAY * float(np.quantile(np.abs(value - np.median(value)), _NEARLY_ALL))
-    return np.clip(value, np.median(value) - limit, np.median(value) + limit)
-
-
-def _dummies(level: NDArray[np.int64]) -> Floats:
-    return np.asarray((level[:, None] == np.unique(level)[None, :]).astype(np.float64))
-
-
-Option = tuple[Columns, "Values"]
-
-
-class Values:
-    """Makes a term's values of what is linear and what came from the grid, in the term's own order."""
-
-    def __init__(self, *fixed: float) -> None:
-        self.fixed = fixed
-
-    def __call__(self, sizes: Floats) -> list[float]:
-        """Return the values: sizes, then the grid's."""
-        return [*sizes.tolist(), *self.fixed]
-
-
-class _Picture(Values):
-    def __call__(self, sizes: Floats) -> list[float]:
-        bend = float(sizes[0])
-        limit = 3.0
-        centre = [float(np.clip(s / bend, -limit, limit)) if bend else 0.0 for s in sizes[1:]]
-        return [bend, *centre, 0.0, 0.0][:3]
-
-
-class _Wave(Values):
-    def __call__(self, sizes: Floats) -> list[float]:
-        return [*self.fixed, *sizes.tolist()]
-
-
-def _options(
-    rates: Rates, stands: Steering, geometry: Geometry, judge: _Judge
-) -> Iterator[tuple[type[terms.EmpiricalTerm], Iterator[Option]]]:
-    c = rates.covariates
-    sine = np.column_stack([np.cos(c["heading_rad"]), np.sin(c["heading_rad"])])
-    yield terms.SpeedInDisc, _discs(rates)
-    yield terms.TurnAtLine, _lines(rates, judge)
-    yield terms.BentPicture, _pictures(rates)
-    yield terms.SpeedByHeading, iter([({0: sine}, Values())])
-    yield terms.TurnByHeading, iter([({2: sine}, Values())])
-    yield terms.SpeedByRunTime, _run_times(rates)
-    yield terms.TwistAtStart, _starts(rates)
-    yield terms.SteeringByCampaignTime, _campaign_times(rates, stands, geometry)
-    hours, direction = c["campaign_time_h"], c["direction"]
-    yield terms.TrimByCampaignTime, iter([(_axles(hours, hours, stands, geometry), Values())])
-    yield terms.SteeringByDirection, iter([(_axles(direction, direction, stands, geometry), Values())])
-    short = stands.before - stands.tangent
-    angle = np.arctan(stands.before) - np.arctan(stands.tangent)
-    if np.any(short != 0.0):
-        both = _axles(angle[:, 0], angle[:, 1], stands, geometry)
-        yield terms.SteeringByHistory, iter([({k: v.sum(axis=1, keepdims=True) for k, v in both.items()}, Values())])
-    yield terms.WaveByDistance, _waves(rates)
-
-
-def _axles(front: Floats, rear: Floats, stands: Steering, geometry: Geometry) -> Columns:
-    """Return what turning each axle by these angles [rad] does, sideways and turning: a column per axle."""
-    slope = 1.0 + stands.tangent**2
-    f, r = front * slope[:, 0], rear * slope[:, 1]
-    lf, lr, base = geometry.front_axle_m, geometry.rear_axle_m, geometry.wheelbase_m
-    return {1: np.column_stack([lr * f, lf * r]) / base, 2: np.column_stack([f, -r]) / base}
-
-
-def _campaign_times(rates: Rates, stands: Steering, geometry: Geometry) -> Iterator[Option]:
-    angle = np.arctan(stands.tangent)
-    for hours in _HOURS:
-        warm = -np.expm1(-rates.covariates["campaign_time_h"] / hours)
-        both = _axles(warm * angle[:, 0], warm * angle[:, 1], stands, geometry)
-        yield {k: v.sum(axis=1, keepdims=True) for k, v in both.items()}, Values(hours)
-
-
-def _run_times(rates: Rates) -> Iterator[Option]:
-    for constant in _RUN_TIMES_S:
-        column = np.expm1(-rates.covariates["time_in_run_s"] / constant)
-        yield {0: column[:, None]}, Values(constant)
-
-
-def _starts(rates: Rates) -> Iterator[Option]:
-    first = np.r_[True, np.diff(rates.run) != 0] / rates.weight
-    zero = np.zeros_like(first)
-    lost = -first * rates.covariates["speed_mps"]
-    yield {0: np.column_stack([zero, lost]), 2: np.column_stack([first, zero])}, Values()
-
-
-def _waves(rates: Rates) -> Iterator[Option]:
-    zero = np.zeros((len(rates.run), 2))
-    for period in _WAVES_M:
-        angle = math.tau * rates.covariates["distance_m"] / period
-        wave = np.column_stack([np.cos(angle), np.sin(angle)])
-        yield {0: np.hstack([wave, zero]), 2: np.hstack([zero, wave])}, _Wave(float(period))
-
-
-def _discs(rates: Rates) -> Iterator[Option]:
-    low, high = (f(rates.middle, axis=0) for f in (np.min, np.max))
-    step = max(float(np.max(high - low)) / _DISC_STEP, 0.05)
-    ways = [(1.0 - s) * rates.begin[:, :2] + s * rates.end[:, :2] for s in _ALONG_WAY]
-    for x in np.arange(low[0], high[0] + step, step):
-        for y in np.arange(low[1], high[1] + step, step):
-            square = np.stack([(w[:, 0] - x) ** 2 + (w[:, 1] - y) ** 2 for w in ways])
-            for radius in _RADII_M:
-                inside = np.mean(square < radius * radius, axis=0)
-                if np.count_nonzero(inside) >= 10:
-                    yield {0: -inside[:, None]}, Values(float(x), float(y), radius)
-
-
-def _lines(rates: Rates, judge: _Judge) -> Iterator[Option]:
-    """Yield lines that turn what crosses them: blurred ones over the whole floor, then sharp ones near the best.
-
-    A sharp line that is off by a hand's breadth is crossed at other samples, and explains nothing.
-    """
-    coarse = []
-    for direction in np.arange(_LINE_DIRECTIONS) * math.pi / _LINE_DIRECTIONS:
-        low, high = (float(f(rates.begin[:, :2] @ _across(direction))) for f in (np.min, np.max))
-        for place in np.linspace(low, high, _LINE_STEP)[1:-1]:
-            crossed = _crossed(rates, direction, place, _BLUR_M)
-            if crossed is not None:
-                coarse.append((judge.gain({2: crossed})[0], direction, place))
-    best = sorted(coarse, reverse=True)[:_BEST_LINES]
-    for _, direction, place in best:
-        for turned in direction + np.linspace(-1.0, 1.0, _FINE) * 0.5 * math.pi / _LINE_DIRECTIONS:
-            for moved in place + np.linspace(-1.0, 1.0, _FINE) * _BLUR_M:
-                crossed = _crossed(rates, turned, moved, _SHARP_M)
-                if crossed is not None:
-                    yield {2: crossed}, Values(float(moved), float(turned))
-
-
-def _across(direction: float) -> Floats:
-    return np.array([math.cos(direction), math.sin(direction)])
-
-
-def _crossed(rates: Rates, direction: float, place: float, blur_m: float) -> Floats | None:
-    """Return by how much of a line each step crosses (n, 1), per metre; None where hardly any does."""
-    before, after = ((p[:, :2] @ _across(direction) - place) / blur_m for p in (rates.begin, rates.end))
-    if np.count_nonzero((before > 0.0) != (after > 0.0)) < _FEWEST_CROSSINGS:
-        return None
-    part = 0.5 * (np.tanh(after) - np.tanh(before))
-    return np.asarray((part * rates.covariates["direction"] / rates.weight)[:, None])
-
-
-def _pictures(rates: Rates) -> Iterator[Option]:
-    def field(p: Floats) -> Floats:
-        """Return displacements (3, n, 2): for the bend about the origin, and for its centre."""
-        x, y = p[:, 0], p[:, 1]
-        r2 = x * x + y * y
-        bend = np.column_stack([r2 * x, r2 * y])
-        return np.stack(
-            [
-                bend,
-                np.column_stack([-2.0 * x * x - r2, -2.0 * x * y]),
-                np.column_stack([-2.0 * x * y, -2.0 * y * y - r2]),
-            ]
-        )
-
-    moved = field(rates.end) - field(rates.begin)
-    heading = 0.5 * (rates.begin[:, 2] + rates.end[:, 2])
-    c, s = np.cos(heading), np.sin(heading)
-    per = rates.covariates["direction"] / rates.weight
-    along = (moved[..., 0] * c + moved[..., 1] * s) * per
-    aside = (moved[..., 1] * c - moved[..., 0] * s) * per
-    yield {0: along[:1].T, 1: aside[:1].T}, _Picture()
-    yield {0: along.T, 1: aside.T}, _Picture()

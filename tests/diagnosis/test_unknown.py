@@ -13,7 +13,8 @@ from agvbench.diagnosis import Verdict, diagnose
 from agvbench.diagnosis import empirical_terms as terms
 from agvbench.diagnosis.contradictions import refuse_contradictions
 from agvbench.diagnosis.empirical import gain_p_value
-from agvbench.diagnosis.empirical_screen import Start, Steering, screen
+from agvbench.diagnosis.empirical_regression import Steering
+from agvbench.diagnosis.empirical_screen import Start, screen
 from agvbench.diagnosis.reading import read_runs
 from agvbench.diagnosis.structure import ALPHA, RANDOM_PHASE, Rates, dependences, swing
 from agvbench.errors import CampaignError

@@ -1,0 +1,112 @@
+"""Residual rates ready for regression on shapes, with what the maps' own levels can take up removed.
+
+Residuals are weighted by the misfit itself: by the cameras' noise everything would look certain.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.diagnosis.prediction import Batch
+from agvbench.diagnosis.structure import Rates
+from agvbench.types import Floats
+
+FOLDS = 5
+
+_LEAST = 1e-9
+_STRAY, _NEARLY_ALL = 3.0, 0.99
+
+Columns = dict[int, Floats]
+"""Regressors (n, q) by feature: 0 along, 1 sideways, 2 turning."""
+
+
+@dataclass(frozen=True)
+class Steering:
+    """Tangents of both axles' settled angles (n, 2) at each residual rate, ``before`` under the command before.
+
+    ``levels`` (n, 3): which level of drive, front and rear was in force.
+    """
+
+    tangent: Floats
+    before: Floats
+    levels: NDArray[np.int64]
+
+
+def steering(batch: Batch, parameters: Floats, rates: Rates) -> Steering:
+    """Return how the axles stood at each rate, by the maps' values in `parameters`."""
+    where = batch.maps.slices()
+    settled = np.column_stack([batch.weights[role] @ parameters[where[role]] for role in ("front", "rear")])
+    tangent = np.tan(np.clip(settled, -1.4, 1.4))
+    before = tangent.copy()
+    for k, role in enumerate(("front", "rear")):
+        command = batch.commands[role]
+        for row in range(1, len(command)):
+            if batch.base.row_runs[row] == batch.base.row_runs[row - 1]:
+                same = command[row] == command[row - 1]
+                before[row, k] = before[row - 1, k] if same else tangent[row - 1, k]
+    rows = np.empty(len(rates.run), dtype=np.int64)
+    for r in np.unique(rates.run):
+        own = rates.run == r
+        at = np.searchsorted(batch.readings.runs[r].commands.t_s, rates.covariates["time_in_run_s"][own], side="right")
+        rows[own] = batch.base.row_starts[r] + at
+    levels = np.column_stack(
+        [np.unique(batch.commands[role], return_inverse=True)[1][rows] for role in ("drive", "front", "rear")]
+    )
+    return Steering(tangent[rows], before[rows], levels)
+
+
+class Judge:
+    """Residual rates ready for regression: what maps take up removed, each feature in units of its misfit."""
+
+    def __init__(self, rates: Rates, stands: Steering, fold: NDArray[np.int64]) -> None:
+        self.fold, self.root = fold, np.sqrt(rates.weight)
+        drive, axles = _dummies(stands.levels[:, 0]), [_dummies(stands.levels[:, k]) for k in (1, 2)]
+        self.known = [self._orthogonal([drive]), *[self._orthogonal(axles)] * 2]
+        self.values = [self._clean(k, _without_strays(rates.value[:, k])) for k in range(3)]
+        self.size = [max(float(np.sqrt(np.mean(v * v))), _LEAST) for v in self.values]
+        self.values = [v / s for v, s in zip(self.values, self.size, strict=True)]
+        self.count = len(np.unique(rates.run))
+
+    def _orthogonal(self, blocks: Sequence[Floats]) -> Floats:
+        matrix = np.column_stack([np.ones(len(self.root)), *blocks]) * self.root[:, None]
+        left, singular, _ = np.linalg.svd(matrix, full_matrices=False)
+        return np.asarray(left[:, singular > 1e-8 * singular[0]])
+
+    def _clean(self, k: int, columns: Floats) -> Floats:
+        weighted = (columns.T * self.root).T
+        return np.asarray(weighted - self.known[k] @ (self.known[k].T @ weighted))
+
+    def gain(self, columns: Columns) -> tuple[float, Floats]:
+        """Return the log likelihood that `columns` gain in folds left out, and their sizes fitted to all."""
+        clean = {k: self._clean(k, c) / self.size[k] for k, c in columns.items()}
+        parts = []
+        for f in range(FOLDS):
+            own = self.fold == f
+            parts.append([(c[own].T @ c[own], c[own].T @ self.values[k][own], k) for k, c in clean.items()])
+        matrix = sum(g for part in parts for g, _, _ in part)
+        pull = sum(b for part in parts for _, b, _ in part)
+        ridge = 1e-9 * np.trace(matrix) * np.eye(len(pull)) + 1e-300 * np.eye(len(pull))
+        change = dict.fromkeys(clean, 0.0)
+        for part in parts:
+            out, out_pull = sum(g for g, _, _ in part), sum(b for _, b, _ in part)
+            c = np.linalg.lstsq(matrix - out + ridge, pull - out_pull, rcond=None)[0]
+            for g, b, k in part:
+                change[k] += float(c @ g @ c - 2.0 * b @ c)
+        total = len(self.root)
+        gain = sum(-math.log(max(1.0 + change[k] / total, _LEAST)) for k in change)
+        return 0.5 * self.count * gain, np.linalg.lstsq(matrix + ridge, pull, rcond=None)[0]
+
+
+def _without_strays(value: Floats) -> Floats:
+    """Return the values (n,), those far beyond nearly all others cut: one run gone astray must not drown the rest."""
+    limit = _STRAY * float(np.quantile(np.abs(value - np.median(value)), _NEARLY_ALL))
+    return np.clip(value, np.median(value) - limit, np.median(value) + limit)
+
+
+def _dummies(level: NDArray[np.int64]) -> Floats:
+    return np.asarray((level[:, None] == np.unique(level)[None, :]).astype(np.float64))
