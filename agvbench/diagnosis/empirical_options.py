@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from agvbench.diagnosis import empirical_terms as terms
+from agvbench.diagnosis import terms
 from agvbench.diagnosis.empirical_regression import Columns, Judge, Steering
 from agvbench.diagnosis.structure import Rates
 from agvbench.types import Floats

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from agvbench.diagnosis.empirical_terms import TERMS, EmpiricalTerm
 from agvbench.diagnosis.judging import clustered_covariance
 from agvbench.diagnosis.result import Estimate, NamedEffect
 from agvbench.diagnosis.selection import RIVAL_MARGIN, Selection
+from agvbench.diagnosis.terms import TERMS, EmpiricalTerm
 from agvbench.effects import Effect, effect_kinds
 from agvbench.effects.forms import cause_of, effect_forms
 from agvbench.types import Floats

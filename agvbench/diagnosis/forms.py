@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from agvbench.diagnosis.candidates import Candidate, bounds_of, candidate, candidates
-from agvbench.diagnosis.empirical_terms import TERMS
 from agvbench.diagnosis.fitting import fit
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.promises import promised_gain
 from agvbench.diagnosis.selection import LEAST_GAIN, RIVAL_MARGIN, Scored, Selection, Selector
 from agvbench.diagnosis.standing import SLOW_STEERING, otherwise
+from agvbench.diagnosis.terms import TERMS
 from agvbench.effects import Effect
 from agvbench.effects.forms import Form, cause_of, effect_forms
 from agvbench.model import VehicleModel

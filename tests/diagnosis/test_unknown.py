@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from tiny_vehicle import FRONT_M, REAR_M, Tiny, campaign_runs
 
-from agvbench.diagnosis import Verdict, diagnose
-from agvbench.diagnosis import empirical_terms as terms
+from agvbench.diagnosis import Verdict, diagnose, terms
 from agvbench.diagnosis.contradictions import refuse_contradictions
 from agvbench.diagnosis.empirical import gain_p_value
 from agvbench.diagnosis.empirical_regression import Steering

@@ -1,0 +1,83 @@
+"""Shapes of a speed that is not what commands make it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from agvbench.diagnosis.terms.base import EmpiricalTerm
+from agvbench.effects.base import Stage, parameter
+from agvbench.effects.state import FRONT_SPEED, HEADING, REAR_SPEED, TIME, X, Y
+from agvbench.types import Floats
+
+_EDGE_M = 0.015
+
+
+@dataclass(frozen=True)
+class SpeedInDisc(EmpiricalTerm):
+    """In a disc of the floor the vehicle is slower: ``v ← v (1 − loss)``, with an edge of some centimetres."""
+
+    name: ClassVar[str] = "speed_in_disc"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    covariates: ClassVar[tuple[str, ...]] = ("x_m", "y_m")
+    through: ClassVar[str] = "speed"
+    local: ClassVar[bool] = True
+
+    loss: float = parameter(unit="–", low=-1.0, high=0.9, scale=0.1)
+    x_m: float = parameter(unit="m", low=-50.0, high=50.0, scale=0.5)
+    y_m: float = parameter(unit="m", low=-50.0, high=50.0, scale=0.5)
+    radius_m: float = parameter(unit="m", low=0.0, high=20.0, scale=0.3)
+
+    @staticmethod
+    def drive(state: Floats, loss: float, x_m: float, y_m: float, radius_m: float) -> None:
+        """Slow both axles inside."""
+        if loss != 0.0:
+            inside = radius_m - math.hypot(state[X] - x_m, state[Y] - y_m)
+            left = 1.0 - 0.5 * loss * (1.0 + math.tanh(inside / _EDGE_M))
+            state[FRONT_SPEED] *= left
+            state[REAR_SPEED] *= left
+
+
+@dataclass(frozen=True)
+class SpeedByHeading(EmpiricalTerm):
+    """Speed depends on where the vehicle points: ``v ← v (1 + a cos ψ + b sin ψ)``."""
+
+    name: ClassVar[str] = "speed_by_heading"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    covariates: ClassVar[tuple[str, ...]] = ("heading_rad",)
+    through: ClassVar[str] = "speed"
+    local: ClassVar[bool] = True
+
+    cosine: float = parameter(unit="–", low=-0.7, high=0.7, scale=0.03)
+    sine: float = parameter(unit="–", low=-0.7, high=0.7, scale=0.03)
+
+    @staticmethod
+    def drive(state: Floats, cosine: float, sine: float) -> None:
+        """Change the speed of both axles."""
+        if cosine != 0.0 or sine != 0.0:
+            left = 1.0 + cosine * math.cos(state[HEADING]) + sine * math.sin(state[HEADING])
+            state[FRONT_SPEED] *= left
+            state[REAR_SPEED] *= left
+
+
+@dataclass(frozen=True)
+class SpeedByRunTime(EmpiricalTerm):
+    """Speed falls (or grows) within each run: ``v ← v (1 − share (1 − e^(−t/T)))``."""
+
+    name: ClassVar[str] = "speed_by_run_time"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    covariates: ClassVar[tuple[str, ...]] = ("time_in_run_s",)
+    through: ClassVar[str] = "speed"
+    local: ClassVar[bool] = True
+
+    share: float = parameter(unit="–", low=-0.9, high=0.9, scale=0.05)
+    time_constant_s: float = parameter(unit="s", low=0.0, high=60.0, scale=2.0)
+
+    @staticmethod
+    def drive(state: Floats, share: float, time_constant_s: float) -> None:
+        """Slow both axles by the time in the run."""
+        if share != 0.0:
+            left = 1.0 - share * (1.0 - math.exp(-max(state[TIME], 0.0) / max(time_constant_s, 0.05)))
+            state[FRONT_SPEED] *= left
+            state[REAR_SPEED] *= left

@@ -1,0 +1,120 @@
+"""Shapes of a path that bends without a cause in the steering."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from agvbench.diagnosis.terms.base import EmpiricalTerm
+from agvbench.effects.base import Stage, parameter
+from agvbench.effects.state import DISTANCE, FORWARD, HEADING, LEFT, SPEED, X_RATE, Y_RATE, YAW_RATE, X, Y
+from agvbench.types import Floats
+
+_EDGE_M = 0.015
+_TURN = math.tau
+_START_S = 0.1
+_PER_ROOT = 1.0 / math.sqrt(math.tau)
+
+
+@dataclass(frozen=True)
+class TurnAtLine(EmpiricalTerm):
+    """A line on the floor turns what crosses it, one way across and the other way back."""
+
+    name: ClassVar[str] = "turn_at_line"
+    stage: ClassVar[Stage] = Stage.FLOOR
+    covariates: ClassVar[tuple[str, ...]] = ("x_m", "y_m")
+    through: ClassVar[str] = "turning"
+    local: ClassVar[bool] = True
+
+    turn_rad: float = parameter(unit="rad", low=-0.5, high=0.5, scale=0.02)
+    place_m: float = parameter(unit="m", low=-50.0, high=50.0, scale=0.5)
+    direction_rad: float = parameter(unit="rad", low=-2.0 * _TURN, high=2.0 * _TURN, scale=0.5)
+
+    @staticmethod
+    def drift(state: Floats, turn_rad: float, place_m: float, direction_rad: float) -> None:
+        """Turn while the line is near, by as much as it is crossed."""
+        if turn_rad != 0.0:
+            c, s = math.cos(direction_rad), math.sin(direction_rad)
+            beyond = (c * state[X] + s * state[Y] - place_m) / _EDGE_M
+            across = c * state[X_RATE] + s * state[Y_RATE]
+            state[YAW_RATE] += turn_rad * across * _PER_ROOT / _EDGE_M * math.exp(-0.5 * beyond * beyond)
+
+
+@dataclass(frozen=True)
+class TurnByHeading(EmpiricalTerm):
+    """The path bends by where the vehicle points: ``κ ← κ + a cos ψ + b sin ψ``."""
+
+    name: ClassVar[str] = "turn_by_heading"
+    stage: ClassVar[Stage] = Stage.BODY
+    covariates: ClassVar[tuple[str, ...]] = ("heading_rad",)
+    through: ClassVar[str] = "turning"
+    local: ClassVar[bool] = True
+
+    cosine: float = parameter(unit="1/m", low=-2.0, high=2.0, scale=0.02)
+    sine: float = parameter(unit="1/m", low=-2.0, high=2.0, scale=0.02)
+
+    @staticmethod
+    def move(state: Floats, cosine: float, sine: float) -> None:
+        """Turn with the way driven."""
+        if cosine != 0.0 or sine != 0.0:
+            bend = cosine * math.cos(state[HEADING]) + sine * math.sin(state[HEADING])
+            state[YAW_RATE] += bend * state[FORWARD]
+
+
+@dataclass(frozen=True)
+class TwistAtStart(EmpiricalTerm):
+    """As it begins to move the vehicle loses time and turns, the other way when it starts backward."""
+
+    name: ClassVar[str] = "twist_at_start"
+    stage: ClassVar[Stage] = Stage.BODY
+    covariates: ClassVar[tuple[str, ...]] = ("time_in_run_s", "history")
+    through: ClassVar[str] = "turning"
+    local: ClassVar[bool] = True
+
+    twist_rad: float = parameter(unit="rad", low=-0.5, high=0.5, scale=0.02)
+    lost_s: float = parameter(unit="s", low=0.0, high=0.8, scale=0.1)
+
+    @staticmethod
+    def move(state: Floats, twist_rad: float, lost_s: float) -> None:
+        """Twist and hold back within the first centimetres, by which `lost_s` is lost."""
+        if (twist_rad != 0.0 or lost_s != 0.0) and state[SPEED] != 0.0:
+            since = state[DISTANCE] / (abs(state[SPEED]) * _START_S)
+            if since < 40.0:
+                held = 1.0 - math.exp(-lost_s / _START_S)
+                rate = held / lost_s if lost_s > 1e-6 else 1.0 / _START_S
+                near = math.exp(-since)
+                state[FORWARD] *= 1.0 - held * near
+                state[LEFT] *= 1.0 - held * near
+                state[YAW_RATE] *= 1.0 - held * near
+                state[YAW_RATE] += math.copysign(twist_rad * rate * near, state[SPEED])
+
+
+@dataclass(frozen=True)
+class WaveByDistance(EmpiricalTerm):
+    """Speed and course swing with the way driven in the run, once per period."""
+
+    name: ClassVar[str] = "wave_by_distance"
+    stage: ClassVar[Stage] = Stage.BODY
+    covariates: ClassVar[tuple[str, ...]] = ("distance_modulo_period_m",)
+    through: ClassVar[str] = "speed and turning"
+    local: ClassVar[bool] = True
+
+    period_m: float = parameter(unit="m", low=0.0, high=10.0, scale=0.1)
+    speed_cosine: float = parameter(unit="–", low=-0.7, high=0.7, scale=0.03)
+    speed_sine: float = parameter(unit="–", low=-0.7, high=0.7, scale=0.03)
+    turn_cosine: float = parameter(unit="1/m", low=-5.0, high=5.0, scale=0.1)
+    turn_sine: float = parameter(unit="1/m", low=-5.0, high=5.0, scale=0.1)
+
+    @staticmethod
+    def move(
+        state: Floats, period_m: float, speed_cosine: float, speed_sine: float, turn_cosine: float, turn_sine: float
+    ) -> None:
+        """Swing."""
+        if period_m > 0.0:
+            angle = math.tau * state[DISTANCE] / period_m
+            c, s = math.cos(angle), math.sin(angle)
+            state[YAW_RATE] += (turn_cosine * c + turn_sine * s) * state[FORWARD]
+            left = 1.0 + speed_cosine * c + speed_sine * s
+            state[FORWARD] *= left
+            state[LEFT] *= left
