@@ -189,7 +189,7 @@ def _settled(
         useless = [name for name, model in smaller.items() if not wide.earns(model, current)]
         if not useless:
             return current, term, gains, {name: rivals.get(name, {}) for name in gains}
-        current = smaller[min(useless, key=lambda name: gains[name])]
+        current = wide.left(smaller[min(useless, key=lambda name: gains[name])], current)
 
 
 def gain_p_value(gain: Floats, group: NDArray[np.int64], seed: int) -> float:

@@ -176,7 +176,7 @@ class Selector:
             useless = [name for name, model in smaller.items() if not self.earns(model, current)]
             if not useless:
                 return current, gains
-            current = smaller[min(useless, key=lambda name: gains[name])]
+            current = self.left(smaller[min(useless, key=lambda name: gains[name])], current)
         return current, {}
 
     def exchanged(
@@ -310,6 +310,16 @@ class Selector:
             self.tried += 1
             self._known[key] = Scored(names, fitted, cross_validated(fitted, self._fold, bounds))
         return self._known[key]
+
+    def left(self, smaller: Scored, larger: Scored) -> Scored:
+        """Return what is left of `larger` when an effect is dropped that it does not need.
+
+        The smaller model may have been fitted before, from elsewhere, and have ended somewhere else.
+        """
+        if smaller.names == self.given:
+            return smaller
+        again = self._known[tuple(sorted(smaller.names))] = self.retried(smaller, larger)
+        return again
 
     def retried(self, model: Scored, beyond: Scored) -> Scored:
         """Return `model` fitted again, patiently, from where the larger model `beyond` stands, if it predicts better.

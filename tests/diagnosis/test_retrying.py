@@ -42,3 +42,14 @@ def test_a_model_that_is_at_its_best_stays(selector):
     lag = selector.grown(selector.base(), "steering_lag")
     again = selector.retried(lag, selector.grown(lag, "lateral_slip"))
     assert lag.total - 1.0 < again.total <= lag.total
+
+
+def test_what_is_left_of_a_model_is_not_what_once_ended_elsewhere(selector):
+    lag = selector.grown(selector.base(), "steering_lag")
+    larger = selector.score(("steering_lag", "lateral_slip"), np.r_[lag.fit.parameters, 0.01], lag.fit)
+    poor = fit(Predictor(selector.batch, lag.names), np.r_[selector.start, 0.4], np.array([[0.4, 0.4]]), iterations=8)
+    selector._known[lag.names] = Scored(lag.names, poor, poor.loss)
+    left, gains = selector.pruned(selector.base(), larger)
+    assert left.names == lag.names
+    assert list(gains) == ["steering_lag"]
+    assert left.total == pytest.approx(lag.total, abs=2.0)
