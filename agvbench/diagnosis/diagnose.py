@@ -32,6 +32,7 @@ from agvbench.diagnosis.standing import resettle, settle
 from agvbench.diagnosis.structure import RANDOM_PHASE, Dependence, dependences, residual_rates, swing
 from agvbench.diagnosis.thinning import MOST_RUNS, measured_in_all, some_repeats
 from agvbench.diagnosis.vehicle import corrected_vehicle
+from agvbench.diagnosis.veto import withdrawn
 from agvbench.diagnosis.windows import horizon_of
 from agvbench.diagnosis.windows_diagnose import diagnose_windows
 from agvbench.effects.forms import effect_forms
@@ -113,6 +114,7 @@ def diagnose(
     if len(some) < len(fitted):
         tell(f"causes were looked for in {len(some)} runs; now they are measured in all {len(fitted)}")
         selection, explained = measured_in_all(selection, explained, selector, fitted)
+    selection, explained = withdrawn(selection, explained, readings.select(held), tell)
     return _conclude(header, readings, held, selection, explained, vehicle, geometry, seed)
 
 

@@ -1,0 +1,47 @@
+"""The last word of the runs that were set aside: what predicts them worse than the maps alone is not named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from agvbench.diagnosis.empirical import Explained
+from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.reading import Readings
+from agvbench.diagnosis.residuals import misses
+from agvbench.diagnosis.selection import Scored, Selection
+
+
+def withdrawn(
+    selection: Selection, explained: Explained | None, kept: Readings, tell: Callable[[str], None]
+) -> tuple[Selection, Explained | None]:
+    """Return what was found, or the maps alone where they predict the runs set aside better.
+
+    Cross-validation asks the runs that were fitted, and may be led astray by all of them together. A cause at work
+    improves what nobody looked at, too.
+
+    Parameters
+    ----------
+    selection, explained
+        What was found.
+    kept
+        The runs set aside.
+    tell
+        Called with a line if it is withdrawn.
+    """
+    chosen = explained.selection.chosen if explained else selection.chosen
+    if chosen.names == selection.base.names or _missed(chosen, kept) <= _missed(selection.base, kept):
+        return selection, explained
+    tell(f"{' + '.join(chosen.names)}: withdrawn, for the runs set aside are predicted better without")
+    rejected = selection.rejected | selection.gains
+    return replace(selection, chosen=selection.base, rivals={}, gains={}, rejected=rejected), None
+
+
+def _missed(model: Scored, kept: Readings) -> float:
+    """Return the mean square of the position that a model misses [m²]."""
+    fitted = model.fit.predictor.batch
+    batch = Batch(kept, fitted.maps, fitted.geometry, kinds=fitted.kinds)
+    poses = Predictor(batch, model.fit.predictor.effects).predict(model.fit.parameters)
+    return float(np.mean(misses(kept, poses).squares()["position_rms_mm"]))
