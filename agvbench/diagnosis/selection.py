@@ -32,6 +32,7 @@ RIVAL_MARGIN = 10.0
 NOTICEABLE = 0.15
 """An effect has to move the prediction by this part of what remains unpredicted, be it ever so certain."""
 
+_NEARLY_RIVAL = 100.0  # a rival may look so much worse because its fit ended sooner
 _SHORT, _LONG = 3, 10
 _HOPELESS = 3.0  # what promises less, to first order, is not fitted
 _LIKELY = 40.0  # what promises more is fitted to the end
@@ -213,9 +214,16 @@ class Selector:
             best = min(better, key=lambda offer: offer.total)
             self.tell(f"{' + '.join(best.names)} in place of {' + '.join(current.names)}")
             current = best
-        worse = {n: {o: offer.total - current.total for o, offer in offers.items()} for n, offers in swapped.items()}
+        worse = {n: {o: self._worse(offer, current) for o, offer in offers.items()} for n, offers in swapped.items()}
         rivals = {n: {o: w for o, w in others.items() if w < RIVAL_MARGIN} for n, others in worse.items()}
         return current, {name: others for name, others in rivals.items() if name in current.names}
+
+    def _worse(self, offer: Scored, current: Scored) -> float:
+        """Return by how much another effect predicts worse, its fit carried on from where the chosen one stands."""
+        worse = offer.total - current.total
+        if RIVAL_MARGIN <= worse < _NEARLY_RIVAL and offer.fit.predictor.effects == offer.names:
+            worse = self.retried(offer, current).total - current.total
+        return worse
 
     def shrunk(self, base: Scored, current: Scored, name: str) -> Scored:
         """Return the model without the effect called `name`."""
@@ -322,11 +330,12 @@ class Selector:
         return again
 
     def retried(self, model: Scored, beyond: Scored) -> Scored:
-        """Return `model` fitted again, patiently, from where the larger model `beyond` stands, if it predicts better.
+        """Return `model` fitted again, patiently, from where the model `beyond` stands, if it predicts better.
 
-        What a larger model gains may be nothing but the way that its fit went on.
+        What another model gains may be nothing but the way that its fit went on. Effects that it lacks begin where they
+        are in `model`.
         """
-        own = beyond.fit.effect_values()
+        own = model.fit.effect_values() | beyond.fit.effect_values()
         kept = [value for name in model.names for key, value in own.items() if key.partition(".")[0] == name]
         bounds = bounds_of(self.candidates, model.names)
         again = fit(

@@ -15,6 +15,8 @@ from agvbench.diagnosis.reading import read_runs
 from agvbench.diagnosis.selection import Scored, Selector
 from agvbench.vehicle.geometry import Geometry
 
+NO_LIMIT = np.array([[0.0, 5.0]])
+
 
 @pytest.fixture(scope="module")
 def selector(tiny_campaign):
@@ -53,3 +55,12 @@ def test_what_is_left_of_a_model_is_not_what_once_ended_elsewhere(selector):
     assert left.names == lag.names
     assert list(gains) == ["steering_lag"]
     assert left.total == pytest.approx(lag.total, abs=2.0)
+
+
+def test_a_rival_is_judged_by_a_fit_that_went_as_far(selector, monkeypatch):
+    monkeypatch.setattr("agvbench.diagnosis.selection._NEARLY_RIVAL", np.inf)
+    lag = selector.grown(selector.base(), "steering_lag")
+    begun = fit(Predictor(selector.batch, lag.names), np.r_[selector.start, 0.1], NO_LIMIT, iterations=1)
+    early = Scored(lag.names, begun, begun.loss)
+    assert early.total > lag.total + 100.0
+    assert abs(selector._worse(early, lag)) < 2.0
