@@ -84,7 +84,9 @@ def reform(selection: Selection, selector: Selector) -> Selection:
     current, gains = wide.pruned(selection.base, current)
     better = selection.chosen.total - current.total
     rivals = {name: _rivals(selection, name, better) | _other_causes(current, name, offered) for name in gains}
-    rejected = {n: g for n, g in selection.rejected.items() if n not in current.names}
+    # What another cause's law has replaced may still be right beside a term that is found later.
+    causes = {cause_of(n) for n in current.names}
+    rejected = {n: g for n, g in (selection.rejected | selection.gains).items() if n not in causes}
     selector.candidates |= {n: c for n, c in form_candidates().items() if n in current.names}
     return Selection(selection.base, current, rivals, gains, rejected, selection.tried + wide.tried)
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tiny_vehicle import FRONT_M, HEADER, NEUTRAL, REAR_M, Tiny
 
 from agvbench.calibration import measure_run
+from agvbench.diagnosis import forms
 from agvbench.diagnosis.candidates import bounds_of, candidates
 from agvbench.diagnosis.fitting import fit
 from agvbench.diagnosis.levels import ROLES, free_maps, start_values
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.reading import read_runs
-from agvbench.diagnosis.selection import Scored, Selector
+from agvbench.diagnosis.selection import Scored, Selection, Selector
 from agvbench.vehicle.geometry import Geometry
 
 NO_LIMIT = np.array([[0.0, 5.0]])
@@ -64,3 +67,17 @@ def test_a_rival_is_judged_by_a_fit_that_went_as_far(selector, monkeypatch):
     early = Scored(lag.names, begun, begun.loss)
     assert early.total > lag.total + 100.0
     assert abs(selector._worse(early, lag)) < 2.0
+
+
+@pytest.mark.parametrize(
+    ("law", "again"), [("lateral_slip_power", {"steering_lag": 500.0}), ("steering_lag_inertia", {})]
+)
+def test_what_another_causes_law_replaced_may_be_tried_again(selector, monkeypatch, law, again):
+    base = selector.base()
+    lag = selector.grown(base, "steering_lag")
+    monkeypatch.setattr(forms, "_laws", lambda *_: iter(()))
+    monkeypatch.setattr(forms, "_best", lambda _wide, current, _offers: replace(current, names=(law,)))
+    monkeypatch.setattr(Selector, "pruned", lambda _self, _base, current: (current, {law: 100.0}))
+    reformed = forms.reform(Selection(base, lag, {}, {"steering_lag": 500.0}, {}, 2), selector)
+    assert reformed.chosen.names == (law,)
+    assert reformed.rejected == again
