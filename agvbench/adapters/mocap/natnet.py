@@ -16,7 +16,8 @@ from agvbench.bus.identity_message import MocapIdentity
 from agvbench.errors import LinkError
 
 _QUIET_S = 1.0
-_PATIENCE_S = 2.0
+# Sooner than the supervisor, which would only say that tracking was lost.
+_PATIENCE_S = 0.4
 
 
 class NatNetMocap(MocapAdapter):
