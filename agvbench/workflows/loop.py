@@ -185,11 +185,15 @@ def _learned(directory: Path, settings: BenchSettings, tell: Tell) -> str:
 
     path, model = directory / REMAINDERS, VehicleModel.load(directory / VEHICLE)
     if settings.remainders == MODEL_ONLY:
+        tell("3/5 corrected plans are not tried: --model-only")
         return ""
     if path.exists():
+        tell(f"3/5 what corrected plans miss was learned before: {path}")
         return str(path)
     known = remainders(Campaign.open(directory / BEFORE), model, "calibrated")
-    if settings.remainders != NO_TRIAL:
+    if settings.remainders == NO_TRIAL:
+        tell("3/5 corrected plans are not tried: --no-trial")
+    else:
         tell(f"3/5 trying corrected plans, for what they still miss → {directory / TRIAL}")
         _write_remainders(directory / FIRST_REMAINDERS, known)
         _drive_corrected(directory, TRIAL, TRYING, settings, str(directory / FIRST_REMAINDERS), tell)

@@ -7,6 +7,7 @@ import json
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
@@ -14,7 +15,9 @@ from agvbench.campaign import Campaign
 from agvbench.errors import FileError, FlagError
 from agvbench.model import VehicleModel
 from agvbench.running.remainders import read_remainders
-from agvbench.workflows.loop_settings import opened, write
+from agvbench.running.settings import BenchSettings
+from agvbench.workflows.loop import _learned
+from agvbench.workflows.loop_settings import MODEL_ONLY, NO_TRIAL, opened, write
 
 PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
 
@@ -133,6 +136,19 @@ def test_what_is_tried_is_not_what_is_compared(driven):
     first, then = (read_remainders(str(directory / f"{name}.json")) for name in ("remainders-before", "remainders"))
     assert set(first) == set(then)
     assert first != then
+
+
+@pytest.mark.slow
+def test_less_may_be_learned(driven, tmp_path):
+    directory = shutil.copytree(driven[0], tmp_path / "it")
+    settings, said = BenchSettings.load(directory / "before"), []
+    assert _learned(directory, replace(settings, remainders=MODEL_ONLY), said.append) == ""
+    shutil.rmtree(directory / "trial")
+    (directory / "remainders.json").unlink()
+    learned = _learned(directory, replace(settings, remainders=NO_TRIAL), said.append)
+    assert read_remainders(learned) == read_remainders(str(directory / "remainders-before.json"))
+    assert not (directory / "trial").exists()
+    assert [line.partition(": ")[2] for line in said] == ["--model-only", "--no-trial"]
 
 
 @pytest.mark.slow
