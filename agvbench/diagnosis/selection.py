@@ -56,10 +56,6 @@ class Scored:
         return float(self.loss.sum())
 
 
-def _total(model: Scored) -> float:
-    return model.total
-
-
 @dataclass(frozen=True)
 class Selection:
     """What was chosen.
@@ -343,7 +339,8 @@ class Selector:
             offsets=beyond.fit.offsets, scatter=beyond.fit.scatter, iterations=_LONG, patient=True,
         )  # fmt: skip
         self.tried += 1
-        return min(model, Scored(model.names, again, cross_validated(again, self._fold, bounds)), key=_total)
+        scored = Scored(model.names, again, cross_validated(again, self._fold, bounds))
+        return min(model, scored, key=lambda one: one.total)
 
     def known(self, names: tuple[str, ...]) -> Scored | None:
         """Return the model with the effects `names` if it was fitted."""

@@ -32,16 +32,18 @@ def withdrawn(
         Called with a line if it is withdrawn.
     """
     chosen = explained.selection.chosen if explained else selection.chosen
-    if chosen.names == selection.base.names or _missed(chosen, kept) <= _missed(selection.base, kept):
+    if chosen.names == selection.base.names:
+        return selection, explained
+    fitted = chosen.fit.predictor.batch
+    batch = Batch(kept, fitted.maps, fitted.geometry, kinds=fitted.kinds)
+    if _missed(chosen, batch) <= _missed(selection.base, batch):
         return selection, explained
     tell(f"{' + '.join(chosen.names)}: withdrawn, for the runs set aside are predicted better without")
     rejected = selection.rejected | selection.gains
     return replace(selection, chosen=selection.base, rivals={}, gains={}, rejected=rejected), None
 
 
-def _missed(model: Scored, kept: Readings) -> float:
-    """Return the mean square of the position that a model misses [m²]."""
-    fitted = model.fit.predictor.batch
-    batch = Batch(kept, fitted.maps, fitted.geometry, kinds=fitted.kinds)
+def _missed(model: Scored, batch: Batch) -> float:
+    """Return the mean square of the position that a model misses of the runs of `batch` [m²]."""
     poses = Predictor(batch, model.fit.predictor.effects).predict(model.fit.parameters)
-    return float(np.mean(misses(kept, poses).squares()["position_rms_mm"]))
+    return float(np.mean(misses(batch.readings, poses).squares()["position_rms_mm"]))

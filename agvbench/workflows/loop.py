@@ -183,13 +183,14 @@ def _learned(directory: Path, settings: BenchSettings, tell: Tell) -> str:
     from agvbench.campaign import Campaign
     from agvbench.workflows.loop_remainders import remainders
 
-    path, model = directory / REMAINDERS, VehicleModel.load(directory / VEHICLE)
+    path = directory / REMAINDERS
     if settings.remainders == MODEL_ONLY:
         tell("3/5 corrected plans are not tried: --model-only")
         return ""
     if path.exists():
         tell(f"3/5 what corrected plans miss was learned before: {path}")
         return str(path)
+    model = VehicleModel.load(directory / VEHICLE)
     known = remainders(Campaign.open(directory / BEFORE), model, "calibrated")
     if settings.remainders == NO_TRIAL:
         tell("3/5 corrected plans are not tried: --no-trial")

@@ -9,7 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from tiny_vehicle import HEADER, Tiny, campaign_runs
 
-from agvbench.diagnosis.plausibility import refuse_units
+from agvbench.diagnosis.plausibility import _tracks, refuse_units
 from agvbench.types import Frames
 
 RATE_HZ = 120.0
@@ -24,4 +24,10 @@ def test_a_run_of_any_length(first, count):
     still, nan = np.zeros(count + 1), np.full(count + 1, np.nan)
     tracked, number = np.ones(count + 1, dtype=np.bool_), np.full(count + 1, -1)
     frames = Frames(t_s, 0.3 * t_s, still, still, tracked, number, nan, nan)
-    refuse_units([replace(RUN, frames=frames)], HEADER)
+    run = replace(RUN, frames=frames)
+    refuse_units([run], HEADER)
+    for when, poses in _tracks([run]):
+        assert when[0] == t_s[0]
+        assert when[-1] <= t_s[-1]
+        assert np.all(np.diff(when) > 0.0)
+        np.testing.assert_array_equal(poses[:, 0], 0.3 * when)
