@@ -117,9 +117,25 @@ def _judge_times(t_s: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
 
 
 def _longest_rising(values: Floats) -> NDArray[np.int64]:
-    """Return the indices of the longest sequence that does not fall (patience sorting, n log n)."""
-    if len(values) < 2 or np.all(np.diff(values) >= 0.0):
+    """Return the indices of the longest sequence that does not fall.
+
+    Where no value that follows is smaller than any before, the sequence can be cut: what is out of order is sorted out
+    in its own short piece, so that a late frame does not cost a walk along the whole run.
+    """
+    if len(values) < 2:
         return np.arange(len(values))
+    smallest_after = np.minimum.accumulate(values[::-1])[::-1][1:]
+    cuts = np.flatnonzero(np.maximum.accumulate(values)[:-1] <= smallest_after) + 1
+    begins, ends = np.r_[0, cuts], np.r_[cuts, len(values)]
+    chosen = np.ones(len(values), dtype=np.bool_)
+    for begin, end in zip(begins[ends - begins > 1], ends[ends - begins > 1], strict=True):
+        chosen[begin:end] = False
+        chosen[begin + _longest_in_piece(values[begin:end])] = True
+    return np.flatnonzero(chosen)
+
+
+def _longest_in_piece(values: Floats) -> NDArray[np.int64]:
+    """Return the indices of the longest sequence that does not fall (patience sorting, n log n)."""
     tails: list[float] = []
     tail_index: list[int] = []
     previous = np.full(len(values), -1)

@@ -26,6 +26,7 @@ from agvbench.types import Run
 
 BENCHMARKS = ("calibration", "trajectories", "step_response", "free_driving")
 HIDDEN = ("nothing", "steering_lag", "steering_lag_and_lateral_slip", "slow_patch")
+ASKED = 170
 SHARES = (0.5, 0.75, 1.0)
 BOUND_S = {True: 15.0, False: 40.0}
 PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
@@ -33,7 +34,7 @@ PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
 
 @dataclass(frozen=True)
 class Part:
-    """Some of a campaign's runs: every one whose repeat is among the first ``share`` of repeats."""
+    """Some of a campaign's runs."""
 
     header: CampaignHeader
     runs: list[Run]
@@ -53,6 +54,14 @@ def drive(hidden: str, repeats: int, folder: Path) -> Campaign:
     return Campaign.open(folder / hidden)
 
 
+def parts_of(campaign: Campaign, repeats: int) -> list[Part]:
+    """Return the first 170 runs in order of their repeats, and those of the first half, three quarters, all repeats."""
+    runs = list(campaign)
+    counts = [ASKED, *(sum(run.repeat < max(2, share * repeats) for run in runs) for share in SHARES)]
+    first = sorted(range(len(runs)), key=lambda k: (runs[k].repeat, k))
+    return [Part(campaign.header, [runs[k] for k in sorted(first[:count])]) for count in counts]
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -63,10 +72,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         for hidden in arguments.hidden:
             campaign = drive(hidden, arguments.repeats, Path(folder))
-            runs = list(campaign)
-            for share in SHARES:
-                part = Part(campaign.header, [run for run in runs if run.repeat < max(2, share * arguments.repeats)])
-                if share == SHARES[0]:
+            for k, part in enumerate(parts_of(campaign, arguments.repeats)):
+                if k == 0:
                     diagnose(part)  # compiles
                 began = time.process_time()
                 found = diagnose(part)

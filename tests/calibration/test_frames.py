@@ -147,3 +147,16 @@ def test_whatever_comes_in_what_comes_out_is_in_order_tracked_and_was_in_it(rows
 def test_no_frames_and_one_frame():
     assert inspect_frames(Frames.empty())[1].tracked_share == 0.0
     assert len(clean_frames(drive().select(np.array([3])))) == 1
+
+
+@given(st.lists(st.integers(0, 30), min_size=1, max_size=40))
+@settings(deadline=None)
+def test_as_few_frames_as_can_be_are_said_to_have_come_late(arrivals):
+    """The longest sequence that does not fall, counted here by trying every frame as its last."""
+    longest: list[int] = []
+    for k, time in enumerate(arrivals):
+        longest.append(1 + max((longest[i] for i in range(k) if arrivals[i] <= time), default=0))
+    t = np.array(arrivals) / 100.0
+    still = np.zeros(len(t))
+    frames = Frames(t, still, still, still, still == 0.0, np.full(len(t), -1), still, still)
+    assert inspect_frames(frames)[1].late == len(arrivals) - max(longest)
