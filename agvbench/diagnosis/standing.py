@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from agvbench.diagnosis.fitted_models import Scored
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.promises import promised_gain
-from agvbench.diagnosis.selection import LEAST_GAIN, Scored, Selection, Selector
+from agvbench.diagnosis.selection import LEAST_GAIN, Selection, Selector
 from agvbench.effects.forms import cause_of
 
 SLOW_STEERING = ("steering_lag", "steering_rate_limit", "steering_backlash")

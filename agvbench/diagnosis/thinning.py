@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis.candidates import candidates
 from agvbench.diagnosis.empirical import Explained, term_candidates
+from agvbench.diagnosis.fitted_models import Scored
 from agvbench.diagnosis.forms import BEYOND, form_candidates
 from agvbench.diagnosis.prediction import Batch
 from agvbench.diagnosis.reading import Readings
-from agvbench.diagnosis.selection import Scored, Selection, Selector
+from agvbench.diagnosis.selection import Selection, Selector
 from agvbench.diagnosis.windows_split import thinned
 
 MOST_RUNS = 240

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from agvbench.diagnosis.empirical import Explained
+from agvbench.diagnosis.fitted_models import Scored
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.reading import Readings
 from agvbench.diagnosis.residuals import misses
-from agvbench.diagnosis.selection import Scored, Selection
+from agvbench.diagnosis.selection import Selection
 
 
 def withdrawn(

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from agvbench.calibration.source import HeaderLike
 from agvbench.diagnosis.candidates import bounds_of, given_effects
 from agvbench.diagnosis.estimates import named_effects
+from agvbench.diagnosis.fitted_models import Scored
 from agvbench.diagnosis.fitting import Fit, fit
 from agvbench.diagnosis.forms import tried_beside
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.provenance import provenance, refuse_nothing
 from agvbench.diagnosis.reading import Readings, read_windows
 from agvbench.diagnosis.result import Diagnosis, HeldOut, NamedEffect, Verdict
-from agvbench.diagnosis.selection import Scored, Selection
+from agvbench.diagnosis.selection import Selection
 from agvbench.diagnosis.structure import Dependence, dependences, residual_rates
 from agvbench.diagnosis.vehicle import corrected_vehicle
 from agvbench.diagnosis.windows import SUPPORT_S, Horizon
