@@ -7,6 +7,7 @@ import pytest
 
 from agvbench.cli import main
 from agvbench.workflows.thesis.assumptions import Assumptions
+from agvbench.workflows.thesis.chapter_8_carried import asymmetry_with
 from agvbench.workflows.thesis.chapter_8_effects import (
     CAUSES,
     checks,
@@ -15,8 +16,9 @@ from agvbench.workflows.thesis.chapter_8_effects import (
     predicted,
     rows_with,
 )
+from agvbench.workflows.thesis.idle_axle import arm_across_tables
 from agvbench.workflows.thesis.prediction import predict_all
-from agvbench.workflows.thesis.residuals import arm_across_tables, asymmetry_with, kinematics_alone, traced
+from agvbench.workflows.thesis.residual_cases import kinematics_alone, traced
 from agvbench.workflows.thesis.scoring import CONDITIONS
 from agvbench.workflows.thesis.tables import drive_table, endurance_table, steering_table
 
