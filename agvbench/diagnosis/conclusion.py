@@ -1,0 +1,160 @@
+"""What is concluded from the effects that were chosen: judged on the runs set aside, and put into a verdict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.diagnosis.asked import Asked
+from agvbench.diagnosis.candidates import bounds_of, candidates
+from agvbench.diagnosis.empirical import Explained, described, term_candidates, with_term_first
+from agvbench.diagnosis.estimates import named_effects
+from agvbench.diagnosis.forms import BEYOND, form_candidates
+from agvbench.diagnosis.map_effects import map_effects
+from agvbench.diagnosis.next_experiment_propose import with_next_experiment
+from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.reading import Readings
+from agvbench.diagnosis.residual_spread import EndSpread, end_spread
+from agvbench.diagnosis.residual_table import with_residuals
+from agvbench.diagnosis.residuals import AT_THE_FLOOR, LACK_OF_FIT, Misses, floor, lack_of_fit, misses
+from agvbench.diagnosis.result import Diagnosis, HeldOut, Verdict
+from agvbench.diagnosis.selection import Selection
+from agvbench.diagnosis.structure import RANDOM_PHASE, Dependence, dependences, residual_rates, swing
+from agvbench.diagnosis.thinning import MOST_RUNS, some_repeats
+from agvbench.diagnosis.vehicle import corrected_vehicle
+from agvbench.effects.forms import effect_forms
+from agvbench.model import VehicleModel
+from agvbench.types import Floats
+
+
+@dataclass(frozen=True)
+class _Judged:
+    before: Misses
+    after: Misses
+    floor: dict[str, float]
+    lack_of_fit: float | None
+
+
+def conclude(
+    asked: Asked, readings: Readings, held: NDArray[np.bool_], library: Selection, explained: Explained | None
+) -> Diagnosis:
+    """Return the diagnosis that `library` and what `explained` adds to it amount to, judged on the runs `held` out."""
+    selection = explained.selection if explained else library
+    fit = selection.chosen.fit
+    reformed = bool(effect_forms().keys() & set(selection.chosen.names))
+    batch = Batch(readings, fit.predictor.maps, asked.geometry, kinds=BEYOND if explained or reformed else ())
+    every = Predictor(batch, selection.chosen.names)
+    poses, before = every.predict(fit.parameters), _poses_before(asked.vehicle, batch, selection)
+    judged = _judge(readings, held, before, poses, end_spread(every, fit))
+    if judged is None:
+        return asked.cannot_tell(readings, "there are no repeats among the runs held out or fitted, and so no floor")
+    rest = _what_is_left(batch, poses, explained, asked.seed)
+    known = candidates() | term_candidates() | form_candidates()
+    effects = named_effects(selection, bounds_of(known, selection.chosen.names)) + map_effects(fit, asked.vehicle)
+    significant = explained is not None or _is_significant(judged, rest)
+    verdict, why = _verdict(effects, significant, rest, explained)
+    found = Diagnosis(
+        verdict,
+        why,
+        effects,
+        significant,
+        tuple(rest),
+        _held_out(readings.select(held), judged),
+        corrected_vehicle(asked.header, asked.geometry, fit, fit.predictor.maps, asked.seed),
+        selection.rejected,
+        asked.provenance(readings)
+        | _how_it_was_fitted(selection, readings, held)
+        | {"lack_of_fit_p_value": judged.lack_of_fit}
+        | ({"empirical_term": described(explained)} if explained else {}),
+    )
+    found = with_residuals(found, readings, held, before, poses)
+    if explained or reformed:
+        return found
+    return with_next_experiment(found, selection, readings, asked.header, asked.seed)
+
+
+def _poses_before(vehicle: VehicleModel | None, batch: Batch, selection: Selection) -> Floats:
+    """Return what the vehicle that was believed predicts; without one, what static maps do."""
+    if vehicle is None:
+        return Predictor(batch, selection.base.names).predict(selection.base.fit.parameters)
+    readings = batch.readings
+    return np.array(vehicle.rollout([run.commands for run in readings.runs], readings.start, list(readings.t_s)))
+
+
+def _what_is_left(batch: Batch, poses: Floats, explained: Explained | None, seed: int) -> list[Dependence]:
+    """Return what the rest depends on: that of the model without an empirical term, whose own covariate comes first."""
+    readings, unexplained = batch.readings, poses
+    if explained is not None:
+        without = explained.without
+        unexplained = Predictor(batch, without.names).predict(without.fit.parameters)
+    rest = dependences(residual_rates(readings, unexplained), readings.group, seed)
+    # A place passed through in every run can look like a swing: it is looked for in what the term leaves.
+    if (swings := swing(residual_rates(readings, poses), seed)) is not None:
+        rest = [swings, *(d for d in rest if d.covariate != RANDOM_PHASE)]
+    return rest if explained is None else with_term_first(rest, explained)
+
+
+def _how_it_was_fitted(selection: Selection, readings: Readings, held: NDArray[np.bool_]) -> dict[str, object]:
+    offsets = selection.chosen.fit.scatter.offsets
+    return {
+        "fit_runs": int((~held).sum()),
+        "searched_runs": int(some_repeats(readings.group[~held], MOST_RUNS).sum()),
+        "models_fitted": selection.tried,
+        "steering_stood_at": "the first command" if readings.stood else "neutral",
+        "scatter": {
+            "front_deg": float(np.degrees(offsets[1])),
+            "rear_deg": float(np.degrees(offsets[2])),
+            "speed_percent": 100.0 * float(offsets[3]),
+        },
+    }
+
+
+def _judge(
+    readings: Readings, held: NDArray[np.bool_], before: Floats, after: Floats, spread: EndSpread
+) -> _Judged | None:
+    kept = readings.select(held)
+    missed = misses(kept, after[held])
+    least = floor(missed, kept.group) or floor(misses(readings, after), readings.group)
+    if least is None:
+        return None
+    return _Judged(misses(kept, before[held]), missed, least, lack_of_fit(missed, kept.group, spread.select(held)))
+
+
+def _is_significant(judged: _Judged, rest: list[Dependence]) -> bool:
+    after = judged.after.rms()
+    above = any(after[name] > AT_THE_FLOOR * judged.floor[name] for name in ("position_rms_mm", "heading_rms_deg"))
+    lacks = judged.lack_of_fit is not None and judged.lack_of_fit < LACK_OF_FIT
+    return (above and lacks) or bool(rest)
+
+
+def _verdict(
+    effects: tuple[object, ...], significant: bool, rest: list[Dependence], explained: Explained | None
+) -> tuple[Verdict, str]:
+    if significant:
+        on = f" it depends on {rest[0].covariate}" if rest else " but on none of the covariates looked at"
+        if explained is not None:
+            on += f", and {explained.term.name} describes it"
+        elif rest and rest[0].covariate == RANDOM_PHASE:
+            on += ", with another phase in every run, which nothing that is planned beforehand can remove"
+        return Verdict.UNKNOWN, "structure remains that no effect explains:" + on
+    if not effects:
+        return Verdict.ADEQUATE, "the model, its maps fitted again, predicts as well as repeats agree with one another"
+    if any(getattr(effect, "confounded_with", ()) for effect in effects):
+        return Verdict.AMBIGUOUS, "several effects explain the residual equally well"
+    return Verdict.NAMED, "the effects named bring the prediction to the floor"
+
+
+def _held_out(kept: Readings, judged: _Judged) -> HeldOut:
+    before, after = judged.before.rms(), judged.after.rms()
+    errors = {name: {"before": before[name], "after": after[name], "floor": judged.floor[name]} for name in before}
+    was, now = judged.before.squares()["position_rms_mm"], judged.after.squares()["position_rms_mm"]
+    slack = (judged.floor["position_rms_mm"] / 1e3) ** 2
+    worse = []
+    for g in np.unique(kept.group):
+        own = kept.group == g
+        if float(np.mean(now[own])) > float(np.mean(was[own])) + slack:
+            run = kept.runs[int(np.argmax(own))]
+            worse.append(run.trajectory or run.run_id)
+    return HeldOut(len(kept), errors, tuple(dict.fromkeys(worse)))
