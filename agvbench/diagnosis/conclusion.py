@@ -22,7 +22,6 @@ from agvbench.diagnosis.residuals import AT_THE_FLOOR, LACK_OF_FIT, Misses, floo
 from agvbench.diagnosis.result import Diagnosis, HeldOut, Verdict
 from agvbench.diagnosis.selection import Selection
 from agvbench.diagnosis.structure import RANDOM_PHASE, Dependence, dependences, residual_rates, swing
-from agvbench.diagnosis.thinning import MOST_RUNS, some_repeats
 from agvbench.diagnosis.vehicle import corrected_vehicle
 from agvbench.effects.forms import effect_forms
 from agvbench.model import VehicleModel
@@ -38,9 +37,26 @@ class _Judged:
 
 
 def conclude(
-    asked: Asked, readings: Readings, held: NDArray[np.bool_], library: Selection, explained: Explained | None
+    asked: Asked,
+    readings: Readings,
+    held: NDArray[np.bool_],
+    library: Selection,
+    explained: Explained | None,
+    searched: int,
 ) -> Diagnosis:
-    """Return the diagnosis that `library` and what `explained` adds to it amount to, judged on the runs `held` out."""
+    """Return the diagnosis that what was found amounts to, judged on the runs set aside.
+
+    Parameters
+    ----------
+    asked, readings
+        What was asked, and every run.
+    held
+        (R,): which runs were set aside.
+    library, explained
+        What was chosen of the library, and what an empirical term adds to it.
+    searched
+        In how many runs causes were looked for.
+    """
     selection = explained.selection if explained else library
     fit = selection.chosen.fit
     reformed = bool(effect_forms().keys() & set(selection.chosen.names))
@@ -65,7 +81,8 @@ def conclude(
         corrected_vehicle(asked.header, asked.geometry, fit, fit.predictor.maps, asked.seed),
         selection.rejected,
         asked.provenance(readings)
-        | _how_it_was_fitted(selection, readings, held)
+        | _how_it_was_fitted(selection, readings)
+        | {"fit_runs": int((~held).sum()), "searched_runs": searched}
         | {"lack_of_fit_p_value": judged.lack_of_fit}
         | ({"empirical_term": described(explained)} if explained else {}),
     )
@@ -96,11 +113,9 @@ def _what_is_left(batch: Batch, poses: Floats, explained: Explained | None, seed
     return rest if explained is None else with_term_first(rest, explained)
 
 
-def _how_it_was_fitted(selection: Selection, readings: Readings, held: NDArray[np.bool_]) -> dict[str, object]:
+def _how_it_was_fitted(selection: Selection, readings: Readings) -> dict[str, object]:
     offsets = selection.chosen.fit.scatter.offsets
     return {
-        "fit_runs": int((~held).sum()),
-        "searched_runs": int(some_repeats(readings.group[~held], MOST_RUNS).sum()),
         "models_fitted": selection.tried,
         "steering_stood_at": "the first command" if readings.stood else "neutral",
         "scatter": {

@@ -82,11 +82,11 @@ def diagnose(
     selection, selector = reform_and_resettle(chosen, selector)
     readings = replace(readings, stood=selector.batch.readings.stood)
     explained = explain(selection, selector)
-    if (some := len(selector.batch.readings)) < len(fitted):
-        tell(f"causes were looked for in {some} runs; now they are measured in all {len(fitted)}")
+    if (searched := len(selector.batch.readings)) < len(fitted):
+        tell(f"causes were looked for in {searched} runs; now they are measured in all {len(fitted)}")
         selection, explained = measured_in_all(selection, explained, selector, fitted)
     selection, explained = withdrawn(selection, explained, readings.select(held), tell)
-    return conclude(asked, readings, held, selection, explained)
+    return conclude(asked, readings, held, selection, explained, searched)
 
 
 def _selector(asked: Asked, some: Readings, tell: Tell) -> Selector:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 
 import numpy as np
 import pytest
 from tiny_vehicle import HEADER, Tiny, drive
 
+from agvbench.diagnosis import conclusion, diagnose
 from agvbench.diagnosis.candidates import candidates
 from agvbench.diagnosis.next_experiment import pin, separate
 from agvbench.diagnosis.next_experiment_designs import Design, designs, levels_of, mutated
@@ -29,24 +29,23 @@ def diagnosed():
     """Return a function that diagnoses a tiny vehicle and returns the answer and the selection behind it."""
     from tiny_vehicle import campaign_runs
 
-    module = importlib.import_module("agvbench.diagnosis.diagnose")
     known = {}
 
     def get(tiny, *, steps):
         if (tiny, steps) not in known:
             kept = []
-            original = module.with_next_experiment
+            original = conclusion.with_next_experiment
 
             def keep(found, selection, *rest):
                 kept.append(selection)
                 return original(found, selection, *rest)
 
-            module.with_next_experiment = keep
+            conclusion.with_next_experiment = keep
             try:
                 runs = campaign_runs(tiny, steps=steps)
-                found = module.diagnose(type("Tinies", (), {"header": HEADER, "__iter__": lambda _: iter(runs)})())
+                found = diagnose(type("Tinies", (), {"header": HEADER, "__iter__": lambda _: iter(runs)})())
             finally:
-                module.with_next_experiment = original
+                conclusion.with_next_experiment = original
             known[tiny, steps] = found, kept[0]
         return known[tiny, steps]
 
