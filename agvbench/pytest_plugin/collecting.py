@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import pytest
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 REPEAT = "agvbench_repeat"
 CALIBRATION_EXPERIMENTS = frozenset({"steering_front", "steering_rear", "steering_opposite", "drive"})
 _DEFAULT_REPEATS = 10
+_SETTINGS = pytest.StashKey["BenchSettings"]()
 
 
 class BenchModule(pytest.Module):
@@ -40,25 +41,39 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
 @pytest.hookimpl(trylast=True)
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Apply the marks ``grid`` and ``repeats``."""
-    full = bool(metafunc.config.getoption("full"))
-    for mark in metafunc.definition.iter_markers("grid"):
-        name, reduced, complete = mark.args
-        values = complete if full else reduced
+    grids = list(metafunc.definition.iter_markers("grid"))
+    mark = metafunc.definition.get_closest_marker("repeats")
+    if not grids and mark is None:
+        return
+    settings = _settings(metafunc.config)
+    for grid in grids:
+        name, reduced, complete = grid.args
+        values = complete if settings.full else reduced
         metafunc.parametrize(name, values, ids=[f"{v:.3g}" if isinstance(v, float) else str(v) for v in values])
-    mark_ = metafunc.definition.get_closest_marker("repeats")
-    if mark_ is not None:
+    if mark is not None:
         metafunc.fixturenames.append(REPEAT)
-        n = _repeats(mark_, full=full, asked=metafunc.config.getoption("repeats"))
+        n = _repeats(mark, settings)
         metafunc.parametrize(REPEAT, range(1, n + 1), ids=[f"r{k:02d}" for k in range(1, n + 1)], indirect=True)
 
 
-def _repeats(mark: pytest.Mark, *, full: bool, asked: int | None) -> int:
+def _settings(config: pytest.Config) -> BenchSettings:
+    """Return the session's settings, or the usual ones: what is wrong is told once everything is collected."""
+    if _SETTINGS not in config.stash:
+        from agvbench.running.settings import BenchSettings
+
+        try:
+            config.stash[_SETTINGS] = settings_from(config)
+        except AgvbenchError:
+            config.stash[_SETTINGS] = BenchSettings()
+    return config.stash[_SETTINGS]
+
+
+def _repeats(mark: pytest.Mark, settings: BenchSettings) -> int:
     """Return how often to drive: a fixed number, or what ``--repeats`` asks for where the mark leaves it open."""
     fixed = mark.args[0] if mark.args else None
     if fixed is None:
-        # What is asked wrongly is told once everything is collected.
-        return _DEFAULT_REPEATS if asked is None else max(asked, 1)
-    return int(mark.kwargs.get("full") or fixed) if full else int(fixed)
+        return settings.repeats or _DEFAULT_REPEATS
+    return int(mark.kwargs.get("full") or fixed) if settings.full else int(fixed)
 
 
 @pytest.hookimpl(trylast=True)
@@ -70,7 +85,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     try:
         settings = settings_from(config)
         undriven = [item for item in benches if not _condition_applies(item)]
-        unknown = [] if _corrected_vehicle(config, settings) else [item for item in benches if _is_corrected(item)]
+        unknown = [] if settings.corrected else [item for item in benches if _is_corrected(item)]
     except AgvbenchError as error:
         raise pytest.UsageError(str(error)) from None
     from agvbench.running.order import ordered
@@ -84,6 +99,16 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items[:] = [item for item in items if not is_bench(item)] + driven
     if undriven:
         config.hook.pytest_deselected(items=undriven)
+
+
+def chosen(config: pytest.Config, items: Iterable[pytest.Item]) -> dict[str, Any]:
+    """Return what chose the runs of this session, for the one that resumes it: benchmarks, and pytest's ``-k``."""
+    from agvbench.running.benchmark_files import benchmark_name
+
+    given = [str(argument) for argument in config.args]
+    if not all(Path(argument.partition("::")[0]).is_file() for argument in given):
+        given = list(dict.fromkeys(str(item.path) for item in items if is_bench(item)))
+    return {"benchmarks": tuple(map(benchmark_name, given)), "only": config.getoption("keyword")}
 
 
 def is_bench(item: pytest.Item) -> bool:
@@ -128,17 +153,6 @@ def _check_names(items: Iterable[pytest.Item]) -> None:
                 f"two benchmarks would record the run {name!r}: {seen[name]} and {item.nodeid}; rename one"
             )
         seen[name] = item.nodeid
-
-
-def _corrected_vehicle(config: pytest.Config, settings: BenchSettings) -> str:
-    """Return the file of the corrected model, given now or when the session that goes on began; "" for none."""
-    if settings.corrected or not config.getoption("resume"):
-        return settings.corrected
-    from agvbench.running.directory import choose_directory
-    from agvbench.running.settings import SETTINGS_FILE, BenchSettings
-
-    directory = choose_directory(config.getoption("out"), resume=True)
-    return BenchSettings.load(directory).corrected if (directory / SETTINGS_FILE).exists() else ""
 
 
 def _is_corrected(item: pytest.Item) -> bool:

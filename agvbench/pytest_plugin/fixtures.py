@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from agvbench.errors import AgvbenchError
-from agvbench.pytest_plugin.collecting import experiment, is_bench, repeat, run_name
+from agvbench.pytest_plugin.collecting import chosen, experiment, is_bench, repeat, run_name
 from agvbench.pytest_plugin.options import given_options
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
     with ExitStack() as stack:
         try:
             opened = open_session(
-                given_options(config),
+                given_options(config) | chosen(config, session.items),
                 out=config.getoption("out"),
                 resume=bool(config.getoption("resume")),
                 dry_run=bool(config.getoption("dry_run")),

@@ -36,13 +36,14 @@ def given_options(config: pytest.Config) -> dict[str, Any]:
 
 
 def settings_from(config: pytest.Config) -> BenchSettings:
-    """Return the settings that the command line asks for.
+    """Return the settings of the session: those that the command line asks for, or that a resumed one began with.
 
     Raises
     ------
-    FlagError
-        If a value cannot be used.
+    AgvbenchError
+        If a value cannot be used, or what the session began with not be read.
     """
-    from agvbench.running.settings import BenchSettings
+    from agvbench.running.session_settings import session_settings
 
-    return BenchSettings.given(given_options(config))
+    resume = bool(config.getoption("resume"))
+    return session_settings(given_options(config), config.getoption("out"), resume=resume)[1]

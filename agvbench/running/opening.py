@@ -22,12 +22,12 @@ from agvbench.planning import Workspace
 from agvbench.running.bench import Bench
 from agvbench.running.calibrating import calibrate_campaign
 from agvbench.running.campaign_time import TURNAROUND_S, CampaignTime, SimulatedCampaignTime, WallCampaignTime
-from agvbench.running.directory import choose_directory
 from agvbench.running.placers.choosing import choose_placer
 from agvbench.running.provenance import provenance
 from agvbench.running.remainders import read_remainders
 from agvbench.running.session import BenchSession
-from agvbench.running.settings import SETTINGS_FILE, BenchSettings, settings_for_resume
+from agvbench.running.session_settings import LAB_VEHICLE, session_settings
+from agvbench.running.settings import SETTINGS_FILE, BenchSettings
 from agvbench.running.signals import interruptible
 from agvbench.running.supervision.limits import DEFAULT_SAFETY
 from agvbench.running.unbroken import UnbrokenLink
@@ -35,8 +35,6 @@ from agvbench.running.vehicles import uncalibrated_vehicle
 from agvbench.types import Run
 
 PROVENANCE_TABLE = "provenance"
-LAB_VEHICLE = "vehicle.toml"
-"""The vehicle of a lab folder, believed before calibration where no other is named."""
 
 
 @contextmanager
@@ -48,8 +46,7 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
     AgvbenchError
         If an option, a file, the rig or the directory cannot be used.
     """
-    directory = choose_directory(out, resume=resume)
-    settings = _settings(given, directory, resume=resume)
+    directory, settings = session_settings(given, out, resume=resume)
     models = _known_models(settings)
     workspace, remainders = Workspace.parse(settings.workspace), read_remainders(settings.remainders)
     if dry_run:
@@ -82,13 +79,6 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
         session.notices = _notices(settings, given, resume=resume, resumed=bool(writer.finished_ids), where=directory)
         with bench.pause.by_signal():
             yield session
-
-
-def _settings(given: Mapping[str, Any], directory: Path, *, resume: bool) -> BenchSettings:
-    if resume and (directory / SETTINGS_FILE).exists():
-        return settings_for_resume(BenchSettings.load(directory), given)
-    beside = {"vehicle": LAB_VEHICLE} if "vehicle" not in given and Path(LAB_VEHICLE).is_file() else {}
-    return BenchSettings.given({**beside, **given})
 
 
 def _notices(

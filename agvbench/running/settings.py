@@ -22,7 +22,7 @@ PLACES = ("auto", "operator", "teleport")
 MAPS = ("default", "thesis")
 _LARGEST_SEED = 2**63 - 1
 # What may differ between a session and the one that resumes it: none of these changes what is driven.
-_FREE_ON_RESUME = frozenset({"connect", "bus_config", "lab", "exchange"})
+_FREE_ON_RESUME = frozenset({"benchmarks", "only", "connect", "bus_config", "lab", "exchange"})
 # A fault that was rehearsed may be taken away, or another one put in.
 _WITHOUT_FAULTS = {"agv": unimpaired, "mocap": unimpaired, "camera": without_packet_faults}
 
@@ -36,7 +36,8 @@ class BenchSettings:
     ``corrected`` the one with the effects that a diagnosis found ("" for none: the condition is not driven) and
     ``remainders`` what that model still misses; ``repeats`` 0 means what each benchmark declares; ``order`` is one of
     `ORDERS`; ``place``, one of `PLACES`, is how the vehicle comes to its starts ("" for the usual way); ``full`` drives
-    every pulse of the thesis; ``exchange`` [s] is for how long a vehicle is told what to do at a time.
+    every pulse of the thesis; ``exchange`` [s] is for how long a vehicle is told what to do at a time. ``benchmarks``
+    are names or files, and ``only`` chooses among their runs by pytest's ``-k``.
     """
 
     agv: str = "sim"
@@ -59,6 +60,8 @@ class BenchSettings:
     bus_config: str = ""
     lab: str = "lab"
     exchange: float = DEFAULT_SAFETY.exchange_s
+    benchmarks: tuple[str, ...] = ()
+    only: str = ""
 
     def __post_init__(self) -> None:
         _check(self.repeats >= 0, "--repeats", self.repeats, "at least 1", "give a whole number of repeats")
@@ -100,7 +103,7 @@ class BenchSettings:
         path = directory / SETTINGS_FILE
         try:
             table = read_toml(path)
-            return cls(**table)
+            return cls(**table | {"benchmarks": tuple(map(str, table.get("benchmarks", ())))})
         except FileNotFoundError:
             raise FileError("no bench session to resume", where=path, remedy="start anew without --resume") from None
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, TypeError) as error:

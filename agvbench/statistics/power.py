@@ -39,8 +39,11 @@ def smallest_p(n_a: int, n_b: int) -> float:
 
     >>> round(smallest_p(5, 5), 5)
     0.00397
+    >>> smallest_p(660, 660)
+    0.0
     """
-    return 1.0 / math.comb(n_a + n_b, n_a)
+    # Whole numbers divide into 0.0 where there are more orders than a float can count; 1.0 over them would not.
+    return 1 / math.comb(n_a + n_b, n_a)
 
 
 def fewest_repeats(alpha: float) -> int:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from agvbench.errors import FlagError
-from agvbench.resources import resource_directory
+from agvbench.running.benchmark_files import find_benchmark
+from agvbench.running.directory import choose_directory
 from agvbench.running.options import OPTIONS, SESSION_OPTIONS, destination
+from agvbench.running.settings import SETTINGS_FILE, BenchSettings
 
 DEFAULT = ("calibration", "trajectories")
 # The command line has imported agvbench before pytest looks for plugins, which does no harm here.
@@ -22,13 +23,17 @@ def run_benchmarks(
 ) -> int:
     """Run the benchmarks `names` with `options`; return the exit code of ``agvbench``.
 
-    ``only`` chooses among them as pytest's ``-k`` does; without ``summary`` nothing is said at the end.
+    ``only`` chooses among them as pytest's ``-k`` does; without ``summary`` nothing is said at the end. A session that
+    is resumed without saying which benchmarks drives those that it began with.
 
     Raises
     ------
-    FlagError
-        If a benchmark does not exist, or no run is chosen.
+    AgvbenchError
+        If a benchmark does not exist, no run is chosen, or the session to be resumed cannot be read.
     """
+    if options.get("resume") and not names:
+        began = _begun_with(options.get("out"))
+        names, only = began.benchmarks, only or began.only
     files = [str(find_benchmark(name)) for name in names or DEFAULT]
     arguments = [*files, "-q", "--strict-markers", "-p", "no:cacheprovider", "-W", _IN_PROCESS, *_flags(options)]
     if only:
@@ -42,22 +47,10 @@ def run_benchmarks(
     return 2 if code == pytest.ExitCode.USAGE_ERROR else int(code)
 
 
-def find_benchmark(name: str) -> Path:
-    """Return the file of a benchmark: a path, or a name found in ``benchmarks/`` here, else among those shipped.
-
-    Raises
-    ------
-    FlagError
-        If there is none.
-    """
-    if Path(name.partition("::")[0]).is_file():
-        return Path(name)
-    folders = [Path("benchmarks"), resource_directory("benchmarks")]
-    for folder in folders:
-        if (path := folder / f"bench_{name}.py").is_file():
-            return path
-    known = sorted({p.stem.removeprefix("bench_") for folder in folders for p in folder.glob("bench_*.py")})
-    raise FlagError("no such benchmark", value=name, limit=", ".join(known), remedy="name one of these, or a file")
+def _begun_with(out: str | None) -> BenchSettings:
+    """Return what the session to be resumed began with; the usual settings where there is none."""
+    directory = choose_directory(out, resume=True)
+    return BenchSettings.load(directory) if (directory / SETTINGS_FILE).exists() else BenchSettings()
 
 
 def _flags(options: Mapping[str, Any]) -> list[str]:

@@ -10,11 +10,11 @@ import pytest
 from agvbench.campaign import CampaignHeader, CampaignWriter
 from agvbench.errors import AgvbenchError
 from agvbench.model import example_path
+from agvbench.running.benchmark_files import find_benchmark
 from agvbench.running.calibrating import calibrate_campaign
 from agvbench.running.driver import Driver
 from agvbench.running.opening import open_session
 from agvbench.running.settings import BenchSettings
-from agvbench.workflows.bench import find_benchmark
 from agvbench.workflows.init import make_lab
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "errors-bench.md"

@@ -1,0 +1,79 @@
+"""A session that is resumed without its options drives what it began with, and nothing else."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from agvbench.campaign import Campaign
+from agvbench.errors import FlagError
+from agvbench.running.benchmark_files import benchmark_name, find_benchmark
+from agvbench.workflows.bench import run_benchmarks
+
+MINE = """'''Two turns, for agvbench.'''
+
+import pytest
+
+
+@pytest.mark.grid("share", [0.5], [0.5, 1.0])
+@pytest.mark.repeats(None)
+def bench_left(drive, share):
+    drive.hold(drive=1.0, front=share, rear=0.0, for_s=0.3)
+
+
+@pytest.mark.repeats(None)
+def bench_right(drive):
+    drive.hold(drive=1.0, front=-0.5, rear=0.0, for_s=0.3)
+"""
+BEGAN = ["bench_mine.py", "--repeats=2", "--order=shuffled", "--full", "-k=left"]
+
+
+@pytest.fixture
+def lab(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bench_mine.py").write_text(MINE)
+    return tmp_path
+
+
+def bench(*arguments):
+    program = "import sys; from agvbench.cli import main; sys.exit(main())"
+    command = [sys.executable, "-c", program, "bench", "--out=c", "--no-report", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False, env=os.environ)
+
+
+def test_what_was_chosen_is_chosen_again(lab):
+    assert bench(*BEGAN).returncode == 0
+    first = {run.run_id for run in Campaign.open(lab / "c")}
+    assert len(first) == 4
+    for table in ("runs", "commands", "poses"):
+        (lab / "c" / f"{table}.parquet" / "left-1-r02.parquet").unlink()
+    resumed = bench("--resume")
+    assert resumed.returncode == 0, resumed.stdout + resumed.stderr
+    assert {run.run_id for run in Campaign.open(lab / "c")} == first
+
+
+def test_more_benchmarks_may_be_asked_for_than_it_began_with(lab):
+    assert bench(*BEGAN).returncode == 0
+    assert bench("--resume", "bench_mine.py").returncode == 0
+    assert len(list(Campaign.open(lab / "c"))) == 6
+
+
+def test_there_must_be_something_to_resume(lab):
+    with pytest.raises(FlagError, match="no session to resume"):
+        run_benchmarks([], {"resume": True})
+
+
+@pytest.mark.parametrize("name", ["calibration", "endurance"])
+def test_a_shipped_benchmark_is_known_by_its_name(name, lab):
+    assert benchmark_name(str(find_benchmark(name))) == name
+
+
+def test_one_of_your_own_is_known_by_its_path_unless_it_lies_in_benchmarks(lab):
+    assert benchmark_name("bench_mine.py") == "bench_mine.py"
+    (lab / "benchmarks").mkdir()
+    (lab / "bench_mine.py").rename(lab / "benchmarks" / "bench_mine.py")
+    assert benchmark_name("benchmarks/bench_mine.py") == "mine"
+    assert benchmark_name("benchmarks/bench_mine.py::bench_left") == "benchmarks/bench_mine.py::bench_left"
