@@ -19,7 +19,14 @@ from agvbench.pytest_plugin.collecting import (
     pytest_collection_modifyitems,
     pytest_generate_tests,
 )
-from agvbench.pytest_plugin.fixtures import agvbench_repeat, bench, drive, pytest_runtestloop, pytest_sessionfinish
+from agvbench.pytest_plugin.fixtures import (
+    agvbench_repeat,
+    bench,
+    drive,
+    pytest_runtestloop,
+    pytest_sessionfinish,
+    pytest_unconfigure,
+)
 from agvbench.pytest_plugin.options import pytest_addoption, pytest_configure
 from agvbench.pytest_plugin.telling import (
     pytest_pyfunc_call,
@@ -45,4 +52,5 @@ __all__ = [
     "pytest_runtestloop",
     "pytest_sessionfinish",
     "pytest_terminal_summary",
+    "pytest_unconfigure",
 ]

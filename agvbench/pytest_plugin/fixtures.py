@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Generator
 from contextlib import ExitStack
 from typing import TYPE_CHECKING
@@ -60,12 +61,22 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
 
 @pytest.hookimpl(trylast=True)
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """End with the exit code that shells know of the signal that ended the session."""
-    interrupt = session.config.stash.get(INTERRUPT, None)
-    if interrupt is not None:
+    """End with the exit code that shells know of the signal that ended the session, or that of a set-up that failed."""
+    stash = session.config.stash
+    if INTERRUPT in stash:
         from agvbench.running.signals import exit_code
 
-        session.exitstatus = exit_code(interrupt)
+        session.exitstatus = exit_code(stash[INTERRUPT])
+    elif SESSION in stash and stash[SESSION].failure is not None:
+        session.exitstatus = pytest.ExitCode.INTERRUPTED
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Say last of all what ended the driving: later failures only repeat it."""
+    failure = config.stash[SESSION].failure if SESSION in config.stash else None
+    if failure is not None and INTERRUPT not in config.stash:
+        remedy = "" if failure.remedy else "; mend it, and go on with --resume"
+        print(f"ERROR: the bench was stopped: {failure}{remedy}", file=sys.stderr)
 
 
 @pytest.fixture(scope="session")

@@ -11,7 +11,7 @@ from agvbench.model import VehicleModel
 from agvbench.planning import Departure, Workspace
 from agvbench.running.campaign_time import CampaignTime
 from agvbench.running.drive import DEFAULT_TIMING, Drive, Timing, drive, exchanged
-from agvbench.running.latch import Latch
+from agvbench.running.latch import Failure, Latch
 from agvbench.running.links import RunnerLink
 from agvbench.running.pausing import Pause, standing
 from agvbench.running.placers.choosing import make_placer
@@ -75,6 +75,11 @@ class Bench:
         if self._calibrated is None:
             self._calibrated = self._calibrate()
         return self._calibrated
+
+    @property
+    def failure(self) -> Failure | None:
+        """What ended the driving: the first failure of hardware, bus or disk."""
+        return self._latch.failure
 
     @property
     def departure(self) -> Departure:

@@ -19,6 +19,11 @@ class Latch:
     def __init__(self) -> None:
         self._failure: Failure | None = None
 
+    @property
+    def failure(self) -> Failure | None:
+        """What went wrong first, if anything did."""
+        return self._failure
+
     def check(self) -> None:
         """Raise `LinkError` with the first failure as its cause, if there was one."""
         if self._failure is not None:

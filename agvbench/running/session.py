@@ -20,6 +20,7 @@ from agvbench.planning import (
 from agvbench.running.bench import Bench
 from agvbench.running.constant import Shares
 from agvbench.running.driver import Driver, NotDrivenError
+from agvbench.running.latch import Failure
 from agvbench.running.records import DriveOrder
 from agvbench.running.remainders import NO_REMAINDERS
 from agvbench.types import Pose, Run
@@ -55,6 +56,11 @@ class BenchSession:
     def is_dry(self) -> bool:
         """Whether nothing is driven."""
         return self._bench is None
+
+    @property
+    def failure(self) -> Failure | None:
+        """What ended the driving before its time, if anything did."""
+        return None if self._bench is None else self._bench.failure
 
     def model(self, condition: str) -> VehicleModel:
         """Return the vehicle model that commands are computed with under `condition`."""

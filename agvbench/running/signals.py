@@ -18,6 +18,7 @@ class Terminated(KeyboardInterrupt):
 
     def __init__(self, number: int) -> None:
         super().__init__(signal.Signals(number).name)
+        self.number = number
         self.exit_code = 128 + number
 
 
@@ -32,10 +33,11 @@ def exit_code(interrupt: KeyboardInterrupt) -> int:
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """While the context lasts, raise `Terminated` in the main thread on SIGTERM and SIGHUP.
+    """While the context lasts, raise `Terminated` in the main thread on the first SIGTERM or SIGHUP.
 
-    What is ignored (SIGHUP under ``nohup``) stays so. Elsewhere than in the main thread this does nothing: signals
-    cannot be taken there.
+    Those that follow are ignored, so that nothing comes between the vehicle and its stop. What was ignored before
+    (SIGHUP under ``nohup``) stays so. Elsewhere than in the main thread this does nothing: signals cannot be taken
+    there.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -52,4 +54,6 @@ def interruptible() -> Iterator[None]:
 
 
 def _end(number: int, _: FrameType | None) -> None:
+    for ending in _ENDING:
+        signal.signal(ending, signal.SIG_IGN)
     raise Terminated(number)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -11,12 +12,15 @@ from pathlib import Path
 
 from agvbench.errors import AgvbenchError
 from agvbench.running.settings import SETTINGS_FILE, BenchSettings
+from agvbench.running.signals import Terminated, interruptible
 
 _PROGRAM = (
     "import json, sys; from agvbench.workflows.bench import run_benchmarks;"
     " sys.exit(run_benchmarks(*json.loads(sys.argv[1]), summary=False))"
 )
 _DONE = {0, 1}  # 1: some run was never driven well enough; what was is a campaign all the same
+_ERROR = "ERROR: "
+_PATIENCE_S = 5.0
 
 Tell = Callable[[str], None]
 
@@ -42,22 +46,41 @@ def drive(directory: Path, names: Sequence[str], settings: BenchSettings, more: 
     """
     options = {name: value for name, value in asdict(settings).items() if value != getattr(BenchSettings(), name)}
     options |= {**more, "out": str(directory), "resume": directory.exists(), "no_report": True}
-    command = [sys.executable, "-c", _PROGRAM, json.dumps([names, options])]
-    errors = ""
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:  # noqa: S603 - our own program
-        try:
-            errors = process.communicate()[1]
-        except KeyboardInterrupt:
-            # It was interrupted as well, stops the vehicle, and records what it has seen.
-            process.wait()
-            raise
-    if process.returncode not in _DONE:
-        said = [line.removeprefix("ERROR: ") for line in errors.splitlines() if line.strip()]
-        raise AgvbenchError(said[-1] if said else f"the bench ended with exit code {process.returncode}")
-    if errors:
-        sys.stderr.write(errors)
-    if process.returncode:
+    code, errors = _run([sys.executable, "-c", _PROGRAM, json.dumps([names, options])])
+    if code not in _DONE:
+        raise AgvbenchError(errors[-1] if errors else f"the bench ended with exit code {code}")
+    if code:
         tell(f"    some runs could not be driven: agvbench report {directory} says which")
+
+
+def _run(command: Sequence[str]) -> tuple[int, list[str]]:
+    """Run a bench; return its exit code, and why it failed. What it asks of an operator is passed on at once."""
+    errors: list[str] = []
+    with interruptible(), subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:  # noqa: S603 - ours
+        try:
+            for line in process.stderr or ():
+                if line.startswith(_ERROR):
+                    errors.append(line.removeprefix(_ERROR).strip())
+                else:
+                    sys.stderr.write(line)
+        except KeyboardInterrupt as interrupt:
+            _end(process, interrupt)
+            raise
+    return process.returncode, errors
+
+
+def _end(process: subprocess.Popen[str], interrupt: KeyboardInterrupt) -> None:
+    """Let the bench stop its vehicle and record what it has seen, when the loop is to end.
+
+    A terminal interrupts both; what was sent to the loop alone is sent on.
+    """
+    if isinstance(interrupt, Terminated):
+        process.send_signal(interrupt.number)
+    try:
+        process.communicate(timeout=_PATIENCE_S)
+    except subprocess.TimeoutExpired:
+        process.send_signal(signal.SIGINT)
+        process.communicate()
 
 
 def moved(directory: Path, models: Mapping[str, str]) -> None:
