@@ -11,7 +11,8 @@ TEMPORARY_PREFIX = ".tmp-"
 def write_atomically(path: Path, data: bytes | memoryview, *, durable: bool = True) -> None:
     """Write `data` to `path` so that a reader sees the old file or the new one and never a part of it.
 
-    With `durable` the data are on the disk before the name is, so that this also holds through a power cut.
+    With `durable` the data are on the disk before the name is, and the name before this returns, so that it also
+    holds through a power cut.
     """
     temporary = path.with_name(TEMPORARY_PREFIX + path.name)
     descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
@@ -24,6 +25,17 @@ def write_atomically(path: Path, data: bytes | memoryview, *, durable: bool = Tr
     finally:
         os.close(descriptor)
     temporary.rename(path)
+    if durable:
+        _force_to_disk(path.parent)
+
+
+def _force_to_disk(directory: Path) -> None:
+    """Let the names in `directory` outlive a power cut."""
+    descriptor = os.open(directory, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def is_temporary(path: Path) -> bool:

@@ -26,7 +26,10 @@ import argparse
 
 from agvbench.running.options import OPTIONS, destination
 
-_OF_THE_RIG = ("--agv", "--mocap", "--plant", "--workspace", "--connect", "--lab")
+_OF_THE_RIG = (
+    "--agv", "--mocap", "--camera", "--plant", "--place", "--workspace", "--connect", "--bus-config", "--lab",
+    "--vehicle-name",
+)  # fmt: skip
 HELP = "find the physical effect that the vehicle model lacks"
 
 

@@ -51,7 +51,8 @@ def refuse_units(runs: Sequence[Run], header: HeaderLike) -> None:
         If so, naming the column.
     """
     where = f"campaign {header.name}: poses"
-    steps_s = [np.median(np.diff(np.sort(run.frames.t_s))) for run in runs if run.is_ok and len(run.frames) > 1]
+    times = [np.unique(run.frames.t_s) for run in runs if run.is_ok]  # doubled frames come at once
+    steps_s = [np.median(np.diff(each)) for each in times if len(each) > 1]
     if not steps_s:
         return
     step_s = max(float(np.median(steps_s)), 1e-9)

@@ -29,10 +29,10 @@ def between_rows(run: Run) -> Run:
     A recording has the command beside the pose: what changes is first seen in the row after it changed. Taken at that
     row's time, every camera would look half a period early.
     """
-    if "source_row" not in run.extra or len(run.commands) < 2 or len(run.frames) < 2:
+    if "source_row" not in run.extra or len(run.commands) < 2 or len(times := np.unique(run.frames.t_s)) < 2:
         return run
     t_s = run.commands.t_s.copy()
-    t_s[1:] -= 0.5 * float(np.median(np.diff(np.sort(run.frames.t_s))))
+    t_s[1:] -= 0.5 * float(np.median(np.diff(times)))
     return replace(run, commands=replace(run.commands, t_s=np.maximum.accumulate(t_s)))
 
 

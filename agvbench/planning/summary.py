@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from agvbench.errors import PlanError
 from agvbench.model import VehicleModel
+from agvbench.planning.corrected import corrected_plan
 from agvbench.planning.planner import Plan, plan
 from agvbench.planning.trajectory import Trajectory
 from agvbench.planning.workspace import Workspace
@@ -91,7 +92,9 @@ def dry_run(
 def _row(
     trajectory: Trajectory, condition: str, model: VehicleModel, workspace: Workspace | None, start: Pose | None
 ) -> DryRunRow:
+    # A corrected plan makes up for the model's effects, and is what a bench would drive.
+    made = corrected_plan if condition == "corrected" else plan
     try:
-        return DryRunRow(trajectory, condition, plan(trajectory, model, workspace=workspace, start=start), None)
+        return DryRunRow(trajectory, condition, made(trajectory, model, workspace=workspace, start=start), None)
     except PlanError as problem:
         return DryRunRow(trajectory, condition, None, problem)

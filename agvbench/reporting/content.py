@@ -135,3 +135,8 @@ def plain(text: str) -> str:
     kept = "".join("\ufffd" if unicodedata.category(c) in {"Cc", "Cf", "Cs"} and not c.isspace() else c for c in text)
     line = " ".join(kept.split())
     return line if len(line) <= _LONGEST else f"{line[: _LONGEST - 1]}…"
+
+
+def plain_sentences(text: str) -> str:
+    """Return `text` on one line without control characters, of whatever length."""
+    return " ".join(plain(word) for word in text.split())

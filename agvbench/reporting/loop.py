@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 from agvbench.errors import FileError
 from agvbench.reporting.console import console_table
-from agvbench.reporting.content import Block, Bullets, Column, Content, Paragraph, Table, Value, plain
+from agvbench.reporting.content import (
+    Block,
+    Bullets,
+    Column,
+    Content,
+    Paragraph,
+    Table,
+    Value,
+    plain,
+    plain_sentences,
+)
 from agvbench.reporting.csv_table import to_csv
 from agvbench.reporting.html import to_html
 from agvbench.reporting.latex import to_latex
@@ -189,14 +199,14 @@ def _plans(plans: Mapping[str, Any]) -> Table:
         "Where the vehicle should end, driven by the corrected model's static maps alone and by corrected plans.",
         columns,
         rows,
-        note="Missed before: what the corrected model missed in the first session, taken off the aim.",
+        note="Missed before: what the corrected model missed when it was tried, taken off the aim.",
     )
 
 
 def _said(plans: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     for name, entry in plans.items():
         for sentence in [entry["problem"]] if "problem" in entry else entry.get("said", []):
-            yield name, plain(sentence)
+            yield name, plain_sentences(sentence)
 
 
 __all__ = ["LoopReport", "before_after_table", "print_loop", "write_loop_report"]

@@ -16,6 +16,7 @@ from agvbench.adapters.camera_options import camera_options
 from agvbench.bus.bus_config import BusConfig
 from agvbench.bus.link import VehicleLink
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
+from agvbench.campaign.header import FILE_NAME
 from agvbench.errors import FlagError, VehicleError
 from agvbench.model import VehicleModel, thesis_vehicle
 from agvbench.planning import Workspace
@@ -25,6 +26,7 @@ from agvbench.running.campaign_time import TURNAROUND_S, CampaignTime, Simulated
 from agvbench.running.placers.choosing import choose_placer
 from agvbench.running.provenance import provenance
 from agvbench.running.remainders import read_remainders
+from agvbench.running.rest import LEAST_RATE_HZ
 from agvbench.running.session import BenchSession
 from agvbench.running.session_settings import LAB_VEHICLE, session_settings
 from agvbench.running.settings import SETTINGS_FILE, BenchSettings
@@ -51,7 +53,8 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
     workspace, remainders = Workspace.parse(settings.workspace), read_remainders(settings.remainders)
     if dry_run:
         check_specs(settings.agv, settings.mocap)
-        models.setdefault("calibrated", thesis_vehicle())
+        # What calibration will find is not known yet: what is believed now has the right axles, unit and neutral.
+        models.setdefault("calibrated", models["uncalibrated"] if settings.vehicle else thesis_vehicle())
         yield BenchSession(directory, models=models, workspace=workspace, bench=None, remainders=remainders)
         return
     with (
@@ -65,14 +68,17 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
             connect=settings.connect or None,
             bus_config=BusConfig.load(settings.bus_config) if settings.bus_config else None,
             lab=settings.lab,
+            vehicle=settings.vehicle_name,
             command_unit=models["uncalibrated"].command_unit,
             neutral=models["uncalibrated"].neutral,
+            calibration_hash=models["calibrated"].calibration_hash if "calibrated" in models else "",
         ) as link,
     ):
         _check_unit(models["uncalibrated"], link)
         choose_placer(settings.place, simulated=link.identity().simulated)
         _check_exchange(settings, link)
-        header = _header(directory.name, models["uncalibrated"], link)
+        _check_rate(link)
+        header = _header(_name(directory, resume=resume), models["uncalibrated"], link)
         writer = _writer(directory, settings, header, resume=resume, simulated=link.identity().simulated)
         bench = _bench(settings, models, link, writer)
         session = BenchSession(directory, models=models, workspace=workspace, bench=bench, remainders=remainders)
@@ -125,6 +131,25 @@ def _check_exchange(settings: BenchSettings, link: VehicleLink) -> None:
         )
 
 
+def _check_rate(link: VehicleLink) -> None:
+    rate_hz = link.identity().mocap_rate_hz
+    if rate_hz < LEAST_RATE_HZ:
+        raise FlagError(
+            "the camera looks too seldom to tell whether a vehicle is at rest",
+            where="--mocap",
+            value=f"{rate_hz:g} Hz",
+            limit=f"at least {LEAST_RATE_HZ:g} Hz",
+            remedy="ask it for more frames, or wish for more with --camera rate_hz=",
+        )
+
+
+def _name(directory: Path, *, resume: bool) -> str:
+    """Return the campaign's name: its directory's, or what that was called when the session that goes on began."""
+    if resume and (directory / FILE_NAME).exists():
+        return CampaignHeader.load(directory / FILE_NAME).name
+    return directory.resolve().name
+
+
 def _header(name: str, nominal: VehicleModel, link: VehicleLink) -> CampaignHeader:
     identity = link.identity()
     return CampaignHeader(
@@ -142,7 +167,7 @@ def _header(name: str, nominal: VehicleModel, link: VehicleLink) -> CampaignHead
 def _writer(
     directory: Path, settings: BenchSettings, header: CampaignHeader, *, resume: bool, simulated: bool
 ) -> CampaignWriter:
-    open_writer = CampaignWriter.resume if resume and (directory / "campaign.toml").exists() else CampaignWriter.create
+    open_writer = CampaignWriter.resume if resume and (directory / FILE_NAME).exists() else CampaignWriter.create
     # What a power cut takes of a simulation is simulated again; what it takes of a laboratory's day is gone.
     writer = open_writer(directory, header, durable=not simulated)
     if not (directory / SETTINGS_FILE).exists():

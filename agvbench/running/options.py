@@ -72,6 +72,7 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
         "tell a simulated vehicle for S seconds at a time: sooner driven, later stopped (default: 0.1, as a real one)",
     ),
     ("--lab", {"metavar": "NAME"}, "name of the lab on the bus (default: lab)"),
+    ("--vehicle-name", {"metavar": "NAME"}, "name of the vehicle on the bus, and of its body (default: agv1)"),
 )
 SESSION_OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
     ("--out", {"metavar": "DIR"}, "campaign directory (default: a new one under campaigns/)"),

@@ -36,8 +36,9 @@ class BenchSettings:
     ``corrected`` the one with the effects that a diagnosis found ("" for none: the condition is not driven) and
     ``remainders`` what that model still misses; ``repeats`` 0 means what each benchmark declares; ``order`` is one of
     `ORDERS`; ``place``, one of `PLACES`, is how the vehicle comes to its starts ("" for the usual way); ``full`` drives
-    every pulse of the thesis; ``exchange`` [s] is for how long a vehicle is told what to do at a time. ``benchmarks``
-    are names or files, and ``only`` chooses among their runs by pytest's ``-k``.
+    every pulse of the thesis; ``exchange`` [s] is for how long a vehicle is told what to do at a time.
+    ``vehicle_name`` is what the bus calls the vehicle; ``benchmarks`` are names or files, and ``only`` chooses among
+    their runs by pytest's ``-k``.
     """
 
     agv: str = "sim"
@@ -59,6 +60,7 @@ class BenchSettings:
     connect: str = ""
     bus_config: str = ""
     lab: str = "lab"
+    vehicle_name: str = "agv1"
     exchange: float = DEFAULT_SAFETY.exchange_s
     benchmarks: tuple[str, ...] = ()
     only: str = ""

@@ -9,8 +9,9 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -88,16 +89,16 @@ def run_challenge(
 def hold_trial(spec: str, seed: int, repeats: int) -> Trial:
     """Drive a campaign with one hidden plant, diagnose it, and only then unseal the truth.
 
-    A diagnosis that ends with an error is the answer ``"ERROR"``.
+    A bench or a diagnosis that ends with an error is the answer ``"ERROR"``.
     """
     from agvbench.campaign import Campaign
     from agvbench.diagnosis import Diagnosis, Verdict, diagnose
 
     with tempfile.TemporaryDirectory(prefix="agvbench-challenge-") as folder:
-        directory = Path(folder) / "campaign"
-        _drive(spec, seed, repeats, directory)
-        began = time.process_time()
+        directory, began = Path(folder) / "campaign", time.process_time()
         try:
+            _drive(spec, seed, repeats, directory)
+            began = time.process_time()
             found, failed = diagnose(Campaign.open(directory)), False
         except AgvbenchError as error:  # hours of other trials must not be lost for one that has no answer
             found, failed = Diagnosis(Verdict.NOT_IDENTIFIABLE, str(error)), True
@@ -163,13 +164,20 @@ def _held(wanted: Sequence[tuple[str, int]], repeats: int, jobs: int) -> Iterato
     from rich.progress import track
 
     console = Console(stderr=True)
+    trials = _as_they_end(wanted, repeats, jobs)
+    yield from track(trials, "blind trials", len(wanted), console=console, disable=not console.is_terminal)
+
+
+def _as_they_end(wanted: Sequence[tuple[str, int]], repeats: int, jobs: int) -> Iterator[Trial]:
+    """Hold as many trials at a time as there are jobs; none waits in a queue that an interruption had to work off."""
+    coming = iter(wanted)
     with ProcessPoolExecutor(jobs) as pool:
-        futures = [pool.submit(hold_trial, spec, seed, repeats) for spec, seed in wanted]
-        bar = track(
-            as_completed(futures), "blind trials", len(futures), console=console, disable=not console.is_terminal
-        )  # fmt: skip
-        for future in bar:
-            yield future.result()
+        held = {pool.submit(hold_trial, *one, repeats) for one in islice(coming, jobs)}
+        while held:
+            ended, held = wait(held, return_when=FIRST_COMPLETED)
+            held |= {pool.submit(hold_trial, *one, repeats) for one in islice(coming, len(ended))}
+            for future in ended:
+                yield future.result()
 
 
 def tell(scores: Scores, console: Console) -> None:

@@ -26,7 +26,10 @@ from agvbench.types import Run
 
 DRIVEN = "driven"
 SESSION = "next"
-_OF_THE_RIG = ("agv", "mocap", "plant", "seed", "connect", "lab", "attempts", "workspace")
+# What decides which runs are driven, and by which models, is not the campaign's: the diagnosis says so.
+_OF_THE_CAMPAIGN = frozenset(
+    {"vehicle", "calibration", "corrected", "remainders", "maps", "repeats", "order", "full", "benchmarks", "only"}
+)
 _TABLES = {"campaign.toml", "runs", "commands", "poses"}
 
 
@@ -103,7 +106,7 @@ def _free_directory(path: Path, out: str | Path | None) -> Path:
 def _options(path: Path, rig: Mapping[str, Any]) -> dict[str, Any]:
     """Return the options of the session: those of the campaign's own bench, and what was asked for instead."""
     saved = dataclasses.asdict(BenchSettings.load(path)) if (path / SETTINGS_FILE).exists() else {}
-    options = {name: saved[name] for name in _OF_THE_RIG if name in saved}
+    options = {name: value for name, value in saved.items() if name not in _OF_THE_CAMPAIGN}
     if (path / "vehicle.toml").exists():
         options["vehicle"] = str(path / "vehicle.toml")
     return options | {name: value for name, value in rig.items() if value is not None}

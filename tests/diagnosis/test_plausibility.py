@@ -31,3 +31,8 @@ def test_a_run_of_any_length(first, count):
         assert when[-1] <= t_s[-1]
         assert np.all(np.diff(when) > 0.0)
         np.testing.assert_array_equal(poses[:, 0], 0.3 * when)
+
+
+def test_every_frame_doubled_is_no_other_unit():
+    frames = RUN.frames.select(np.repeat(np.arange(len(RUN.frames)), 3))
+    refuse_units([replace(RUN, frames=frames)], HEADER)

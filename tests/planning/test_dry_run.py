@@ -1,11 +1,13 @@
 """What a campaign would take, and the command that shows it."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
 from agvbench.cli import main
-from agvbench.planning import Workspace, dry_run, load_trajectory, plan
+from agvbench.effects import SpeedLag
+from agvbench.planning import Workspace, corrected_plan, dry_run, load_trajectory, plan
 
 
 def test_a_dry_run_adds_up(nominal, calibrated):
@@ -73,3 +75,11 @@ def test_plan_shows_the_rest_when_one_cannot_be_driven(capsys):
     captured = capsys.readouterr()
     assert "1.00 1.00 90°" in captured.out
     assert captured.err.count("does not fit") == 2
+
+
+def test_what_is_corrected_is_planned_as_a_bench_would(calibrated):
+    lagging = replace(calibrated, effects=(SpeedLag(0.2, 0.3),))
+    made = dry_run([load_trajectory("1")], {"calibrated": lagging, "corrected": lagging})
+    durations = {row.condition: row.plan.duration_s for row in made.rows}
+    assert durations["corrected"] == corrected_plan(load_trajectory("1"), lagging).duration_s
+    assert durations["corrected"] != pytest.approx(durations["calibrated"], abs=0.01)

@@ -103,3 +103,10 @@ def test_the_campaigns_report_has_the_section_once_a_diagnosis_lies_there(tmp_pa
     (path / JSON).write_text(json.dumps(content()), encoding="utf-8")
     (path / RESIDUALS).write_bytes(b"PAR1 no more")
     assert read_diagnosis(path).residuals is None
+
+
+def test_a_long_sentence_is_not_cut():
+    why = "structure remains that no effect explains: " + "it depends on campaign_time_h, and " * 5 + "so on"
+    shown = ShownDiagnosis({**content(), "verdict": "UNKNOWN", "provenance": {"why": why}}, None, ())
+    lead = next(block for block in diagnosis_blocks(shown) if isinstance(block, Paragraph))
+    assert lead.text == f"UNKNOWN: {why}"

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from agvbench.errors import AgvbenchError, FileError, FlagError
+from agvbench.model import thesis_vehicle
 from agvbench.running.opening import open_session
 from agvbench.running.settings import SETTINGS_FILE, BenchSettings, settings_for_resume
+from agvbench.vehicle.geometry import Geometry
 
 
 @pytest.mark.parametrize(
@@ -68,3 +72,38 @@ def test_cameras_are_told_what_is_wanted_of_them(tmp_path, monkeypatch):
         open_session(given, out=str(tmp_path / "d"), resume=False, dry_run=False),
     ):
         pass
+
+
+def test_a_camera_that_cannot_tell_a_vehicle_at_rest_is_refused(tmp_path):
+    with (
+        pytest.raises(FlagError, match=r"--mocap: the camera looks too seldom .*: 15 Hz \(limit: at least 25 Hz\)"),
+        open_session({"camera": "rate_hz=15"}, out=str(tmp_path / "c"), resume=False, dry_run=False),
+    ):
+        pass
+
+
+def test_the_rig_knows_the_vehicle_s_name_and_what_calibration_is_believed(tmp_path):
+    file = tmp_path / "vehicle.toml"
+    thesis_vehicle().save(file)
+    given = {"vehicle_name": "blue", "calibration": str(file)}
+    with open_session(given, out=str(tmp_path / "c"), resume=False, dry_run=False) as session:
+        identity = session._bench.link.identity()
+    assert (identity.vehicle, identity.calibration_hash) == ("blue", thesis_vehicle().calibration_hash)
+
+
+def test_a_dry_run_plans_for_the_vehicle_that_is_believed(tmp_path):
+    file = tmp_path / "vehicle.toml"
+    small = replace(thesis_vehicle(), geometry=Geometry(0.05, 0.06))
+    small.save(file)
+    with open_session({"vehicle": str(file)}, out=str(tmp_path / "c"), resume=False, dry_run=True) as session:
+        assert session.model("calibrated").geometry == small.geometry
+
+
+def test_a_campaign_may_be_renamed_between_sessions_and_lie_where_one_stands(tmp_path, monkeypatch):
+    (tmp_path / "tonight").mkdir()
+    monkeypatch.chdir(tmp_path / "tonight")
+    with open_session({}, out=".", resume=False, dry_run=False) as session:
+        assert session._bench.writer.header.name == "tonight"
+    (tmp_path / "tonight").rename(tmp_path / "monday")
+    with open_session({}, out=str(tmp_path / "monday"), resume=True, dry_run=False) as session:
+        assert session._bench.writer.header.name == "tonight"

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
+from pathlib import Path
 
 import pytest
 
-from agvbench.errors import FileError, FlagError
-from agvbench.workflows.challenge import run_challenge
+from agvbench.errors import FileError, FlagError, PlantError
+from agvbench.workflows import challenge
+from agvbench.workflows.challenge import hold_trial, run_challenge
 from agvbench.workflows.challenge_file import known_trials, write_trials
 from agvbench.workflows.challenge_scores import Trial
 
@@ -62,3 +65,30 @@ def test_other_repeats_are_told(tmp_path):
 def test_to_resume_without_a_file_is_told():
     with pytest.raises(FlagError, match="--resume"):
         run_challenge(1, first_seed=0, specs=[], repeats=5, jobs=1, json_file=None, resume=True)
+
+
+def one_that_fails(spec, seed, repeats):
+    """Stand in for a trial, in the processes that hold them: the third cannot be held."""
+    Path(os.environ["HELD"], f"{seed}").touch()
+    if seed == 2:
+        raise RuntimeError(spec)
+    return dataclasses.replace(LAG, spec=spec, seed=seed)
+
+
+def test_what_was_held_before_a_trial_that_fails_is_kept_and_no_other_is_begun(tmp_path, monkeypatch):
+    (tmp_path / "held").mkdir()
+    monkeypatch.setenv("HELD", str(tmp_path / "held"))
+    monkeypatch.setattr(challenge, "hold_trial", one_that_fails)
+    file = tmp_path / "challenge.json"
+    with pytest.raises(RuntimeError, match="steering_lag"):
+        run_challenge(40, first_seed=0, specs=["steering_lag"], repeats=5, jobs=1, json_file=str(file))
+    assert sorted(known_trials(file, 5)) == [("steering_lag", 0), ("steering_lag", 1)]
+    assert len(list((tmp_path / "held").iterdir())) <= 4
+
+
+def test_a_plant_that_cannot_be_driven_is_an_answer_that_counts_as_wrong(monkeypatch):
+    def fails(*_):
+        raise PlantError("the bench could not drive this plant")
+
+    monkeypatch.setattr(challenge, "_drive", fails)
+    assert hold_trial("steering_lag", 3, 5).verdict == "ERROR"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from agvbench.adapters.natnet.frame import FrameOfData
 from agvbench.adapters.natnet.layout import BODY, MARKER
 from agvbench.cli import main
 from agvbench.model import thesis_vehicle
+from agvbench.running.vehicles import uncalibrated_vehicle
 from agvbench.workflows.doctor import Lab, State, examine
 
 
@@ -54,6 +56,11 @@ def test_a_calibration_grows_old(tmp_path: Path) -> None:
     os.utime(file, (old_s, old_s))
     state, said = found(Lab(folder=tmp_path))["calibration"]
     assert (state, "40 days old (limit: 30)" in said) == (State.DOUBTFUL, True)
+    own = tmp_path / "vehicle.toml"
+    uncalibrated_vehicle().save(own)
+    assert str(file) in found(Lab(folder=tmp_path))["calibration"][1]
+    replace(thesis_vehicle(), provenance={"campaign": "monday"}).save(own)
+    assert found(Lab(folder=tmp_path))["calibration"][0] is State.GOOD
     file.write_text("not = [toml")
     assert found(Lab(folder=tmp_path))["calibration"][0] is State.BAD
 

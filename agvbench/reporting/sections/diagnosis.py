@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from agvbench.reporting.content import Block, Bullets, Column, FigureBlock, Panel, Paragraph, Table, Value, plain
+from agvbench.reporting.content import (
+    Block,
+    Bullets,
+    Column,
+    FigureBlock,
+    Panel,
+    Paragraph,
+    Table,
+    Value,
+    plain_sentences,
+)
 from agvbench.reporting.figures.residuals import AFTER, BEFORE, draw_dependence, draw_floor
 from agvbench.reporting.sections.base import Section
 from agvbench.workflows.diagnosis_files import ShownDiagnosis
@@ -59,11 +69,14 @@ def diagnosis_blocks(shown: ShownDiagnosis) -> list[Block]:
     """Return what there is to say about a diagnosis; whatever its file lacks is left out."""
     content = shown.content
     if not content:
-        return [Paragraph(" ".join(plain(problem) for problem in shown.problems) or "The diagnosis is empty.")]
+        return [
+            Paragraph(" ".join(plain_sentences(problem) for problem in shown.problems) or "The diagnosis is empty.")
+        ]
     provenance = _mapping(content.get("provenance"))
-    blocks: list[Block] = [Paragraph(plain(f"{content.get('verdict')}: {provenance.get('why', '')}"), lead=True)]
+    verdict = plain_sentences(f"{content.get('verdict')}: {provenance.get('why', '')}")
+    blocks: list[Block] = [Paragraph(verdict, lead=True)]
     blocks += [table for table in (_effects(content), _errors(content)) if table.rows]
-    sentences = [plain(text) for text in (*_sentences(content, provenance), *shown.problems)]
+    sentences = [plain_sentences(text) for text in (*_sentences(content, provenance), *shown.problems)]
     if sentences:
         blocks.append(Bullets(sentences))
     if shown.residuals is None or shown.residuals.empty:

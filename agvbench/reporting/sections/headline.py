@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from agvbench.reporting.content import Block, Bullets, Paragraph, plain
+from agvbench.reporting.content import Block, Bullets, Paragraph, plain, plain_sentences
 from agvbench.reporting.sections.base import Section
 from agvbench.statistics import Comparison, Difference, Verdict, valid
 from agvbench.statistics.differences import ALL
@@ -90,8 +90,3 @@ def _details(comparison: Comparison) -> Iterator[str]:
             more = f"; and {len(found) - _MOST_NAMED} more" if len(found) > _MOST_NAMED else ""
             yield f"{lead}, {pair}: {named}{more}."
     yield from comparison.notes
-
-
-def plain_sentences(text: str) -> str:
-    """Return `text` on one line without control characters, of whatever length."""
-    return " ".join(plain(word) for word in text.split())

@@ -18,11 +18,16 @@ class Calibration(Check):
 
     def examine(self, lab: Lab) -> Finding:
         """Compare its age with a month."""
-        files = [*lab.folder.glob("vehicle.toml"), *lab.folder.glob("campaigns/*/vehicle.toml")]
-        if not files:
+        files = list(lab.folder.glob("campaigns/*/vehicle.toml"))
+        names = {path: VehicleModel.load(path).name for path in files}
+        # A lab folder begins with a vehicle that nobody has measured: only a campaign makes it a calibrated one.
+        for own in lab.folder.glob("vehicle.toml"):
+            if "campaign" in (model := VehicleModel.load(own)).provenance:
+                names[own] = model.name
+        if not names:
             return Finding(State.DOUBTFUL, "no calibrated vehicle here", "calibrate it: agvbench bench")
-        newest = max(files, key=lambda path: path.stat().st_mtime)
-        name = VehicleModel.load(newest).name
+        newest = max(names, key=lambda path: path.stat().st_mtime)
+        name = names[newest]
         days = (time.time() - newest.stat().st_mtime) / _DAY_S
         if days > _OLD_DAYS:
             return Finding(
