@@ -131,12 +131,13 @@ def settings_for_resume(saved: BenchSettings, given: Mapping[str, Any]) -> Bench
         if name in _WITHOUT_FAULTS and _WITHOUT_FAULTS[name](value) == _WITHOUT_FAULTS[name](before):
             continue
         if value != before:
+            flag = f"--{name.replace('_', '-')}"
             raise FlagError(
                 "a resumed session drives what it began with",
-                where=f"--{name}",
+                where=flag,
                 value=value,
                 limit=before,
-                remedy=f"leave --{name} out, or start anew without --resume",
+                remedy=f"leave {flag} out, or start anew without --resume",
             )
     return replace(saved, **{name: given[name] for name in (*_FREE_ON_RESUME, *_WITHOUT_FAULTS) if name in given})
 

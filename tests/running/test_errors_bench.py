@@ -42,6 +42,12 @@ def resumed_with_another_seed():
     opened("begun", resume=True, seed=2)()
 
 
+def resumed_with_another_name():
+    Path("begun").mkdir()
+    BenchSettings().save(Path("begun"))
+    opened("begun", resume=True, vehicle_name="red")()
+
+
 def over_the_bus_in_another_unit(monkeypatch):
     """A vehicle that says of itself that it takes µs, as one in another process would."""
     from agvbench.running import opening
@@ -80,6 +86,8 @@ CASES = {
     "`--place crane`": opened(place="crane"),
     "`--exchange 0.01`": opened(exchange=0.01),
     "`--agv live --exchange 2`": opened(agv="live", exchange=2.0),
+    "`--camera rate_hz=15`": opened(camera="rate_hz=15"),
+    "`--resume --vehicle-name red` after `agv1`": resumed_with_another_name,
     "`--vehicle nope.toml`": opened(vehicle="nope.toml"),
     "`--calibration nope.toml`": opened(calibration="nope.toml"),
     "`--plant nope.py:x`": opened(plant="nope.py:x"),
