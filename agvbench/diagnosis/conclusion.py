@@ -108,7 +108,7 @@ def _what_is_left(batch: Batch, poses: Floats, explained: Explained | None, seed
         unexplained = Predictor(batch, without.names).predict(without.fit.parameters)
     rest = dependences(residual_rates(readings, unexplained), readings.group, seed)
     # A place passed through in every run can look like a swing: it is looked for in what the term leaves.
-    if (swings := swing(residual_rates(readings, poses), seed)) is not None:
+    if (swings := swing(residual_rates(readings, poses), readings.group, seed)) is not None:
         rest = [swings, *(d for d in rest if d.covariate != RANDOM_PHASE)]
     return rest if explained is None else with_term_first(rest, explained)
 
@@ -148,12 +148,12 @@ def _verdict(
     effects: tuple[object, ...], significant: bool, rest: list[Dependence], explained: Explained | None
 ) -> tuple[Verdict, str]:
     if significant:
-        on = f" it depends on {rest[0].covariate}" if rest else " but on none of the covariates looked at"
+        on = f"it depends on {rest[0].covariate if rest else 'none of the covariates looked at'}"
         if explained is not None:
             on += f", and {explained.term.name} describes it"
         elif rest and rest[0].covariate == RANDOM_PHASE:
             on += ", with another phase in every run, which nothing that is planned beforehand can remove"
-        return Verdict.UNKNOWN, "structure remains that no effect explains:" + on
+        return Verdict.UNKNOWN, "structure remains that no effect explains: " + on
     if not effects:
         return Verdict.ADEQUATE, "the model, its maps fitted again, predicts as well as repeats agree with one another"
     if any(getattr(effect, "confounded_with", ()) for effect in effects):

@@ -21,6 +21,7 @@ _ALONG_WAY = (0.1, 0.3, 0.5, 0.7, 0.9)
 _RADII_M = (0.2, 0.35, 0.5, 0.8)
 _DISC_STEP, _LINE_STEP = 18, 40
 _LINE_DIRECTIONS = 16
+_STRIP_DIRECTIONS, _STRIP_STEP, _WIDTHS_M = 8, 16, (0.3, 0.6, 1.0, 1.6)
 _BLUR_M, _SHARP_M, _BEST_LINES, _FINE, _FEWEST_CROSSINGS = 0.1, 0.01, 4, 9, 5
 _RUN_TIMES_S = (0.4, 0.8, 1.6, 3.2, 6.4)
 _HOURS = (0.1, 0.2, 0.4, 0.8, 2.0)
@@ -60,6 +61,7 @@ def options(
     c = rates.covariates
     sine = np.column_stack([np.cos(c["heading_rad"]), np.sin(c["heading_rad"])])
     yield terms.SpeedInDisc, _discs(rates)
+    yield terms.SpeedInStrip, _strips(rates)
     yield terms.TurnAtLine, _lines(rates, judge)
     yield terms.BentPicture, _pictures(rates)
     yield terms.SpeedByHeading, iter([({0: sine}, Values())])
@@ -126,6 +128,18 @@ def _discs(rates: Rates) -> Iterator[Option]:
                 inside = np.mean(square < radius * radius, axis=0)
                 if np.count_nonzero(inside) >= 10:
                     yield {0: -inside[:, None]}, Values(float(x), float(y), radius)
+
+
+def _strips(rates: Rates) -> Iterator[Option]:
+    ways = [(1.0 - s) * rates.begin[:, :2] + s * rates.end[:, :2] for s in _ALONG_WAY]
+    for direction in np.arange(_STRIP_DIRECTIONS) * math.pi / _STRIP_DIRECTIONS:
+        across = np.stack([way @ _across(direction) for way in ways])
+        step = max(float(np.ptp(across)) / _STRIP_STEP, 0.05)
+        for place in np.arange(np.min(across), np.max(across) + step, step):
+            for width in _WIDTHS_M:
+                inside = np.mean(np.abs(across - place) < 0.5 * width, axis=0)
+                if np.count_nonzero(inside) >= 10:
+                    yield {0: -inside[:, None]}, Values(float(place), float(direction), width)
 
 
 def _lines(rates: Rates, judge: Judge) -> Iterator[Option]:

@@ -40,6 +40,14 @@ class Scored:
         """The cross-validated loss of all runs."""
         return float(self.loss.sum())
 
+    def gain_over(self, other: Scored) -> float:
+        """Return by how much this model predicts better, and fits better: the lesser of the two.
+
+        Where few runs tell a value of the maps, predicting without them is a gamble, and wins or loses a hundred.
+        What the runs themselves do not speak for is no gain.
+        """
+        return min(other.total - self.total, float(other.fit.loss.sum() - self.fit.loss.sum()))
+
 
 @dataclass
 class FittedModels:

@@ -192,7 +192,7 @@ def _best(wide: Selector, current: Scored, offers: list[Scored]) -> Scored:
     """Return the best offer; one with fewer effects than `current` has to do as well as it, not better."""
     best = min((current, *offers), key=lambda offer: offer.total + LEAST_GAIN * len(offer.names))
     fewer = len(best.names) < len(current.names)
-    if best is current or best.total >= current.total - (-LEAST_GAIN if fewer else LEAST_GAIN):
+    if best is current or best.gain_over(current) <= (-LEAST_GAIN if fewer else LEAST_GAIN):
         return current
     wide.tell(f"{' + '.join(best.names)}: another law gains {current.total - best.total:.0f}")
     return best

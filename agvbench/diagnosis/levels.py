@@ -14,6 +14,7 @@ from agvbench.types import Commands, Floats, Run
 ROLES = ("front", "rear", "drive")
 _MOST_NODES = 40
 _FEW_NODES = 16
+_HELD_S = 0.25
 _SLOWEST_MPS = 0.02
 
 
@@ -53,17 +54,58 @@ class FreeMaps:
 
 
 def free_maps(runs: Sequence[Run], neutral: float) -> FreeMaps:
-    """Return a node for every level at which the vehicle drove; where there are too many, for quantiles of them."""
-    driven = [_driven_rows(run.commands, neutral) for run in runs]
+    """Return a node for every level at which the vehicle drove; where there are too many, for `chosen_levels`."""
     nodes = {}
     for role in ROLES:
-        levels = np.unique(
-            np.concatenate([getattr(run.commands, role)[d] for run, d in zip(runs, driven, strict=True)])
-        )
+        told, held_s = _told(runs, role, neutral)
+        levels, which = np.unique(told, return_inverse=True)
         if len(levels) > _MOST_NODES:
-            levels = np.unique(np.quantile(levels, np.linspace(0.0, 1.0, _FEW_NODES)))
+            longest_s = np.zeros(len(levels))
+            np.maximum.at(longest_s, which, held_s)
+            levels = chosen_levels(levels, longest_s)
         nodes[role] = levels[levels != neutral] if role == "drive" else levels
     return FreeMaps(nodes, neutral)
+
+
+def chosen_levels(levels: Floats, longest_s: Floats) -> Floats:
+    """Return some of very many levels (n,), ascending: those that were held, and of the others what fills gaps.
+
+    A steering that swings passes many levels, a twentieth of a second each. Were nodes laid by how many levels there
+    are, they would crowd where it swings, and leave an end stop elsewhere between two of them.
+
+    Parameters
+    ----------
+    levels
+        (n,): ascending.
+    longest_s
+        (n,): for how long each was held at most [s].
+    """
+    ends = np.isin(np.arange(len(levels)), (0, len(levels) - 1))
+    held = (longest_s >= _HELD_S) | ends
+    nodes = _spread(levels[ends], levels[held], 0.0, _MOST_NODES)
+    return _spread(nodes, levels, float(np.ptp(levels)) / (_FEW_NODES - 1), _MOST_NODES)
+
+
+def _spread(nodes: Floats, levels: Floats, near: float, most: int) -> Floats:
+    """Return `nodes` and, one after another, the level farthest from all, until none is farther than `near`."""
+    while len(nodes) < most:
+        away = np.abs(levels[:, None] - nodes).min(axis=1)
+        if away.max() <= near:
+            break
+        nodes = np.append(nodes, levels[np.argmax(away)])
+    return np.sort(nodes)
+
+
+def _told(runs: Sequence[Run], role: str, neutral: float) -> tuple[Floats, Floats]:
+    """Return every command (n,) with which the vehicle drove, and for how long each was held [s]."""
+    told, held_s = [], []
+    for run in runs:
+        commands, last_s = run.commands, float(np.max(run.frames.t_s, initial=-np.inf))
+        until_s = np.append(commands.t_s[1:], max(last_s, commands.t_s[-1]))
+        driven = _driven_rows(commands, neutral)
+        told.append(getattr(commands, role)[driven])
+        held_s.append((until_s - commands.t_s)[driven])
+    return np.concatenate(told), np.concatenate(held_s)
 
 
 def _driven_rows(commands: Commands, neutral: float) -> NDArray[np.bool_]:
@@ -73,8 +115,8 @@ def _driven_rows(commands: Commands, neutral: float) -> NDArray[np.bool_]:
 def start_values(maps: FreeMaps, measured: Sequence[RunMeasurement], believed: dict[str, Floats]) -> Floats:
     """Return values to start a fit from: what steady drives imply by inverted kinematics, at their commands.
 
-    Where no steady drive had the command, it is `believed[role]` (values at the nodes), moved by what the
-    measured nodes were off by in the median.
+    Where no steady drive had the command, it is `believed[role]` (values at the nodes), moved by what measured nodes
+    nearby were off by. A fit that starts far off may end anywhere.
     """
     values = []
     for role in ROLES:
@@ -85,8 +127,10 @@ def start_values(maps: FreeMaps, measured: Sequence[RunMeasurement], believed: d
             seen = [v for v in seen if np.isfinite(v)]
             if seen:
                 known[k] = float(np.median(seen))
-        off = np.nanmedian(known - believed[role]) if role != "drive" and np.isfinite(known).any() else 0.0
-        values.append(np.where(np.isfinite(known), known, believed[role] + off))
+        measured_here = np.isfinite(known)
+        off = (known - believed[role])[measured_here]
+        moved = believed[role] + (np.interp(nodes, nodes[measured_here], off) if len(off) else 0.0)
+        values.append(np.where(measured_here, known, moved))
     return np.concatenate(values)
 
 

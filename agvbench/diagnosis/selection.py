@@ -90,7 +90,7 @@ class Selector(FittedModels):
         """Whether the larger model predicts better by enough, not in a few groups of runs alone, and to be noticed."""
         gain = without.loss - with_it.loss
         return bool(
-            gain.sum() > self.least_gain
+            with_it.gain_over(without) > self.least_gain
             and without_best(gain, self.batch.readings.group, self.best_share) > 0.0
             and self._noticeable(without, with_it)
             and all(
@@ -144,7 +144,7 @@ class Selector(FittedModels):
                 offer
                 for name, offers in swapped.items()
                 for offer in offers.values()
-                if offer.total < current.total - LEAST_GAIN and self.earns(self.shrunk(base, current, name), offer)
+                if offer.gain_over(current) > LEAST_GAIN and self.earns(self.shrunk(base, current, name), offer)
             ]
             if not better:
                 break

@@ -23,6 +23,7 @@ _PERIODS_M = np.geomspace(0.1, 1.0, 25)
 _FLIPS = 4999
 _SWINGS_M = np.geomspace(0.15, 1.0, 48)
 _SHUFFLES, _LEAST_STEPS, _STEPS_PER_SWING, _LEAST_SWING = 999, 12, 1.6, 0.3
+_LOUDEST = 3.0  # times the median run
 _SWING_ALPHA = 5e-3  # as many shuffles resolve
 
 
@@ -147,21 +148,25 @@ def dependences(rates: Rates, group: NDArray[np.int64], seed: int) -> list[Depen
     return sorted(significant, key=lambda d: -d.share)
 
 
-def swing(rates: Rates, seed: int) -> Dependence | None:
+def swing(rates: Rates, group: NDArray[np.int64], seed: int) -> Dependence | None:
     """Return the dependence on the distance modulo a period whose phase differs from run to run, if there is one.
 
     An eccentric wheel swings speed and course once per turn, from wherever it happens to stand. In each run a wave
     with a phase of its own is fitted to what a straight line leaves; what waves explain of all runs together shows the
     period, and shuffled samples how much of it is chance. Differences of noisy poses swing a little by themselves (a
-    tenth), so the share has to be large.
+    tenth), so the share has to be large. What repeats (of one ``group``, (R,)) have in common has no phase of its own,
+    whatever its shape, and is taken off before.
     """
     rng = np.random.default_rng([0x5F15, seed])
-    counts = np.bincount(rates.run)
-    runs = [rates.run == run for run in np.flatnonzero(counts >= _LEAST_STEPS)]
+    counts = np.bincount(rates.run, minlength=len(group))
+    repeated = np.bincount(group, weights=counts >= _LEAST_STEPS)[group] > 1
+    runs = [rates.run == run for run in np.flatnonzero((counts >= _LEAST_STEPS) & repeated)]
     best: Dependence | None = None
     for feature in ("speed", "turning"):
-        value = rates.value[:, FEATURES.index(feature)]
-        rests = [_bent(rates.covariates["distance_m"][own], rates.weight[own], value[own]) for own in runs]
+        value = _of_its_own(rates.value[:, FEATURES.index(feature)], rates.run, group)
+        rests = _none_too_loud(
+            [_bent(rates.covariates["distance_m"][own], rates.weight[own], value[own]) for own in runs]
+        )
         total = sum(float(rest @ rest) for rest, _ in rests)
         if total <= 0.0:
             continue
@@ -177,6 +182,24 @@ def swing(rates: Rates, seed: int) -> Dependence | None:
         p_value = (1.0 + float(np.count_nonzero(chance.max(axis=1) >= size[period]))) / (_SHUFFLES + 1.0)
         best = Dependence(RANDOM_PHASE, feature, p_value, float(share[period]))
     return best if best is not None and best.p_value < _SWING_ALPHA else None
+
+
+def _of_its_own(value: Floats, run: NDArray[np.int64], group: NDArray[np.int64]) -> Floats:
+    """Return what each run has (n,) beyond the mean of its group's runs at the same step."""
+    first = np.searchsorted(run, run)  # the samples of a run lie together
+    _, place = np.unique(np.column_stack([group[run], np.arange(len(run)) - first]), axis=0, return_inverse=True)
+    count = np.bincount(place)[place]
+    mean = np.bincount(place, weights=value)[place] / count
+    return np.where(count > 1, (value - mean) * np.sqrt(count / np.maximum(count - 1, 1)), 0.0)
+
+
+def _none_too_loud(rests: list[tuple[Floats, Floats]]) -> list[tuple[Floats, Floats]]:
+    """Return what is left of the runs, the loudest turned down: a wheel swings in all of them, and not in a few."""
+    size = np.array([float(rest @ rest) for rest, _ in rests])
+    most = _LOUDEST * float(np.median(size)) if len(size) else 0.0
+    return [
+        (rest * np.sqrt(most / s) if s > most else rest, waves) for (rest, waves), s in zip(rests, size, strict=True)
+    ]
 
 
 def _bent(distance: Floats, weight: Floats, value: Floats) -> tuple[Floats, Floats]:

@@ -74,10 +74,19 @@ def test_a_dependence_is_found_with_its_covariate_first():
 @pytest.mark.parametrize("period", [0.3, 0.45])
 def test_a_swing_with_another_phase_in_each_run_is_a_matter_of_distance(period):
     rates = drives(2)
-    assert swing(rates, 0) is None
+    assert swing(rates, GROUP, 0) is None
+    # What repeats have in common has no phase of its own.
+    same = dataclasses.replace(rates, value=rates.value.copy())
+    same.value[:, 2] += 0.05 * np.sin(math.tau * rates.covariates["distance_m"] / period)
+    assert swing(same, GROUP, 0) is None
     phase = np.random.default_rng(3).uniform(0.0, math.tau, RUNS)[rates.run]
-    rates.value[:, 2] += 0.05 * np.sin(math.tau * rates.covariates["distance_m"] / period + phase)
-    found = swing(rates, 0)
+    wave = np.sin(math.tau * rates.covariates["distance_m"] / period + phase)
+    # Nor do a few runs that miss by far make a swing of all.
+    loud = dataclasses.replace(rates, value=rates.value.copy())
+    loud.value[:, 2] += 3.0 * wave * (rates.run < 4)
+    assert swing(loud, GROUP, 0) is None
+    rates.value[:, 2] += 0.05 * wave
+    found = swing(rates, GROUP, 0)
     assert found is not None
     assert (found.covariate, found.feature) == (RANDOM_PHASE, "turning")
     assert found.share > 0.5
@@ -93,6 +102,19 @@ def test_a_slow_disc_is_found_where_it_lies():
     assert loss == pytest.approx(0.2, rel=0.2)
     assert math.hypot(x - 0.4, y + 0.3) < 0.25  # within reach of a fit: the grid is coarse
     assert radius == pytest.approx(0.5, abs=0.2)
+
+
+def test_a_slow_strip_is_found_where_it_lies():
+    rates = drives(6)
+    across = rates.middle[:, 0] * math.cos(2.0) + rates.middle[:, 1] * math.sin(2.0)
+    rates.value[:, 0] -= 0.2 * (np.abs(across - 0.3) < 0.5)
+    (best, *_) = screened(rates)
+    assert best.term is terms.SpeedInStrip
+    loss, place, direction, width = best.values[0]
+    assert loss == pytest.approx(0.2, rel=0.2)
+    assert place == pytest.approx(0.3, abs=0.15)
+    assert direction == pytest.approx(2.0, abs=0.2)
+    assert width == pytest.approx(1.0, abs=0.4)
 
 
 def test_a_line_that_turns_is_found_where_it_lies():

@@ -7,7 +7,7 @@ predicts runs that it was not fitted to.
 
 from agvbench.diagnosis.terms.base import EmpiricalTerm
 from agvbench.diagnosis.terms.camera import BentPicture
-from agvbench.diagnosis.terms.speed import SpeedByHeading, SpeedByRunTime, SpeedInDisc
+from agvbench.diagnosis.terms.speed import SpeedByHeading, SpeedByRunTime, SpeedInDisc, SpeedInStrip
 from agvbench.diagnosis.terms.steering import (
     SteeringByCampaignTime,
     SteeringByDirection,
@@ -18,6 +18,7 @@ from agvbench.diagnosis.terms.turning import TurnAtLine, TurnByHeading, TwistAtS
 
 TERMS: tuple[type[EmpiricalTerm], ...] = (
     SpeedInDisc,
+    SpeedInStrip,
     TurnAtLine,
     BentPicture,
     SpeedByHeading,
@@ -39,6 +40,7 @@ __all__ = [
     "SpeedByHeading",
     "SpeedByRunTime",
     "SpeedInDisc",
+    "SpeedInStrip",
     "SteeringByCampaignTime",
     "SteeringByDirection",
     "SteeringByHistory",

@@ -40,6 +40,34 @@ class SpeedInDisc(EmpiricalTerm):
 
 
 @dataclass(frozen=True)
+class SpeedInStrip(EmpiricalTerm):
+    """In a strip of the floor, such as a carpet, the vehicle is slower: ``v ← v (1 − loss)``, edges as of the disc.
+
+    The strip lies across ``direction_rad``, its middle ``place_m`` from the origin.
+    """
+
+    name: ClassVar[str] = "speed_in_strip"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    covariates: ClassVar[tuple[str, ...]] = ("x_m", "y_m")
+    through: ClassVar[str] = "speed"
+    local: ClassVar[bool] = True
+
+    loss: float = parameter(unit="–", low=-1.0, high=0.9, scale=0.1)
+    place_m: float = parameter(unit="m", low=-50.0, high=50.0, scale=0.5)
+    direction_rad: float = parameter(unit="rad", low=-math.tau, high=math.tau, scale=0.3)
+    width_m: float = parameter(unit="m", low=0.0, high=20.0, scale=0.3)
+
+    @staticmethod
+    def drive(state: Floats, loss: float, place_m: float, direction_rad: float, width_m: float) -> None:
+        """Slow both axles inside."""
+        if loss != 0.0:
+            across = state[X] * math.cos(direction_rad) + state[Y] * math.sin(direction_rad) - place_m
+            left = 1.0 - 0.5 * loss * (1.0 + math.tanh((0.5 * width_m - abs(across)) / _EDGE_M))
+            state[FRONT_SPEED] *= left
+            state[REAR_SPEED] *= left
+
+
+@dataclass(frozen=True)
 class SpeedByHeading(EmpiricalTerm):
     """Speed depends on where the vehicle points: ``v ← v (1 + a cos ψ + b sin ψ)``."""
 
