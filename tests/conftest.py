@@ -1,4 +1,4 @@
-"""What all tests share: Hypothesis without deadlines (machines are shared), and where measured recordings lie."""
+"""What all tests share: Hypothesis without deadlines, for machines are shared, and mistakes with their tracebacks."""
 
 from __future__ import annotations
 

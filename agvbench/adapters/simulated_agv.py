@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import ClassVar, Self
 
 from agvbench.adapters.contract import AdapterOptions, AgvAdapter, AgvReports
@@ -30,7 +31,8 @@ class SimulatedAgv(AgvAdapter):
     @classmethod
     def open(cls, address: str, options: AdapterOptions) -> Self:
         """Make the plant that `address`, else the options, name."""
-        return cls(load_plant(address or options.plant)(options.seed), options)
+        options = replace(options, plant=address or options.plant)
+        return cls(load_plant(options.plant)(options.seed), options)
 
     def identity(self) -> AgvIdentity:
         """Return who this is."""

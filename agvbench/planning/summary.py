@@ -13,8 +13,8 @@ from agvbench.planning.trajectory import Trajectory
 from agvbench.planning.workspace import Workspace
 from agvbench.types import Pose
 
-BETWEEN_RUNS_S = 20.0
-"""Time at rest before and after a run, and to bring the vehicle back to its start [s]."""
+BETWEEN_RUNS_S = 17.0
+"""Time at rest before and after a run (2 s), and to bring the vehicle back to its start [s]."""
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 Each of the smaller days is held out in turn, then both together. Printed for each recording held out: position error
 1 s and 2 s ahead, with 95 % intervals over stretches, for the floor, the static maps, those with the measured speed
 held, the naive predictor, and the model found; and for each effect what it does to the days held out. The recordings
-are looked for in ``$AGVBENCH_MEASURED``, else in ``../shared/measured``. Run with
+are looked for in ``$AGVBENCH_MEASURED``, else in a folder ``shared/measured`` beside the project's. Run with
 ``python benchmarks/perf/perf_dart.py [--figure FILE.svg]``.
 """
 
