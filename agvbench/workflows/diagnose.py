@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -10,22 +11,19 @@ import tomli_w
 from rich import box
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from agvbench.campaign import Campaign
 from agvbench.diagnosis import Diagnosis, NamedEffect, diagnose
 from agvbench.diagnosis.next_experiment_propose import with_first_experiment
+from agvbench.diagnosis.result import HeldOut
 from agvbench.errors import FlagError
 from agvbench.model import VehicleModel
 from agvbench.workflows.diagnosis_files import keep
+from agvbench.workflows.diagnosis_words import QUANTITIES, left_in_words, next_in_words
 from agvbench.workflows.windows_table import windows_table
 from agvbench.workflows.writing import write_file
 
-_TITLES = {
-    "position_rms_mm": "position along the way, mm",
-    "heading_rms_deg": "heading along the way, °",
-    "delta_s_mm": "Δs at the end, mm",
-    "delta_heading_deg": "Δδ at the end, °",
-}
 _MOST_DEPENDENCES = 5
 
 
@@ -110,30 +108,24 @@ def _decided(
 
 def tell(found: Diagnosis, console: Console) -> None:
     """Print the answer in plain words."""
+    content = found.to_json()
     console.print(f"[bold]{found.verdict}[/bold]: {found.why}", highlight=False, soft_wrap=True)
-    for effect in found.effects:
-        console.print(f"  {in_words(effect)}", highlight=False, markup=False, soft_wrap=True)
-    for d in found.depends_on[:_MOST_DEPENDENCES]:
-        text = f"the rest depends on {d.covariate} (through {d.feature}; {d.share:.0%} of it, p = {d.p_value:.1g})"
-        console.print(f"  {text}", highlight=False, markup=False, soft_wrap=True)
+    lines = [*map(in_words, found.effects), *islice(left_in_words(content), _MOST_DEPENDENCES)]
+    _say(lines, console)
     if found.held_out is not None:
-        console.print(errors_table(found))
+        console.print()
+        console.print(f"Prediction errors of {found.held_out.runs} runs held out, root mean square:", highlight=False)
+        console.print(errors_table(found.held_out))
         if windows := found.provenance.get("windows"):
             console.print(windows_table(windows))
         if found.held_out.worse_on:
-            console.print(f"  worse than before on: {', '.join(found.held_out.worse_on)}", soft_wrap=True)
-    for line in next_in_words(found):
+            _say([f"Worse than before on: {', '.join(found.held_out.worse_on)}."], console)
+    _say(next_in_words(content), console)
+
+
+def _say(lines: Iterable[str], console: Console) -> None:
+    for line in lines:
         console.print(f"  {line}", highlight=False, markup=False, soft_wrap=True)
-
-
-def next_in_words(found: Diagnosis) -> Iterator[str]:
-    """Yield what to drive next, what no run can tell apart, and which parameters these runs do not pin."""
-    if (experiment := found.next_experiment) is not None:
-        yield f"next run, {experiment.trajectory.name}: {experiment.why}"
-    for item in found.provenance.get("inseparable", ()):
-        yield f"no run from rest to rest tells {' from '.join(item['between'])}; it takes {item['needs']}"
-    for name, why in found.provenance.get("not_identifiable", {}).items():
-        yield f"{name} is not identifiable from these runs ({why})"
 
 
 def in_words(effect: NamedEffect) -> str:
@@ -146,16 +138,12 @@ def in_words(effect: NamedEffect) -> str:
     return line + (f"; or instead {', '.join(effect.confounded_with)}" if effect.confounded_with else "")
 
 
-def errors_table(found: Diagnosis) -> Table:
+def errors_table(held: HeldOut) -> Table:
     """Return errors before and after beside the floor."""
-    held = found.held_out
-    runs = held.runs if held else 0
-    table = Table(
-        title=f"prediction errors of {runs} runs held out (root mean square)", box=box.SIMPLE_HEAD, title_justify="left"
-    )
+    table = Table(box=box.SIMPLE_HEAD)
     table.add_column("")
     for heading in ("before", "after", "floor"):
         table.add_column(heading, justify="right")
-    for name, errors in (held.errors if held else {}).items():
-        table.add_row(_TITLES[name], *(f"{errors[column]:.2f}" for column in ("before", "after", "floor")))
+    for name, errors in held.errors.items():
+        table.add_row(Text(QUANTITIES[name]), *(f"{errors[column]:.2f}" for column in ("before", "after", "floor")))
     return table

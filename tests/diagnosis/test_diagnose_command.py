@@ -22,6 +22,7 @@ def test_json_and_vehicle_of_a_whole_command(adequate, tmp_path, capsys):
     said = capsys.readouterr().out
     assert said.startswith("ADEQUATE")
     assert "floor" in said
+    assert "position along the way [mm]" in said
     content = json.loads(found.read_text())
     assert content["schema"] == 1
     assert content["verdict"] == "ADEQUATE"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from agvbench.reporting.content import (
 from agvbench.reporting.figures.residuals import AFTER, BEFORE, draw_dependence, draw_floor
 from agvbench.reporting.sections.base import Section
 from agvbench.workflows.diagnosis_files import ShownDiagnosis
+from agvbench.workflows.diagnosis_words import QUANTITIES, items, left_in_words, mapping, next_in_words, number
 from agvbench.workflows.report import ReportData
 
 if TYPE_CHECKING:
@@ -38,12 +39,6 @@ _AGAINST = {
     "curvature_per_m": "steering: curvature [1/m]",
     "direction": "direction (−1 backward, 1 forward)",
     "campaign_time_h": "time since the session began [h]",
-}
-_ERRORS = {
-    "position_rms_mm": "position along the way [mm]",
-    "heading_rms_deg": "heading along the way [°]",
-    "delta_s_mm": "Δs at the end [mm]",
-    "delta_heading_deg": "Δδ at the end [°]",
 }
 _CAPTION = (
     "What each step between two samples misses, per metre driven, in the vehicle's own frame: medians with quartiles "
@@ -72,11 +67,11 @@ def diagnosis_blocks(shown: ShownDiagnosis) -> list[Block]:
         return [
             Paragraph(" ".join(plain_sentences(problem) for problem in shown.problems) or "The diagnosis is empty.")
         ]
-    provenance = _mapping(content.get("provenance"))
+    provenance = mapping(content.get("provenance"))
     verdict = plain_sentences(f"{content.get('verdict')}: {provenance.get('why', '')}")
     blocks: list[Block] = [Paragraph(verdict, lead=True)]
     blocks += [table for table in (_effects(content), _errors(content)) if table.rows]
-    sentences = [plain_sentences(text) for text in (*_sentences(content, provenance), *shown.problems)]
+    sentences = [plain_sentences(text) for text in (*left_in_words(content), *next_in_words(content), *shown.problems)]
     if sentences:
         blocks.append(Bullets(sentences))
     if shown.residuals is None or shown.residuals.empty:
@@ -86,56 +81,28 @@ def diagnosis_blocks(shown: ShownDiagnosis) -> list[Block]:
     return blocks
 
 
-def _mapping(value: object) -> Mapping[str, Any]:
-    return value if isinstance(value, Mapping) else {}
-
-
-def _list(value: object) -> list[Any]:
-    return value if isinstance(value, list) else []
-
-
-def _number(value: object) -> float:
-    return float(value) if isinstance(value, int | float) else math.nan
-
-
 def _effects(content: Mapping[str, Any]) -> Table:
     rows: list[list[Value]] = []
-    for effect in map(_mapping, _list(content.get("effects"))):
-        others = ", ".join(map(str, _list(effect.get("confounded_with"))))
-        for name, estimate in _mapping(effect.get("parameters")).items():
-            e = _mapping(estimate)
-            value, stderr = (f"{_number(e.get(key)):.4g}" for key in ("value", "stderr"))
+    for effect in map(mapping, items(content.get("effects"))):
+        others = ", ".join(map(str, items(effect.get("confounded_with"))))
+        for name, estimate in mapping(effect.get("parameters")).items():
+            e = mapping(estimate)
+            value, stderr = (f"{number(e.get(key)):.4g}" for key in ("value", "stderr"))
             rows.append([str(effect.get("name")), str(name), f"{value} ± {stderr}", str(e.get("unit", "")), others])
     columns = ("effect", "parameter", "estimate", "unit", "or instead")
     return Table("effects", "Effects found.", [Column(c.replace(" ", "_"), c) for c in columns], rows)
 
 
 def _errors(content: Mapping[str, Any]) -> Table:
-    held = _mapping(content.get("held_out"))
+    held = mapping(content.get("held_out"))
     rows: list[list[Value]] = []
-    for name, title in _ERRORS.items():
-        errors = _mapping(held.get(name))
+    for name, title in QUANTITIES.items():
+        errors = mapping(held.get(name))
         if errors:
-            rows.append([title, *(_number(errors.get(key)) for key in ("before", "after", "floor"))])
+            rows.append([title, *(number(errors.get(key)) for key in ("before", "after", "floor"))])
     columns = [Column("quantity", "root mean square"), *(Column(c, c, 2) for c in ("before", "after", "floor"))]
-    runs = _number(held.get("runs"))
+    runs = number(held.get("runs"))
     return Table("held_out", f"Prediction errors of {runs:.0f} runs held out.", columns, rows)
-
-
-def _sentences(content: Mapping[str, Any], provenance: Mapping[str, Any]) -> Iterator[str]:
-    rest = _mapping(content.get("unexplained"))
-    for d in map(_mapping, _list(rest.get("depends_on"))):
-        share = _number(d.get("share"))
-        yield f"What is left depends on {d.get('covariate')} through {d.get('through')} ({100.0 * share:.0f} % of it)."
-    following = _mapping(content.get("next_experiment"))
-    if following:
-        name = _mapping(following.get("trajectory")).get("name")
-        yield f"Next run, {name}: {following.get('why')}."
-    for item in map(_mapping, _list(provenance.get("inseparable"))):
-        pair = " from ".join(map(str, _list(item.get("between"))))
-        yield f"No run from rest to rest tells {pair}; it takes {item.get('needs')}."
-    for name, why in _mapping(provenance.get("not_identifiable")).items():
-        yield f"{name} is not identifiable from these runs ({why})."
 
 
 def _pictures(residuals: pd.DataFrame) -> list[Block]:

@@ -1,0 +1,49 @@
+"""A diagnosis in words, from its JSON, which anyone may have written: whatever it lacks is left out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+QUANTITIES = {
+    "position_rms_mm": "position along the way [mm]",
+    "heading_rms_deg": "heading along the way [°]",
+    "delta_s_mm": "Δs at the end [mm]",
+    "delta_heading_deg": "Δδ at the end [°]",
+}
+"""What errors before and after are of, by their name in the JSON."""
+
+
+def left_in_words(content: Mapping[str, Any]) -> Iterator[str]:
+    """Yield on what the rest depends."""
+    for d in map(mapping, items(mapping(content.get("unexplained")).get("depends_on"))):
+        of_it = f"{100.0 * number(d.get('share')):.0f} % of it, p = {number(d.get('p_value')):.1g}"
+        yield f"What is left depends on {d.get('covariate')} through {d.get('through')} ({of_it})."
+
+
+def next_in_words(content: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what to drive next, what no run can tell apart, and which parameters these runs do not pin."""
+    if following := mapping(content.get("next_experiment")):
+        yield f"Next run, {mapping(following.get('trajectory')).get('name')}: {following.get('why')}."
+    provenance = mapping(content.get("provenance"))
+    for item in map(mapping, items(provenance.get("inseparable"))):
+        between = " from ".join(map(str, items(item.get("between"))))
+        yield f"No run from rest to rest tells {between}; it takes {item.get('needs')}."
+    for name, why in mapping(provenance.get("not_identifiable")).items():
+        yield f"{name} is not identifiable from these runs ({why})."
+
+
+def mapping(value: object) -> Mapping[str, Any]:
+    """Return a mapping as it is, anything else as an empty one."""
+    return value if isinstance(value, Mapping) else {}
+
+
+def items(value: object) -> list[Any]:
+    """Return a list as it is, anything else as an empty one."""
+    return value if isinstance(value, list) else []
+
+
+def number(value: object) -> float:
+    """Return a number, NaN for anything else."""
+    return float(value) if isinstance(value, int | float) else math.nan
