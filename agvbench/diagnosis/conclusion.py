@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis.asked import Asked
 from agvbench.diagnosis.candidates import bounds_of, candidates
+from agvbench.diagnosis.dependences import RANDOM_PHASE, Dependence, dependences
 from agvbench.diagnosis.empirical import Explained, described, term_candidates, with_term_first
 from agvbench.diagnosis.estimates import named_effects
 from agvbench.diagnosis.forms import BEYOND, form_candidates
@@ -16,12 +17,13 @@ from agvbench.diagnosis.map_effects import map_effects
 from agvbench.diagnosis.next_experiment_propose import with_next_experiment
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.reading import Readings
+from agvbench.diagnosis.residual_rates import residual_rates
 from agvbench.diagnosis.residual_spread import EndSpread, end_spread
 from agvbench.diagnosis.residual_table import with_residuals
 from agvbench.diagnosis.residuals import AT_THE_FLOOR, LACK_OF_FIT, Misses, floor, lack_of_fit, misses
 from agvbench.diagnosis.result import Diagnosis, HeldOut, Verdict
 from agvbench.diagnosis.selection import Selection
-from agvbench.diagnosis.structure import RANDOM_PHASE, Dependence, dependences, residual_rates, swing
+from agvbench.diagnosis.swing import swing
 from agvbench.diagnosis.vehicle import corrected_vehicle
 from agvbench.effects.forms import effect_forms
 from agvbench.model import VehicleModel

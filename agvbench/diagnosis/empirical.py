@@ -8,15 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.diagnosis.candidates import Candidate, candidate
+from agvbench.diagnosis.dependences import Dependence
 from agvbench.diagnosis.empirical_regression import steering
 from agvbench.diagnosis.empirical_screen import Start, screen
 from agvbench.diagnosis.fitted_models import Scored
 from agvbench.diagnosis.forms import wider
 from agvbench.diagnosis.judging import without_best
 from agvbench.diagnosis.likelihood import residual_of
+from agvbench.diagnosis.residual_rates import residual_rates
 from agvbench.diagnosis.residuals import AT_THE_FLOOR, LACK_OF_FIT, floor, lack_of_fit, misses
 from agvbench.diagnosis.selection import Selection, Selector
-from agvbench.diagnosis.structure import Dependence, residual_rates
 from agvbench.diagnosis.terms import TERMS, EmpiricalTerm
 from agvbench.types import Floats
 

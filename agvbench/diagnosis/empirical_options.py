@@ -13,7 +13,7 @@ import numpy as np
 
 from agvbench.diagnosis import terms
 from agvbench.diagnosis.empirical_regression import Columns, Judge, Steering
-from agvbench.diagnosis.structure import Rates
+from agvbench.diagnosis.residual_rates import Rates
 from agvbench.types import Floats
 from agvbench.vehicle.geometry import Geometry
 

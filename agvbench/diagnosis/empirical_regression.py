@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.diagnosis.prediction import Batch
-from agvbench.diagnosis.structure import Rates
+from agvbench.diagnosis.residual_rates import Rates
 from agvbench.types import Floats
 
 FOLDS = 5

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from agvbench.diagnosis.empirical_options import options
 from agvbench.diagnosis.empirical_regression import FOLDS, Judge, Steering
 from agvbench.diagnosis.grouping import folds
-from agvbench.diagnosis.structure import Rates
+from agvbench.diagnosis.residual_rates import Rates
 from agvbench.diagnosis.terms import EmpiricalTerm
 from agvbench.types import Floats
 from agvbench.vehicle.geometry import Geometry

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.diagnosis.reading import Readings
+from agvbench.diagnosis.residual_rates import residual_rates
 from agvbench.diagnosis.result import Diagnosis
-from agvbench.diagnosis.structure import residual_rates
 from agvbench.types import Floats
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
+from agvbench.diagnosis.dependences import Dependence
 from agvbench.diagnosis.next_experiment_result import NextExperiment
-from agvbench.diagnosis.structure import Dependence
 from agvbench.model import VehicleModel
 
 if TYPE_CHECKING:

@@ -9,14 +9,15 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis.asked import Asked
 from agvbench.diagnosis.candidates import bounds_of
+from agvbench.diagnosis.dependences import Dependence, dependences
 from agvbench.diagnosis.estimates import named_effects
 from agvbench.diagnosis.fitted_models import Scored
 from agvbench.diagnosis.fitting import Fit
 from agvbench.diagnosis.prediction import Batch, Predictor
 from agvbench.diagnosis.reading import Readings
+from agvbench.diagnosis.residual_rates import residual_rates
 from agvbench.diagnosis.result import Diagnosis, HeldOut, NamedEffect, Verdict
 from agvbench.diagnosis.selection import Selection
-from agvbench.diagnosis.structure import Dependence, dependences, residual_rates
 from agvbench.diagnosis.vehicle import corrected_vehicle
 from agvbench.diagnosis.windows import SUPPORT_S, Horizon
 from agvbench.diagnosis.windows_errors import QUANTITIES, by_recording, floor_squares, rms, squares
