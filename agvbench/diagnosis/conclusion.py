@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.diagnosis.asked import Asked
+from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.candidates import bounds_of, candidates
 from agvbench.diagnosis.dependences import RANDOM_PHASE, Dependence, dependences
 from agvbench.diagnosis.empirical import Explained, described, term_candidates, with_term_first
@@ -15,7 +16,7 @@ from agvbench.diagnosis.estimates import named_effects
 from agvbench.diagnosis.forms import BEYOND, form_candidates
 from agvbench.diagnosis.map_effects import map_effects
 from agvbench.diagnosis.next_experiment_propose import with_next_experiment
-from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.reading import Readings
 from agvbench.diagnosis.residual_rates import residual_rates
 from agvbench.diagnosis.residual_spread import EndSpread, end_spread

@@ -8,7 +8,8 @@ from enum import Enum, auto
 import numpy as np
 
 from agvbench.diagnosis.likelihood import Terms, residual_of, terms_of
-from agvbench.diagnosis.prediction import Linearised, Predictor
+from agvbench.diagnosis.linearised import Linearised
+from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.scatter import Scatter, rescatter
 from agvbench.diagnosis.stepping import Point, Stepper
 from agvbench.types import Floats

@@ -10,6 +10,7 @@ from agvbench.calibration import RunMeasurement, measure_run
 from agvbench.calibration.source import CampaignLike
 from agvbench.diagnosis.ability import cannot_tell
 from agvbench.diagnosis.asked import Asked
+from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.candidates import given_effects
 from agvbench.diagnosis.conclusion import conclude
 from agvbench.diagnosis.contradictions import refuse_contradictions
@@ -19,7 +20,6 @@ from agvbench.diagnosis.forms import reform_and_resettle, tried_beside
 from agvbench.diagnosis.grouping import held_out_runs
 from agvbench.diagnosis.levels import ROLES, FreeMaps, free_maps, start_values
 from agvbench.diagnosis.plausibility import refuse_units
-from agvbench.diagnosis.prediction import Batch
 from agvbench.diagnosis.reading import Readings, read_runs
 from agvbench.diagnosis.result import Diagnosis
 from agvbench.diagnosis.selection import Selector

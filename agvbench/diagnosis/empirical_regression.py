@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.diagnosis.prediction import Batch
+from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.residual_rates import Rates
 from agvbench.types import Floats
 

@@ -8,11 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.candidates import Candidate, bounds_of
 from agvbench.diagnosis.fitting import Fit, fit
 from agvbench.diagnosis.grouping import folds
 from agvbench.diagnosis.judging import FOLDS, cross_validated
-from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.promises import promised_gain
 from agvbench.diagnosis.windows_split import fold_groups
 from agvbench.types import Floats

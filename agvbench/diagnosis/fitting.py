@@ -14,7 +14,8 @@ import numpy as np
 
 from agvbench.diagnosis.descent import Descent, Pace, State
 from agvbench.diagnosis.likelihood import residual_of, ridge, terms_of
-from agvbench.diagnosis.prediction import Linearised, Predictor
+from agvbench.diagnosis.linearised import Linearised
+from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.promises import Ground
 from agvbench.diagnosis.scatter import Scatter, first_scatter, scatter_of_windows
 from agvbench.types import Floats

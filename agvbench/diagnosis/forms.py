@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.candidates import Candidate, bounds_of, candidate, candidates
 from agvbench.diagnosis.fitted_models import Scored
 from agvbench.diagnosis.fitting import fit
-from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.promises import promised_gain
 from agvbench.diagnosis.selection import LEAST_GAIN, RIVAL_MARGIN, Selection, Selector
 from agvbench.diagnosis.standing import SLOW_STEERING, otherwise

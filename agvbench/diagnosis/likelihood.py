@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agvbench.diagnosis.prediction import Linearised, Predictor
+from agvbench.diagnosis.linearised import Linearised
+from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.scatter import Scatter, priors, scale_of, student, tempering, weights
 from agvbench.types import Floats
 

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.fitting import Fit
 from agvbench.diagnosis.next_experiment_designs import Design
-from agvbench.diagnosis.prediction import OFFSETS, Batch, Predictor
+from agvbench.diagnosis.prediction import OFFSETS, Predictor
 from agvbench.diagnosis.reading import SAMPLES, Readings
 from agvbench.diagnosis.scatter import EVIDENCE_POSES
 from agvbench.planning.workspace import Workspace

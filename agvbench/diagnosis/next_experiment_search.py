@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.fitting import Fit
 from agvbench.diagnosis.next_experiment_designs import Design, Levels, designs, levels_of, mutated
 from agvbench.diagnosis.next_experiment_pins import Unpinned, pin_scores
@@ -19,7 +20,7 @@ from agvbench.diagnosis.next_experiment_score import (
     like,
     starts_within,
 )
-from agvbench.diagnosis.prediction import OFFSETS, Batch, Predictor
+from agvbench.diagnosis.prediction import OFFSETS, Predictor
 from agvbench.diagnosis.reading import Readings
 from agvbench.planning import Workspace
 from agvbench.types import Floats, Pose

@@ -13,7 +13,7 @@ from agvbench.diagnosis.grouping import at_common_levels, group_runs
 from agvbench.diagnosis.resting import between_rows, frame_noise, motion_of, start_of
 from agvbench.diagnosis.windows import Beginnings, Horizon, blocks, cut_windows, recording_of
 from agvbench.errors import FitError
-from agvbench.model.simulation import SimulatedRun
+from agvbench.model.simulated_run import SimulatedRun
 from agvbench.types import Commands, Floats, Frames, Run
 
 SAMPLES = 24

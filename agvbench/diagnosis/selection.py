@@ -9,9 +9,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.fitted_models import FittedModels, Scored
 from agvbench.diagnosis.judging import differs_from_nothing, without_best
-from agvbench.diagnosis.prediction import Batch
 from agvbench.diagnosis.residuals import misses
 
 LEAST_GAIN = 12.0

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.fitted_models import Scored
-from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.promises import promised_gain
 from agvbench.diagnosis.selection import LEAST_GAIN, Selection, Selector
 from agvbench.effects.forms import cause_of

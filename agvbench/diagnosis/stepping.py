@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from agvbench.diagnosis.likelihood import Terms, objective, residual_of, ridge
-from agvbench.diagnosis.prediction import Linearised, Predictor
+from agvbench.diagnosis.linearised import Linearised
+from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.scatter import Scatter
 from agvbench.types import Floats
 

@@ -11,11 +11,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.candidates import candidates
 from agvbench.diagnosis.empirical import Explained, term_candidates
 from agvbench.diagnosis.fitted_models import Scored
 from agvbench.diagnosis.forms import BEYOND, form_candidates
-from agvbench.diagnosis.prediction import Batch
 from agvbench.diagnosis.reading import Readings
 from agvbench.diagnosis.selection import Selection, Selector
 from agvbench.diagnosis.windows_split import thinned

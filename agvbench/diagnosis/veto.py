@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.empirical import Explained
 from agvbench.diagnosis.fitted_models import Scored
-from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.reading import Readings
 from agvbench.diagnosis.residuals import misses
 from agvbench.diagnosis.selection import Selection

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.diagnosis.asked import Asked
+from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.candidates import bounds_of
 from agvbench.diagnosis.dependences import Dependence, dependences
 from agvbench.diagnosis.estimates import named_effects
 from agvbench.diagnosis.fitted_models import Scored
 from agvbench.diagnosis.fitting import Fit
-from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.reading import Readings
 from agvbench.diagnosis.residual_rates import residual_rates
 from agvbench.diagnosis.result import Diagnosis, HeldOut, NamedEffect, Verdict

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from agvbench.calibration.source import HeaderLike
 from agvbench.diagnosis.asked import Asked
+from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.candidates import given_effects
 from agvbench.diagnosis.fitted_models import Tell
 from agvbench.diagnosis.fitting import Fit, fit
 from agvbench.diagnosis.forms import tried_beside
-from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.provenance import refuse_nothing
 from agvbench.diagnosis.reading import Readings, read_windows
 from agvbench.diagnosis.result import Diagnosis

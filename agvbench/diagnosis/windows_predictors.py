@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.fitting import Fit
-from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.reading import Readings
 from agvbench.diagnosis.windows_split import _begins
 from agvbench.model import VehicleModel
-from agvbench.model.simulation import SimulatedRun, Simulation
+from agvbench.model.simulated_run import SimulatedRun
+from agvbench.model.simulation import Simulation
 from agvbench.types import Floats
 
 

@@ -7,8 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.fitted_models import Scored
-from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.selection import Selector
 from agvbench.types import Floats
 

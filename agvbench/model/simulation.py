@@ -23,45 +23,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from agvbench.effects import Effect, effect_kinds
 from agvbench.errors import InputError, VehicleError
+from agvbench.model.simulated_run import SimulatedRun, check_runs
 from agvbench.model.simulation_compose import kernel
-from agvbench.types import Commands, Floats
+from agvbench.types import Floats
 from agvbench.vehicle.geometry import Geometry
 
 Integers = NDArray[np.int64]
 Map = Callable[[Floats], ArrayLike]
 
 STEP_S = 0.025
-
-
-@dataclass(frozen=True)
-class SimulatedRun:
-    """What is to be simulated of one run.
-
-    Parameters
-    ----------
-    commands
-        Its commands, in the vehicle's unit.
-    t_s
-        Stamps of the frames to predict [s], ascending, on the commands' clock.
-    started_h
-        When it began, in hours since the session began.
-    begins_s
-        Stamp of the initial pose, for a window of free driving: commands before it only set the actuators in motion.
-        None for a run from rest, where the vehicle stands at the initial pose until its first command takes effect.
-    stood
-        Front and rear command at which the axles had settled before the first command; by default neutral.
-    """
-
-    commands: Commands
-    t_s: Floats
-    started_h: float = 0.0
-    begins_s: float | None = None
-    stood: tuple[float, float] | None = None
-
-    def before(self, neutral: float) -> dict[str, float]:
-        """Return the command under which the vehicle stood before the first, by channel."""
-        front, rear = self.stood or (neutral, neutral)
-        return {"drive": neutral, "front": front, "rear": rear}
 
 
 @dataclass(frozen=True)
@@ -130,7 +100,9 @@ class Simulation:
         step_s: float = STEP_S,
         kinds: Sequence[type[Effect]] = (),
     ) -> None:
-        _check(runs, step_s)
+        check_runs(runs)
+        if not step_s > 0.0:
+            raise InputError("must be greater than zero", where="step_s", value=f"{step_s:g} s")
         self.geometry, self.neutral, self.step_s = geometry, neutral, step_s
         self.kinds = (*effect_kinds().values(), *kinds)
         declared = [(kind.name, p) for kind in self.kinds for p in kind.parameters()]
@@ -303,18 +275,3 @@ class Simulation:
 
 def _starts(counts: Sequence[int]) -> Integers:
     return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-
-
-def _check(runs: Sequence[SimulatedRun], step_s: float) -> None:
-    if not runs:
-        raise InputError("a simulation needs a run")
-    if not step_s > 0.0:
-        raise InputError("must be greater than zero", where="step_s", value=f"{step_s:g} s")
-    for i, run in enumerate(runs):
-        if len(run.commands) == 0:
-            raise InputError("a run needs a command", where=f"run {i}", remedy="give at least one row")
-        for what, times in (("commands.t_s", run.commands.t_s), ("t_s", run.t_s)):
-            if not np.isfinite(times).all():
-                raise InputError("is not finite", where=f"run {i}: {what}")
-            if np.any(np.diff(times) < 0.0):
-                raise InputError("time goes back", where=f"run {i}: {what}", remedy="sort by time")

@@ -10,11 +10,12 @@ from tiny_vehicle import FRONT_M, HEADER, NEUTRAL, REAR_M, Tiny
 
 from agvbench.calibration import measure_run
 from agvbench.diagnosis import forms
+from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.candidates import bounds_of, candidates
 from agvbench.diagnosis.fitted_models import Scored
 from agvbench.diagnosis.fitting import fit
 from agvbench.diagnosis.levels import ROLES, free_maps, start_values
-from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.reading import read_runs
 from agvbench.diagnosis.selection import Selection, Selector
 from agvbench.vehicle.geometry import Geometry

@@ -9,10 +9,10 @@ import pytest
 from tiny_vehicle import FRONT_M, HEADER, NEUTRAL, REAR_M, Tiny
 
 from agvbench.calibration import measure_run
+from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.candidates import candidates
 from agvbench.diagnosis.grouping import held_out_runs
 from agvbench.diagnosis.levels import ROLES, free_maps, start_values
-from agvbench.diagnosis.prediction import Batch
 from agvbench.diagnosis.reading import read_runs
 from agvbench.diagnosis.selection import Selection, Selector
 from agvbench.diagnosis.veto import withdrawn

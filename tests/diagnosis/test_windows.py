@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tiny_vehicle import HEADER, NEUTRAL, Tiny, campaign_runs
 
-from agvbench.diagnosis.prediction import Batch, Predictor
+from agvbench.diagnosis.batch import Batch
+from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.reading import Readings, read_windows
 from agvbench.diagnosis.windows import Horizon, Window, cut_windows, horizon_of
 from agvbench.diagnosis.windows_errors import by_recording, floor_squares, interval, squares

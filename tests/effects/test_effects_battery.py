@@ -18,7 +18,8 @@ import agvbench.effects as effects_package
 from agvbench.effects import Effect, effect_from_toml, effect_kinds
 from agvbench.errors import VehicleError
 from agvbench.model import VehicleModel, example_vehicle
-from agvbench.model.simulation import SimulatedRun, Simulation
+from agvbench.model.simulated_run import SimulatedRun
+from agvbench.model.simulation import Simulation
 from agvbench.types import Commands
 from agvbench.vehicle.geometry import Geometry
 from agvbench.workflows.effects import reference_page, template_text

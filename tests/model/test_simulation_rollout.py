@@ -8,7 +8,8 @@ import pytest
 from agvbench.effects import ActuationDelay, SpeedLag, SteeringLag, effect_kinds
 from agvbench.errors import InputError
 from agvbench.model import thesis_vehicle
-from agvbench.model.simulation import SimulatedRun, Simulation
+from agvbench.model.simulated_run import SimulatedRun
+from agvbench.model.simulation import Simulation
 from agvbench.model.simulation_rollout import general_rollout
 from agvbench.types import Commands
 from agvbench.vehicle.geometry import Geometry

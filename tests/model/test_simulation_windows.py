@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from agvbench.model.simulation import SimulatedRun, Simulation
+from agvbench.model.simulated_run import SimulatedRun
+from agvbench.model.simulation import Simulation
 from agvbench.types import Commands
 from agvbench.vehicle.geometry import Geometry
 

@@ -1,0 +1,104 @@
+"""Runs packed for simulation, and variants of them whose differences are derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.diagnosis.levels import ROLES, FreeMaps
+from agvbench.diagnosis.reading import Readings
+from agvbench.effects import Effect
+from agvbench.model.simulation import Simulation
+from agvbench.types import Floats
+from agvbench.vehicle.geometry import Geometry
+
+
+class Batch:
+    """Runs packed for simulation: as they are, and as lanes, each of which differs in one level or in heading.
+
+    A run's own levels of command are varied one by one, which gives the derivatives by the maps' values and by the
+    run's offsets alike. Where commands change so often that a run has more levels than free values, the values are
+    varied instead (``by_node``). Packed once, it serves every set of effects, also ``kinds``
+    beyond those of the library. ``level_scatter`` as for
+    `Simulation.predict`; ``redundancy``: so many windows are as much evidence as one.
+    """
+
+    def __init__(
+        self,
+        readings: Readings,
+        maps: FreeMaps,
+        geometry: Geometry,
+        level_scatter: float = np.inf,
+        redundancy: float = 1.0,
+        kinds: Sequence[type[Effect]] = (),
+    ) -> None:
+        self.readings, self.maps, self.geometry = readings, maps, geometry
+        self.level_scatter, self.redundancy, self.kinds = level_scatter, redundancy, tuple(kinds)
+        runs = readings.simulated()
+        self.base = Simulation(geometry, maps.neutral, runs, kinds=kinds)
+        self.commands: dict[str, Floats] = {role: getattr(self.base, role) for role in ROLES}
+        self.weights = {role: maps.weights(role, self.commands[role]) for role in ROLES}
+        self.drives = self.commands["drive"] != maps.neutral
+        owns = [np.arange(a, b) for a, b in pairwise(self.base.row_starts.tolist())]
+        self.by_node = sum(map(self._count_nodes, owns)) < sum(map(self._count_levels, owns))
+        varied = [list(self._nodes(own) if self.by_node else self._levels(own)) for own in owns]
+        run, kind, row, changed = [], [], [], []
+        for i, own in enumerate(owns):
+            still = np.zeros((len(own), len(ROLES)))
+            for role, first, change in [("base", -1, still), ("heading", -1, still), *varied[i]]:
+                run.append(i)
+                kind.append(role)
+                row.append(first)
+                changed.append(change)
+        # Of a lane that varies a level, `lane_row` is a row that has it; of one that varies a node, the node.
+        self.lane_run, self.lane_kind, self.lane_row = np.array(run), np.array(kind), np.array(row)
+        self.lanes = Simulation(geometry, maps.neutral, [runs[i] for i in run], kinds=kinds)
+        self.touched = self._touched(owns)
+        self.column = self._column()
+        self.rows = np.concatenate([owns[i] for i in run])
+        self.row_change = np.concatenate(changed)
+
+    def _touched(self, owns: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+        """Return which of the maps' values each run depends on (R, m), and others where it depends on fewer than m."""
+        used = np.array(
+            [np.concatenate([(self.weights[role][own] != 0.0).any(axis=0) for role in ROLES]) for own in owns]
+        )
+        return np.argsort(~used, axis=1, kind="stable")[:, : max(1, int(used.sum(axis=1).max()))]
+
+    def _column(self) -> NDArray[np.int64]:
+        """Return in which column of `touched` each run has each of the maps' values (R, values), -1 for none."""
+        column = np.full((len(self.touched), self.maps.size), -1)
+        np.put_along_axis(column, self.touched, np.arange(self.touched.shape[1])[None, :], axis=1)
+        return column
+
+    def _count_levels(self, own: NDArray[np.int64]) -> int:
+        drives = self.drives[own]
+        return sum(
+            len(np.unique(self.commands[r][own][drives] if r == "drive" else self.commands[r][own])) for r in ROLES
+        )
+
+    def _count_nodes(self, own: NDArray[np.int64]) -> int:
+        drives = self.drives[own]
+        return sum(
+            int(np.count_nonzero((self.weights[r][own][drives] if r == "drive" else self.weights[r][own]).any(axis=0)))
+            for r in ROLES
+        )
+
+    def _levels(self, own: NDArray[np.int64]) -> Iterator[tuple[str, int, Floats]]:
+        """Yield each level of each command of one run: a row that has it, and by how much each row changes with it."""
+        for k, role in enumerate(ROLES):
+            rows = self.drives[own] if role == "drive" else np.ones(len(own), dtype=np.bool_)
+            values = self.commands[role][own]
+            for level in np.unique(values[rows]):
+                moves = rows & (values == level)
+                yield role, int(own[np.argmax(moves)]), np.outer(moves, np.arange(len(ROLES)) == k).astype(np.float64)
+
+    def _nodes(self, own: NDArray[np.int64]) -> Iterator[tuple[str, int, Floats]]:
+        """Yield each free value that one run depends on: its number, and by how much each row changes with it."""
+        for k, role in enumerate(ROLES):
+            weights = self.weights[role][own] * (self.drives[own][:, None] if role == "drive" else 1.0)
+            for node in np.flatnonzero(weights.any(axis=0)):
+                yield role, int(node), np.outer(weights[:, node], np.arange(len(ROLES)) == k)
