@@ -109,7 +109,7 @@ def _what_is_left(batch: Batch, poses: Floats, explained: Explained | None, seed
     if explained is not None:
         without = explained.without
         unexplained = Predictor(batch, without.names).predict(without.fit.parameters)
-    rest = dependences(residual_rates(readings, unexplained), readings.group, seed)
+    rest = dependences(residual_rates(readings, unexplained), readings.group, seed, readings.start)
     # A place passed through in every run can look like a swing: it is looked for in what the term leaves.
     if (swings := swing(residual_rates(readings, poses), readings.group, seed)) is not None:
         rest = [swings, *(d for d in rest if d.covariate != RANDOM_PHASE)]

@@ -16,6 +16,9 @@ ALPHA = 1e-3
 
 LEAST_SHARE = 0.02
 RANDOM_PHASE = "distance_modulo_period_m"
+DRIFT = "drift"
+_PLACE = ("x_m", "y_m")
+_ELSEWHERE_M = 0.3
 _KNOTS = 6
 _PERIODS_M = np.geomspace(0.1, 1.0, 25)
 _FLIPS = 4999
@@ -34,30 +37,43 @@ class Dependence:
     share: float
 
 
-def dependences(rates: Rates, group: NDArray[np.int64], seed: int) -> list[Dependence]:
+def dependences(rates: Rates, group: NDArray[np.int64], seed: int, starts: Floats | None = None) -> list[Dependence]:
     """Return what the residual significantly depends on, the largest share first.
 
-    For each feature and covariate: least squares on a smooth curve, its score statistic with the group of runs as unit
-    (errors within may be correlated as they like), and the share of variance predicted in groups left out.
-    Distance enters modulo a period, the best of several. p-values count how often the largest of all
-    statistics that were looked at is as large when each group's scores have their sign by chance (wild bootstrap
-    by groups; Westfall and Young 1993 for having looked at many): asymptotic ones are too small where groups are few.
+    For each feature and covariate (and for the drift over the floor and the place): least squares on a smooth curve,
+    its score statistic with the group of runs as unit (errors within may be correlated as they like), and the share of
+    variance predicted in groups left out. Distance enters modulo a period, the best of several. p-values count how
+    often the largest of all statistics that were looked at is as large when each group's scores have their sign by
+    chance (wild bootstrap by groups; Westfall and Young 1993 for having looked at many): asymptotic ones are too small
+    where groups are few.
+
+    Parameters
+    ----------
+    rates
+        Of all runs.
+    group
+        (R,): of each run, the command that it repeats.
+    seed
+        Draws signs and folds.
+    starts
+        (R, 3): where runs began. Repeats that began elsewhere tell of the place each by itself.
     """
     fold = folds(group, 5, seed)[rates.run]
-    _, unit = np.unique(group[rates.run], return_inverse=True)
     rng = np.random.default_rng([0x5C0E, seed])
-    signs = np.asarray(rng.integers(0, 2, (_FLIPS, int(unit.max()) + 1)) * 2 - 1, dtype=np.float64)
+    groups = _Units.drawn(group[rates.run], rng)
+    places = group if starts is None else _by_start(group, starts)
+    by_place = groups if places is group else _Units.drawn(places[rates.run], rng)
     most = np.full(_FLIPS, -np.inf)
     found: list[tuple[str, str, float, float]] = []
     for name, covariate in rates.covariates.items():
         bases = [_basis(covariate, name)] if name != "distance_m" else [_waves(covariate, p) for p in _PERIODS_M]
         bases = [basis for basis in bases if basis.shape[1]]
         label = name if name != "distance_m" else RANDOM_PHASE
-        for k, feature in enumerate(FEATURES):
-            value = rates.value[:, k]
+        unit = by_place if name in _PLACE else groups
+        for feature, value in _features(rates, name):
             best, strongest = None, -np.inf
             for basis in bases:
-                strength, by_chance = _strength(basis, value, rates.weight, unit, signs)
+                strength, by_chance = _strength(basis, value, rates.weight, unit)
                 np.maximum(most, by_chance, out=most)
                 if strength > strongest:
                     best, strongest = basis, strength
@@ -69,6 +85,37 @@ def dependences(rates: Rates, group: NDArray[np.int64], seed: int) -> list[Depen
         if share > LEAST_SHARE and (p_value := float(np.mean(np.r_[most >= strength, True]))) < ALPHA
     ]
     return sorted(significant, key=lambda d: -d.share)
+
+
+@dataclass(frozen=True)
+class _Units:
+    """What is independent: ``of`` each sample (n,) its unit, and random ``signs`` of the units (flips, units)."""
+
+    of: NDArray[np.int64]
+    signs: Floats
+
+    @classmethod
+    def drawn(cls, names: NDArray[np.int64], rng: np.random.Generator) -> _Units:
+        _, of = np.unique(names, return_inverse=True)
+        signs = np.asarray(rng.integers(0, 2, (_FLIPS, int(of.max()) + 1)) * 2 - 1, dtype=np.float64)
+        return cls(of, signs)
+
+
+def _by_start(group: NDArray[np.int64], starts: Floats) -> NDArray[np.int64]:
+    """Return units (R,): the runs of a group together where they began alike, else each by itself."""
+    alone = np.zeros(len(group), dtype=np.bool_)
+    for g in np.unique(group):
+        own = group == g
+        alone[own] = np.ptp(starts[own, :2], axis=0).max() > _ELSEWHERE_M
+    return group if not alone.any() else np.where(alone, len(group) + int(group.max()) + np.arange(len(group)), group)
+
+
+def _features(rates: Rates, covariate: str) -> list[tuple[str, Floats]]:
+    """Return what may depend on a covariate, (n,) each, by its name."""
+    features = list(zip(FEATURES, rates.value.T, strict=True))
+    # What pulls a vehicle towards a place moves it aside one way and back the other: only over the floor it is the
+    # same for all.
+    return features + [(DRIFT, value) for value in rates.drift.T] if covariate in _PLACE else features
 
 
 def _basis(covariate: Floats, name: str) -> Floats:
@@ -95,18 +142,18 @@ def _centred(basis: Floats, weight: Floats) -> Floats:
     return np.asarray(basis - np.average(basis, axis=0, weights=weight))
 
 
-def _strength(
-    basis: Floats, value: Floats, weight: Floats, unit: NDArray[np.int64], signs: Floats
-) -> tuple[float, Floats]:
-    """Return how strong a dependence is, −log p by χ², and the same for groups' scores with the `signs` given."""
+def _strength(basis: Floats, value: Floats, weight: Floats, unit: _Units) -> tuple[float, Floats]:
+    """Return how strong a dependence is, −log p by χ², and the same for units' scores with signs by chance."""
     centred = value - np.average(value, weights=weight)
-    scores = np.zeros((signs.shape[1], basis.shape[1]))
-    np.add.at(scores, unit, _centred(basis, weight) * (weight * centred)[:, None])
+    scores = np.zeros((unit.signs.shape[1], basis.shape[1]))
+    np.add.at(scores, unit.of, _centred(basis, weight) * (weight * centred)[:, None])
     size, turn = np.linalg.eigh(scores.T @ scores)
     kept = size > 1e-9 * max(size[-1], 1e-300)
     white = scores @ (turn[:, kept] / np.sqrt(size[kept]))
     dof = int(np.count_nonzero(kept))
-    return float(_surprise(np.sum(white.sum(axis=0) ** 2), dof)), _surprise(np.sum((signs @ white) ** 2, axis=1), dof)
+    return float(_surprise(np.sum(white.sum(axis=0) ** 2), dof)), _surprise(
+        np.sum((unit.signs @ white) ** 2, axis=1), dof
+    )
 
 
 def _surprise(square: Floats, dof: int) -> Floats:

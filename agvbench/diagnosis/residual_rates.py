@@ -34,6 +34,14 @@ class Rates:
         """Where the vehicle was (n, 2)."""
         return np.asarray(0.5 * (self.begin + self.end)[:, :2])
 
+    @property
+    def drift(self) -> Floats:
+        """What is missed on the way, as a drift over the floor (n, 2), in metres per metre driven."""
+        heading = 0.5 * (self.begin + self.end)[:, 2]
+        along, aside = (self.value[:, :2] * self.covariates["direction"][:, None]).T
+        cos, sin = np.cos(heading), np.sin(heading)
+        return np.column_stack([cos * along - sin * aside, sin * along + cos * aside])
+
 
 def residual_rates(readings: Readings, poses: Floats) -> Rates:
     """Return how fast measured and predicted motion part, per metre, with what it may depend on.

@@ -73,6 +73,23 @@ def test_a_dependence_is_found_with_its_covariate_first():
     assert first.p_value < ALPHA
 
 
+def test_what_pulls_towards_a_place_is_a_drift_that_depends_on_it():
+    rates = drives(7)
+    away = rates.middle - np.array([0.3, -0.2])
+    pull = np.where(np.hypot(*away.T) < 0.8, 0.04 / np.maximum(np.hypot(*away.T), 1e-9), 0.0)
+    cos, sin = np.cos(rates.begin[:, 2]), np.sin(rates.begin[:, 2])
+    dx, dy = -(pull[:, None] * away * rates.covariates["direction"][:, None]).T
+    rates.value[:, 0] += cos * dx + sin * dy
+    rates.value[:, 1] += cos * dy - sin * dx
+    assert rates.drift.shape == (RUNS * STEPS, 2)
+    elsewhere = rates.begin[::STEPS]
+    found = dependences(rates, GROUP, 0, elsewhere)
+    assert {(d.covariate, d.feature) for d in found} == {("x_m", "drift"), ("y_m", "drift")}
+    # Repeats that began alike are one piece of evidence, of which these are too few.
+    assert dependences(rates, GROUP, 0, np.zeros_like(elsewhere)) == dependences(rates, GROUP, 0) == []
+    assert dependences(drives(7), GROUP, 0, elsewhere) == []
+
+
 @pytest.mark.parametrize("period", [0.3, 0.45])
 def test_a_swing_with_another_phase_in_each_run_is_a_matter_of_distance(period):
     rates = drives(2)
