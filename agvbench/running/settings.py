@@ -89,6 +89,19 @@ class BenchSettings:
         known = {f.name for f in fields(cls)}
         return cls(**{name: value for name, value in options.items() if name in known})
 
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any]) -> BenchSettings:
+        """Return the settings that a file holds.
+
+        Raises
+        ------
+        TypeError
+            If it has others.
+        FlagError
+            If a value cannot be used.
+        """
+        return cls(**{**table, "benchmarks": tuple(map(str, table.get("benchmarks", ())))})
+
     def save(self, directory: Path) -> None:
         """Write the settings beside the campaign's tables."""
         (directory / SETTINGS_FILE).write_text(tomli_w.dumps(asdict(self)), encoding="utf-8")
@@ -105,7 +118,7 @@ class BenchSettings:
         path = directory / SETTINGS_FILE
         try:
             table = read_toml(path)
-            return cls(**table | {"benchmarks": tuple(map(str, table.get("benchmarks", ())))})
+            return cls.from_table(table)
         except FileNotFoundError:
             raise FileError("no bench session to resume", where=path, remedy="start anew without --resume") from None
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, TypeError) as error:

@@ -61,7 +61,7 @@ def _run(command: Sequence[str]) -> tuple[int, list[str]]:
             for line in process.stderr or ():
                 if line.startswith(_ERROR):
                     errors.append(line.removeprefix(_ERROR).strip())
-                else:
+                elif line.strip():
                     sys.stderr.write(line)
         except KeyboardInterrupt as interrupt:
             _end(process, interrupt)

@@ -77,7 +77,7 @@ def _newest() -> Path:
 
 def _load(path: Path) -> BenchSettings:
     try:
-        return BenchSettings(**read_toml(path))
+        return BenchSettings.from_table(read_toml(path))
     except FileNotFoundError:
         raise FileError("no loop to resume", where=path, remedy="start anew without --resume") from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, TypeError) as error:
