@@ -20,7 +20,8 @@ from agvbench.simulator.hidden import SealedTruth, sealed_truth, true_rivals
 from agvbench.simulator.hidden.catalogue import AND, CATALOGUE, NOTHING, recipes
 from agvbench.simulator.hidden.drawing import vehicle_of
 from agvbench.workflows.challenge_file import known_trials, write_trials
-from agvbench.workflows.challenge_scores import Scores, Trial, score
+from agvbench.workflows.challenge_scores import Scores, score
+from agvbench.workflows.challenge_trial import Trial
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -11,7 +11,8 @@ from typing import Any
 
 from agvbench.errors import FileError
 from agvbench.text_files import read_json
-from agvbench.workflows.challenge_scores import Trial, plain, score
+from agvbench.workflows.challenge_scores import plain, score
+from agvbench.workflows.challenge_trial import Trial
 from agvbench.workflows.writing import write_file
 
 SCHEMA = 1

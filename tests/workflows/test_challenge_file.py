@@ -13,7 +13,7 @@ from agvbench.errors import FileError, FlagError, PlantError
 from agvbench.workflows import challenge
 from agvbench.workflows.challenge import hold_trial, run_challenge
 from agvbench.workflows.challenge_file import known_trials, write_trials
-from agvbench.workflows.challenge_scores import Trial
+from agvbench.workflows.challenge_trial import Trial
 
 LAG = Trial(
     "steering_lag", 3, "library", ("steering_lag",), ("steering_lag",), (), False, False,

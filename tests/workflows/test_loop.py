@@ -16,8 +16,8 @@ from agvbench.errors import FileError, FlagError
 from agvbench.model import VehicleModel
 from agvbench.running.remainders import read_remainders
 from agvbench.running.settings import BenchSettings
-from agvbench.workflows.loop import _learned
 from agvbench.workflows.loop_settings import MODEL_ONLY, NO_TRIAL, opened, write
+from agvbench.workflows.loop_stages import learned
 
 PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
 
@@ -142,11 +142,11 @@ def test_what_is_tried_is_not_what_is_compared(driven):
 def test_less_may_be_learned(driven, tmp_path):
     directory = shutil.copytree(driven[0], tmp_path / "it")
     settings, said = BenchSettings.load(directory / "before"), []
-    assert _learned(directory, replace(settings, remainders=MODEL_ONLY), said.append) == ""
+    assert learned(directory, replace(settings, remainders=MODEL_ONLY), said.append) == ""
     shutil.rmtree(directory / "trial")
     (directory / "remainders.json").unlink()
-    learned = _learned(directory, replace(settings, remainders=NO_TRIAL), said.append)
-    assert read_remainders(learned) == read_remainders(str(directory / "remainders-before.json"))
+    known = learned(directory, replace(settings, remainders=NO_TRIAL), said.append)
+    assert read_remainders(known) == read_remainders(str(directory / "remainders-before.json"))
     assert not (directory / "trial").exists()
     assert [line.partition(": ")[2] for line in said] == ["--model-only", "--no-trial"]
 

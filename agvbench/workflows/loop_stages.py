@@ -1,0 +1,144 @@
+"""The stages of a loop between its two sessions: what is diagnosed, learned and planned, each kept in a file."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from agvbench.errors import FileError, FitError
+from agvbench.model import VehicleModel
+from agvbench.running.remainders import read_remainders
+from agvbench.running.settings import BenchSettings
+from agvbench.text_files import read_json
+from agvbench.workflows.loop_driving import Tell, drive, moved
+from agvbench.workflows.loop_plans import plans_of
+from agvbench.workflows.loop_settings import (
+    BEFORE,
+    DIAGNOSIS,
+    FIRST_REMAINDERS,
+    MODEL_ONLY,
+    NO_TRIAL,
+    PLANS,
+    REMAINDERS,
+    TRIAL,
+    VEHICLE,
+    write,
+)
+
+if TYPE_CHECKING:
+    from agvbench.diagnosis import Diagnosis
+
+TRYING = ("trial",)
+"""What is driven between the sessions: corrected plans, for what they still miss."""
+
+
+def drive_corrected(
+    directory: Path, session: str, names: Sequence[str], settings: BenchSettings, learned: str, tell: Tell
+) -> None:
+    """Drive a session with what was found and learned."""
+    models = {
+        "calibration": str((directory / BEFORE / VEHICLE).resolve()),
+        "corrected": str((directory / VEHICLE).resolve()),
+        "remainders": str(Path(learned).resolve()) if learned else "",
+    }
+    moved(directory / session, models)
+    drive(directory / session, names, settings, models, tell)
+
+
+def diagnosed(directory: Path, seed: int, tell: Tell) -> dict[str, Any]:
+    """Return the diagnosis, after writing it and the corrected vehicle, unless they are there already."""
+    from agvbench.campaign import Campaign
+    from agvbench.diagnosis import diagnose
+
+    path, vehicle = directory / DIAGNOSIS, directory / VEHICLE
+    if path.exists() and vehicle.exists():
+        content = _read(path)
+        tell(f"    {content['verdict']}, as found before")
+        return content
+    calibrated = VehicleModel.load(directory / BEFORE / VEHICLE) if (directory / BEFORE / VEHICLE).exists() else None
+    found = diagnose(Campaign.open(directory / BEFORE).check(), vehicle=calibrated, seed=seed, tell=lambda line: None)
+    model = found.model or calibrated
+    if model is None:
+        raise FitError("nothing to correct with", where=directory / BEFORE, value=found.why)
+    for line in _in_words(found):
+        tell(f"    {line}")
+    part = directory / f".{VEHICLE}.part"
+    model.save(part)
+    os.replace(part, vehicle)  # noqa: PTH105 - says what it does
+    write(path, found.to_text())
+    return _read(path)
+
+
+def _in_words(found: Diagnosis) -> list[str]:
+    from agvbench.workflows.diagnose import in_words
+
+    lines = [f"{found.verdict}: {found.why}", *(in_words(effect) for effect in found.effects)]
+    if found.model is None:
+        return [*lines, "no effect can be corrected: the condition corrected drives the calibrated maps"]
+    if found.depends_on:
+        covariates = ", ".join(d.covariate for d in found.depends_on[:3])
+        lines.append(f"what no effect explains is not corrected; it depends on {covariates}")
+    if not found.effects:
+        lines.append("no effect was named: the condition corrected drives maps fitted again")
+    return lines
+
+
+def learned(directory: Path, settings: BenchSettings, tell: Tell) -> str:
+    """Return the file of what the corrected model missed so far, after learning it unless it is there; "" for nothing.
+
+    First from the calibrated runs of the first session; then corrected plans are tried, for an effect that the model
+    lacks does something else on another way.
+    """
+    from agvbench.campaign import Campaign
+    from agvbench.workflows.loop_remainders import remainders
+
+    path = directory / REMAINDERS
+    if settings.remainders == MODEL_ONLY:
+        tell("3/5 corrected plans are not tried: --model-only")
+        return ""
+    if path.exists():
+        tell(f"3/5 what corrected plans miss was learned before: {path}")
+        return str(path)
+    model = VehicleModel.load(directory / VEHICLE)
+    known = remainders(Campaign.open(directory / BEFORE), model, "calibrated")
+    if settings.remainders == NO_TRIAL:
+        tell("3/5 corrected plans are not tried: --no-trial")
+    else:
+        tell(f"3/5 trying corrected plans, for what they still miss → {directory / TRIAL}")
+        _write_remainders(directory / FIRST_REMAINDERS, known)
+        drive_corrected(directory, TRIAL, TRYING, settings, str(directory / FIRST_REMAINDERS), tell)
+        known |= remainders(Campaign.open(directory / TRIAL), model, "corrected")
+    _write_remainders(path, known)
+    return str(path)
+
+
+def _write_remainders(path: Path, known: Mapping[str, Mapping[str, float]]) -> None:
+    write(path, json.dumps({"schema": 1, "remainders": known}, indent=2, allow_nan=False) + "\n")
+
+
+def planned(directory: Path, settings: BenchSettings, learned: str, tell: Tell) -> dict[str, Any]:
+    """Return what corrected plans make up for, after writing it, unless it is there already."""
+    path = directory / PLANS
+    if not path.exists():
+        content = plans_of(VehicleModel.load(directory / VEHICLE), settings.workspace, read_remainders(learned))
+        write(path, json.dumps({"schema": 1, "plans": content}, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    plans: dict[str, Any] = _read(path)["plans"]
+    for name, entry in plans.items():
+        if entry.get("problem"):
+            tell(f"    {name}: {entry['problem']}")
+        for sentence in entry.get("said", ()):
+            tell(f"    {name}: {sentence}")
+    return plans
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        content: dict[str, Any] = read_json(path)
+    except (OSError, ValueError) as error:
+        raise FileError(
+            "cannot be read", where=path, value=error, remedy="delete it; --resume makes it again"
+        ) from None
+    return content
