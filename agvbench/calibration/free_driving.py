@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from agvbench.calibration.drive_regression import DriveData, DriveRegression, regress_drive
 from agvbench.calibration.samples import Role, Sample
 from agvbench.calibration.source import HeaderLike
-from agvbench.calibration.windows import WINDOW_S, Windows, command_spread, cut_windows, held_command
+from agvbench.calibration.windows import WINDOW_S, Windows, command_spread, held_command, measured_windows
 from agvbench.errors import FitError
 from agvbench.types import Floats, Run
 from agvbench.vehicle.geometry import Geometry
@@ -58,7 +58,7 @@ def read_free_driving(runs: Sequence[Run], geometry: Geometry, header: HeaderLik
     FitError
         If no run has moving windows enough.
     """
-    drives = [_Drive(run, cut_windows(run, geometry)) for run in runs if run.is_ok and len(run.commands)]
+    drives = [_Drive(run, measured_windows(run, geometry)) for run in runs if run.is_ok and len(run.commands)]
     moving = [_Drive(d.run, d.windows.select(np.abs(d.windows.forward_mps) > _MOVES_MPS)) for d in drives]
     moving = [d for d in moving if len(d.windows)]
     total = sum(len(d.windows) for d in moving)

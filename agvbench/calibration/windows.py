@@ -39,7 +39,7 @@ class Windows:
         return Windows(*(getattr(self, f.name)[mask] for f in fields(self)))
 
 
-def cut_windows(run: Run, geometry: Geometry) -> Windows:
+def measured_windows(run: Run, geometry: Geometry) -> Windows:
     """Cut the clean frames of a run into windows of `WINDOW_S`, each overlapping half of the next.
 
     In each a parabola is fitted to x, y and heading over time; its slope in the middle is the velocity. Windows with

@@ -27,7 +27,7 @@ _CHECK_M = 0.02
 
 
 @dataclass(frozen=True)
-class Leg:
+class GearLeg:
     """A stretch of a way that is driven in one gear.
 
     Parameters
@@ -92,7 +92,7 @@ def way_back(
     radii_m: Sequence[float],
     leads_m: Sequence[float],
     gears: Sequence[bool] = (False, True),
-) -> list[Leg]:
+) -> list[GearLeg]:
     """Return the legs of the quickest way from `seen` to `start` (floor frame); the last ends with a straight.
 
     Parameters
@@ -144,7 +144,7 @@ def _cost(pieces: Sequence[Piece]) -> float:
     return length_of(pieces) + _CUSP_M * cusps
 
 
-def _legs(pieces: Sequence[Piece], here: Pose) -> list[Leg]:
+def _legs(pieces: Sequence[Piece], here: Pose) -> list[GearLeg]:
     legs = []
     for backward, gear in itertools.groupby(pieces, key=lambda piece: piece.backward):
         leg = _leg(list(gear), here, STEP_M, backward=backward)
@@ -153,7 +153,7 @@ def _legs(pieces: Sequence[Piece], here: Pose) -> list[Leg]:
     return legs
 
 
-def _leg(pieces: Sequence[Piece], here: Pose, step_m: float, *, backward: bool) -> Leg:
+def _leg(pieces: Sequence[Piece], here: Pose, step_m: float, *, backward: bool) -> GearLeg:
     """Return a leg with a point every `step_m` or so; the last is its end, and the course does not jump."""
     points, distances, curvatures = [np.array([here])], [np.zeros(1)], []
     for piece in pieces:
@@ -168,4 +168,4 @@ def _leg(pieces: Sequence[Piece], here: Pose, step_m: float, *, backward: bool) 
         distances.append(distances[-1][-1] + on)
         curvatures += [curvature] * len(on)
     bends = np.array([*curvatures, curvatures[-1]])
-    return Leg(np.concatenate(points), np.concatenate(distances), bends, backward)
+    return GearLeg(np.concatenate(points), np.concatenate(distances), bends, backward)

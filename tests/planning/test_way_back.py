@@ -13,7 +13,7 @@ from agvbench.errors import PlanError
 from agvbench.planning import Workspace
 from agvbench.planning.paths import end_of, length_of
 from agvbench.planning.reeds_shepp import paths_by_length, shortest_path
-from agvbench.planning.way_back import Guided, Leg, way_back
+from agvbench.planning.way_back import GearLeg, Guided, way_back
 from agvbench.types import Pose, wrap_angle
 from agvbench.vehicle.geometry import Geometry
 
@@ -23,7 +23,7 @@ RADII, LEADS = (0.9, 0.6, 0.45), (0.8, 0.6, 0.4)
 POSES = st.builds(Pose, st.floats(-1.9, 1.9), st.floats(-1.4, 1.4), st.floats(-math.pi, math.pi))
 
 
-def driven(leg: Leg, start: np.ndarray) -> np.ndarray:
+def driven(leg: GearLeg, start: np.ndarray) -> np.ndarray:
     """Integrate curvature over distance from `start`; return where it leads."""
     x, y, course = start
     sign = -1.0 if leg.backward else 1.0

@@ -15,7 +15,7 @@ from agvbench.adapters import open_rig
 from agvbench.errors import AgvbenchError, PlacingError, SafetyStopError
 from agvbench.model import VehicleModel, nominal_model, thesis_vehicle
 from agvbench.planning import Workspace
-from agvbench.planning.way_back import Leg
+from agvbench.planning.way_back import GearLeg
 from agvbench.running.returning.follower import Follower
 from agvbench.running.returning.returner import Returner
 from agvbench.running.supervision import Supervisor
@@ -105,7 +105,7 @@ def test_where_there_is_no_way_nothing_moves() -> None:
 def test_errors_die_off_without_overshoot_in_either_gear(offset_m: float, *, backward: bool) -> None:
     along, sign = np.linspace(0.0, 3.0, 601), -1.0 if backward else 1.0
     points = np.column_stack([sign * along, np.zeros((601, 2))])
-    follower = Follower(Leg(points, along, np.zeros(601), backward), 0.2)
+    follower = Follower(GearLeg(points, along, np.zeros(601), backward), 0.2)
     x, y, heading, offsets = 0.0, offset_m, 0.0, []
     for _ in range(1400):
         curvature = follower.guide(Pose(x, y, heading), 0.0).curvature_per_m

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from agvbench.planning.way_back import STEP_M, Leg
+from agvbench.planning.way_back import STEP_M, GearLeg
 from agvbench.types import Pose, wrap_angle
 
 _AHEAD_M = 0.3
@@ -35,7 +35,7 @@ class Guidance:
 class Follower:
     """Follows one leg; `goal_crab_rad` is the crab angle for which its end was planned, if it ends at the goal."""
 
-    def __init__(self, leg: Leg, length_m: float, *, goal_crab_rad: float | None = None) -> None:
+    def __init__(self, leg: GearLeg, length_m: float, *, goal_crab_rad: float | None = None) -> None:
         self._leg, self._length_m, self._planned = leg, length_m, goal_crab_rad
         self._index = 0
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 
 from agvbench.errors import PlacingError
-from agvbench.planning.way_back import Guided, Leg
+from agvbench.planning.way_back import GearLeg, Guided
 from agvbench.running.returning.follower import Follower, Guidance
 from agvbench.running.returning.habits import Habits
 from agvbench.running.returning.helm import Helm
@@ -29,7 +29,7 @@ class LegDrive:
 
     def __init__(
         self,
-        leg: Leg,
+        leg: GearLeg,
         reins: Reins,
         helm: Helm,
         habits: Habits,

@@ -7,7 +7,7 @@ import math
 from agvbench.errors import PlacingError, PlanError
 from agvbench.model import VehicleModel
 from agvbench.planning import Workspace
-from agvbench.planning.way_back import Guided, Leg, way_back
+from agvbench.planning.way_back import GearLeg, Guided, way_back
 from agvbench.running.links import RunnerLink
 from agvbench.running.rest import is_at_rest, pose_before
 from agvbench.running.returning.aim import Aim
@@ -120,7 +120,7 @@ class Returner:
                 return aim.begin_anew()
         return aim.took(legs[-1].backward)
 
-    def _way(self, seen: Pose, aim: Aim, crab_rad: float) -> list[Leg]:
+    def _way(self, seen: Pose, aim: Aim, crab_rad: float) -> list[GearLeg]:
         geometry, radius_m = self._helm.model.geometry, self._helm.radius_m
         guided = Guided(geometry, self._helm.ahead_m, crab_rad)
         radii_m = [share * radius_m for share in _RADII]
