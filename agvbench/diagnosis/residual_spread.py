@@ -19,18 +19,20 @@ from agvbench.types import Floats
 
 @dataclass(frozen=True)
 class EndSpread:
-    """Covariances (R, 3, 3) in each run's start frame [m, m, rad], at its last sample.
+    """How far each run's last sample may be off, in its start frame [m, m, rad].
 
-    ``own``: of run and frame, drawn anew with each repeat; ``shared`` by all repeats of a command: what the fitted
-    parameters may be off by.
+    ``own`` (R, 3, 3): covariance of run and frame, drawn anew with each repeat; ``slopes`` (R, 3, P) by the fitted
+    parameters, and ``parameters`` (P, P), what these may be off by: that is shared, by repeats of a command and by all
+    commands that meet in a parameter.
     """
 
     own: Floats
-    shared: Floats
+    slopes: Floats
+    parameters: Floats
 
     def select(self, chosen: NDArray[np.bool_]) -> EndSpread:
         """Return those of the runs that a mask chooses."""
-        return EndSpread(self.own[chosen], self.shared[chosen])
+        return EndSpread(self.own[chosen], self.slopes[chosen], self.parameters)
 
 
 def end_spread(every: Predictor, fitted: Fit) -> EndSpread:
@@ -48,4 +50,4 @@ def end_spread(every: Predictor, fitted: Fit) -> EndSpread:
     scatter = fitted.scatter
     frame = np.diag(np.square([scatter.position_m, scatter.position_m, scatter.heading_rad]))
     own = (a * priors(every, scatter)[:, None, :] ** 2) @ a.transpose(0, 2, 1) + frame
-    return EndSpread(own, j @ fitted.covariance @ j.transpose(0, 2, 1))
+    return EndSpread(own, j, fitted.covariance)

@@ -119,10 +119,10 @@ def lack_of_fit(missed: Misses, group: NDArray[np.int64], spread: EndSpread | No
     """Return a p-value that what is missed is the same for all groups of repeats: lack of fit against pure error.
 
     The unit is the run. From each run come three numbers (where it ended: along, across, heading), in units of how far
-    it may end from its prediction by the scatter that was fitted, which is not the same for a straight and a slalom;
-    what the parameters may be off by is added for the mean of a group. Between and within groups they are compared by
-    F, so that the size of the scatter itself does not matter. Without `spread` all runs scatter alike. None without
-    repeats.
+    it may end from its prediction by the scatter that was fitted, which is not the same for a straight and a slalom.
+    The means of groups may also be off, and together, by what the parameters may be: two commands with a level in
+    common share its error, and are not two pieces of evidence. Between and within groups they are compared by F, so
+    that the size of the scatter itself does not matter. Without `spread` all runs scatter alike. None without repeats.
     """
     from scipy import special
 
@@ -133,22 +133,26 @@ def lack_of_fit(missed: Misses, group: NDArray[np.int64], spread: EndSpread | No
     rows = np.arange(len(group))
     last = missed.seen.shape[1] - 1 - np.argmax(missed.seen[:, ::-1], axis=1)
     ends = missed.path[rows, last]
-    means = np.array([ends[index == g].mean(axis=0) for g in range(len(names))])
+    means = _by_group(ends, index)
     apart = ends - means[index]
     if spread is None:
-        own = np.broadcast_to(apart.T @ apart / (len(group) - len(names)) + np.eye(3) * _LEAST**2, (len(group), 3, 3))
-        shared = np.zeros_like(own)
+        alike = apart.T @ apart / (len(group) - len(names)) + np.eye(3) * _LEAST**2
+        own, shared = np.broadcast_to(alike, (len(names), 3, 3)), np.zeros((between_dof, between_dof))
     else:
-        own, shared = spread.own, spread.shared
-    within = between = 0.0
-    for g, size in enumerate(sizes):
-        runs = index == g
-        scatter = own[runs].mean(axis=0)
-        within += float(np.sum(_white(scatter, apart[runs].T) ** 2))
-        between += float(np.sum(_white(scatter / size + shared[runs].mean(axis=0), means[g]) ** 2))
+        own, slopes = _by_group(spread.own, index), _by_group(spread.slopes, index).reshape(between_dof, -1)
+        shared = slopes @ spread.parameters @ slopes.T
+    within = sum(float(np.sum(_white(own[g], apart[index == g].T) ** 2)) for g in range(len(names)))
     if within <= 0.0:
         return 1.0
+    for g, size in enumerate(sizes):
+        shared[3 * g : 3 * g + 3, 3 * g : 3 * g + 3] += own[g] / size
+    between = float(np.sum(_white(shared, means.ravel()) ** 2))
     return float(special.fdtrc(between_dof, within_dof, between / between_dof / (within / within_dof)))
+
+
+def _by_group(values: Floats, index: NDArray[np.int64]) -> Floats:
+    """Return the mean of runs' values (R, …) in each group (G, …)."""
+    return np.array([values[index == g].mean(axis=0) for g in range(int(index.max()) + 1)])
 
 
 def _white(covariance: Floats, values: Floats) -> Floats:

@@ -1,8 +1,11 @@
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
+from agvbench.diagnosis.residual_spread import EndSpread
 from agvbench.diagnosis.residuals import Misses, floor, lack_of_fit
 
 GROUP = np.repeat(np.arange(40), 4)
@@ -44,3 +47,19 @@ def test_scatter_alone_is_no_lack_of_fit():
 
 def test_what_repeats_have_in_common_is_lack_of_fit():
     assert lack_of_fit(scattered(4, scatter_m=0.004, common_m=0.004), GROUP) < 1e-6
+
+
+def test_commands_that_share_a_value_of_the_maps_share_its_error():
+    """Thirty commands in groups of ten turn with one of three values, each of which is off by what it may be."""
+    group = np.repeat(np.arange(30), 2)
+    slopes = np.zeros((60, 3, 3))
+    slopes[np.arange(60), 2, group // 10] = 1.0
+    spread = EndSpread(np.broadcast_to(np.diag([1e-6, 1e-6, 4e-4]), (60, 3, 3)), slopes, np.eye(3) * 2e-4)
+    p_values = []
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        ends = rng.multivariate_normal(np.zeros(3), spread.own[0], 60) + slopes @ rng.normal(0.0, math.sqrt(2e-4), 3)
+        missed = Misses(ends[:, None, :], np.ones((60, 1), dtype=bool), ends[:, 0], ends[:, 2])
+        p_values.append(lack_of_fit(missed, group, spread))
+    assert np.mean(np.array(p_values) < 0.05) < 0.11
+    assert np.mean(np.array(p_values) < 0.5) > 0.35
