@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from agvbench.diagnosis.asked import Asked
 from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.candidates import bounds_of, candidates
-from agvbench.diagnosis.dependences import RANDOM_PHASE, Dependence, dependences
+from agvbench.diagnosis.dependences import ALPHA, LIKELY, RANDOM_PHASE, Dependence, dependences
 from agvbench.diagnosis.empirical import Explained, described, term_candidates, with_term_first
 from agvbench.diagnosis.estimates import named_effects
 from agvbench.diagnosis.forms import BEYOND, form_candidates
@@ -73,6 +73,8 @@ def conclude(
     known = candidates() | term_candidates() | form_candidates()
     effects = named_effects(selection, bounds_of(known, selection.chosen.names)) + map_effects(fit, asked.vehicle)
     significant = explained is not None or _is_significant(judged, rest)
+    if significant and not rest:
+        rest = _what_is_left(batch, poses, explained, asked.seed, LIKELY)
     verdict, why = _verdict(effects, significant, rest, explained)
     found = Diagnosis(
         verdict,
@@ -103,13 +105,15 @@ def _poses_before(vehicle: VehicleModel | None, batch: Batch, selection: Selecti
     return np.array(vehicle.rollout([run.commands for run in readings.runs], readings.start, list(readings.t_s)))
 
 
-def _what_is_left(batch: Batch, poses: Floats, explained: Explained | None, seed: int) -> list[Dependence]:
+def _what_is_left(
+    batch: Batch, poses: Floats, explained: Explained | None, seed: int, alpha: float = ALPHA
+) -> list[Dependence]:
     """Return what the rest depends on: that of the model without an empirical term, whose own covariate comes first."""
     readings, unexplained = batch.readings, poses
     if explained is not None:
         without = explained.without
         unexplained = Predictor(batch, without.names).predict(without.fit.parameters)
-    rest = dependences(residual_rates(readings, unexplained), readings.group, seed, readings.start)
+    rest = dependences(residual_rates(readings, unexplained), readings.group, seed, readings.start, alpha=alpha)
     # A place passed through in every run can look like a swing: it is looked for in what the term leaves.
     if (swings := swing(residual_rates(readings, poses), readings.group, seed)) is not None:
         rest = [swings, *(d for d in rest if d.covariate != RANDOM_PHASE)]

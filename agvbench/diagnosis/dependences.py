@@ -14,6 +14,9 @@ from agvbench.types import Floats
 ALPHA = 1e-3
 """A dependence is significant below this, corrected for all that were looked at."""
 
+LIKELY = 0.05
+"""Below this it is worth saying where structure is known to remain."""
+
 LEAST_SHARE = 0.02
 RANDOM_PHASE = "distance_modulo_period_m"
 DRIFT = "drift"
@@ -37,7 +40,9 @@ class Dependence:
     share: float
 
 
-def dependences(rates: Rates, group: NDArray[np.int64], seed: int, starts: Floats | None = None) -> list[Dependence]:
+def dependences(
+    rates: Rates, group: NDArray[np.int64], seed: int, starts: Floats | None = None, *, alpha: float = ALPHA
+) -> list[Dependence]:
     """Return what the residual significantly depends on, the largest share first.
 
     For each feature and covariate (and for the drift over the floor and the place): least squares on a smooth curve,
@@ -57,6 +62,8 @@ def dependences(rates: Rates, group: NDArray[np.int64], seed: int, starts: Float
         Draws signs and folds.
     starts
         (R, 3): where runs began. Repeats that began elsewhere tell of the place each by itself.
+    alpha
+        Level of significance.
     """
     fold = folds(group, 5, seed)[rates.run]
     rng = np.random.default_rng([0x5C0E, seed])
@@ -82,7 +89,7 @@ def dependences(rates: Rates, group: NDArray[np.int64], seed: int, starts: Float
     significant = [
         Dependence(label, feature, p_value, share)
         for label, feature, strength, share in found
-        if share > LEAST_SHARE and (p_value := float(np.mean(np.r_[most >= strength, True]))) < ALPHA
+        if share > LEAST_SHARE and (p_value := float(np.mean(np.r_[most >= strength, True]))) < alpha
     ]
     return sorted(significant, key=lambda d: -d.share)
 

@@ -11,7 +11,7 @@ from tiny_vehicle import FRONT_M, REAR_M, Tiny, campaign_runs
 
 from agvbench.diagnosis import Verdict, diagnose, terms
 from agvbench.diagnosis.contradictions import refuse_contradictions
-from agvbench.diagnosis.dependences import ALPHA, RANDOM_PHASE, dependences
+from agvbench.diagnosis.dependences import ALPHA, LIKELY, RANDOM_PHASE, dependences
 from agvbench.diagnosis.empirical import gain_p_value
 from agvbench.diagnosis.empirical_regression import Steering
 from agvbench.diagnosis.empirical_screen import Start, screen
@@ -88,6 +88,15 @@ def test_what_pulls_towards_a_place_is_a_drift_that_depends_on_it():
     # Repeats that began alike are one piece of evidence, of which these are too few.
     assert dependences(rates, GROUP, 0, np.zeros_like(elsewhere)) == dependences(rates, GROUP, 0) == []
     assert dependences(drives(7), GROUP, 0, elsewhere) == []
+
+
+def test_where_structure_is_known_to_remain_what_is_likely_is_found_too():
+    rates = drives(1)
+    rates.value[:, 0] += 0.012 * np.sin(2.0 * rates.covariates["x_m"])
+    assert dependences(rates, GROUP, 0) == []
+    (likely,) = dependences(rates, GROUP, 0, alpha=LIKELY)
+    assert (likely.covariate, likely.feature) == ("x_m", "speed")
+    assert ALPHA < likely.p_value < LIKELY
 
 
 @pytest.mark.parametrize("period", [0.3, 0.45])
