@@ -69,13 +69,16 @@ def conclude(
     judged = _judge(readings, held, before, poses, end_spread(every, fit))
     if judged is None:
         return asked.cannot_tell(readings, "there are no repeats among the runs held out or fitted, and so no floor")
-    rest = _what_is_left(batch, poses, explained, asked.seed)
+    rest, likely = _what_is_left(batch, poses, explained, asked.seed)
     known = candidates() | term_candidates() | form_candidates()
     effects = named_effects(selection, bounds_of(known, selection.chosen.names)) + map_effects(fit, asked.vehicle)
     significant = explained is not None or _is_significant(judged, rest)
-    if significant and not rest:
-        rest = _what_is_left(batch, poses, explained, asked.seed, LIKELY)
     verdict, why = _verdict(effects, significant, rest, explained)
+    if significant and not rest and likely:
+        rest, why = (
+            likely,
+            f"structure remains that no effect explains: it is likely to depend on {likely[0].covariate}",
+        )
     found = Diagnosis(
         verdict,
         why,
@@ -106,18 +109,23 @@ def _poses_before(vehicle: VehicleModel | None, batch: Batch, selection: Selecti
 
 
 def _what_is_left(
-    batch: Batch, poses: Floats, explained: Explained | None, seed: int, alpha: float = ALPHA
-) -> list[Dependence]:
-    """Return what the rest depends on: that of the model without an empirical term, whose own covariate comes first."""
+    batch: Batch, poses: Floats, explained: Explained | None, seed: int
+) -> tuple[list[Dependence], list[Dependence]]:
+    """Return what the rest depends on, and what it is likely to.
+
+    It is the rest of the model without an empirical term, whose own covariate comes first.
+    """
     readings, unexplained = batch.readings, poses
     if explained is not None:
         without = explained.without
         unexplained = Predictor(batch, without.names).predict(without.fit.parameters)
-    rest = dependences(residual_rates(readings, unexplained), readings.group, seed, readings.start, alpha=alpha)
+    rates = residual_rates(readings, unexplained)
+    likely = dependences(rates, readings.group, seed, readings.start, alpha=LIKELY)
+    rest = [d for d in likely if d.p_value < ALPHA]
     # A place passed through in every run can look like a swing: it is looked for in what the term leaves.
     if (swings := swing(residual_rates(readings, poses), readings.group, seed)) is not None:
         rest = [swings, *(d for d in rest if d.covariate != RANDOM_PHASE)]
-    return rest if explained is None else with_term_first(rest, explained)
+    return (rest if explained is None else with_term_first(rest, explained)), likely
 
 
 def _how_it_was_fitted(selection: Selection, readings: Readings) -> dict[str, object]:

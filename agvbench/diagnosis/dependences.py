@@ -91,7 +91,12 @@ def dependences(
         for label, feature, strength, share in found
         if share > LEAST_SHARE and (p_value := float(np.mean(np.r_[most >= strength, True]))) < alpha
     ]
-    return sorted(significant, key=lambda d: -d.share)
+    significant.sort(key=lambda d: -d.share)
+    # Along x and along y drifts have one name: the stronger stands for both.
+    strongest_first: dict[tuple[str, str], Dependence] = {}
+    for d in significant:
+        strongest_first.setdefault((d.covariate, d.feature), d)
+    return list(strongest_first.values())
 
 
 @dataclass(frozen=True)

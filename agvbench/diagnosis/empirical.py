@@ -131,10 +131,7 @@ def _best_term(wide: Selector, root: Scored, starts: list[Start]) -> tuple[Score
         values = np.clip(start.values, kind.bounds[:, 0], kind.bounds[:, 1])
         foremost = start is starts[0]
         wide.candidates[start.term.name] = replace(kind, starts=values, screened=True, foremost=foremost)
-        try:
-            offer = wide.grown(root, start.term.name)
-        except np.linalg.LinAlgError:
-            continue  # a shape that runs away to where nothing can be predicted describes nothing
+        offer = wide.grown(root, start.term.name)
         if wide.earns(root, offer) and (best is None or offer.total < best[0].total):
             best = offer, start.term
     return best

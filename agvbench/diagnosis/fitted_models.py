@@ -102,20 +102,26 @@ class FittedModels:
         key = tuple(sorted(names))
         if key in self._known:
             return self._known[key]
-        predictor = self._predictor(names)
+        try:
+            return self._grown(current, self._predictor(names), self.candidates[name])
+        except np.linalg.LinAlgError:
+            # What runs away to where nothing can be predicted describes nothing.
+            return replace(current, names=names)
+
+    def _grown(self, current: Scored, predictor: Predictor, candidate: Candidate) -> Scored:
+        names, now = predictor.effects, current.fit
         bounds = bounds_of(self.candidates, names)
-        candidate, now = self.candidates[name], current.fit
         promises = [promised_gain(now, predictor, start, candidate.bounds) for start in candidate.starts]
-        best = int(np.argmax(promises))
-        if promises[best] < _HOPELESS:
+        promise = max(promises)
+        if promise < _HOPELESS:
             return replace(current, names=names)  # as good as without it, and never chosen
         ordered = [candidate.starts[k] for k in np.argsort(promises)[::-1]]
-        believed = candidate.screened and promises[best] > _LIKELY
-        short = self._begun(current, predictor, ordered, bounds, _KEPT * promises[best] if believed else None)
+        believed = candidate.screened and promise > _LIKELY
+        short = self._begun(current, predictor, ordered, bounds, _KEPT * promise if believed else None)
         # What promises much may have to climb first: maps that took up a cause must give it back before it shows.
-        if promises[best] < _LIKELY and float(now.loss.sum() - short.loss.sum()) < _HOPELESS:
+        if promise < _LIKELY and float(now.loss.sum() - short.loss.sum()) < _HOPELESS:
             self.tried += 1
-            self._known[key] = Scored(names, short, cross_validated(short, self._fold, bounds))
+            self._known[tuple(sorted(names))] = Scored(names, short, cross_validated(short, self._fold, bounds))
         return self.score(names, short.parameters, short, patient=believed and candidate.foremost)
 
     def _begun(

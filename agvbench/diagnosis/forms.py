@@ -191,12 +191,19 @@ def _offers(wide: Selector, current: Scored, law: _Law) -> list[Scored]:
 
 def _best(wide: Selector, current: Scored, offers: list[Scored]) -> Scored:
     """Return the best offer; one with fewer effects than `current` has to do as well as it, not better."""
-    best = min((current, *offers), key=lambda offer: offer.total + LEAST_GAIN * len(offer.names))
-    fewer = len(best.names) < len(current.names)
-    if best is current or best.gain_over(current) <= (-LEAST_GAIN if fewer else LEAST_GAIN):
+    worthy = [offer for offer in offers if _does(offer, current)]
+    best = min((current, *worthy), key=lambda offer: offer.total + LEAST_GAIN * len(offer.names))
+    if best is current:
         return current
     wide.tell(f"{' + '.join(best.names)}: another law gains {current.total - best.total:.0f}")
     return best
+
+
+def _does(offer: Scored, current: Scored) -> bool:
+    """Whether an offer is better than `current` or, with fewer effects, predicts about as well."""
+    if len(offer.names) < len(current.names):
+        return offer.total < current.total + LEAST_GAIN
+    return offer.gain_over(current) > LEAST_GAIN
 
 
 def _swapped(wide: Selector, current: Scored, out: set[str], form: str) -> Scored:

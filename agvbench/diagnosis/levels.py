@@ -100,11 +100,12 @@ def _told(runs: Sequence[Run], role: str, neutral: float) -> tuple[Floats, Float
     """Return every command (n,) with which the vehicle drove, and for how long each was held [s]."""
     told, held_s = [], []
     for run in runs:
-        commands, last_s = run.commands, float(np.max(run.frames.t_s, initial=-np.inf))
-        until_s = np.append(commands.t_s[1:], max(last_s, commands.t_s[-1]))
-        driven = _driven_rows(commands, neutral)
-        told.append(getattr(commands, role)[driven])
-        held_s.append((until_s - commands.t_s)[driven])
+        values, t_s, driven = getattr(run.commands, role), run.commands.t_s, _driven_rows(run.commands, neutral)
+        # A row begins where any command changes: this one may be held over many.
+        begins = np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
+        ends_s = np.append(t_s[begins[1:]], max(float(np.max(run.frames.t_s, initial=-np.inf)), t_s[-1]))
+        told.append(values[driven])
+        held_s.append(np.repeat(ends_s - t_s[begins], np.diff(np.append(begins, len(values))))[driven])
     return np.concatenate(told), np.concatenate(held_s)
 
 

@@ -19,7 +19,8 @@ class Rates:
     """The residual per metre driven, between successive samples.
 
     ``run`` (n,) its run; ``value`` (n, 3): share of the distance that is missed along and to the left, and curvature
-    missed [1/m]; ``weight`` (n,) metres; ``covariates`` by name (n,); ``begin`` and ``end`` (n, 3) measured poses.
+    missed [1/m]; ``weight`` (n,) metres; ``covariates`` by name (n,); ``begin`` and ``end`` (n, 3) measured poses;
+    ``step`` (n,) the number of the sample at its end, the same in repeats.
     """
 
     run: NDArray[np.int64]
@@ -28,6 +29,7 @@ class Rates:
     covariates: dict[str, Floats]
     begin: Floats
     end: Floats
+    step: NDArray[np.int64]
 
     @property
     def middle(self) -> Floats:
@@ -60,7 +62,7 @@ def residual_rates(readings: Readings, poses: Floats) -> Rates:
     steps_p = _body_steps(predicted[rows, last[:, :-1]], predicted[:, 1:])
     length = np.hypot(steps_p[..., 0], steps_p[..., 1])
     use = np.isfinite(steps_m).all(axis=-1) & (length > _STILL_M)
-    run = np.nonzero(use)[0]
+    run, step = np.nonzero(use)
     size = length[use]
     direction = np.sign(steps_p[..., 0])[use]
     # By the way driven, forward counted positive: a trim of the axles is the same backward as forward.
@@ -80,7 +82,7 @@ def residual_rates(readings: Readings, poses: Floats) -> Rates:
         "sideslip": direction * steps_p[..., 1][use] / size,
         "distance_m": driven,
     }
-    return Rates(run, value, size, covariates, begin[use], measured[:, 1:][use])
+    return Rates(run, value, size, covariates, begin[use], measured[:, 1:][use], step)
 
 
 def _body_steps(begin: Floats, end: Floats) -> Floats:

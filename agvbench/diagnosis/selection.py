@@ -72,7 +72,7 @@ class Selector(FittedModels):
         rejected: dict[str, float] = {}
         while len(current.names) < len(self.given) + _MOST_EFFECTS:
             offers = {name: self.grown(current, name) for name in self.candidates if name not in current.names}
-            rejected = {name: current.total - offer.total for name, offer in offers.items()}
+            rejected = {name: offer.gain_over(current) for name, offer in offers.items()}
             worthy = {name: offer for name, offer in offers.items() if self.earns(current, offer)}
             if not worthy:
                 break

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import reduce
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,15 +28,9 @@ def swing(rates: Rates, group: NDArray[np.int64], seed: int) -> Dependence | Non
     whatever its shape, and is taken off before.
     """
     rng = np.random.default_rng([0x5F15, seed])
-    counts = np.bincount(rates.run, minlength=len(group))
-    repeated = np.bincount(group, weights=counts >= _LEAST_STEPS)[group] > 1
-    runs = [rates.run == run for run in np.flatnonzero((counts >= _LEAST_STEPS) & repeated)]
     best: Dependence | None = None
     for feature in ("speed", "turning"):
-        value = _of_its_own(rates.value[:, FEATURES.index(feature)], rates.run, group)
-        rests = _none_too_loud(
-            [_bent(rates.covariates["distance_m"][own], rates.weight[own], value[own]) for own in runs]
-        )
+        rests = _none_too_loud([_bent(*contrast) for contrast in _contrasts(rates, feature, group)])
         total = sum(float(rest @ rest) for rest, _ in rests)
         if total <= 0.0:
             continue
@@ -51,13 +48,25 @@ def swing(rates: Rates, group: NDArray[np.int64], seed: int) -> Dependence | Non
     return best if best is not None and best.p_value < _SWING_ALPHA else None
 
 
-def _of_its_own(value: Floats, run: NDArray[np.int64], group: NDArray[np.int64]) -> Floats:
-    """Return what each run has (n,) beyond the mean of its group's runs at the same step."""
-    first = np.searchsorted(run, run)  # the samples of a run lie together
-    _, place = np.unique(np.column_stack([group[run], np.arange(len(run)) - first]), axis=0, return_inverse=True)
-    count = np.bincount(place)[place]
-    mean = np.bincount(place, weights=value)[place] / count
-    return np.where(count > 1, (value - mean) * np.sqrt(count / np.maximum(count - 1, 1)), 0.0)
+def _contrasts(rates: Rates, feature: str, group: NDArray[np.int64]) -> Iterator[tuple[Floats, Floats, Floats]]:
+    """Yield distance, weight and value (k,) of what repeats do not share: for each group one series less than runs.
+
+    Each is a Helmert contrast of the runs at the same steps: waves of one period in them are one wave of that period.
+    """
+    value, distance = rates.value[:, FEATURES.index(feature)], rates.covariates["distance_m"]
+    for g in np.unique(group):
+        rows = [np.flatnonzero(rates.run == run) for run in np.flatnonzero(group == g)]
+        rows = [own for own in rows if len(own) >= _LEAST_STEPS]
+        if len(rows) < 2:
+            continue
+        steps = reduce(np.intersect1d, [rates.step[own] for own in rows])
+        if len(steps) < _LEAST_STEPS:
+            continue
+        rows = [own[np.isin(rates.step[own], steps)] for own in rows]
+        values = np.array([value[own] for own in rows])
+        for n in range(1, len(rows)):
+            own = rows[n]
+            yield distance[own], rates.weight[own], (values[:n].mean(axis=0) - values[n]) * np.sqrt(n / (n + 1.0))
 
 
 def _none_too_loud(rests: list[tuple[Floats, Floats]]) -> list[tuple[Floats, Floats]]:

@@ -10,7 +10,7 @@ WINDOW_S = 0.4
 SPEED_LIMIT_MPS = 0.01
 _FEWEST_FRAMES = 4
 LEAST_RATE_HZ = (_FEWEST_FRAMES + 1) / (WINDOW_S / 2)
-"""A camera that looks less often than this can never say so."""
+"""A camera that looks less often than this cannot lose a frame and still say so."""
 
 
 def is_at_rest(frames: Frames, *, until_s: float, window_s: float = WINDOW_S) -> bool:

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 BENCHMARKS = ("calibration", "trajectories", "step_response", "free_driving")
 _PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
 _POSITION = "position_rms_mm"
+_ERROR = "ERROR"
 PAIRS = (
     "steering_lag_and_lateral_slip", "speed_lag_and_cornering_speed_loss", "axle_coupling_and_battery_droop",
     "actuation_delay_and_reverse_steering_gain", "steering_lag_and_slow_patch", "speed_lag_and_floor_seam",
@@ -75,7 +76,9 @@ def run_challenge(
         except PlantError as error:
             raise FlagError(error.what, where="--only", value=error.value, limit=error.limit) from None
     file = None if json_file is None else Path(json_file)
-    done = known_trials(file, repeats) if resume and file is not None and file.exists() else {}
+    known = known_trials(file, repeats) if resume and file is not None and file.exists() else {}
+    # What ended with an error may have met a full disk: it is tried again.
+    done = {one: trial for one, trial in known.items() if trial.verdict != _ERROR}
     wanted = [(s, n) for n in range(first_seed, first_seed + seeds) for s in specs or (NOTHING, *CATALOGUE, *PAIRS)]
     missing = [one for one in wanted if one not in done]
     for trial in _held(missing, repeats, jobs or os.cpu_count() or 1):
@@ -101,11 +104,12 @@ def hold_trial(spec: str, seed: int, repeats: int) -> Trial:
             _drive(spec, seed, repeats, directory)
             began = time.process_time()
             found, failed = diagnose(Campaign.open(directory)), False
-        except AgvbenchError as error:  # hours of other trials must not be lost for one that has no answer
+        # Hours of other trials must not be lost for one that has no answer, be it for a mistake of agvbench itself.
+        except (AgvbenchError, ArithmeticError, ValueError) as error:
             found, failed = Diagnosis(Verdict.NOT_IDENTIFIABLE, str(error)), True
         seconds = time.process_time() - began
     trial = unsealed(spec, seed, sealed_truth(spec, seed), found, seconds)
-    return replace(trial, verdict="ERROR") if failed else trial
+    return replace(trial, verdict=_ERROR) if failed else trial
 
 
 def unsealed(spec: str, seed: int, truth: SealedTruth, found: Diagnosis, seconds: float) -> Trial:

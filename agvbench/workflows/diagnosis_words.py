@@ -18,8 +18,12 @@ QUANTITIES = {
 def left_in_words(content: Mapping[str, Any]) -> Iterator[str]:
     """Yield on what the rest depends."""
     for d in map(mapping, items(mapping(content.get("unexplained")).get("depends_on"))):
-        of_it = f"{100.0 * number(d.get('share')):.0f} % of it, p = {number(d.get('p_value')):.1g}"
-        yield f"What is left depends on {d.get('covariate')} through {d.get('through')} ({of_it})."
+        share, p_value = number(d.get("share")), number(d.get("p_value"))
+        known = [f"{100.0 * share:.0f} % of it"] * (not math.isnan(share))
+        known += [f"p = {p_value:.1g}"] * (not math.isnan(p_value))
+        of_it = f" ({', '.join(known)})" if known else ""
+        if "covariate" in d:
+            yield f"What is left depends on {d['covariate']} through {d.get('through', 'the motion')}{of_it}."
 
 
 def next_in_words(content: Mapping[str, Any]) -> Iterator[str]:

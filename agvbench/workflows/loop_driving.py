@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -20,7 +21,6 @@ _PROGRAM = (
 )
 _DONE = {0, 1}  # 1: some run was never driven well enough; what was is a campaign all the same
 _ERROR = "ERROR: "
-_PATIENCE_S = 5.0
 
 Tell = Callable[[str], None]
 
@@ -49,6 +49,8 @@ def drive(directory: Path, names: Sequence[str], settings: BenchSettings, more: 
     code, errors = _run([sys.executable, "-c", _PROGRAM, json.dumps([names, options])])
     if code not in _DONE:
         raise AgvbenchError(errors[-1] if errors else f"the bench ended with exit code {code}")
+    for error in errors:
+        sys.stderr.write(f"{error}\n")
     if code:
         tell(f"    some runs could not be driven: agvbench report {directory} says which")
 
@@ -72,15 +74,21 @@ def _run(command: Sequence[str]) -> tuple[int, list[str]]:
 def _end(process: subprocess.Popen[str], interrupt: KeyboardInterrupt) -> None:
     """Let the bench stop its vehicle and record what it has seen, when the loop is to end.
 
-    A terminal interrupts both; what was sent to the loop alone is sent on.
+    What was sent to the loop alone is sent on, once: nothing may come between the vehicle and its stop.
     """
     if isinstance(interrupt, Terminated):
         process.send_signal(interrupt.number)
-    try:
-        process.communicate(timeout=_PATIENCE_S)
-    except subprocess.TimeoutExpired:
+    elif not _in_front():
         process.send_signal(signal.SIGINT)
-        process.communicate()
+    process.communicate()
+
+
+def _in_front() -> bool:
+    """Return whether a terminal's Ctrl-C goes to this process, and so to the bench, too."""
+    try:
+        return os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
+    except (OSError, ValueError):
+        return False  # there is no terminal
 
 
 def moved(directory: Path, models: Mapping[str, str]) -> None:

@@ -83,3 +83,14 @@ def test_what_another_causes_law_replaced_may_be_tried_again(selector, monkeypat
     reformed = forms.reform(Selection(base, lag, {}, {"steering_lag": 500.0}, {}, 2), selector)
     assert reformed.chosen.names == (law,)
     assert reformed.rejected == again
+
+
+def test_what_runs_away_is_as_good_as_nothing(selector, monkeypatch):
+    def away(*_, **__):
+        raise np.linalg.LinAlgError
+
+    base = selector.base()
+    monkeypatch.setattr(type(selector), "_begun", away)
+    lag = selector.grown(base, "steering_lag")
+    assert (lag.names, lag.total) == (("steering_lag",), base.total)
+    assert not selector.earns(base, lag)

@@ -88,7 +88,7 @@ def test_a_value_lies_at_every_level_that_was_held():
 
 
 @given(
-    st.lists(st.integers(1000, 2000), min_size=2, max_size=300, unique=True).map(sorted),
+    st.lists(st.integers(1000, 2000), min_size=2, max_size=150, unique=True).map(sorted),
     st.integers(0, 2**32 - 1),
 )
 def test_some_of_many_levels_reach_from_end_to_end_without_wide_gaps(levels, seed):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 
 from agvbench.model import VehicleModel
 from agvbench.workflows.doctor.finding import Check, Finding, Lab, State
@@ -18,20 +19,24 @@ class Calibration(Check):
 
     def examine(self, lab: Lab) -> Finding:
         """Compare its age with a month."""
-        files = list(lab.folder.glob("campaigns/*/vehicle.toml"))
-        names = {path: VehicleModel.load(path).name for path in files}
-        # A lab folder begins with a vehicle that nobody has measured: only a campaign makes it a calibrated one.
-        for own in lab.folder.glob("vehicle.toml"):
-            if "campaign" in (model := VehicleModel.load(own)).provenance:
-                names[own] = model.name
-        if not names:
+        own, campaigns = lab.folder.glob("vehicle.toml"), lab.folder.glob("campaigns/*/vehicle.toml")
+        newest = next(filter(_is_calibrated, sorted([*own, *campaigns], key=_age_s)), None)
+        if newest is None:
             return Finding(State.DOUBTFUL, "no calibrated vehicle here", "calibrate it: agvbench bench")
-        newest = max(names, key=lambda path: path.stat().st_mtime)
-        name = names[newest]
-        days = (time.time() - newest.stat().st_mtime) / _DAY_S
+        name = VehicleModel.load(newest).name
+        days = _age_s(newest) / _DAY_S
         if days > _OLD_DAYS:
             return Finding(
                 State.DOUBTFUL, f"{newest} ({name}) is {days:.0f} days old (limit: {_OLD_DAYS:g})",
                 "calibrate again: agvbench bench calibration",
             )  # fmt: skip
         return Finding(State.GOOD, f"{newest} ({name}), {days:.1f} days old")
+
+
+def _is_calibrated(file: Path) -> bool:
+    """Whether a campaign has measured the vehicle: a lab folder begins with one that nobody has."""
+    return file.parent.parent.name == "campaigns" or "campaign" in VehicleModel.load(file).provenance
+
+
+def _age_s(file: Path) -> float:
+    return time.time() - file.stat().st_mtime
