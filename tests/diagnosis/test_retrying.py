@@ -89,8 +89,9 @@ def test_what_runs_away_is_as_good_as_nothing(selector, monkeypatch):
     def away(*_, **__):
         raise np.linalg.LinAlgError
 
-    base = selector.base()
-    monkeypatch.setattr(type(selector), "_begun", away)
-    lag = selector.grown(base, "steering_lag")
+    fresh = selector.over(selector.batch)
+    base = fresh.base()
+    monkeypatch.setattr(Selector, "_begun", away)
+    lag = fresh.grown(base, "steering_lag")
     assert (lag.names, lag.total) == (("steering_lag",), base.total)
-    assert not selector.earns(base, lag)
+    assert not fresh.earns(base, lag)
