@@ -30,6 +30,8 @@ from agvbench.effects.forms import effect_forms
 from agvbench.model import VehicleModel
 from agvbench.types import Floats
 
+_REMAINS = "structure remains that no effect explains: "
+
 
 @dataclass(frozen=True)
 class _Judged:
@@ -75,10 +77,7 @@ def conclude(
     significant = explained is not None or _is_significant(judged, rest)
     verdict, why = _verdict(effects, significant, rest, explained)
     if significant and not rest and likely:
-        rest, why = (
-            likely,
-            f"structure remains that no effect explains: it is likely to depend on {likely[0].covariate}",
-        )
+        rest, why = likely, f"{_REMAINS}it is likely to depend on {likely[0].covariate}"
     found = Diagnosis(
         verdict,
         why,
@@ -168,7 +167,7 @@ def _verdict(
             on += f", and {explained.term.name} describes it"
         elif rest and rest[0].covariate == RANDOM_PHASE:
             on += ", with another phase in every run, which nothing that is planned beforehand can remove"
-        return Verdict.UNKNOWN, "structure remains that no effect explains: " + on
+        return Verdict.UNKNOWN, _REMAINS + on
     if not effects:
         return Verdict.ADEQUATE, "the model, its maps fitted again, predicts as well as repeats agree with one another"
     if any(getattr(effect, "confounded_with", ()) for effect in effects):

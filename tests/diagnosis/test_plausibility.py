@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from tiny_vehicle import HEADER, Tiny, campaign_runs
 
 from agvbench.diagnosis.plausibility import _tracks, refuse_units
+from agvbench.errors import CampaignError
 from agvbench.types import Frames
 
 RATE_HZ = 120.0
@@ -36,3 +38,6 @@ def test_a_run_of_any_length(first, count):
 def test_every_frame_doubled_is_no_other_unit():
     frames = RUN.frames.select(np.repeat(np.arange(len(RUN.frames)), 3))
     refuse_units([replace(RUN, frames=frames)], HEADER)
+    in_milliseconds = replace(frames, t_s=1000.0 * frames.t_s)
+    with pytest.raises(CampaignError, match="t_s is not in seconds"):
+        refuse_units([replace(RUN, frames=in_milliseconds)], HEADER)
