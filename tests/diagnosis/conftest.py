@@ -2,36 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from tiny_vehicle import HEADER, Tiny, campaign_runs
+from tiny_vehicle import HEADER, InMemory, Tiny, campaign_runs
 
 from agvbench.campaign import CampaignWriter
 from agvbench.types import Run
 
 
-class TinyCampaign:
-    """A header and runs, as `diagnose` takes them."""
-
-    header = HEADER
-
-    def __init__(self, runs: list[Run]) -> None:
-        self.runs = runs
-
-    def __iter__(self) -> Iterator[Run]:
-        return iter(self.runs)
-
-
 @pytest.fixture(scope="session")
-def tiny_campaign() -> Callable[..., TinyCampaign]:
+def tiny_campaign() -> Callable[..., InMemory]:
     """Return a function that drives a campaign with what is true of the vehicle."""
-    known: dict[Tiny, TinyCampaign] = {}
+    known: dict[Tiny, InMemory] = {}
 
-    def drive(tiny: Tiny) -> TinyCampaign:
+    def drive(tiny: Tiny) -> InMemory:
         if tiny not in known:
-            known[tiny] = TinyCampaign(campaign_runs(tiny))
+            known[tiny] = InMemory(campaign_runs(tiny))
         return known[tiny]
 
     return drive

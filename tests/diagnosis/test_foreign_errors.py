@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tiny_vehicle import HEADER, Tiny, campaign_runs
+from tiny_vehicle import InMemory, Tiny, campaign_runs
 
 from agvbench.cli import main
 from agvbench.diagnosis import Verdict, diagnose
@@ -28,15 +28,6 @@ that no vehicle can have written. `agvbench diagnose` says so in one line and ex
 | case | input | message |
 |---|---|---|
 """
-
-
-@dataclasses.dataclass
-class InMemory:
-    runs: list[Run]
-    header = HEADER
-
-    def __iter__(self):
-        return iter(self.runs)
 
 
 def _frames(change: Callable[[Frames], dict[str, np.ndarray]], every: int = 1) -> Callable[[list[Run]], list[Run]]:

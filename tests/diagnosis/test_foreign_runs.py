@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from tiny_vehicle import HEADER, Tiny, campaign_runs
+from tiny_vehicle import HEADER, InMemory, Tiny, campaign_runs
 
 from agvbench.campaign import Campaign
 from agvbench.diagnosis import diagnose
@@ -12,15 +12,6 @@ from agvbench.diagnosis.grouping import at_common_levels
 from agvbench.diagnosis.reading import read_runs
 from agvbench.diagnosis.resting import between_rows, rests
 from agvbench.diagnosis.windows import horizon_of
-
-
-@dataclasses.dataclass
-class InMemory:
-    runs: list
-    header = HEADER
-
-    def __iter__(self):
-        return iter(self.runs)
 
 
 def late(run, seconds):

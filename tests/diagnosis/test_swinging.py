@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tiny_vehicle import HEADER, NEUTRAL, Tiny, campaign_runs, drive
+from tiny_vehicle import NEUTRAL, InMemory, Tiny, campaign_runs, drive
 
 from agvbench.diagnosis import Verdict, diagnose
 from agvbench.diagnosis.fitted_models import Scored
@@ -51,16 +51,6 @@ def swinging(tiny):
             Run(f"{name}-{repeat}", "step", "", "", repeat, NO_TARGET, started_s, "ok", "tiny", commands, frames)
         )
     return runs
-
-
-class InMemory:
-    header = HEADER
-
-    def __init__(self, runs):
-        self.runs = runs
-
-    def __iter__(self):
-        return iter(self.runs)
 
 
 @pytest.mark.slow

@@ -29,6 +29,17 @@ _STEP_S = 1.0 / 240.0
 _BEFORE_S, _AFTER_S = 0.4, 1.2
 
 
+@dataclass
+class InMemory:
+    """A header and runs, as `diagnose` takes them."""
+
+    runs: list[Run]
+    header = HEADER
+
+    def __iter__(self) -> Iterator[Run]:
+        return iter(self.runs)
+
+
 @dataclass(frozen=True)
 class Tiny:
     """What is true of the vehicle; all zero is what free maps can describe."""
