@@ -36,13 +36,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Calibrate; return the exit code."""
-    from agvbench.workflows.calibrate import run_calibrate
+    from pathlib import Path
 
-    run_calibrate(
-        arguments.directory,
-        maps=arguments.maps,
-        session=arguments.session,
-        out=arguments.out,
-        firmware=arguments.firmware,
-    )
+    from rich.console import Console
+
+    from agvbench.reporting.calibration_console import print_calibration
+    from agvbench.workflows.calibrate import calibrated, save
+    from agvbench.workflows.firmware_header import write_firmware_header
+
+    console, out, firmware = Console(), arguments.out, arguments.firmware
+    calibration = calibrated(arguments.directory, maps=arguments.maps, session=arguments.session)
+    print_calibration(calibration, console)
+    if out is not None:
+        save(calibration, Path(out))
+    if firmware is not None:
+        write_firmware_header(calibration.model, Path(firmware))
+    for file in (out, firmware):
+        if file is not None:
+            console.print(f"{file}: calibration {calibration.model.calibration_hash}", soft_wrap=True)
+    if out is None and firmware is None:
+        console.print("nothing written; --out vehicle.toml writes the vehicle model with the maps marked ●")
     return 0

@@ -34,9 +34,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Hold the trials; return the exit code."""
+    from rich.console import Console
+
+    from agvbench.reporting.challenge_console import print_scores
     from agvbench.workflows.challenge import run_challenge
 
-    run_challenge(
+    scores = run_challenge(
         arguments.seeds,
         first_seed=arguments.first_seed,
         specs=arguments.only,
@@ -45,4 +48,5 @@ def run(arguments: argparse.Namespace) -> int:
         json_file=arguments.json_file,
         resume=arguments.resume,
     )
+    print_scores(scores, Console())
     return 0

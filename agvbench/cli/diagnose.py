@@ -60,10 +60,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose; return the exit code."""
+    from rich.console import Console
+
+    from agvbench.reporting.diagnosis_console import print_diagnosis
     from agvbench.workflows.diagnose import run_diagnose
+
+    console = Console()
 
     found = run_diagnose(
         arguments.directory,
+        tell=lambda answer: print_diagnosis(answer, console),
         json_file=arguments.json_file,
         out=arguments.out,
         vehicle=arguments.vehicle,

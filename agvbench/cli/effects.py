@@ -31,7 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """List effects or write a template; return the exit code."""
-    from agvbench.workflows.effects import effects_table, reference_page, write_template
+    from agvbench.reporting.console import wide_console
+    from agvbench.reporting.effects_list import effects_table, reference_page
+    from agvbench.workflows.effects import write_template
 
     if arguments.action == "new":
         print(f"wrote {write_template(arguments.name, arguments.dir)}: now say what it does")
@@ -39,7 +41,5 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.markdown:
         print(reference_page(), end="")
         return 0
-    from agvbench.reporting.console import wide_console
-
     wide_console().print(effects_table())
     return 0

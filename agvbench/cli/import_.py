@@ -29,7 +29,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Import; return the exit code."""
+    from rich.console import Console
+
+    from agvbench.reporting.import_console import print_import
     from agvbench.workflows.import_recordings import run_import
 
-    run_import(arguments.mapping, arguments.files, arguments.out)
+    print_import(run_import(arguments.mapping, arguments.files, arguments.out), Console())
     return 0

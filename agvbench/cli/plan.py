@@ -76,14 +76,14 @@ def run(args: argparse.Namespace) -> int:
 def _print(made: DryRun, args: argparse.Namespace) -> None:
     from rich.console import Console
 
-    from agvbench.workflows import plan
+    from agvbench.reporting.plan_console import commands_csv, print_dry_run, to_json
 
     if args.json:
-        print(plan.to_json(made))
+        print(to_json(made))
     elif args.commands:
-        print(plan.commands_csv(made))
+        print(commands_csv(made))
     else:
-        plan.print_dry_run(made, Console())
+        print_dry_run(made, Console())
 
 
 def _start(text: str | None) -> Pose | None:

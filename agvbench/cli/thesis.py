@@ -36,10 +36,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Compute, show and write."""
+    from agvbench.reporting.thesis_console import print_section, thesis_console, with_progress
     from agvbench.workflows.thesis import thesis_sections, write_json, write_tables
-    from agvbench.workflows.thesis.console import print_section, wide_console, with_progress
 
-    console = wide_console()
+    console = thesis_console()
     sections = with_progress(thesis_sections(arguments.section))
     if arguments.json is not None or arguments.out is not None:
         # Files first: a reader that closes the pipe early must not cost them.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import subprocess
 import sys
@@ -17,15 +16,13 @@ from typing import TYPE_CHECKING
 
 from agvbench.errors import AgvbenchError, FlagError, PlantError
 from agvbench.simulator.hidden import SealedTruth, sealed_truth, true_rivals
-from agvbench.simulator.hidden.catalogue import AND, CATALOGUE, NOTHING, recipes
+from agvbench.simulator.hidden.catalogue import CATALOGUE, NOTHING, recipes
 from agvbench.simulator.hidden.drawing import vehicle_of
 from agvbench.workflows.challenge_file import known_trials, write_trials
 from agvbench.workflows.challenge_scores import Scores, score
 from agvbench.workflows.challenge_trial import Trial
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from agvbench.diagnosis import Diagnosis
 
 BENCHMARKS = ("calibration", "trajectories", "step_response", "free_driving")
@@ -50,7 +47,7 @@ def run_challenge(
     json_file: str | None,
     resume: bool = False,
 ) -> Scores:
-    """Hold the trials with a progress bar, print the scores, and write them if asked for.
+    """Hold the trials with a progress bar, and write the scores if asked for.
 
     The file is written anew after each trial, so that an interruption loses those under way only; with `resume` the
     trials that it holds are not held again.
@@ -62,8 +59,6 @@ def run_challenge(
     FileError
         If the JSON file cannot be written or, to resume, read.
     """
-    from rich.console import Console
-
     if resume and json_file is None:
         raise FlagError("needs the file to go on with", where="--resume", remedy="add --json FILE")
     if seeds < 1 or repeats < 2:
@@ -85,9 +80,7 @@ def run_challenge(
         done[trial.spec, trial.seed] = trial
         if file is not None:
             write_trials(file, repeats, list(done.values()))
-    scores = score([done[one] for one in sorted(wanted)])
-    tell(scores, Console())
-    return scores
+    return score([done[one] for one in sorted(wanted)])
 
 
 def hold_trial(spec: str, seed: int, repeats: int) -> Trial:
@@ -183,33 +176,3 @@ def _as_they_end(wanted: Sequence[tuple[str, int]], repeats: int, jobs: int) -> 
             held |= {pool.submit(hold_trial, *one, repeats) for one in islice(coming, len(ended))}
             for future in ended:
                 yield future.result()
-
-
-def tell(scores: Scores, console: Console) -> None:
-    """Print the shares with their bounds, the confusion matrix and the rest."""
-    from rich import box
-    from rich.table import Table
-
-    table = Table(title=f"{scores.trials} blind trials", box=box.SIMPLE_HEAD, title_justify="left")
-    for heading in ("", "count", "share", "95 % bounds"):
-        table.add_column(heading, justify="left" if not heading else "right")
-    for text, share in (*scores.shares.items(), ("95 % intervals that cover", scores.coverage)):
-        value = f"{share.value:.1%}" if share.total else "–"
-        table.add_row(text, f"{share.count} of {share.total}", value, f"{share.low:.1%} to {share.high:.1%}")
-    console.print(table)
-    answers = Table(title="hidden, and answered", box=box.SIMPLE_HEAD, title_justify="left")
-    answers.add_column("hidden")
-    answers.add_column("answers")
-    for spec, counts in scores.confusion.items():
-        ordered = sorted(counts.items(), key=lambda item: (-item[1], item[0]))
-        answers.add_row(spec.replace(AND, " + "), ", ".join(f"{count} × {answer}" for answer, count in ordered))
-    console.print(answers)
-    for group, (worst, median) in scores.removed.items():
-        if math.isfinite(median):
-            text = f"excess held-out error removed, {group}: median {median:.3f}, worst {worst:.3f}"
-            console.print(text, highlight=False, soft_wrap=True)
-    if math.isfinite(scores.list_length):
-        console.print(f"effects in an AMBIGUOUS answer: {scores.list_length:.1f} on average", highlight=False)
-    console.print(f"something predicted worse than before: {scores.worse_on} trials", highlight=False)
-    middle, most = scores.seconds
-    console.print(f"time of a diagnosis: median {middle:.1f} s, longest {most:.1f} s", highlight=False)

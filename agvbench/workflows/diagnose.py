@@ -1,35 +1,27 @@
-"""What ``agvbench diagnose`` does: read the campaign, diagnose it, print, and write JSON and vehicle."""
+"""What ``agvbench diagnose`` does: read the campaign, diagnose it, tell, and write JSON and vehicle."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from itertools import islice
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import tomli_w
-from rich import box
 from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from agvbench.campaign import Campaign
-from agvbench.diagnosis import Diagnosis, NamedEffect, diagnose
+from agvbench.diagnosis import Diagnosis, diagnose
 from agvbench.diagnosis.next_experiment_propose import with_first_experiment
-from agvbench.diagnosis.result import HeldOut
 from agvbench.errors import FlagError
 from agvbench.model import VehicleModel
 from agvbench.workflows.diagnosis_files import keep
-from agvbench.workflows.diagnosis_words import QUANTITIES, left_in_words, next_in_words
-from agvbench.workflows.windows_table import windows_table
 from agvbench.workflows.writing import write_file
-
-_MOST_DEPENDENCES = 5
 
 
 def run_diagnose(
     directory: str,
     *,
+    tell: Callable[[Diagnosis], None],
     json_file: str | None = None,
     out: str | None = None,
     vehicle: str | None = None,
@@ -39,10 +31,11 @@ def run_diagnose(
     next_out: str | None = None,
     rig: Mapping[str, Any] | None = None,
 ) -> Diagnosis:
-    """Diagnose the campaign in `directory`, print the answer, and write JSON and the corrected vehicle if asked for.
+    """Diagnose the campaign in `directory`, `tell` the answer, and write JSON and the corrected vehicle if asked for.
 
     With `drive_next` the run that the diagnosis proposes is driven with the `rig`, added to a copy of the campaign, and
-    that is diagnosed: what is written and returned is the second answer. ``next_file`` takes the trajectory proposed.
+    that is diagnosed and told: what is written and returned is the second answer. ``next_file`` takes the trajectory
+    proposed.
 
     Raises
     ------
@@ -59,13 +52,13 @@ def run_diagnose(
     believed = Path(vehicle) if vehicle is not None else campaign.path / "vehicle.toml"
     model = VehicleModel.load(believed) if vehicle is not None or believed.exists() else None
     found = _diagnosed(campaign, model, seed)
-    tell(found, Console())
+    tell(found)
     if next_file is not None and found.next_experiment is not None:
         trajectory = found.next_experiment.trajectory
         text = tomli_w.dumps(trajectory.to_table())
         write_file("--next", Path(next_file), lambda path: path.write_text(text, encoding="utf-8"))
     if drive_next:
-        found = _decided(campaign, found, model, seed, next_out, rig or {})
+        found = _decided(campaign, found, tell, model, seed, next_out, rig or {})
     if json_file is not None:
         text = found.to_text()
         write_file("--json", Path(json_file), lambda path: path.write_text(text, encoding="utf-8"))
@@ -86,6 +79,7 @@ def _diagnosed(campaign: Campaign, model: VehicleModel | None, seed: int) -> Dia
 def _decided(
     campaign: Campaign,
     found: Diagnosis,
+    tell: Callable[[Diagnosis], None],
     model: VehicleModel | None,
     seed: int,
     out: str | None,
@@ -102,48 +96,5 @@ def _decided(
     name = found.next_experiment.trajectory.name
     console.print(f"drove {name}; the campaign with it: {extended.path}", highlight=False, soft_wrap=True)
     again = _diagnosed(extended.check(), model, seed)
-    tell(again, console)
+    tell(again)
     return again
-
-
-def tell(found: Diagnosis, console: Console) -> None:
-    """Print the answer in plain words."""
-    content = found.to_json()
-    console.print(f"[bold]{found.verdict}[/bold]: {found.why}", highlight=False, soft_wrap=True)
-    lines = [*map(in_words, found.effects), *islice(left_in_words(content), _MOST_DEPENDENCES)]
-    _say(lines, console)
-    if found.held_out is not None:
-        console.print()
-        console.print(f"Prediction errors of {found.held_out.runs} runs held out, root mean square:", highlight=False)
-        console.print(errors_table(found.held_out))
-        if windows := found.provenance.get("windows"):
-            console.print(windows_table(windows))
-        if found.held_out.worse_on:
-            _say([f"Worse than before on: {', '.join(found.held_out.worse_on)}."], console)
-    _say(next_in_words(content), console)
-
-
-def _say(lines: Iterable[str], console: Console) -> None:
-    for line in lines:
-        console.print(f"  {line}", highlight=False, markup=False, soft_wrap=True)
-
-
-def in_words(effect: NamedEffect) -> str:
-    """Return one line on an effect: its parameters, and what cannot be told from it."""
-    parts = []
-    for name, e in effect.parameters.items():
-        unit = "" if e.unit == "–" else f" {e.unit}"
-        parts.append(f"{name} = {e.value:.4g} ± {e.stderr:.2g}{unit}" + (f" ({e.note})" if e.note else ""))
-    line = f"{effect.name}: {', '.join(parts)}"
-    return line + (f"; or instead {', '.join(effect.confounded_with)}" if effect.confounded_with else "")
-
-
-def errors_table(held: HeldOut) -> Table:
-    """Return errors before and after beside the floor."""
-    table = Table(box=box.SIMPLE_HEAD)
-    table.add_column("")
-    for heading in ("before", "after", "floor"):
-        table.add_column(heading, justify="right")
-    for name, errors in held.errors.items():
-        table.add_row(Text(QUANTITIES[name]), *(f"{errors[column]:.2f}" for column in ("before", "after", "floor")))
-    return table

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from agvbench.diagnosis import NamedEffect
 
 QUANTITIES = {
     "position_rms_mm": "position along the way [mm]",
@@ -13,6 +16,16 @@ QUANTITIES = {
     "delta_heading_deg": "Δδ at the end [°]",
 }
 """What errors before and after are of, by their name in the JSON."""
+
+
+def effect_in_words(effect: NamedEffect) -> str:
+    """Return one line on an effect: its parameters, and what cannot be told from it."""
+    parts = []
+    for name, e in effect.parameters.items():
+        unit = "" if e.unit == "–" else f" {e.unit}"
+        parts.append(f"{name} = {e.value:.4g} ± {e.stderr:.2g}{unit}" + (f" ({e.note})" if e.note else ""))
+    line = f"{effect.name}: {', '.join(parts)}"
+    return line + (f"; or instead {', '.join(effect.confounded_with)}" if effect.confounded_with else "")
 
 
 def left_in_words(content: Mapping[str, Any]) -> Iterator[str]:

@@ -5,30 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-import pandas as pd
-from rich import box
 from rich.console import Console
 from rich.progress import track
-from rich.table import Table
 
-from agvbench.campaign import import_recordings
-from agvbench.campaign.importing import IMPORT_TABLE
-
-_COLUMNS = {
-    "file": "file",
-    "rows": "rows",
-    "not_driven": "not driven",
-    "not_seen": "not seen",
-    "jumped": "jumped",
-    "too_short": "too short",
-    "used": "used",
-    "runs": "runs",
-    "seconds": "time s",
-}
+from agvbench.campaign import Campaign, import_recordings
 
 
-def run_import(mapping: str, files: Sequence[str], out: str) -> None:
-    """Import `files` and print what became of their rows.
+def run_import(mapping: str, files: Sequence[str], out: str) -> Campaign:
+    """Import `files` with a progress bar; return the campaign, which has the account of every row.
 
     Raises
     ------
@@ -40,28 +24,4 @@ def run_import(mapping: str, files: Sequence[str], out: str) -> None:
     def progress(paths: Iterable[Path]) -> Iterable[Path]:
         return track(paths, "importing", console=errors, transient=True, disable=not errors.is_terminal)
 
-    campaign = import_recordings(mapping, files, out, progress=progress)
-    console = Console()
-    console.print(_table(campaign.table(IMPORT_TABLE)))
-    sessions = campaign.runs["session"].nunique()
-    console.print(f"runs: {len(campaign)}, sessions: {sessions}, campaign: {campaign.path}", soft_wrap=True)
-
-
-def _table(accounts: pd.DataFrame) -> Table:
-    table = Table(
-        title="what became of the rows",
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
-        padding=(0, 1),
-        collapse_padding=True,
-        show_edge=False,
-    )
-    for title in _COLUMNS.values():
-        table.add_column(title, justify="left" if title == "file" else "right", no_wrap=title == "file")
-    for row in accounts.to_dict("records"):
-        table.add_row(*(str(row[name]) for name in _COLUMNS))
-    if len(accounts) > 1:
-        totals = accounts[list(_COLUMNS)[1:]].sum()
-        table.add_section()
-        table.add_row("all", *(f"{totals[name]:.10g}" for name in list(_COLUMNS)[1:]))
-    return table
+    return import_recordings(mapping, files, out, progress=progress)

@@ -73,9 +73,9 @@ def diagnosed(directory: Path, seed: int, tell: Tell) -> dict[str, Any]:
 
 
 def _in_words(found: Diagnosis) -> list[str]:
-    from agvbench.workflows.diagnose import in_words
+    from agvbench.workflows.diagnosis_words import effect_in_words
 
-    lines = [f"{found.verdict}: {found.why}", *(in_words(effect) for effect in found.effects)]
+    lines = [f"{found.verdict}: {found.why}", *(effect_in_words(effect) for effect in found.effects)]
     if found.model is None:
         return [*lines, "no effect can be corrected: the condition corrected drives the calibrated maps"]
     if found.depends_on:

@@ -20,9 +20,10 @@ from agvbench.errors import VehicleError
 from agvbench.model import VehicleModel, example_vehicle
 from agvbench.model.simulated_run import SimulatedRun
 from agvbench.model.simulation import Simulation
+from agvbench.reporting.effects_list import reference_page
 from agvbench.types import Commands
 from agvbench.vehicle.geometry import Geometry
-from agvbench.workflows.effects import reference_page, template_text
+from agvbench.workflows.effects import template_text
 
 KINDS = effect_kinds()
 each_effect = pytest.mark.parametrize("cls", KINDS.values(), ids=KINDS.keys())

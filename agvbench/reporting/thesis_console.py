@@ -16,7 +16,7 @@ _LONG_WORD = 13
 _MIN_WIDTH = 100
 
 
-def wide_console() -> Console:
+def thesis_console() -> Console:
     """Return the terminal, or 100 columns where it has fewer: a wrapped line is better than a lost column."""
     from rich.console import Console
 

@@ -1,0 +1,50 @@
+"""What became of the rows of imported recordings, on the console."""
+
+from __future__ import annotations
+
+import pandas as pd
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from agvbench.campaign import Campaign
+from agvbench.campaign.importing import IMPORT_TABLE
+
+_COLUMNS = {
+    "file": "file",
+    "rows": "rows",
+    "not_driven": "not driven",
+    "not_seen": "not seen",
+    "jumped": "jumped",
+    "too_short": "too short",
+    "used": "used",
+    "runs": "runs",
+    "seconds": "time s",
+}
+
+
+def print_import(campaign: Campaign, console: Console) -> None:
+    """Print the account of every row, and what the campaign holds."""
+    console.print(_table(campaign.table(IMPORT_TABLE)))
+    sessions = campaign.runs["session"].nunique()
+    console.print(f"runs: {len(campaign)}, sessions: {sessions}, campaign: {campaign.path}", soft_wrap=True)
+
+
+def _table(accounts: pd.DataFrame) -> Table:
+    table = Table(
+        title="what became of the rows",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+        padding=(0, 1),
+        collapse_padding=True,
+        show_edge=False,
+    )
+    for title in _COLUMNS.values():
+        table.add_column(title, justify="left" if title == "file" else "right", no_wrap=title == "file")
+    for row in accounts.to_dict("records"):
+        table.add_row(*(str(row[name]) for name in _COLUMNS))
+    if len(accounts) > 1:
+        totals = accounts[list(_COLUMNS)[1:]].sum()
+        table.add_section()
+        table.add_row("all", *(f"{totals[name]:.10g}" for name in list(_COLUMNS)[1:]))
+    return table
