@@ -21,11 +21,11 @@ from agvbench.simulator.hidden.drawing import vehicle_of
 from agvbench.workflows.challenge_file import known_trials, write_trials
 from agvbench.workflows.challenge_scores import Scores, score
 from agvbench.workflows.challenge_trial import Trial
+from agvbench.workflows.exciting import EXCITING
 
 if TYPE_CHECKING:
     from agvbench.diagnosis import Diagnosis
 
-BENCHMARKS = ("calibration", "trajectories", "step_response", "free_driving")
 _PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
 _POSITION = "position_rms_mm"
 _ERROR = "ERROR"
@@ -148,7 +148,7 @@ def _drive(spec: str, seed: int, repeats: int, directory: Path) -> None:
         "--no-report",
         "--exchange=2",
     ]
-    command = [sys.executable, "-c", _PROGRAM, "bench", *BENCHMARKS, *options, f"--out={directory}"]
+    command = [sys.executable, "-c", _PROGRAM, "bench", *EXCITING, *options, f"--out={directory}"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - our own program
     if done.returncode not in {0, 1}:
         raise PlantError(

@@ -12,6 +12,7 @@ from typing import Any
 
 from agvbench.errors import AgvbenchError
 from agvbench.running.settings import BenchSettings
+from agvbench.workflows.exciting import EXCITING
 from agvbench.workflows.loop_driving import Tell, drive
 from agvbench.workflows.loop_settings import (
     AFTER,
@@ -24,8 +25,6 @@ from agvbench.workflows.loop_settings import (
 )
 from agvbench.workflows.loop_stages import diagnosed, drive_corrected, learned, planned
 
-EXCITING = ("calibration", "trajectories", "step_response", "free_driving")
-"""What the first session drives: the second and third tell lags, which steady driving hides."""
 SHOWING = ("trajectories",)
 """What the second session drives."""
 

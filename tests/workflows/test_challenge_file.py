@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from agvbench.cli import main
 from agvbench.errors import FileError, FlagError, PlantError
 from agvbench.workflows import challenge
 from agvbench.workflows.challenge import hold_trial, run_challenge
@@ -39,10 +40,12 @@ def test_trials_that_the_file_holds_are_not_held_again(tmp_path, capsys):
     file = tmp_path / "challenge.json"
     write_trials(file, 5, [LAG])
     before = file.read_bytes()
-    scores = run_challenge(1, first_seed=3, specs=["steering_lag"], repeats=5, jobs=1, json_file=str(file), resume=True)
-    assert scores.trials == 1
+    flags = ["--first-seed=3", "--only", "steering_lag", "--jobs=1", f"--json={file}", "--resume"]
+    assert main(["challenge", *flags]) == 0
     assert file.read_bytes() == before
-    assert "1 blind trials" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "1 blind trials" in shown
+    assert "1 × NAMED steering_lag" in shown
 
 
 @pytest.mark.parametrize("content", ["", "[]", '{"each": [{"spec": 1}], "repeats": 5}', '{"repeats": 5}'])
