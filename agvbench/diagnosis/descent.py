@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 
 import numpy as np
 
-from agvbench.diagnosis.likelihood import Terms, residual_of, terms_of
+from agvbench.diagnosis.likelihood import Terms, residual_of, ridge, terms_of
 from agvbench.diagnosis.linearised import Linearised
 from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.scatter import Scatter, rescatter
@@ -97,6 +97,22 @@ class Descent:
             if before - view.loss < _WORTH:
                 break
         return state, view
+
+    def off_plateaus(self, state: State, view: View, iterations: int, *, patient: bool) -> tuple[State, View]:
+        """Return a better end of the way where values of the maps have come to lie where no run tells them; else this.
+
+        Play has plateaus: a command that ends within it moves nothing, and has no slope that led out again, be it that
+        the axle did move. So such values are laid between their neighbours, and the way goes on from there.
+        """
+        maps = self.predictor.maps
+        told, doubt = view.terms.information.sum(axis=0), ridge(self.predictor)
+        silent = np.diagonal(told)[: maps.size] < np.diagonal(doubt)[: maps.size]
+        if not silent.any():
+            return state, view
+        parameters = np.r_[maps.bridged(state.parameters[: maps.size], silent), state.parameters[maps.size :]]
+        begun, pace = self.go(replace(state, parameters=parameters), iterations)
+        end, seen = self.arrive(begun, pace, iterations, patient=patient)
+        return (end, seen) if seen.loss < view.loss else (state, view)
 
     def excursion(self, state: State, view: View) -> State | None:
         """Return a better state that lies across a bend, or None; `view` is what is seen from `state`.

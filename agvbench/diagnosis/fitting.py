@@ -95,8 +95,10 @@ def fit(
     descent = Descent(predictor, bounds)
     state, pace = descent.go(State(parameters.copy(), offsets, scatter), iterations, near)
     # Only a fit that is to be believed is worth the way to its end.
-    pace = pace if iterations > _ITERATIONS else Pace.STANDS
-    state, view = descent.arrive(state, pace, iterations, patient=patient)
+    believed = iterations > _ITERATIONS
+    state, view = descent.arrive(state, pace if believed else Pace.STANDS, iterations, patient=patient)
+    if believed:
+        state, view = descent.off_plateaus(state, view, iterations, patient=patient)
     terms = view.terms
     return Fit(
         predictor, state.parameters, state.offsets, state.scatter,

@@ -52,6 +52,22 @@ class FreeMaps:
         place = int(np.searchsorted(nodes, self.neutral))
         return np.delete(_interpolation(np.insert(nodes, place, self.neutral), command), place, axis=1)
 
+    def bridged(self, values: Floats, silent: NDArray[np.bool_]) -> Floats:
+        """Return `values` (size,) with those that are `silent` laid on straight lines between the others of their role.
+
+        Where a role has no other, its values stay.
+        """
+        laid = values.copy()
+        for role, own in self.slices().items():
+            nodes, heard = self.nodes[role], ~silent[own]
+            at, told = nodes[heard], values[own][heard]
+            if role == "drive":
+                place = int(np.searchsorted(at, self.neutral))
+                at, told = np.insert(at, place, self.neutral), np.insert(told, place, 0.0)
+            if len(at):
+                laid[own] = np.where(heard, values[own], np.interp(nodes, at, told))
+        return laid
+
 
 def free_maps(runs: Sequence[Run], neutral: float) -> FreeMaps:
     """Return a node for every level at which the vehicle drove; where there are too many, for `chosen_levels`."""

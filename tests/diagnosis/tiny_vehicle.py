@@ -47,6 +47,7 @@ class Tiny:
     delay_s: float = 0.0
     steering_lag_s: float = 0.0
     steering_inertia_s: float = 0.0
+    play_rad: float = 0.0
     accelerate_s: float = 0.0
     brake_s: float = 0.0
     slip: float = 0.0
@@ -89,7 +90,7 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
     warm = 1.0 + tiny.warm_gain * -math.expm1(-started_s / 3600.0 / tiny.warm_h)
     x, y, heading = start
     front, rear, speed = front_of(NEUTRAL) + f_off, rear_of(NEUTRAL) + r_off, 0.0
-    turning = [0.0, 0.0]
+    turning, loose = [0.0, 0.0], [front, rear]
     poses, times = [], []
     steps = round((commands.t_s[-1] + _AFTER_S + _BEFORE_S) / _STEP_S)
     for k in range(steps):
@@ -119,6 +120,9 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
                 was, (front, rear, speed), (tiny.steering_lag_s, tiny.steering_lag_s, lag), strict=True
             )
         )
+        if tiny.play_rad:
+            loose = [follow(axle, servo, tiny.play_rad / 2.0) for axle, servo in zip(loose, (f, r), strict=True)]
+            f, r = loose
         df = (f + tiny.front_from_rear * r) * relief * warm
         dr = (r + tiny.rear_from_front * f) * relief * warm
         v = s * (1.0 - tiny.cornering_loss * (abs(math.tan(df)) + abs(math.tan(dr))))
@@ -141,7 +145,12 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
     return Frames(np.array(times), p[:, 0], p[:, 1], p[:, 2], np.ones(n, dtype=bool), np.full(n, -1), nan, nan)
 
 
-def _held(drive_us: float, front: float, rear: float, seconds: float) -> Commands:
+def follow(axle: float, servo: float, half: float) -> float:
+    """Return where an axle with play of twice `half` comes to stand that its servo pulls along."""
+    return min(max(axle, servo - half), servo + half)
+
+
+def held(drive_us: float, front: float, rear: float, seconds: float) -> Commands:
     return Commands(
         np.array([0.0, 0.4, 0.4 + seconds]),
         np.array([NEUTRAL, drive_us, NEUTRAL]),
@@ -150,7 +159,7 @@ def _held(drive_us: float, front: float, rear: float, seconds: float) -> Command
     )
 
 
-def _steps(drive_us: float, fronts: list[float], rears: list[float], seconds: float) -> Commands:
+def switched(drive_us: float, fronts: list[float], rears: list[float], seconds: float) -> Commands:
     t = [0.0, *(0.4 + seconds * np.arange(len(fronts))), 0.4 + seconds * len(fronts)]
     return Commands(
         np.array(t),
@@ -165,24 +174,24 @@ def experiments(*, steps: bool = True) -> Iterator[tuple[str, Commands, int]]:
     n = NEUTRAL
     levels = (1000.0, 1150.0, 1300.0, 1400.0, 1500.0, 1600.0, 1700.0, 1850.0, 2000.0)
     for c in levels:
-        yield "steering_front", _held(900.0, c, n, 4.0), 2
-        yield "steering_rear", _held(900.0, n, c, 4.0), 2
+        yield "steering_front", held(900.0, c, n, 4.0), 2
+        yield "steering_rear", held(900.0, n, c, 4.0), 2
     for c in (1300.0, 1700.0):
-        yield "steering_opposite", _held(900.0, c, 3000.0 - c, 4.0), 2
-        yield "steering_opposite", _held(2100.0, c, 3000.0 - c, 4.0), 2
-        yield "steering_opposite", _held(900.0, c, c, 4.0), 2
+        yield "steering_opposite", held(900.0, c, 3000.0 - c, 4.0), 2
+        yield "steering_opposite", held(2100.0, c, 3000.0 - c, 4.0), 2
+        yield "steering_opposite", held(900.0, c, c, 4.0), 2
     for c in (900.0, 1200.0, 1350.0, 1400.0, 1430.0, 1570.0, 1600.0, 1650.0, 1800.0, 2100.0):
-        yield "drive", _held(c, n, n, 4.0), 2
+        yield "drive", held(c, n, n, 4.0), 2
     for c in (1350.0, 1650.0):
-        yield "trajectory", _held(c, 1400.0, 1600.0, 5.0), 3
-        yield "trajectory", _held(c, 1600.0, 1400.0, 5.0), 3
+        yield "trajectory", held(c, 1400.0, 1600.0, 5.0), 3
+        yield "trajectory", held(c, 1600.0, 1400.0, 5.0), 3
     for c in (900.0, 2100.0):
-        yield "trajectory", _held(c, 1400.0, 1600.0, 5.0), 3
-        yield "trajectory", _held(c, 1600.0, 1400.0, 5.0), 3
+        yield "trajectory", held(c, 1400.0, 1600.0, 5.0), 3
+        yield "trajectory", held(c, 1600.0, 1400.0, 5.0), 3
     if steps:
         for c in (900.0, 2100.0, 1350.0):
-            yield "step", _steps(c, [1300.0, 1700.0, 1300.0, 1700.0, 1500.0], [n] * 5, 1.2), 3
-            yield "step", _steps(c, [1500.0, 1300.0, 1700.0, 1400.0], [1500.0, 1700.0, 1300.0, 1600.0], 1.5), 3
+            yield "step", switched(c, [1300.0, 1700.0, 1300.0, 1700.0, 1500.0], [n] * 5, 1.2), 3
+            yield "step", switched(c, [1500.0, 1300.0, 1700.0, 1400.0], [1500.0, 1700.0, 1300.0, 1600.0], 1.5), 3
 
 
 def campaign_runs(tiny: Tiny, *, seed: int = 0, steps: bool = True, hours: float = 1.0) -> list[Run]:

@@ -1,0 +1,91 @@
+"""Values of the maps that no run tells any more, where play leaves a plateau, find their way off it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tiny_vehicle import FRONT_M, NEUTRAL, REAR_M, InMemory, Tiny, campaign_runs, drive, held, rear_of, switched
+
+from agvbench.calibration import measure_run
+from agvbench.diagnosis import Verdict, diagnose
+from agvbench.diagnosis.batch import Batch
+from agvbench.diagnosis.candidates import bounds_of, candidates
+from agvbench.diagnosis.fitting import fit
+from agvbench.diagnosis.levels import ROLES, FreeMaps, free_maps, start_values
+from agvbench.diagnosis.reading import read_runs
+from agvbench.diagnosis.selection import Selector
+from agvbench.types import Pose
+from agvbench.vehicle.geometry import Geometry
+
+MAPS = FreeMaps(
+    {"front": np.array([1000.0, 1400.0]), "rear": np.array([1000.0, 1500.0, 2000.0]), "drive": np.array([1600.0])},
+    NEUTRAL,
+)
+PLAY_RAD = 0.028
+NEARLY_STRAIGHT = 1487.0
+
+
+def test_values_that_no_run_tells_are_laid_between_the_others_of_their_role():
+    silent = np.array([False, True, False, True, False, True])
+    laid = MAPS.bridged(np.array([0.5, 9.0, 0.6, 9.0, -0.4, 9.0]), silent)
+    # An outer value is that of its neighbour; the drive stands still at neutral.
+    assert laid == pytest.approx([0.5, 0.5, 0.6, 0.1, -0.4, 0.0])
+
+
+def test_values_that_all_are_silent_stay():
+    values = np.array([0.5, 9.0, 0.6, 9.0, -0.4, 0.3])
+    assert MAPS.bridged(values, np.array([True, True, False, False, False, False])) == pytest.approx(values)
+
+
+@pytest.fixture(scope="module")
+def play():
+    """Return a campaign with play, in which one command ends hardly beyond it."""
+    tiny, rng = Tiny(play_rad=PLAY_RAD), np.random.default_rng(5)
+    runs = campaign_runs(tiny)
+    straight = [NEUTRAL] * 4
+    ways = [[a, NEUTRAL, b, NEUTRAL] for a, b in ((1300.0, 1700.0), (1600.0, 1400.0))]
+    more = [
+        held(900.0, NEUTRAL, NEARLY_STRAIGHT, 4.0),
+        *(switched(900.0, back_and_forth, straight, 1.2) for back_and_forth in ways),
+        *(switched(2100.0, straight, back_and_forth, 1.2) for back_and_forth in ways),
+    ]
+    for k, commands in enumerate(4 * more):
+        frames = drive(tiny, commands, Pose(0.1 * k, 0.0, 0.3 * k), runs[-1].started_s + 60.0, rng)
+        started_s = runs[-1].started_s + 60.0
+        runs.append(replace(runs[0], run_id=f"more-{k}", commands=commands, frames=frames, started_s=started_s))
+    return InMemory(runs)
+
+
+@pytest.fixture(scope="module")
+def selector(play):
+    """Return a selector of these runs."""
+    readings, geometry = read_runs(play.runs, NEUTRAL), Geometry(FRONT_M, REAR_M)
+    maps = free_maps(readings.runs, NEUTRAL)
+    believed = {role: np.zeros(len(maps.nodes[role])) for role in ROLES}
+    start = start_values(maps, [measure_run(run, geometry, neutral=NEUTRAL) for run in play.runs], believed)
+    return Selector(Batch(readings, maps, geometry), candidates(), start, 0, lambda _: None)
+
+
+def test_a_fit_that_begins_on_a_plateau_ends_where_others_do(selector):
+    good = selector.grown(selector.base(), "steering_backlash").fit
+    maps, rear = selector.batch.maps, selector.batch.maps.slices()["rear"]
+    node = rear.start + int(np.searchsorted(maps.nodes["rear"], NEARLY_STRAIGHT))
+    begun = good.parameters.copy()
+    begun[node] = rear_of(NEUTRAL) + 0.2 * PLAY_RAD
+    bounds = bounds_of(selector.candidates, ("steering_backlash",))
+    again = fit(good.predictor, begun, bounds, offsets=good.offsets, scatter=good.scatter, iterations=10)
+    assert again.loss.sum() == pytest.approx(good.loss.sum(), abs=1.0)
+    assert again.parameters[node] == pytest.approx(rear_of(NEARLY_STRAIGHT), abs=3e-3)
+
+
+def test_play_is_found_where_a_command_ends_hardly_beyond_it(play):
+    found = diagnose(play)
+    assert found.verdict is Verdict.NAMED
+    (effect,) = found.effects
+    assert effect.name == "steering_backlash"
+    width = effect.parameters["width_rad"]
+    assert abs(width.value - PLAY_RAD) < 3.0 * width.stderr + 5e-4
+    assert found.model is not None
+    assert float(found.model.rear(NEARLY_STRAIGHT)) == pytest.approx(rear_of(NEARLY_STRAIGHT), abs=3e-3)
