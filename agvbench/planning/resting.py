@@ -27,21 +27,10 @@ class Departure:
         Start pose in the floor frame, as the camera sees it.
     started_h
         When the run begins, in hours since the session began.
-    steered_s
-        For how long, before the first command, its steering is set already [s].
     """
 
     start: Pose = _ORIGIN
     started_h: float = 0.0
-    steered_s: float = 0.0
-
-    def sent(self, commands: Commands, neutral: float) -> Commands:
-        """Return everything that is sent: `commands`, and the steering that is set before them."""
-        if self.steered_s <= 0.0:
-            return commands
-        first = (float(commands.t_s[0]) - self.steered_s, neutral, commands.front[0], commands.rear[0])
-        columns = (commands.t_s, commands.drive, commands.front, commands.rear)
-        return Commands(*(np.insert(column, 0, value) for column, value in zip(columns, first, strict=True)))
 
 
 @dataclass(frozen=True)
@@ -97,8 +86,8 @@ def _paths(
     model: VehicleModel, commands: Sequence[Commands], t_s: Sequence[Floats | list[float]], departure: Departure
 ) -> list[Floats]:
     start = departure.start
-    sent = [departure.sent(c, model.neutral) for c in commands]
-    seen = model.rollout(sent, np.tile(start, (len(sent), 1)), t_s, [departure.started_h] * len(sent))
+    count = len(commands)
+    seen = model.rollout(commands, np.tile(start, (count, 1)), t_s, [departure.started_h] * count)
     c, s = math.cos(start.heading_rad), math.sin(start.heading_rad)
     turned = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     return [(path - np.array(start)) @ turned for path in seen]

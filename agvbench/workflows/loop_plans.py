@@ -8,8 +8,7 @@ from typing import Any
 
 from agvbench.errors import PlanError
 from agvbench.model import VehicleModel
-from agvbench.planning import NOTHING_LEFT, Correction, Departure, Miss, Workspace, corrected_plan, load_trajectory
-from agvbench.running.drive import DEFAULT_TIMING
+from agvbench.planning import NOTHING_LEFT, Correction, Miss, Workspace, corrected_plan, load_trajectory
 from agvbench.running.remainders import NO_REMAINDERS
 from agvbench.types import Pose
 
@@ -31,12 +30,11 @@ def plans_of(
     cannot be driven.
     """
     floor = Workspace.parse(workspace)
-    departure = Departure(steered_s=DEFAULT_TIMING.rest_before_s)
     out: dict[str, dict[str, Any]] = {}
     for name in names:
         left = remainders.get(name, NOTHING_LEFT)
         try:
-            made = corrected_plan(load_trajectory(name), model, workspace=floor, departure=departure, remainder=left)
+            made = corrected_plan(load_trajectory(name), model, workspace=floor, remainder=left)
         except PlanError as error:
             out[name] = {"problem": str(error)}
             continue

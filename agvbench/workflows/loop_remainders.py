@@ -16,7 +16,6 @@ from agvbench.errors import FitError
 from agvbench.model import VehicleModel
 from agvbench.planning import Departure
 from agvbench.planning.resting import rest_poses
-from agvbench.running.drive import DEFAULT_TIMING
 from agvbench.statistics.rest import end_pose, start_pose
 from agvbench.types import Floats, Pose, Run
 
@@ -57,6 +56,6 @@ def _missed(runs: Iterable[Run], model: VehicleModel) -> Iterable[Pose]:
             start, end = start_pose(run).pose, end_pose(run).pose
         except FitError:
             continue  # a run without a pose at rest is no evidence
-        departure = Departure(start, run.started_s / 3600.0, DEFAULT_TIMING.rest_before_s)
+        departure = Departure(start, run.started_s / 3600.0)
         predicted = rest_poses(model, [run.commands], departure)[0]
         yield end.relative_to(start).relative_to(Pose(*predicted.tolist()))

@@ -131,14 +131,6 @@ def test_nothing_to_correct_changes_nothing(calibrated):
     assert made.correction.remaining.distance_m < 1e-6
 
 
-def test_steering_set_before_the_run_has_settled_more(calibrated):
-    model = calibrated.with_effects(SteeringLag(0.4))
-    early = corrected_plan(load_trajectory("5"), model, departure=Departure(steered_s=0.5)).correction
-    late = corrected_plan(load_trajectory("5"), model).correction
-    assert 0.0 < early.uncorrected.distance_m < 0.5 * late.uncorrected.distance_m
-    assert max(early.remaining.distance_m, late.remaining.distance_m) < 2e-4
-
-
 def test_what_the_camera_measures_wrongly_is_told(calibrated):
     correction = corrected_plan(load_trajectory("1"), calibrated.with_effects(MocapScale(0.02))).correction
     assert correction.remaining.distance_m < 2e-4

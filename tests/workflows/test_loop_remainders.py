@@ -1,9 +1,20 @@
 """What is learned of a first session: biases that stand out, and no scatter."""
 
+import math
+
 import numpy as np
 import pytest
 
-from agvbench.workflows.loop_remainders import shrunk
+from agvbench.effects import SteeringLag
+from agvbench.model import thesis_vehicle
+from agvbench.planning import Departure, corrected_plan, load_trajectory
+from agvbench.planning.resting import coasting_path
+from agvbench.types import Frames, Pose, Run
+from agvbench.workflows.loop_plans import plans_of
+from agvbench.workflows.loop_remainders import remainders, shrunk
+
+START = Pose(0.4, -0.3, 0.7)
+REST_S = 0.5
 
 
 def errors_left(bias_sds, n=10, draws=4000):
@@ -25,3 +36,43 @@ def test_where_there_is_no_bias_less_is_learned_than_the_mean_says():
 def test_a_large_bias_is_learned_whole():
     values = 40.0 + np.random.default_rng(1).standard_normal((10, 3))
     np.testing.assert_allclose(shrunk(values), values.mean(axis=0), rtol=1e-3)
+
+
+class Driven:
+    """A campaign of one run, as `remainders` takes it, three times over."""
+
+    def __init__(self, run):
+        self.runs = [run] * 3
+
+    def select(self, *, condition):
+        assert condition == "corrected"
+        return self.runs
+
+
+def as_the_model_says(model, commands, target):
+    """Return a run that ends where the model says, after a rest at neutral as the bench makes it."""
+    path = coasting_path(model, commands, Departure(START))
+    path = np.vstack([np.c_[np.linspace(-REST_S, -0.02, 25), np.zeros((25, 3))], path])
+    way = (path[:, 1] + 1j * path[:, 2]) * np.exp(1j * START.heading_rad) + complex(START.x_m, START.y_m)
+    n = len(path)
+    heading = np.array([math.remainder(START.heading_rad + turned, math.tau) for turned in path[:, 3]])
+    nan = np.full(n, np.nan)
+    frames = Frames(path[:, 0], way.real, way.imag, heading, np.ones(n, np.bool_), np.arange(n), nan, nan)
+    return Run("1", "trajectory", "5", "corrected", 1, target, 0.0, "ok", "sim", commands, frames)
+
+
+def test_a_vehicle_that_does_what_the_model_says_leaves_nothing_to_learn():
+    model = thesis_vehicle().with_effects(SteeringLag(0.4))
+    made = corrected_plan(load_trajectory("5"), model, departure=Departure(START))
+    left = remainders(Driven(as_the_model_says(model, made.commands, made.target)), model, "corrected")["5"]
+    assert [1e3 * left["x_m"], 1e3 * left["y_m"]] == pytest.approx([0.0, 0.0], abs=0.1)
+    assert math.degrees(left["heading_rad"]) == pytest.approx(0.0, abs=0.02)
+
+
+def test_what_is_said_of_a_plan_before_it_is_driven_is_of_the_plan_that_is_driven():
+    model = thesis_vehicle().with_effects(SteeringLag(0.4))
+    said = plans_of(model, "circle:20", names=("5",))["5"]
+    driven = corrected_plan(load_trajectory("5"), model).correction
+    assert said["uncorrected"]["delta_heading_deg"] == pytest.approx(
+        math.degrees(driven.uncorrected.delta_heading_rad), abs=1e-3
+    )
