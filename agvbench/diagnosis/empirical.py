@@ -27,6 +27,8 @@ _LEAST_OF_BEST = 0.3
 _MOST_RETRIED = 3
 _FLIPS = 9999
 _FEW = 0.1
+_MOST_NAMES = 5
+_TERM_NAMES = frozenset(term.name for term in TERMS)
 
 
 @dataclass(frozen=True)
@@ -174,6 +176,7 @@ def _settled(
     """
     base = selection.base
     rivals: dict[str, dict[str, float]] = {}
+    current = _unmasked(wide, current)
     again = [n for n in selection.chosen.names if n not in current.names]
     again += sorted(selection.rejected, key=lambda n: -selection.rejected[n])[:_MOST_RETRIED]
     for name in again:
@@ -189,6 +192,24 @@ def _settled(
         if not useless:
             return current, term, gains, {name: rivals.get(name, {}) for name in gains}
         current = wide.left(smaller[min(useless, key=lambda name: gains[name])], current)
+
+
+def _unmasked(wide: Selector, current: Scored) -> Scored:
+    """Return the model with the effects that the unknown cause had hidden, as long as it misses more than scatter.
+
+    An effect that gained nothing beside what was chosen first may stand out as soon as the term is there. All are asked
+    for what they promise, and only the best are fitted.
+    """
+    while len(current.names) < _MOST_NAMES and _lacks(current):
+        names = [name for name in wide.candidates if name not in current.names and name not in _TERM_NAMES]
+        promises = {name: wide.promise(current, name) for name in names}
+        best = sorted(promises, key=lambda name: -promises[name])[:_MOST_RETRIED]
+        offers = [wide.grown(current, name) for name in best if promises[name] > wide.least_gain]
+        worthy = [offer for offer in offers if wide.earns(current, offer)]
+        if not worthy:
+            break
+        current = min(worthy, key=lambda offer: offer.total)
+    return current
 
 
 def gain_p_value(gain: Floats, group: NDArray[np.int64], seed: int) -> float:

@@ -108,10 +108,18 @@ class FittedModels:
             # What runs away to where nothing can be predicted describes nothing.
             return replace(current, names=names)
 
+    def promise(self, current: Scored, name: str) -> float:
+        """Return what the effect called `name` promises beside `current`, to first order, from the best of its starts."""
+        return max(self._promises(current, self._predictor((*current.names, name)), self.candidates[name]))
+
+    @staticmethod
+    def _promises(current: Scored, predictor: Predictor, candidate: Candidate) -> list[float]:
+        return [promised_gain(current.fit, predictor, start, candidate.bounds) for start in candidate.starts]
+
     def _grown(self, current: Scored, predictor: Predictor, candidate: Candidate) -> Scored:
         names, now = predictor.effects, current.fit
         bounds = bounds_of(self.candidates, names)
-        promises = [promised_gain(now, predictor, start, candidate.bounds) for start in candidate.starts]
+        promises = self._promises(current, predictor, candidate)
         promise = max(promises)
         if promise < _HOPELESS:
             return replace(current, names=names)  # as good as without it, and never chosen
