@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from agvbench.diagnosis.judging import clustered_covariance
 from agvbench.diagnosis.result import Estimate, NamedEffect
 from agvbench.diagnosis.selection import RIVAL_MARGIN, Selection
+from agvbench.diagnosis.standard_errors import standard_errors
 from agvbench.diagnosis.terms import TERMS, EmpiricalTerm
 from agvbench.effects import Effect, effect_kinds
 from agvbench.effects.forms import cause_of, effect_forms
@@ -18,11 +16,11 @@ _FLAT = 3.0
 def named_effects(selection: Selection, bounds: Floats) -> tuple[NamedEffect, ...]:
     """Return the effects of the chosen model.
 
-    Standard errors are those of `clustered_covariance`.
+    Standard errors are those of `standard_errors`.
     """
     fit = selection.chosen.fit
     maps = fit.predictor.maps.size
-    stderr = np.sqrt(np.diagonal(clustered_covariance(fit, fit.predictor.readings.group)))
+    stderr = standard_errors(fit, fit.predictor.readings.group)
     kinds: dict[str, type[Effect]] = {**effect_kinds(), **effect_forms(), **{term.name: term for term in TERMS}}
     at = 0
     found = []

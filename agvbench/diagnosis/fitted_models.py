@@ -109,7 +109,7 @@ class FittedModels:
             return replace(current, names=names)
 
     def promise(self, current: Scored, name: str) -> float:
-        """Return what the effect called `name` promises beside `current`, to first order, from the best of its starts."""
+        """Return what the effect called `name` promises beside `current`, to first order, from its best start."""
         return max(self._promises(current, self._predictor((*current.names, name)), self.candidates[name]))
 
     @staticmethod
