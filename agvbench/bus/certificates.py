@@ -77,7 +77,7 @@ def why_not(certificates: Certificates, host: str, port: int) -> str:
         return f"its certificate: {error.verify_message}"
     except ssl.SSLError as error:
         return _in_words(error)
-    except OSError:
+    except (OSError, UnicodeError):
         return ""
     return ""
 

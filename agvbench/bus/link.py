@@ -57,6 +57,8 @@ class VehicleLink:
     ------
     AdapterGoneError
         If an adapter does not turn up or does not say who it is.
+    LinkError
+        If another runner drives this vehicle.
     """
 
     def __init__(
@@ -79,6 +81,7 @@ class VehicleLink:
         self._closed = False
         try:
             self._identity = self._meet(discovery_limit_s)
+            self._presence.refuse_other_runner(discovery_limit_s)
         except BaseException:
             self._release()
             raise
@@ -154,9 +157,10 @@ class VehicleLink:
         return self._driver.flush()
 
     def stop(self) -> None:
-        """Command neutral at once; safe after any failure."""
+        """Command neutral at once; safe after any failure: on a bus that is closed nobody hears it."""
         if not self._closed:
-            self._driver.stop()
+            with suppress(LinkError):
+                self._driver.stop()
 
     def replay(self, run_key: str, commands: Commands, *, pose: Pose = _ORIGIN, until_s: float | None = None) -> None:
         """Let a simulated vehicle drive a recorded run again, without frames: what wears or drains is as it was.
@@ -205,9 +209,7 @@ class VehicleLink:
         """Stop the vehicle and leave the bus; again does nothing."""
         if self._closed:
             return
-        # On a bus that is closed already nobody hears a stop, and whatever closed it is the error to tell.
-        with suppress(LinkError):
-            self.stop()
+        self.stop()
         self._closed = True
         self._token.undeclare()
         self._release()

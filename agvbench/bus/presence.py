@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 from agvbench.bus.clock import Clock
-from agvbench.bus.keys import AGV, MOCAP, Keys
-from agvbench.errors import AdapterGoneError
+from agvbench.bus.keys import AGV, MOCAP, RUNNER, Keys
+from agvbench.errors import AdapterGoneError, LinkError
 
 
 class Presence:
@@ -27,7 +27,7 @@ class Presence:
     """
 
     def __init__(self, session: Any, keys: Keys, clock: Clock, on_gone: Callable[[], None] = lambda: None) -> None:
-        self._keys, self._clock, self._on_gone = keys, clock, on_gone
+        self._session, self._keys, self._clock, self._on_gone = session, keys, clock, on_gone
         self._present: dict[str, bool] = {}
         self._gone_since_s: dict[str, float] = {}
         self._arrived = threading.Event()
@@ -85,6 +85,19 @@ class Presence:
                     value=f"{gone_s:.1f} s ago",
                     remedy="start it again; the run that was being driven does not count",
                 )
+
+    def refuse_other_runner(self, limit_s: float) -> None:
+        """Raise `LinkError` if a runner drives this vehicle already, asking the bus for at most `limit_s` [s].
+
+        Two would drive it by turns: a stop of one is a pause until the next command of the other.
+        """
+        replies = self._session.liveliness().get(self._keys.alive(RUNNER), timeout=limit_s)
+        if any(reply.ok is not None for reply in replies):
+            raise LinkError(
+                "another runner drives this vehicle",
+                where=self._keys.root,
+                remedy="wait until it has ended, or end it; another vehicle has another --vehicle-name",
+            )
 
     def close(self) -> None:
         """Stop watching."""

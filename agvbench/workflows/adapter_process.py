@@ -6,14 +6,14 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from agvbench.adapters.contract import AdapterOptions
 from agvbench.adapters.node import host_adapters
 from agvbench.bus.bus_config import BusConfig
 from agvbench.bus.session import is_open_to_anybody, open_session
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def run_adapters(
@@ -26,7 +26,7 @@ def run_adapters(
     connect: Sequence[str],
     bus_config: str | None = None,
 ) -> int:
-    """Host adapters until SIGINT or SIGTERM; stop the vehicle first, then leave the bus.
+    """Host adapters until SIGINT, SIGTERM or SIGHUP; stop the vehicle first, then leave the bus.
 
     Raises
     ------
@@ -44,7 +44,9 @@ def run_adapters(
         where = " ".join([*(f"listens on {e}" for e in listen), *(f"connected to {e}" for e in connect)])
         print(f"ready: {what} of {lab}/{options.vehicle}, {where}; stop with Ctrl-C", flush=True)
         stopped.wait()
-    print("stopped", flush=True)
+    # The terminal that would be told may be what was closed.
+    with suppress(OSError):
+        print("stopped", flush=True)
     return 0
 
 
@@ -59,9 +61,11 @@ def _warn_of_remote_access(listen: Sequence[str], config: BusConfig | None) -> N
 
 @contextmanager
 def stop_signal() -> Iterator[threading.Event]:
-    """Give what SIGINT and SIGTERM set, in place of what they usually do."""
+    """Give what SIGINT, SIGTERM and SIGHUP set, in place of what they do; under ``nohup`` SIGHUP stays ignored."""
     stopped = threading.Event()
-    before = {number: signal.signal(number, lambda *_: stopped.set()) for number in _SIGNALS}
+    kept = {signal.SIGHUP} if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else set()
+    taken = [number for number in _SIGNALS if number not in kept]
+    before = {number: signal.signal(number, lambda *_: stopped.set()) for number in taken}
     try:
         yield stopped
     finally:

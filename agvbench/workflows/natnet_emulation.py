@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from contextlib import suppress
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from agvbench.adapters.natnet.encode import Model
 from agvbench.adapters.natnet.frame import FrameOfData
 from agvbench.adapters.natnet.layout import MARKER
 from agvbench.adapters.natnet.network import PacketFaults
+from agvbench.adapters.natnet.options import multicast_group
 from agvbench.adapters.natnet.version import Version
 from agvbench.bus.clock import WallClock, wait_until
 from agvbench.simulator import Camera, load_plant
@@ -26,29 +28,31 @@ _NO_MARKERS = np.zeros(0, MARKER)
 
 
 def emulate(options: AdapterOptions, version: str, multicast: str | None, port: int) -> int:
-    """Stream until SIGINT or SIGTERM.
+    """Stream until SIGINT, SIGTERM or SIGHUP.
 
     Raises
     ------
     AgvbenchError
         If version, port, plant or camera cannot be used.
     """
+    group = None if multicast is None else multicast_group(multicast, "--multicast")
     faults, seen_with = PacketFaults.split(options.camera)
     camera = Camera.from_options(seen_with)
     settings = Settings(
-        Version.parse(version), port=port, multicast=multicast, data_port=DATA_PORT if multicast else 0,
+        Version.parse(version), port=port, multicast=group, data_port=DATA_PORT if group else 0,
         rate_hz=camera.rate_hz, network=faults, seed=options.seed,
     )  # fmt: skip
     server = Emulator(settings, [Model(_BODY, options.vehicle)])
     try:
         with stop_signal() as stopped:
             host, own_port = server.address
-            where = f"to {multicast}" if multicast else "in unicast"
+            where = f"to {group}" if group else "in unicast"
             print(f"ready: NatNet {version} at {host}:{own_port}, streaming {where}; stop with Ctrl-C", flush=True)
             _stream(server, camera, options, stopped)
     finally:
         server.close()
-    print("stopped", flush=True)
+    with suppress(OSError):
+        print("stopped", flush=True)
     return 0
 
 

@@ -106,8 +106,21 @@ def test_a_vehicle_without_a_camera_says_so(endpoint: str) -> None:
             assert len(drive_run(link, "a")) > 0
 
 
-def test_ctrl_c_ends_a_process_cleanly_as_sigterm_does_everywhere_else_here(endpoint: str) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
+def test_ctrl_c_and_a_closed_terminal_end_a_process_cleanly(endpoint: str, number: signal.Signals) -> None:
     with process("sim", "--plant", TINY, "--listen", endpoint) as child:
-        child.send_signal(signal.SIGINT)
+        child.send_signal(number)
         assert child.communicate(timeout=20) == ("stopped\n", "")
         assert child.returncode == 0
+
+
+def test_a_second_runner_of_one_vehicle_is_refused_until_the_first_has_gone(endpoint: str, expected: list[str]) -> None:
+    with process("sim", *SEED, "--plant", TINY, "--listen", endpoint):
+        with (
+            open_rig(connect=endpoint, seed=11),
+            pytest.raises(LinkError, match="another runner drives this vehicle"),
+            open_rig(connect=endpoint, seed=11),
+        ):
+            pass
+        with open_rig(connect=endpoint, seed=11) as link:
+            assert [digest(drive_run(link, key)) for key in KEYS] == expected

@@ -67,7 +67,8 @@ class LiveAgv(SimulatedAgv):
     def close(self) -> None:
         """Move no more."""
         self._closed.set()
-        self._thread.join()
+        if self._thread.is_alive():
+            self._thread.join()
 
     def _hold(self, command: Command) -> None:
         with self._lock:

@@ -78,12 +78,14 @@ class Channel:
             self._server = (socket.gethostbyname(connection.server), connection.port)
             self._local = connection.local or self._route()
             self._command = self._open((self._local, 0))
-        except OSError as error:
+        # A name with an empty part, or one that is too long, never gets as far as the network.
+        except (OSError, UnicodeError) as error:
             raise self._unusable(error) from None
 
-    def _unusable(self, error: OSError) -> LinkError:
+    def _unusable(self, error: OSError | UnicodeError) -> LinkError:
         self.close()
-        return LinkError("address cannot be used", where=self._connection, value=error.strerror or error)
+        why = getattr(error, "strerror", None) or getattr(error, "reason", None) or error
+        return LinkError("address cannot be used", where=self._connection, value=why)
 
     def _route(self) -> str:
         """Return the address of the interface that leads to the server."""
@@ -108,7 +110,7 @@ class Channel:
             data = self._open((group, port), shared=True)
             member = socket.inet_aton(group) + socket.inet_aton(self._local)
             data.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, member)
-        except OSError as error:
+        except (OSError, UnicodeError) as error:
             raise self._unusable(error) from None
 
     def tell(self, message: Message, payload: bytes = b"") -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from ipaddress import IPv4Address
 
 from agvbench.adapters.natnet.channel import COMMAND_PORT, Connection
 from agvbench.adapters.natnet.version import Version
@@ -49,11 +50,27 @@ class NatNetOptions:
             _port(port or COMMAND_PORT, f"natnet:{address}"),
             str(camera.get("local", "")),
             None if version is None else Version.parse(version),
-            group=str(camera["multicast"]) if "multicast" in camera else None,
+            group=multicast_group(str(camera["multicast"]), "--camera multicast") if "multicast" in camera else None,
             data_port=_port(camera["data_port"], "--camera data_port") if "data_port" in camera else None,
         )
         body, up, rate_hz = camera.get("body", vehicle), camera.get("up", "y"), camera.get("rate_hz")
         return cls(connection, f"{body:g}" if isinstance(body, float) else body, _up(up), _rate(rate_hz))
+
+
+def multicast_group(text: str, where: str) -> str:
+    """Return the address of a multicast group as it is.
+
+    Raises
+    ------
+    FlagError
+        If it is none.
+    """
+    try:
+        if IPv4Address(text).is_multicast:
+            return text
+    except ValueError:
+        pass
+    raise FlagError("not a multicast group", where=where, value=text, limit="224.0.0.0 to 239.255.255.255")
 
 
 def _port(value: str | float, where: str) -> int:

@@ -219,3 +219,9 @@ def test_a_server_that_is_not_there_is_one_clear_line() -> None:
         Client(connection, WallClock(), print)
     with pytest.raises(LinkError, match="address cannot be used"):
         Client(Connection("127.0.0.1", 1510, local="192.0.2.1"), WallClock(), print)
+
+
+@pytest.mark.parametrize("host", [".lab", "a..b", "x" * 70])
+def test_a_name_that_can_be_no_host_is_one_clear_line(host: str) -> None:
+    with pytest.raises(LinkError, match="address cannot be used"):
+        Client(Connection(host, 1510), WallClock(), print)
