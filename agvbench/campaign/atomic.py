@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 TEMPORARY_PREFIX = ".tmp-"
@@ -24,9 +25,16 @@ def write_atomically(path: Path, data: bytes | memoryview, *, durable: bool = Tr
             os.fsync(descriptor)
     finally:
         os.close(descriptor)
-    temporary.rename(path)
+    temporary.replace(path)
     if durable:
         _force_to_disk(path.parent)
+
+
+def replace_whole(path: Path, write: Callable[[Path], object]) -> None:
+    """Have `write` write a file beside `path`, and put it in its place once it is whole."""
+    temporary = path.with_name(TEMPORARY_PREFIX + path.name)
+    write(temporary)
+    temporary.replace(path)
 
 
 def _force_to_disk(directory: Path) -> None:

@@ -6,11 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.campaign.mapping_schema import Gate
+from agvbench.errors import InputError
 from agvbench.types import Floats
 
 Indices = NDArray[np.int64]
 
 _STEP_S = 0.25
+_MOST_PIECES = 20_000
 _FRAME_WORTH_M = 1e-9  # decides between chains that drive equally far: a vehicle that stands still
 
 
@@ -30,11 +32,21 @@ def jumped(t_s: Floats, x_m: Floats, y_m: Floats, heading_rad: Floats, gate: Gat
         Poses [m, m, rad] in the floor frame.
     gate
         The largest speed and yaw rate, and the slack that noise needs.
+
+    Raises
+    ------
+    InputError
+        If it cuts the track into more pieces than can be joined in reasonable time: a wrong unit, as a rule.
     """
     if len(t_s) == 0:
         return np.zeros(0, np.bool_)
     poses = np.column_stack((t_s, x_m, y_m, heading_rad))
     first = np.flatnonzero(np.r_[True, ~_reachable(poses[:-1], poses[1:], gate)])
+    if len(first) > _MOST_PIECES:
+        raise InputError(
+            "the gate finds a jump nearly everywhere", where="[gate]", value=f"{len(first) - 1} in {len(t_s)} frames",
+            limit=f"at most {_MOST_PIECES - 1}", remedy="check max_speed, max_yaw_rate and the units of the columns",
+        )  # fmt: skip
     last = np.r_[first[1:], len(t_s)] - 1
     score = _driven(poses, first, last, gate.slack_m) + _FRAME_WORTH_M * (last - first + 1)
     return np.repeat(~_best_chain(poses[first], poses[last], score, gate), last - first + 1)

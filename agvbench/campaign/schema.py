@@ -35,14 +35,4 @@ POSES = (
     *_columns("number", "mean_error_m received_s", required=False),
 )
 TABLES: dict[str, tuple[Column, ...]] = {"runs": RUNS, "commands": COMMANDS, "poses": POSES}
-EXPERIMENTS = (
-    "steering_front",
-    "steering_rear",
-    "steering_opposite",
-    "drive",
-    "trajectory",
-    "endurance",
-    "step",
-    "free",
-)
 SPLITS = ("fit", "held_out")

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import errno
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
-from agvbench.campaign.atomic import is_temporary, write_atomically
+from agvbench.campaign.atomic import is_temporary, replace_whole, write_atomically
 from agvbench.campaign.checks import check_commands, check_poses, check_runs
 from agvbench.campaign.header import FILE_NAME, CampaignHeader
 from agvbench.campaign.parquet import to_parquet
@@ -101,12 +102,29 @@ class CampaignWriter:
 
     def _recover(self) -> None:
         self._finished = {run_id_of(part): None for part in parts(self.path / "runs.parquet")}
+        for name in TABLES:
+            orphans = (part for part in parts(self.path / f"{name}.parquet") if run_id_of(part) not in self._finished)
+            self._remove(orphans)
         for directory in (self.path, *(self.path / f"{name}.parquet" for name in TABLES)):
-            for file in sorted(directory.iterdir()):
-                orphan = directory != self.path and run_id_of(file) not in self._finished
-                if is_temporary(file) or orphan:
-                    file.unlink()
-                    self.recovered.append(str(file.relative_to(self.path)))
+            self._remove(file for file in sorted(directory.iterdir()) if is_temporary(file) and file.is_file())
+
+    def _remove(self, files: Iterable[Path]) -> None:
+        for file in files:
+            with self._recording():
+                file.unlink()
+            self.recovered.append(str(file.relative_to(self.path)))
+
+    @contextmanager
+    def _recording(self) -> Iterator[None]:
+        """Say in one line what the disk refuses."""
+        try:
+            yield
+        except OSError as error:
+            full = error.errno in _FULL
+            raise RecordingError(
+                f"cannot be written ({error.strerror})", where=self.path,
+                remedy=f"{'free some space' if full else 'bring the folder back'}, then go on with --resume",
+            ) from None  # fmt: skip
 
     @property
     def finished_ids(self) -> list[str]:
@@ -131,15 +149,9 @@ class CampaignWriter:
         name = part_name(run.run_id)
         tables = parts_of(run)
         check_parts(tables, self.path, self.header.command_unit)
-        try:
+        with self._recording():
             for table, part in tables.items():
                 write_atomically(self.path / f"{table}.parquet" / name, to_parquet(part), durable=self._durable)
-        except OSError as error:
-            full = error.errno in _FULL
-            raise RecordingError(
-                f"cannot be written ({error.strerror})", where=self.path,
-                remedy=f"{'free some space' if full else 'bring the folder back'}, then go on with --resume",
-            ) from None  # fmt: skip
         self._finished[run.run_id] = None
 
     def write_table(self, name: str, table: pd.DataFrame) -> None:
@@ -149,13 +161,27 @@ class CampaignWriter:
         ------
         CampaignError
             If `name` is one of the three.
+        RecordingError
+            If the disk refuses.
         """
         if name in TABLES:
             raise CampaignError(
                 "is written run by run", where=self.path, value=name, remedy="choose another table name"
             )
         arrow = pa.Table.from_pandas(table, preserve_index=False).replace_schema_metadata(None)
-        write_atomically(self.path / f"{name}.parquet", to_parquet(arrow), durable=self._durable)
+        with self._recording():
+            write_atomically(self.path / f"{name}.parquet", to_parquet(arrow), durable=self._durable)
+
+    def write_beside(self, name: str, write: Callable[[Path], object]) -> None:
+        """Have `write` write a further file, such as ``vehicle.toml``: it is there as a whole or not at all.
+
+        Raises
+        ------
+        RecordingError
+            If the disk refuses.
+        """
+        with self._recording():
+            replace_whole(self.path / name, write)
 
 
 def check_parts(tables: Mapping[str, pa.Table], where: Path, unit: CommandUnit) -> None:

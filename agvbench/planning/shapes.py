@@ -178,12 +178,16 @@ class Endurance(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 Row = tuple[float, float, float, float]
 
 
+MOST_ROWS = 8000
+"""How many commands a run may have, a little less than a recorded run may that is driven again unseen."""
+
+
 class CommandTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Raw commands: `rows` of t_s, drive, front, rear in the vehicle's own `unit`; the stop is at `duration_s`."""
 
     unit: CommandUnit
     duration_s: Duration
-    rows: Annotated[tuple[Row, ...], Meta(min_length=1)]
+    rows: Annotated[tuple[Row, ...], Meta(min_length=1, max_length=MOST_ROWS)]
 
     def __post_init__(self) -> None:
         times = [row[0] for row in self.rows] + [self.duration_s]

@@ -74,7 +74,7 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
             calibration_hash=models["calibrated"].calibration_hash if "calibrated" in models else "",
         ) as link,
     ):
-        _check_unit(models["uncalibrated"], link)
+        _check_models(models, link)
         choose_placer(settings.place, simulated=link.identity().simulated)
         _check_exchange(settings, link)
         _check_rate(link)
@@ -108,16 +108,22 @@ def _known_models(settings: BenchSettings) -> dict[str, VehicleModel]:
     return models
 
 
-def _check_unit(nominal: VehicleModel, link: VehicleLink) -> None:
+_OPTIONS = {"uncalibrated": "--vehicle", "calibrated": "--calibration", "corrected": "--corrected"}
+
+
+def _check_models(models: Mapping[str, VehicleModel], link: VehicleLink) -> None:
+    """Refuse a model that would stop at another command than the vehicle does, or speak in another unit."""
     identity = link.identity()
-    if identity.command_unit != nominal.command_unit:
-        raise VehicleError(
-            "the vehicle takes commands in another unit than its file says",
-            where=nominal.name,
-            value=nominal.command_unit,
-            limit=identity.command_unit,
-            remedy="give the right file with --vehicle",
-        )
+    for condition, model in models.items():
+        for what, said, true in (
+            ("takes commands in another unit", model.command_unit, identity.command_unit),
+            ("stands still at another command", model.neutral, identity.neutral),
+        ):
+            if said != true:
+                remedy = f"give the right file with {_OPTIONS[condition]}"
+                raise VehicleError(
+                    f"the vehicle {what} than its file says", where=model.name, value=said, limit=true, remedy=remedy
+                )
 
 
 def _check_exchange(settings: BenchSettings, link: VehicleLink) -> None:

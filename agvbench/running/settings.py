@@ -12,6 +12,7 @@ from typing import Any
 import tomli_w
 
 from agvbench.adapters.impairment.spec import unimpaired, without_packet_faults
+from agvbench.campaign.atomic import write_atomically
 from agvbench.errors import FileError, FlagError
 from agvbench.running.supervision.limits import DEFAULT_SAFETY
 from agvbench.text_files import read_toml
@@ -103,8 +104,18 @@ class BenchSettings:
         return cls(**{**table, "benchmarks": tuple(map(str, table.get("benchmarks", ())))})
 
     def save(self, directory: Path) -> None:
-        """Write the settings beside the campaign's tables."""
-        (directory / SETTINGS_FILE).write_text(tomli_w.dumps(asdict(self)), encoding="utf-8")
+        """Write the settings beside the campaign's tables; what was there is replaced at once or not at all.
+
+        Raises
+        ------
+        FileError
+            If they cannot be written.
+        """
+        path = directory / SETTINGS_FILE
+        try:
+            write_atomically(path, tomli_w.dumps(asdict(self)).encode())
+        except OSError as error:
+            raise FileError("cannot be written", where=path, value=error.strerror, remedy="free some space") from None
 
     @classmethod
     def load(cls, directory: Path) -> BenchSettings:

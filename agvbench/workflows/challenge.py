@@ -65,6 +65,9 @@ def run_challenge(
         raise FlagError(
             "too few to score", where="--seeds, --repeats", value=f"{seeds}, {repeats}", limit="from 1, from 2"
         )
+    for where, value, least in (("--first-seed", first_seed, 0), ("--jobs", 1 if jobs is None else jobs, 1)):
+        if value < least:
+            raise FlagError("is too small", where=where, value=value, limit=f"at least {least}")
     for spec in specs:
         try:
             recipes(spec)

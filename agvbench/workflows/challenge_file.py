@@ -9,6 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from agvbench.campaign.atomic import write_atomically
 from agvbench.errors import FileError
 from agvbench.text_files import read_json
 from agvbench.workflows.challenge_scores import plain, score
@@ -29,13 +30,8 @@ def write_trials(path: Path, repeats: int, trials: Sequence[Trial]) -> None:
     ordered = sorted(trials, key=lambda trial: (trial.spec, trial.seed))
     content: dict[str, Any] = {"schema": SCHEMA, "repeats": repeats, **score(ordered).to_json()}
     content["each"] = [plain(asdict(trial)) for trial in ordered]
-    part = path.with_name(f"{path.name}.part")
-
-    def write(whole: Path) -> None:
-        part.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-        part.replace(whole)
-
-    write_file("--json", path, write)
+    text = json.dumps(content, indent=1) + "\n"
+    write_file("--json", path, lambda whole: write_atomically(whole, text.encode()))
 
 
 def known_trials(path: Path, repeats: int) -> dict[tuple[str, int], Trial]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from agvbench.errors import FileError
 from agvbench.text_files import read_json
+from agvbench.workflows.writing import write_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,8 +39,21 @@ def shown(found: Diagnosis) -> ShownDiagnosis:
 
 def keep(found: Diagnosis, json_file: Path) -> None:
     """Write the residuals beside the JSON where that is a campaign's own `JSON`."""
-    if json_file.name == JSON and (json_file.parent / "campaign.toml").exists() and found.residuals is not None:
-        found.residuals.to_parquet(json_file.with_name(RESIDUALS), index=False)
+    if json_file.name == JSON and (json_file.parent / "campaign.toml").exists():
+        keep_residuals(found, json_file.parent)
+
+
+def keep_residuals(found: Diagnosis, directory: Path) -> None:
+    """Write the residuals into a directory in which the JSON lies.
+
+    Raises
+    ------
+    FileError
+        If they cannot be written.
+    """
+    residuals = found.residuals
+    if residuals is not None:
+        write_file("--json", directory / RESIDUALS, lambda path: residuals.to_parquet(path, index=False))
 
 
 def read_diagnosis(directory: Path) -> ShownDiagnosis | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -12,6 +11,7 @@ from typing import Any
 
 import tomli_w
 
+from agvbench.campaign.atomic import write_atomically
 from agvbench.errors import FileError, FlagError
 from agvbench.running.directory import CAMPAIGNS
 from agvbench.running.settings import BenchSettings, settings_for_resume
@@ -59,10 +59,8 @@ def write(path: Path, text: str) -> None:
     FileError
         If it cannot be written.
     """
-    part = path.with_name(f".{path.name}.part")
     try:
-        part.write_text(text, encoding="utf-8")
-        os.replace(part, path)  # noqa: PTH105 - says what it does
+        write_atomically(path, text.encode())
     except OSError as error:
         raise FileError("cannot be written", where=path, value=error.strerror) from None
 

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from agvbench.campaign.atomic import replace_whole
 from agvbench.errors import FileError, FitError
 from agvbench.model import VehicleModel
 from agvbench.running.remainders import read_remainders
 from agvbench.running.settings import BenchSettings
 from agvbench.text_files import read_json
+from agvbench.workflows.diagnosis_files import keep_residuals
 from agvbench.workflows.loop_driving import Tell, drive, moved
 from agvbench.workflows.loop_plans import plans_of
 from agvbench.workflows.loop_settings import (
@@ -65,9 +66,8 @@ def diagnosed(directory: Path, seed: int, tell: Tell) -> dict[str, Any]:
         raise FitError("nothing to correct with", where=directory / BEFORE, value=found.why)
     for line in _in_words(found):
         tell(f"    {line}")
-    part = directory / f".{VEHICLE}.part"
-    model.save(part)
-    os.replace(part, vehicle)  # noqa: PTH105 - says what it does
+    replace_whole(vehicle, model.save)
+    keep_residuals(found, directory)
     write(path, found.to_text())
     return _read(path)
 

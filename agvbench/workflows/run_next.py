@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import dataclasses
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from agvbench.running.opening import open_session
 from agvbench.running.records import DriveOrder
 from agvbench.running.settings import SETTINGS_FILE, BenchSettings
 from agvbench.types import Run
+from agvbench.workflows.diagnosis_files import RESIDUALS
 
 DRIVEN = "driven"
 SESSION = "next"
@@ -30,7 +32,8 @@ SESSION = "next"
 _OF_THE_CAMPAIGN = frozenset(
     {"vehicle", "calibration", "corrected", "remainders", "maps", "repeats", "order", "full", "benchmarks", "only"}
 )
-_TABLES = {"campaign.toml", "runs", "commands", "poses"}
+_TABLES = {"runs", "commands", "poses"}
+_OF_BEFORE = {"campaign.toml", RESIDUALS}
 
 
 def run_next(
@@ -70,7 +73,7 @@ def run_next(
     """
     target = _free_directory(campaign.path, out)
     driven = target / DRIVEN
-    runs, refused = _driven(experiment, model, _options(campaign.path, rig), driven, len(_earlier(campaign)))
+    runs, refused = _driven(experiment, model, _options(campaign.path, rig), driven, set(campaign.run_ids))
     if not runs:
         raise PlanError(
             "no attempt at the next run counted",
@@ -118,18 +121,23 @@ def _earlier(campaign: Campaign) -> list[Run]:
 
 
 def _driven(
-    experiment: NextExperiment, model: VehicleModel | None, options: dict[str, Any], driven: Path, earlier: int
+    experiment: NextExperiment,
+    model: VehicleModel | None,
+    options: dict[str, Any],
+    driven: Path,
+    taken: Collection[str],
 ) -> tuple[list[Run], str]:
-    """Return the repeats that count, and why the last that does not was refused."""
+    """Return the repeats that count, and why the last that does not was refused; no id begins as one that is taken."""
     trajectory = experiment.trajectory
     runs: list[Run] = []
     refused = ""
     with open_session(options, out=str(driven), resume=False, dry_run=False) as session:
-        for repeat in range(1, experiment.repeats + 1):
+        free = (name for name in _names(trajectory.name) if not any(run_id.startswith(name) for run_id in taken))
+        for repeat, run_id in zip(range(1, experiment.repeats + 1), free, strict=False):
             start = experiment.starts[(repeat - 1) % len(experiment.starts)] if experiment.starts else None
             planned = plan(trajectory, model or session.nominal, workspace=session.workspace, start=start)
             order = DriveOrder(
-                run_id=f"{trajectory.name}-{earlier + repeat:02d}",
+                run_id=run_id,
                 experiment=trajectory.experiment,
                 trajectory=trajectory.name,
                 condition="calibrated",
@@ -144,6 +152,10 @@ def _driven(
             else:
                 refused = run.status
     return runs, refused
+
+
+def _names(stem: str) -> Iterator[str]:
+    return (f"{stem}-{number:02d}" for number in count(1))
 
 
 def _kept(campaign: Campaign, seed: int) -> Iterator[Run]:
@@ -163,9 +175,9 @@ def _kept(campaign: Campaign, seed: int) -> Iterator[Run]:
 def _later(runs: list[Run], campaign: Campaign) -> Iterator[Run]:
     """Return the new runs after the old ones, in a session of their own, to be fitted."""
     begin = max((run.started_s for run in campaign), default=0.0) + 3600.0
-    count = len({run.session for run in _earlier(campaign)}) + 1
+    number = len({run.session for run in _earlier(campaign)}) + 1
     for run in runs:
-        yield dataclasses.replace(run, started_s=begin + run.started_s, session=f"{SESSION}{count}", split="fit")
+        yield dataclasses.replace(run, started_s=begin + run.started_s, session=f"{SESSION}{number}", split="fit")
 
 
 def _settle(target: Path) -> None:
@@ -178,10 +190,10 @@ def _settle(target: Path) -> None:
 
 
 def _copy_what_else(path: Path, target: Path) -> None:
-    """Copy settings, vehicle and further tables, but no report and no diagnosis: those are of the campaign before."""
+    """Copy settings, vehicle and further tables, but neither report nor diagnosis: those are of the campaign before."""
     for item in sorted(path.iterdir()):
         stem = item.name.partition(".")[0]
-        if stem in _TABLES or item.name == "campaign.toml" or (target / item.name).exists():
+        if stem in _TABLES or item.name in _OF_BEFORE or (target / item.name).exists():
             continue
         if item.is_file() and item.suffix in {".toml", ".parquet", ".csv"}:
             shutil.copy2(item, target / item.name)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from agvbench.campaign.gate import jumped
 from agvbench.campaign.mapping_schema import Gate
+from agvbench.errors import InputError
 
 GATE = Gate(max_speed_m_per_s=2.0, max_yaw_rate_rad_per_s=6.0)
 
@@ -27,6 +28,12 @@ def test_a_clean_track_passes() -> None:
 def test_a_vehicle_that_stands_passes() -> None:
     t_s = np.arange(500) / 100.0
     assert not jumped(t_s, t_s * 0.0, t_s * 0.0, t_s * 0.0, GATE).any()
+
+
+def test_a_gate_in_another_unit_is_told_and_not_waited_for() -> None:
+    t_s = np.arange(100_000) / 100.0
+    with pytest.raises(InputError, match=r"\[gate\]: the gate finds a jump nearly everywhere: 99999 in 100000 frames"):
+        jumped(t_s, 1000.0 * t_s, t_s * 0.0, t_s * 0.0, GATE)
 
 
 @settings(max_examples=50, deadline=None)

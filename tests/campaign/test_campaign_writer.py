@@ -81,6 +81,9 @@ def test_resume_removes_what_was_never_finished(tmp_path: Path) -> None:
     whole = _bytes(tmp_path)
     (tmp_path / "runs.parquet" / "b.parquet").unlink()  # killed between the poses and the runs part
     (tmp_path / "poses.parquet" / ".tmp-c.parquet").write_bytes(b"PAR1 half")
+    # What somebody else put there is nobody's unfinished run.
+    (tmp_path / "poses.parquet" / "notes.txt").write_text("the floor was wet")
+    (tmp_path / "poses.parquet" / ".ipynb_checkpoints").mkdir()
     assert Campaign.open(tmp_path).check().run_ids == ["a"]
 
     writer = CampaignWriter.resume(tmp_path, HEADER)
@@ -91,6 +94,8 @@ def test_resume_removes_what_was_never_finished(tmp_path: Path) -> None:
         "poses.parquet/b.parquet",
     ]
     writer.append(make_run("b"))
+    (tmp_path / "poses.parquet" / "notes.txt").unlink()
+    (tmp_path / "poses.parquet" / ".ipynb_checkpoints").rmdir()
     assert _bytes(tmp_path) == whole
 
 

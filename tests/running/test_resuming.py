@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import subprocess
 import sys
 
 import pytest
 
-from agvbench.campaign import Campaign
-from agvbench.errors import FlagError
+from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
+from agvbench.errors import FitError, FlagError
+from agvbench.model import thesis_vehicle
 from agvbench.running.benchmark_files import benchmark_name, find_benchmark
+from agvbench.running.calibrating import VEHICLE_FILE, calibrate_campaign
 from agvbench.workflows.bench import run_benchmarks
 
 MINE = """'''Two turns, for agvbench.'''
@@ -53,6 +56,34 @@ def test_what_was_chosen_is_chosen_again(lab):
     resumed = bench("--resume")
     assert resumed.returncode == 0, resumed.stdout + resumed.stderr
     assert {run.run_id for run in Campaign.open(lab / "c")} == first
+
+
+def test_a_calibration_that_was_made_before_an_interruption_is_kept(tmp_path):
+    nominal = thesis_vehicle()
+    writer = CampaignWriter.create(
+        tmp_path, CampaignHeader(1, "c", "v", 0.181, 0.121, nominal.command_unit, nominal.neutral, 100.0)
+    )
+    with pytest.raises(FitError, match="cannot calibrate"):
+        calibrate_campaign(writer, maps="default")
+    nominal.save(tmp_path / VEHICLE_FILE)
+    assert calibrate_campaign(writer, maps="default") == nominal
+
+
+@pytest.mark.parametrize(
+    ("changed", "line"),
+    [
+        ({"neutral": 1480.0}, "the vehicle stands still at another command than its file says: 1480.0 (limit: 1500.0)"),
+        ({"command_unit": "normalised"}, "the vehicle takes commands in another unit than its file says: normalised"),
+    ],
+)
+def test_a_model_of_another_vehicle_is_refused_before_anything_moves(lab, changed, line):
+    dataclasses.replace(thesis_vehicle(), **changed).save(lab / "other.toml")
+    for option in ("--calibration", "--corrected"):
+        said = bench("trajectories", "-k=calibrated", f"{option}=other.toml")
+        assert said.returncode == 2
+        assert line in said.stdout + said.stderr
+        assert f"give the right file with {option}" in said.stdout + said.stderr
+        assert not (lab / "c" / "runs.parquet").exists()
 
 
 def test_more_benchmarks_may_be_asked_for_than_it_began_with(lab):

@@ -112,7 +112,17 @@ def test_json_has_no_nan():
     assert json.loads(text)["confusion"] == {"nothing": {"ADEQUATE": 1}}
 
 
-@pytest.mark.parametrize(("seeds", "specs"), [(0, []), (1, ["steering_leg"])])
-def test_bad_flags_are_told(seeds, specs):
-    with pytest.raises(FlagError, match=r"--seeds|--only"):
-        run_challenge(seeds, first_seed=0, specs=specs, repeats=5, jobs=1, json_file=None)
+@pytest.mark.parametrize(
+    ("flag", "wrong"),
+    [
+        ("--seeds", {"seeds": 0}),
+        ("--first-seed", {"first_seed": -1}),
+        ("--jobs", {"jobs": -1}),
+        ("--jobs", {"jobs": 0}),
+        ("--only", {"specs": ["steering_leg"]}),
+    ],
+)
+def test_bad_flags_are_told(flag, wrong):
+    right = {"seeds": 1, "first_seed": 0, "specs": [], "repeats": 5, "jobs": 1, "json_file": None}
+    with pytest.raises(FlagError, match=flag):
+        run_challenge(**(right | wrong))
