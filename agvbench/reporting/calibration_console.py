@@ -7,6 +7,7 @@ import math
 from rich import box
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from agvbench.calibration import Calibration, MapFit
 from agvbench.errors import FitError
@@ -28,7 +29,7 @@ def print_calibration(calibration: Calibration, console: Console) -> None:
 def _fits_table(calibration: Calibration) -> Table:
     """Return all fits below one another; the one in the vehicle model is marked."""
     table = Table(
-        title=f"static maps of {calibration.model.name}, from {calibration.model.provenance['method']}",
+        title=Text(f"static maps of {calibration.model.name}, from {calibration.model.provenance['method']}"),
         box=box.SIMPLE_HEAD,
         pad_edge=False,
         padding=(0, 1),

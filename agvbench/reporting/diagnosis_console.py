@@ -21,7 +21,7 @@ _MOST_DEPENDENCES = 5
 def print_diagnosis(found: Diagnosis, console: Console) -> None:
     """Print the answer in plain words."""
     content = found.to_json()
-    console.print(f"[bold]{found.verdict}[/bold]: {found.why}", highlight=False, soft_wrap=True)
+    console.print(Text.assemble((str(found.verdict), "bold"), f": {found.why}"), soft_wrap=True)
     lines = [*map(effect_in_words, found.effects), *islice(left_in_words(content), _MOST_DEPENDENCES)]
     _say(lines, console)
     if found.held_out is not None:

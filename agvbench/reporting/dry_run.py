@@ -35,7 +35,8 @@ def dry_run_table(planned: Sequence[tuple[DriveOrder, Plan]]) -> str:
         floor = " × ".join(f"{max(sides):.2f}" for sides in zip(*(plan.floor_m for plan in plans), strict=True))
         minutes = _total_s(plans) / 60.0
         table.add_row(
-            experiment, trajectory or "–", condition, str(len(plans)), f"{longest:.1f}", f"{minutes:.1f}", floor
+            *map(Text, (experiment, trajectory or "–", condition, str(len(plans)))),
+            *map(Text, (f"{longest:.1f}", f"{minutes:.1f}", floor)),
         )
     return as_text(table)
 

@@ -6,6 +6,7 @@ import pandas as pd
 from rich import box
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from agvbench.campaign import Campaign
 from agvbench.campaign.importing import IMPORT_TABLE
@@ -42,7 +43,7 @@ def _table(accounts: pd.DataFrame) -> Table:
     for title in _COLUMNS.values():
         table.add_column(title, justify="left" if title == "file" else "right", no_wrap=title == "file")
     for row in accounts.to_dict("records"):
-        table.add_row(*(str(row[name]) for name in _COLUMNS))
+        table.add_row(*(Text(str(row[name])) for name in _COLUMNS))
     if len(accounts) > 1:
         totals = accounts[list(_COLUMNS)[1:]].sum()
         table.add_section()

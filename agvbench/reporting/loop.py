@@ -27,9 +27,12 @@ from agvbench.reporting.latex import to_latex
 from agvbench.reporting.markdown import to_markdown
 from agvbench.reporting.progress import track
 from agvbench.reporting.sections import all_sections
+from agvbench.reporting.sections.diagnosis import diagnosis_blocks
 from agvbench.statistics.equivalence import Bias
 from agvbench.statistics.quantities import QUANTITIES
 from agvbench.types import CONDITIONS
+from agvbench.workflows.diagnosis_files import ShownDiagnosis, read_diagnosis
+from agvbench.workflows.diagnosis_words import items, mapping
 from agvbench.workflows.loop import Loop
 from agvbench.workflows.loop_table import BeforeAfter, before_after, counts, root_mean_square_bias
 from agvbench.workflows.report import gather
@@ -66,7 +69,9 @@ def write_loop_report(loop: Loop) -> LoopReport:
     """
     data = gather(loop.after, track=lambda runs, total: track(runs, total, what="reading runs"))
     rows = before_after(data.errors)
-    sections = [*_sections(loop, rows), *(section.content(data) for section in all_sections())]
+    own = _sections(loop, rows)
+    said = {section.slug for section in own}
+    sections = [*own, *(section.content(data) for section in all_sections() if section.slug not in said)]
     title, subtitle = f"Loop {plain(loop.directory.name)}", f"{plain(data.header.vehicle_name)} · {len(data.runs)} runs"
     texts = {"report.html": to_html(title, subtitle, sections), "report.md": to_markdown(title, sections)}
     for table in (table for section in sections for table in section.tables):
@@ -129,7 +134,7 @@ def _sections(loop: Loop, rows: Sequence[BeforeAfter]) -> list[Content]:
     blocks: list[Block] = [Paragraph(sentence, lead=True) for sentence in _headline(loop, rows)]
     return [
         Content("before-after", "Before and after", [*blocks, before_after_table(rows)]),
-        Content("diagnosis", "What the calibrated model lacks", list(_diagnosis(loop.diagnosis))),
+        Content("diagnosis", "What the calibrated model lacks", _diagnosis(loop)),
         Content("plans", "What corrected plans make up for", [_plans(loop.plans), *([Bullets(said)] if said else [])]),
     ]
 
@@ -159,22 +164,12 @@ def _headline(loop: Loop, rows: Sequence[BeforeAfter]) -> Iterator[str]:
         yield f"The diagnosis was {plain(verdict)}: what it did not name is not corrected but where it showed before."
 
 
-def _diagnosis(content: Mapping[str, Any]) -> Iterator[Block]:
-    yield Paragraph(f"{content['verdict']}: {content.get('provenance', {}).get('why', '')}", lead=True)
-    columns = [
-        *(Column("effect", "effect"), Column("parameter", "parameter"), Column("value", "value", 4)),
-        *(Column("stderr", "standard error", 4), Column("unit", "unit"), Column("rivals", "or instead")),
-    ]
-    rows: list[list[Value]] = [
-        [effect["name"], name, p["value"], p["stderr"], p["unit"], ", ".join(effect["confounded_with"])]
-        for effect in content["effects"]
-        for name, p in effect["parameters"].items()
-    ]
-    if rows:
-        yield Table("effects", "Effects that the corrected model has.", columns, rows)
-    left = [f"{d['covariate']} ({d['share']:.0%} of it)" for d in content["unexplained"]["depends_on"]]
-    if left:
-        yield Paragraph(f"Not explained, and not corrected unless named above; it depends on {', '.join(left)}.")
+def _diagnosis(loop: Loop) -> list[Block]:
+    shown = read_diagnosis(loop.directory) or ShownDiagnosis(loop.diagnosis)
+    blocks = diagnosis_blocks(shown)
+    if items(mapping(shown.content.get("unexplained")).get("depends_on")):
+        blocks.insert(1, Paragraph("What is left unexplained is not corrected, but where it was missed before."))
+    return blocks
 
 
 def _plans(plans: Mapping[str, Any]) -> Table:

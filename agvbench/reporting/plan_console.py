@@ -7,6 +7,7 @@ import math
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from agvbench.planning import DryRun, DryRunRow, Plan
 from agvbench.types import Pose
@@ -33,7 +34,7 @@ def _table(made: DryRun, *, wide: bool) -> Table:
     if wide:
         table.add_column("what")
     for row in made.rows:
-        table.add_row(*_cells(row)[: len(table.columns)])
+        table.add_row(*map(Text, _cells(row)[: len(table.columns)]))
     return table
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from rich import box
 from rich.table import Table
+from rich.text import Text
 
 _PREDICTORS = {
     "static": "static maps",
@@ -30,7 +31,7 @@ def windows_table(windows: Mapping[str, Any]) -> Table:
         label = f"{row['recording']}{' (held out)' if row['held_out'] else ''}"
         for ahead, errors in _errors(row):
             cells = [_cell(errors[f"{name}_mm"]) for name in known]
-            table.add_row(label, ahead, f"{errors['floor_mm']:.1f}", *cells)
+            table.add_row(Text(label), ahead, f"{errors['floor_mm']:.1f}", *cells)
             label = ""
     return table
 

@@ -12,8 +12,6 @@ from agvbench.statistics import Comparison, Verdict, compare, pose_errors
 from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
 from agvbench.statistics.comparison_json import comparison_to_json
 
-FAIL_ON = ("regression", "any", "never")
-
 
 def compare_campaigns(
     a: str | Path,
