@@ -34,8 +34,8 @@ class Headline(Section):
     def blocks(self, data: ReportData) -> Sequence[Block]:
         """Return the sentences."""
         lead = [Paragraph(sentence, lead=True) for sentence in _lead(data)]
-        details = [item for comparison in data.comparisons for item in _details(comparison)]
-        details += list(data.problems)
+        said = (item for comparison in data.comparisons for item in _details(comparison))
+        details = list(dict.fromkeys((*said, *data.problems)))
         return [*lead, Bullets(details)] if details else lead
 
 
