@@ -1,4 +1,4 @@
-"""What is said of a camera on the command line: ``NAME=VALUE``."""
+"""What is said of a camera on the command line: ``NAME=VALUE``, several with commas or one after another."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from agvbench.errors import FlagError
 def camera_options(pairs: Iterable[str]) -> dict[str, str]:
     """Return the camera's parameters by name.
 
-    >>> camera_options(["lost=0.01"])
-    {'lost': '0.01'}
+    >>> camera_options(["lost=0.01,rate_hz=240", "up=z"])
+    {'lost': '0.01', 'rate_hz': '240', 'up': 'z'}
 
     Raises
     ------
@@ -19,7 +19,7 @@ def camera_options(pairs: Iterable[str]) -> dict[str, str]:
         If a pair has no ``=``.
     """
     options: dict[str, str] = {}
-    for pair in pairs:
+    for pair in filter(None, ",".join(pairs).split(",")):
         name, equals, value = pair.partition("=")
         if not (name and equals and value):
             raise FlagError(

@@ -53,7 +53,7 @@ def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME=VALUE",
-        help="set a parameter of the simulated camera, such as rate_hz=240 or lost=0 (repeatable)",
+        help="set a parameter of the simulated camera, such as rate_hz=240 or lost=0; several with commas, or again",
     )
 
 

@@ -63,7 +63,7 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
             agv=settings.agv,
             mocap=settings.mocap,
             plant=settings.plant,
-            camera=camera_options(filter(None, settings.camera.split(","))),
+            camera=camera_options([settings.camera]),
             seed=settings.seed,
             connect=settings.connect or None,
             bus_config=BusConfig.load(settings.bus_config) if settings.bus_config else None,

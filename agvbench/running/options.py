@@ -2,8 +2,21 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable
 from typing import Any
+
+
+class Joined(argparse.Action):
+    """Keeps every value of an option that is given several times, with commas between."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option: str | None = None
+    ) -> None:
+        """Add a value to those before."""
+        before = getattr(namespace, self.dest, None)
+        setattr(namespace, self.dest, f"{before},{values}" if before else values)
+
 
 # Not given is None everywhere, so that a resumed session can tell what was asked from what is usual.
 _FLAG: dict[str, Any] = {"action": "store_true", "default": None}
@@ -16,8 +29,8 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
     ("--mocap", {"metavar": "ADAPTER"}, "motion capture adapter: sim (default), natnet:HOST, natnet:emulated"),
     (
         "--camera",
-        {"metavar": "NAME=VALUE"},
-        "options of the camera, several with commas, such as body=blue,up=z or rate_hz=240",
+        {"metavar": "NAME=VALUE", "action": Joined},
+        "an option of the camera, such as body=blue or rate_hz=240; several with commas, or one after another",
     ),
     (
         "--plant",
