@@ -14,7 +14,7 @@ from agvbench.planning.planner import Plan, place, plan
 from agvbench.planning.reading import list_trajectories, load_trajectory, trajectory_from_table
 from agvbench.planning.resting import Departure, Miss
 from agvbench.planning.summary import DryRun, DryRunRow, dry_run
-from agvbench.planning.trajectory import Trajectory
+from agvbench.planning.trajectory import Trajectory, steered
 from agvbench.planning.workspace import Workspace
 
 __all__ = [
@@ -35,5 +35,6 @@ __all__ = [
     "load_trajectory",
     "place",
     "plan",
+    "steered",
     "trajectory_from_table",
 ]

@@ -13,6 +13,8 @@ from agvbench.planning.steering import axle_angles, radius_of, smallest_radius
 from agvbench.planning.trajectory import Trajectory
 from agvbench.vehicle.kinematics import body_motion
 
+_MOUNTED_OFF_RAD = math.radians(3.0)
+
 
 @dataclass(frozen=True)
 class Leg:
@@ -101,6 +103,7 @@ def _angles(segment: Straight | Arc, mode: Steering, model: VehicleModel, *, whe
         radius = radius_of(mode, math.radians(segment.axle_angle_deg), model.geometry)
     side = 1.0 if segment.turn == "left" else -1.0
     front, rear = (side * angle for angle in axle_angles(mode, radius, model.geometry, where=where))
+    front, rear = _as_mounted(front, rear, model)
     for axle, angle in (("front", front), ("rear", rear)):
         _check_end_stop(f"turn radius {radius:.2f} m", axle, angle, model, where, _widen(mode, model))
     return front, rear
@@ -110,12 +113,25 @@ def _straight_angles(segment: Straight, mode: Steering, model: VehicleModel, *, 
     crab = math.radians(segment.crab_deg)
     if crab and mode != "crab":
         raise PlanError("crab_deg needs crab steering", where=where, value=mode, remedy='say steering = "crab"')
-    for axle in ("front", "rear"):
+    front, rear = _as_mounted(crab, crab, model)
+    for axle, angle in (("front", front), ("rear", rear)):
         what = f"moving at {segment.crab_deg:.1f}° to the heading" if crab else "a straight"
         _check_end_stop(
-            what, axle, crab, model, where, "calibrate the steering" if not crab else "choose a smaller angle"
+            what, axle, angle, model, where, "calibrate the steering" if not crab else "choose a smaller angle"
         )
-    return crab, crab
+    return front, rear
+
+
+def _as_mounted(front_rad: float, rear_rad: float, model: VehicleModel) -> tuple[float, float]:
+    """Return both angles turned by what an axle that does not steer is mounted off by, as calibration found it.
+
+    Turned alike they keep a straight a straight, and an arc's curvature to first order.
+    """
+    for map_, angle in ((model.front, front_rad), (model.rear, rear_rad)):
+        low, high = map_.output_range
+        if low == high and abs(low - angle) <= _MOUNTED_OFF_RAD:
+            return front_rad + low - angle, rear_rad + low - angle
+    return front_rad, rear_rad
 
 
 def _check_end_stop(what: str, axle: str, angle_rad: float, model: VehicleModel, where: str, remedy: str) -> None:

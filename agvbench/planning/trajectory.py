@@ -127,6 +127,11 @@ class Trajectory(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, 
         return cast(dict[str, object], _without_none(msgspec.to_builtins(self)))
 
 
+def steered(trajectory: Trajectory, mode: str) -> Trajectory:
+    """Return the trajectory steered in this mode, or as it is for "": `Trajectory.with_steering`."""
+    return trajectory.with_steering(cast(Steering, mode)) if mode else trajectory
+
+
 def _without_none(value: object) -> object:
     if isinstance(value, dict):
         return {key: _without_none(item) for key, item in value.items() if item is not None}

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from agvbench.errors import FlagError, PlanError
-from agvbench.planning import Plan, Trajectory, load_trajectory
+from agvbench.planning import Plan, Trajectory
 from agvbench.planning.shapes import CommandTable
 from agvbench.running.constant import held
 from agvbench.running.records import DriveOrder
@@ -57,7 +57,7 @@ class Driver:
         """
         if condition not in CONDITIONS:
             raise FlagError("unknown condition", value=condition, limit=", ".join(CONDITIONS), where=self._run_id)
-        return self._drive(self._session.plan(load_trajectory(name), condition), condition)
+        return self._drive(self._session.plan(self._session.trajectory(name), condition), condition)
 
     def hold(self, *, for_s: float, drive: float = 0.0, front: float = 0.0, rear: float = 0.0) -> Run:
         """Hold shares of full command for `for_s` seconds: drive 1 is full speed forward, steering 1 full left."""

@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -50,12 +51,19 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
     """
     directory, settings = session_settings(given, out, resume=resume)
     models = _known_models(settings)
-    workspace, remainders = Workspace.parse(settings.workspace), read_remainders(settings.remainders)
+    session_with = partial(
+        BenchSession,
+        directory,
+        models=models,
+        workspace=Workspace.parse(settings.workspace),
+        remainders=read_remainders(settings.remainders),
+        steering=settings.steering,
+    )
     if dry_run:
         check_specs(settings.agv, settings.mocap)
         # What calibration will find is not known yet: what is believed now has the right axles, unit and neutral.
         models.setdefault("calibrated", models["uncalibrated"] if settings.vehicle else thesis_vehicle())
-        yield BenchSession(directory, models=models, workspace=workspace, bench=None, remainders=remainders)
+        yield session_with(bench=None)
         return
     with (
         interruptible(),
@@ -81,7 +89,7 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
         header = _header(_name(directory, resume=resume), models["uncalibrated"], link)
         writer = _writer(directory, settings, header, resume=resume, simulated=link.identity().simulated)
         bench = _bench(settings, models, link, writer)
-        session = BenchSession(directory, models=models, workspace=workspace, bench=bench, remainders=remainders)
+        session = session_with(bench=bench)
         session.notices = _notices(settings, given, resume=resume, resumed=bool(writer.finished_ids), where=directory)
         with bench.pause.by_signal():
             yield session

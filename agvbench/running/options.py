@@ -37,6 +37,11 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
         {"metavar": "PLANT"},
         "simulated plant, MODULE_OR_FILE:FACTORY (default: a vehicle like the thesis')",
     ),
+    (
+        "--steering",
+        {"choices": ("abeam", "front", "rear", "opposite", "crab")},
+        "steer every trajectory in this mode: front, where the rear axle does not steer (default: as each says)",
+    ),
     ("--vehicle", {"metavar": "FILE"}, "vehicle.toml believed before calibration (default: nominal maps)"),
     ("--calibration", {"metavar": "FILE"}, "calibrated vehicle.toml (default: calibrate in this session)"),
     (

@@ -15,7 +15,9 @@ from agvbench.planning import (
     Workspace,
     corrected_plan,
     depends_on_time,
+    load_trajectory,
     plan,
+    steered,
 )
 from agvbench.running.bench import Bench
 from agvbench.running.constant import Shares
@@ -30,7 +32,8 @@ class BenchSession:
     """A session that drives with `bench` or, where that is None, a dry run that plans everything and drives nothing.
 
     ``models`` are those known before anything is driven, by condition; a dry run needs one of each. ``remainders`` is
-    what the corrected one still misses, by trajectory.
+    what the corrected one still misses, by trajectory; ``steering`` the mode in which all are steered, "" for each its
+    own.
     """
 
     def __init__(
@@ -41,12 +44,13 @@ class BenchSession:
         workspace: Workspace,
         bench: Bench | None,
         remainders: Mapping[str, Pose] = NO_REMAINDERS,
+        steering: str = "",
     ) -> None:
         self.directory, self.workspace = directory, workspace
         self.nominal = models["uncalibrated"]
         self.shares = Shares.of_model(self.nominal)
         self.planned: list[tuple[DriveOrder, Plan]] = []
-        self._models, self._bench, self._remainders = models, bench, remainders
+        self._models, self._bench, self._remainders, self._steering = models, bench, remainders, steering
         self._plans: dict[tuple[Trajectory, str], Plan] = {}
         self._undrivable: dict[tuple[Trajectory, str], PlanError] = {}
         self._hourly: set[tuple[Trajectory, str]] = set()
@@ -65,6 +69,10 @@ class BenchSession:
     def model(self, condition: str) -> VehicleModel:
         """Return the vehicle model that commands are computed with under `condition`."""
         return self._models[condition] if self._bench is None else self._bench.model(condition)
+
+    def trajectory(self, name: str) -> Trajectory:
+        """Return the trajectory of this name or file, steered as the session is."""
+        return steered(load_trajectory(name), self._steering)
 
     def plan(self, trajectory: Trajectory, condition: str) -> Plan:
         """Return the plan of `trajectory` under `condition`: made once, driven in every repeat.

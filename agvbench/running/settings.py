@@ -7,13 +7,14 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import tomli_w
 
 from agvbench.adapters.impairment.spec import unimpaired, without_packet_faults
 from agvbench.campaign.atomic import write_atomically
 from agvbench.errors import FileError, FlagError
+from agvbench.planning.segments import Steering
 from agvbench.running.supervision.limits import DEFAULT_SAFETY
 from agvbench.text_files import read_toml
 
@@ -36,16 +37,17 @@ class BenchSettings:
     ``calibration`` are vehicle files ("" for the shipped nominal vehicle, and for calibrating in this session),
     ``corrected`` the one with the effects that a diagnosis found ("" for none: the condition is not driven) and
     ``remainders`` what that model still misses; ``repeats`` 0 means what each benchmark declares; ``order`` is one of
-    `ORDERS`; ``place``, one of `PLACES`, is how the vehicle comes to its starts ("" for the usual way); ``full`` drives
-    every pulse of the thesis; ``exchange`` [s] is for how long a vehicle is told what to do at a time.
-    ``vehicle_name`` is what the bus calls the vehicle; ``benchmarks`` are names or files, and ``only`` chooses among
-    their runs by pytest's ``-k``.
+    `ORDERS`; ``steering`` is the mode in which all trajectories are steered ("" for each its own); ``place``, one of
+    `PLACES`, is how the vehicle comes to its starts ("" for the usual way); ``full`` drives every pulse of the thesis;
+    ``exchange`` [s] is for how long a vehicle is told what to do at a time. ``vehicle_name`` is what the bus calls the
+    vehicle; ``benchmarks`` are names or files, and ``only`` chooses among their runs by pytest's ``-k``.
     """
 
     agv: str = "sim"
     mocap: str = "sim"
     camera: str = ""
     plant: str = "agvbench.simulator:make_plant"
+    steering: str = ""
     vehicle: str = ""
     calibration: str = ""
     corrected: str = ""
@@ -74,6 +76,8 @@ class BenchSettings:
         _check(self.place in ("", *PLACES), "--place", self.place, ", ".join(PLACES), "choose one of these")
         least = DEFAULT_SAFETY.watch_s
         _check(least <= self.exchange < math.inf, "--exchange", self.exchange, f"from {least:g} s", "leave it out")
+        modes = get_args(Steering)
+        _check(self.steering in ("", *modes), "--steering", self.steering, ", ".join(modes), "choose one of these")
         _check(self.maps in MAPS, "--maps", self.maps, ", ".join(MAPS), "choose one of these")
 
     @classmethod

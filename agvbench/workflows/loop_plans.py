@@ -8,7 +8,7 @@ from typing import Any
 
 from agvbench.errors import PlanError
 from agvbench.model import VehicleModel
-from agvbench.planning import NOTHING_LEFT, Correction, Miss, Workspace, corrected_plan, load_trajectory
+from agvbench.planning import NOTHING_LEFT, Correction, Miss, Workspace, corrected_plan, load_trajectory, steered
 from agvbench.running.remainders import NO_REMAINDERS
 from agvbench.types import Pose
 
@@ -21,6 +21,7 @@ def plans_of(
     workspace: str,
     remainders: Mapping[str, Pose] = NO_REMAINDERS,
     names: Sequence[str] = THE_EIGHT,
+    steering: str = "",
 ) -> dict[str, dict[str, Any]]:
     """Return, by trajectory, where the model would end uncorrected and ends corrected, and what to say about it.
 
@@ -34,7 +35,7 @@ def plans_of(
     for name in names:
         left = remainders.get(name, NOTHING_LEFT)
         try:
-            made = corrected_plan(load_trajectory(name), model, workspace=floor, remainder=left)
+            made = corrected_plan(steered(load_trajectory(name), steering), model, workspace=floor, remainder=left)
         except PlanError as error:
             out[name] = {"problem": str(error)}
             continue

@@ -123,7 +123,8 @@ def planned(directory: Path, settings: BenchSettings, learned: str, tell: Tell) 
     """Return what corrected plans make up for, after writing it, unless it is there already."""
     path = directory / PLANS
     if not path.exists():
-        content = plans_of(VehicleModel.load(directory / VEHICLE), settings.workspace, read_remainders(learned))
+        model, missed = VehicleModel.load(directory / VEHICLE), read_remainders(learned)
+        content = plans_of(model, settings.workspace, missed, steering=settings.steering)
         write(path, json.dumps({"schema": 1, "plans": content}, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
     plans: dict[str, Any] = _read(path)["plans"]
     for name, entry in plans.items():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import cast
 
 from agvbench.errors import FlagError
 from agvbench.model import VehicleModel, nominal_model, thesis_vehicle
@@ -15,8 +14,8 @@ from agvbench.planning import (
     dry_run,
     list_trajectories,
     load_trajectory,
+    steered,
 )
-from agvbench.planning.segments import Steering
 from agvbench.types import Pose
 from agvbench.vehicle.maps import Fixed
 
@@ -37,7 +36,7 @@ def models_for(vehicle: Path | None, conditions: Sequence[str]) -> dict[str, Veh
 def chosen_trajectories(names: Sequence[str], directory: Path | None, steering: str | None) -> list[Trajectory]:
     """Return the trajectories of those names or files (all of `directory` if none are named), steered as asked."""
     found = [load_trajectory(name, directory=directory) for name in names] or list_trajectories(directory)
-    return [t.with_steering(cast(Steering, steering)) for t in found] if steering else found
+    return [steered(trajectory, steering or "") for trajectory in found]
 
 
 def plan_trajectories(

@@ -1,5 +1,6 @@
 """Commands, time and target of plans, against an independent integration of the vehicle."""
 
+import dataclasses
 import itertools
 import math
 
@@ -206,6 +207,23 @@ def test_a_stated_target_is_kept_and_none_is_none(make):
     stated = make(target={"x_m": 1.0, "y_m": 0.2, "heading_deg": 90.0}, **keys)
     assert plan(stated, NOMINAL).target == Pose(1.0, 0.2, math.pi / 2)
     assert not plan(make(target="none", **keys), NOMINAL).target.is_finite
+
+
+@pytest.mark.parametrize("name", ["1", "5", "8"])
+def test_an_axle_that_is_mounted_a_little_off_turns_the_other_with_it(front_steered, name):
+    trajectory = load_trajectory(name).with_steering("front")
+    straight_ahead = plan(trajectory, front_steered)
+    off = dataclasses.replace(front_steered, rear=dataclasses.replace(front_steered.rear, output=math.radians(0.7)))
+    made = plan(trajectory, off)
+    turned = [math.degrees(float(np.ptp(p.expected[:, 3]))) for p in (straight_ahead, made)]
+    assert turned[1] == pytest.approx(turned[0], abs=0.5)
+    assert made.duration_s == pytest.approx(straight_ahead.duration_s, rel=0.01)
+
+
+def test_an_axle_that_is_mounted_far_off_is_told(front_steered):
+    off = dataclasses.replace(front_steered, rear=dataclasses.replace(front_steered.rear, output=math.radians(7.0)))
+    with pytest.raises(PlanError, match="which does not steer"):
+        plan(load_trajectory("1"), off)
 
 
 def test_a_vehicle_steered_in_front_needs_the_front_mode(front_steered):

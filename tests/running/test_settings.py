@@ -22,6 +22,7 @@ from agvbench.vehicle.geometry import Geometry
         ("seed", 2**64, "--seed"),
         ("order", "random", "interleaved, blocked, shuffled"),
         ("maps", "spline", "default, thesis"),
+        ("steering", "sideways", "abeam, front, rear"),
         ("exchange", 0.05, "--exchange"),
         ("exchange", float("nan"), "--exchange"),
     ],
