@@ -21,10 +21,7 @@ from agvbench.reporting.content import (
     plain,
     plain_sentences,
 )
-from agvbench.reporting.csv_table import to_csv
-from agvbench.reporting.html import to_html
-from agvbench.reporting.latex import to_latex
-from agvbench.reporting.markdown import to_markdown
+from agvbench.reporting.page_texts import TABLES, page_texts
 from agvbench.reporting.progress import track
 from agvbench.reporting.sections import all_sections
 from agvbench.reporting.sections.diagnosis import diagnosis_blocks
@@ -72,12 +69,10 @@ def write_loop_report(loop: Loop) -> LoopReport:
     own = _sections(loop, rows)
     said = {section.slug for section in own}
     sections = [*own, *(section.content(data) for section in all_sections() if section.slug not in said)]
-    title, subtitle = f"Loop {plain(loop.directory.name)}", f"{plain(data.header.vehicle_name)} · {len(data.runs)} runs"
-    texts = {"report.html": to_html(title, subtitle, sections), "report.md": to_markdown(title, sections)}
-    for table in (table for section in sections for table in section.tables):
-        texts |= {f"tables/{table.slug}.csv": to_csv(table), f"tables/{table.slug}.tex": to_latex(table)}
+    subtitle = f"{plain(data.header.vehicle_name)} · {len(data.runs)} runs"
+    texts = dict(page_texts(f"Loop {plain(loop.directory.name)}", subtitle, sections))
     try:
-        (loop.directory / "tables").mkdir(exist_ok=True)
+        (loop.directory / TABLES).mkdir(exist_ok=True)
         for name, text in texts.items():
             (loop.directory / name).write_text(text, encoding="utf-8")
     except OSError as error:

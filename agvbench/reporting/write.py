@@ -8,17 +8,15 @@ from pathlib import Path
 
 from agvbench.errors import FileError
 from agvbench.reporting.content import Content, plain
-from agvbench.reporting.csv_table import frame_to_csv, to_csv
-from agvbench.reporting.html import to_html
-from agvbench.reporting.latex import to_latex
-from agvbench.reporting.markdown import to_markdown
+from agvbench.reporting.csv_table import frame_to_csv
+from agvbench.reporting.page_texts import TABLES, page_texts
 from agvbench.reporting.progress import track
 from agvbench.reporting.recording import write_recording
 from agvbench.reporting.sections import all_sections
 from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
 from agvbench.workflows.report import ReportData, gather
 
-HTML, MARKDOWN, RECORDING, TABLES = "report.html", "report.md", "campaign.rrd", "tables"
+RECORDING = "campaign.rrd"
 
 
 @dataclass(frozen=True)
@@ -81,14 +79,9 @@ def write_report(
 
 
 def _texts(data: ReportData, sections: Sequence[Content]) -> Iterator[tuple[str, str]]:
-    title = plain(data.header.name)
     subtitle = f"{plain(data.header.vehicle_name)} · {len(data.runs)} runs"
-    yield HTML, to_html(title, subtitle, sections)
-    yield MARKDOWN, to_markdown(title, sections)
+    yield from page_texts(plain(data.header.name), subtitle, sections)
     yield f"{TABLES}/pose_errors.csv", frame_to_csv(data.errors)
-    for table in (table for section in sections for table in section.tables):
-        yield f"{TABLES}/{table.slug}.csv", to_csv(table)
-        yield f"{TABLES}/{table.slug}.tex", to_latex(table)
 
 
 def _write(path: Path, text: str) -> Path:

@@ -23,9 +23,19 @@ def choose_directory(out: str | None, *, resume: bool) -> Path:
         return Path(out)
     if not resume:
         return CAMPAIGNS / datetime.now().astimezone().strftime("bench-%Y%m%d-%H%M%S")
-    sessions = sorted(CAMPAIGNS.glob(f"*/{SETTINGS_FILE}"), key=lambda path: path.stat().st_mtime)
-    if not sessions:
-        raise FlagError(
-            "no session to resume", where="--resume", value=f"none in {CAMPAIGNS}/", remedy="name it with --out DIR"
-        )
-    return sessions[-1].parent
+    return newest(SETTINGS_FILE, "session")
+
+
+def newest(file: str, what: str) -> Path:
+    """Return the directory below ``campaigns`` in which the newest `file` of this name lies; `what` it makes of it.
+
+    Raises
+    ------
+    FlagError
+        If there is none.
+    """
+    found = sorted(CAMPAIGNS.glob(f"*/{file}"), key=lambda path: path.stat().st_mtime)
+    if not found:
+        value = f"none in {CAMPAIGNS}/"
+        raise FlagError(f"no {what} to resume", where="--resume", value=value, remedy="name it with --out DIR")
+    return found[-1].parent

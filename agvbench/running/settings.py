@@ -130,16 +130,24 @@ class BenchSettings:
         FileError
             If they are missing or not what agvbench wrote.
         """
-        path = directory / SETTINGS_FILE
+        return cls.read(directory / SETTINGS_FILE, "bench session")
+
+    @classmethod
+    def read(cls, path: Path, what: str) -> BenchSettings:
+        """Read the settings in the file `path`; `what` they are of.
+
+        Raises
+        ------
+        FileError
+            If they are missing or not what agvbench wrote.
+        """
+        remedy = "start anew without --resume"
         try:
-            table = read_toml(path)
-            return cls.from_table(table)
+            return cls.from_table(read_toml(path))
         except FileNotFoundError:
-            raise FileError("no bench session to resume", where=path, remedy="start anew without --resume") from None
+            raise FileError(f"no {what} to resume", where=path, remedy=remedy) from None
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, TypeError) as error:
-            raise FileError(
-                "not the settings of a bench session", where=path, value=error, remedy="start anew without --resume"
-            ) from None
+            raise FileError(f"not the settings of a {what}", where=path, value=error, remedy=remedy) from None
 
 
 def settings_for_resume(saved: BenchSettings, given: Mapping[str, Any]) -> BenchSettings:

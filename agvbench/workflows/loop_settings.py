@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import datetime
@@ -13,9 +12,8 @@ import tomli_w
 
 from agvbench.campaign.atomic import write_atomically
 from agvbench.errors import FileError, FlagError
-from agvbench.running.directory import CAMPAIGNS
+from agvbench.running.directory import CAMPAIGNS, newest
 from agvbench.running.settings import BenchSettings, settings_for_resume
-from agvbench.text_files import read_toml
 
 SETTINGS = "loop.toml"
 BEFORE, DIAGNOSIS, VEHICLE, PLANS, AFTER = "before", "diagnosis.json", "vehicle.toml", "plans.json", "after"
@@ -36,8 +34,8 @@ def opened(given: Mapping[str, Any], out: str | None, *, resume: bool) -> tuple[
     """
     options = {name: value for name, value in given.items() if value is not None}
     if resume:
-        directory = Path(out) if out is not None else _newest()
-        return directory, settings_for_resume(_load(directory / SETTINGS), options)
+        directory = Path(out) if out is not None else newest(SETTINGS, "loop")
+        return directory, settings_for_resume(BenchSettings.read(directory / SETTINGS, "loop"), options)
     directory = Path(out) if out is not None else CAMPAIGNS / datetime.now().astimezone().strftime("loop-%Y%m%d-%H%M%S")
     settings = BenchSettings.given(options)
     if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
@@ -63,20 +61,3 @@ def write(path: Path, text: str) -> None:
         write_atomically(path, text.encode())
     except OSError as error:
         raise FileError("cannot be written", where=path, value=error.strerror) from None
-
-
-def _newest() -> Path:
-    loops = sorted(CAMPAIGNS.glob(f"*/{SETTINGS}"), key=lambda path: path.stat().st_mtime)
-    if not loops:
-        where = f"none in {CAMPAIGNS}/"
-        raise FlagError("no loop to resume", where="--resume", value=where, remedy="name it with --out DIR")
-    return loops[-1].parent
-
-
-def _load(path: Path) -> BenchSettings:
-    try:
-        return BenchSettings.from_table(read_toml(path))
-    except FileNotFoundError:
-        raise FileError("no loop to resume", where=path, remedy="start anew without --resume") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, TypeError) as error:
-        raise FileError("not the settings of a loop", where=path, value=error, remedy="start anew") from None
