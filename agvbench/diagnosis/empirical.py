@@ -84,6 +84,7 @@ def explain(selection: Selection, selector: Selector) -> Explained | None:
     elif any(_rests_on_few(selector, selection, name) for name in selection.gains):
         found.append(_in_place(wide, selection))
     models = [_settled(wide, selection, *pair) for pair in found if pair is not None]
+    models += [_afresh(wide, selection, model[1]) for model in models if selection.gains and _lacks(model[0])]
     models = [model for model in models if model[0].total < selection.chosen.total - selector.least_gain]
     if not models:
         return None
@@ -192,6 +193,17 @@ def _settled(
         if not useless:
             return current, term, gains, {name: rivals.get(name, {}) for name in gains}
         current = wide.left(smaller[min(useless, key=lambda name: gains[name])], current)
+
+
+def _afresh(
+    wide: Selector, selection: Selection, term: type[EmpiricalTerm]
+) -> tuple[Scored, type[EmpiricalTerm], dict[str, float], dict[str, dict[str, float]]]:
+    """Return the model that comes of the term beside none of the effects that were chosen before it.
+
+    What was chosen while the unknown cause was missed may only look like what is right beside its term.
+    """
+    alone = wide.grown(selection.base, term.name)
+    return _settled(wide, replace(selection, chosen=selection.base, gains={}, rivals={}), alone, term)
 
 
 def _unmasked(wide: Selector, current: Scored) -> Scored:

@@ -14,7 +14,7 @@ from agvbench.diagnosis.fitting import Fit, fit
 from agvbench.diagnosis.grouping import folds
 from agvbench.diagnosis.judging import FOLDS, cross_validated
 from agvbench.diagnosis.prediction import Predictor
-from agvbench.diagnosis.promises import promised_gain
+from agvbench.diagnosis.promises import begun, promised_gain
 from agvbench.diagnosis.windows_split import fold_groups
 from agvbench.types import Floats
 
@@ -164,7 +164,7 @@ class FittedModels:
         now = current.fit
         return fit(
             predictor,
-            np.r_[now.parameters, start] if beside is None else beside.parameters,
+            begun(now, predictor, start) if beside is None else beside.parameters,
             bounds,
             offsets=(beside or now).offsets,
             scatter=(beside or now).scatter,

@@ -70,7 +70,8 @@ def held_out_runs(runs: Sequence[Run], group: NDArray[np.int64], seed: int) -> N
 
     The campaign's own ``split`` decides where it has one. Else whole groups are drawn, about a quarter of the
     runs, such that every level of every command in them was also driven in a group that stays: what is judged is how
-    known commands combine, not how a map is interpolated.
+    known commands combine, not how a map is interpolated. Of runs that steer while they drive at most a third is
+    drawn: they are few, and nothing else tells what depends on the way by which an angle was reached.
 
     Raises
     ------
@@ -93,9 +94,12 @@ def _drawn(runs: Sequence[Run], group: NDArray[np.int64], rng: np.random.Generat
         for level in own:
             uses[level] = uses.get(level, 0) + 1
     held = np.zeros(len(runs), dtype=np.bool_)
+    steering = np.array([_steers_while_driving(run.commands) for run in runs])
     for g in rng.permutation(np.unique(group)).tolist():
         own = group == g
         if np.count_nonzero(held) + np.count_nonzero(own) > 1.1 * HELD_OUT_SHARE * len(runs):
+            continue
+        if steering[own].any() and np.count_nonzero(held & steering) + np.count_nonzero(own) > np.sum(steering) / 3.0:
             continue
         if all(uses[level] > 1 for level in levels[g]):
             held |= own
@@ -112,6 +116,12 @@ def _some_repeats(group: NDArray[np.int64], rng: np.random.Generator) -> NDArray
         if len(own) >= 2:
             held[rng.permutation(own)[: max(1, len(own) // 4)]] = True
     return held
+
+
+def _steers_while_driving(commands: Commands) -> bool:
+    """Whether the steering changes between rows of one and the same drive."""
+    driven = np.flatnonzero(np.diff(commands.drive) == 0.0)
+    return bool(np.any(np.diff(commands.front)[driven] != 0.0) or np.any(np.diff(commands.rear)[driven] != 0.0))
 
 
 def _levels(commands: Commands) -> set[tuple[str, float]]:

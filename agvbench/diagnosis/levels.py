@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.calibration import RunMeasurement
+from agvbench.effects import Effect
 from agvbench.types import Commands, Floats, Run
 
 ROLES = ("front", "rear", "drive")
@@ -51,6 +52,15 @@ class FreeMaps:
         # Standing still at neutral is no parameter: it takes part in the interpolation with a value of zero.
         place = int(np.searchsorted(nodes, self.neutral))
         return np.delete(_interpolation(np.insert(nodes, place, self.neutral), command), place, axis=1)
+
+    def beside(self, values: Floats, kind: type[Effect], parameters: Floats) -> Floats:
+        """Return what `values` (size,) that were fitted without an effect of this kind are beside it."""
+        laid = values.copy()
+        for role in ("front", "rear"):
+            own = self.slices()[role]
+            at_neutral = float((self.weights(role, np.array([self.neutral])) @ values[own])[0])
+            laid[own] = kind.beside(values[own], at_neutral, *parameters.tolist())
+        return laid
 
     def bridged(self, values: Floats, silent: NDArray[np.bool_]) -> Floats:
         """Return `values` (size,) with those that are `silent` laid on straight lines between the others of their role.

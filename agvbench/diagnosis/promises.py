@@ -10,6 +10,7 @@ import numpy as np
 from agvbench.diagnosis.likelihood import WEAK, inner_inverse, residual_of, ridge, terms_of
 from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.scatter import priors, weights
+from agvbench.effects import effect_kinds
 from agvbench.types import Floats
 
 if TYPE_CHECKING:
@@ -75,13 +76,26 @@ class Ground:
         return float(self.square(was) - self.square(e) + saved)
 
 
-def promised_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floats) -> float:
-    """Return by how much the loss would fall with more effects, their parameters near `start`, to first order.
+def begun(fitted: Fit, larger: Predictor, start: Floats) -> Floats:
+    """Return the parameters at which a fit of `larger` begins, whose last effect is at `start`: maps lie beside it.
 
-    `larger` has the effects of `fitted` and then others. It is linearised at `start`, with the derivatives by what
+    They do where runs begin at neutral; elsewhere they stay.
+    """
+    values, maps = fitted.parameters, larger.maps.size
+    if larger.readings.begins is None and not larger.readings.stood:
+        name = larger.effects[-1]
+        kind = next((kind for kind in larger.batch.kinds if kind.name == name), None) or effect_kinds()[name]
+        values = np.r_[larger.maps.beside(values[:maps], kind, start), values[maps:]]
+    return np.asarray(np.r_[values, start])
+
+
+def promised_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floats) -> float:
+    """Return by how much the loss would fall with one effect more, its parameters near `start`, to first order.
+
+    `larger` has the effects of `fitted` and then the other. It is linearised at `start`, with the derivatives by what
     was fitted before left as they are: some simulations in place of a fit.
     """
-    parameters = np.r_[fitted.parameters, start]
+    parameters = begun(fitted, larger, start)
     poses, slopes = larger.by_last(parameters, fitted.offsets, len(start))
     residual = residual_of(larger, poses)
     if larger.readings.begins is None:

@@ -10,6 +10,7 @@ from enum import StrEnum
 from typing import Any, ClassVar, Self
 
 from agvbench.errors import VehicleError
+from agvbench.types import Floats
 from agvbench.vehicle.checks import coerce_float
 from agvbench.vehicle.tables import from_table, to_table
 
@@ -136,6 +137,16 @@ class Effect:
     drift: ClassVar[Hook | None] = None
     capture: ClassVar[Hook | None] = None
     see: ClassVar[Hook | None] = None
+
+    @staticmethod
+    def beside(outputs: Floats, at_neutral: float, *parameters: float) -> Floats:
+        """Return a steering map's outputs (n,) [rad] beside this effect, of a map that was fitted without it.
+
+        Runs begin at neutral, where the map is `at_neutral`. A map that took up a cause may lie where the cause hides
+        its values, and a fit that began there would never learn them. By default nothing changes.
+        """
+        del at_neutral, parameters
+        return outputs
 
     def __post_init__(self) -> None:
         for p in self.parameters():

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from agvbench.effects.base import Effect, Stage, parameter
 from agvbench.effects.state import PLAY
 from agvbench.types import Floats
@@ -28,6 +30,12 @@ class SteeringBacklash(Effect):
     )
 
     width_rad: float = parameter(unit="rad", low=0.0, high=0.5, scale=0.03)
+
+    @staticmethod
+    def beside(outputs: Floats, at_neutral: float, *parameters: float) -> Floats:
+        """Return the map of a servo whose axle stayed behind by half the play on its way from neutral."""
+        (width_rad,) = parameters
+        return np.asarray(outputs + 0.5 * width_rad * np.sign(outputs - at_neutral))
 
     @staticmethod
     def aim(state: Floats, width_rad: float) -> None:

@@ -51,6 +51,15 @@ def test_what_is_set_aside_is_whole_groups_whose_levels_were_driven_elsewhere_to
         assert aside <= kept | {NEUTRAL}
 
 
+@given(seed=st.integers(0, 200))
+def test_most_of_what_steers_while_it_drives_stays_to_be_fitted(seed):
+    runs = bare_runs()
+    held = held_out_runs(runs, group_runs(runs), seed)
+    steps = np.array([run.experiment == "step" for run in runs])
+    assert steps.sum() > 0
+    assert (held & steps).sum() <= steps.sum() / 3.0
+
+
 def test_the_campaigns_own_split_is_kept():
     runs = [dataclasses.replace(r, split="held_out" if i % 3 == 0 else "fit") for i, r in enumerate(bare_runs())]
     held = held_out_runs(runs, group_runs(runs), 0)

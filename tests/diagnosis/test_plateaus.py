@@ -16,6 +16,8 @@ from agvbench.diagnosis.fitting import fit
 from agvbench.diagnosis.levels import ROLES, FreeMaps, free_maps, start_values
 from agvbench.diagnosis.reading import read_runs
 from agvbench.diagnosis.selection import Selector
+from agvbench.effects import SteeringLag
+from agvbench.effects.steering_backlash import SteeringBacklash
 from agvbench.types import Pose
 from agvbench.vehicle.geometry import Geometry
 
@@ -23,7 +25,7 @@ MAPS = FreeMaps(
     {"front": np.array([1000.0, 1400.0]), "rear": np.array([1000.0, 1500.0, 2000.0]), "drive": np.array([1600.0])},
     NEUTRAL,
 )
-PLAY_RAD = 0.028
+PLAY_RAD, MORE_PLAY_RAD = 0.028, 0.09
 NEARLY_STRAIGHT = 1487.0
 
 
@@ -39,10 +41,9 @@ def test_values_that_all_are_silent_stay():
     assert MAPS.bridged(values, np.array([True, True, False, False, False, False])) == pytest.approx(values)
 
 
-@pytest.fixture(scope="module")
-def play():
+def driven(play_rad):
     """Return a campaign with play, in which one command ends hardly beyond it."""
-    tiny, rng = Tiny(play_rad=PLAY_RAD), np.random.default_rng(5)
+    tiny, rng = Tiny(play_rad=play_rad), np.random.default_rng(5)
     runs = campaign_runs(tiny)
     straight = [NEUTRAL] * 4
     ways = [[a, NEUTRAL, b, NEUTRAL] for a, b in ((1300.0, 1700.0), (1600.0, 1400.0))]
@@ -56,6 +57,11 @@ def play():
         started_s = runs[-1].started_s + 60.0
         runs.append(replace(runs[0], run_id=f"more-{k}", commands=commands, frames=frames, started_s=started_s))
     return InMemory(runs)
+
+
+@pytest.fixture(scope="module")
+def play():
+    return driven(PLAY_RAD)
 
 
 @pytest.fixture(scope="module")
@@ -80,6 +86,14 @@ def test_a_fit_that_begins_on_a_plateau_ends_where_others_do(selector):
     assert again.parameters[node] == pytest.approx(rear_of(NEARLY_STRAIGHT), abs=3e-3)
 
 
+def test_maps_beside_play_lie_half_of_it_farther_from_neutral():
+    values = np.array([0.4, 0.1, 0.5, -0.02, -0.4, 0.3])
+    laid = MAPS.beside(values, SteeringBacklash, np.array([0.06]))
+    # Both axles' outer values; neutral's own (front: beyond the last node, rear: the middle one) and the drive's stay.
+    assert laid == pytest.approx([0.43, 0.1, 0.53, -0.02, -0.43, 0.3])
+    assert MAPS.beside(values, SteeringLag, np.array([0.2])) == pytest.approx(values)
+
+
 def test_play_is_found_where_a_command_ends_hardly_beyond_it(play):
     found = diagnose(play)
     assert found.verdict is Verdict.NAMED
@@ -89,3 +103,9 @@ def test_play_is_found_where_a_command_ends_hardly_beyond_it(play):
     assert abs(width.value - PLAY_RAD) < 3.0 * width.stderr + 5e-4
     assert found.model is not None
     assert float(found.model.rear(NEARLY_STRAIGHT)) == pytest.approx(rear_of(NEARLY_STRAIGHT), abs=3e-3)
+
+
+def test_much_play_is_found_too():
+    (effect,) = diagnose(driven(MORE_PLAY_RAD)).effects
+    assert effect.name == "steering_backlash"
+    assert effect.parameters["width_rad"].value == pytest.approx(MORE_PLAY_RAD, abs=3e-3)
