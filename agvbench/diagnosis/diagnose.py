@@ -14,7 +14,7 @@ from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.candidates import given_effects
 from agvbench.diagnosis.conclusion import conclude
 from agvbench.diagnosis.contradictions import refuse_contradictions
-from agvbench.diagnosis.empirical import explain
+from agvbench.diagnosis.empirical import explain_and_resettle
 from agvbench.diagnosis.fitted_models import Tell
 from agvbench.diagnosis.forms import reform_and_resettle, tried_beside
 from agvbench.diagnosis.grouping import held_out_runs
@@ -80,8 +80,8 @@ def diagnose(
     selector = _selector(asked, fitted.select(some_repeats(fitted.group, MOST_RUNS)), tell)
     chosen, selector = resettle(selector.select(), selector)
     selection, selector = reform_and_resettle(chosen, selector)
+    selection, explained, selector = explain_and_resettle(selection, selector)
     readings = replace(readings, stood=selector.batch.readings.stood)
-    explained = explain(selection, selector)
     if (searched := len(selector.batch.readings)) < len(fitted):
         tell(f"causes were looked for in {searched} runs; now they are measured in all {len(fitted)}")
         selection, explained = measured_in_all(selection, explained, selector, fitted)

@@ -12,13 +12,15 @@ from agvbench.diagnosis.dependences import Dependence
 from agvbench.diagnosis.empirical_regression import steering
 from agvbench.diagnosis.empirical_screen import Start, screen
 from agvbench.diagnosis.fitted_models import Scored
-from agvbench.diagnosis.forms import wider
+from agvbench.diagnosis.forms import selected_otherwise, wider
 from agvbench.diagnosis.judging import without_best
 from agvbench.diagnosis.likelihood import residual_of
 from agvbench.diagnosis.residual_rates import residual_rates
 from agvbench.diagnosis.residuals import AT_THE_FLOOR, LACK_OF_FIT, floor, lack_of_fit, misses
-from agvbench.diagnosis.selection import Selection, Selector
+from agvbench.diagnosis.selection import LEAST_GAIN, Selection, Selector
+from agvbench.diagnosis.standing import SLOW_STEERING, otherwise
 from agvbench.diagnosis.terms import TERMS, EmpiricalTerm
+from agvbench.effects.forms import cause_of
 from agvbench.types import Floats
 
 _MOST_STARTS = 3
@@ -29,6 +31,10 @@ _FLIPS = 9999
 _FEW = 0.1
 _MOST_NAMES = 5
 _TERM_NAMES = frozenset(term.name for term in TERMS)
+
+
+_Settled = tuple[Scored, type[EmpiricalTerm], dict[str, float], dict[str, dict[str, float]]]
+"""A model with a term, the term, the gains of the effects beside it, and their rivals."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +73,6 @@ def explain(selection: Selection, selector: Selector) -> Explained | None:
     selector
         Who chose it.
     """
-    batch = selector.batch
     wide = wider(selector)
     starts = promising(wide, selection.chosen)
     found: list[tuple[Scored, type[EmpiricalTerm]] | None] = []
@@ -84,7 +89,11 @@ def explain(selection: Selection, selector: Selector) -> Explained | None:
     elif any(_rests_on_few(selector, selection, name) for name in selection.gains):
         found.append(_in_place(wide, selection))
     models = [_settled(wide, selection, *pair) for pair in found if pair is not None]
-    models += [_afresh(wide, selection, model[1]) for model in models if selection.gains and _lacks(model[0])]
+    return _explained(wide, selection, selector, models)
+
+
+def _explained(wide: Selector, selection: Selection, selector: Selector, models: list[_Settled]) -> Explained | None:
+    """Return the best of the models with a term, if that earns its place."""
     models = [model for model in models if model[0].total < selection.chosen.total - selector.least_gain]
     if not models:
         return None
@@ -101,8 +110,50 @@ def explain(selection: Selection, selector: Selector) -> Explained | None:
         term,
         without,
         float(gain.sum()),
-        gain_p_value(gain, batch.readings.group, selector.seed),
+        gain_p_value(gain, wide.batch.readings.group, selector.seed),
     )
+
+
+def explain_and_resettle(selection: Selection, selector: Selector) -> tuple[Selection, Explained | None, Selector]:
+    """Do as `explain` does, and all again under the other belief of where the steering stood if that is better now.
+
+    While an unknown cause is missed nobody can tell where a slow servo stood before a run.
+    """
+    explained = explain(selection, selector)
+    if explained is None:
+        return selection, None, selector
+    if _stood_elsewhere(explained.selection.chosen, selector):
+        selected, other = selected_otherwise(selector)
+        again = explain(selected, other)
+        if again is not None and again.selection.chosen.total < explained.selection.chosen.total:
+            selection, explained, selector = selected, again, other
+    return selection, _afresh(selection, explained, selector), selector
+
+
+def _stood_elsewhere(chosen: Scored, selector: Selector) -> bool:
+    """Whether a model with slow steering predicts better by far under the other belief of where that stood."""
+    if not {*SLOW_STEERING} & {cause_of(name) for name in chosen.names}:
+        return False
+    there = otherwise(wider(selector))
+    there.candidates |= {name: c for name, c in term_candidates().items() if name not in there.candidates}
+    return there.score(chosen.names, chosen.fit.parameters, None).total < chosen.total - LEAST_GAIN
+
+
+def _afresh(selection: Selection, explained: Explained, selector: Selector) -> Explained:
+    """Return what comes of the term beside none of the effects that were chosen before it, where that is better.
+
+    What was chosen while the unknown cause was missed may only look like what is right beside its term; where nothing
+    more than scatter is missed it is not asked.
+    """
+    if not selection.gains or not _lacks(explained.selection.chosen):
+        return explained
+    wide, term = wider(selector), explained.term
+    kind, values = candidate(term), np.array([list(explained.values.values())])
+    wide.candidates[term.name] = replace(kind, starts=values, screened=True, foremost=True)
+    alone = wide.grown(selection.base, term.name)
+    bare = replace(selection, chosen=selection.base, gains={}, rivals={})
+    again = _explained(wide, selection, selector, [_settled(wide, bare, alone, term)])
+    return again if again is not None and again.selection.chosen.total < explained.selection.chosen.total else explained
 
 
 def promising(wide: Selector, root: Scored) -> list[Start]:
@@ -168,9 +219,7 @@ def _in_place(wide: Selector, selection: Selection) -> tuple[Scored, type[Empiri
     return best
 
 
-def _settled(
-    wide: Selector, selection: Selection, current: Scored, term: type[EmpiricalTerm]
-) -> tuple[Scored, type[EmpiricalTerm], dict[str, float], dict[str, dict[str, float]]]:
+def _settled(wide: Selector, selection: Selection, current: Scored, term: type[EmpiricalTerm]) -> _Settled:
     """Return the model with the library's effects that earn their place beside the term, their gains and rivals.
 
     What was chosen without the term may only have been a rival of what is right beside it.
@@ -193,17 +242,6 @@ def _settled(
         if not useless:
             return current, term, gains, {name: rivals.get(name, {}) for name in gains}
         current = wide.left(smaller[min(useless, key=lambda name: gains[name])], current)
-
-
-def _afresh(
-    wide: Selector, selection: Selection, term: type[EmpiricalTerm]
-) -> tuple[Scored, type[EmpiricalTerm], dict[str, float], dict[str, dict[str, float]]]:
-    """Return the model that comes of the term beside none of the effects that were chosen before it.
-
-    What was chosen while the unknown cause was missed may only look like what is right beside its term.
-    """
-    alone = wide.grown(selection.base, term.name)
-    return _settled(wide, replace(selection, chosen=selection.base, gains={}, rivals={}), alone, term)
 
 
 def _unmasked(wide: Selector, current: Scored) -> Scored:

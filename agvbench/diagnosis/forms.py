@@ -134,10 +134,15 @@ def reform_and_resettle(selection: Selection, selector: Selector) -> tuple[Selec
     there = otherwise(wider(selector)).score(chosen.names, chosen.fit.parameters, None)
     if there.total >= chosen.total - LEAST_GAIN:
         return reformed, selector
+    again, other = selected_otherwise(selector)
+    return (again, other) if again.chosen.total < chosen.total else (reformed, selector)
+
+
+def selected_otherwise(selector: Selector) -> tuple[Selection, Selector]:
+    """Return what is selected under the other belief of where the steering stood, and who selected it."""
     other = otherwise(selector)
     other.candidates = {n: c for n, c in other.candidates.items() if n not in effect_forms() or n in selector.given}
-    again = reform(other.select(), other)
-    return (again, other) if again.chosen.total < chosen.total else (reformed, selector)
+    return reform(other.select(), other), other
 
 
 def _laws(selection: Selection, selector: Selector, wide: Selector, name: str) -> Iterator[_Law]:
