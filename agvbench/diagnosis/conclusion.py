@@ -11,8 +11,9 @@ from agvbench.diagnosis.asked import Asked
 from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.candidates import bounds_of, candidates
 from agvbench.diagnosis.dependences import ALPHA, LIKELY, RANDOM_PHASE, Dependence, dependences
-from agvbench.diagnosis.empirical import Explained, described, term_candidates, with_term_first
+from agvbench.diagnosis.empirical import term_candidates
 from agvbench.diagnosis.estimates import named_effects
+from agvbench.diagnosis.explained import Explained, described, with_term_first
 from agvbench.diagnosis.forms import BEYOND, form_candidates
 from agvbench.diagnosis.map_effects import map_effects
 from agvbench.diagnosis.next_experiment_propose import with_next_experiment

@@ -2,61 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from agvbench.diagnosis.beside_term import Settled, lacks, settled
 from agvbench.diagnosis.candidates import Candidate, candidate
-from agvbench.diagnosis.dependences import Dependence
 from agvbench.diagnosis.empirical_regression import steering
 from agvbench.diagnosis.empirical_screen import Start, screen
+from agvbench.diagnosis.explained import Explained, gain_p_value
 from agvbench.diagnosis.fitted_models import Scored
 from agvbench.diagnosis.forms import selected_otherwise, wider
 from agvbench.diagnosis.judging import without_best
-from agvbench.diagnosis.likelihood import residual_of
 from agvbench.diagnosis.residual_rates import residual_rates
-from agvbench.diagnosis.residuals import AT_THE_FLOOR, LACK_OF_FIT, floor, lack_of_fit, misses
 from agvbench.diagnosis.selection import LEAST_GAIN, Selection, Selector
 from agvbench.diagnosis.standing import SLOW_STEERING, otherwise
 from agvbench.diagnosis.terms import TERMS, EmpiricalTerm
 from agvbench.effects.forms import cause_of
-from agvbench.types import Floats
 
 _MOST_STARTS = 3
 _LEAST_PROMISE = 4.0
 _LEAST_OF_BEST = 0.3
-_MOST_RETRIED = 3
-_FLIPS = 9999
 _FEW = 0.1
-_MOST_NAMES = 5
-_TERM_NAMES = frozenset(term.name for term in TERMS)
-
-
-_Settled = tuple[Scored, type[EmpiricalTerm], dict[str, float], dict[str, dict[str, float]]]
-"""A model with a term, the term, the gains of the effects beside it, and their rivals."""
-
-
-@dataclass(frozen=True)
-class Explained:
-    """A selection with an empirical term.
-
-    ``selection.chosen`` holds the term beside the effects that predict better with it; ``without`` is the model of
-    these effects alone. ``gain`` is the term's, in cross-validated minus two log likelihood; ``p_value`` that of
-    as great a gain if it helped each group of runs as often as not.
-    """
-
-    selection: Selection
-    term: type[EmpiricalTerm]
-    without: Scored
-    gain: float
-    p_value: float
-
-    @property
-    def values(self) -> dict[str, float]:
-        """The term's parameters by name."""
-        own = self.selection.chosen.fit.effect_values()
-        return {p.name: own[f"{self.term.name}.{p.name}"] for p in self.term.parameters()}
 
 
 def explain(selection: Selection, selector: Selector) -> Explained | None:
@@ -76,7 +43,7 @@ def explain(selection: Selection, selector: Selector) -> Explained | None:
     wide = wider(selector)
     starts = promising(wide, selection.chosen)
     found: list[tuple[Scored, type[EmpiricalTerm]] | None] = []
-    if starts or _lacks(selection.chosen):
+    if starts or lacks(selection.chosen):
         alone = promising(wide, selection.base) if selection.gains else []
         promises_more = bool(alone) and alone[0].gain > max((start.gain for start in starts), default=0.0)
         first = _best_term(wide, selection.base, alone) if promises_more else None
@@ -88,11 +55,11 @@ def explain(selection: Selection, selector: Selector) -> Explained | None:
                 found += [first or _best_term(wide, selection.base, alone), _in_place(wide, selection)]
     elif any(_rests_on_few(selector, selection, name) for name in selection.gains):
         found.append(_in_place(wide, selection))
-    models = [_settled(wide, selection, *pair) for pair in found if pair is not None]
+    models = [settled(wide, selection, *pair) for pair in found if pair is not None]
     return _explained(wide, selection, selector, models)
 
 
-def _explained(wide: Selector, selection: Selection, selector: Selector, models: list[_Settled]) -> Explained | None:
+def _explained(wide: Selector, selection: Selection, selector: Selector, models: list[Settled]) -> Explained | None:
     """Return the best of the models with a term, if that earns its place."""
     models = [model for model in models if model[0].total < selection.chosen.total - selector.least_gain]
     if not models:
@@ -145,14 +112,14 @@ def _afresh(selection: Selection, explained: Explained, selector: Selector) -> E
     What was chosen while the unknown cause was missed may only look like what is right beside its term; where nothing
     more than scatter is missed it is not asked.
     """
-    if not selection.gains or not _lacks(explained.selection.chosen):
+    if not selection.gains or not lacks(explained.selection.chosen):
         return explained
     wide, term = wider(selector), explained.term
     kind, values = candidate(term), np.array([list(explained.values.values())])
     wide.candidates[term.name] = replace(kind, starts=values, screened=True, foremost=True)
     alone = wide.grown(selection.base, term.name)
     bare = replace(selection, chosen=selection.base, gains={}, rivals={})
-    again = _explained(wide, selection, selector, [_settled(wide, bare, alone, term)])
+    again = _explained(wide, selection, selector, [settled(wide, bare, alone, term)])
     return again if again is not None and again.selection.chosen.total < explained.selection.chosen.total else explained
 
 
@@ -165,17 +132,6 @@ def promising(wide: Selector, root: Scored) -> list[Start]:
     starts = screen(rates, stands, batch.geometry, batch.readings.group, wide.seed)
     least = max(_LEAST_PROMISE, _LEAST_OF_BEST * starts[0].gain) if starts else 0.0
     return [start for start in starts if start.gain > least][:_MOST_STARTS]
-
-
-def _lacks(model: Scored) -> bool:
-    """Whether what the model misses is above the scatter of repeats, and differs between groups beyond it."""
-    predictor = model.fit.predictor
-    missed = misses(predictor.readings, predictor.predict(model.fit.parameters))
-    least, group = floor(missed, predictor.readings.group), predictor.readings.group
-    p_value = lack_of_fit(missed, group)
-    if least is None or p_value is None or p_value >= LACK_OF_FIT:
-        return False
-    return any(missed.rms()[name] > AT_THE_FLOOR * least[name] for name in ("position_rms_mm", "heading_rms_deg"))
 
 
 def _best_term(wide: Selector, root: Scored, starts: list[Start]) -> tuple[Scored, type[EmpiricalTerm]] | None:
@@ -219,90 +175,6 @@ def _in_place(wide: Selector, selection: Selection) -> tuple[Scored, type[Empiri
     return best
 
 
-def _settled(wide: Selector, selection: Selection, current: Scored, term: type[EmpiricalTerm]) -> _Settled:
-    """Return the model with the library's effects that earn their place beside the term, their gains and rivals.
-
-    What was chosen without the term may only have been a rival of what is right beside it.
-    """
-    base = selection.base
-    rivals: dict[str, dict[str, float]] = {}
-    current = _unmasked(wide, current)
-    again = [n for n in selection.chosen.names if n not in current.names]
-    again += sorted(selection.rejected, key=lambda n: -selection.rejected[n])[:_MOST_RETRIED]
-    for name in again:
-        offer = wide.grown(current, name)
-        if name not in current.names and wide.earns(current, offer):
-            current = offer
-    current, rivals = wide.exchanged(base, current, selection.rivals)
-    while True:
-        found = [n for n in current.names if n not in {*base.names, term.name}]
-        smaller = {name: wide.shrunk(base, current, name) for name in found}
-        gains = {name: model.total - current.total for name, model in smaller.items()}
-        useless = [name for name, model in smaller.items() if not wide.earns(model, current)]
-        if not useless:
-            return current, term, gains, {name: rivals.get(name, {}) for name in gains}
-        current = wide.left(smaller[min(useless, key=lambda name: gains[name])], current)
-
-
-def _unmasked(wide: Selector, current: Scored) -> Scored:
-    """Return the model with the effects that the unknown cause had hidden, as long as it misses more than scatter.
-
-    An effect that gained nothing beside what was chosen first may stand out as soon as the term is there. All are asked
-    for what they promise, and only the best are fitted.
-    """
-    while len(current.names) < _MOST_NAMES and _lacks(current):
-        names = [name for name in wide.candidates if name not in current.names and name not in _TERM_NAMES]
-        promises = {name: wide.promise(current, name) for name in names}
-        best = sorted(promises, key=lambda name: -promises[name])[:_MOST_RETRIED]
-        offers = [wide.grown(current, name) for name in best if promises[name] > wide.least_gain]
-        worthy = [offer for offer in offers if wide.earns(current, offer)]
-        if not worthy:
-            break
-        current = min(worthy, key=lambda offer: offer.total)
-    return current
-
-
-def gain_p_value(gain: Floats, group: NDArray[np.int64], seed: int) -> float:
-    """Return how often the total gain would be as great if each group's gain (R,) had its sign by chance."""
-    _, index = np.unique(group, return_inverse=True)
-    by_group = np.bincount(index, weights=gain)
-    rng = np.random.default_rng([0xF119, seed])
-    signs = rng.integers(0, 2, (_FLIPS, len(by_group))) * 2.0 - 1.0
-    return float((1.0 + np.count_nonzero(signs @ by_group >= by_group.sum())) / (_FLIPS + 1.0))
-
-
-def described(explained: Explained) -> dict[str, object]:
-    """Return what is said of an empirical term in the diagnosis."""
-    return {
-        "name": explained.term.name,
-        "covariate": explained.term.covariates[0],
-        "through": explained.term.through,
-        "parameters": explained.values,
-        "gain": explained.gain,
-        "p_value": explained.p_value,
-    }
-
-
 def term_candidates() -> dict[str, Candidate]:
     """Return every term by name, as effects are tried."""
     return {term.name: candidate(term) for term in TERMS}
-
-
-def with_term_first(rest: list[Dependence], explained: Explained) -> list[Dependence]:
-    """Return the dependences with what the term depends on first.
-
-    Of covariates that the term leaves open (along x or along y) it is the one that smooth curves find stronger.
-    """
-    own = [d for d in rest if d.covariate in explained.term.covariates]
-    if own:
-        first = replace(own[0], p_value=min(own[0].p_value, explained.p_value))
-        return [first, *(d for d in rest if d is not own[0])]
-    with_term, without = (_missed(model) for model in (explained.selection.chosen, explained.without))
-    share = 1.0 - with_term / max(without, 1e-300)
-    return [Dependence(explained.term.covariates[0], explained.term.through, explained.p_value, share), *rest]
-
-
-def _missed(model: Scored) -> float:
-    """Return the sum of squares that a model misses, no run's own offsets helping."""
-    predictor = model.fit.predictor
-    return float(np.nansum(residual_of(predictor, predictor.predict(model.fit.parameters)) ** 2))

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.candidates import candidates
-from agvbench.diagnosis.empirical import Explained, term_candidates
+from agvbench.diagnosis.empirical import term_candidates
+from agvbench.diagnosis.explained import Explained
 from agvbench.diagnosis.fitted_models import Scored
 from agvbench.diagnosis.forms import BEYOND, form_candidates
 from agvbench.diagnosis.reading import Readings

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from agvbench.diagnosis.batch import Batch
-from agvbench.diagnosis.empirical import Explained
+from agvbench.diagnosis.explained import Explained
 from agvbench.diagnosis.fitted_models import Scored
 from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.reading import Readings

@@ -12,9 +12,9 @@ from tiny_vehicle import FRONT_M, REAR_M, Tiny, campaign_runs
 from agvbench.diagnosis import Verdict, diagnose, terms
 from agvbench.diagnosis.contradictions import refuse_contradictions
 from agvbench.diagnosis.dependences import ALPHA, LIKELY, RANDOM_PHASE, dependences
-from agvbench.diagnosis.empirical import gain_p_value
 from agvbench.diagnosis.empirical_regression import Steering
 from agvbench.diagnosis.empirical_screen import Start, screen
+from agvbench.diagnosis.explained import gain_p_value
 from agvbench.diagnosis.reading import read_runs
 from agvbench.diagnosis.residual_rates import Rates
 from agvbench.diagnosis.swing import swing
