@@ -89,7 +89,7 @@ def explain_and_resettle(selection: Selection, selector: Selector) -> tuple[Sele
     explained = explain(selection, selector)
     if explained is None:
         return selection, None, selector
-    if _stood_elsewhere(explained.selection.chosen, selector):
+    if stood_elsewhere(explained.selection.chosen, selector):
         selected, other = selected_otherwise(selector)
         again = explain(selected, other)
         if again is not None and again.selection.chosen.total < explained.selection.chosen.total:
@@ -97,7 +97,7 @@ def explain_and_resettle(selection: Selection, selector: Selector) -> tuple[Sele
     return selection, _afresh(selection, explained, selector), selector
 
 
-def _stood_elsewhere(chosen: Scored, selector: Selector) -> bool:
+def stood_elsewhere(chosen: Scored, selector: Selector) -> bool:
     """Whether a model with slow steering predicts better by far under the other belief of where that stood."""
     if not {*SLOW_STEERING} & {cause_of(name) for name in chosen.names}:
         return False

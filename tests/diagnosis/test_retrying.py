@@ -12,12 +12,14 @@ from agvbench.calibration import measure_run
 from agvbench.diagnosis import forms
 from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.candidates import bounds_of, candidates
+from agvbench.diagnosis.empirical import stood_elsewhere
 from agvbench.diagnosis.fitted_models import Scored
 from agvbench.diagnosis.fitting import fit
 from agvbench.diagnosis.levels import ROLES, free_maps, start_values
 from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.reading import read_runs
 from agvbench.diagnosis.selection import Selection, Selector
+from agvbench.diagnosis.standing import otherwise
 from agvbench.vehicle.geometry import Geometry
 
 NO_LIMIT = np.array([[0.0, 5.0]])
@@ -95,3 +97,12 @@ def test_what_runs_away_is_as_good_as_nothing(selector, monkeypatch):
     lag = fresh.grown(base, "steering_lag")
     assert (lag.names, lag.total) == (("steering_lag",), base.total)
     assert not fresh.earns(base, lag)
+
+
+def test_where_a_slow_servo_stood_can_be_decided_again(selector):
+    right = selector.grown(selector.base(), "steering_lag")
+    wrong_belief = otherwise(selector)
+    wrong = wrong_belief.grown(wrong_belief.base(), "steering_lag")
+    assert stood_elsewhere(wrong, wrong_belief)
+    assert not stood_elsewhere(right, selector)
+    assert not stood_elsewhere(wrong_belief.base(), wrong_belief)
