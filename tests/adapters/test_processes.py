@@ -108,10 +108,15 @@ def test_a_vehicle_without_a_camera_says_so(endpoint: str) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
 def test_ctrl_c_and_a_closed_terminal_end_a_process_cleanly(endpoint: str, number: signal.Signals) -> None:
-    with process("sim", "--plant", TINY, "--listen", endpoint) as child:
-        child.send_signal(number)
-        assert child.communicate(timeout=20) == ("stopped\n", "")
-        assert child.returncode == 0
+    # What is ignored here, as SIGHUP is under ``nohup``, the process would ignore, too.
+    before = signal.signal(number, signal.default_int_handler)
+    try:
+        with process("sim", "--plant", TINY, "--listen", endpoint) as child:
+            child.send_signal(number)
+            assert child.communicate(timeout=20) == ("stopped\n", "")
+            assert child.returncode == 0
+    finally:
+        signal.signal(number, before)
 
 
 def test_a_second_runner_of_one_vehicle_is_refused_until_the_first_has_gone(endpoint: str, expected: list[str]) -> None:
