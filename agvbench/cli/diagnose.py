@@ -66,7 +66,6 @@ def run(arguments: argparse.Namespace) -> int:
     from agvbench.workflows.diagnose import run_diagnose
 
     console = Console()
-
     found = run_diagnose(
         arguments.directory,
         tell=lambda answer: print_diagnosis(answer, console),

@@ -12,13 +12,11 @@ from agvbench.diagnosis.empirical_regression import steering
 from agvbench.diagnosis.empirical_screen import Start, screen
 from agvbench.diagnosis.explained import Explained, gain_p_value
 from agvbench.diagnosis.fitted_models import Scored
-from agvbench.diagnosis.forms import selected_otherwise, wider
+from agvbench.diagnosis.forms import selected_otherwise, stood_elsewhere, wider
 from agvbench.diagnosis.judging import without_best
 from agvbench.diagnosis.residual_rates import residual_rates
-from agvbench.diagnosis.selection import LEAST_GAIN, Selection, Selector
-from agvbench.diagnosis.standing import SLOW_STEERING, otherwise
+from agvbench.diagnosis.selection import Selection, Selector
 from agvbench.diagnosis.terms import TERMS, EmpiricalTerm
-from agvbench.effects.forms import cause_of
 
 _MOST_STARTS = 3
 _LEAST_PROMISE = 4.0
@@ -95,15 +93,6 @@ def explain_and_resettle(selection: Selection, selector: Selector) -> tuple[Sele
         if again is not None and again.selection.chosen.total < explained.selection.chosen.total:
             selection, explained, selector = selected, again, other
     return selection, _afresh(selection, explained, selector), selector
-
-
-def stood_elsewhere(chosen: Scored, selector: Selector) -> bool:
-    """Whether a model with slow steering predicts better by far under the other belief of where that stood."""
-    if not {*SLOW_STEERING} & {cause_of(name) for name in chosen.names}:
-        return False
-    there = otherwise(wider(selector))
-    there.candidates |= {name: c for name, c in term_candidates().items() if name not in there.candidates}
-    return there.score(chosen.names, chosen.fit.parameters, None).total < chosen.total - LEAST_GAIN
 
 
 def _afresh(selection: Selection, explained: Explained, selector: Selector) -> Explained:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis.dependences import Dependence
 from agvbench.diagnosis.fitted_models import Scored
+from agvbench.diagnosis.judging import by_group
 from agvbench.diagnosis.likelihood import residual_of
 from agvbench.diagnosis.selection import Selection
 from agvbench.diagnosis.terms import EmpiricalTerm
@@ -73,8 +74,7 @@ def _missed(model: Scored) -> float:
 
 def gain_p_value(gain: Floats, group: NDArray[np.int64], seed: int) -> float:
     """Return how often the total gain would be as great if each group's gain (R,) had its sign by chance."""
-    _, index = np.unique(group, return_inverse=True)
-    by_group = np.bincount(index, weights=gain)
+    gains = by_group(gain, group)
     rng = np.random.default_rng([0xF119, seed])
-    signs = rng.integers(0, 2, (_FLIPS, len(by_group))) * 2.0 - 1.0
-    return float((1.0 + np.count_nonzero(signs @ by_group >= by_group.sum())) / (_FLIPS + 1.0))
+    signs = rng.integers(0, 2, (_FLIPS, len(gains))) * 2.0 - 1.0
+    return float((1.0 + np.count_nonzero(signs @ gains >= gains.sum())) / (_FLIPS + 1.0))

@@ -128,14 +128,19 @@ def reform_and_resettle(selection: Selection, selector: Selector) -> tuple[Selec
     In the wrong law a slow servo may look as if it had stood elsewhere.
     """
     reformed = reform(selection, selector)
-    chosen = reformed.chosen
-    if reformed is selection or not {*SLOW_STEERING} & {cause_of(name) for name in chosen.names}:
-        return reformed, selector
-    there = otherwise(wider(selector)).score(chosen.names, chosen.fit.parameters, None)
-    if there.total >= chosen.total - LEAST_GAIN:
+    if reformed is selection or not stood_elsewhere(reformed.chosen, selector):
         return reformed, selector
     again, other = selected_otherwise(selector)
-    return (again, other) if again.chosen.total < chosen.total else (reformed, selector)
+    return (again, other) if again.chosen.total < reformed.chosen.total else (reformed, selector)
+
+
+def stood_elsewhere(chosen: Scored, selector: Selector) -> bool:
+    """Whether a model with slow steering predicts better by far under the other belief of where that stood."""
+    if not {*SLOW_STEERING} & {cause_of(name) for name in chosen.names}:
+        return False
+    there = otherwise(wider(selector))
+    there.candidates |= {kind.name: candidate(kind) for kind in TERMS if kind.name not in there.candidates}
+    return there.score(chosen.names, chosen.fit.parameters, None).total < chosen.total - LEAST_GAIN
 
 
 def selected_otherwise(selector: Selector) -> tuple[Selection, Selector]:

@@ -78,10 +78,9 @@ def without_best(gain: Floats, group: NDArray[np.int64], share: float = _BEST_SH
 
     A true cause helps wherever it acts; a gain that sits in one group of runs is that group's own trouble.
     """
-    names, index = np.unique(group, return_inverse=True)
-    by_group = np.bincount(index, weights=gain)
-    best = np.sort(by_group)[::-1][: max(1, round(share * len(names)))]
-    return float(by_group.sum() - best.sum())
+    gains = by_group(gain, group)
+    best = np.sort(gains)[::-1][: max(1, round(share * len(gains)))]
+    return float(gains.sum() - best.sum())
 
 
 def clustered_covariance(fitted: Fit, group: NDArray[np.int64]) -> Floats:
@@ -90,15 +89,20 @@ def clustered_covariance(fitted: Fit, group: NDArray[np.int64]) -> Floats:
     What a run's samples share, and what repeats of a command share, is then not counted many times (the sandwich of
     Liang and Zeger, 1986). Where it is the smaller, the likelihood's own covariance is kept.
     """
-    _, index = np.unique(group, return_inverse=True)
-    pulls = np.zeros((int(index.max()) + 1, fitted.gradient.shape[1]))
-    np.add.at(pulls, index, fitted.gradient)
-    own = fitted.covariance
+    pulls, own = by_group(fitted.gradient, group), fitted.covariance
     maps = fitted.predictor.maps.size
     spare = max(len(group) - maps, 1)
     robust = own @ (pulls.T @ pulls * len(group) / spare) @ own
     widen = np.sqrt(np.maximum(np.diagonal(robust) / np.maximum(np.diagonal(own), 1e-300), 1.0))
     return np.asarray(own * widen[:, None] * widen[None, :])
+
+
+def by_group(values: Floats, group: NDArray[np.int64]) -> Floats:
+    """Return the sums of runs' `values` (R, …) by group, (G, …)."""
+    _, index = np.unique(group, return_inverse=True)
+    sums = np.zeros((int(index.max()) + 1, *values.shape[1:]))
+    np.add.at(sums, index, values)
+    return sums
 
 
 def differs_from_nothing(fitted: Fit, name: str, group: NDArray[np.int64]) -> bool:

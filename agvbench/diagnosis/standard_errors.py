@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.diagnosis.fitting import Fit
-from agvbench.diagnosis.judging import clustered_covariance
+from agvbench.diagnosis.judging import by_group, clustered_covariance
 from agvbench.diagnosis.likelihood import ridge
 from agvbench.types import Floats
 
@@ -32,20 +32,16 @@ def standard_errors(fitted: Fit, group: NDArray[np.int64]) -> Floats:
     """
     if fitted.predictor.readings.begins is not None:
         return np.asarray(np.sqrt(np.diagonal(clustered_covariance(fitted, group))))
-    by_group, counts = _jackknife(fitted, group)
-    by_run, _ = _jackknife(fitted, np.arange(len(group)))
+    of_groups, counts = _jackknife(fitted, group)
+    of_runs, _ = _jackknife(fitted, np.arange(len(group)))
     own = np.sqrt(np.diagonal(fitted.covariance))
-    return np.asarray(np.where(counts >= _FEWEST, by_group, np.maximum(own, by_run)))
+    return np.asarray(np.where(counts >= _FEWEST, of_groups, np.maximum(own, of_runs)))
 
 
 def _jackknife(fitted: Fit, group: NDArray[np.int64]) -> tuple[Floats, Floats]:
     """Return the jackknife's standard errors (P,), and how many groups, in effect, tell each parameter (P,)."""
-    _, index = np.unique(group, return_inverse=True)
-    groups = int(index.max()) + 1
-    pulls = np.zeros((groups, fitted.gradient.shape[1]))
-    np.add.at(pulls, index, fitted.gradient)
-    told = np.zeros((groups, *fitted.information.shape[1:]))
-    np.add.at(told, index, fitted.information)
+    pulls, told = by_group(fitted.gradient, group), by_group(fitted.information, group)
+    groups = len(pulls)
     rest = told.sum(axis=0) + ridge(fitted.predictor) - told
     squares = np.array([np.linalg.lstsq(rest[g], pulls[g], rcond=1e-12)[0] for g in range(groups)]) ** 2
     counts = squares.sum(axis=0) ** 2 / np.maximum((squares**2).sum(axis=0), 1e-300)

@@ -38,6 +38,7 @@ from agvbench.running.vehicles import uncalibrated_vehicle
 from agvbench.types import Run
 
 PROVENANCE_TABLE = "provenance"
+_OPTIONS = {"uncalibrated": "--vehicle", "calibrated": "--calibration", "corrected": "--corrected"}
 
 
 @contextmanager
@@ -114,9 +115,6 @@ def _known_models(settings: BenchSettings) -> dict[str, VehicleModel]:
     if settings.corrected:
         models["corrected"] = VehicleModel.load(settings.corrected)
     return models
-
-
-_OPTIONS = {"uncalibrated": "--vehicle", "calibrated": "--calibration", "corrected": "--corrected"}
 
 
 def _check_models(models: Mapping[str, VehicleModel], link: VehicleLink) -> None:

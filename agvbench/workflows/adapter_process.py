@@ -44,9 +44,7 @@ def run_adapters(
         where = " ".join([*(f"listens on {e}" for e in listen), *(f"connected to {e}" for e in connect)])
         print(f"ready: {what} of {lab}/{options.vehicle}, {where}; stop with Ctrl-C", flush=True)
         stopped.wait()
-    # The terminal that would be told may be what was closed.
-    with suppress(OSError):
-        print("stopped", flush=True)
+    say_stopped()
     return 0
 
 
@@ -59,12 +57,18 @@ def _warn_of_remote_access(listen: Sequence[str], config: BusConfig | None) -> N
             )
 
 
+def say_stopped() -> None:
+    """Say that everything is stopped, unless the terminal that would be told is what was closed."""
+    with suppress(OSError):
+        print("stopped", flush=True)
+
+
 @contextmanager
 def stop_signal() -> Iterator[threading.Event]:
     """Give what SIGINT, SIGTERM and SIGHUP set, in place of what they do; under ``nohup`` SIGHUP stays ignored."""
     stopped = threading.Event()
-    kept = {signal.SIGHUP} if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else set()
-    taken = [number for number in _SIGNALS if number not in kept]
+    hung_up = signal.getsignal(signal.SIGHUP)
+    taken = [number for number in _SIGNALS if number != signal.SIGHUP or hung_up is not signal.SIG_IGN]
     before = {number: signal.signal(number, lambda *_: stopped.set()) for number in taken}
     try:
         yield stopped

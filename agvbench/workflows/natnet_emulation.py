@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from contextlib import suppress
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from agvbench.adapters.natnet.version import Version
 from agvbench.bus.clock import WallClock, wait_until
 from agvbench.simulator import Camera, load_plant
 from agvbench.types import Command, Frames
-from agvbench.workflows.adapter_process import stop_signal
+from agvbench.workflows.adapter_process import say_stopped, stop_signal
 
 _BODY = 1
 _CIRCLE = Command(1700.0, 1450.0, 1550.0)
@@ -51,8 +50,7 @@ def emulate(options: AdapterOptions, version: str, multicast: str | None, port: 
             _stream(server, camera, options, stopped)
     finally:
         server.close()
-    with suppress(OSError):
-        print("stopped", flush=True)
+    say_stopped()
     return 0
 
 

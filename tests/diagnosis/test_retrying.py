@@ -12,9 +12,9 @@ from agvbench.calibration import measure_run
 from agvbench.diagnosis import forms
 from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.candidates import bounds_of, candidates
-from agvbench.diagnosis.empirical import stood_elsewhere
 from agvbench.diagnosis.fitted_models import Scored
 from agvbench.diagnosis.fitting import fit
+from agvbench.diagnosis.forms import stood_elsewhere
 from agvbench.diagnosis.levels import ROLES, free_maps, start_values
 from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.reading import read_runs

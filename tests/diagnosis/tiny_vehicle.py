@@ -137,12 +137,16 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
         x += (pace * math.cos(middle + beta) + moving * tiny.tilt_mps * math.cos(tiny.tilt_rad)) * _STEP_S
         y += (pace * math.sin(middle + beta) + moving * tiny.tilt_mps * math.sin(tiny.tilt_rad)) * _STEP_S
         heading += yaw * _STEP_S
-    p = np.array(poses)
+    return seen(tiny, np.array(times), np.array(poses), rng)
+
+
+def seen(tiny: Tiny, t_s: np.ndarray, p: np.ndarray, rng: np.random.Generator) -> Frames:
+    """Return what a camera with noise says of poses (n, 3)."""
     n = len(p)
     p[:, :2] += rng.normal(0.0, tiny.noise_m, (n, 2))
     p[:, 2] += rng.normal(0.0, tiny.noise_rad, n)
     nan = np.full(n, np.nan)
-    return Frames(np.array(times), p[:, 0], p[:, 1], p[:, 2], np.ones(n, dtype=bool), np.full(n, -1), nan, nan)
+    return Frames(t_s, p[:, 0], p[:, 1], p[:, 2], np.ones(n, dtype=bool), np.full(n, -1), nan, nan)
 
 
 def follow(axle: float, servo: float, half: float) -> float:
