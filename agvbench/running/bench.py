@@ -17,7 +17,7 @@ from agvbench.running.pausing import Pause, standing
 from agvbench.running.placers.choosing import make_placer
 from agvbench.running.placers.placer import Rig
 from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess
-from agvbench.running.records import DriveOrder, record_aborted, recorded_run
+from agvbench.running.records import DriveOrder, record_aborted, recorded_run, times_stopped
 from agvbench.running.settings import BenchSettings
 from agvbench.running.supervision import DEFAULT_SAFETY, Supervisor
 from agvbench.types import Command, Frames, Run
@@ -136,7 +136,7 @@ class Bench:
         if self._identity.simulated:
             duration_s = float(str(run.extra["duration_s"]))
             commands, until_s = exchanged(run.commands, self._neutral(), duration_s, self._timing)
-            self.link.replay(run.run_id, commands, pose=order.start, until_s=until_s)
+            self.link.replay(self._drawn_as(run.run_id), commands, pose=order.start, until_s=until_s)
             self._placer.was_moved()
             self._time.has_run(run.started_s, duration_s)
         return run
@@ -159,11 +159,17 @@ class Bench:
             order.commands,
             neutral=self._neutral(),
             start=order.start,
-            run_key=self._placer.run_key(run_id),
+            run_key=self._placer.run_key(self._drawn_as(run_id)),
             supervisor=self._supervisor,
             timing=self._timing,
             seen=seen,
         )
+
+    def _drawn_as(self, run_id: str) -> str:
+        """Return what a simulated run's randomness follows from: its name and, were it not to meet the same camera
+        again for ever, how often it was stopped before."""
+        stopped = times_stopped(run_id, self._recorded)
+        return f"{run_id}-again{stopped}" if stopped else run_id
 
     def _status(self, order: DriveOrder, driven: Drive) -> str:
         begin_s = -self._timing.rest_before_s

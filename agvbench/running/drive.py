@@ -8,10 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from agvbench.errors import SafetyStopError
 from agvbench.running.links import RunnerLink
 from agvbench.running.rest import is_at_rest
-from agvbench.running.supervision import Supervisor
+from agvbench.running.supervision import Supervisor, safety_stop
 from agvbench.types import Command, Commands, Frames, Pose
 
 
@@ -90,11 +89,8 @@ def drive(
 def _check_seen(batches: list[Frames], timing: Timing, *, where: str) -> None:
     """Refuse to drive a vehicle that was never seen at rest: nobody would know where it goes."""
     if not any(frames.tracked.any() for frames in batches):
-        raise SafetyStopError(
-            "stopped 0.0 s into the run: tracking was lost", where=where,
-            value=f"not seen for {timing.rest_before_s:.2f} s, at rest",
-            remedy="look at vehicle and camera, then go on with --resume",
-        )  # fmt: skip
+        value = f"not seen for {timing.rest_before_s:.2f} s, at rest"
+        raise safety_stop(0.0, "tracking was lost", where=where, value=value)
 
 
 def _settle(watched: Callable[..., None], commands: Commands, batches: list[Frames], timing: Timing) -> float:

@@ -11,7 +11,11 @@ import numpy as np
 from agvbench.campaign import CampaignWriter
 from agvbench.errors import CampaignError
 from agvbench.running.drive import Drive
+from agvbench.running.supervision import STOPPED
 from agvbench.types import Commands, Frames, Pose, Run
+
+
+_ABORTED = "-aborted"
 
 
 @dataclass(frozen=True)
@@ -58,9 +62,14 @@ def record_aborted(
     frames = Frames.concatenate(seen)
     if not len(frames):
         return
-    name = free_name(f"{run_id}-aborted", writer.finished_ids)
+    name = free_name(run_id + _ABORTED, writer.finished_ids)
     with suppress(CampaignError):  # what ended the run has to be told, not that it could not be recorded
         writer.append(aborted_run(order, name, started_s, f"aborted: {why}", frames, firmware))
+
+
+def times_stopped(run_id: str, recorded: Mapping[str, Run]) -> int:
+    """Return how often the supervisor has stopped the run `run_id`, going by what was `recorded`."""
+    return sum(name.startswith(run_id + _ABORTED) and STOPPED in run.status for name, run in recorded.items())
 
 
 def free_name(stem: str, taken: Collection[str]) -> str:

@@ -7,13 +7,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from agvbench.errors import SafetyStopError
 from agvbench.planning import Workspace
 from agvbench.registry import classes_by_file
 from agvbench.running.links import RunnerLink
 from agvbench.running.supervision import rules
 from agvbench.running.supervision.limits import DEFAULT_SAFETY, SafetyLimits
 from agvbench.running.supervision.rule import Rule, Slice
+from agvbench.running.supervision.stop import safety_stop
 from agvbench.types import Command, Frames
 
 _SLACK_S = 1e-9
@@ -73,10 +73,7 @@ class Supervisor:
             if (complaint := rule.complaint(seen)) is not None:
                 link.stop()
                 what, value, limit = complaint
-                raise SafetyStopError(
-                    f"stopped {now_s:.1f} s into the run: {what}", where=link.keys.root, value=value, limit=limit,
-                    remedy="look at vehicle and camera, then go on with --resume",
-                )  # fmt: skip
+                raise safety_stop(now_s, what, where=link.keys.root, value=value, limit=limit)
 
 
 def _parts(begin_s: float, end_s: float, length_s: float) -> Iterator[float]:
