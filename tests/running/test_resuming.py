@@ -58,6 +58,22 @@ def test_what_was_chosen_is_chosen_again(lab):
     assert {run.run_id for run in Campaign.open(lab / "c")} == first
 
 
+def test_a_simulated_vehicle_that_was_lost_is_not_lost_again_whenever_the_session_goes_on(lab):
+    lost = bench("bench_mine.py", "--repeats=2", "--seed=7", "-k=left", "--camera=untracked=0.003,burst_frames=60")
+    assert lost.returncode == 2
+    assert "tracking was lost" in lost.stderr
+    resumed = bench("--resume")
+    assert resumed.returncode == 0, resumed.stdout + resumed.stderr
+    (stopped,) = [run for run in Campaign.open(lab / "c") if "-aborted" in run.run_id]
+    assert "tracking was lost" in stopped.status
+    tables = [lab / "c" / f"{table}.parquet" / "left-0.5-r02.parquet" for table in ("runs", "commands", "poses")]
+    before = [table.read_bytes() for table in tables]
+    for table in tables:
+        table.unlink()
+    assert bench("--resume").returncode == 0
+    assert [table.read_bytes() for table in tables] == before
+
+
 def test_a_calibration_that_was_made_before_an_interruption_is_kept(tmp_path):
     nominal = thesis_vehicle()
     writer = CampaignWriter.create(
