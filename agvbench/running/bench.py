@@ -166,8 +166,10 @@ class Bench:
         )
 
     def _drawn_as(self, run_id: str) -> str:
-        """Return what a simulated run's randomness follows from: its name and, were it not to meet the same camera
-        again for ever, how often it was stopped before."""
+        """Return what a simulated run's randomness follows from: its name, and how often it was stopped before.
+
+        By its name alone a camera would lose the vehicle in the same way whenever the session goes on.
+        """
         stopped = times_stopped(run_id, self._recorded)
         return f"{run_id}-again{stopped}" if stopped else run_id
 

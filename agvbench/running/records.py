@@ -14,7 +14,6 @@ from agvbench.running.drive import Drive
 from agvbench.running.supervision import STOPPED
 from agvbench.types import Commands, Frames, Pose, Run
 
-
 _ABORTED = "-aborted"
 
 
