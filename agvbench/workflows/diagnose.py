@@ -90,7 +90,7 @@ def _decided(
 
     console = Console()
     if found.next_experiment is None:
-        console.print("nothing is driven: no run would tell more", highlight=False)
+        console.print("nothing is driven: no run is proposed", highlight=False)
         return found
     extended = run_next(campaign, found.next_experiment, found.model or model, rig, out=out, seed=seed)
     name = found.next_experiment.trajectory.name

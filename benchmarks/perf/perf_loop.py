@@ -16,7 +16,9 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from scipy.stats import binomtest
@@ -59,7 +61,9 @@ def _drawn(plants: int, first_seed: int) -> Iterator[tuple[str, str, int]]:
 
 def _go_round(name: str, plant: str, seed: int, repeats: int, folder: Path, *, model_only: bool) -> Driven:
     out = folder / f"{name}-{seed}"
-    options = ["--resume"] if (out / "loop.toml").exists() else [f"--repeats={repeats}", f"--seed={seed}"]
+    # A longer exchange is the same drive, sooner.
+    begun = (out / "loop.toml").exists()
+    options = ["--resume"] if begun else [f"--repeats={repeats}", f"--seed={seed}", "--exchange=2"]
     options += ["--model-only"] if model_only else []
     command = [sys.executable, "-c", PROGRAM, "loop", f"--plant={plant}", *options, f"--out={out}"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - our own program
@@ -96,6 +100,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", metavar="NAME", help="hide these instead, each with the first seed")
     parser.add_argument("--model-only", action="store_true", help="leave aims alone, as the loop's option does")
     parser.add_argument("--keep", metavar="DIR", type=Path, help="keep the loops there")
+    parser.add_argument("--jobs", type=int, default=1, help="loops at a time (default 1)")
     parser.add_argument("--cells", action="store_true", help="print every trajectory")
     given = parser.parse_args()
     wanted = [DEFAULT, *_drawn(given.plants, given.first_seed)]
@@ -103,12 +108,14 @@ def main() -> None:
         wanted = [(name, f"agvbench.simulator.hidden:{name}", given.first_seed) for name in given.only]
     with contextlib.ExitStack() as stack:
         folder = given.keep or Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        pool = stack.enter_context(ThreadPoolExecutor(given.jobs))
+        go_round = partial(_go_round, repeats=given.repeats, folder=folder, model_only=given.model_only)
         loops = []
-        for name, plant, seed in wanted:
-            loops.append(_go_round(name, plant, seed, given.repeats, folder, model_only=given.model_only))
-            _tell(loops[-1])
+        for driven in pool.map(go_round, *zip(*wanted, strict=True)):
+            loops.append(driven)
+            _tell(driven)
             if given.cells:
-                _tell_cells(loops[-1])
+                _tell_cells(driven)
     cells = sum(len(loop.rows) for loop in loops)
     within = sum(loop.count(Bias.WITHIN) for loop in loops)
     if cells:
