@@ -8,14 +8,16 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
-from tiny_vehicle import HEADER, Tiny, campaign_runs
+from tiny_vehicle import HEADER, NEUTRAL, Tiny, drive, held
 
 from agvbench.diagnosis.plausibility import _tracks, refuse_units
 from agvbench.errors import CampaignError
-from agvbench.types import Frames
+from agvbench.types import NO_TARGET, Frames, Pose, Run
 
 RATE_HZ = 120.0
-RUN = campaign_runs(Tiny())[0]
+COMMANDS = held(900.0, NEUTRAL, NEUTRAL, 4.0)
+FRAMES = drive(Tiny(), COMMANDS, Pose(0.0, 0.0, 0.0), 0.0, np.random.default_rng(0))
+RUN = Run("a", "drive", "", "calibrated", 1, NO_TARGET, 0.0, "ok", "tiny", COMMANDS, FRAMES)
 
 
 # Of three in a thousand lengths, the last of the moments looked at is rounded past the last frame.

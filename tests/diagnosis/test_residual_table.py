@@ -19,6 +19,7 @@ def test_a_prediction_that_is_short_by_five_per_cent_misses_five_per_cent():
     table = residual_table(readings, held, short, readings.poses)
     np.testing.assert_allclose(table["before_speed"], 0.05, atol=0.02)
     np.testing.assert_allclose(table["after_speed"], 0.0, atol=1e-9)
-    assert set(table["run_id"]) <= {run.run_id for run in readings.runs}
-    assert set(table.loc[table["held_out"], "run_id"]) <= {readings.runs[i].run_id for i in np.flatnonzero(held)}
+    assert set(table["run_id"]) == {run.run_id for run in readings.runs}
+    assert set(table.loc[table["held_out"], "run_id"]) == {readings.runs[i].run_id for i in np.flatnonzero(held)}
+    assert table.groupby("run_id").size().min() > 5
     assert np.isfinite(table.drop(columns=["run_id"]).to_numpy(dtype=float)).all()

@@ -92,9 +92,14 @@ def test_a_tracker_that_jumps_metres_moves_no_window():
     wild = run.frames.x_m.copy()
     wild[[210, 211, 400]] += 9.0
     jumped = dataclasses.replace(run, frames=dataclasses.replace(run.frames, x_m=wild))
-    for a, b in zip(cut_windows(run, HORIZON, NEUTRAL), cut_windows(jumped, HORIZON, NEUTRAL), strict=False):
-        assert abs(a.speed_mps - b.speed_mps) < 0.05
-        assert np.nanmax(np.abs(b.poses[:, :2])) < 4.0  # the circle is 3.3 m wide, wild frames are 9 m away
+    calm, shaken = list(cut_windows(run, HORIZON, NEUTRAL)), list(cut_windows(jumped, HORIZON, NEUTRAL))
+    assert len(shaken) == len(calm) > 3
+    for a, b in zip(calm, shaken, strict=True):
+        assert b.speed_mps == pytest.approx(a.speed_mps, abs=0.01)
+        np.testing.assert_allclose(b.start, a.start, atol=1e-3)
+        seen = np.isfinite(b.poses)
+        np.testing.assert_allclose(b.poses[seen], a.poses[seen], atol=1e-3)
+        assert seen.mean() > 0.9
 
 
 def test_runs_from_rest_stay_runs_and_free_driving_becomes_windows():
@@ -172,6 +177,11 @@ def test_errors_are_told_by_recording_with_intervals_over_stretches(readings):
 def test_an_interval_covers_its_error_and_is_unknown_without_stretches():
     values = np.random.default_rng(0).exponential(1.0, 64)
     alone, together = np.arange(64), np.arange(64) // 16
+    covers = 0
+    for seed in range(200):
+        drawn = interval(np.random.default_rng(seed).exponential(1.0, 64), np.arange(64), seed)
+        covers += drawn["low"] <= 1e3 <= drawn["high"]
+    assert 0.85 <= covers / 200 <= 0.99  # percentiles of a skew mean fall a little short of 95 %
     many, few = interval(values, alone, 0), interval(np.sort(values), together, 0)
     assert many["low"] < many["rms"] < many["high"]
     assert few["high"] - few["low"] > many["high"] - many["low"]

@@ -5,6 +5,7 @@ Semi-implicit Euler at 240 Hz from commands to poses, in the floor frame; every 
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -199,7 +200,12 @@ def experiments(*, steps: bool = True) -> Iterator[tuple[str, Commands, int]]:
 
 
 def campaign_runs(tiny: Tiny, *, seed: int = 0, steps: bool = True, hours: float = 1.0) -> list[Run]:
-    """Drive a campaign: repeats interleaved, start poses at random."""
+    """Return a campaign: repeats interleaved, start poses at random."""
+    return list(_driven(tiny, seed, steps, hours))
+
+
+@functools.cache
+def _driven(tiny: Tiny, seed: int, steps: bool, hours: float) -> tuple[Run, ...]:  # noqa: FBT001  (private)
     rng = np.random.default_rng(seed)
     plan = [
         (name, commands, repeat, k)
@@ -227,4 +233,4 @@ def campaign_runs(tiny: Tiny, *, seed: int = 0, steps: bool = True, hours: float
                 frames,
             )
         )
-    return runs
+    return tuple(runs)

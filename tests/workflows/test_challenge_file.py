@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import subprocess
 from pathlib import Path
 
 import pytest
 
 from agvbench.cli import main
-from agvbench.errors import FileError, FlagError, PlantError
+from agvbench.errors import FileError, FitError, FlagError, PlantError
+from agvbench.running.supervision import safety_stop
 from agvbench.workflows import challenge
 from agvbench.workflows.challenge import hold_trial, run_challenge
 from agvbench.workflows.challenge_file import known_trials, write_trials
@@ -87,6 +89,53 @@ def test_what_was_held_before_a_trial_that_fails_is_kept_and_no_other_is_begun(t
         run_challenge(40, first_seed=0, specs=["steering_lag"], repeats=5, jobs=1, json_file=str(file))
     assert sorted(known_trials(file, 5)) == [("steering_lag", 0), ("steering_lag", 1)]
     assert len(list((tmp_path / "held").iterdir())) <= 4
+
+
+def test_a_trial_that_ended_with_an_error_is_held_again(tmp_path, monkeypatch):
+    (tmp_path / "held").mkdir()
+    monkeypatch.setenv("HELD", str(tmp_path / "held"))
+    monkeypatch.setattr(challenge, "hold_trial", one_that_fails)
+    file = tmp_path / "challenge.json"
+    write_trials(file, 5, [dataclasses.replace(LAG, verdict="ERROR", named=())])
+    run_challenge(1, first_seed=3, specs=["steering_lag"], repeats=5, jobs=1, json_file=str(file), resume=True)
+    assert (tmp_path / "held" / "3").exists()
+    assert same(known_trials(file, 5)["steering_lag", 3], LAG)
+
+
+def benches(monkeypatch, *ends):
+    """Let benches end so, one after another; return the commands that began them."""
+    coming, began = list(ends), []
+
+    def run(command, **_):
+        began.append(command)
+        code, said = coming.pop(0)
+        return subprocess.CompletedProcess(command, code, "", said)
+
+    monkeypatch.setattr(challenge.subprocess, "run", run)
+    return began
+
+
+def test_a_session_that_was_stopped_goes_on_and_one_that_failed_does_not(tmp_path, monkeypatch):
+    lost = str(safety_stop(0.9, "tracking was lost", where="agvbench/v2/lab/agv1", value="not seen for 0.59 s"))
+    wrapped = lost.replace(" into ", "\ninto ")
+    began = benches(monkeypatch, (2, wrapped), (2, lost), (1, ""))
+    challenge._drive("nothing", 3, 5, tmp_path)
+    assert len(began) == 3
+    assert all("--resume" in command for command in began)
+    began = benches(monkeypatch, (2, "ERROR: the disk is full"), (0, ""))
+    with pytest.raises(PlantError, match=r"could not drive.*disk is full"):
+        challenge._drive("nothing", 3, 5, tmp_path)
+    assert len(began) == 1
+
+
+def test_a_diagnosis_that_fails_is_an_answer_that_counts_as_wrong(monkeypatch):
+    def fails(_):
+        raise FitError("nothing to fit")
+
+    monkeypatch.setattr(challenge, "_drive", lambda *_: None)
+    monkeypatch.setattr("agvbench.campaign.Campaign.open", lambda _: None)
+    monkeypatch.setattr("agvbench.diagnosis.diagnose", fails)
+    assert hold_trial("nothing", 3, 5).verdict == "ERROR"
 
 
 def test_a_plant_that_cannot_be_driven_is_an_answer_that_counts_as_wrong(monkeypatch):

@@ -101,6 +101,25 @@ def test_removed_error_is_what_lies_above_the_floor():
     assert score([good, level]).removed["inside the library"] == pytest.approx((0.99, 0.99))
 
 
+def test_the_scores_of_four_trials_are_those_counted_by_hand():
+    held = [{"before": 101.0, "after": 1.0 + 100.0 * left, "floor": 1.0} for left in (0.8, 0.1, 0.01)]
+    told = {"true_parameters": {"steering_lag": {"time_constant_s": 0.1}}}
+    lag = ["steering_lag"]
+    found = score([
+        trial(lag, verdict="NAMED", named=lag, squares_mm2=held[0], seconds=4.0, **told,
+              estimates={"steering_lag": {"time_constant_s": (0.13, 0.01)}}),
+        trial(lag, verdict="AMBIGUOUS", named=lag, alternatives=("mocap_latency", "speed_lag"), seconds=10.0, **told,
+              squares_mm2=held[1], estimates={"steering_lag": {"time_constant_s": (0.11, 0.01)}}),
+        trial(lag, verdict="NAMED", named=lag, squares_mm2=held[2], worse_on=("5",), seconds=6.0),
+        trial(seconds=1.0),
+    ])  # fmt: skip
+    assert found.removed["inside the library"] == pytest.approx((0.2, 0.9))
+    assert found.list_length == 3.0
+    assert (found.coverage.count, found.coverage.total) == (1, 2)
+    assert found.worse_on == 1
+    assert found.seconds == (5.0, 10.0)
+
+
 def test_removed_error_is_not_asked_for_where_free_maps_leave_none():
     good = trial(["steering_lag"], squares_mm2={"before": 101.0, "after": 2.0, "floor": 1.0})
     taken_up = trial(["mocap_scale"], absorbed=True, squares_mm2={"before": 2.0, "after": 2.0, "floor": 1.0})

@@ -1,0 +1,88 @@
+"""What is concluded from errors, floors and dependences, told by hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from agvbench.diagnosis.conclusion import _held_out, _is_significant, _Judged, _verdict
+from agvbench.diagnosis.dependences import RANDOM_PHASE, Dependence
+from agvbench.diagnosis.residuals import QUANTITIES, Misses
+from agvbench.diagnosis.result import NamedEffect, Verdict
+
+FLOOR = dict.fromkeys(QUANTITIES, 2.0)  # mm, degrees
+PATCH = Dependence("x_m", "speed", 1e-6, 0.3)
+
+
+@dataclass
+class Kept:
+    """Readings, as far as they are looked at."""
+
+    group: np.ndarray
+    runs: list[SimpleNamespace]
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+
+def off_by(*position_m: float) -> Misses:
+    """Return what runs miss that are off ahead by as much, in each of three frames."""
+    path = np.zeros((len(position_m), 3, 3))
+    path[..., 0] = np.array(position_m)[:, None]
+    nothing = np.zeros(len(position_m))
+    return Misses(path, np.ones(path.shape[:2], dtype=bool), nothing, nothing)
+
+
+def judged(after_floors: float, lack_of_fit: float | None) -> _Judged:
+    after = off_by(*[2e-3 * after_floors] * 4)
+    return _Judged(after, after, FLOOR, lack_of_fit)
+
+
+@pytest.mark.parametrize(
+    ("after_floors", "lack_of_fit", "rest", "significant"),
+    [
+        (2.0, 1e-4, [], True),
+        (2.0, 0.5, [], False),
+        (2.0, None, [], False),
+        (1.1, 1e-6, [], False),
+        (1.1, 0.5, [PATCH], True),
+    ],
+)
+def test_significant_is_what_is_above_the_floor_and_beyond_scatter_or_depends_on_something(
+    after_floors, lack_of_fit, rest, significant
+):
+    assert _is_significant(judged(after_floors, lack_of_fit), rest) is significant
+
+
+@pytest.mark.parametrize(
+    ("effects", "significant", "rest", "verdict", "why"),
+    [
+        ((), False, [], Verdict.ADEQUATE, "as repeats agree"),
+        ((NamedEffect("steering_lag", {}, (), {}),), False, [], Verdict.NAMED, "to the floor"),
+        ((NamedEffect("steering_lag", {}, ("mocap_latency",), {}),), False, [], Verdict.AMBIGUOUS, "equally well"),
+        ((NamedEffect("steering_lag", {}, (), {}),), True, [PATCH], Verdict.UNKNOWN, "depends on x_m"),
+        ((), True, [], Verdict.UNKNOWN, "none of the covariates"),
+        ((), True, [Dependence(RANDOM_PHASE, "speed", 1e-3, 0.5)], Verdict.UNKNOWN, "another phase in every run"),
+    ],
+)
+def test_a_verdict_says_what_is_known_and_what_is_not(effects, significant, rest, verdict, why):
+    said = _verdict(effects, significant, rest, None)
+    assert said[0] is verdict
+    assert why in said[1]
+
+
+def test_what_got_worse_by_more_than_the_floor_is_told():
+    runs = [SimpleNamespace(trajectory=name, run_id=f"{name or 'free'}-{k}") for name in ("1", "2", "") for k in (1, 2)]
+    before = off_by(*[3e-3] * 6)
+    # Squares: 9 before; 9 + 4 × 0.25, 9 + 4 × 4 and less, the floor's square being 4 mm².
+    after = off_by(*[np.sqrt(10.0) * 1e-3] * 2, *[5e-3] * 2, *[1e-3] * 2)
+    kept = Kept(np.repeat([0, 1, 2], 2), runs)
+    found = _held_out(kept, _Judged(before, after, FLOOR, None))
+    assert found.worse_on == ("2",)
+    assert found.runs == 6
+    assert found.errors["position_rms_mm"]["before"] == pytest.approx(3.0)
+    turned = _held_out(kept, _Judged(after, before, FLOOR, None))
+    assert turned.worse_on == ("free-1",)
