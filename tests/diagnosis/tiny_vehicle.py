@@ -205,7 +205,7 @@ def campaign_runs(tiny: Tiny, *, seed: int = 0, steps: bool = True, hours: float
 
 
 @functools.cache
-def _driven(tiny: Tiny, seed: int, steps: bool, hours: float) -> tuple[Run, ...]:  # noqa: FBT001  (private)
+def _driven(tiny: Tiny, seed: int, steps: bool, hours: float) -> tuple[Run, ...]:
     rng = np.random.default_rng(seed)
     plan = [
         (name, commands, repeat, k)

@@ -116,13 +116,15 @@ def test_a_planted_value_is_recovered(name):
     def residual(values):
         return ((data.poses - data.predict(name, values)) / NOISE).ravel()
 
-    fits, scale = [], [p.scale for p in parameters]
+    scale = [p.scale for p in parameters]
     starts = [
         [direction if p.name == "direction_rad" else sign * p.scale for p in parameters]
         for sign, direction in zip((1.0, -1.0, 1.0, -1.0), (-2.4, -0.8, 0.8, 2.4), strict=True)
     ]
-    for start in np.unique(np.clip(starts, low, np.minimum(high, 1e3)), axis=0):
-        fits.append(least_squares(residual, start, bounds=(low, high), x_scale=scale, diff_step=1e-4))
+    fits = [
+        least_squares(residual, start, bounds=(low, high), x_scale=scale, diff_step=1e-4)
+        for start in np.unique(np.clip(starts, low, np.minimum(high, 1e3)), axis=0)
+    ]
     best = min(fits, key=lambda fit: fit.cost)
     stderr = np.sqrt(np.diagonal(np.linalg.inv(best.jac.T @ best.jac)))
     turn = np.array([p.name == "direction_rad" for p in parameters])
