@@ -11,7 +11,9 @@ import pytest
 from agvbench.diagnosis.conclusion import _held_out, _is_significant, _Judged, _verdict
 from agvbench.diagnosis.dependences import RANDOM_PHASE, Dependence
 from agvbench.diagnosis.residuals import QUANTITIES, Misses
-from agvbench.diagnosis.result import NamedEffect, Verdict
+from agvbench.diagnosis.result import HeldOut, NamedEffect, Verdict
+from agvbench.diagnosis.windows_conclusion import AT_THE_FLOOR, FAR_ABOVE, _above
+from agvbench.diagnosis.windows_conclusion import _verdict as verdict_of_windows
 
 FLOOR = dict.fromkeys(QUANTITIES, 2.0)  # mm, degrees
 PATCH = Dependence("x_m", "speed", 1e-6, 0.3)
@@ -72,6 +74,22 @@ def test_a_verdict_says_what_is_known_and_what_is_not(effects, significant, rest
     said = _verdict(effects, significant, rest, None)
     assert said[0] is verdict
     assert why in said[1]
+
+
+@pytest.mark.parametrize(
+    ("effects", "rest", "floors", "verdict"),
+    [
+        ((), [], 1.1, Verdict.ADEQUATE),
+        ((NamedEffect("steering_lag", {}, (), {}),), [], 4.0, Verdict.NAMED),
+        ((NamedEffect("steering_lag", {}, ("mocap_latency",), {}),), [], 4.0, Verdict.AMBIGUOUS),
+        ((NamedEffect("steering_lag", {}, (), {}),), [], 5.1, Verdict.UNKNOWN),
+        ((), [PATCH], 2.0, Verdict.UNKNOWN),
+    ],
+)
+def test_free_driving_is_unknown_far_above_its_floor_or_where_something_is_depended_on(effects, rest, floors, verdict):
+    held = HeldOut(9, {"heading_rms_deg": {"before": 9.0, "after": floors, "floor": 1.0}}, ())
+    assert verdict_of_windows(effects, rest, _above(held, FAR_ABOVE))[0] is verdict
+    assert _above(held, AT_THE_FLOOR) is (floors > 1.25)
 
 
 def test_what_got_worse_by_more_than_the_floor_is_told():

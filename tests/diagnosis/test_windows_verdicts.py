@@ -9,7 +9,7 @@ import pytest
 from free_drives import FREE_HEADER, free_runs
 from tiny_vehicle import Tiny
 
-from agvbench.diagnosis import Diagnosis, diagnose
+from agvbench.diagnosis import Diagnosis, Verdict, diagnose
 from agvbench.errors import CampaignError
 from agvbench.types import Run
 
@@ -32,6 +32,7 @@ def lagging() -> Diagnosis:
 def test_a_steering_lag_is_named_with_its_size(lagging):
     assert [effect.name for effect in lagging.effects] == ["steering_lag"]
     assert lagging.effects[0].parameters["time_constant_s"].value == pytest.approx(0.25, abs=0.02)
+    assert lagging.verdict is Verdict.NAMED
     errors = lagging.held_out.errors
     for name in ("position_rms_mm", "heading_rms_deg"):
         assert errors[name]["after"] < 0.2 * errors[name]["before"]
@@ -61,6 +62,7 @@ def test_every_effect_is_listed_with_what_it_does_to_sessions_held_out(lagging):
 
 def test_nothing_is_named_where_nothing_is_hidden():
     found = diagnose(FreeCampaign(free_runs(Tiny(), runs=2, seconds=24.0)))
+    assert found.verdict is Verdict.ADEQUATE
     assert not found.effects
     errors = found.held_out.errors["position_rms_mm"]
     assert errors["after"] < 1.3 * errors["before"] < 10.0  # mm, 2 s ahead
