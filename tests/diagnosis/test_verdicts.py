@@ -53,6 +53,7 @@ def test_an_effect_is_named_with_its_size(tiny_campaign, tiny, name, parameters)
     assert [effect.name for effect in found.effects] == [name]
     for key, value in parameters.items():
         estimate = found.effects[0].parameters[key]
+        assert 0.0 < estimate.stderr < 0.25 * abs(value)
         assert abs(estimate.value - value) < 4.0 * estimate.stderr + 0.02 * abs(value)
 
 

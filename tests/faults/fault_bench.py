@@ -13,6 +13,7 @@ from typing import Any
 from fault_record import Outcome
 from told_to_drive import Witness, witness
 
+from agvbench.campaign import Campaign as Recorded
 from agvbench.errors import AgvbenchError
 from agvbench.running.opening import open_session
 from agvbench.running.session import BenchSession
@@ -50,10 +51,11 @@ class Campaign:
         with witness() as seen:
             said, last_s = self._drive(path, {**struck, "workspace": self.workspace}, seen)
         self.undo(path)
+        attempts = _attempts(path)
         finished = _part(path, RUNS[0])
         resumed = self._resumed(path, {"agv": agv, "mocap": mocap, "camera": ""})
         intact = finished is not None and finished == _part(path, RUNS[0]) and finished == self._undisturbed(rig)
-        return Outcome(None if last_s is None else max(0.0, last_s - FROM_S), *said, intact, resumed == "")
+        return Outcome(None if last_s is None else max(0.0, last_s - FROM_S), *said, intact, resumed == "", attempts)
 
     @property
     def _hold(self) -> tuple[float, float]:
@@ -125,6 +127,14 @@ def _trip(session: BenchSession, do: Callable[[], None]) -> None:
 def _part(path: Path, name: str) -> dict[str, bytes] | None:
     parts = [path / f"{table}.parquet" / f"{name}.parquet" for table in ("runs", "commands", "poses")]
     return {part.parent.name: part.read_bytes() for part in parts} if all(part.exists() for part in parts) else None
+
+
+def _attempts(path: Path) -> tuple[str, ...] | None:
+    """Return what was recorded of the run that was befallen, the first word of each attempt's status."""
+    with suppress(AgvbenchError):
+        found = {run.run_id: run.status.partition(":")[0] for run in Recorded.open(path)}
+        return tuple(found[name] for name in sorted(found) if name.startswith(RUNS[1]))
+    return None
 
 
 @cache

@@ -35,7 +35,8 @@ class Outcome:
     ``reaction_s`` [s] is how long the vehicle was told to drive after the fault began (None: to the end of its run),
     ``said`` what the run that it befell failed with, ``later`` what the next failed with. ``intact`` is whether the run
     that was finished before stayed as it was, byte by byte, ``resumed`` whether a session without the fault then drove
-    all that was missing; None is for what was not tried.
+    all that was missing; ``attempts`` is what was recorded of the run that it befell, attempt by attempt: "ok",
+    "rejected" or "aborted". None is for what was not tried.
     """
 
     reaction_s: float | None
@@ -43,6 +44,7 @@ class Outcome:
     later: str | None = None
     intact: bool | None = None
     resumed: bool | None = None
+    attempts: tuple[str, ...] | None = None
 
     def breaks(self, fault: Fault, slack: float = 1.0) -> list[str]:
         """Return which promises of `fault` are broken, in words; times may be `slack` times as long."""
@@ -57,8 +59,17 @@ class Outcome:
             f"later runs fail with the same cause or not at all, not {self.later!r}": latched,
             "finished runs stay as they are": self.intact is not False,
             "can be resumed": self.resumed is not False,
+            f"counts or is rejected as it should, not {self.attempts}": self._counts(fault.then),
         }
         return [promise for promise, kept in promises.items() if not kept]
+
+    def _counts(self, then: Then) -> bool:
+        if self.attempts is None or then not in {Then.GOES_ON, Then.REJECTS}:
+            return True
+        if then is Then.GOES_ON:
+            return self.attempts == ("ok",)
+        *before, last = self.attempts
+        return len(before) > 0 and set(before) == {"rejected"} and last == ("rejected" if self.said else "ok")
 
 
 @dataclass(frozen=True)
