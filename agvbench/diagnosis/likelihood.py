@@ -78,6 +78,7 @@ def inner_inverse(a: Floats, prior: Floats) -> tuple[Floats, Floats]:
     return inner, np.asarray(np.linalg.inv(inner))
 
 
+@np.errstate(over="ignore")  # what a step too far predicts may be beyond all numbers: infinitely bad, and not taken
 def objective(predictor: Predictor, residual: Floats, offsets: Floats, scatter: Scatter) -> float:
     """Return the weighted squares of residuals and offsets: what a step must not make larger."""
     temper, _ = tempering(predictor)

@@ -1,0 +1,41 @@
+"""What a step is held against."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from agvbench.diagnosis.likelihood import objective, residual_of
+from agvbench.diagnosis.scatter import first_scatter
+
+RUNS, SAMPLES = 3, 5
+
+
+class Readings(SimpleNamespace):
+    """Runs that stood at the origin."""
+
+    seen = np.ones((RUNS, SAMPLES), dtype=bool)
+    begins = None
+    poses = np.zeros((RUNS, SAMPLES, 3))
+    start_stderr = np.full((RUNS, 3), 1e-3)
+
+    def __len__(self):
+        return RUNS
+
+
+def squares(poses):
+    asked = SimpleNamespace(readings=Readings())
+    return objective(asked, residual_of(asked, poses), np.zeros((RUNS, 6)), first_scatter())
+
+
+def test_the_farther_off_the_larger():
+    poses = np.zeros((RUNS, SAMPLES, 3))
+    assert squares(poses) == 0.0
+    assert 0.0 < squares(poses + 0.01) < squares(poses + 0.02)
+
+
+def test_what_a_step_too_far_predicts_is_infinitely_bad_and_no_warning():
+    poses = np.zeros((RUNS, SAMPLES, 3))
+    poses[1, 2:] = np.inf
+    assert squares(poses) == np.inf
