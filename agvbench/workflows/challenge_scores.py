@@ -12,6 +12,9 @@ from agvbench.statistics.share import Share
 from agvbench.workflows.challenge_trial import Trial
 
 _Z = 1.959963984540054
+_THREE_FLOORS = 9.0
+"""Squares at which free maps leave three floors, the least that sizes are drawn for: below it a share of the excess
+tells the scatter of the floor as much as what the model removes."""
 
 
 def _one(trial: Trial) -> bool:
@@ -21,6 +24,22 @@ def _one(trial: Trial) -> bool:
 def _outside(trial: Trial) -> bool:
     return len(trial.hidden) == 1 and trial.outside == 1
 
+
+def _inside(trial: Trial) -> bool:
+    return bool(trial.library_names) and not trial.outside and not trial.absorbed
+
+
+def _leaves_three_floors(trial: Trial) -> bool:
+    before, floor = (trial.squares_mm2.get(name, math.nan) for name in ("before", "floor"))
+    return before >= _THREE_FLOORS * floor
+
+
+Group = tuple[str, Callable[[Trial], bool]]
+GROUPS: tuple[Group, ...] = (
+    ("inside the library", _inside),
+    ("inside the library, free maps left three floors", lambda t: _inside(t) and _leaves_three_floors(t)),
+    ("outside, without random phase", lambda t: _outside(t) and not t.random_phase),
+)
 
 Question = tuple[str, Callable[[Trial], bool], Callable[[Trial], bool]]
 QUESTIONS: tuple[Question, ...] = (
@@ -79,14 +98,7 @@ def score(trials: Sequence[Trial]) -> Scores:
         {name: dict(answers) for name, answers in sorted(confusion.items())},
         sum(lists) / len(lists) if lists else math.nan,
         Share.of(covered for trial in trials for covered in coverings(trial)),
-        {
-            "inside the library": _worst_and_median(
-                t.removed for t in trials if t.library_names and not t.outside and not t.absorbed
-            ),
-            "outside, without random phase": _worst_and_median(
-                t.removed for t in trials if _outside(t) and not t.random_phase
-            ),
-        },
+        {name: _worst_and_median(t.removed for t in trials if counts(t)) for name, counts in GROUPS},
         sum(bool(t.worse_on) for t in trials),
         _median_and_most([t.seconds for t in trials]),
     )

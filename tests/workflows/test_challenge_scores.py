@@ -101,6 +101,14 @@ def test_removed_error_is_what_lies_above_the_floor():
     assert score([good, level]).removed["inside the library"] == pytest.approx((0.99, 0.99))
 
 
+def test_a_size_that_leaves_less_than_three_floors_is_counted_with_all_and_not_beside_those_that_leave_them():
+    small = trial(["steering_backlash"], squares_mm2={"before": 28.5, "after": 10.3, "floor": 6.8})
+    large = trial(["steering_lag"], squares_mm2={"before": 108.8, "after": 7.8, "floor": 6.8})
+    found = score([small, large]).removed
+    assert found["inside the library"] == pytest.approx((18.2 / 21.7, 0.5 * (18.2 / 21.7 + 101.0 / 102.0)))
+    assert found["inside the library, free maps left three floors"] == pytest.approx((101.0 / 102.0,) * 2)
+
+
 def test_the_scores_of_four_trials_are_those_counted_by_hand():
     held = [{"before": 101.0, "after": 1.0 + 100.0 * left, "floor": 1.0} for left in (0.8, 0.1, 0.01)]
     told = {"true_parameters": {"steering_lag": {"time_constant_s": 0.1}}}
