@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.calibration import inspect_frames
+from agvbench.campaign.sessions import session_starts
 from agvbench.diagnosis.grouping import at_common_levels, group_runs
 from agvbench.diagnosis.resting import between_rows, frame_noise, motion_of, start_of
 from agvbench.diagnosis.windows import Beginnings, Horizon, blocks, cut_windows, recording_of
@@ -98,7 +99,7 @@ def read_runs(runs: Iterable[Run], neutral: float | None = None) -> Readings:
     Where `neutral` is given, a vehicle is taken to rest while its drive is there, for runs not seen before they began.
     """
     every = [between_rows(run) for run in at_common_levels(list(runs))]
-    began = _session_starts(every)
+    began = session_starts(every)
     kept: list[Run] = []
     rows: list[tuple[Floats, Floats, Floats, Floats]] = []
     refused: dict[str, str] = {}
@@ -117,7 +118,7 @@ def read_runs(runs: Iterable[Run], neutral: float | None = None) -> Readings:
 def read_windows(runs: Iterable[Run], horizon: Horizon, neutral: float) -> Readings:
     """Cut runs into windows; a run that has none is named in ``refused``."""
     every = list(at_common_levels(list(runs)))
-    began = _session_starts(every)
+    began = session_starts(every)
     refused: dict[str, str] = {}
     windows = []
     for run in every:
@@ -141,13 +142,6 @@ def read_windows(runs: Iterable[Run], horizon: Horizon, neutral: float) -> Readi
     )
     group = blocks(windows, horizon)
     return Readings(tuple(w.run for w in windows), t_s, poses, start, stderr, started_h, group, refused, begins)
-
-
-def _session_starts(runs: list[Run]) -> dict[str | None, float]:
-    began: dict[str | None, float] = {}
-    for run in runs:
-        began[run.session] = min(run.started_s, began.get(run.session, np.inf))
-    return began
 
 
 def _read(run: Run, neutral: float | None) -> tuple[Floats, Floats, Floats, Floats]:

@@ -18,9 +18,12 @@ from agvbench.running.placers.choosing import make_placer
 from agvbench.running.placers.placer import Rig
 from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess
 from agvbench.running.records import DriveOrder, record_aborted, recorded_run, times_stopped
+from agvbench.running.session_began import SessionBegan
 from agvbench.running.settings import BenchSettings
 from agvbench.running.supervision import DEFAULT_SAFETY, Supervisor
 from agvbench.types import Command, Frames, Run
+
+_UNNAMED = SessionBegan()
 
 
 class Bench:
@@ -41,6 +44,7 @@ class Bench:
         calibrate: Callable[[], VehicleModel],
         recorded: Mapping[str, Run],
         corrected: VehicleModel | None = None,
+        session: SessionBegan = _UNNAMED,
         timing: Timing = DEFAULT_TIMING,
         limits: QualityLimits = DEFAULT_LIMITS,
     ) -> None:
@@ -52,7 +56,7 @@ class Bench:
         self._time, self._timing, self._limits = campaign_time, timing, limits
         self._identity = link.identity()
         self._latch, self.pause = Latch(), Pause(writer.path)
-        self._recorded = recorded
+        self._recorded, self._session = recorded, session
         workspace = Workspace.parse(settings.workspace)
         safety = replace(DEFAULT_SAFETY, flickers=not self._identity.simulated, exchange_s=settings.exchange)
         self._supervisor = Supervisor(workspace, nominal.neutral, safety)
@@ -83,8 +87,8 @@ class Bench:
 
     @property
     def departure(self) -> Departure:
-        """When the next run begins."""
-        return Departure(started_h=self._time.now_s() / 3600.0)
+        """When the next run begins, since its session did."""
+        return Departure(started_h=(self._time.now_s() - self._session.started_s) / 3600.0)
 
     def run(self, order: DriveOrder) -> Run:
         """Drive `order` until an attempt counts; return the last attempt.
@@ -100,6 +104,7 @@ class Bench:
             If the run was driven and cannot be recorded; the bench drives no more, either.
         """
         self._latch.check()
+        order = replace(order, session=self._session.name)
         with self._latch.remembering():
             for attempt in range(1, self._attempts(order) + 1):
                 run = self._attempt(order, attempt)

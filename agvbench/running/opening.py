@@ -18,7 +18,6 @@ from agvbench.bus.bus_config import BusConfig
 from agvbench.bus.link import VehicleLink
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
 from agvbench.campaign.header import FILE_NAME
-from agvbench.errors import FlagError, VehicleError
 from agvbench.model import VehicleModel, thesis_vehicle
 from agvbench.planning import Workspace
 from agvbench.running.bench import Bench
@@ -27,18 +26,17 @@ from agvbench.running.campaign_time import TURNAROUND_S, CampaignTime, Simulated
 from agvbench.running.placers.choosing import choose_placer
 from agvbench.running.provenance import provenance
 from agvbench.running.remainders import read_remainders
-from agvbench.running.rest import LEAST_RATE_HZ
+from agvbench.running.rig_checks import check_rig
 from agvbench.running.session import BenchSession
+from agvbench.running.session_began import SessionBegan, idle_notice, last_end_s
 from agvbench.running.session_settings import LAB_VEHICLE, session_settings
 from agvbench.running.settings import SETTINGS_FILE, BenchSettings
 from agvbench.running.signals import interruptible
-from agvbench.running.supervision.limits import DEFAULT_SAFETY
 from agvbench.running.unbroken import UnbrokenLink
 from agvbench.running.vehicles import uncalibrated_vehicle
 from agvbench.types import Run
 
 PROVENANCE_TABLE = "provenance"
-_OPTIONS = {"uncalibrated": "--vehicle", "calibrated": "--calibration", "corrected": "--corrected"}
 
 
 @contextmanager
@@ -83,15 +81,16 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
             calibration_hash=models["calibrated"].calibration_hash if "calibrated" in models else "",
         ) as link,
     ):
-        _check_models(models, link)
+        check_rig(models, settings, link)
         choose_placer(settings.place, simulated=link.identity().simulated)
-        _check_exchange(settings, link)
-        _check_rate(link)
         header = _header(_name(directory, resume=resume), models["uncalibrated"], link)
         writer = _writer(directory, settings, header, resume=resume, simulated=link.identity().simulated)
-        bench = _bench(settings, models, link, writer)
+        recorded = _recorded(writer)
+        campaign_time = _campaign_time(link, writer, recorded, drives_back=settings.place == "auto")
+        bench = _bench(settings, models, link, writer, recorded, campaign_time)
         session = session_with(bench=bench)
-        session.notices = _notices(settings, given, resume=resume, resumed=bool(writer.finished_ids), where=directory)
+        session.notices = _notices(settings, given, resume=resume, resumed=bool(recorded), where=directory)
+        session.notices += idle_notice(recorded.values(), campaign_time.now_s(), settings.session)
         with bench.pause.by_signal():
             yield session
 
@@ -115,44 +114,6 @@ def _known_models(settings: BenchSettings) -> dict[str, VehicleModel]:
     if settings.corrected:
         models["corrected"] = VehicleModel.load(settings.corrected)
     return models
-
-
-def _check_models(models: Mapping[str, VehicleModel], link: VehicleLink) -> None:
-    """Refuse a model that would stop at another command than the vehicle does, or speak in another unit."""
-    identity = link.identity()
-    for condition, model in models.items():
-        for what, said, true in (
-            ("takes commands in another unit", model.command_unit, identity.command_unit),
-            ("stands still at another command", model.neutral, identity.neutral),
-        ):
-            if said != true:
-                remedy = f"give the right file with {_OPTIONS[condition]}"
-                raise VehicleError(
-                    f"the vehicle {what} than its file says", where=model.name, value=said, limit=true, remedy=remedy
-                )
-
-
-def _check_exchange(settings: BenchSettings, link: VehicleLink) -> None:
-    if settings.exchange > DEFAULT_SAFETY.exchange_s and not link.identity().lock_step:
-        raise FlagError(
-            "a vehicle in real time must be watched while it drives",
-            where="--exchange",
-            value=f"{settings.exchange:g} s",
-            limit=f"{DEFAULT_SAFETY.exchange_s:g} s",
-            remedy="leave it out",
-        )
-
-
-def _check_rate(link: VehicleLink) -> None:
-    rate_hz = link.identity().mocap_rate_hz
-    if rate_hz < LEAST_RATE_HZ:
-        raise FlagError(
-            "the camera looks too seldom to tell whether a vehicle is at rest",
-            where="--mocap",
-            value=f"{rate_hz:g} Hz",
-            limit=f"at least {LEAST_RATE_HZ:g} Hz",
-            remedy="ask it for more frames, or wish for more with --camera rate_hz=",
-        )
 
 
 def _name(directory: Path, *, resume: bool) -> str:
@@ -191,19 +152,24 @@ def _writer(
 
 
 def _bench(
-    settings: BenchSettings, models: Mapping[str, VehicleModel], link: VehicleLink, writer: CampaignWriter
+    settings: BenchSettings,
+    models: Mapping[str, VehicleModel],
+    link: VehicleLink,
+    writer: CampaignWriter,
+    recorded: Mapping[str, Run],
+    campaign_time: CampaignTime,
 ) -> Bench:
     def calibrated() -> VehicleModel:
         return models.get("calibrated") or calibrate_campaign(writer, maps=settings.maps)
 
-    recorded, drives_back = _recorded(writer), settings.place == "auto"
     return Bench(
         settings,
         nominal=models["uncalibrated"],
         corrected=models.get("corrected"),
-        link=UnbrokenLink(link) if drives_back and link.identity().lock_step else link,
+        link=UnbrokenLink(link) if settings.place == "auto" and link.identity().lock_step else link,
         writer=writer,
-        campaign_time=_campaign_time(link, writer, recorded, turnaround_s=0.0 if drives_back else TURNAROUND_S),
+        campaign_time=campaign_time,
+        session=SessionBegan.of(settings.session, recorded.values(), campaign_time.now_s()),
         calibrate=calibrated,
         recorded=recorded,
     )
@@ -217,13 +183,10 @@ def _recorded(writer: CampaignWriter) -> dict[str, Run]:
 
 
 def _campaign_time(
-    link: VehicleLink, writer: CampaignWriter, recorded: Mapping[str, Run], *, turnaround_s: float
+    link: VehicleLink, writer: CampaignWriter, recorded: Mapping[str, Run], *, drives_back: bool
 ) -> CampaignTime:
     if link.identity().simulated:
-        return SimulatedCampaignTime(turnaround_s)
+        return SimulatedCampaignTime(0.0 if drives_back else TURNAROUND_S)
     table = pd.read_parquet(os.fspath(writer.path / f"{PROVENANCE_TABLE}.parquet"))
     began = dict(zip(table["name"], table["value"], strict=True))["began"]
-    last_s = max(
-        (run.started_s + float(str(run.extra.get("duration_s", 0.0))) for run in recorded.values()), default=0.0
-    )
-    return WallCampaignTime(datetime.fromisoformat(began).timestamp(), last_s)
+    return WallCampaignTime(datetime.fromisoformat(began).timestamp(), last_end_s(recorded.values()))

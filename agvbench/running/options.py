@@ -89,6 +89,11 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
         {"type": float, "metavar": "S"},
         "tell a simulated vehicle for S seconds at a time: sooner driven, later stopped (default: 0.1, as a real one)",
     ),
+    (
+        "--session",
+        {"metavar": "NAME"},
+        "resumed after the vehicle was charged, re-mounted or trimmed: a new name for the runs from now on",
+    ),
     ("--lab", {"metavar": "NAME"}, "name of the lab on the bus (default: lab)"),
     ("--vehicle-name", {"metavar": "NAME"}, "name of the vehicle on the bus, and of its body (default: agv1)"),
 )

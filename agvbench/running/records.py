@@ -29,6 +29,7 @@ class DriveOrder:
     commands: Commands
     target: Pose
     start: Pose
+    session: str | None = None
     extra: Mapping[str, object] = field(default_factory=dict)
 
 
@@ -102,5 +103,6 @@ def _run(
         firmware=firmware,
         commands=commands,
         frames=frames,
+        session=order.session,
         extra=extra,
     )

@@ -24,7 +24,7 @@ PLACES = ("auto", "operator", "teleport")
 MAPS = ("default", "thesis")
 _LARGEST_SEED = 2**63 - 1
 # What may differ between a session and the one that resumes it: none of these changes what is driven.
-_FREE_ON_RESUME = frozenset({"benchmarks", "only", "connect", "bus_config", "lab", "exchange"})
+_FREE_ON_RESUME = frozenset({"benchmarks", "only", "connect", "bus_config", "lab", "exchange", "session"})
 # A fault that was rehearsed may be taken away, or another one put in.
 _WITHOUT_FAULTS = {"agv": unimpaired, "mocap": unimpaired, "camera": without_packet_faults}
 
@@ -40,7 +40,8 @@ class BenchSettings:
     `ORDERS`; ``steering`` is the mode in which all trajectories are steered ("" for each its own); ``place``, one of
     `PLACES`, is how the vehicle comes to its starts ("" for the usual way); ``full`` drives every pulse of the thesis;
     ``exchange`` [s] is for how long a vehicle is told what to do at a time. ``vehicle_name`` is what the bus calls the
-    vehicle; ``benchmarks`` are names or files, and ``only`` chooses among their runs by pytest's ``-k``.
+    vehicle, and ``session`` what the runs from now on belong to ("" for what the last belonged to); ``benchmarks`` are
+    names or files, and ``only`` chooses among their runs by pytest's ``-k``.
     """
 
     agv: str = "sim"
@@ -64,6 +65,7 @@ class BenchSettings:
     bus_config: str = ""
     lab: str = "lab"
     vehicle_name: str = "agv1"
+    session: str = ""
     exchange: float = DEFAULT_SAFETY.exchange_s
     benchmarks: tuple[str, ...] = ()
     only: str = ""
@@ -175,7 +177,9 @@ def settings_for_resume(saved: BenchSettings, given: Mapping[str, Any]) -> Bench
                 limit=before,
                 remedy=f"leave {flag} out, or start anew without --resume",
             )
-    return replace(saved, **{name: given[name] for name in (*_FREE_ON_RESUME, *_WITHOUT_FAULTS) if name in given})
+    free = {name: given[name] for name in (*_FREE_ON_RESUME, *_WITHOUT_FAULTS) if name in given}
+    # What the first runs were called is not what the last were: that is read off the runs.
+    return replace(saved, **{"session": "", **free})
 
 
 def _check(condition: bool, flag: str, value: object, limit: str, remedy: str) -> None:

@@ -12,6 +12,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from agvbench.campaign import Campaign
+from agvbench.campaign.sessions import session_starts
 from agvbench.errors import FitError
 from agvbench.model import VehicleModel
 from agvbench.planning import Departure
@@ -30,9 +31,10 @@ def remainders(campaign: Campaign, model: VehicleModel, condition: str) -> dict[
     by the share of its square that its standard error explains, so that scatter is not learned.
     """
     runs = [run for run in campaign.select(condition=condition) if run.target.is_finite]
-    out = {}
+    began, out = session_starts(campaign), {}
     for name in dict.fromkeys(run.trajectory for run in runs):
-        missed = np.array(list(_missed((run for run in runs if run.trajectory == name), model))).reshape(-1, 3)
+        driven = ((run, run.started_s - began[run.session]) for run in runs if run.trajectory == name)
+        missed = np.array(list(_missed(driven, model))).reshape(-1, 3)
         if len(missed) >= FEWEST:
             x, y, heading = shrunk(missed).tolist()
             out[name] = {"x_m": round(x, 6), "y_m": round(y, 6), "heading_rad": round(heading, 6), "runs": len(missed)}
@@ -50,12 +52,12 @@ def shrunk(values: Floats) -> Floats:
     return np.asarray(mean * np.maximum(0.0, 1.0 - share**2))
 
 
-def _missed(runs: Iterable[Run], model: VehicleModel) -> Iterable[Pose]:
-    for run in runs:
+def _missed(runs: Iterable[tuple[Run, float]], model: VehicleModel) -> Iterable[Pose]:
+    for run, since_s in runs:
         try:
             start, end = start_pose(run).pose, end_pose(run).pose
         except FitError:
             continue  # a run without a pose at rest is no evidence
-        departure = Departure(start, run.started_s / 3600.0)
+        departure = Departure(start, since_s / 3600.0)
         predicted = rest_poses(model, [run.commands], departure)[0]
         yield end.relative_to(start).relative_to(Pose(*predicted.tolist()))

@@ -86,6 +86,7 @@ CASES = {
     "`--place crane`": opened(place="crane"),
     "`--exchange 0.01`": opened(exchange=0.01),
     "`--agv live --exchange 2`": opened(agv="live", exchange=2.0),
+    "`--session tuesday`, simulated": opened(session="tuesday"),
     "`--camera rate_hz=15`": opened(camera="rate_hz=15"),
     "`--resume --vehicle-name red` after `agv1`": resumed_with_another_name,
     "`--vehicle nope.toml`": opened(vehicle="nope.toml"),

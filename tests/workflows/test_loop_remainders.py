@@ -44,6 +44,9 @@ class Driven:
     def __init__(self, run):
         self.runs = [run] * 3
 
+    def __iter__(self):
+        return iter(self.runs)
+
     def select(self, *, condition):
         assert condition == "corrected"
         return self.runs

@@ -1,0 +1,77 @@
+"""Whether the rig that answers can drive what a session asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from agvbench.bus.link import VehicleLink
+from agvbench.errors import FlagError, VehicleError
+from agvbench.model import VehicleModel
+from agvbench.running.rest import LEAST_RATE_HZ
+from agvbench.running.settings import BenchSettings
+from agvbench.running.supervision.limits import DEFAULT_SAFETY
+
+_OPTIONS = {"uncalibrated": "--vehicle", "calibrated": "--calibration", "corrected": "--corrected"}
+
+
+def check_rig(models: Mapping[str, VehicleModel], settings: BenchSettings, link: VehicleLink) -> None:
+    """Refuse what would go wrong later.
+
+    Raises
+    ------
+    VehicleError
+        If a model, by condition, would stop at another command than the vehicle does, or speaks in another unit.
+    FlagError
+        If an option is not for this rig.
+    """
+    _check_models(models, link)
+    _check_exchange(settings, link)
+    _check_session(settings, link)
+    _check_rate(link)
+
+
+def _check_models(models: Mapping[str, VehicleModel], link: VehicleLink) -> None:
+    identity = link.identity()
+    for condition, model in models.items():
+        for what, said, true in (
+            ("takes commands in another unit", model.command_unit, identity.command_unit),
+            ("stands still at another command", model.neutral, identity.neutral),
+        ):
+            if said != true:
+                remedy = f"give the right file with {_OPTIONS[condition]}"
+                raise VehicleError(
+                    f"the vehicle {what} than its file says", where=model.name, value=said, limit=true, remedy=remedy
+                )
+
+
+def _check_exchange(settings: BenchSettings, link: VehicleLink) -> None:
+    if settings.exchange > DEFAULT_SAFETY.exchange_s and not link.identity().lock_step:
+        raise FlagError(
+            "a vehicle in real time must be watched while it drives",
+            where="--exchange",
+            value=f"{settings.exchange:g} s",
+            limit=f"{DEFAULT_SAFETY.exchange_s:g} s",
+            remedy="leave it out",
+        )
+
+
+def _check_session(settings: BenchSettings, link: VehicleLink) -> None:
+    if settings.session and link.identity().simulated:
+        raise FlagError(
+            "a simulated vehicle is never charged or re-mounted: its campaign is one session",
+            where="--session",
+            value=settings.session,
+            remedy="leave it out",
+        )
+
+
+def _check_rate(link: VehicleLink) -> None:
+    rate_hz = link.identity().mocap_rate_hz
+    if rate_hz < LEAST_RATE_HZ:
+        raise FlagError(
+            "the camera looks too seldom to tell whether a vehicle is at rest",
+            where="--mocap",
+            value=f"{rate_hz:g} Hz",
+            limit=f"at least {LEAST_RATE_HZ:g} Hz",
+            remedy="ask it for more frames, or wish for more with --camera rate_hz=",
+        )
