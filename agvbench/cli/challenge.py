@@ -9,6 +9,7 @@ examples:
   agvbench challenge --seeds 10 --json challenge.json         everything, ten vehicles: hours
   agvbench challenge --seeds 10 --json challenge.json --resume   go on after an interruption
   agvbench challenge --seeds 300 --only nothing               how often a name is given where nothing is hidden
+  agvbench challenge --seeds 10 --json challenge.json --resume --markdown   what a whole file says, as tables
   agvbench challenge --first-seed 5000                        vehicles that nobody has looked at
 """
 
@@ -29,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--repeats", type=int, default=5, metavar="N", help="of each trajectory (default 5)")
     parser.add_argument("--jobs", type=int, metavar="N", help="trials at a time (default: one per processor)")
     parser.add_argument("--json", metavar="FILE", dest="json_file", help="write scores and every trial there")
+    parser.add_argument("--markdown", action="store_true", help="print the scores as Markdown")
     parser.add_argument("--resume", action="store_true", help="go on with the trials that the JSON file lacks")
 
 
@@ -37,6 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
     from rich.console import Console
 
     from agvbench.reporting.challenge_console import print_scores
+    from agvbench.reporting.challenge_markdown import scores_markdown
     from agvbench.workflows.challenge import run_challenge
 
     scores = run_challenge(
@@ -48,5 +51,8 @@ def run(arguments: argparse.Namespace) -> int:
         json_file=arguments.json_file,
         resume=arguments.resume,
     )
-    print_scores(scores, Console())
+    if arguments.markdown:
+        print(scores_markdown(scores), end="")
+    else:
+        print_scores(scores, Console())
     return 0
