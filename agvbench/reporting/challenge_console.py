@@ -21,8 +21,8 @@ def print_scores(scores: Scores, console: Console) -> None:
     answers = Table(title="hidden, and answered", box=box.SIMPLE_HEAD, title_justify="left")
     for heading in ANSWERS:
         answers.add_column(heading)
-    for row in answer_rows(scores):
-        answers.add_row(*row)
+    for answer in answer_rows(scores):
+        answers.add_row(*answer)
     console.print(answers)
     for line in other_lines(scores):
         console.print(line, highlight=False, soft_wrap=True)
