@@ -1,0 +1,26 @@
+"""The tables of blind trials in the documents are what the files beside them score."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from agvbench.reporting.challenge_markdown import scores_markdown
+from agvbench.workflows.challenge_file import known_trials
+from agvbench.workflows.challenge_scores import score
+
+REFERENCE = Path(__file__).resolve().parents[2] / "docs" / "reference"
+PAGE = (REFERENCE / "blind-trials.md").read_text(encoding="utf-8")
+FILES = sorted((REFERENCE / "blind-trials").glob("*.json"))
+
+
+def test_there_are_files():
+    assert [file.name for file in FILES] == ["vehicles-9030.json"]
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_the_page_says_what_the_file_scores(file):
+    trials = known_trials(file, 5)
+    assert f"blind-trials/{file.name}" in PAGE
+    assert scores_markdown(score(list(trials.values()))) in PAGE
