@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,17 +12,17 @@ from agvbench.diagnosis.dependences import ALPHA, LIKELY, RANDOM_PHASE, Dependen
 from agvbench.diagnosis.empirical import term_candidates
 from agvbench.diagnosis.estimates import named_effects
 from agvbench.diagnosis.explained import Explained, described, with_term_first
-from agvbench.diagnosis.forms import BEYOND, form_candidates
+from agvbench.diagnosis.forms import form_candidates
 from agvbench.diagnosis.map_effects import map_effects
 from agvbench.diagnosis.next_experiment_propose import with_next_experiment
 from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.reading import Readings
 from agvbench.diagnosis.residual_rates import residual_rates
-from agvbench.diagnosis.residual_spread import EndSpread, end_spread
+from agvbench.diagnosis.residual_spread import end_spread
 from agvbench.diagnosis.residual_table import with_residuals
-from agvbench.diagnosis.residuals import AT_THE_FLOOR, LACK_OF_FIT, Misses, floor, lack_of_fit, misses
 from agvbench.diagnosis.result import Diagnosis, HeldOut, Verdict
 from agvbench.diagnosis.selection import Selection
+from agvbench.diagnosis.set_aside import Judged, judge, predicts
 from agvbench.diagnosis.swing import swing
 from agvbench.diagnosis.vehicle import corrected_vehicle
 from agvbench.effects.forms import effect_forms
@@ -32,14 +30,6 @@ from agvbench.model import VehicleModel
 from agvbench.types import Floats
 
 _REMAINS = "structure remains that no effect explains: "
-
-
-@dataclass(frozen=True)
-class _Judged:
-    before: Misses
-    after: Misses
-    floor: dict[str, float]
-    lack_of_fit: float | None
 
 
 def conclude(
@@ -65,17 +55,16 @@ def conclude(
     """
     selection = explained.selection if explained else library
     fit = selection.chosen.fit
-    reformed = bool(effect_forms().keys() & set(selection.chosen.names))
-    batch = Batch(readings, fit.predictor.maps, asked.geometry, kinds=BEYOND if explained or reformed else ())
-    every = Predictor(batch, selection.chosen.names)
+    every = predicts(library, explained, readings)
+    batch, reformed = every.batch, bool(effect_forms().keys() & set(selection.chosen.names))
     poses, before = every.predict(fit.parameters), _poses_before(asked.vehicle, batch, selection)
-    judged = _judge(readings, held, before, poses, end_spread(every, fit))
+    judged = judge(readings, held, before, poses, end_spread(every, fit))
     if judged is None:
         return asked.cannot_tell(readings, "there are no repeats among the runs held out or fitted, and so no floor")
     rest, likely = _what_is_left(batch, poses, explained, asked.seed)
     known = candidates() | term_candidates() | form_candidates()
     effects = named_effects(selection, bounds_of(known, selection.chosen.names)) + map_effects(fit, asked.vehicle)
-    significant = explained is not None or _is_significant(judged, rest)
+    significant = explained is not None or judged.lacks or bool(rest)
     verdict, why = _verdict(effects, significant, rest, explained)
     if significant and not rest and likely:
         rest, why = likely, f"{_REMAINS}it is likely to depend on {likely[0].covariate}"
@@ -141,24 +130,6 @@ def _how_it_was_fitted(selection: Selection, readings: Readings) -> dict[str, ob
     }
 
 
-def _judge(
-    readings: Readings, held: NDArray[np.bool_], before: Floats, after: Floats, spread: EndSpread
-) -> _Judged | None:
-    kept = readings.select(held)
-    missed = misses(kept, after[held])
-    least = floor(missed, kept.group) or floor(misses(readings, after), readings.group)
-    if least is None:
-        return None
-    return _Judged(misses(kept, before[held]), missed, least, lack_of_fit(missed, kept.group, spread.select(held)))
-
-
-def _is_significant(judged: _Judged, rest: list[Dependence]) -> bool:
-    after = judged.after.rms()
-    above = any(after[name] > AT_THE_FLOOR * judged.floor[name] for name in ("position_rms_mm", "heading_rms_deg"))
-    lacks = judged.lack_of_fit is not None and judged.lack_of_fit < LACK_OF_FIT
-    return (above and lacks) or bool(rest)
-
-
 def _verdict(
     effects: tuple[object, ...], significant: bool, rest: list[Dependence], explained: Explained | None
 ) -> tuple[Verdict, str]:
@@ -176,7 +147,7 @@ def _verdict(
     return Verdict.NAMED, "the effects named bring the prediction to the floor"
 
 
-def _held_out(kept: Readings, judged: _Judged) -> HeldOut:
+def _held_out(kept: Readings, judged: Judged) -> HeldOut:
     before, after = judged.before.rms(), judged.after.rms()
     errors = {name: {"before": before[name], "after": after[name], "floor": judged.floor[name]} for name in before}
     was, now = judged.before.squares()["position_rms_mm"], judged.after.squares()["position_rms_mm"]

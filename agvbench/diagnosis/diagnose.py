@@ -14,7 +14,8 @@ from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.candidates import given_effects
 from agvbench.diagnosis.conclusion import conclude
 from agvbench.diagnosis.contradictions import refuse_contradictions
-from agvbench.diagnosis.empirical import explain_and_resettle
+from agvbench.diagnosis.empirical import explain_and_resettle, instead
+from agvbench.diagnosis.explained import Explained
 from agvbench.diagnosis.fitted_models import Tell
 from agvbench.diagnosis.forms import reform_and_resettle, tried_beside
 from agvbench.diagnosis.grouping import held_out_runs
@@ -22,7 +23,8 @@ from agvbench.diagnosis.levels import ROLES, FreeMaps, free_maps, start_values
 from agvbench.diagnosis.plausibility import refuse_units
 from agvbench.diagnosis.reading import Readings, read_runs
 from agvbench.diagnosis.result import Diagnosis
-from agvbench.diagnosis.selection import Selector
+from agvbench.diagnosis.selection import Selection, Selector
+from agvbench.diagnosis.set_aside import contradicts
 from agvbench.diagnosis.standing import resettle, settle
 from agvbench.diagnosis.thinning import MOST_RUNS, measured_in_all, some_repeats
 from agvbench.diagnosis.veto import withdrawn
@@ -75,18 +77,31 @@ def diagnose(
     if not held.any():
         why = "no run can be set aside to judge on: drive repeats, or commands in more combinations"
         return asked.cannot_tell(readings, why)
-    fitted, kept = readings.select(~held), readings.select(held)
-    tell(f"{len(fitted)} runs to fit, {len(kept)} held out")
+    fitted = readings.select(~held)
+    tell(f"{len(fitted)} runs to fit, {held.sum()} held out")
     selector = _selector(asked, fitted.select(some_repeats(fitted.group, MOST_RUNS)), tell)
     chosen, selector = resettle(selector.select(), selector)
     selection, selector = reform_and_resettle(chosen, selector)
     selection, explained, selector = explain_and_resettle(selection, selector)
     readings = replace(readings, stood=selector.batch.readings.stood)
+    kept = readings.select(held)
     if (searched := len(selector.batch.readings)) < len(fitted):
         tell(f"causes were looked for in {searched} runs; now they are measured in all {len(fitted)}")
+    found = _measured_and_kept(selection, explained, selector, fitted, kept)
+    if found[1] is None and found[0].gains and contradicts(found[0], readings, held):
+        tell("the runs set aside contradict what was found: a term is tried in its place")
+        again = _measured_and_kept(selection, instead(selection, selector), selector, fitted, kept)
+        found = found if again[1] is None else again
+    return conclude(asked, readings, held, *found, searched)
+
+
+def _measured_and_kept(
+    selection: Selection, explained: Explained | None, selector: Selector, fitted: Readings, kept: Readings
+) -> tuple[Selection, Explained | None]:
+    """Return what was found measured in all runs `fitted`, or the maps alone where the runs `kept` say so."""
+    if len(selector.batch.readings) < len(fitted):
         selection, explained = measured_in_all(selection, explained, selector, fitted)
-    selection, explained = withdrawn(selection, explained, readings.select(held), tell)
-    return conclude(asked, readings, held, selection, explained, searched)
+    return withdrawn(selection, explained, kept, selector.tell)
 
 
 def _selector(asked: Asked, some: Readings, tell: Tell) -> Selector:

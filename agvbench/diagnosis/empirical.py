@@ -57,6 +57,17 @@ def explain(selection: Selection, selector: Selector) -> Explained | None:
     return _explained(wide, selection, selector, models)
 
 
+def instead(selection: Selection, selector: Selector) -> Explained | None:
+    """Return the term that predicts better in the place of an effect that was chosen; None if none does.
+
+    Asked where the runs set aside contradict what was chosen although nothing was missed of those it was chosen from: a
+    cause that is told by few of these is mimicked there.
+    """
+    wide = wider(selector)
+    found = _in_place(wide, selection)
+    return _explained(wide, selection, selector, [] if found is None else [settled(wide, selection, *found)])
+
+
 def _explained(wide: Selector, selection: Selection, selector: Selector, models: list[Settled]) -> Explained | None:
     """Return the best of the models with a term, if that earns its place."""
     models = [model for model in models if model[0].total < selection.chosen.total - selector.least_gain]

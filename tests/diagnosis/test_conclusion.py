@@ -8,10 +8,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from agvbench.diagnosis.conclusion import _held_out, _is_significant, _Judged, _verdict
+from agvbench.diagnosis.conclusion import _held_out, _verdict
 from agvbench.diagnosis.dependences import RANDOM_PHASE, Dependence
 from agvbench.diagnosis.residuals import QUANTITIES, Misses
 from agvbench.diagnosis.result import HeldOut, NamedEffect, Verdict
+from agvbench.diagnosis.set_aside import Judged
 from agvbench.diagnosis.windows_conclusion import AT_THE_FLOOR, FAR_ABOVE, _above
 from agvbench.diagnosis.windows_conclusion import _verdict as verdict_of_windows
 
@@ -38,25 +39,17 @@ def off_by(*position_m: float) -> Misses:
     return Misses(path, np.ones(path.shape[:2], dtype=bool), nothing, nothing)
 
 
-def judged(after_floors: float, lack_of_fit: float | None) -> _Judged:
+def judged(after_floors: float, lack_of_fit: float | None) -> Judged:
     after = off_by(*[2e-3 * after_floors] * 4)
-    return _Judged(after, after, FLOOR, lack_of_fit)
+    return Judged(after, after, FLOOR, lack_of_fit)
 
 
 @pytest.mark.parametrize(
-    ("after_floors", "lack_of_fit", "rest", "significant"),
-    [
-        (2.0, 1e-4, [], True),
-        (2.0, 0.5, [], False),
-        (2.0, None, [], False),
-        (1.1, 1e-6, [], False),
-        (1.1, 0.5, [PATCH], True),
-    ],
+    ("after_floors", "lack_of_fit", "lacks"),
+    [(2.0, 1e-4, True), (2.0, 0.5, False), (2.0, None, False), (1.1, 1e-6, False)],
 )
-def test_significant_is_what_is_above_the_floor_and_beyond_scatter_or_depends_on_something(
-    after_floors, lack_of_fit, rest, significant
-):
-    assert _is_significant(judged(after_floors, lack_of_fit), rest) is significant
+def test_what_lacks_is_above_the_floor_and_beyond_scatter(after_floors, lack_of_fit, lacks):
+    assert judged(after_floors, lack_of_fit).lacks is lacks
 
 
 @pytest.mark.parametrize(
@@ -98,9 +91,9 @@ def test_what_got_worse_by_more_than_the_floor_is_told():
     # Squares: 9 before; 9 + 4 × 0.25, 9 + 4 × 4 and less, the floor's square being 4 mm².
     after = off_by(*[np.sqrt(10.0) * 1e-3] * 2, *[5e-3] * 2, *[1e-3] * 2)
     kept = Kept(np.repeat([0, 1, 2], 2), runs)
-    found = _held_out(kept, _Judged(before, after, FLOOR, None))
+    found = _held_out(kept, Judged(before, after, FLOOR, None))
     assert found.worse_on == ("2",)
     assert found.runs == 6
     assert found.errors["position_rms_mm"]["before"] == pytest.approx(3.0)
-    turned = _held_out(kept, _Judged(after, before, FLOOR, None))
+    turned = _held_out(kept, Judged(after, before, FLOOR, None))
     assert turned.worse_on == ("free-1",)

@@ -11,26 +11,39 @@ from tiny_vehicle import FRONT_M, HEADER, NEUTRAL, REAR_M, Tiny
 from agvbench.calibration import measure_run
 from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.candidates import candidates
+from agvbench.diagnosis.empirical import instead
 from agvbench.diagnosis.explained import Explained
 from agvbench.diagnosis.grouping import held_out_runs
 from agvbench.diagnosis.levels import ROLES, free_maps, start_values
 from agvbench.diagnosis.reading import read_runs
 from agvbench.diagnosis.selection import Selection, Selector
+from agvbench.diagnosis.set_aside import contradicts
 from agvbench.diagnosis.terms.speed import SpeedInDisc
 from agvbench.diagnosis.veto import withdrawn
 from agvbench.vehicle.geometry import Geometry
 
 
-@pytest.fixture(scope="module")
-def found(tiny_campaign):
-    """Return a selection of a steering lag that is there, and the runs set aside."""
-    runs = list(tiny_campaign(Tiny(steering_lag_s=0.15)))
+def chooser(campaign):
+    """Return who chooses among causes of what a campaign shows, all its runs, and which are set aside."""
+    runs = list(campaign)
     readings, geometry = read_runs(runs, HEADER.neutral), Geometry(FRONT_M, REAR_M)
     held = held_out_runs(readings.runs, readings.group, 0)
     maps = free_maps(readings.runs, NEUTRAL)
     believed = {role: np.zeros(len(maps.nodes[role])) for role in ROLES}
     start = start_values(maps, [measure_run(run, geometry, neutral=NEUTRAL) for run in runs], believed)
-    selector = Selector(Batch(readings.select(~held), maps, geometry), candidates(), start, 0, lambda _: None)
+    batch = Batch(readings.select(~held), maps, geometry)
+    return Selector(batch, candidates(), start, 0, lambda _: None), readings, held
+
+
+@pytest.fixture(scope="module")
+def tried(tiny_campaign):
+    return chooser(tiny_campaign(Tiny(steering_lag_s=0.15)))
+
+
+@pytest.fixture(scope="module")
+def found(tried):
+    """Return a selection of the steering lag, and the runs set aside."""
+    selector, readings, held = tried
     base = selector.base()
     lag = selector.grown(base, "steering_lag")
     return Selection(base, lag, {}, {"steering_lag": 500.0}, {}, 2), readings.select(held)
@@ -71,3 +84,24 @@ def test_a_cause_that_makes_it_worse_is_withdrawn(found, spoilt):
     assert left.gains == left.rivals == {}
     assert left.rejected == {"steering_lag": 500.0}
     assert said == ["steering_lag: withdrawn, for the runs set aside are predicted better without"]
+
+
+def test_runs_set_aside_contradict_maps_that_lack_the_cause_and_not_the_cause(tried, found):
+    _, readings, held = tried
+    selection, _ = found
+    assert not contradicts(selection, readings, held)
+    assert contradicts(replace(selection, chosen=selection.base), readings, held)
+
+
+def test_no_term_takes_the_place_of_the_cause(tried, found):
+    assert instead(found[0], tried[0]) is None
+
+
+def test_a_term_takes_the_place_of_what_only_looks_like_the_cause(tiny_campaign):
+    selector, _, _ = chooser(tiny_campaign(Tiny(warm_gain=0.2)))
+    base = selector.base()
+    mimic = selector.grown(base, "reverse_steering_gain")
+    explained = instead(Selection(base, mimic, {}, {"reverse_steering_gain": 1.0}, {}, 2), selector)
+    assert explained is not None
+    assert explained.selection.chosen.names == ("steering_by_campaign_time",)
+    assert explained.values["gain"] == pytest.approx(0.2, rel=0.1)
