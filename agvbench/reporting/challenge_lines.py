@@ -13,10 +13,10 @@ ANSWERS = ("hidden", "answers")
 
 
 def share_rows(scores: Scores) -> Iterator[tuple[str, str, str, str]]:
-    """Yield a row under `SHARES` for each question, and for the intervals."""
+    """Yield a row under `SHARES` for each question that some trial answers, and for the intervals."""
     for text, share in (*scores.shares.items(), ("95 % intervals that cover", scores.coverage)):
-        value = f"{share.value:.1%}" if share.total else "–"
-        yield text, f"{share.count} of {share.total}", value, f"{share.low:.1%} to {share.high:.1%}"
+        if share.total:
+            yield text, f"{share.count} of {share.total}", f"{share.value:.1%}", f"{share.low:.1%} to {share.high:.1%}"
 
 
 def answer_rows(scores: Scores) -> Iterator[tuple[str, str]]:
