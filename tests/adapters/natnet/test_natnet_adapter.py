@@ -15,6 +15,7 @@ import pytest
 from streams import drawn
 
 from agvbench.adapters.contract import AdapterOptions
+from agvbench.adapters.mocap.natnet import NatNetMocap
 from agvbench.adapters.mocap_host import MocapHost
 from agvbench.adapters.natnet.axes import from_floor
 from agvbench.adapters.natnet.emulator import Emulator, Settings
@@ -47,8 +48,19 @@ class Bench:
         stack.callback(self.inbox.close)
         options = AdapterOptions(vehicle="agv2", camera={"up": up, **camera}, clock=WallClock())
         adapter = open_mocap(f"natnet:{host}:{port}", options)
-        self.identity = adapter.identity()
+        assert isinstance(adapter, NatNetMocap)
+        self.identity, self.client = adapter.identity(), adapter._client
         stack.callback(MocapHost(session, keys, adapter, WallClock(), listens_for_truth=False).close)
+
+    def clock_known_to_s(self, limit_s: float) -> float:
+        """Return what a stamp may be wrong by [s], once that is less than a limit: echoes may be slow."""
+        deadline_s = time.monotonic() + 20.0
+        while time.monotonic() < deadline_s:
+            now_s = self.server.ticks() / self.server.settings.clock_hz
+            if self.client.ready and (uncertainty_s := self.client.sync.host_time(now_s).uncertainty_s) < limit_s:
+                return uncertainty_s
+            time.sleep(0.01)
+        pytest.fail(f"no echo came back within {limit_s} s")
 
     def send(self, numbers: range, flags: int = 1) -> float:
         """Stream frames; return the host's time of the first exposure."""
@@ -85,14 +97,15 @@ def stack() -> Iterator[ExitStack]:
 @pytest.mark.parametrize("up", ["y", "z"])
 def test_a_body_is_seen_on_the_floor_when_it_was_exposed(stack: ExitStack, up: str) -> None:
     bench = Bench(stack, up)
+    uncertainty_s = bench.clock_known_to_s(0.01)
     began_s = bench.send(range(1, 25))
     frames = bench.frames(24)
     assert np.allclose(frames.x_m, POSES[1, 0], atol=1e-6)
     assert np.allclose(frames.y_m, POSES[1, 1], atol=1e-6)
     assert np.allclose(frames.heading_rad, POSES[1, 2], atol=1e-6)
     assert np.allclose(frames.mean_error_m, 0.00025)
-    assert np.allclose(np.diff(frames.t_s), 1 / 240.0, atol=1e-5)
-    assert abs(frames.t_s[0] - began_s) < 0.02
+    # A better echo may come at any time, and moves the stamps from then on: within what was said before, and its drift.
+    assert np.allclose(frames.t_s, began_s + np.arange(24) / 240.0, rtol=0.0, atol=uncertainty_s + 1e-4)
     assert frames.frame.tolist() == list(range(1, 25))
     assert (bench.identity.adapter, bench.identity.rate_hz, bench.identity.simulated) == ("natnet", 240.0, False)
 
