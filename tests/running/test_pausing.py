@@ -5,8 +5,10 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -37,13 +39,27 @@ def told(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return said
 
 
+def once_paused(told: list[str], act: Callable[[], object]) -> threading.Thread:
+    """Act in a thread, once a session has said that it is paused."""
+
+    def wait() -> None:
+        deadline_s = time.monotonic() + 20.0
+        while not any(line.startswith("paused ") for line in told) and time.monotonic() < deadline_s:
+            time.sleep(0.01)
+        time.sleep(0.1)  # the pause itself takes a while, as a person's would
+        act()
+
+    thread = threading.Thread(target=wait)
+    thread.start()
+    return thread
+
+
 def test_a_file_pauses_and_its_absence_goes_on(tmp_path: Path, told: list[str]) -> None:
     path = tmp_path / "campaign"
     with session(path) as opened:
         drive(opened, "one")
         (path / PAUSE_FILE).touch()
-        finish = threading.Timer(0.6, (path / PAUSE_FILE).unlink)
-        finish.start()
+        finish = once_paused(told, (path / PAUSE_FILE).unlink)
         drive(opened, "two")
         finish.join()
     assert told[0].startswith("paused before two, the vehicle at neutral: press Ctrl-Z or remove ")
@@ -63,8 +79,7 @@ def test_ctrl_z_pauses_and_again_goes_on(tmp_path: Path, told: list[str]) -> Non
     with session(path) as opened:
         signal.raise_signal(signal.SIGTSTP)
         assert (path / PAUSE_FILE).exists()
-        again = threading.Timer(0.4, os.kill, (os.getpid(), signal.SIGTSTP))
-        again.start()
+        again = once_paused(told, partial(os.kill, os.getpid(), signal.SIGTSTP))
         drive(opened, "one")
         again.join()
     assert signal.getsignal(signal.SIGTSTP) is before
@@ -98,7 +113,7 @@ def test_ctrl_c_ends_a_pause(tmp_path: Path, told: list[str]) -> None:
     def pause_and_interrupt() -> None:
         with session(path) as opened:
             (path / PAUSE_FILE).touch()
-            threading.Timer(0.4, os.kill, (os.getpid(), signal.SIGINT)).start()
+            once_paused(told, partial(os.kill, os.getpid(), signal.SIGINT))
             drive(opened, "one")
 
     with pytest.raises(KeyboardInterrupt):
