@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-
 import pytest
 
 from agvbench.adapters import open_rig
@@ -19,10 +17,13 @@ def test_a_run_begins_when_the_vehicle_stands_at_its_start() -> None:
     told: list[str] = []
     with open_rig("live", seed=1) as link:
         link.reset(Pose(0.2, -0.1, 1.1), run_key="a")
-        put_down = threading.Timer(1.3, link.reset, (START,), {"run_key": "b"})
-        put_down.start()
-        wait_for_start(link, NEUTRAL, START, patience_s=20.0, tell=told.append)
-        put_down.join()
+
+        def put_down_when_told(text: str) -> None:
+            told.append(text)
+            link.reset(START, run_key="b")
+
+        wait_for_start(link, NEUTRAL, START, patience_s=20.0, tell=put_down_when_told)
+    assert len(told) == 1
     assert told[0].startswith("put agv1 at x = 0.500 m, y = -0.500 m, heading 57.3°: it is 500 mm and 5.7° off")
 
 
