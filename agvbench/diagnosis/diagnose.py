@@ -90,8 +90,9 @@ def diagnose(
     found = _measured_and_kept(selection, explained, selector, fitted, kept)
     if found[1] is None and found[0].gains and contradicts(found[0], readings, held):
         tell("the runs set aside contradict what was found: a term is tried in its place")
-        again = _measured_and_kept(selection, instead(selection, selector), selector, fitted, kept)
-        found = found if again[1] is None else again
+        if (other := instead(selection, selector)) is not None:
+            again = _measured_and_kept(selection, other, selector, fitted, kept)
+            found = found if again[1] is None else again
     return conclude(asked, readings, held, *found, searched)
 
 

@@ -91,8 +91,10 @@ def objective(predictor: Predictor, residual: Floats, offsets: Floats, scatter: 
 
 
 def residual_of(predictor: Predictor, poses: Floats) -> Floats:
-    """Return measured minus predicted poses (R, K, 3), 0 where nothing was measured."""
-    return np.asarray(np.nan_to_num(predictor.readings.poses - poses))
+    """Return measured minus predicted poses (R, K, 3): 0 where nothing was measured, huge where none is predicted."""
+    residual = np.asarray(predictor.readings.poses - poses)
+    residual[np.isnan(poses) & predictor.readings.seen[:, :, None]] = np.inf
+    return np.asarray(np.nan_to_num(residual))
 
 
 def ridge(predictor: Predictor) -> Floats:

@@ -59,8 +59,13 @@ def predicts(selection: Selection, explained: Explained | None, readings: Readin
 
 def contradicts(selection: Selection, readings: Readings, held: NDArray[np.bool_]) -> bool:
     """Whether the runs `held` (R,) miss what was chosen by more than their scatter."""
+    kept = readings.select(held)
+    judged = _judged(selection, kept, np.ones(len(kept), dtype=np.bool_)) or _judged(selection, readings, held)
+    return judged is not None and judged.lacks
+
+
+def _judged(selection: Selection, readings: Readings, held: NDArray[np.bool_]) -> Judged | None:
     fit = selection.chosen.fit
     every = predicts(selection, None, readings)
     poses = every.predict(fit.parameters)
-    judged = judge(readings, held, poses, poses, end_spread(every, fit))
-    return judged is not None and judged.lacks
+    return judge(readings, held, poses, poses, end_spread(every, fit))

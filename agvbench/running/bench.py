@@ -87,8 +87,8 @@ class Bench:
 
     @property
     def departure(self) -> Departure:
-        """When the next run begins, since its session did."""
-        return Departure(started_h=(self._time.now_s() - self._session.started_s) / 3600.0)
+        """When the next run begins, since the first of its session did."""
+        return Departure(started_h=self._session.hours(self._time.now_s()))
 
     def run(self, order: DriveOrder) -> Run:
         """Drive `order` until an attempt counts; return the last attempt.
@@ -126,6 +126,7 @@ class Bench:
         self.pause.wait(run_id, standing(self.link, self._neutral()))
         order = self._placed(order, run_id)
         started_s = self._time.now_s()
+        self._session = self._session.with_run(started_s)
         seen: list[Frames] = []
         try:
             driven = self._drive(order, run_id, seen)
@@ -148,7 +149,7 @@ class Bench:
 
     def _placed(self, order: DriveOrder, run_id: str) -> DriveOrder:
         """Bring the vehicle to the start; return the order with what the campaign is to say of that."""
-        placing = self._placer.place(order.start, run_id)
+        placing = self._placer.place(order.start, self._drawn_as(run_id))
         if placing is None:
             return order
         self._time.has_placed(placing.duration_s)

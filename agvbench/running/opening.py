@@ -18,7 +18,7 @@ from agvbench.bus.bus_config import BusConfig
 from agvbench.bus.link import VehicleLink
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
 from agvbench.campaign.header import FILE_NAME
-from agvbench.model import VehicleModel, thesis_vehicle
+from agvbench.model import VehicleModel
 from agvbench.planning import Workspace
 from agvbench.running.bench import Bench
 from agvbench.running.calibrating import calibrate_campaign
@@ -33,7 +33,7 @@ from agvbench.running.session_settings import LAB_VEHICLE, session_settings
 from agvbench.running.settings import SETTINGS_FILE, BenchSettings
 from agvbench.running.signals import interruptible
 from agvbench.running.unbroken import UnbrokenLink
-from agvbench.running.vehicles import uncalibrated_vehicle
+from agvbench.running.vehicles import expected_calibration, uncalibrated_vehicle
 from agvbench.types import Run
 
 PROVENANCE_TABLE = "provenance"
@@ -60,8 +60,7 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
     )
     if dry_run:
         check_specs(settings.agv, settings.mocap)
-        # What calibration will find is not known yet: what is believed now has the right axles, unit and neutral.
-        models.setdefault("calibrated", models["uncalibrated"] if settings.vehicle else thesis_vehicle())
+        models.setdefault("calibrated", expected_calibration(settings.vehicle))
         yield session_with(bench=None)
         return
     with (
@@ -169,7 +168,7 @@ def _bench(
         link=UnbrokenLink(link) if settings.place == "auto" and link.identity().lock_step else link,
         writer=writer,
         campaign_time=campaign_time,
-        session=SessionBegan.of(settings.session, recorded.values(), campaign_time.now_s()),
+        session=SessionBegan.of(settings.session, recorded.values()),
         calibrate=calibrated,
         recorded=recorded,
     )

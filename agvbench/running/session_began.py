@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from agvbench.campaign.sessions import session_starts
 from agvbench.types import Run
@@ -13,19 +13,28 @@ _LONG_AGO_S = 3600.0
 
 @dataclass(frozen=True)
 class SessionBegan:
-    """``name`` of a session (None where the campaign names none), and ``started_s`` [s since the campaign began]."""
+    """``name`` of a session (None where the campaign names none).
+
+    ``started_s`` [s since the campaign began] is when its first run started, None before that.
+    """
 
     name: str | None = None
-    started_s: float = 0.0
+    started_s: float | None = None
 
     @classmethod
-    def of(cls, name: str, recorded: Collection[Run], now_s: float) -> SessionBegan:
-        """Return the session called `name`, or with ``""`` that of the last run `recorded`; a new one begins now."""
+    def of(cls, name: str, recorded: Collection[Run]) -> SessionBegan:
+        """Return the session called `name`, or with ``""`` that of the last run `recorded`."""
         last = max(recorded, key=lambda run: run.started_s, default=None)
         chosen = name or (last.session if last else None)
-        if chosen is None:
-            return cls()
-        return cls(chosen, session_starts(recorded).get(chosen, now_s))
+        return cls(chosen, session_starts(recorded).get(chosen))
+
+    def with_run(self, started_s: float) -> SessionBegan:
+        """Return the session with a run that starts at `started_s`."""
+        return replace(self, started_s=started_s) if self.started_s is None else self
+
+    def hours(self, now_s: float) -> float:
+        """Return for how long the session has gone on [h] at `now_s`."""
+        return 0.0 if self.started_s is None else (now_s - self.started_s) / 3600.0
 
 
 def last_end_s(recorded: Iterable[Run]) -> float:
@@ -34,9 +43,10 @@ def last_end_s(recorded: Iterable[Run]) -> float:
 
 
 def idle_notice(recorded: Collection[Run], now_s: float, session: str) -> list[str]:
-    """Return what to say where nothing was driven for long, and no new session was named: at most one line."""
+    """Return what to say where nothing was driven for long, and no new `session` was named: at most one line."""
     idle_s = now_s - last_end_s(recorded)
-    if session or not recorded or idle_s < _LONG_AGO_S:
+    is_new = bool(session) and session not in {run.session for run in recorded}
+    if is_new or not recorded or idle_s < _LONG_AGO_S:
         return []
-    since = f"the last run ended {idle_s / 3600.0:.1f} h ago"
+    since = f"the last run ended {idle_s / 3600.0:.1f} h ago" + (f", and {session} goes on" if session else "")
     return [f"{since}: if it was charged, re-mounted or trimmed since, stop and resume with --session and a new name"]

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from agvbench.model import VehicleModel, nominal_model
+from dataclasses import replace
+
+from agvbench.model import VehicleModel, nominal_model, thesis_vehicle
 from agvbench.vehicle.geometry import Geometry
+from agvbench.vehicle.maps import FullSpeedOrStop, MonotoneTable
 
 
 def uncalibrated_vehicle(path: str = "") -> VehicleModel:
@@ -17,3 +20,24 @@ def uncalibrated_vehicle(path: str = "") -> VehicleModel:
     if path:
         return VehicleModel.load(path)
     return nominal_model("model AGV", Geometry(front_axle_m=0.181, rear_axle_m=0.121), "us", 1500.0)
+
+
+def expected_calibration(path: str = "") -> VehicleModel:
+    """Return what stands in for the calibrated vehicle while nothing was measured: axles, unit and neutral are its own.
+
+    Where only full speed and stop are known of the drive, it is taken to be straight between them.
+
+    Raises
+    ------
+    VehicleError
+        If the file `path` cannot be used.
+    """
+    if not path:
+        return thesis_vehicle()
+    believed = uncalibrated_vehicle(path)
+    drive = believed.drive
+    if not isinstance(drive, FullSpeedOrStop):
+        return believed
+    commands = (drive.command_low, drive.command_stop, drive.command_high)
+    speeds = (drive.output_low, 0.0, drive.output_high)
+    return replace(believed, drive=MonotoneTable(commands, speeds, interpolation="linear"))

@@ -29,9 +29,10 @@ from agvbench.workflows.diagnosis_files import RESIDUALS
 DRIVEN = "driven"
 SESSION = "next"
 # What decides which runs are driven, and by which models, is not the campaign's: the diagnosis says so.
-_OF_THE_CAMPAIGN = frozenset(
-    {"vehicle", "calibration", "corrected", "remainders", "maps", "repeats", "order", "full", "benchmarks", "only"}
-)
+_OF_THE_CAMPAIGN = frozenset({
+    "vehicle", "calibration", "corrected", "remainders", "maps",
+    "repeats", "order", "full", "benchmarks", "only", "session",
+})  # fmt: skip
 _TABLES = {"runs", "commands", "poses"}
 _OF_BEFORE = {"campaign.toml", RESIDUALS}
 

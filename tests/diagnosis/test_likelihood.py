@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from agvbench.diagnosis.likelihood import objective, residual_of
 from agvbench.diagnosis.scatter import first_scatter
@@ -35,7 +36,8 @@ def test_the_farther_off_the_larger():
     assert 0.0 < squares(poses + 0.01) < squares(poses + 0.02)
 
 
-def test_what_a_step_too_far_predicts_is_infinitely_bad_and_no_warning():
+@pytest.mark.parametrize("beyond", [np.inf, -np.inf, np.nan])
+def test_what_a_step_too_far_predicts_is_infinitely_bad_and_no_warning(beyond):
     poses = np.zeros((RUNS, SAMPLES, 3))
-    poses[1, 2:] = np.inf
+    poses[1, 2:] = beyond
     assert squares(poses) == np.inf

@@ -84,7 +84,7 @@ def test_a_campaign_that_can_tell_nothing_gets_a_first_run(tmp_path):
 
 def test_the_next_run_is_driven_with_the_rig_of_the_campaign_and_chosen_by_the_diagnosis(tmp_path):
     rig = {"mocap": "natnet:lab", "camera": "up=z", "place": "operator", "bus_config": "b.json5", "vehicle_name": "red"}
-    BenchSettings(**rig, repeats=7, corrected="c.toml", benchmarks=("trial",), full=True).save(tmp_path)
+    BenchSettings(**rig, repeats=7, corrected="c.toml", benchmarks=("trial",), full=True, session="mon").save(tmp_path)
     options = _options(tmp_path, {"place": "auto", "agv": None})
     assert {name: options[name] for name in rig} == {**rig, "place": "auto"}
-    assert not {"repeats", "corrected", "benchmarks", "full", "only"} & options.keys()
+    assert not {"repeats", "corrected", "benchmarks", "full", "only", "session"} & options.keys()

@@ -39,19 +39,25 @@ def told(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return said
 
 
-def once_paused(told: list[str], act: Callable[[], object]) -> threading.Thread:
-    """Act in a thread, once a session has said that it is paused."""
+@contextmanager
+def once_paused(told: list[str], act: Callable[[], object]) -> Iterator[None]:
+    """Within the context, act as soon as a session has said that it is paused."""
+    over = threading.Event()
 
     def wait() -> None:
-        deadline_s = time.monotonic() + 20.0
-        while not any(line.startswith("paused ") for line in told) and time.monotonic() < deadline_s:
-            time.sleep(0.01)
-        time.sleep(0.1)  # the pause itself takes a while, as a person's would
-        act()
+        while not over.wait(0.01):
+            if any(line.startswith("paused ") for line in told):
+                time.sleep(0.1)  # the pause itself takes a while, as a person's would
+                act()
+                return
 
     thread = threading.Thread(target=wait)
     thread.start()
-    return thread
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
 
 
 def test_a_file_pauses_and_its_absence_goes_on(tmp_path: Path, told: list[str]) -> None:
@@ -59,9 +65,8 @@ def test_a_file_pauses_and_its_absence_goes_on(tmp_path: Path, told: list[str]) 
     with session(path) as opened:
         drive(opened, "one")
         (path / PAUSE_FILE).touch()
-        finish = once_paused(told, (path / PAUSE_FILE).unlink)
-        drive(opened, "two")
-        finish.join()
+        with once_paused(told, (path / PAUSE_FILE).unlink):
+            drive(opened, "two")
     assert told[0].startswith("paused before two, the vehicle at neutral: press Ctrl-Z or remove ")
     assert told[1:] == ["going on"]
     undisturbed = tmp_path / "undisturbed"
@@ -79,9 +84,8 @@ def test_ctrl_z_pauses_and_again_goes_on(tmp_path: Path, told: list[str]) -> Non
     with session(path) as opened:
         signal.raise_signal(signal.SIGTSTP)
         assert (path / PAUSE_FILE).exists()
-        again = once_paused(told, partial(os.kill, os.getpid(), signal.SIGTSTP))
-        drive(opened, "one")
-        again.join()
+        with once_paused(told, partial(os.kill, os.getpid(), signal.SIGTSTP)):
+            drive(opened, "one")
     assert signal.getsignal(signal.SIGTSTP) is before
     assert [line.partition(" ")[0] for line in told] == ["pausing", "paused", "going"]
     assert Campaign.open(path).run_ids == ["one"]
@@ -113,8 +117,8 @@ def test_ctrl_c_ends_a_pause(tmp_path: Path, told: list[str]) -> None:
     def pause_and_interrupt() -> None:
         with session(path) as opened:
             (path / PAUSE_FILE).touch()
-            once_paused(told, partial(os.kill, os.getpid(), signal.SIGINT))
-            drive(opened, "one")
+            with once_paused(told, partial(os.kill, os.getpid(), signal.SIGINT)):
+                drive(opened, "one")
 
     with pytest.raises(KeyboardInterrupt):
         pause_and_interrupt()

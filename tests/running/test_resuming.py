@@ -14,6 +14,9 @@ from agvbench.errors import FitError, FlagError
 from agvbench.model import thesis_vehicle
 from agvbench.running.benchmark_files import benchmark_name, find_benchmark
 from agvbench.running.calibrating import VEHICLE_FILE, calibrate_campaign
+from agvbench.running.opening import open_session
+from agvbench.running.placers.auto import Auto
+from agvbench.running.placers.choosing import PLACERS
 from agvbench.workflows.bench import run_benchmarks
 
 MINE = """'''Two turns, for agvbench.'''
@@ -72,6 +75,20 @@ def test_a_simulated_vehicle_that_was_lost_is_not_lost_again_whenever_the_sessio
         table.unlink()
     assert bench("--resume").returncode == 0
     assert [table.read_bytes() for table in tables] == before
+
+
+def test_one_that_drives_back_itself_begins_at_other_random_numbers_too(tmp_path, monkeypatch):
+    class Placed(Auto):
+        def place(self, start, run_id):
+            asked.append(run_id)
+            return super().place(start, run_id)
+
+    asked: list[str] = []
+    monkeypatch.setitem(PLACERS, "auto", Placed)
+    monkeypatch.setattr("agvbench.running.bench.times_stopped", lambda *_: 2)
+    with open_session({"place": "auto"}, out=str(tmp_path / "c"), resume=False, dry_run=False) as session:
+        session.driver("left", experiment="free", repeat=1).hold(drive=0.5, front=0.5, rear=0.0, for_s=0.3)
+    assert asked == ["left-again2"]
 
 
 def test_a_calibration_that_was_made_before_an_interruption_is_kept(tmp_path):
