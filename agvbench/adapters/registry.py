@@ -1,6 +1,7 @@
 """Adapters by scheme: a file in ``adapters/agv/`` or ``adapters/mocap/`` is an adapter, found by name.
 
-``sim`` and ``serial:/dev/ttyACM0`` are adapter specifications: scheme, then an address behind a colon.
+``sim`` and ``serial:/dev/ttyACM0`` are adapter specifications: scheme, then an address behind a colon. ``vicon.py`` and
+``lab/vicon.py:192.168.0.3`` name a file instead.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from typing import TypeVar
 
 from agvbench.adapters import agv, mocap
 from agvbench.adapters.contract import AdapterOptions, AgvAdapter, MocapAdapter
+from agvbench.adapters.own_file import is_file, open_own, own_adapter
 from agvbench.errors import LinkError
 from agvbench.registry import classes_by_file
 
@@ -45,20 +47,31 @@ def parse_spec(spec: str) -> tuple[str, str]:
 
 def open_agv(spec: str, options: AdapterOptions) -> AgvAdapter:
     """Open the AGV adapter that `spec` names, or raise `LinkError`."""
-    scheme, address = parse_spec(spec)
-    return _choose("agv", scheme, agv_adapters()).open(address, options)
+    return _opened("agv", spec, options, agv_adapters(), AgvAdapter)  # type: ignore[type-abstract]
 
 
 def open_mocap(spec: str, options: AdapterOptions) -> MocapAdapter:
     """Open the mocap adapter that `spec` names, or raise `LinkError`."""
-    scheme, address = parse_spec(spec)
-    return _choose("mocap", scheme, mocap_adapters()).open(address, options)
+    return _opened("mocap", spec, options, mocap_adapters(), MocapAdapter)  # type: ignore[type-abstract]
 
 
 def check_specs(agv: str, mocap: str) -> None:
     """Raise `LinkError` unless there are adapters of these names; nothing is opened."""
-    _choose("agv", parse_spec(agv)[0], agv_adapters())
-    _choose("mocap", parse_spec(mocap)[0], mocap_adapters())
+    _named("agv", agv, agv_adapters(), AgvAdapter)  # type: ignore[type-abstract]
+    _named("mocap", mocap, mocap_adapters(), MocapAdapter)  # type: ignore[type-abstract]
+
+
+def _opened(
+    role: str, spec: str, options: AdapterOptions, known: dict[str, type[_Adapter]], base: type[_Adapter]
+) -> _Adapter:
+    scheme, address = parse_spec(spec)
+    adapter = _named(role, spec, known, base)
+    return open_own(adapter, scheme, address, options) if is_file(scheme) else adapter.open(address, options)
+
+
+def _named(role: str, spec: str, known: dict[str, type[_Adapter]], base: type[_Adapter]) -> type[_Adapter]:
+    scheme, _ = parse_spec(spec)
+    return own_adapter(scheme, base) if is_file(scheme) else _choose(role, scheme, known)
 
 
 def _choose(role: str, scheme: str, known: dict[str, type[_Adapter]]) -> type[_Adapter]:

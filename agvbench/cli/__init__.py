@@ -19,7 +19,9 @@ from agvbench import __version__
 from agvbench.errors import AgvbenchError, FlagError
 
 _EPILOG = """\
-exit codes: 0 done; 1 the answer is "no" (a regression, not adequate);
+exit codes: 0 done; 1 the answer is "no" (compare: a regression,
+diagnose --check: not adequate, bench: a run failed, doctor: not ready);
+130, 143, 129 ended by Ctrl-C, SIGTERM, SIGHUP, the vehicle stopped first;
 2 bad input or set-up, with one line that says what to do;
 70 a mistake of agvbench itself, with the file to report.
 shell completion: eval "$(register-python-argcomplete agvbench)"

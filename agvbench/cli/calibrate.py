@@ -7,7 +7,7 @@ predict better, with what was left out and why.
 
 examples:
   agvbench calibrate campaigns/tonight                        look only
-  agvbench calibrate campaigns/tonight --out vehicle.toml     keep the vehicle
+  agvbench calibrate campaigns/tonight --out calibrated.toml  keep the vehicle
   agvbench calibrate campaigns/tonight --maps thesis          the maps of the thesis, for comparison
   agvbench calibrate campaigns/tonight --firmware calibration.h   for the vehicle's firmware to say which it has
   agvbench calibrate campaigns/dart --session 2024-09-16      one day of several
@@ -23,7 +23,7 @@ HELP = "fit the static maps from a campaign's calibration runs"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument("directory", metavar="DIR", help="a campaign directory")
-    parser.add_argument("--out", metavar="vehicle.toml", help="write the calibrated vehicle there")
+    parser.add_argument("--out", metavar="FILE", help="write the calibrated vehicle there")
     parser.add_argument("--firmware", metavar="FILE.h", help="write the calibration's hash for the vehicle's firmware")
     parser.add_argument(
         "--maps",
@@ -55,5 +55,5 @@ def run(arguments: argparse.Namespace) -> int:
         if file is not None:
             console.print(f"{file}: calibration {calibration.model.calibration_hash}", soft_wrap=True)
     if out is None and firmware is None:
-        console.print("nothing written; --out vehicle.toml writes the vehicle model with the maps marked ●")
+        console.print("nothing written; --out calibrated.toml writes the vehicle model with the maps marked ●")
     return 0

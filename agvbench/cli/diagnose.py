@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument("directory", metavar="DIR", help="a campaign directory")
     parser.add_argument("--json", metavar="FILE", dest="json_file", help="write the diagnosis there")
-    parser.add_argument("--out", metavar="vehicle.toml", help="write the corrected vehicle there")
+    parser.add_argument("--out", metavar="FILE", help="write the corrected vehicle there")
     parser.add_argument(
         "--vehicle", metavar="FILE", help="the model before (default: vehicle.toml in DIR, else maps fitted to DIR)"
     )

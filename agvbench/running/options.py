@@ -26,7 +26,7 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
         {"metavar": "ADAPTER"},
         "vehicle adapter: sim (default); live, the same in real time; serial:PORT; simavr, the firmware simulated",
     ),
-    ("--mocap", {"metavar": "ADAPTER"}, "motion capture adapter: sim (default), natnet:HOST, natnet:emulated"),
+    ("--mocap", {"metavar": "ADAPTER"}, "motion capture adapter: sim (default), natnet:HOST, natnet:emulated, FILE.py:ADDRESS"),
     (
         "--camera",
         {"metavar": "NAME=VALUE", "action": Joined},

@@ -68,7 +68,7 @@ def load_plant(spec: str) -> CheckedFactory:
     if not (separator and source and attribute.isidentifier()):
         raise PlantError("plant is not named", value=repr(spec), remedy=_FORM)
     is_file = source.endswith(".py") or "/" in source or "\\" in source
-    module = _import_file(Path(source)) if is_file else _import_module(source)
+    module = import_file(Path(source)) if is_file else _import_module(source)
     factory = getattr(module, attribute, None)
     if factory is None:
         raise PlantError(f"{source} has no '{attribute}'", remedy=_suggestion(module, attribute))
@@ -104,10 +104,17 @@ def _import_module(name: str) -> ModuleType:
             raise explain(error, name) from error
 
 
-def _import_file(path: Path) -> ModuleType:
+def import_file(path: Path) -> ModuleType:
+    """Return the module in the file `path`, which may import its neighbours.
+
+    Raises
+    ------
+    PlantError
+        If the file is missing or fails on import.
+    """
     if not path.is_file():
         raise PlantError("there is no such file", where=path, remedy=_FORM)
-    name = f"agvbench_plant_{path.stem}"
+    name = f"agvbench_own_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path.resolve())
     if spec is None or spec.loader is None:
         raise PlantError("plant's file is not Python", where=path, limit="a name that ends in .py")

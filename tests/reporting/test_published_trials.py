@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from agvbench.reporting.challenge_markdown import scores_markdown
-from agvbench.workflows.challenge_file import known_trials
+from agvbench.workflows.challenge_file import known_trials, write_trials
 from agvbench.workflows.challenge_scores import score
 
 REFERENCE = Path(__file__).resolve().parents[2] / "docs" / "reference"
@@ -24,3 +24,9 @@ def test_the_page_says_what_the_file_scores(file):
     trials = known_trials(file, 5)
     assert f"blind-trials/{file.name}" in PAGE
     assert scores_markdown(score(list(trials.values()))) in PAGE
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_the_file_is_as_it_would_be_written_now(file, tmp_path):
+    write_trials(tmp_path / "again.json", 5, list(known_trials(file, 5).values()))
+    assert (tmp_path / "again.json").read_bytes() == file.read_bytes()

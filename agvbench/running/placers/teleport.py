@@ -7,7 +7,7 @@ from agvbench.types import Pose
 
 
 class Teleport(Placer):
-    """Leaves it to the run, which resets the vehicle: all randomness of a run then follows from its name."""
+    """Leaves it to the run, which resets the vehicle: all randomness of a run then follows from its key."""
 
     places_simulated, places_real = True, False
 
@@ -15,5 +15,5 @@ class Teleport(Placer):
         """Do nothing."""
 
     def run_key(self, run_id: str) -> str:
-        """Return the run's name."""
+        """Return the run's own key."""
         return run_id
