@@ -23,7 +23,7 @@ HELP = "run an AGV adapter as its own process"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("adapter", metavar="ADAPTER", help="SCHEME or SCHEME:ADDRESS, such as sim; or FILE.py:ADDRESS")
+    parser.add_argument("adapter", metavar="ADAPTER", help="SCHEME[:ADDRESS], such as sim, or FILE.py[:ADDRESS]")
     shared.add_seed_argument(parser)
     shared.add_vehicle_arguments(parser)
     shared.add_bus_arguments(parser, shared.AGV_ENDPOINT)

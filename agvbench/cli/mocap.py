@@ -22,7 +22,9 @@ HELP = "run a motion capture adapter as its own process; decode or emulate a Nat
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("adapter", metavar="ADAPTER", nargs="?", help="SCHEME or SCHEME:ADDRESS, such as sim; or FILE.py:ADDRESS")
+    parser.add_argument(
+        "adapter", metavar="ADAPTER", nargs="?", help="SCHEME[:ADDRESS], such as sim, or FILE.py[:ADDRESS]"
+    )
     parser.add_argument(
         "--decode",
         metavar="FILE",

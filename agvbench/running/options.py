@@ -24,9 +24,14 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
     (
         "--agv",
         {"metavar": "ADAPTER"},
-        "vehicle adapter: sim (default); live, the same in real time; serial:PORT; simavr, the firmware simulated",
+        "vehicle adapter: sim (default); live, the same in real time; serial:PORT; simavr, the firmware simulated;"
+        " FILE.py:ADDRESS, one of your own",
     ),
-    ("--mocap", {"metavar": "ADAPTER"}, "motion capture adapter: sim (default), natnet:HOST, natnet:emulated, FILE.py:ADDRESS"),
+    (
+        "--mocap",
+        {"metavar": "ADAPTER"},
+        "motion capture adapter: sim (default); natnet:HOST; natnet:emulated; FILE.py:ADDRESS, one of your own",
+    ),
     (
         "--camera",
         {"metavar": "NAME=VALUE", "action": Joined},
