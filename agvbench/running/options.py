@@ -24,13 +24,12 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
     (
         "--agv",
         {"metavar": "ADAPTER"},
-        "vehicle adapter: sim (default); live, the same in real time; serial:PORT; simavr, the firmware simulated;"
-        " FILE.py:ADDRESS, one of your own",
+        "vehicle adapter: sim (default); live, in real time; serial:PORT; simavr, its firmware simulated; FILE.py:ADDRESS",
     ),
     (
         "--mocap",
         {"metavar": "ADAPTER"},
-        "motion capture adapter: sim (default); natnet:HOST; natnet:emulated; FILE.py:ADDRESS, one of your own",
+        "motion capture adapter: sim (default); natnet:HOST; natnet:emulated; FILE.py:ADDRESS",
     ),
     (
         "--camera",
