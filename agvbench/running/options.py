@@ -24,7 +24,7 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
     (
         "--agv",
         {"metavar": "ADAPTER"},
-        "vehicle adapter: sim (default); live, in real time; serial:PORT; simavr, its firmware simulated; FILE.py:ADDRESS",
+        "vehicle adapter: sim (default); live, in real time; serial:PORT; simavr, its firmware; FILE.py:ADDRESS",
     ),
     (
         "--mocap",
