@@ -16,7 +16,7 @@ FILES = sorted((REFERENCE / "blind-trials").glob("*.json"))
 
 
 def test_there_are_files():
-    assert [file.name for file in FILES] == ["nothing-20168.json", "vehicles-9030.json"]
+    assert [file.name for file in FILES] == ["hysteresis-9040.json", "nothing-20168.json", "vehicles-9030.json"]
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
