@@ -10,6 +10,7 @@ import shutil
 from pathlib import Path
 
 import nox
+from nox.command import CommandFailed
 
 nox.needs_version = ">=2024.10"
 nox.options.default_venv_backend = "uv|virtualenv"
@@ -35,10 +36,16 @@ def bench(session: nox.Session) -> None:
 
 @nox.session
 def tests(session: nox.Session) -> None:
-    """Run all tests, with coverage."""
+    """Run all tests, with coverage; what fails is run once more, alone, and has to pass then."""
     install(session, "test")
-    arguments = session.posargs or ["--cov", "--cov-report=term:skip-covered", "-n", "2", "--dist", "worksteal"]
-    session.run("pytest", *arguments)
+    if session.posargs:
+        session.run("pytest", *session.posargs)
+        return
+    try:
+        session.run("pytest", "--cov", "--cov-report=term:skip-covered", "-n", "2", "--dist", "worksteal")
+    except CommandFailed:
+        # Vehicles, cameras and a bus in real time share the machine with the other worker and whoever else is there.
+        session.run("pytest", "--last-failed", "--last-failed-no-failures", "none")
 
 
 @nox.session(venv_backend="none")
