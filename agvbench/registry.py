@@ -31,10 +31,14 @@ def classes_by_file(package: ModuleType | str, base: type[_Class]) -> list[type[
     modules = (
         importlib.import_module(info.name) for info in pkgutil.iter_modules(module.__path__, f"{module.__name__}.")
     )
-    return [cls for inside in modules for cls in vars(inside).values() if _is_own(cls, base, inside)]
+    return [cls for inside in modules for cls in own_classes(inside, base) if not inspect.isabstract(cls)]
+
+
+def own_classes(module: ModuleType, base: type[_Class]) -> list[type[_Class]]:
+    """Return every subclass of `base` that `module` itself defines, abstract ones too, in its order."""
+    return [cls for cls in vars(module).values() if _is_own(cls, base, module)]
 
 
 def _is_own(value: object, base: type[_Class], module: ModuleType) -> TypeGuard[type[_Class]]:
-    if not (isinstance(value, type) and issubclass(value, base) and value is not base):
-        return False
-    return value.__module__ == module.__name__ and not inspect.isabstract(value)
+    is_derived = isinstance(value, type) and issubclass(value, base) and value is not base
+    return is_derived and value.__module__ == module.__name__

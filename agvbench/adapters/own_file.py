@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import inspect
 from pathlib import Path
-from typing import TypeGuard, TypeVar
+from typing import TypeVar
 
 from agvbench.adapters.contract import AdapterOptions, AgvAdapter, MocapAdapter
 from agvbench.errors import AgvbenchError, LinkError
+from agvbench.registry import own_classes
 from agvbench.simulator.checked import explain
 from agvbench.simulator.loading import import_file
 
@@ -37,7 +38,7 @@ def own_adapter(path: str, base: type[_Adapter]) -> type[_Adapter]:
         module = import_file(Path(path))
     except AgvbenchError as error:
         raise _told(error, path) from error
-    own = [cls for cls in vars(module).values() if _is_own(cls, base, module.__name__)]
+    own = own_classes(module, base)
     whole = [cls for cls in own if not inspect.isabstract(cls)]
     if len(whole) != 1:
         raise _not_one(path, own, whole, base)
@@ -61,10 +62,6 @@ def open_own(adapter: type[_Adapter], path: str, address: str, options: AdapterO
         raise
     except Exception as error:
         raise _told(error, path) from error
-
-
-def _is_own(value: object, base: type[_Adapter], module: str) -> TypeGuard[type[_Adapter]]:
-    return isinstance(value, type) and issubclass(value, base) and value.__module__ == module
 
 
 def _not_one(path: str, own: list[type], whole: list[type], base: type) -> LinkError:
