@@ -7,13 +7,12 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
 
 import pytest
 from rig_driving import HANGING, NEUTRAL, START, TINY, digest, drive_run, process
 
 from agvbench.adapters import AdapterOptions, host_adapters, open_rig
+from agvbench.bus.keys import RUNNER, Keys
 from agvbench.bus.link import VehicleLink
 from agvbench.bus.session import open_session
 from agvbench.errors import AdapterGoneError, LinkError
@@ -122,32 +121,24 @@ def test_ctrl_c_and_a_closed_terminal_end_a_process_cleanly(endpoint: str, numbe
         signal.signal(number, before)
 
 
-def drive_until_refused(endpoint: str) -> None:
-    """Open the vehicle again and again: word of who drives it may take a moment to go round."""
+def wait_for_word(endpoint: str, *, of_a_runner: bool) -> None:
+    """Wait until everybody can know whether somebody drives the vehicle: that takes a moment to go round."""
     deadline_s = time.monotonic() + 20.0
-    while time.monotonic() < deadline_s:
-        with open_rig(connect=endpoint, seed=11):
-            time.sleep(0.1)
-
-
-@contextmanager
-def opened_once_free(endpoint: str) -> Iterator[VehicleLink]:
-    """Open the vehicle as soon as word has gone round that nobody drives it."""
-    deadline_s = time.monotonic() + 20.0
-    with ExitStack() as stack:
-        while True:
-            try:
-                link = stack.enter_context(open_rig(connect=endpoint, seed=11))
-                break
-            except LinkError:
-                assert time.monotonic() < deadline_s
-                time.sleep(0.1)
-        yield link
+    with open_session(connect=[endpoint]) as session:
+        while any(reply.ok for reply in session.liveliness().get(Keys("lab", "agv1").alive(RUNNER))) != of_a_runner:
+            assert time.monotonic() < deadline_s
+            time.sleep(0.01)
 
 
 def test_a_second_runner_of_one_vehicle_is_refused_until_the_first_has_gone(endpoint: str, expected: list[str]) -> None:
     with process("sim", *SEED, "--plant", TINY, "--listen", endpoint):
-        with open_rig(connect=endpoint, seed=11), pytest.raises(LinkError, match="another runner drives this vehicle"):
-            drive_until_refused(endpoint)
-        with opened_once_free(endpoint) as link:
+        with open_rig(connect=endpoint, seed=11):
+            wait_for_word(endpoint, of_a_runner=True)
+            with (
+                pytest.raises(LinkError, match="another runner drives this vehicle"),
+                open_rig(connect=endpoint, seed=11),
+            ):
+                pass
+        wait_for_word(endpoint, of_a_runner=False)
+        with open_rig(connect=endpoint, seed=11) as link:
             assert [digest(drive_run(link, key)) for key in KEYS] == expected

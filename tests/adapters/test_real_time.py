@@ -193,6 +193,7 @@ def test_a_real_runner_that_thinks_between_runs_does_not_hold_up_the_camera() ->
         link.reset(START, run_key="a")
         began_s = time.monotonic()
         link.exchange(NEUTRAL, t_s=0.0, hold_s=0.05)
+        time.sleep(0.5)
         while link.loss.received <= 100 and time.monotonic() < began_s + 20.0:
             time.sleep(0.05)
         assert link.loss.received > 100

@@ -106,6 +106,7 @@ def test_a_body_is_seen_on_the_floor_when_it_was_exposed(stack: ExitStack, up: s
     assert np.allclose(frames.mean_error_m, 0.00025)
     # A better echo may come at any time, and moves the stamps from then on: within what was said before, and its drift.
     assert np.allclose(frames.t_s, began_s + np.arange(24) / 240.0, rtol=0.0, atol=uncertainty_s + 1e-4)
+    assert np.isclose(np.diff(frames.t_s), 1 / 240.0, rtol=0.0, atol=1e-5).sum() >= 20
     assert frames.frame.tolist() == list(range(1, 25))
     assert (bench.identity.adapter, bench.identity.rate_hz, bench.identity.simulated) == ("natnet", 240.0, False)
 

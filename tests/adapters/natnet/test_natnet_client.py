@@ -117,14 +117,15 @@ def test_names_are_asked_for_again_when_they_change(lab: Lab) -> None:
     until(lambda: lab.client.names.get("agv1") == 1)
     lab.server.describe([model.__class__(model.id, f"blue{model.id}", model.markers_m) for model in MODELS])
     lab.send(2, flags=MODELS_CHANGED)
-    until(lambda: lab.client.names.get("blue1") == 1 and "agv1" not in lab.client.names)
+    until(lambda: "blue1" in lab.client.names)
+    assert lab.client.names == {"blue1": 1, "blue2": 2, "blue3": 3}
 
 
 @pytest.mark.parametrize("drift", [-50e-6, 0.0, 50e-6])
 def test_capture_times_are_within_their_stated_uncertainty(lab: Lab, drift: float) -> None:
     lab.open(Settings(drift=drift, offset_s=12_345.0))
     clock_hz = lab.server.settings.clock_hz
-    until(lambda: lab.client.sync.host_time(lab.server.ticks() / clock_hz).uncertainty_s < 0.1)
+    until(lambda: lab.client.sync.host_time(lab.server.ticks() / clock_hz).uncertainty_s < 0.09)
     rng, true_s = np.random.default_rng(0), []
     for number in range(1, 101):
         exposed_s = time.monotonic()
@@ -135,7 +136,7 @@ def test_capture_times_are_within_their_stated_uncertainty(lab: Lab, drift: floa
     errors = np.array([one.captured.time_s for one in lab.seen]) - true_s
     bounds = np.array([one.captured.uncertainty_s for one in lab.seen])
     assert (np.abs(errors) <= bounds).all()
-    assert (bounds < 0.11).all()
+    assert (bounds < 0.1).all()
 
 
 @given(
