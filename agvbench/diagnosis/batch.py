@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.diagnosis.lanes import Lanes
 from agvbench.diagnosis.levels import ROLES, FreeMaps
 from agvbench.diagnosis.reading import Readings
 from agvbench.effects import Effect
@@ -48,16 +49,17 @@ class Batch:
         run, kind, row, changed = [], [], [], []
         for i, own in enumerate(owns):
             still = np.zeros((len(own), len(ROLES)))
-            for role, first, change in [("base", -1, still), ("heading", -1, still), *varied[i]]:
+            for role, first, change in [("heading", -1, still), *varied[i]]:
                 run.append(i)
                 kind.append(role)
                 row.append(first)
                 changed.append(change)
-        # Of a lane that varies a level, `lane_row` is a row that has it; of one that varies a node, the node.
-        self.lane_run, self.lane_kind, self.lane_row = np.array(run), np.array(kind), np.array(row)
+        self.lane_run = np.array(run)
         self.lanes = Simulation(geometry, maps.neutral, [runs[i] for i in run], kinds=kinds)
         self.touched = self._touched(owns)
-        self.column = self._column()
+        kinds_of = np.array(kind)
+        self.turned = kinds_of == "heading"
+        self.varied = {role: self._varied(role, kinds_of == role, np.array(row)) for role in ROLES}
         self.rows = np.concatenate([owns[i] for i in run])
         self.row_change = np.concatenate(changed)
 
@@ -68,11 +70,15 @@ class Batch:
         )
         return np.argsort(~used, axis=1, kind="stable")[:, : max(1, int(used.sum(axis=1).max()))]
 
-    def _column(self) -> NDArray[np.int64]:
-        """Return in which column of `touched` each run has each of the maps' values (R, values), -1 for none."""
+    def _varied(self, role: str, own: NDArray[np.bool_], row: NDArray[np.int64]) -> Lanes:
+        """Return the lanes that vary a level of `role`, of which `row` has a row, or one of its nodes."""
+        lane = np.flatnonzero(own)
+        nodes = len(self.maps.nodes[role])
+        weights = np.eye(nodes)[row[lane]] if self.by_node else self.weights[role][row[lane]]
+        # In which column of `touched` each run has each of the values.
         column = np.full((len(self.touched), self.maps.size), -1)
         np.put_along_axis(column, self.touched, np.arange(self.touched.shape[1])[None, :], axis=1)
-        return column
+        return Lanes.of(lane, self.lane_run[lane], row[lane], weights, column[:, self.maps.slices()[role]])
 
     def _count_levels(self, own: NDArray[np.int64]) -> int:
         drives = self.drives[own]

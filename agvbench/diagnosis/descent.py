@@ -105,7 +105,7 @@ class Descent:
         the axle did move. So such values are laid between their neighbours, and the way goes on from there.
         """
         maps = self.predictor.maps
-        told, doubt = view.terms.information.sum(axis=0), ridge(self.predictor)
+        told, doubt = view.terms.information.total, ridge(self.predictor)
         silent = np.diagonal(told)[: maps.size] < np.diagonal(doubt)[: maps.size]
         if not silent.any():
             return state, view

@@ -5,7 +5,6 @@ Residuals are weighted by the misfit itself: by the cameras' noise everything wo
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -64,7 +63,7 @@ class Judge:
     """Residual rates ready for regression: what maps take up removed, each feature in units of its misfit."""
 
     def __init__(self, rates: Rates, stands: Steering, fold: NDArray[np.int64]) -> None:
-        self.fold, self.root = fold, np.sqrt(rates.weight)
+        self.folds, self.root = [np.flatnonzero(fold == f) for f in range(FOLDS)], np.sqrt(rates.weight)
         drive, axles = _dummies(stands.levels[:, 0]), [_dummies(stands.levels[:, k]) for k in (1, 2)]
         self.known = [self._orthogonal([drive]), *[self._orthogonal(axles)] * 2]
         self.values = [self._clean(k, _without_strays(rates.value[:, k])) for k in range(3)]
@@ -84,22 +83,22 @@ class Judge:
     def gain(self, columns: Columns) -> tuple[float, Floats]:
         """Return the log likelihood that `columns` gain in folds left out, and their sizes fitted to all."""
         clean = {k: self._clean(k, c) / self.size[k] for k, c in columns.items()}
-        parts = []
-        for f in range(FOLDS):
-            own = self.fold == f
-            parts.append([(c[own].T @ c[own], c[own].T @ self.values[k][own], k) for k, c in clean.items()])
-        matrix = sum(g for part in parts for g, _, _ in part)
-        pull = sum(b for part in parts for _, b, _ in part)
-        ridge = 1e-9 * np.trace(matrix) * np.eye(len(pull)) + 1e-300 * np.eye(len(pull))
-        change = dict.fromkeys(clean, 0.0)
-        for part in parts:
-            out, out_pull = sum(g for g, _, _ in part), sum(b for _, b, _ in part)
-            c = np.linalg.lstsq(matrix - out + ridge, pull - out_pull, rcond=None)[0]
-            for g, b, k in part:
-                change[k] += float(c @ g @ c - 2.0 * b @ c)
-        total = len(self.root)
-        gain = sum(-math.log(max(1.0 + change[k] / total, _LEAST)) for k in change)
-        return 0.5 * self.count * gain, np.linalg.lstsq(matrix + ridge, pull, rcond=None)[0]
+        forms, pulls = (np.array(of) for of in zip(*(self._products(k, c) for k, c in clean.items()), strict=True))
+        without, whole = forms.sum(axis=0), pulls.sum(axis=0)
+        matrix, pull = without.sum(axis=0), whole.sum(axis=0)
+        ridge = (1e-9 * np.trace(matrix) + 1e-300) * np.eye(len(pull))
+        # Fitted to all, and without each fold.
+        left = np.concatenate([matrix[None], matrix - without]) + ridge
+        sizes = np.linalg.solve(left, np.vstack([pull, pull - whole])[..., None])[..., 0]
+        fitted = sizes[1:]
+        change = np.einsum("fi,kfij,fj->k", fitted, forms, fitted) - 2.0 * np.einsum("kfi,fi->k", pulls, fitted)
+        gain = -np.log(np.maximum(1.0 + change / len(self.root), _LEAST)).sum()
+        return float(0.5 * self.count * gain), sizes[0]
+
+    def _products(self, k: int, columns: Floats) -> tuple[Floats, Floats]:
+        """Return by fold the products of columns (n, q) with each other (folds, q, q), and with feature `k`."""
+        parts = [(columns[own], self.values[k][own]) for own in self.folds]
+        return np.array([c.T @ c for c, _ in parts]), np.array([c.T @ v for c, v in parts])
 
 
 def _without_strays(value: Floats) -> Floats:

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from agvbench.diagnosis.descent import Descent, Pace, State
+from agvbench.diagnosis.information import Information
 from agvbench.diagnosis.likelihood import residual_of, ridge, terms_of
 from agvbench.diagnosis.linearised import Linearised
 from agvbench.diagnosis.prediction import Predictor
@@ -28,7 +29,7 @@ class Fit:
     """A fitted model.
 
     ``parameters`` (P,), the maps' values first; ``offsets`` (R, 6) of each run; ``scatter``; ``loss`` (R,): minus two
-    log likelihood of each run; ``information`` (R, P, P) and ``gradient`` (R, P): its quadratic form about them;
+    log likelihood of each run; ``information`` and ``gradient`` (R, P): its quadratic form about them;
     ``residual`` (R, K, 3): measured minus predicted with the offsets.
     """
 
@@ -37,7 +38,7 @@ class Fit:
     offsets: Floats
     scatter: Scatter
     loss: Floats
-    information: Floats
+    information: Information
     gradient: Floats
     residual: Floats
     linear: Linearised
@@ -45,7 +46,7 @@ class Fit:
     @property
     def covariance(self) -> Floats:
         """Covariance of the parameters (P, P)."""
-        return np.asarray(np.linalg.pinv(self.information.sum(axis=0) + ridge(self.predictor), hermitian=True))
+        return np.asarray(np.linalg.pinv(self.information.total + ridge(self.predictor), hermitian=True))
 
     @cached_property
     def ground(self) -> Ground:

@@ -30,21 +30,24 @@ def cross_validated(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Flo
     effects = fitted.parameters[maps:]
     free = np.ones(len(fitted.parameters), dtype=np.bool_)
     free[maps:] = (effects > bounds[:, 0]) & (effects < bounds[:, 1])
-    information = fitted.information[:, free][:, :, free]
+    among = np.ix_(free, free)
     gradient = fitted.gradient[:, free]
-    total = information.sum(axis=0)
+    total = fitted.information.total[among]
     weak = 1e-6 * np.diag(np.diagonal(total) + 1.0)
     whiten = np.linalg.inv(np.linalg.cholesky(total + weak)).T
     loss = fitted.loss.copy()
     for k in np.unique(fold):
         out = fold == k
         # Where all runs together know each direction equally well, the fold knows what the others lack.
-        share, turn = np.linalg.eigh(whiten.T @ (information[~out].sum(axis=0) + weak) @ whiten)
+        share, turn = np.linalg.eigh(whiten.T @ (fitted.information.total_of(~out)[among] + weak) @ whiten)
         turn = whiten @ turn
         others, own = (turn.T @ gradient[chosen].sum(axis=0) for chosen in (~out, out))
         known = share > _OWN_SHARE
-        move = turn @ np.where(known, others / np.maximum(share, _OWN_SHARE), own / np.maximum(1.0 - share, _OWN_SHARE))
-        loss[out] += -2.0 * gradient[out] @ move + np.einsum("rij,i,j->r", information[out], move, move, optimize=True)
+        move = np.zeros(len(free))
+        move[free] = turn @ np.where(
+            known, others / np.maximum(share, _OWN_SHARE), own / np.maximum(1.0 - share, _OWN_SHARE)
+        )
+        loss[out] += (fitted.information.along(move) - 2.0 * fitted.gradient @ move)[out]
     return loss
 
 
@@ -58,11 +61,11 @@ def _cross_validated_windows(fitted: Fit, fold: NDArray[np.int64], bounds: Float
     loss = fitted.loss.copy()
     if maps == count:
         return loss
-    total = fitted.information.sum(axis=0) + np.eye(count)
+    total = fitted.information.total + np.eye(count)
     for k in np.unique(fold):
         out = fold == k
         others = (
-            fitted.information[~out].sum(axis=0) + np.eye(count) * np.r_[np.ones(maps), np.full(count - maps, 1e-4)]
+            fitted.information.total_of(~out) + np.eye(count) * np.r_[np.ones(maps), np.full(count - maps, 1e-4)]
         )
         step = np.linalg.lstsq(others, fitted.gradient[~out].sum(axis=0), rcond=1e-12)[0]
         moved = fitted.parameters.copy()

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from agvbench.diagnosis.information import Information
 from agvbench.diagnosis.linearised import Linearised
 from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.scatter import Scatter, priors, scale_of, student, tempering, weights
@@ -23,13 +24,13 @@ WEAK = 1e-4
 class Terms:
     """A likelihood about some parameters.
 
-    ``loss`` (R,): minus two log likelihood of each run; ``information`` (R, P, P) and ``gradient`` (R, P): its
-    quadratic form; ``inner_inverse`` (R, 6, 6): the offsets' covariance; ``mixed`` (R, 6, P) and ``pull`` (R, 6): how
+    ``loss`` (R,): minus two log likelihood of each run; ``information`` and ``gradient`` (R, P): its quadratic form;
+    ``inner_inverse`` (R, 6, 6): the offsets' covariance; ``mixed`` (R, 6, P) and ``pull`` (R, 6): how
     they follow the parameters, and where they are drawn.
     """
 
     loss: Floats
-    information: Floats
+    information: Information
     gradient: Floats
     inner_inverse: Floats
     mixed: Floats
@@ -53,8 +54,7 @@ def terms_of(predictor: Predictor, residual: Floats, linear: Linearised, offsets
     rows = np.arange(runs)[:, None]
     mixed = np.zeros((runs, 6, linear.count))
     mixed[rows, :, own] = short.transpose(0, 2, 1)
-    information = np.zeros((runs, mixed.shape[2], mixed.shape[2]))
-    information[rows[..., None], own[:, :, None], own[:, None, :]] = jt @ j - short.transpose(0, 2, 1) @ inverse @ short
+    blocks = jt @ j - short.transpose(0, 2, 1) @ inverse @ short
     gradient = np.zeros((runs, mixed.shape[2]))
     steep = (jt @ e[..., None])[..., 0] - (short.transpose(0, 2, 1) @ (inverse @ pull[..., None]))[..., 0]
     gradient[rows, own] = steep
@@ -66,8 +66,9 @@ def terms_of(predictor: Predictor, residual: Floats, linear: Linearised, offsets
     if predictor.readings.begins is not None:
         logs += 6.0 * temper * (predictor.readings.seen * np.log(scatter.growth)).sum(axis=1)
         squares, trust = student(predictor, squares)
-        information *= trust[:, None, None]
+        blocks *= trust[:, None, None]
         gradient = np.asarray(gradient * trust[:, None])
+    information = Information(own, blocks, linear.count)
     return Terms(squares + logs, information, gradient, inverse, mixed, pull)
 
 

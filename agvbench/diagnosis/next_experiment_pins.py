@@ -51,7 +51,7 @@ def unpinned(chosen: Fit, candidates: Mapping[str, Candidate]) -> list[Unpinned]
     readings = chosen.predictor.readings
     weighted = Weighted(readings, readings.seen, chosen.linear.by_offsets, chosen)
     own = weighted.columns(chosen.linear.by_parameters)
-    known = chosen.information.sum(axis=0)
+    known = chosen.information.total
     inverse = np.linalg.inv(known + _WEAK * np.eye(len(known)))
     kinds = effect_kinds()
     found = []
@@ -100,7 +100,7 @@ def pin_scores(chosen: Fit, flat: Sequence[Unpinned], predictors: Sequence[Predi
     ``predictors`` are the chosen model with each of the parameters' effects added, for the designs' runs.
     """
     out = []
-    known = chosen.information.sum(axis=0)
+    known = chosen.information.total
     maps = len(chosen.parameters)
     for item, predictor in zip(flat, predictors, strict=True):
         new = information(chosen, predictor, np.r_[chosen.parameters, item.start])

@@ -83,7 +83,7 @@ class Search:
             gains = []
             for wrong, difference in ((one.fit, apart[rows]), (other.fit, -apart[rows])):
                 new = information(wrong, like(wrong, some, self.geometry), wrong.parameters, difference)
-                known = wrong.information.sum(axis=0)
+                known = wrong.information.total
                 gains.append(evidence(known, new, LEAST_REPEATS) / LEAST_REPEATS)
             out[k, chosen] = np.minimum(*gains) * _gentle(apart, len(tried))[chosen] ** 2
         return out

@@ -32,6 +32,7 @@ class Predictor:
         self.parameter_names: list[str] = [batch.base.parameter_names[i] for i in self._own]
         self.nulls: Floats = batch.base.nulls[self._own]
         self._steps = _STEP_SHARE * batch.base.scales[self._own]
+        self._last: tuple[tuple[bytes, ...], Floats] = (), np.empty(0)
 
     def settled(self, parameters: Floats) -> tuple[Floats, Floats]:
         """Return settled angles and speed of every row (rows, 3), and initial states (R, 5)."""
@@ -66,8 +67,13 @@ class Predictor:
         return self._simulate(settled, parameters[self.maps.size :], initial)
 
     def _simulate(self, settled: Floats, own: Floats, initial: Floats) -> Floats:
-        poses = self.batch.base.predict(settled, self._all(own), initial, level_scatter=self.batch.level_scatter)
-        return poses.reshape(len(self.readings), -1, 3)
+        """Return poses (R, K, 3); those of the last time are kept, for a fit looks around where it has just stepped."""
+        asked = (settled.tobytes(), own.tobytes(), initial.tobytes())
+        if asked != self._last[0]:
+            poses = self.batch.base.predict(settled, self._all(own), initial, level_scatter=self.batch.level_scatter)
+            poses.flags.writeable = False
+            self._last = asked, poses.reshape(len(self.readings), -1, 3)
+        return self._last[1]
 
     def linearise(self, parameters: Floats, offsets: Floats, near: Linearised | None = None) -> Linearised:
         """Return poses and derivatives about parameters (P,) and offsets (R, 6).
@@ -84,35 +90,34 @@ class Predictor:
 
     def _by_lanes(self, parameters: Floats, offsets: Floats, settled: Floats, initial: Floats) -> Linearised:
         """Return poses and their derivatives by the maps' values and by offsets."""
-        own = parameters[self.maps.size :]
-        batch = self.batch
+        own, batch = parameters[self.maps.size :], self.batch
+        base = self._simulate(settled, own, initial)
         lanes = self._simulate_lanes(settled, initial, own)
-        base = lanes[batch.lane_kind == "base"]
         by_own = np.zeros((*base.shape, batch.touched.shape[1]))
         columns = by_own.transpose(0, 3, 1, 2)
         by_offsets = np.zeros((*base.shape, len(OFFSETS)))
         by_offsets[:, :, 0, 0] = by_offsets[:, :, 1, 1] = 1.0
-        by_offsets[..., 2] = (lanes[batch.lane_kind == "heading"] - base) / _STEP
-        where = self.maps.slices()
+        by_offsets[..., 2] = (lanes[batch.turned] - base) / _STEP
         for k, role in enumerate(ROLES):
-            chosen = np.flatnonzero(batch.lane_kind == role)
-            run, row = batch.lane_run[chosen], batch.lane_row[chosen]
-            change = (lanes[chosen] - base[run]) / _STEP
-            drives = role == "drive"
-            if batch.by_node:
-                scale = np.exp(offsets[run, 5]) if drives else np.ones(len(run))
-                own_value = scale * parameters[where[role]][row] if drives else scale
-                np.add.at(by_offsets[..., 3 + k], run, change * own_value[:, None, None])
-                columns[run, batch.column[run, where[role].start + row]] = change * scale[:, None, None]
-                continue
-            factor = settled[row, 2] if drives else np.ones(len(row))
-            np.add.at(by_offsets[..., 3 + k], run, change * factor[:, None, None])
-            weights = batch.weights[role][row] * (np.exp(offsets[run, 5]) if drives else np.ones(len(row)))[:, None]
-            for node in range(weights.shape[1]):
-                used = weights[:, node] != 0.0
-                own_column = batch.column[run[used], where[role].start + node]
-                np.add.at(columns, (run[used], own_column), change[used] * weights[used, node][:, None, None])
+            varied = batch.varied[role]
+            change = (lanes[varied.lane] - base[varied.run]) / _STEP
+            by_offset, by_level = self._shares(role, parameters, offsets, settled)
+            gathered = varied.by_run
+            by_offsets[gathered.place[:, 0], :, :, 3 + k] = gathered.sums(change * by_offset[:, None, None])
+            weight = varied.weight * by_level[varied.term]
+            run, column = varied.by_value.place.T
+            columns[run, column] = varied.by_value.sums(change[varied.term] * weight[:, None, None])
         return Linearised(base, batch.touched, by_own, by_offsets, self.maps.size)
+
+    def _shares(self, role: str, parameters: Floats, offsets: Floats, settled: Floats) -> tuple[Floats, Floats]:
+        """Return how much each lane of `role` changes (n,) with its run's offset, and with the level that it varies."""
+        varied = self.batch.varied[role]
+        if role != "drive":
+            return np.ones(len(varied.run)), np.ones(len(varied.run))
+        faster = np.exp(offsets[varied.run, 5])
+        if self.batch.by_node:
+            return faster * parameters[self.maps.slices()[role]][varied.row], faster
+        return settled[varied.row, 2], faster
 
     def by_last(self, parameters: Floats, offsets: Floats, count: int) -> tuple[Floats, Floats]:
         """Return poses (R, K, 3), and their derivatives by the last `count` parameters (R, K, 3, count)."""
@@ -135,7 +140,7 @@ class Predictor:
         batch = self.batch
         varied = settled[batch.rows] + _STEP * batch.row_change
         first = initial[batch.lane_run]
-        first[:, 2] += _STEP * (batch.lane_kind == "heading")
+        first[:, 2] += _STEP * batch.turned
         return batch.lanes.predict(varied, self._all(own), first, level_scatter=batch.level_scatter).reshape(
             len(batch.lane_run), -1, 3
         )

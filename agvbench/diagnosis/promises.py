@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agvbench.diagnosis.likelihood import WEAK, inner_inverse, residual_of, ridge, terms_of
 from agvbench.diagnosis.prediction import Predictor
@@ -22,49 +24,58 @@ class Ground:
     """A fitted model of runs as larger ones are linearised about it, with the runs' offsets projected out.
 
     ``weight`` (R, K, 3) of residuals; ``a`` (R, 3K, 6) derivatives by the offsets, ``inverse`` (R, 6, 6) of their
-    information, ``drawn`` (R, 6) what their prior pulls; ``j`` (3 R K, P) derivatives by the parameters, projected;
-    ``covariance`` (P, P); ``pull`` (P,) of the offsets' prior on the parameters.
+    information, ``drawn`` (R, 6) what their prior pulls; ``own`` (R, m) the numbers of the parameters that each run
+    depends on at most, ``j`` (R, 3K, m) derivatives by these, projected; ``covariance`` (P, P); ``pull`` (P,) of the
+    offsets' prior on the parameters; ``residual`` (R, 3K), weighted.
     """
 
     weight: Floats
     a: Floats
     inverse: Floats
     drawn: Floats
+    own: NDArray[np.int64]
     j: Floats
     covariance: Floats
     pull: Floats
+    residual: Floats
 
     @classmethod
     def of(cls, fitted: Fit) -> Ground:
         """Return the ground of a fit."""
-        predictor, scatter, offsets = fitted.predictor, fitted.scatter, fitted.offsets
+        predictor, scatter, linear = fitted.predictor, fitted.scatter, fitted.linear
         weight = weights(predictor, scatter)
-        runs = len(offsets)
-        a = (fitted.linear.by_offsets * weight[..., None]).reshape(runs, -1, 6)
-        j = (fitted.linear.by_parameters * weight[..., None]).reshape(runs, a.shape[1], -1)
+        residual = (fitted.residual * weight).reshape(len(weight), -1)
+        a = (linear.by_offsets * weight[..., None]).reshape(*residual.shape, -1)
+        j = (linear.by_own * weight[..., None]).reshape(*residual.shape, -1)
         prior = priors(predictor, scatter)
         inverse = inner_inverse(a, prior)[1]
         mixed = inverse @ (a.transpose(0, 2, 1) @ j)
-        drawn = offsets / prior**2
-        matrix = fitted.information.sum(axis=0) + ridge(predictor)
-        projected = (j - a @ mixed).reshape(-1, j.shape[-1])
+        drawn = fitted.offsets / prior**2
+        matrix = fitted.information.total + ridge(predictor)
+        pull = np.zeros(len(matrix))
+        np.add.at(pull, linear.own, np.einsum("rij,ri->rj", mixed, drawn))
         covariance = np.asarray(np.linalg.inv(matrix))
-        return cls(weight, a, inverse, drawn, projected, covariance, np.einsum("rij,ri->j", mixed, drawn))
+        return cls(weight, a, inverse, drawn, linear.own, j - a @ mixed, covariance, pull, residual)
 
-    def square(self, e: Floats) -> float:
+    @cached_property
+    def squares(self) -> float:
+        """The weighted squares of the fit's own residuals."""
+        return self._squares(self.residual)
+
+    def _squares(self, e: Floats) -> float:
         """Return the weighted squares of residuals `e` (R, 3K), their offsets found anew."""
-        pull = np.einsum("rni,rn->ri", self.a, e) - self.drawn
-        return float(np.sum(e * e) - np.einsum("ri,rij,rj->", pull, self.inverse, pull, optimize=True))
+        pull = (self.a.transpose(0, 2, 1) @ e[..., None])[..., 0] - self.drawn
+        return float(np.sum(e * e) - np.sum(pull * (self.inverse @ pull[..., None])[..., 0]))
 
-    def promise(self, residual: Floats, before: Floats, slopes: Floats, start: Floats, bounds: Floats) -> float:
-        """Return by how much the loss falls, to first order, from residuals `before` by `residual` and its `slopes`."""
+    def promise(self, residual: Floats, slopes: Floats, start: Floats, bounds: Floats) -> float:
+        """Return by how much the loss falls, to first order, by `residual` (R, K, 3) and its `slopes`."""
         e = (residual * self.weight).reshape(len(residual), -1)
         new = (slopes * self.weight[..., None]).reshape(*e.shape, -1)
         fixed = new - self.a @ (self.inverse @ (self.a.transpose(0, 2, 1) @ new))
-        pull = np.einsum("rnq,rn->q", fixed, e)
-        pull += np.einsum("rnq,rni,rij,rj->q", new, self.a, self.inverse, self.drawn, optimize=True)
-        old_pull = self.j.T @ e.ravel() + self.pull
-        shared = self.j.T @ new.reshape(len(self.j), -1)
+        # What the offsets' prior pulls comes in by the same way.
+        pull = np.einsum("rnq,rn->q", fixed, e) + np.einsum("rnq,rn->q", new, self._drawn_along)
+        onto = self._onto(np.concatenate([e[..., None], new], axis=-1))
+        old_pull, shared = onto[:, 0] + self.pull, onto[:, 1:]
         own = np.einsum("rnp,rnq->pq", new, fixed) + WEAK * np.eye(len(start))
         # The maps and effects that there are move along; what is left is a question of the new parameters alone.
         along = self.covariance @ shared
@@ -72,8 +83,17 @@ class Ground:
         wanted = start + np.linalg.lstsq(matrix, rest, rcond=1e-12)[0]
         move = np.clip(wanted, bounds[:, 0], bounds[:, 1]) - start
         saved = old_pull @ self.covariance @ old_pull + 2.0 * rest @ move - move @ matrix @ move
-        was = (before * self.weight).reshape(len(residual), -1)
-        return float(self.square(was) - self.square(e) + saved)
+        return float(self.squares - self._squares(e) + saved)
+
+    @cached_property
+    def _drawn_along(self) -> Floats:
+        return np.asarray((self.a @ (self.inverse @ self.drawn[..., None]))[..., 0])
+
+    def _onto(self, columns: Floats) -> Floats:
+        """Return the products of columns (R, 3K, q) with the derivatives by all parameters, (P, q)."""
+        out = np.zeros((len(self.pull), columns.shape[-1]))
+        np.add.at(out, self.own, self.j.transpose(0, 2, 1) @ columns)
+        return out
 
 
 def begun(fitted: Fit, larger: Predictor, start: Floats) -> Floats:
@@ -99,9 +119,9 @@ def promised_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floats)
     poses, slopes = larger.by_last(parameters, fitted.offsets, len(start))
     residual = residual_of(larger, poses)
     if larger.readings.begins is None:
-        return fitted.ground.promise(residual, fitted.residual, slopes, start, bounds)
+        return fitted.ground.promise(residual, slopes, start, bounds)
     terms = terms_of(larger, residual, fitted.linear.with_last(slopes), fitted.offsets, fitted.scatter)
-    gradient, matrix = terms.gradient.sum(axis=0), terms.information.sum(axis=0) + ridge(larger)
+    gradient, matrix = terms.gradient.sum(axis=0), terms.information.total + ridge(larger)
     move = np.linalg.lstsq(matrix, gradient, rcond=1e-12)[0]
     # What would go beyond its bound stops there, and the rest is solved for again.
     known = len(fitted.parameters)

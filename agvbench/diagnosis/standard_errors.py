@@ -46,7 +46,7 @@ def standard_errors(fitted: Fit, group: NDArray[np.int64]) -> Floats:
 
 def _jackknife(fitted: Fit, group: NDArray[np.int64]) -> tuple[Floats, Floats]:
     """Return the jackknife's standard errors (P,), and how many groups, in effect, tell each parameter (P,)."""
-    pulls, told = by_group(fitted.gradient, group), by_group(fitted.information, group)
+    pulls, told = by_group(fitted.gradient, group), by_group(fitted.information.dense(), group)
     groups = len(pulls)
     rest = told.sum(axis=0) + ridge(fitted.predictor) - told
     squares = np.array([np.linalg.lstsq(rest[g], pulls[g], rcond=1e-12)[0] for g in range(groups)]) ** 2

@@ -64,7 +64,7 @@ class Stepper:
         return objective(self.predictor, point.residual, point.offsets, self.scatter)
 
     def _normal_equations(self, terms: Terms) -> tuple[Floats, Floats]:
-        return terms.information.sum(axis=0) + ridge(self.predictor), terms.gradient.sum(axis=0)
+        return terms.information.total + ridge(self.predictor), terms.gradient.sum(axis=0)
 
     def _move(self, point: Point, terms: Terms, matrix: Floats, gradient: Floats) -> tuple[Floats, Floats]:
         move = self._bounded(matrix, gradient, point.parameters)

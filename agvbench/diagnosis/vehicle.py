@@ -20,7 +20,7 @@ _DIGITS = 9
 def corrected_vehicle(header: HeaderLike, geometry: Geometry, fitted: Fit, maps: FreeMaps, seed: int) -> VehicleModel:
     """Return the vehicle that `fitted` describes; its maps are tables, made monotone where scatter made them turn."""
     where = maps.slices()
-    weight = np.maximum(np.diagonal(fitted.information.sum(axis=0)), 1e-6)
+    weight = np.maximum(np.diagonal(fitted.information.total), 1e-6)
     values = {role: fitted.parameters[own] for role, own in where.items()}
     front, rear = (_table(maps.nodes[r], values[r], weight[where[r]]) for r in ("front", "rear"))
     place = int(np.searchsorted(maps.nodes["drive"], maps.neutral))
