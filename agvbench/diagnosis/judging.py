@@ -64,9 +64,7 @@ def _cross_validated_windows(fitted: Fit, fold: NDArray[np.int64], bounds: Float
     total = fitted.information.total + np.eye(count)
     for k in np.unique(fold):
         out = fold == k
-        others = (
-            fitted.information.total_of(~out) + np.eye(count) * np.r_[np.ones(maps), np.full(count - maps, 1e-4)]
-        )
+        others = fitted.information.total_of(~out) + np.eye(count) * np.r_[np.ones(maps), np.full(count - maps, 1e-4)]
         step = np.linalg.lstsq(others, fitted.gradient[~out].sum(axis=0), rcond=1e-12)[0]
         moved = fitted.parameters.copy()
         moved[maps:] = np.clip(moved[maps:] + step[maps:], bounds[:, 0], bounds[:, 1])

@@ -17,8 +17,9 @@ def compiled(*, fast: bool = False, inner: bool = False, inline: bool = False) -
     """Return numba's decorator for a function at module level: cached on disk, without the interpreter's lock.
 
     An `inner` function is called from compiled functions only, which saves compiling its wrapper, and becomes a part
-    of them: left to itself the compiler stops doing so at some size, and the simulation takes a third longer. With
-    `inline` its body goes into the caller before types are known, so that constants reach it.
+    of them: left to itself the compiler stops doing so at some size, and the simulation takes a third longer. It may
+    not make arrays, and so counts no references to any: atomic, at every step, those took a quarter of the simulation.
+    With `inline` its body goes into the caller before types are known, so that constants reach it.
     Division by zero gives an infinity as in NumPy: a check for it would keep loops from being vectorised.
     """
     decorator: Callable[[F], F] = njit(
@@ -30,5 +31,6 @@ def compiled(*, fast: bool = False, inner: bool = False, inline: bool = False) -
         forceinline=inner,
         no_cpython_wrapper=inner,
         no_cfunc_wrapper=inner,
+        _nrt=not inner,
     )
     return decorator

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from whole_information import every_parameter
 
 from agvbench.diagnosis.judging import cross_validated
 
@@ -23,7 +24,7 @@ def linear_fit(design, measured):
         ),
         parameters=best,
         loss=np.sum(miss**2, axis=1),
-        information=np.einsum("rki,rkj->rij", design, design),
+        information=every_parameter(np.einsum("rki,rkj->rij", design, design)),
         gradient=np.einsum("rki,rk->ri", design, miss),
     )  # fmt: skip
 

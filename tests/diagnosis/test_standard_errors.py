@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from whole_information import every_parameter
 
 from agvbench.diagnosis.standard_errors import standard_errors
 
@@ -21,7 +22,7 @@ def fitted(slopes, missed):
             maps=SimpleNamespace(size=0), parameter_names=["slope"], readings=SimpleNamespace(begins=None)
         ),
         gradient=(slopes * (missed - slopes * value))[:, None],
-        information=(slopes**2)[:, None, None],
+        information=every_parameter((slopes**2)[:, None, None]),
         covariance=np.array([[1.0 / float(slopes @ slopes)]]),
     ), value
 
