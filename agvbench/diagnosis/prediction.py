@@ -61,38 +61,40 @@ class Predictor:
         return np.column_stack([front, rear, speed]), initial
 
     def predict(self, parameters: Floats, offsets: Floats | None = None) -> Floats:
-        """Return poses (R, K, 3) for parameters (P,) and offsets (R, 6), by default none."""
+        """Return poses (R, K, 3) for parameters (P,) and offsets (R, 6), by default none.
+
+        Those of the last time are kept, and so not to be written to: a fit looks around where it has just stepped.
+        """
         offsets = np.zeros((len(self.readings), len(OFFSETS))) if offsets is None else offsets
-        settled, initial = self._inputs(parameters, offsets)
-        return self._simulate(settled, parameters[self.maps.size :], initial)
+        asked = (parameters.tobytes(), offsets.tobytes())
+        if asked != self._last[0]:
+            settled, initial = self._inputs(parameters, offsets)
+            poses = self._simulate(settled, parameters[self.maps.size :], initial)
+            poses.flags.writeable = False
+            self._last = asked, poses
+        return self._last[1]
 
     def _simulate(self, settled: Floats, own: Floats, initial: Floats) -> Floats:
-        """Return poses (R, K, 3); those of the last time are kept, for a fit looks around where it has just stepped."""
-        asked = (settled.tobytes(), own.tobytes(), initial.tobytes())
-        if asked != self._last[0]:
-            poses = self.batch.base.predict(settled, self._all(own), initial, level_scatter=self.batch.level_scatter)
-            poses.flags.writeable = False
-            self._last = asked, poses.reshape(len(self.readings), -1, 3)
-        return self._last[1]
+        poses = self.batch.base.predict(settled, self._all(own), initial, level_scatter=self.batch.level_scatter)
+        return poses.reshape(len(self.readings), -1, 3)
 
     def linearise(self, parameters: Floats, offsets: Floats, near: Linearised | None = None) -> Linearised:
         """Return poses and derivatives about parameters (P,) and offsets (R, 6).
 
         Where `near` is given, derivatives by the maps' values and by offsets are taken from there.
         """
-        settled, initial = self._inputs(parameters, offsets)
-        own = parameters[self.maps.size :]
+        base = self.predict(parameters, offsets)
         if near is None:
-            by_maps = self._by_lanes(parameters, offsets, settled, initial)
+            by_maps = self._by_lanes(parameters, offsets, base)
         else:
-            by_maps = replace(near.by_first(self.maps.size), poses=self._simulate(settled, own, initial))
-        return by_maps.with_last(self._slopes(settled, own, initial, by_maps.poses, range(len(own))))
+            by_maps = replace(near.by_first(self.maps.size), poses=base)
+        return by_maps.with_last(self._slopes(parameters, offsets, base, len(parameters) - self.maps.size))
 
-    def _by_lanes(self, parameters: Floats, offsets: Floats, settled: Floats, initial: Floats) -> Linearised:
-        """Return poses and their derivatives by the maps' values and by offsets."""
-        own, batch = parameters[self.maps.size :], self.batch
-        base = self._simulate(settled, own, initial)
-        lanes = self._simulate_lanes(settled, initial, own)
+    def _by_lanes(self, parameters: Floats, offsets: Floats, base: Floats) -> Linearised:
+        """Return poses `base` with their derivatives by the maps' values and by offsets."""
+        batch = self.batch
+        settled, initial = self._inputs(parameters, offsets)
+        lanes = self._simulate_lanes(settled, initial, parameters[self.maps.size :])
         by_own = np.zeros((*base.shape, batch.touched.shape[1]))
         columns = by_own.transpose(0, 3, 1, 2)
         by_offsets = np.zeros((*base.shape, len(OFFSETS)))
@@ -121,16 +123,15 @@ class Predictor:
 
     def by_last(self, parameters: Floats, offsets: Floats, count: int) -> tuple[Floats, Floats]:
         """Return poses (R, K, 3), and their derivatives by the last `count` parameters (R, K, 3, count)."""
+        base = self.predict(parameters, offsets)
+        return base, self._slopes(parameters, offsets, base, count)
+
+    def _slopes(self, parameters: Floats, offsets: Floats, base: Floats, count: int) -> Floats:
+        """Return the derivatives (R, K, 3, count) of poses `base` by the last of the effects' parameters."""
         settled, initial = self._inputs(parameters, offsets)
         own = parameters[self.maps.size :]
-        base = self._simulate(settled, own, initial)
-        last = range(len(own) - count, len(own))
-        return base, self._slopes(settled, own, initial, base, last)
-
-    def _slopes(self, settled: Floats, own: Floats, initial: Floats, base: Floats, which: range) -> Floats:
-        """Return the derivatives (R, K, 3, q) of poses `base` by some of the effects' parameters."""
-        slopes = np.empty((*base.shape, len(which)))
-        for column, k in enumerate(which):
+        slopes = np.empty((*base.shape, count))
+        for column, k in enumerate(range(len(own) - count, len(own))):
             moved = own.copy()
             moved[k] += self._steps[k]
             slopes[..., column] = (self._simulate(settled, moved, initial) - base) / self._steps[k]
