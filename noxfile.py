@@ -18,6 +18,7 @@ nox.options.reuse_existing_virtualenvs = True
 nox.options.sessions = ["lint", "tests", "docs"]
 
 LOCK = "requirements.lock"
+SIDE_BY_SIDE = ("-n", "2", "--dist", "worksteal")
 FIRMWARE_PACKAGES = ["make", "gcc", "libc6-dev", "gcc-avr", "avr-libc", "simavr", "libsimavr-dev"]
 
 
@@ -36,16 +37,23 @@ def bench(session: nox.Session) -> None:
 
 @nox.session
 def tests(session: nox.Session) -> None:
-    """Run all tests, with coverage; what fails is run once more, alone, and has to pass then."""
+    """Run all tests; what fails is run once more, alone, and has to pass then."""
     install(session, "test")
     if session.posargs:
         session.run("pytest", *session.posargs)
         return
     try:
-        session.run("pytest", "--cov", "--cov-report=term:skip-covered", "-n", "2", "--dist", "worksteal")
+        session.run("pytest", *SIDE_BY_SIDE)
     except CommandFailed:
         # Vehicles, cameras and a bus in real time share the machine with the other worker and whoever else is there.
         session.run("pytest", "--last-failed", "--last-failed-no-failures", "none")
+
+
+@nox.session
+def coverage(session: nox.Session) -> None:
+    """Run all tests and list the lines that none reaches, in nearly twice the time; too many are an error."""
+    install(session, "test")
+    session.run("pytest", "--cov", "--cov-report=term:skip-covered", *(session.posargs or SIDE_BY_SIDE))
 
 
 @nox.session(venv_backend="none")
