@@ -109,7 +109,8 @@ class Host(ABC):
 
         try:
             self._session.put(key, payload, congestion_control=zenoh.CongestionControl.BLOCK)
-        except self._zenoh_error:
+        except (self._zenoh_error, RuntimeError):
+            # The session is closed, or just being closed by another thread: nobody is told any more.
             return
 
     def _fail(self, error: Exception, acknowledged: int = 0) -> None:
