@@ -45,11 +45,11 @@ class Batch:
         self.drives = self.commands["drive"] != maps.neutral
         owns = [np.arange(a, b) for a, b in pairwise(self.base.row_starts.tolist())]
         self.by_node = sum(map(self._count_nodes, owns)) < sum(map(self._count_levels, owns))
-        varied = [list(self._nodes(own) if self.by_node else self._levels(own)) for own in owns]
+        changes = [list(self._nodes(own) if self.by_node else self._levels(own)) for own in owns]
         run, kind, row, changed = [], [], [], []
         for i, own in enumerate(owns):
             still = np.zeros((len(own), len(ROLES)))
-            for role, first, change in [("heading", -1, still), *varied[i]]:
+            for role, first, change in [("heading", -1, still), *changes[i]]:
                 run.append(i)
                 kind.append(role)
                 row.append(first)
@@ -57,9 +57,8 @@ class Batch:
         self.lane_run = np.array(run)
         self.lanes = Simulation(geometry, maps.neutral, [runs[i] for i in run], kinds=kinds)
         self.touched = self._touched(owns)
-        kinds_of = np.array(kind)
-        self.turned = kinds_of == "heading"
-        self.varied = {role: self._varied(role, kinds_of == role, np.array(row)) for role in ROLES}
+        self.turned = np.array(kind) == "heading"
+        self.varied = self._varied(np.array(kind), np.array(row))
         self.rows = np.concatenate([owns[i] for i in run])
         self.row_change = np.concatenate(changed)
 
@@ -70,15 +69,17 @@ class Batch:
         )
         return np.argsort(~used, axis=1, kind="stable")[:, : max(1, int(used.sum(axis=1).max()))]
 
-    def _varied(self, role: str, own: NDArray[np.bool_], row: NDArray[np.int64]) -> Lanes:
-        """Return the lanes that vary a level of `role`, of which `row` has a row, or one of its nodes."""
-        lane = np.flatnonzero(own)
-        nodes = len(self.maps.nodes[role])
-        weights = np.eye(nodes)[row[lane]] if self.by_node else self.weights[role][row[lane]]
+    def _varied(self, kind: NDArray[np.str_], row: NDArray[np.int64]) -> dict[str, Lanes]:
+        """Return by role the lanes of that `kind` (lanes,): each varies a level that `row` has, or the node `row`."""
         # In which column of `touched` each run has each of the values.
         column = np.full((len(self.touched), self.maps.size), -1)
         np.put_along_axis(column, self.touched, np.arange(self.touched.shape[1])[None, :], axis=1)
-        return Lanes.of(lane, self.lane_run[lane], row[lane], weights, column[:, self.maps.slices()[role]])
+        varied = {}
+        for role, own in self.maps.slices().items():
+            lane = np.flatnonzero(kind == role)
+            values = np.eye(len(self.maps.nodes[role])) if self.by_node else self.weights[role]
+            varied[role] = Lanes.of(lane, self.lane_run[lane], row[lane], values[row[lane]], column[:, own])
+        return varied
 
     def _count_levels(self, own: NDArray[np.int64]) -> int:
         drives = self.drives[own]

@@ -84,14 +84,14 @@ class Judge:
         """Return the log likelihood that `columns` gain in folds left out, and their sizes fitted to all."""
         clean = {k: self._clean(k, c) / self.size[k] for k, c in columns.items()}
         forms, pulls = (np.array(of) for of in zip(*(self._products(k, c) for k, c in clean.items()), strict=True))
-        without, whole = forms.sum(axis=0), pulls.sum(axis=0)
-        matrix, pull = without.sum(axis=0), whole.sum(axis=0)
+        of_folds, pulls_of_folds = forms.sum(axis=0), pulls.sum(axis=0)
+        matrix, pull = of_folds.sum(axis=0), pulls_of_folds.sum(axis=0)
         ridge = (1e-9 * np.trace(matrix) + 1e-300) * np.eye(len(pull))
-        # Fitted to all, and without each fold.
-        left = np.concatenate([matrix[None], matrix - without]) + ridge
-        sizes = np.linalg.solve(left, np.vstack([pull, pull - whole])[..., None])[..., 0]
-        fitted = sizes[1:]
-        change = np.einsum("fi,kfij,fj->k", fitted, forms, fitted) - 2.0 * np.einsum("kfi,fi->k", pulls, fitted)
+        # Fitted to all, then without each fold.
+        left, pulls_left = np.concatenate([matrix[None], matrix - of_folds]), np.vstack([pull, pull - pulls_of_folds])
+        sizes = np.linalg.solve(left + ridge, pulls_left[..., None])[..., 0]
+        others = sizes[1:]
+        change = np.einsum("fi,kfij,fj->k", others, forms, others) - 2.0 * np.einsum("kfi,fi->k", pulls, others)
         gain = -np.log(np.maximum(1.0 + change / len(self.root), _LEAST)).sum()
         return float(0.5 * self.count * gain), sizes[0]
 

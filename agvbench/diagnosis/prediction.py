@@ -83,17 +83,18 @@ class Predictor:
 
         Where `near` is given, derivatives by the maps' values and by offsets are taken from there.
         """
-        base = self.predict(parameters, offsets)
+        base, inputs = self.predict(parameters, offsets), self._inputs(parameters, offsets)
         if near is None:
-            by_maps = self._by_lanes(parameters, offsets, base)
+            by_maps = self._by_lanes(parameters, offsets, base, *inputs)
         else:
             by_maps = replace(near.by_first(self.maps.size), poses=base)
-        return by_maps.with_last(self._slopes(parameters, offsets, base, len(parameters) - self.maps.size))
+        return by_maps.with_last(self._slopes(parameters, base, *inputs, len(parameters) - self.maps.size))
 
-    def _by_lanes(self, parameters: Floats, offsets: Floats, base: Floats) -> Linearised:
+    def _by_lanes(
+        self, parameters: Floats, offsets: Floats, base: Floats, settled: Floats, initial: Floats
+    ) -> Linearised:
         """Return poses `base` with their derivatives by the maps' values and by offsets."""
         batch = self.batch
-        settled, initial = self._inputs(parameters, offsets)
         lanes = self._simulate_lanes(settled, initial, parameters[self.maps.size :])
         by_own = np.zeros((*base.shape, batch.touched.shape[1]))
         columns = by_own.transpose(0, 3, 1, 2)
@@ -124,11 +125,10 @@ class Predictor:
     def by_last(self, parameters: Floats, offsets: Floats, count: int) -> tuple[Floats, Floats]:
         """Return poses (R, K, 3), and their derivatives by the last `count` parameters (R, K, 3, count)."""
         base = self.predict(parameters, offsets)
-        return base, self._slopes(parameters, offsets, base, count)
+        return base, self._slopes(parameters, base, *self._inputs(parameters, offsets), count)
 
-    def _slopes(self, parameters: Floats, offsets: Floats, base: Floats, count: int) -> Floats:
+    def _slopes(self, parameters: Floats, base: Floats, settled: Floats, initial: Floats, count: int) -> Floats:
         """Return the derivatives (R, K, 3, count) of poses `base` by the last of the effects' parameters."""
-        settled, initial = self._inputs(parameters, offsets)
         own = parameters[self.maps.size :]
         slopes = np.empty((*base.shape, count))
         for column, k in enumerate(range(len(own) - count, len(own))):
