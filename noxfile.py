@@ -53,7 +53,8 @@ def tests(session: nox.Session) -> None:
 def coverage(session: nox.Session) -> None:
     """Run all tests and list the lines that none reaches, in nearly twice the time; too many are an error."""
     install(session, "test")
-    session.run("pytest", "--cov", "--cov-report=term:skip-covered", *(session.posargs or SIDE_BY_SIDE))
+    arguments = session.posargs or ("--cov-fail-under=90", *SIDE_BY_SIDE)
+    session.run("pytest", "--cov", "--cov-report=term:skip-covered", *arguments)
 
 
 @nox.session(venv_backend="none")
