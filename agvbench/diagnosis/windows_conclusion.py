@@ -61,7 +61,7 @@ class WindowConclusion:
         }
         before = predicted["static"]
         if asked.vehicle is not None:
-            before = predicted["believed"] = believed(asked.vehicle, self.judged)
+            before = predicted["believed"] = believed(asked.vehicle, self.judged, self.selector.batch.kinds)
         shaken = by_speed_error(Predictor(self._every, chosen.fit.predictor.effects), chosen.fit.parameters)
         effects = named_effects(self.selection, bounds_of(self.selector.candidates, chosen.names))
         held_out = self._held_out(before, poses, shaken)

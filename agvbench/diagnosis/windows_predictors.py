@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from agvbench.diagnosis.fitting import Fit
 from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.reading import Readings
 from agvbench.diagnosis.windows_split import _begins
+from agvbench.effects import Effect
 from agvbench.model import VehicleModel
 from agvbench.model.simulated_run import SimulatedRun
 from agvbench.model.simulation import Simulation
@@ -52,17 +54,17 @@ def by_speed_error(predictor: Predictor, parameters: Floats) -> Floats:
     return shaken.predict(parameters) - before
 
 
-def believed(vehicle: VehicleModel, readings: Readings) -> Floats:
-    """Return poses (W, K, 3) that a vehicle model predicts."""
+def believed(vehicle: VehicleModel, readings: Readings, kinds: Sequence[type[Effect]]) -> Floats:
+    """Return poses (W, K, 3) that a vehicle model predicts; `kinds` are its effects beyond the library's."""
     begins = _begins(readings)
     runs = [
         SimulatedRun(run.commands, t, float(h), begins_s=float(b))
         for run, t, h, b in zip(readings.runs, readings.t_s, readings.started_h, begins.t_s, strict=True)
     ]
-    simulation = Simulation(vehicle.geometry, vehicle.neutral, runs)
+    simulation = Simulation(vehicle.geometry, vehicle.neutral, runs, kinds=kinds)
     settled = simulation.settled(vehicle.front, vehicle.rear, vehicle.drive)
     initial = np.column_stack([readings.start, begins.speed_mps])
-    poses = simulation.predict(settled, simulation.parameters(vehicle.effects), initial)
+    poses = simulation.predict(settled, simulation.parameters([e for e in vehicle.effects if not e.is_null]), initial)
     return poses.reshape(len(readings), -1, 3)
 
 
@@ -78,7 +80,7 @@ def level_scatter(predictor: Predictor, parameters: Floats) -> float:
     ]
     settled, initial = predictor.settled(parameters)
     initial[:, 3] = np.nan
-    simulation = Simulation(batch.geometry, batch.maps.neutral, shortly)
+    simulation = Simulation(batch.geometry, batch.maps.neutral, shortly, kinds=batch.kinds)
     moved = simulation.predict(settled, predictor.all_parameters(parameters), initial) - initial[:, :3]
     told = (np.cos(initial[:, 2]) * moved[:, 0] + np.sin(initial[:, 2]) * moved[:, 1]) / _SHORTLY_S
     use = (np.abs(told) > _SLOW_MPS) & (told * begins.speed_mps > 0.0) & (np.abs(begins.speed_mps) > _SLOW_MPS)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 from free_drives import FREE_HEADER, free_runs
 from tiny_vehicle import Tiny
 
 from agvbench.diagnosis import Diagnosis, Verdict, diagnose
+from agvbench.effects.forms import effect_forms
 from agvbench.errors import CampaignError
+from agvbench.model import VehicleModel
 from agvbench.types import Run
 
 
@@ -58,6 +61,19 @@ def test_every_effect_is_listed_with_what_it_does_to_sessions_held_out(lagging):
     own = effects["steering_lag"]["held_out_position_mm"]
     assert own["with"] < own["without"]
     assert {"lateral_slip", "speed_lag", "mocap_latency"} < set(effects)
+
+
+def test_a_corrected_vehicle_with_another_law_is_diagnosed_again(lagging, tmp_path):
+    law = effect_forms()["steering_lag_inertia"](time_constant_s=0.25, inertia_s=0.01)
+    replace(lagging.model, effects=(law,)).save(tmp_path / "corrected.toml")
+    again = diagnose(
+        FreeCampaign(free_runs(Tiny(steering_lag_s=0.25), runs=1, seconds=20.0)),
+        vehicle=VehicleModel.load(tmp_path / "corrected.toml"),
+    )
+    assert not again.effects
+    position = again.held_out.errors["position_rms_mm"]
+    assert position["before"] == pytest.approx(position["after"], rel=0.2)
+    assert [effect.name for effect in again.model.effects] == ["steering_lag_inertia"]
 
 
 def test_nothing_is_named_where_nothing_is_hidden():
