@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from agvbench.campaign.manifest import sha256
 from agvbench.campaign.recording import Recording
 
 Account = dict[str, Any]
@@ -39,9 +38,3 @@ def why_nothing(accounts: list[Account]) -> str:
     totals = {reason: sum(account[reason] for account in accounts) for reason in reasons}
     counted = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in totals.items())
     return f"no run is left of {sum(account['rows'] for account in accounts)} rows ({counted})"
-
-
-def sha256(path: Path) -> str:
-    """Return the SHA-256 of a file, in hexadecimal."""
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -31,15 +31,21 @@ def write_atomically(path: Path, data: bytes | memoryview, *, durable: bool = Tr
 
 
 def replace_whole(path: Path, write: Callable[[Path], object]) -> None:
-    """Have `write` write a file beside `path`, and put it in its place once it is whole."""
+    """Have `write` write a file beside `path`, and put it in its place once it is whole and on the disk."""
     temporary = path.with_name(TEMPORARY_PREFIX + path.name)
-    write(temporary)
+    try:
+        write(temporary)
+        _force_to_disk(temporary)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
     temporary.replace(path)
+    _force_to_disk(path.parent)
 
 
-def _force_to_disk(directory: Path) -> None:
-    """Let the names in `directory` outlive a power cut."""
-    descriptor = os.open(directory, os.O_RDONLY)
+def _force_to_disk(path: Path) -> None:
+    """Let a file's content, or the names in a directory, outlive a power cut."""
+    descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
     finally:

@@ -13,6 +13,7 @@ import pyarrow as pa
 
 from agvbench.campaign.checks import check_commands, check_poses, check_runs
 from agvbench.campaign.header import FILE_NAME, CampaignHeader
+from agvbench.campaign.manifest import Manifest
 from agvbench.campaign.schema import COMMANDS, POSES, RUNS, TABLES
 from agvbench.campaign.source import Source
 from agvbench.campaign.timed import TimedTable, blank_untracked
@@ -32,8 +33,11 @@ class Campaign:
     Runs are ordered by when they started. Get one with `Campaign.open`.
     """
 
-    def __init__(self, path: Path, header: CampaignHeader, runs: pa.Table, sources: dict[str, Source]) -> None:
+    def __init__(
+        self, path: Path, header: CampaignHeader, runs: pa.Table, sources: dict[str, Source], manifest: Manifest
+    ) -> None:
         self.path = path
+        self._manifest = manifest
         self.header = header
         self._runs = runs
         self._sources = sources
@@ -47,14 +51,17 @@ class Campaign:
         Raises
         ------
         CampaignError
-            If a file is absent or damaged, or the head or the runs table contradict the schema.
+            If a file is absent, damaged or has changed since it was recorded, or the head or the runs table contradict
+            the schema.
         """
         path = Path(path)
         if not path.is_dir():
             what = "is not a directory" if path.exists() else "does not exist"
             raise CampaignError(what, where=path, remedy="give a campaign directory")
+        manifest = Manifest(path)
+        manifest.check_beside()
         header = CampaignHeader.load(path / FILE_NAME)
-        sources = {name: Source.find(path, name) for name in TABLES}
+        sources = {name: Source.find(path, name, manifest) for name in TABLES}
         runs = sources["runs"].read(RUNS)
         check_runs(runs, sources["runs"].path)
         if not runs.num_rows:
@@ -62,7 +69,7 @@ class Campaign:
                 "has no finished runs", where=sources["runs"].path, remedy="resume the campaign, or drive it again"
             )
         order = np.argsort(runs["started_s"].to_numpy(), kind="stable")
-        return cls(path, header, runs.take(pa.array(order)), sources)
+        return cls(path, header, runs.take(pa.array(order)), sources, manifest)
 
     def check(self) -> Campaign:
         """Read and check every table now; return self.
@@ -121,7 +128,7 @@ class Campaign:
         CampaignError
             If there is none of that name.
         """
-        frame: pd.DataFrame = Source.find(self.path, name).read(()).to_pandas()
+        frame: pd.DataFrame = Source.find(self.path, name, self._manifest).read(()).to_pandas()
         return frame
 
     @cached_property

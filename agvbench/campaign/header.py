@@ -10,8 +10,8 @@ from typing import Annotated, Any
 
 import msgspec
 
-from agvbench.campaign.atomic import write_atomically
 from agvbench.campaign.explain import explain
+from agvbench.campaign.manifest import record
 from agvbench.errors import CampaignError, FileError
 from agvbench.text_files import read_toml
 from agvbench.types import CommandUnit
@@ -117,7 +117,7 @@ class CampaignHeader:
             ) from None
 
     def save(self, path: str | Path) -> None:
-        """Write ``campaign.toml``: renamed into place when whole."""
+        """Write ``campaign.toml``, renamed into place when whole, and list its hash."""
         import tomli_w
 
         table: dict[str, Any] = {
@@ -135,7 +135,7 @@ class CampaignHeader:
         prediction = {"horizon_s": self.prediction_horizon_s, "stride_s": self.prediction_stride_s}
         if given := {key: value for key, value in prediction.items() if value is not None}:
             table["prediction"] = given
-        write_atomically(Path(path), tomli_w.dumps(table).encode())
+        record(Path(path).parent, {Path(path).name: tomli_w.dumps(table).encode()})
 
 
 class _Vehicle(msgspec.Struct):

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from agvbench import __version__
-from agvbench.campaign.accounts import Account, account_for, sha256, why_nothing
+from agvbench.campaign.accounts import Account, account_for, why_nothing
 from agvbench.campaign.campaign import Campaign
 from agvbench.campaign.cutting import cut
 from agvbench.campaign.header import CampaignHeader
+from agvbench.campaign.manifest import sha256
 from agvbench.campaign.mapping import find_mapping, load_mapping
 from agvbench.campaign.mapping_schema import FileRule, Mapping
 from agvbench.campaign.parts import parts_of

@@ -39,6 +39,7 @@ def to_parquet(table: pa.Table) -> memoryview:
         column_encoding=encodings,
         write_statistics=False,
         store_schema=False,
+        write_page_checksum=True,
     )
     return memoryview(sink.getvalue())
 
@@ -53,7 +54,7 @@ def read_parquet(path: Path, *, max_rows: int = MAX_ROWS) -> pa.Table:
     """
     try:
         with pa.OSFile(str(path)) as source:
-            file = pq.ParquetFile(source)
+            file = pq.ParquetFile(source, page_checksum_verification=True)
             if file.metadata.num_rows > max_rows:
                 raise CampaignError(
                     "has too many rows",

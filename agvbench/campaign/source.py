@@ -11,6 +11,7 @@ import pyarrow as pa
 from agvbench.campaign.atomic import is_temporary
 from agvbench.campaign.columns import fill_columns, type_columns
 from agvbench.campaign.csv_text import read_csv_text
+from agvbench.campaign.manifest import Manifest
 from agvbench.campaign.parquet import MAX_ROWS, read_parquet
 from agvbench.campaign.schema import Column
 from agvbench.errors import CampaignError
@@ -25,10 +26,11 @@ class Source:
     path: Path
     files: tuple[Path, ...]
     in_parts: bool
+    manifest: Manifest
 
     @classmethod
-    def find(cls, directory: Path, name: str) -> Source:
-        """Find table `name` of the campaign in `directory`.
+    def find(cls, directory: Path, name: str, manifest: Manifest) -> Source:
+        """Find table `name` of the campaign in `directory`, whose files `manifest` lists.
 
         Raises
         ------
@@ -47,7 +49,8 @@ class Source:
                 f"has table {name} twice, as {paths[0].name} and {paths[1].name}", where=directory, remedy="delete one"
             )
         path = paths[0]
-        return cls(path, parts(path), True) if path.is_dir() else cls(path, (path,), False)
+        is_directory = path.is_dir()
+        return cls(path, parts(path) if is_directory else (path,), is_directory, manifest)
 
     def read(self, columns: Sequence[Column]) -> pa.Table:
         """Read all of it, with the types of `columns`.
@@ -55,10 +58,12 @@ class Source:
         Raises
         ------
         CampaignError
-            If a file cannot be read, lacks a column, or holds a value of the wrong type.
+            If a file has changed since it was recorded, cannot be read, lacks a column, or holds a value of the wrong
+            type.
         """
         tables, room = [], MAX_ROWS
         for file in self.files:
+            self.manifest.check(file)
             tables.append(type_columns(_read_file(file, columns, room), columns, file))
             room -= tables[-1].num_rows
         if not tables:

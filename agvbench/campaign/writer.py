@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
-from agvbench.campaign.atomic import is_temporary, replace_whole, write_atomically
+from agvbench.campaign.atomic import TEMPORARY_PREFIX, is_temporary
 from agvbench.campaign.checks import check_commands, check_poses, check_runs
 from agvbench.campaign.header import FILE_NAME, CampaignHeader
+from agvbench.campaign.manifest import Manifest, record
 from agvbench.campaign.parquet import to_parquet
 from agvbench.campaign.parts import part_name, parts_of, run_id_of
 from agvbench.campaign.schema import TABLES
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+_LISTED = frozenset((".toml", ".parquet"))
 _FULL = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EFBIG))
 
 
@@ -79,9 +81,11 @@ class CampaignWriter:
         Raises
         ------
         CampaignError
-            If there is no campaign, it was begun with another header, or its tables are single files.
+            If there is no campaign, it was begun with another header, its tables are single files, or a file has
+            changed since it was recorded.
         """
         path = Path(path)
+        Manifest(path).check_beside()
         stored = CampaignHeader.load(path / FILE_NAME)
         for field in fields(header):
             old, new = getattr(stored, field.name), getattr(header, field.name)
@@ -107,6 +111,13 @@ class CampaignWriter:
             self._remove(orphans)
         for directory in (self.path, *(self.path / f"{name}.parquet" for name in TABLES)):
             self._remove(file for file in sorted(directory.iterdir()) if is_temporary(file) and file.is_file())
+        with self._recording():
+            Manifest(self.path).renew(self._files(), durable=self._durable)
+
+    def _files(self) -> list[Path]:
+        """Return the files that belong to the campaign: heads, further tables and parts."""
+        beside = (file for file in sorted(self.path.iterdir()) if file.suffix in _LISTED and file.is_file())
+        return [*beside, *(part for name in TABLES for part in parts(self.path / f"{name}.parquet"))]
 
     def _remove(self, files: Iterable[Path]) -> None:
         for file in files:
@@ -149,9 +160,9 @@ class CampaignWriter:
         name = part_name(run.run_id)
         tables = parts_of(run)
         check_parts(tables, self.path, self.header.command_unit)
+        files = {f"{table}.parquet/{name}": to_parquet(part) for table, part in tables.items()}
         with self._recording():
-            for table, part in tables.items():
-                write_atomically(self.path / f"{table}.parquet" / name, to_parquet(part), durable=self._durable)
+            record(self.path, files, durable=self._durable)
         self._finished[run.run_id] = None
 
     def write_table(self, name: str, table: pd.DataFrame) -> None:
@@ -170,7 +181,7 @@ class CampaignWriter:
             )
         arrow = pa.Table.from_pandas(table, preserve_index=False).replace_schema_metadata(None)
         with self._recording():
-            write_atomically(self.path / f"{name}.parquet", to_parquet(arrow), durable=self._durable)
+            record(self.path, {f"{name}.parquet": to_parquet(arrow)}, durable=self._durable)
 
     def write_beside(self, name: str, write: Callable[[Path], object]) -> None:
         """Have `write` write a further file, such as ``vehicle.toml``: it is there as a whole or not at all.
@@ -181,7 +192,9 @@ class CampaignWriter:
             If the disk refuses.
         """
         with self._recording():
-            replace_whole(self.path / name, write)
+            temporary = self.path / f"{TEMPORARY_PREFIX}{name}"
+            write(temporary)
+            record(self.path, {name: temporary.read_bytes()}, durable=self._durable)
 
 
 def check_parts(tables: Mapping[str, pa.Table], where: Path, unit: CommandUnit) -> None:

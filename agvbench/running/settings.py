@@ -12,7 +12,7 @@ from typing import Any, get_args
 import tomli_w
 
 from agvbench.adapters.impairment.spec import unimpaired, without_packet_faults
-from agvbench.campaign.atomic import write_atomically
+from agvbench.campaign.manifest import record
 from agvbench.errors import FileError, FlagError
 from agvbench.planning.segments import Steering
 from agvbench.running.supervision.limits import DEFAULT_SAFETY
@@ -119,7 +119,7 @@ class BenchSettings:
         """
         path = directory / SETTINGS_FILE
         try:
-            write_atomically(path, tomli_w.dumps(asdict(self)).encode())
+            record(directory, {SETTINGS_FILE: tomli_w.dumps(asdict(self)).encode()})
         except OSError as error:
             raise FileError("cannot be written", where=path, value=error.strerror, remedy="free some space") from None
 

@@ -118,6 +118,12 @@ def _too_many_rows() -> None:
     read_parquet(HERE / "poses.parquet", max_rows=5)
 
 
+def _changed() -> None:
+    CampaignWriter.create(HERE, HEADER).append(make_run("a"))
+    _scratch(HERE / "poses.parquet" / "a.parquet")
+    _open()
+
+
 def _unknown_run() -> None:
     Campaign.open(write_campaign(HERE)).run("z")
 
@@ -187,6 +193,7 @@ CASES: Cases = {
     ),
     "parquet-empty": ("a parquet file of no bytes", _file("poses.parquet", lambda p: p.write_bytes(b""))),
     "parquet-damaged": ("parquet pages overwritten with zeros", _file("poses.parquet", _scratch)),
+    "file-changed": ("a recorded file that was overwritten in part", _changed),
     "parquet-too-long": ("more rows than the limit (lowered to 5 here)", _too_many_rows),
     "parts-disagree": ("an extra column that is a number in one part and text in another", _parts_disagree),
     "csv-semicolons": ("CSV separated by semicolons", _poses_csv(lambda t: t.replace(",", ";").encode())),

@@ -1,0 +1,127 @@
+"""SHA-256 hashes of a campaign's finished files, in the format of ``sha256sum``: damage is found when they are read.
+
+A hash is appended before its file is renamed into place. Whatever interrupts the two, a file has its hash; a hash
+without its file, or beside that of the file's earlier content, raises no alarm. Files that are not listed are read
+without this check: campaigns of other programs have no list.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from agvbench.campaign.atomic import write_atomically
+from agvbench.errors import CampaignError
+
+MANIFEST_FILE = "SHA256SUMS"
+_LINE = re.compile(r"([0-9a-f]{64}) [ *](.+)")
+
+
+def record(directory: Path, files: Mapping[str, bytes | memoryview], *, durable: bool = True) -> None:
+    """Write `files` (content by path inside the campaign), each whole or not at all, and list their hashes before."""
+    hashes = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
+    _append(directory / MANIFEST_FILE, hashes, durable)
+    for name, data in files.items():
+        write_atomically(directory / name, data, durable=durable)
+
+
+def sha256(path: Path) -> str:
+    """Return the SHA-256 of a file, in hexadecimal."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+class Manifest:
+    """The hashes listed for the campaign in `directory`; none where it has no list."""
+
+    def __init__(self, directory: Path) -> None:
+        self._directory = directory
+        self._hashes = self._read()
+
+    def _read(self) -> dict[str, set[str]]:
+        """Return the hashes by path; a line that an interruption cut off is left out."""
+        try:
+            text = (self._directory / MANIFEST_FILE).read_text(encoding="utf-8", errors="replace")
+        except OSError:
+            return {}
+        hashes: dict[str, set[str]] = {}
+        for line in text.splitlines():
+            if match := _LINE.fullmatch(line):
+                hashes.setdefault(match[2], set()).add(match[1])
+        return hashes
+
+    def check(self, file: Path) -> None:
+        """Compare `file` with its hash, if it is listed.
+
+        Raises
+        ------
+        CampaignError
+            If its content is not what was recorded.
+        """
+        name = file.relative_to(self._directory).as_posix()
+        if name not in self._hashes or not file.is_file():
+            return
+        found = _hash(file)
+        if found not in self._hashes[name]:
+            self._hashes = self._read()  # a session that is recording may have replaced it since
+        if found not in self._hashes.get(name, {found}):
+            raise CampaignError(
+                f"has changed since it was recorded (its SHA-256 is not in {MANIFEST_FILE})", where=file,
+                remedy=f"restore it from a copy; to keep an intended change, delete its line in {MANIFEST_FILE}",
+            )  # fmt: skip
+
+    def check_beside(self) -> None:
+        """Check every listed file that lies beside the tables' parts, such as ``vehicle.toml``.
+
+        Raises
+        ------
+        CampaignError
+            As `check`.
+        """
+        for name in self._hashes:
+            if "/" not in name:
+                self.check(self._directory / name)
+
+    def renew(self, files: Iterable[Path], *, durable: bool = True) -> None:
+        """Check `files` and write the list again: one line for each of them, listed before or not.
+
+        Raises
+        ------
+        CampaignError
+            As `check`.
+        """
+        present = {file.relative_to(self._directory).as_posix(): file for file in files}
+        for file in present.values():
+            self.check(file)
+        ordered = [name for name in self._hashes if name in present]
+        ordered += [name for name in present if name not in self._hashes]
+        lines = _lines({name: _hash(present[name]) for name in ordered})
+        write_atomically(self._directory / MANIFEST_FILE, lines, durable=durable)
+
+
+def _hash(file: Path) -> str:
+    try:
+        return sha256(file)
+    except OSError as error:
+        raise CampaignError(f"cannot be read ({error.strerror})", where=file, remedy="check permissions") from None
+
+
+def _lines(hashes: Mapping[str, str]) -> bytes:
+    return "".join(f"{digest}  {name}\n" for name, digest in hashes.items()).encode()
+
+
+def _append(path: Path, hashes: Mapping[str, str], durable: bool) -> None:
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+    try:
+        size = os.fstat(descriptor).st_size
+        cut_off = size > 0 and os.pread(descriptor, 1, size - 1) != b"\n"
+        data = memoryview(b"\n" * cut_off + _lines(hashes))
+        while data:
+            data = data[os.write(descriptor, data) :]
+        if durable:
+            os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
