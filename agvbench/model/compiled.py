@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from numba import njit
+from agvbench.compiled import cached_njit
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -22,8 +22,7 @@ def compiled(*, fast: bool = False, inner: bool = False, inline: bool = False) -
     With `inline` its body goes into the caller before types are known, so that constants reach it.
     Division by zero gives an infinity as in NumPy: a check for it would keep loops from being vectorised.
     """
-    decorator: Callable[[F], F] = njit(
-        cache=True,
+    return cached_njit(
         nogil=True,
         error_model="numpy",
         fastmath=set(FAST) if fast else False,
@@ -33,4 +32,3 @@ def compiled(*, fast: bool = False, inner: bool = False, inline: bool = False) -
         no_cfunc_wrapper=inner,
         _nrt=not inner,
     )
-    return decorator

@@ -2,14 +2,12 @@
 
 The kernel is a real module file, so that numba can keep its machine code: the text of `simulation_loop`, and of the
 files that it calls and that know of stages, with one function per stage that calls the hooks in turn. The file's name
-has a hash of everything that goes into it, for numba itself does not notice a changed function in another file. It lies
-in ``$AGVBENCH_CACHE``, else in the user's cache.
+has a hash of every source that goes into it; see `agvbench.compiled`.
 """
 
 from __future__ import annotations
 
 import ast
-import hashlib
 import importlib.util
 import inspect
 import os
@@ -20,23 +18,10 @@ from functools import cache
 from pathlib import Path
 from types import ModuleType
 
-import numba
-
+from agvbench.compiled import cache_directory, source_digest
 from agvbench.effects import HOOKS, TIME_HOOKS, Effect
-from agvbench.effects import state as state_module
 from agvbench.errors import FileError
-from agvbench.model import compiled as compiled_module
-from agvbench.model import (
-    simulation_actuators,
-    simulation_frames,
-    simulation_layout,
-    simulation_level,
-    simulation_loop,
-    simulation_servos,
-    simulation_smoothing,
-    simulation_stages,
-    simulation_step,
-)
+from agvbench.model import simulation_frames, simulation_level, simulation_loop, simulation_stages, simulation_step
 
 # The files of the kernel that call stages, or what calls them, each after those that it imports.
 _PARTS = (simulation_frames, simulation_step, simulation_level, simulation_loop)
@@ -57,9 +42,9 @@ def kernel(kinds: tuple[type[Effect], ...]) -> Callable[..., None]:
         If there is no directory to keep the kernel in.
     """
     text = kernel_text(kinds)
-    name = f"kernel_{_digest(text, kinds)}"
-    directory = _directory()
-    path = directory / f"{name}.py"
+    packages = {"agvbench", *(kind.__module__.partition(".")[0] for kind in kinds)}
+    name = f"kernel_{source_digest(text, *sorted(packages))}"
+    path = cache_directory() / f"{name}.py"
     try:
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             _write(path, text)
@@ -121,22 +106,6 @@ def _stage(name: str, calls: Sequence[str]) -> str:
     arguments = "s, time_s, p" if time else "s, p"
     body = "".join(calls) + ("    return time_s\n" if time else "    return\n")
     return f"\n@compiled(inner=True)\ndef {name}({arguments}):\n{body}\n"
-
-
-def _digest(text: str, kinds: Sequence[type[Effect]]) -> str:
-    """Return a hash over everything whose change must lead to compiling again."""
-    modules = [state_module, compiled_module, simulation_layout]
-    modules += [simulation_actuators, simulation_servos, simulation_smoothing]
-    modules += [sys.modules[kind.__module__] for kind in kinds]
-    parts = [text, numba.__version__, *map(inspect.getsource, dict.fromkeys(modules))]
-    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
-
-
-def _directory() -> Path:
-    if chosen := os.environ.get("AGVBENCH_CACHE"):
-        return Path(chosen)
-    base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path.home() / ".cache") / "agvbench"
 
 
 def _write(path: Path, text: str) -> None:

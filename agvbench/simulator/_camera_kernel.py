@@ -6,8 +6,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from agvbench.compiled import cached_njit
 from agvbench.types import Floats
 
 # Options, in the order in which `Tracker` packs them.
@@ -20,7 +20,7 @@ LUCK = 11
 X, Y, HEADING, RESIDUAL = range(4)
 
 
-@njit(cache=True)
+@cached_njit()
 def fit_body(pose: Floats, noise: Floats, markers: Floats, seen: Floats) -> None:
     """Write x, y, heading and rms residual of the rigid body fitted to noisy markers, least squares.
 
@@ -48,7 +48,7 @@ def fit_body(pose: Floats, noise: Floats, markers: Floats, seen: Floats) -> None
     seen[RESIDUAL] = math.sqrt(squares / count)
 
 
-@njit(cache=True)
+@cached_njit()
 def misplace(luck: Floats, size_m: float, seen: Floats) -> None:
     """Throw a frame metres off, with any heading."""
     jump, direction = 2.0 * size_m * luck[JUMP], 2.0 * math.pi * luck[DIRECTION]
@@ -57,7 +57,7 @@ def misplace(luck: Floats, size_m: float, seen: Floats) -> None:
     seen[HEADING] = math.pi * (1.0 - 2.0 * luck[TURN])
 
 
-@njit(cache=True)
+@cached_njit()
 def burst_length(uniform: float, mean: float) -> int:
     """Return a whole number from 1, geometric with the given mean."""
     if mean <= 1.0:
@@ -65,7 +65,7 @@ def burst_length(uniform: float, mean: float) -> int:
     return 1 + int(math.log1p(-uniform) / math.log1p(-1.0 / mean))
 
 
-@njit(cache=True)
+@cached_njit()
 def _insert(received_s: Floats, order: np.ndarray, count: int, when: float, index: int) -> int:
     """Insert an arrival behind all that arrived no later; return the new count."""
     at = count
@@ -76,7 +76,7 @@ def _insert(received_s: Floats, order: np.ndarray, count: int, when: float, inde
     return count + 1
 
 
-@njit(cache=True)
+@cached_njit()
 def observe(
     t_s: Floats, poses: Floats, noise: Floats, luck: Floats, markers: Floats, options: Floats, burst_left: int
 ) -> tuple[Floats, np.ndarray, Floats, np.ndarray, int]:

@@ -14,8 +14,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from agvbench.compiled import cached_njit
 from agvbench.types import Floats
 
 STEP_S = 1.0 / 1200.0
@@ -55,7 +55,7 @@ _SLACK_OPENS = 0.05  # s: without power the drive train comes off its flanks wit
 _ROUNDING = 1e-9  # of a step: a call that ends this close to a grid point ends on it
 
 
-@njit(cache=True)
+@cached_njit()
 def servo_target(p: Floats, base: int, offset: float) -> float:
     """Return the axle angle [rad] that a servo aims at, `offset` command units from neutral."""
     angle = p[base + OFFSET] + offset * (p[base + SLOPE] + p[base + CUBIC] * offset * offset)
@@ -67,7 +67,7 @@ def servo_target(p: Floats, base: int, offset: float) -> float:
     return angle
 
 
-@njit(cache=True)
+@cached_njit()
 def speed_target(p: Floats, offset: float) -> float:
     """Return the signed wheel speed [m/s] that the drive aims at with a full battery; 0 when unpowered."""
     ahead = p[SENSE] * offset
@@ -78,7 +78,7 @@ def speed_target(p: Floats, offset: float) -> float:
     return math.copysign(min(p[side + FULL], p[side + UNLOADED] * y / (y + p[side + KNEE])), ahead)
 
 
-@njit(cache=True)
+@cached_njit()
 def _wheel_tangents(p: Floats, play: Floats, at: Floats) -> tuple[float, float]:
     """Return tan δ of front and rear wheels: the servos' plus play, less what compliance takes in reverse."""
     back = min(1.0, max(0.0, -at[SPEED] / _RELIEF_SPEED))
@@ -86,14 +86,14 @@ def _wheel_tangents(p: Floats, play: Floats, at: Floats) -> tuple[float, float]:
     return math.tan(share * (at[FRONT_ANGLE] + play[0])), math.tan(share * (at[REAR_ANGLE] + play[1]))
 
 
-@njit(cache=True)
+@cached_njit()
 def _pull(p: Floats, wheel_mps: float, cos_angle: float, speed: float) -> float:
     """Return an axle's pull on the body over its stiffness [m/s]: stiffer when it holds the body back."""
     error = wheel_mps * cos_angle - speed
     return error if error * wheel_mps >= 0.0 else p[OVERRUN] * error
 
 
-@njit(cache=True)
+@cached_njit()
 def _powered(p: Floats, wheel_mps: float, tan_front: float, tan_rear: float, speed: float) -> float:
     """Return the body's acceleration [m/s²] under power."""
     half = 0.5 * (p[REAR_RATIO] - 1.0)
@@ -105,7 +105,7 @@ def _powered(p: Floats, wheel_mps: float, tan_front: float, tan_rear: float, spe
     return min(limit, max(-limit, p[STIFFNESS] * (0.5 * pull - scrub)))
 
 
-@njit(cache=True)
+@cached_njit()
 def _servo_acceleration(p: Floats, base: int, target: float, angle: float, rate: float) -> float:
     """Return a servo's angular acceleration [rad/s²]: second order, its rate bounded."""
     omega, limit = p[base + FREQUENCY], p[base + RATE_LIMIT]
@@ -113,7 +113,7 @@ def _servo_acceleration(p: Floats, base: int, target: float, angle: float, rate:
     return 2.0 * p[base + DAMPING] * omega * (min(limit, max(-limit, wanted)) - rate)
 
 
-@njit(cache=True)
+@cached_njit()
 def _derivative(p: Floats, play: Floats, state: Floats, at: Floats, out: Floats) -> None:
     """Write the time derivative at the moving state `at`, under the aims in `state`."""
     wheel, speed = state[AIMS], at[SPEED]
@@ -140,7 +140,7 @@ def _derivative(p: Floats, play: Floats, state: Floats, at: Floats, out: Floats)
     out[X], out[Y], out[HEADING] = c * ahead - s * left, s * ahead + c * left, yaw_rate
 
 
-@njit(cache=True)
+@cached_njit()
 def _latch(p: Floats, play: Floats, state: Floats, counters: np.ndarray, command: tuple[float, float, float]) -> None:
     """Begin a pulse frame: queue the command and aim for the one of `delay_frames` frames ago."""
     head = counters[RING_HEAD]
@@ -154,7 +154,7 @@ def _latch(p: Floats, play: Floats, state: Floats, counters: np.ndarray, command
     state[AIMS + 2] = servo_target(p, REAR, state[obeyed + 2])
 
 
-@njit(cache=True)
+@cached_njit()
 def _step(p: Floats, play: Floats, state: Floats, dt: float, work: Floats) -> None:
     """Write into ``work[2]`` the moving state `dt` later, by Heun's method; `work` has shape (3, MOVING)."""
     _derivative(p, play, state, state, work[0])
@@ -165,7 +165,7 @@ def _step(p: Floats, play: Floats, state: Floats, dt: float, work: Floats) -> No
         work[2, i] = state[i] + 0.5 * dt * (work[0, i] + work[1, i])
 
 
-@njit(cache=True)
+@cached_njit()
 def advance(
     p: Floats, play: Floats, state: Floats, counters: np.ndarray, work: Floats, drive: float, front: float,
     rear: float, dt: float,

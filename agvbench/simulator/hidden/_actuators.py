@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from agvbench.compiled import cached_njit
 from agvbench.simulator.hidden.constants import (
     ACCELERATE_S,
     BACKLASH,
@@ -43,27 +42,27 @@ from agvbench.types import Floats
 _HOUR_S = 3600.0
 
 
-@njit(cache=True)
+@cached_njit()
 def clip(value: float, low: float, high: float) -> float:
     """Return `value` within [low, high]."""
     return min(high, max(low, value))
 
 
-@njit(cache=True)
+@cached_njit()
 def front_aim(p: Floats, command: float) -> float:
     """Return the angle [rad] at which the front servo aims."""
     angle = clip(p[FRONT_OFFSET] + p[FRONT_SLOPE] * (command - p[NEUTRAL]), p[FRONT_LOW], p[FRONT_HIGH])
     return clip(angle, -p[LIMIT_FRONT], p[LIMIT_FRONT])
 
 
-@njit(cache=True)
+@cached_njit()
 def rear_aim(p: Floats, command: float) -> float:
     """Return the angle [rad] at which the rear servo aims."""
     angle = clip(p[REAR_OFFSET] + p[REAR_SLOPE] * (command - p[NEUTRAL]), p[REAR_LOW], p[REAR_HIGH])
     return clip(angle, -p[LIMIT_REAR], p[LIMIT_REAR])
 
 
-@njit(cache=True)
+@cached_njit()
 def wheel_aim(p: Floats, command: float) -> float:
     """Return the wheel speed [m/s] of a fresh battery; a falling pulse drives forward."""
     ahead = p[NEUTRAL] - command
@@ -73,7 +72,7 @@ def wheel_aim(p: Floats, command: float) -> float:
     return p[GAIN_FORWARD] * beyond if ahead > 0.0 else -p[GAIN_BACKWARD] * beyond
 
 
-@njit(cache=True)
+@cached_njit()
 def supply(p: Floats, session_s: float, driven_s: float) -> float:
     """Return what battery and controller leave of the speed, after hours in the session and seconds of driving."""
     hours = session_s / _HOUR_S
@@ -81,7 +80,7 @@ def supply(p: Floats, session_s: float, driven_s: float) -> float:
     return max(0.0, left * (1.0 - p[SAG] * (1.0 - math.exp(-driven_s / p[SAG_S]))))
 
 
-@njit(cache=True)
+@cached_njit()
 def _turning(p: Floats, aim: float, angle: float, rate: float) -> tuple[float, float]:
     """Return the time derivatives of a servo's angle and rate."""
     if p[SERVO_FREQUENCY] > 0.0:
@@ -90,7 +89,7 @@ def _turning(p: Floats, aim: float, angle: float, rate: float) -> tuple[float, f
     return clip((aim - angle) / p[LAG_S], -p[SLEW], p[SLEW]), 0.0
 
 
-@njit(cache=True)
+@cached_njit()
 def _profiled(p: Floats, aim: float, angle: float, rate: float, dt: float) -> tuple[float, float]:
     """Return angle and rate after `dt` of a servo that may neither turn faster than its slew nor jerk."""
     error = aim - angle
@@ -103,7 +102,7 @@ def _profiled(p: Floats, aim: float, angle: float, rate: float, dt: float) -> tu
     return angle + turned, later
 
 
-@njit(cache=True)
+@cached_njit()
 def servo(p: Floats, aim: float, angle: float, rate: float, dt: float) -> tuple[float, float]:
     """Return a servo's angle and rate `dt` later: at once, at a limited rate, or by a Runge-Kutta step of its lag."""
     if p[SERVO_FREQUENCY] == 0.0 and p[LAG_S] == 0.0:
@@ -120,20 +119,20 @@ def servo(p: Floats, aim: float, angle: float, rate: float, dt: float) -> tuple[
     return angle + sixth * (a1 + 2.0 * (a2 + a3) + a4), rate + sixth * (r1 + 2.0 * (r2 + r3) + r4)
 
 
-@njit(cache=True)
+@cached_njit()
 def linked(p: Floats, angle: float, before: float) -> float:
     """Return the axle's angle behind a play that the servo has to take up first."""
     return clip(before, angle - 0.5 * p[BACKLASH], angle + 0.5 * p[BACKLASH])
 
 
-@njit(cache=True)
+@cached_njit()
 def _gaining(p: Floats, aim: float, speed: float) -> float:
     """Return the time derivative of a lagging wheel speed."""
     grows = (aim - speed) * speed > 0.0 or speed == 0.0
     return (aim - speed) / (p[ACCELERATE_S] if grows else p[BRAKE_S])
 
 
-@njit(cache=True)
+@cached_njit()
 def wheel(p: Floats, aim: float, speed: float, dt: float) -> float:
     """Return the wheel speed `dt` later."""
     if p[RAMP] < math.inf:

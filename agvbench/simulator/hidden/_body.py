@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from agvbench.compiled import cached_njit
 from agvbench.simulator.hidden.constants import (
     AXLE_RATIO,
     DRIFT,
@@ -44,7 +43,7 @@ MOVES_MPS = 0.002
 _HOUR_S = 3600.0
 
 
-@njit(cache=True)
+@cached_njit()
 def wheels(p: Floats, front: float, rear: float, speed: float, session_s: float) -> tuple[float, float]:
     """Return the wheels' angles [rad] for the axles' angles: what the linkage makes of them."""
     warm = 1.0 + p[WARM_GAIN] * (1.0 - math.exp(-session_s / (_HOUR_S * p[WARM_HOURS])))
@@ -55,7 +54,7 @@ def wheels(p: Floats, front: float, rear: float, speed: float, session_s: float)
     return front + p[TORQUE_STEER], rear
 
 
-@njit(cache=True)
+@cached_njit()
 def _grip(p: Floats, x: float, y: float, heading: float, front: float, rear: float) -> float:
     """Return the share of the wheel speed that place, heading and steering leave."""
     left = 1.0 - p[LOSS_TANGENT] * (abs(math.tan(front)) + abs(math.tan(rear)))
@@ -66,7 +65,7 @@ def _grip(p: Floats, x: float, y: float, heading: float, front: float, rear: flo
     return left
 
 
-@njit(cache=True)
+@cached_njit()
 def _shared(p: Floats, front: float, rear: float) -> float:
     """Return the body's share of the wheel speed for both axles' shares: their mean, or nearer to the slower one."""
     stiff = 1.0 + p[OVERRUN]
@@ -74,7 +73,7 @@ def _shared(p: Floats, front: float, rear: float) -> float:
     return (stiff * heavier + lighter) / (stiff + 1.0)
 
 
-@njit(cache=True)
+@cached_njit()
 def motion(
     p: Floats, x: float, y: float, heading: float, rolled: float, front: float, rear: float, speed: float
 ) -> tuple[float, float, float, float]:

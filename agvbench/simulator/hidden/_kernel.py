@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from agvbench.compiled import cached_njit
 from agvbench.simulator.hidden import _actuators as actuators
 from agvbench.simulator.hidden import _body as body
 from agvbench.simulator.hidden import _sight as sight
@@ -51,7 +51,7 @@ RING = 256
 PAST = 2048
 
 
-@njit(cache=True)
+@cached_njit()
 def begin(p: Floats, state: Floats, past: Floats, marks: np.ndarray, pose: tuple[float, float, float]) -> None:
     """Put the vehicle at rest where the camera sees it at `pose`."""
     session, rolled = state[SESSION], state[ROLLED]
@@ -69,7 +69,7 @@ def begin(p: Floats, state: Floats, past: Floats, marks: np.ndarray, pose: tuple
     marks[2] = 1
 
 
-@njit(cache=True)
+@cached_njit()
 def _ask(p: Floats, state: Floats, ring: Floats, marks: np.ndarray, which: int, value: float) -> None:
     """Send a changed command on its way."""
     value = actuators.clip(value, p[COMMAND_LOW], p[COMMAND_HIGH])
@@ -82,7 +82,7 @@ def _ask(p: Floats, state: Floats, ring: Floats, marks: np.ndarray, which: int, 
     marks[1] += 1
 
 
-@njit(cache=True)
+@cached_njit()
 def _latch(p: Floats, state: Floats, which: int, value: float) -> None:
     """Let a command that has arrived take effect."""
     state[DRIVE + which] = value
@@ -93,7 +93,7 @@ def _latch(p: Floats, state: Floats, which: int, value: float) -> None:
     state[AIM_WHEEL + which] = aim - p[SHORTFALL] * (aim - state[AIM_WHEEL + which])
 
 
-@njit(cache=True)
+@cached_njit()
 def _next_arrival(ring: Floats, marks: np.ndarray) -> int:
     """Return where in the ring the earliest command on its way lies, or -1; taken ones are marked by -1."""
     best, when = -1, math.inf
@@ -105,7 +105,7 @@ def _next_arrival(ring: Floats, marks: np.ndarray) -> int:
     return best
 
 
-@njit(cache=True)
+@cached_njit()
 def _rates(
     p: Floats, state: Floats, play: Floats, at: tuple[float, float, float, float], front: float, rear: float,
     speed: float, t: float,
@@ -118,7 +118,7 @@ def _rates(
     return body.motion(p, at[0], at[1], at[2], at[3], front, rear, speed)
 
 
-@njit(cache=True)
+@cached_njit()
 def _step(p: Floats, state: Floats, play: Floats, dt: float, out: Floats) -> None:
     """Write the state `dt` later into `out`."""
     out[:] = state
@@ -153,7 +153,7 @@ def _step(p: Floats, state: Floats, play: Floats, dt: float, out: Floats) -> Non
     _cross_seam(p, state, out)
 
 
-@njit(cache=True)
+@cached_njit()
 def _cross_seam(p: Floats, state: Floats, out: Floats) -> None:
     """Turn a vehicle that has crossed the seam: one way when it crosses one way, the other way when it comes back."""
     if p[SEAM_KICK] == 0.0:
@@ -167,7 +167,7 @@ def _cross_seam(p: Floats, state: Floats, out: Floats) -> None:
         out[HEADING] -= p[SEAM_KICK]
 
 
-@njit(cache=True)
+@cached_njit()
 def _notice_start(state: Floats) -> None:
     """Note when the vehicle was last told to move from rest."""
     moving = abs(state[AIM_WHEEL]) > 0.0
@@ -176,7 +176,7 @@ def _notice_start(state: Floats) -> None:
     state[MOVING] = 1.0 if moving else 0.0
 
 
-@njit(cache=True)
+@cached_njit()
 def _commit(p: Floats, state: Floats, work: Floats, past: Floats, marks: np.ndarray) -> None:
     """Make a step's end the state, and remember the pose."""
     dt = work[CLOCK] - state[CLOCK]
@@ -188,7 +188,7 @@ def _commit(p: Floats, state: Floats, work: Floats, past: Floats, marks: np.ndar
     marks[2] += 1
 
 
-@njit(cache=True)
+@cached_njit()
 def _smooth(p: Floats, work: Floats, dt: float) -> None:
     x, y, heading = sight.seen(p, work[X], work[Y], work[HEADING])
     share = -math.expm1(-dt / p[SMOOTHING_S])
@@ -197,7 +197,7 @@ def _smooth(p: Floats, work: Floats, dt: float) -> None:
     work[SMOOTH_HEADING] += share * (heading - work[SMOOTH_HEADING])
 
 
-@njit(cache=True)
+@cached_njit()
 def _look(p: Floats, work: Floats, past: Floats, marks: np.ndarray, dt: float) -> tuple[float, float, float]:
     """Return what the camera says at the time of `work`, `dt` after the last committed state."""
     if p[SMOOTHING_S] > 0.0:
@@ -217,7 +217,7 @@ def _look(p: Floats, work: Floats, past: Floats, marks: np.ndarray, dt: float) -
     return sight.seen(p, x1, y1, z1)
 
 
-@njit(cache=True)
+@cached_njit()
 def advance(
     p: Floats, play: Floats, state: Floats, ring: Floats, past: Floats, marks: np.ndarray, work: Floats,
     drive: float, front: float, rear: float, dt: float,

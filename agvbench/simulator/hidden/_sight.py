@@ -5,15 +5,14 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from agvbench.compiled import cached_njit
 from agvbench.simulator.hidden.constants import LENS, MARKER_FORWARD, MARKER_LEFT, SCALE, TURNED
 from agvbench.types import Floats
 
 _ROUNDS = 60
 
 
-@njit(cache=True)
+@cached_njit()
 def seen(p: Floats, x: float, y: float, heading: float) -> tuple[float, float, float]:
     """Return the pose that the camera reports for a true pose of where the markers should be."""
     c, s = math.cos(heading), math.sin(heading)
@@ -23,7 +22,7 @@ def seen(p: Floats, x: float, y: float, heading: float) -> tuple[float, float, f
     return bent * mx, bent * my, heading + p[TURNED]
 
 
-@njit(cache=True)
+@cached_njit()
 def unseen(p: Floats, x: float, y: float, heading: float) -> tuple[float, float, float]:
     """Return the true pose at which the camera reports the given one: a vehicle is placed by what is seen of it."""
     true_heading = heading - p[TURNED]

@@ -1,0 +1,108 @@
+"""Machine code that is kept on disk, under a hash of every source from which it was compiled.
+
+numba by itself compiles a function again when the function's own file has changed, and not when a file has changed
+whose functions or constants are compiled into it. It lies in ``$NUMBA_CACHE_DIR`` or ``$AGVBENCH_CACHE``, else in the
+user's cache.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib.util
+import inspect
+import os
+import threading
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+from numba import config
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_LOCK = threading.Lock()
+
+
+def cached_njit(**options: Any) -> Callable[[F], F]:
+    """Return ``numba.njit(cache=True, **options)`` for a function at module level.
+
+    It is compiled again when its file changes, or one of the same package that this imports at its top, directly or
+    not.
+    """
+
+    def decorate(function: F) -> F:
+        text = Path(inspect.getfile(function)).read_text(encoding="utf-8")
+        digest = source_digest(text, function.__module__.partition(".")[0], module=function.__module__)
+        with _LOCK:
+            before, config.CACHE_DIR = config.CACHE_DIR, str(Path(config.CACHE_DIR or cache_directory()) / digest)
+            try:
+                decorated: F = numba.njit(cache=True, **options)(function)
+            finally:
+                config.CACHE_DIR = before
+        return decorated
+
+    return decorate
+
+
+def cache_directory() -> Path:
+    """Return where machine code is kept: ``$AGVBENCH_CACHE``, else in the user's cache."""
+    if chosen := os.environ.get("AGVBENCH_CACHE"):
+        return Path(chosen)
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "agvbench"
+
+
+@cache
+def source_digest(text: str, *packages: str, module: str = "") -> str:
+    """Return a hash of a source and of all modules of `packages` that it imports at its top, directly or not.
+
+    Parameters
+    ----------
+    text
+        The source.
+    packages
+        Names of top-level packages or modules; what else is imported has no part in the hash.
+    module
+        The source's own name, for relative imports.
+    """
+    known, found = {module}, [text]
+    waiting = [*_imported(text, module)]
+    while waiting:
+        name = waiting.pop()
+        if name not in known and name.partition(".")[0] in packages:
+            known.add(name)
+            own = _file(name)
+            found.append(own.read_text(encoding="utf-8") if own else "")
+            waiting += _imported(found[-1], name)
+    return hashlib.sha256("\0".join([numba.__version__, *found]).encode()).hexdigest()[:16]
+
+
+@cache
+def _imported(text: str, module: str) -> tuple[str, ...]:
+    """Return the modules that a source imports at its top, in order."""
+    return tuple(dict.fromkeys(name for node in ast.parse(text).body for name in _names(node, module)))
+
+
+def _names(node: ast.stmt, module: str) -> Iterator[str]:
+    if isinstance(node, ast.Import):
+        yield from (alias.name for alias in node.names)
+    elif isinstance(node, ast.ImportFrom):
+        package = "." * node.level + (node.module or "")
+        if node.level:
+            package = importlib.util.resolve_name(package, module.rpartition(".")[0])
+        for alias in node.names:
+            inside = f"{package}.{alias.name}"
+            yield inside if _file(inside) else package
+
+
+@cache
+def _file(module: str) -> Path | None:
+    """Return the source file of a module; None where there is none of that name."""
+    try:
+        spec = importlib.util.find_spec(module)
+    except (ImportError, ValueError):
+        return None
+    return Path(spec.origin) if spec and spec.origin and spec.origin.endswith(".py") else None
