@@ -104,6 +104,18 @@ def fuzz(session: nox.Session) -> None:
 
 
 @nox.session
+def explore(session: nox.Session) -> None:
+    """Test every property on fresh random examples, 25 rounds (AGVBENCH_EXPLORE=N for N); prints each failing example.
+
+    A failing example is pinned with ``@example`` on its test when the cause is fixed.
+    """
+    install(session, "test")
+    rounds = os.environ.get("AGVBENCH_EXPLORE", "25")
+    where = session.posargs or ("tests",)
+    session.run("pytest", "-m", "hypothesis", *SIDE_BY_SIDE, *where, env={"AGVBENCH_EXPLORE": rounds})
+
+
+@nox.session
 def challenge(session: nox.Session) -> None:
     """Hold blind trials of the diagnosis; again goes on where it was interrupted."""
     install(session)

@@ -4,16 +4,33 @@ from __future__ import annotations
 
 import os
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 # A mistake of agvbench itself is to be seen, not told in one line.
 os.environ.setdefault("AGVBENCH_DEBUG", "1")
 
+# `nox -s explore` sets how many times every property is tested, each time on fresh examples.
+ROUNDS = int(os.environ.get("AGVBENCH_EXPLORE", "0"))
+
 settings.register_profile(
     "agvbench",
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow],
-    # A change is judged by its own examples, not by luck; everybody else's runs look for new ones.
-    derandomize=bool(os.environ.get("CI")),
+    # The same commit has the same examples everywhere: a failure is reproducible and belongs to the change.
+    derandomize=not ROUNDS,
 )
 settings.load_profile("agvbench")
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Test every property `ROUNDS` times."""
+    if ROUNDS and hasattr(metafunc.function, "hypothesis"):
+        metafunc.fixturenames.append("exploration_round")
+        metafunc.parametrize("exploration_round", range(1, ROUNDS + 1))
+
+
+@pytest.fixture
+def exploration_round(request: pytest.FixtureRequest) -> int:
+    """Return the number of the round."""
+    return int(request.param)

@@ -17,21 +17,17 @@ from typing import cast
 
 import numpy as np
 
-from agvbench.errors import PlanError
-from agvbench.planning.paths import Piece, Side
+from agvbench.planning.paths import RESOLUTION, Piece, by_length, path_of, require_solvable
 from agvbench.types import Floats, Pose
 
 WORDS = ("LSL", "RSR", "LSR", "RSL", "LRL", "RLR")
-_SIDES: dict[str, Side] = {"L": "left", "S": "straight", "R": "right"}
 _TURN = 2.0 * math.pi
-# An arc this close to a full circle [rad] is a rounding error away from no arc at all.
-_FULL_TURN_TOLERANCE_RAD = 1e-9
 
 
 def _positive(angle_rad: Floats) -> Floats:
     """Wrap to [0, 2π), where what rounding made a full circle is nothing."""
     angle = np.mod(angle_rad, _TURN)
-    return np.where(angle > _TURN - _FULL_TURN_TOLERANCE_RAD, 0.0, angle)
+    return np.where(angle > _TURN - RESOLUTION, 0.0, angle)
 
 
 def _left_straight_left(x: Floats, y: Floats, heading: Floats) -> Floats:
@@ -39,7 +35,7 @@ def _left_straight_left(x: Floats, y: Floats, heading: Floats) -> Floats:
     course = np.arctan2(centre_y, centre_x)
     straight = np.hypot(centre_x, centre_y)
     # Concentric circles: no straight, and all of the turn is in the first arc.
-    course = np.where(straight < _FULL_TURN_TOLERANCE_RAD, heading, course)
+    course = np.where(straight < RESOLUTION, heading, course)
     return np.stack([_positive(course), straight, _positive(heading - course)])
 
 
@@ -106,17 +102,11 @@ def shortest_path(start: Pose, goal: Pose, radius_m: float) -> tuple[Piece, ...]
     >>> [(piece.side, round(piece.length_m, 6)) for piece in path]
     [('left', 3.141593)]
     """
-    if not (radius_m > 0.0 and math.isfinite(radius_m)):
-        raise PlanError("turning radius is not a positive number", value=f"{radius_m} m")
-    if not (start.is_finite and goal.is_finite):
-        raise PlanError("a pose to drive between is not finite", value=start if goal.is_finite else goal)
-    lengths = word_lengths(np.array([start]), np.array([goal]), radius_m)[:, :, 0]
-    best = int(np.nanargmin(lengths.sum(axis=1)))
-    return tuple(
-        Piece(_SIDES[letter], float(length), math.inf if letter == "S" else radius_m)
-        for letter, length in zip(WORDS[best], lengths[best], strict=True)
-        if length > _FULL_TURN_TOLERANCE_RAD * radius_m
-    )
+    require_solvable(start, goal, radius_m)
+    lengths = word_lengths(np.array([start]), np.array([goal]), radius_m)[:, :, 0] / radius_m
+    solved = zip(WORDS, lengths.tolist(), strict=True)
+    paths = [path_of(word, pieces, radius_m) for word, pieces in solved if math.isfinite(sum(pieces))]
+    return by_length(paths, radius_m)[0]
 
 
 def shortest_path_backward(start: Pose, goal: Pose, radius_m: float) -> tuple[Piece, ...]:

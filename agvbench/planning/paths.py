@@ -6,13 +6,18 @@ A path is a sequence of pieces; it is geometry alone, and knows neither vehicle 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from agvbench.errors import PlanError
 from agvbench.types import Pose, wrap_angle
 
 Side = Literal["left", "straight", "right"]
+# Lengths below this many radii are rounding errors: such a piece is left out, and paths that differ by less are equally
+# long.
+RESOLUTION = 1e-9
+_SIDES: dict[str, Side] = {"L": "left", "S": "straight", "R": "right"}
 _SIGN = {"left": 1, "straight": 0, "right": -1}
 _MIRRORED: dict[Side, Side] = {"left": "right", "straight": "straight", "right": "left"}
 
@@ -81,3 +86,35 @@ def end_of(pieces: Iterable[Piece], start: Pose) -> Pose:
 def length_of(pieces: Iterable[Piece]) -> float:
     """Return the length of a path [m]."""
     return math.fsum(piece.length_m for piece in pieces)
+
+
+def path_of(word: str, lengths: Iterable[float], radius_m: float) -> tuple[Piece, ...]:
+    """Return the path of a word such as ``LSR`` with signed lengths [radii], negative where it is driven backward."""
+    return tuple(
+        Piece(_SIDES[letter], abs(length) * radius_m, math.inf if letter == "S" else radius_m, backward=length < 0.0)
+        for letter, length in zip(word, lengths, strict=True)
+        if abs(length) > RESOLUTION
+    )
+
+
+def by_length(paths: Sequence[tuple[Piece, ...]], radius_m: float) -> list[tuple[Piece, ...]]:
+    """Return the paths, the shortest first; of those that are equally long within rounding, the one of fewest pieces.
+
+    Near a straight several words of small arcs are as long as the straight to the last digits.
+    """
+    tie_m = min(map(length_of, paths)) + RESOLUTION * radius_m
+    return sorted(paths, key=lambda path: (max(length_of(path), tie_m), len(path)))
+
+
+def require_solvable(start: Pose, goal: Pose, radius_m: float) -> None:
+    """Require a turning radius and poses that a path exists for.
+
+    Raises
+    ------
+    PlanError
+        If the radius is not positive or a pose is not finite.
+    """
+    if not (radius_m > 0.0 and math.isfinite(radius_m)):
+        raise PlanError("turning radius is not a positive number", value=f"{radius_m} m")
+    if not (start.is_finite and goal.is_finite):
+        raise PlanError("a pose to drive between is not finite", value=start if goal.is_finite else goal)

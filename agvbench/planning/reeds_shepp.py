@@ -23,13 +23,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.errors import PlanError
-from agvbench.planning.paths import Piece, Side
+from agvbench.planning.paths import RESOLUTION, Piece, by_length, path_of, require_solvable
 from agvbench.types import Floats, Pose
 
 Complexes = NDArray[np.complex128]
 _QUARTER = 0.5 * math.pi
-_NOTHING = 1e-9
 
 
 class _Word(NamedTuple):
@@ -52,7 +50,7 @@ def _to_right(goal: Complexes, heading: Floats) -> Complexes:
 
 def _lsl(goal: Complexes, heading: Floats) -> list[Floats]:
     c = _to_left(goal, heading)
-    course = np.where(abs(c) < _NOTHING, heading, np.angle(c))
+    course = np.where(abs(c) < RESOLUTION, heading, np.angle(c))
     return [course, abs(c), heading - course]
 
 
@@ -116,7 +114,6 @@ _WORDS = (
     _Word("LRSLR", _lrslr),
 )
 _MIRROR = str.maketrans("LR", "RL")
-_SIDES: dict[str, Side] = {"L": "left", "S": "straight", "R": "right"}
 
 
 def _solutions(goal: Complexes, heading: Floats) -> list[tuple[str, Floats]]:
@@ -161,37 +158,18 @@ def shortest_path(start: Pose, goal: Pose, radius_m: float) -> tuple[Piece, ...]
     >>> [(p.side, p.backward) for p in shortest_path(Pose(0, 0, 0), Pose(-1, 0, 0), 0.5)]
     [('straight', True)]
     """
-    _check(start, goal, radius_m)
-    words = _solutions(*_local(np.array([start]), np.array([goal]), radius_m))
-    letters, lengths = words[int(np.nanargmin([abs(lengths).sum() for _, lengths in words]))]
-    return _pieces(letters, lengths[:, 0].tolist(), radius_m)
+    return paths_by_length(start, goal, radius_m)[0]
 
 
 def paths_by_length(start: Pose, goal: Pose, radius_m: float) -> list[tuple[Piece, ...]]:
-    """Return every word's path from `start` to `goal`, the shortest first: for those whom the shortest does not suit.
+    """Return every word's path from `start` to `goal`, the shortest first, for callers that the shortest does not suit.
 
     Raises
     ------
     PlanError
         If the radius is not positive or a pose is not finite.
     """
-    _check(start, goal, radius_m)
+    require_solvable(start, goal, radius_m)
     words = _solutions(*_local(np.array([start]), np.array([goal]), radius_m))
-    driven = [(float(abs(lengths).sum()), letters, lengths[:, 0].tolist()) for letters, lengths in words]
-    reaching = sorted((word for word in driven if math.isfinite(word[0])), key=lambda word: word[0])
-    return [_pieces(letters, lengths, radius_m) for _, letters, lengths in reaching]
-
-
-def _check(start: Pose, goal: Pose, radius_m: float) -> None:
-    if not (radius_m > 0.0 and math.isfinite(radius_m)):
-        raise PlanError("turning radius is not a positive number", value=f"{radius_m} m")
-    if not (start.is_finite and goal.is_finite):
-        raise PlanError("a pose to drive between is not finite", value=start if goal.is_finite else goal)
-
-
-def _pieces(letters: str, lengths: list[float], radius_m: float) -> tuple[Piece, ...]:
-    return tuple(
-        Piece(_SIDES[letter], abs(length) * radius_m, math.inf if letter == "S" else radius_m, backward=length < 0.0)
-        for letter, length in zip(letters, lengths, strict=True)
-        if abs(length) > _NOTHING
-    )
+    reaching = [(word, lengths[:, 0].tolist()) for word, lengths in words if np.isfinite(lengths).all()]
+    return by_length([path_of(word, lengths, radius_m) for word, lengths in reaching], radius_m)
