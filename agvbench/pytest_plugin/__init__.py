@@ -8,49 +8,31 @@
         drive.trajectory("my_turn.toml", condition=condition)
 
 Fixtures: ``drive`` (see `agvbench.running.driver.Driver`) and ``bench`` (the session). Marks: ``repeats``, ``grid``,
-``experiment``. The plugin is found through its entry point; it stays idle, and imports nothing heavy, in sessions
-that collect no benchmarks.
+``experiment``. The plugin is found through its entry point and declares options ``--agvbench-…``. Marks, fixtures and
+hooks are registered when the first file of benchmarks is found: other sessions of pytest see none of them.
 """
 
 from __future__ import annotations
 
-from agvbench.pytest_plugin.collecting import (
-    pytest_collect_file,
-    pytest_collection_modifyitems,
-    pytest_generate_tests,
-)
-from agvbench.pytest_plugin.fixtures import (
-    agvbench_repeat,
-    bench,
-    drive,
-    pytest_runtestloop,
-    pytest_sessionfinish,
-    pytest_unconfigure,
-)
-from agvbench.pytest_plugin.options import pytest_addoption, pytest_configure
-from agvbench.pytest_plugin.telling import (
-    pytest_pyfunc_call,
-    pytest_report_teststatus,
-    pytest_runtest_makereport,
-    pytest_runtest_protocol,
-    pytest_terminal_summary,
-)
+from pathlib import Path
+from typing import cast
 
-__all__ = [
-    "agvbench_repeat",
-    "bench",
-    "drive",
-    "pytest_addoption",
-    "pytest_collect_file",
-    "pytest_collection_modifyitems",
-    "pytest_configure",
-    "pytest_generate_tests",
-    "pytest_pyfunc_call",
-    "pytest_report_teststatus",
-    "pytest_runtest_makereport",
-    "pytest_runtest_protocol",
-    "pytest_runtestloop",
-    "pytest_sessionfinish",
-    "pytest_terminal_summary",
-    "pytest_unconfigure",
-]
+import pytest
+
+from agvbench.pytest_plugin.options import pytest_addoption
+
+__all__ = ["pytest_addoption", "pytest_collect_file"]
+
+
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
+    """Collect ``bench_*.py`` files that speak of agvbench; other tools' files of that name stay theirs."""
+    if file_path.suffix != ".py" or not file_path.name.startswith("bench_"):
+        return None
+    if b"agvbench" not in file_path.read_bytes():
+        return None
+    from agvbench.pytest_plugin import active
+    from agvbench.pytest_plugin.collecting import BenchModule
+
+    if not parent.config.pluginmanager.is_registered(active):
+        parent.config.pluginmanager.register(active, "agvbench-session")
+    return cast(pytest.Collector, BenchModule.from_parent(parent, path=file_path))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -29,18 +29,11 @@ class BenchModule(pytest.Module):
         return name.startswith("bench_")
 
 
-def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
-    """Collect ``bench_*.py`` files that speak of agvbench; other tools' files of that name stay theirs."""
-    if file_path.suffix != ".py" or not file_path.name.startswith("bench_"):
-        return None
-    if b"agvbench" not in file_path.read_bytes():
-        return None
-    return cast(pytest.Collector, BenchModule.from_parent(parent, path=file_path))
-
-
 @pytest.hookimpl(trylast=True)
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Apply the marks ``grid`` and ``repeats``."""
+    """Apply the marks ``grid`` and ``repeats`` of benchmarks; marks of these names elsewhere are their owners'."""
+    if metafunc.definition.getparent(BenchModule) is None:
+        return
     grids = list(metafunc.definition.iter_markers("grid"))
     mark = metafunc.definition.get_closest_marker("repeats")
     if not grids and mark is None:
@@ -76,12 +69,21 @@ def _repeats(mark: pytest.Mark, settings: BenchSettings) -> int:
     return int(mark.kwargs.get("full") or fixed) if settings.full else int(fixed)
 
 
-@pytest.hookimpl(trylast=True)
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Order the benchmarks, and leave out conditions that a trajectory does not know."""
-    benches = [item for item in items if is_bench(item)]
-    if not benches:
-        return
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> Generator[None]:
+    """Order the benchmarks, and leave out conditions that a trajectory does not know.
+
+    The order begins from that of the files: other plugins may choose among benchmarks, and do not shuffle them.
+    """
+    collected = list(items)
+    yield
+    kept = set(items)
+    benches = [item for item in collected if item in kept and is_bench(item)]
+    if benches:
+        _arrange(config, items, benches)
+
+
+def _arrange(config: pytest.Config, items: list[pytest.Item], benches: list[pytest.Item]) -> None:
     try:
         settings = settings_from(config)
         undriven = [item for item in benches if not _condition_applies(item)]

@@ -11,7 +11,7 @@ import pytest
 
 from agvbench.errors import AgvbenchError
 from agvbench.pytest_plugin.collecting import chosen, experiment, is_bench, repeat, run_name
-from agvbench.pytest_plugin.options import given_options
+from agvbench.pytest_plugin.options import given_options, option
 
 if TYPE_CHECKING:
     from agvbench.running.driver import Driver
@@ -41,9 +41,9 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
         try:
             opened = open_session(
                 given_options(config) | chosen(config, session.items),
-                out=config.getoption("out"),
-                resume=bool(config.getoption("resume")),
-                dry_run=bool(config.getoption("dry_run")),
+                out=option(config, "--out"),
+                resume=bool(option(config, "--resume")),
+                dry_run=bool(option(config, "--dry-run")),
             )
             config.stash[SESSION] = bench_session = stack.enter_context(opened)
         except AgvbenchError as error:

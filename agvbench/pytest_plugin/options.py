@@ -1,4 +1,4 @@
-"""The plugin's options and marks."""
+"""The plugin's options and marks: in pytest every option is named ``--agvbench-…``, since other plugins have theirs."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from agvbench.running.options import OPTIONS, add_options, destination
+from agvbench.running.options import OPTIONS, PYTEST_PREFIX, add_options, destination, prefixed
 
 if TYPE_CHECKING:
     from agvbench.running.settings import BenchSettings
 
 _MARKS = (
-    "repeats(n, full=None): drive n times (full times with --full); n=None follows --repeats",
-    "grid(name, reduced, full): parametrize by `reduced`, with --full by `full`",
+    "repeats(n, full=None): drive n times (full times with --agvbench-full); n=None follows --agvbench-repeats",
+    "grid(name, reduced, full): parametrize by `reduced`, with --agvbench-full by `full`",
     "experiment(name): what the campaign calls the runs of this benchmark (default: the function's name)",
 )
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Declare the options of a bench session."""
-    add_options(parser.getgroup("agvbench", "AGV bench").addoption)
+    add_options(parser.getgroup("agvbench", "AGV bench").addoption, PYTEST_PREFIX)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -29,9 +29,14 @@ def pytest_configure(config: pytest.Config) -> None:
         config.addinivalue_line("markers", mark)
 
 
+def option(config: pytest.Config, flag: str) -> Any:
+    """Return the value of an option by its name in ``agvbench bench``; None if it was not given."""
+    return config.getoption(destination(prefixed(flag)))
+
+
 def given_options(config: pytest.Config) -> dict[str, Any]:
     """Return the bench options that were given on the command line, by name."""
-    values = {destination(flag): config.getoption(destination(flag)) for flag, _, _ in OPTIONS}
+    values = {destination(flag): option(config, flag) for flag, _, _ in OPTIONS}
     return {name: value for name, value in values.items() if value is not None}
 
 
@@ -45,5 +50,5 @@ def settings_from(config: pytest.Config) -> BenchSettings:
     """
     from agvbench.running.session_settings import session_settings
 
-    resume = bool(config.getoption("resume"))
-    return session_settings(given_options(config), config.getoption("out"), resume=resume)[1]
+    resume = bool(option(config, "--resume"))
+    return session_settings(given_options(config), option(config, "--out"), resume=resume)[1]

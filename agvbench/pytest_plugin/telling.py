@@ -10,6 +10,7 @@ import pytest
 from agvbench.errors import AgvbenchError
 from agvbench.pytest_plugin.collecting import is_bench
 from agvbench.pytest_plugin.fixtures import INTERRUPT, SESSION
+from agvbench.pytest_plugin.options import option
 
 _BAR = 24
 _PROGRESS = pytest.StashKey["Progress"]()
@@ -131,4 +132,4 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
     if session.is_dry:
         terminalreporter.write_line(dry_run_table(session.planned))
         return
-    terminalreporter.write_line(conclude(session.directory, report=not config.getoption("no_report")))
+    terminalreporter.write_line(conclude(session.directory, report=not option(config, "--no-report")))

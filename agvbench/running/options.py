@@ -6,6 +6,8 @@ import argparse
 from collections.abc import Callable
 from typing import Any
 
+PYTEST_PREFIX = "--agvbench-"
+
 
 class Joined(argparse.Action):
     """Keeps every value of an option that is given several times, with commas between."""
@@ -109,10 +111,19 @@ SESSION_OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
 )
 
 
-def add_options(add: Callable[..., Any]) -> None:
-    """Declare every option with `add`, argparse's or pytest's way."""
+def add_options(add: Callable[..., Any], prefix: str = "--") -> None:
+    """Declare every option with `add`, argparse's or pytest's way, under names that begin with `prefix`."""
     for flag, keywords, text in OPTIONS + SESSION_OPTIONS:
-        add(flag, help=text, **keywords)
+        add(prefixed(flag, prefix), help=text, **keywords)
+
+
+def prefixed(flag: str, prefix: str = PYTEST_PREFIX) -> str:
+    """Return an option's name in pytest, where options of all plugins and projects meet.
+
+    >>> prefixed("--seed")
+    '--agvbench-seed'
+    """
+    return prefix + flag.removeprefix("--")
 
 
 def destination(flag: str) -> str:

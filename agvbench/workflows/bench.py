@@ -10,7 +10,7 @@ import pytest
 from agvbench.errors import FlagError
 from agvbench.running.benchmark_files import find_benchmark
 from agvbench.running.directory import choose_directory
-from agvbench.running.options import OPTIONS, SESSION_OPTIONS, destination
+from agvbench.running.options import OPTIONS, SESSION_OPTIONS, destination, prefixed
 from agvbench.running.settings import SETTINGS_FILE, BenchSettings
 
 DEFAULT = ("calibration", "trajectories")
@@ -58,7 +58,7 @@ def _flags(options: Mapping[str, Any]) -> list[str]:
     for flag, _, _ in OPTIONS + SESSION_OPTIONS:
         value = options.get(destination(flag))
         if value is True:
-            flags.append(flag)
+            flags.append(prefixed(flag))
         elif value is not None and value is not False:
-            flags.append(f"{flag}={value}")
+            flags.append(f"{prefixed(flag)}={value}")
     return flags

@@ -41,7 +41,7 @@ def collected(pytester, *options):
 
 @pytest.mark.usefixtures("bench_file")
 def test_calibration_first_repeats_interleaved_and_no_uncalibrated_half_speed(pytester):
-    assert collected(pytester, "--repeats=2") == [
+    assert collected(pytester, "--agvbench-repeats=2") == [
         "steering_front[0.5-r01]",
         "steering_front[0.5-r02]",
         "trajectory[3-calibrated-r01]",
@@ -55,7 +55,7 @@ def test_calibration_first_repeats_interleaved_and_no_uncalibrated_half_speed(py
 
 @pytest.mark.usefixtures("bench_file")
 def test_full_takes_the_whole_grid_and_every_repeat(pytester):
-    names = collected(pytester, "--full", "--repeats=1", "--order=blocked")
+    names = collected(pytester, "--agvbench-full", "--agvbench-repeats=1", "--agvbench-order=blocked")
     assert names[:6] == [f"steering_front[{share}-r0{k}]" for share in (0.25, 0.5) for k in (1, 2, 3)]
 
 
@@ -73,10 +73,10 @@ def test_bench_files_of_other_tools_stay_theirs(pytester):
 @pytest.mark.parametrize(
     ("options", "line"),
     [
-        (["--repeats=-1"], "--repeats: value cannot be used: -1 (limit: at least 1)"),
-        (["--order=random"], "argument --order: invalid choice: 'random'"),
-        (["--seed=-4"], "--seed: value cannot be used: -4"),
-        (["--attempts=0"], "--attempts: value cannot be used: 0"),
+        (["--agvbench-repeats=-1"], "--repeats: value cannot be used: -1 (limit: at least 1)"),
+        (["--agvbench-order=random"], "argument --agvbench-order: invalid choice: 'random'"),
+        (["--agvbench-seed=-4"], "--seed: value cannot be used: -4"),
+        (["--agvbench-attempts=0"], "--attempts: value cannot be used: 0"),
     ],
 )
 @pytest.mark.usefixtures("bench_file")
@@ -89,7 +89,7 @@ def test_options_that_cannot_be_used_are_told_in_one_line(pytester, options, lin
 
 @pytest.mark.usefixtures("bench_file")
 def test_parallel_workers_are_refused_since_there_is_one_vehicle(pytester):
-    result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "-n1", "-k", "steering", "--repeats=1")
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "-n1", "-k", "steering", "--agvbench-repeats=1")
     assert result.ret == pytest.ExitCode.TESTS_FAILED
     result.stdout.fnmatch_lines(["*one vehicle drives one run at a time: leave -n out*"])
 
@@ -100,3 +100,51 @@ def test_two_benchmarks_of_one_run_name_are_refused(pytester):
     result = pytester.runpytest_subprocess("-p", "no:cacheprovider")
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     assert "two benchmarks would record the run 'a'" in result.stderr.str() + result.stdout.str()
+
+
+SOMEBODY_ELSES_CONFTEST = """
+    import pytest
+
+    def pytest_addoption(parser):
+        for flag in ("--seed", "--out", "--full", "--repeats", "--resume", "--vehicle", "--order", "--dry-run"):
+            parser.addoption(flag, default="theirs")
+
+    def pytest_configure(config):
+        config.addinivalue_line("markers", "repeats(n): something else")
+        config.addinivalue_line("markers", "experiment(name, date): something else")
+        config.addinivalue_line("markers", "grid(size): something else")
+"""
+SOMEBODY_ELSES_TESTS = """
+    import pytest
+
+    @pytest.mark.repeats("often")
+    @pytest.mark.experiment(name="LHC", date=2012)
+    @pytest.mark.grid(7)
+    def test_marks_and_options(request, testrun_uid):
+        names = ("seed", "out", "full", "repeats", "resume", "vehicle", "order", "dry_run")
+        assert {request.config.getoption(name) for name in names} == {"theirs"}
+
+    def test_speed(benchmark):
+        assert benchmark(sum, [1, 2]) == 3
+
+    def test_no_fixture_of_ours(drive):
+        pass
+"""
+
+
+@pytest.mark.parametrize("plugins", [("-n1",), ("-n0", "-p", "randomly", "--randomly-seed=3")])
+def test_a_project_with_options_marks_and_plugins_of_its_own_is_left_alone(pytester, plugins):
+    pytester.makeconftest(SOMEBODY_ELSES_CONFTEST)
+    pytester.makepyfile(test_theirs=SOMEBODY_ELSES_TESTS)
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "--strict-markers", *plugins)
+    result.assert_outcomes(passed=2, errors=1)
+    result.stdout.fnmatch_lines(["*fixture 'drive' not found*"])
+
+
+def test_every_option_of_the_plugin_carries_its_name(pytester):
+    result = pytester.runpytest_subprocess("--help")
+    ours = result.stdout.str().partition("AGV bench:")[2].partition("\n\n")[0]
+    flags = [line.split()[0] for line in ours.splitlines() if line.lstrip().startswith("--")]
+    assert "--agvbench-seed=N" in flags
+    assert all(flag.startswith("--agvbench-") for flag in flags)
+    assert "repeats(n" not in pytester.runpytest_subprocess("--markers").stdout.str()

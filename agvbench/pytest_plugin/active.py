@@ -1,0 +1,41 @@
+"""What takes part in a session that has benchmarks: marks, fixtures and hooks, registered when the first is found."""
+
+from __future__ import annotations
+
+from agvbench.pytest_plugin.collecting import (
+    pytest_collection_modifyitems,
+    pytest_generate_tests,
+)
+from agvbench.pytest_plugin.fixtures import (
+    agvbench_repeat,
+    bench,
+    drive,
+    pytest_runtestloop,
+    pytest_sessionfinish,
+    pytest_unconfigure,
+)
+from agvbench.pytest_plugin.options import pytest_configure
+from agvbench.pytest_plugin.telling import (
+    pytest_pyfunc_call,
+    pytest_report_teststatus,
+    pytest_runtest_makereport,
+    pytest_runtest_protocol,
+    pytest_terminal_summary,
+)
+
+__all__ = [
+    "agvbench_repeat",
+    "bench",
+    "drive",
+    "pytest_collection_modifyitems",
+    "pytest_configure",
+    "pytest_generate_tests",
+    "pytest_pyfunc_call",
+    "pytest_report_teststatus",
+    "pytest_runtest_makereport",
+    "pytest_runtest_protocol",
+    "pytest_runtestloop",
+    "pytest_sessionfinish",
+    "pytest_terminal_summary",
+    "pytest_unconfigure",
+]
