@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
-import threading
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 
@@ -14,6 +14,7 @@ from agvbench.bus.bus_config import BusConfig
 from agvbench.bus.session import is_open_to_anybody, open_session
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_POLL_S = 0.1
 
 
 def run_adapters(
@@ -43,7 +44,8 @@ def run_adapters(
         what = " and ".join(f"{role} {spec}" for role, spec in (("agv", agv), ("mocap", mocap)) if spec is not None)
         where = " ".join([*(f"listens on {e}" for e in listen), *(f"connected to {e}" for e in connect)])
         print(f"ready: {what} of {lab}/{options.vehicle}, {where}; stop with Ctrl-C", flush=True)
-        stopped.wait()
+        while not stopped:
+            time.sleep(_POLL_S)
     say_stopped()
     return 0
 
@@ -64,12 +66,17 @@ def say_stopped() -> None:
 
 
 @contextmanager
-def stop_signal() -> Iterator[threading.Event]:
-    """Give what SIGINT, SIGTERM and SIGHUP set, in place of what they do; under ``nohup`` SIGHUP stays ignored."""
-    stopped = threading.Event()
+def stop_signal() -> Iterator[list[int]]:
+    """Give the list that SIGINT, SIGTERM and SIGHUP are added to, in place of what they do.
+
+    Under ``nohup`` SIGHUP stays ignored. The list is to be looked at again and again: the kernel may deliver a signal
+    to another thread, which does not wake one that waits in the main thread, and a handler that took a lock could wait
+    for the code that it interrupted.
+    """
+    stopped: list[int] = []
     hung_up = signal.getsignal(signal.SIGHUP)
     taken = [number for number in _SIGNALS if number != signal.SIGHUP or hung_up is not signal.SIG_IGN]
-    before = {number: signal.signal(number, lambda *_: stopped.set()) for number in taken}
+    before = {number: signal.signal(number, lambda caught, _: stopped.append(caught)) for number in taken}
     try:
         yield stopped
     finally:

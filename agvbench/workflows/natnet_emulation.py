@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-
 import numpy as np
 
 from agvbench.adapters.contract import AdapterOptions
@@ -54,13 +52,13 @@ def emulate(options: AdapterOptions, version: str, multicast: str | None, port: 
     return 0
 
 
-def _stream(server: Emulator, camera: Camera, options: AdapterOptions, stopped: threading.Event) -> None:
+def _stream(server: Emulator, camera: Camera, options: AdapterOptions, stopped: list[int]) -> None:
     plant = load_plant(options.plant)(options.seed)
     plant.reset((0.0, 0.0, 0.0), seed=options.seed)
     tracker = camera.tracker(np.random.default_rng(options.seed))
     clock, period_s, number = WallClock(), 1.0 / camera.rate_hz, 0
     began_s = clock.now()
-    while not stopped.is_set():
+    while not stopped:
         number += 1
         pose = plant.advance(*_CIRCLE, period_s)
         at_s = began_s + number * period_s

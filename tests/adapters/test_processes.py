@@ -108,17 +108,23 @@ def test_a_vehicle_without_a_camera_says_so(endpoint: str) -> None:
             assert len(drive_run(link, "a")) > 0
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
-def test_ctrl_c_and_a_closed_terminal_end_a_process_cleanly(endpoint: str, number: signal.Signals) -> None:
+@pytest.mark.parametrize(
+    "numbers", [(signal.SIGINT,), (signal.SIGHUP,), (signal.SIGTERM, signal.SIGHUP)], ids=["int", "hup", "term+hup"]
+)
+def test_signals_end_a_process_cleanly_also_in_quick_succession(
+    endpoint: str, numbers: tuple[signal.Signals, ...]
+) -> None:
     # What is ignored here, as SIGHUP is under ``nohup``, the process would ignore, too.
-    before = signal.signal(number, signal.default_int_handler)
+    before = {number: signal.signal(number, signal.default_int_handler) for number in numbers}
     try:
         with process("sim", "--plant", TINY, "--listen", endpoint) as child:
-            child.send_signal(number)
+            for number in numbers:
+                child.send_signal(number)
             assert child.communicate(timeout=20) == ("stopped\n", "")
             assert child.returncode == 0
     finally:
-        signal.signal(number, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def wait_for_word(endpoint: str, *, of_a_runner: bool) -> None:
