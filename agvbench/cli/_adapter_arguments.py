@@ -28,7 +28,9 @@ def add_bus_arguments(parser: argparse.ArgumentParser, default_listen: str) -> N
         help="certificates and rules of a secured bus, as Zenoh writes them (docs/how-to/secure-the-bus.md)",
     )
     group.add_argument("--lab", default="lab", help="name of the lab on the bus (default: %(default)s)")
-    group.add_argument("--vehicle", default="agv1", help="name of the vehicle on the bus (default: %(default)s)")
+    group.add_argument(
+        "--vehicle-name", default="agv1", metavar="NAME", help="name of the vehicle on the bus (default: %(default)s)"
+    )
 
 
 def add_vehicle_arguments(parser: argparse.ArgumentParser) -> None:
@@ -75,7 +77,7 @@ def run_with(arguments: argparse.Namespace, default_listen: str, agv: str | None
     from agvbench.adapters.contract import AdapterOptions
     from agvbench.workflows.adapter_process import run_adapters
 
-    given: dict[str, Any] = {"vehicle": arguments.vehicle, "seed": arguments.seed}
+    given: dict[str, Any] = {"vehicle": arguments.vehicle_name, "seed": arguments.seed}
     readers: dict[str, Callable[[Any], Any]] = {"plant": str, "command_unit": str, "camera": camera_options}
     given |= {name: read(getattr(arguments, name)) for name, read in readers.items() if hasattr(arguments, name)}
     given["neutral"] = getattr(arguments, "neutral", None)

@@ -9,7 +9,7 @@ examples:
   agvbench agv serial:/dev/ttyACM0                     a vehicle with the project's firmware
   agvbench agv simavr                                  that firmware in a simulated microcontroller, driving a plant
   agvbench agv simavr-live:1                           its first version, by the clock on the wall
-  agvbench agv sim:my_plant.py:make_plant --vehicle small_one
+  agvbench agv sim:my_plant.py:make_plant --vehicle-name small_one
 """
 
 from __future__ import annotations

@@ -1,45 +1,47 @@
 """Look whether this machine is ready to drive: nothing moves.
 
-Every check is a line with what was found and what to do about it. The exit code is 1 if one of them fails.
+Every check is a line with what was found and what to do about it. Adapters are opened as a bench opens them, and the
+trajectories that it would drive are planned for its vehicle. The exit code is 1 if a check fails.
 
 examples:
   agvbench doctor                                                  what a simulation needs
   agvbench doctor --agv serial:/dev/ttyACM0 --mocap natnet:192.168.0.2   the lab
   agvbench doctor --mocap natnet:192.168.0.2 --camera body=blue
+  agvbench doctor --vehicle car.toml --plant my_plant.py:make_plant      another vehicle than vehicle.toml here
 """
 
 from __future__ import annotations
 
 import argparse
 
-from agvbench.cli import _adapter_arguments as shared
+from agvbench.running.options import OPTIONS, destination
 
 HELP = "look whether vehicle, cameras and this machine are ready"
+_OF_THE_RIG = (
+    "--agv", "--mocap", "--camera", "--plant", "--steering", "--vehicle", "--calibration", "--corrected", "--seed",
+    "--place", "--workspace", "--connect", "--bus-config", "--lab", "--vehicle-name",
+)  # fmt: skip
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    parser.add_argument("--agv", default="sim", metavar="ADAPTER", help="as for the bench (default: %(default)s)")
-    parser.add_argument("--mocap", default="sim", metavar="ADAPTER", help="as for the bench (default: %(default)s)")
-    parser.add_argument("--vehicle", default="agv1", help="name of the vehicle on the bus (default: %(default)s)")
-    parser.add_argument(
-        "--workspace", default="circle:6.1", metavar="SHAPE", help="floor to drive on (default: %(default)s m)"
-    )
-    parser.add_argument("--bus-config", default="", metavar="FILE", help="certificates and rules of a secured bus")
-    shared.add_camera_arguments(parser)
+    """Declare the command's arguments: those of ``agvbench bench`` that say with what is driven."""
+    for flag, keywords, text in OPTIONS:
+        if flag in _OF_THE_RIG:
+            parser.add_argument(flag, help=text, **keywords)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Print what every check finds; return the exit code."""
     from agvbench.adapters import check_specs
-    from agvbench.adapters.camera_options import camera_options
     from agvbench.reporting.doctor_table import tell
+    from agvbench.running.settings import BenchSettings
+    from agvbench.running.vehicles import lab_vehicle
     from agvbench.workflows.doctor import Lab, State, examine
 
-    check_specs(arguments.agv, arguments.mocap)
-    camera = camera_options(arguments.camera)
-    lab = Lab(
-        arguments.agv, arguments.mocap, camera, arguments.vehicle, arguments.workspace, bus_config=arguments.bus_config
+    given = {destination(flag): getattr(arguments, destination(flag)) for flag in _OF_THE_RIG}
+    settings = BenchSettings.given(
+        {"vehicle": lab_vehicle()} | {name: value for name, value in given.items() if value is not None}
     )
-    states = [tell(name, finding) for name, finding in examine(lab)]
+    check_specs(settings.agv, settings.mocap)
+    states = [tell(name, finding) for name, finding in examine(Lab(settings))]
     return 1 if State.BAD in states else 0

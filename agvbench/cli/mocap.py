@@ -62,7 +62,9 @@ def run(arguments: argparse.Namespace) -> int:
         from agvbench.workflows.natnet_emulation import emulate
 
         camera = camera_options(arguments.camera)
-        options = AdapterOptions(vehicle=arguments.vehicle, seed=arguments.seed, plant=arguments.plant, camera=camera)
+        options = AdapterOptions(
+            vehicle=arguments.vehicle_name, seed=arguments.seed, plant=arguments.plant, camera=camera
+        )
         return emulate(options, arguments.natnet_version or "4.1", arguments.multicast, arguments.port)
     if arguments.decode is not None:
         from agvbench.adapters.natnet.decode_file import print_packets

@@ -1,7 +1,7 @@
 """Show what trajectories mean for a vehicle: commands, time, floor and target. Nothing drives.
 
 examples:
-  agvbench plan                              all trajectories, for the thesis' vehicle
+  agvbench plan                              all trajectories, for vehicle.toml here, else the thesis' vehicle
   agvbench plan 5 7 --vehicle vehicle.toml   two of the eight, for yours
   agvbench plan my_turn.toml --commands      the timed commands, as CSV
   agvbench plan 5 --steering front           where the turn ends with the front axle alone
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     add = parser.add_argument
     add("trajectories", nargs="*", metavar="TRAJECTORY", help="name or .toml file (default: all)")
-    add("--vehicle", type=Path, metavar="FILE", help="vehicle model (default: the thesis' vehicle)")
+    add("--vehicle", metavar="FILE", help="vehicle file (default: vehicle.toml here, else the thesis' vehicle)")
     add("--condition", action="append", choices=_CONDITIONS, help="repeatable (default: uncalibrated, calibrated)")
     add(
         "--workspace", default="circle:6.1", metavar="SHAPE", help="circle:D, ellipse:WxH, rectangle:WxH, polygon:X,Y …"
@@ -53,17 +53,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Plan, print, and say what cannot be driven."""
     from agvbench.planning.workspace import DEFAULT_MARGIN_M, Workspace
+    from agvbench.running.vehicles import lab_vehicle
     from agvbench.workflows.plan import plan_trajectories
 
     if args.repeats < 1:
         raise FlagError("repeats must be positive", where="--repeats", value=args.repeats, limit="at least 1")
     made = plan_trajectories(
         args.trajectories,
-        vehicle=args.vehicle,
+        vehicle=lab_vehicle() if args.vehicle is None else args.vehicle,
         conditions=args.condition or ("uncalibrated", "calibrated"),
         workspace=Workspace.parse(args.workspace, DEFAULT_MARGIN_M if args.margin is None else args.margin),
         start=_start(args.start),
-        steering=args.steering,
+        steering=args.steering or "",
         directory=args.directory,
         repeats=args.repeats,
     )

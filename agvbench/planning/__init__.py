@@ -11,7 +11,7 @@
 
 from agvbench.planning.corrected import NOTHING_LEFT, CorrectedPlan, Correction, corrected_plan, depends_on_time
 from agvbench.planning.planner import Plan, place, plan
-from agvbench.planning.reading import list_trajectories, load_trajectory, trajectory_from_table
+from agvbench.planning.reading import list_trajectories, load_trajectory, own_trajectories, trajectory_from_table
 from agvbench.planning.resting import Departure, Miss
 from agvbench.planning.summary import DryRun, DryRunRow, dry_run
 from agvbench.planning.trajectory import Trajectory, steered
@@ -33,6 +33,7 @@ __all__ = [
     "dry_run",
     "list_trajectories",
     "load_trajectory",
+    "own_trajectories",
     "place",
     "plan",
     "steered",

@@ -84,6 +84,15 @@ def trajectory_files(directory: Path | None = None) -> list[Path]:
     return _local_files() or _shipped_files()
 
 
+def own_trajectories() -> list[str]:
+    """Return the names of the lab's own trajectories: the files under ``trajectories`` that do not ship.
+
+    A bench drives them after the eight. They are named by their files, which are not read.
+    """
+    shipped = {file.stem for file in _shipped_files()}
+    return [file.stem for file in _local_files() if file.stem not in shipped]
+
+
 def _local_files() -> list[Path]:
     return sorted(Path("trajectories").glob("*.toml"))
 

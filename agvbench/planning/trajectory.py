@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 import msgspec
 from msgspec import Meta, Struct
@@ -22,6 +22,9 @@ from agvbench.planning.shapes import (
 )
 from agvbench.planning.speeds import Speed, check_speed
 from agvbench.types import NO_TARGET, Pose
+
+if TYPE_CHECKING:
+    from agvbench.model import VehicleModel
 
 SHAPES = ("segments", "dubins", "s_curve", "slalom", "step_steer", "speed_steps", "endurance", "commands")
 _NAME = re.compile("[A-Za-z0-9][A-Za-z0-9_.-]*")
@@ -127,9 +130,20 @@ class Trajectory(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, 
         return cast(dict[str, object], _without_none(msgspec.to_builtins(self)))
 
 
-def steered(trajectory: Trajectory, mode: str) -> Trajectory:
-    """Return the trajectory steered in this mode, or as it is for "": `Trajectory.with_steering`."""
+def steered(trajectory: Trajectory, mode: str, model: VehicleModel) -> Trajectory:
+    """Return the trajectory steered in this mode (`Trajectory.with_steering`), or for "" as `model` can steer it.
+
+    A vehicle with one steered axle drives with it what is stated for both (``abeam``, ``opposite``).
+    """
+    if not mode and trajectory.steering in ("abeam", "opposite"):
+        mode = _one_axle(model)
     return trajectory.with_steering(cast(Steering, mode)) if mode else trajectory
+
+
+def _one_axle(model: VehicleModel) -> str:
+    """Return which axle steers where the other one does not, or "" for both (or none)."""
+    front, rear = (low < high for low, high in (model.front.output_range, model.rear.output_range))
+    return "" if front == rear else "front" if front else "rear"
 
 
 def _without_none(value: object) -> object:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -12,9 +13,7 @@ from typing import Any
 
 import pandas as pd
 
-from agvbench.adapters import check_specs, open_rig
-from agvbench.adapters.camera_options import camera_options
-from agvbench.bus.bus_config import BusConfig
+from agvbench.adapters import check_specs
 from agvbench.bus.link import VehicleLink
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
 from agvbench.campaign.header import FILE_NAME
@@ -26,14 +25,14 @@ from agvbench.running.campaign_time import TURNAROUND_S, CampaignTime, Simulated
 from agvbench.running.placers.choosing import choose_placer
 from agvbench.running.provenance import provenance
 from agvbench.running.remainders import read_remainders
-from agvbench.running.rig_checks import check_rig
+from agvbench.running.rig_checks import open_session_rig
 from agvbench.running.session import BenchSession
 from agvbench.running.session_began import SessionBegan, idle_notice, last_end_s
-from agvbench.running.session_settings import LAB_VEHICLE, session_settings
+from agvbench.running.session_settings import session_settings
 from agvbench.running.settings import SETTINGS_FILE, BenchSettings
 from agvbench.running.signals import interruptible
 from agvbench.running.unbroken import UnbrokenLink
-from agvbench.running.vehicles import expected_calibration, uncalibrated_vehicle
+from agvbench.running.vehicles import LAB_VEHICLE, expected_calibration, known_models
 from agvbench.types import Run
 
 PROVENANCE_TABLE = "provenance"
@@ -49,7 +48,7 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
         If an option, a file, the rig or the directory cannot be used.
     """
     directory, settings = session_settings(given, out, resume=resume)
-    models = _known_models(settings)
+    models = known_models(settings)
     session_with = partial(
         BenchSession,
         directory,
@@ -63,26 +62,9 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
         models.setdefault("calibrated", expected_calibration(settings.vehicle))
         yield session_with(bench=None)
         return
-    with (
-        interruptible(),
-        open_rig(
-            agv=settings.agv,
-            mocap=settings.mocap,
-            plant=settings.plant,
-            camera=camera_options([settings.camera]),
-            seed=settings.seed,
-            connect=settings.connect or None,
-            bus_config=BusConfig.load(settings.bus_config) if settings.bus_config else None,
-            lab=settings.lab,
-            vehicle=settings.vehicle_name,
-            command_unit=models["uncalibrated"].command_unit,
-            neutral=models["uncalibrated"].neutral,
-            calibration_hash=models["calibrated"].calibration_hash if "calibrated" in models else "",
-        ) as link,
-    ):
-        check_rig(models, settings, link)
+    with interruptible(), open_session_rig(settings, models) as link:
         choose_placer(settings.place, simulated=link.identity().simulated)
-        header = _header(_name(directory, resume=resume), models["uncalibrated"], link)
+        header = _header(directory, settings, models["uncalibrated"], link, resume=resume)
         writer = _writer(directory, settings, header, resume=resume, simulated=link.identity().simulated)
         recorded = _recorded(writer)
         campaign_time = _campaign_time(link, writer, recorded, drives_back=settings.place == "auto")
@@ -106,34 +88,25 @@ def _notices(
     return notices
 
 
-def _known_models(settings: BenchSettings) -> dict[str, VehicleModel]:
-    models = {"uncalibrated": uncalibrated_vehicle(settings.vehicle)}
-    if settings.calibration:
-        models["calibrated"] = VehicleModel.load(settings.calibration)
-    if settings.corrected:
-        models["corrected"] = VehicleModel.load(settings.corrected)
-    return models
-
-
-def _name(directory: Path, *, resume: bool) -> str:
-    """Return the campaign's name: its directory's, or what that was called when the session that goes on began."""
-    if resume and (directory / FILE_NAME).exists():
-        return CampaignHeader.load(directory / FILE_NAME).name
-    return directory.resolve().name
-
-
-def _header(name: str, nominal: VehicleModel, link: VehicleLink) -> CampaignHeader:
+def _header(
+    directory: Path, settings: BenchSettings, nominal: VehicleModel, link: VehicleLink, *, resume: bool
+) -> CampaignHeader:
+    """Return the campaign's header; a session that is resumed keeps the names that it began with."""
     identity = link.identity()
-    return CampaignHeader(
+    header = CampaignHeader(
         schema=1,
-        name=name,
-        vehicle_name=identity.vehicle,
+        name=directory.resolve().name,
+        vehicle_name=nominal.name if settings.vehicle else identity.vehicle,
         front_axle_m=nominal.geometry.front_axle_m,
         rear_axle_m=nominal.geometry.rear_axle_m,
         command_unit=nominal.command_unit,
         neutral=nominal.neutral,
         mocap_rate_hz=identity.mocap_rate_hz,
     )
+    if resume and (directory / FILE_NAME).exists():
+        stored = CampaignHeader.load(directory / FILE_NAME)
+        return replace(header, name=stored.name, vehicle_name=stored.vehicle_name)
+    return header
 
 
 def _writer(

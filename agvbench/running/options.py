@@ -46,7 +46,7 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
     (
         "--steering",
         {"choices": ("abeam", "front", "rear", "opposite", "crab")},
-        "steer every trajectory in this mode: front, where the rear axle does not steer (default: as each says)",
+        "steer every trajectory in this mode (default: as each says, or with the one axle that steers)",
     ),
     ("--vehicle", {"metavar": "FILE"}, "vehicle.toml believed before calibration (default: nominal maps)"),
     ("--calibration", {"metavar": "FILE"}, "calibrated vehicle.toml (default: calibrate in this session)"),

@@ -1,9 +1,14 @@
-"""Whether the rig that answers can drive what a session asks for."""
+"""The rig that a session asks for, and whether it can drive what it asks for."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 
+from agvbench.adapters import AdapterOptions, open_rig
+from agvbench.adapters.camera_options import camera_options
+from agvbench.bus.bus_config import BusConfig
+from agvbench.bus.identity_message import AgvIdentity, Identity
 from agvbench.bus.link import VehicleLink
 from agvbench.errors import FlagError, VehicleError
 from agvbench.model import VehicleModel
@@ -12,6 +17,48 @@ from agvbench.running.settings import BenchSettings
 from agvbench.running.supervision.limits import DEFAULT_SAFETY
 
 _OPTIONS = {"uncalibrated": "--vehicle", "calibrated": "--calibration", "corrected": "--corrected"}
+
+
+def adapter_options(settings: BenchSettings, models: Mapping[str, VehicleModel]) -> AdapterOptions:
+    """Return what the adapters of a session are told."""
+    nominal = models["uncalibrated"]
+    return AdapterOptions(
+        vehicle=settings.vehicle_name,
+        plant=settings.plant,
+        seed=settings.seed,
+        command_unit=nominal.command_unit,
+        neutral=nominal.neutral,
+        calibration_hash=models["calibrated"].calibration_hash if "calibrated" in models else "",
+        camera=camera_options([settings.camera]),
+    )
+
+
+@contextmanager
+def open_session_rig(settings: BenchSettings, models: Mapping[str, VehicleModel]) -> Iterator[VehicleLink]:
+    """Open the rig of a session while the context lasts, checked.
+
+    Raises
+    ------
+    AgvbenchError
+        If an adapter cannot be opened, or `check_rig` refuses the rig.
+    """
+    options = adapter_options(settings, models)
+    with open_rig(
+        agv=settings.agv,
+        mocap=settings.mocap,
+        plant=options.plant,
+        camera=options.camera,
+        seed=options.seed,
+        connect=settings.connect or None,
+        bus_config=BusConfig.load(settings.bus_config) if settings.bus_config else None,
+        lab=settings.lab,
+        vehicle=options.vehicle,
+        command_unit=options.command_unit,
+        neutral=options.neutral,
+        calibration_hash=options.calibration_hash,
+    ) as link:
+        check_rig(models, settings, link)
+        yield link
 
 
 def check_rig(models: Mapping[str, VehicleModel], settings: BenchSettings, link: VehicleLink) -> None:
@@ -24,14 +71,14 @@ def check_rig(models: Mapping[str, VehicleModel], settings: BenchSettings, link:
     FlagError
         If an option is not for this rig.
     """
-    _check_models(models, link)
+    check_commands(models, link.identity())
     _check_exchange(settings, link)
     _check_session(settings, link)
     _check_rate(link)
 
 
-def _check_models(models: Mapping[str, VehicleModel], link: VehicleLink) -> None:
-    identity = link.identity()
+def check_commands(models: Mapping[str, VehicleModel], identity: AgvIdentity | Identity) -> None:
+    """Raise `VehicleError` unless the models, by condition, command the vehicle in its unit, about its neutral."""
     for condition, model in models.items():
         for what, said, true in (
             ("takes commands in another unit", model.command_unit, identity.command_unit),

@@ -71,8 +71,8 @@ class BenchSession:
         return self._models[condition] if self._bench is None else self._bench.model(condition)
 
     def trajectory(self, name: str) -> Trajectory:
-        """Return the trajectory of this name or file, steered as the session is."""
-        return steered(load_trajectory(name), self._steering)
+        """Return the trajectory of this name or file, steered as the session is, or as the vehicle can."""
+        return steered(load_trajectory(name), self._steering, self.nominal)
 
     def plan(self, trajectory: Trajectory, condition: str) -> Plan:
         """Return the plan of `trajectory` under `condition`: made once, driven in every repeat.

@@ -8,9 +8,7 @@ from typing import Any
 
 from agvbench.running.directory import choose_directory
 from agvbench.running.settings import SETTINGS_FILE, BenchSettings, settings_for_resume
-
-LAB_VEHICLE = "vehicle.toml"
-"""The vehicle of a lab folder, believed before calibration where no other is named."""
+from agvbench.running.vehicles import lab_vehicle
 
 
 def session_settings(given: Mapping[str, Any], out: str | None, *, resume: bool) -> tuple[Path, BenchSettings]:
@@ -26,5 +24,4 @@ def session_settings(given: Mapping[str, Any], out: str | None, *, resume: bool)
     directory = choose_directory(out, resume=resume)
     if resume and (directory / SETTINGS_FILE).exists():
         return directory, settings_for_resume(BenchSettings.load(directory), given)
-    beside = {"vehicle": LAB_VEHICLE} if "vehicle" not in given and Path(LAB_VEHICLE).is_file() else {}
-    return directory, BenchSettings.given({**beside, **given})
+    return directory, BenchSettings.given({"vehicle": lab_vehicle(), **given})

@@ -1,12 +1,38 @@
-"""Which vehicle is believed before anything is measured."""
+"""Which vehicle is driven: the nominal one before anything is measured, and those of the other conditions."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 from agvbench.model import VehicleModel, nominal_model, thesis_vehicle
+from agvbench.running.settings import BenchSettings
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import FullSpeedOrStop, MonotoneTable
+
+LAB_VEHICLE = "vehicle.toml"
+"""The vehicle of a lab folder: every command takes it where no other is named."""
+
+
+def lab_vehicle() -> str:
+    """Return the vehicle file of the current folder, or "" where it has none."""
+    return LAB_VEHICLE if Path(LAB_VEHICLE).is_file() else ""
+
+
+def known_models(settings: BenchSettings) -> dict[str, VehicleModel]:
+    """Return the models that are known before anything is driven, by condition.
+
+    Raises
+    ------
+    VehicleError
+        If one of their files cannot be used.
+    """
+    models = {"uncalibrated": uncalibrated_vehicle(settings.vehicle)}
+    if settings.calibration:
+        models["calibrated"] = VehicleModel.load(settings.calibration)
+    if settings.corrected:
+        models["corrected"] = VehicleModel.load(settings.corrected)
+    return models
 
 
 def uncalibrated_vehicle(path: str = "") -> VehicleModel:

@@ -34,8 +34,9 @@ def plans_of(
     out: dict[str, dict[str, Any]] = {}
     for name in names:
         left = remainders.get(name, NOTHING_LEFT)
+        trajectory = steered(load_trajectory(name), steering, model)
         try:
-            made = corrected_plan(steered(load_trajectory(name), steering), model, workspace=floor, remainder=left)
+            made = corrected_plan(trajectory, model, workspace=floor, remainder=left)
         except PlanError as error:
             out[name] = {"problem": str(error)}
             continue

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from agvbench.errors import FlagError
-from agvbench.model import VehicleModel, nominal_model, thesis_vehicle
+from agvbench.model import VehicleModel
 from agvbench.planning import (
     DryRun,
     Trajectory,
@@ -16,45 +16,43 @@ from agvbench.planning import (
     load_trajectory,
     steered,
 )
+from agvbench.running.vehicles import expected_calibration, uncalibrated_vehicle
 from agvbench.types import Pose
-from agvbench.vehicle.maps import Fixed
 
 
-def models_for(vehicle: Path | None, conditions: Sequence[str]) -> dict[str, VehicleModel]:
-    """Return the model of each condition: nominal maps when uncalibrated, the vehicle file's otherwise."""
-    model = VehicleModel.load(vehicle) if vehicle else thesis_vehicle()
-    nominal = nominal_model(
-        model.name,
-        model.geometry,
-        model.command_unit,
-        model.neutral,
-        rear_steered=not isinstance(model.rear, Fixed),
-    )
-    return {condition: nominal if condition == "uncalibrated" else model for condition in conditions}
+def models_for(vehicle: str, conditions: Sequence[str]) -> dict[str, VehicleModel]:
+    """Return the model of each condition, as a bench with this vehicle file ("" for none) plans before it drives."""
+    nominal, expected = uncalibrated_vehicle(vehicle), expected_calibration(vehicle)
+    return {condition: nominal if condition == "uncalibrated" else expected for condition in conditions}
 
 
-def chosen_trajectories(names: Sequence[str], directory: Path | None, steering: str | None) -> list[Trajectory]:
-    """Return the trajectories of those names or files (all of `directory` if none are named), steered as asked."""
-    found = [load_trajectory(name, directory=directory) for name in names] or list_trajectories(directory)
-    return [steered(trajectory, steering or "") for trajectory in found]
+def chosen_trajectories(names: Sequence[str], directory: Path | None) -> list[Trajectory]:
+    """Return the trajectories of those names or files, all of `directory` if none are named."""
+    return [load_trajectory(name, directory=directory) for name in names] or list_trajectories(directory)
 
 
 def plan_trajectories(
     names: Sequence[str],
     *,
-    vehicle: Path | None = None,
+    vehicle: str = "",
     conditions: Sequence[str] = ("uncalibrated", "calibrated"),
     workspace: Workspace | None = None,
     start: Pose | None = None,
-    steering: str | None = None,
+    steering: str = "",
     directory: Path | None = None,
     repeats: int = 1,
 ) -> DryRun:
-    """Return the dry run of the named trajectories (all of them if none are named) under `conditions`."""
-    chosen = chosen_trajectories(names, directory, steering)
+    """Return the dry run of the named trajectories (all of them if none are named) under `conditions`.
+
+    ``vehicle`` is the file of the vehicle before calibration, "" for the thesis'; where `steering` is "" each
+    trajectory is steered as it says, or as the vehicle can.
+    """
+    models = models_for(vehicle, conditions)
+    steers = next(iter(models.values()))
+    chosen = [steered(trajectory, steering, steers) for trajectory in chosen_trajectories(names, directory)]
     made = dry_run(
         chosen,
-        models_for(vehicle, conditions),
+        models,
         repeats=repeats,
         workspace=workspace,
         start=start,

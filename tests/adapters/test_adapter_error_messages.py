@@ -101,7 +101,7 @@ MISTAKES: dict[str, Callable[[], object]] = {
     "certificates are not named": command_line("sim", "--listen", "tls/192.0.2.1:7447"),
     "configuration of the bus is missing": command_line("sim", "--bus-config", "no.json5"),
     "configuration says where to listen": a_configuration_that_listens,
-    "vehicle's name with a slash": command_line("sim", "--vehicle", "blue/one"),
+    "vehicle's name with a slash": command_line("sim", "--vehicle-name", "blue/one"),
     "lab's name is empty": command_line("agv", "sim", "--lab", ""),
     "no such adapter": command_line("agv", "simm"),
     "no such mocap adapter": command_line("mocap", "optitrak:192.0.2.7"),

@@ -83,3 +83,25 @@ def test_what_is_corrected_is_planned_as_a_bench_would(calibrated):
     durations = {row.condition: row.plan.duration_s for row in made.rows}
     assert durations["corrected"] == corrected_plan(load_trajectory("1"), lagging).duration_s
     assert durations["corrected"] != pytest.approx(durations["calibrated"], abs=0.01)
+
+
+def planned(capsys, *arguments):
+    """Return duration [s] and target of trajectory 5 by condition."""
+    assert main(["plan", "5", "--json", *arguments]) == 0
+    rows = json.loads(capsys.readouterr().out)["rows"]
+    return {row["condition"]: (row["duration_s"], row["target"]["y_m"]) for row in rows}
+
+
+def test_a_vehicle_is_planned_with_its_own_nominal_speed_and_steering(
+    capsys, tmp_path, monkeypatch, nominal, front_steered
+):
+    monkeypatch.chdir(tmp_path)
+    fast = replace(nominal, drive=replace(nominal.drive, output_low=-0.64, output_high=0.64))
+    fast.save("fast.toml")
+    slow, quick = planned(capsys), planned(capsys, "--vehicle=fast.toml")
+    assert quick["uncalibrated"][0] - 0.5 == pytest.approx((slow["uncalibrated"][0] - 0.5) / 2.0, rel=1e-6)
+    fast.save("vehicle.toml")
+    assert planned(capsys) == quick
+    front_steered.save("vehicle.toml")
+    assert planned(capsys)["uncalibrated"][1] == pytest.approx(planned(capsys, "--steering=front")["uncalibrated"][1])
+    assert planned(capsys)["uncalibrated"][1] > 1.05

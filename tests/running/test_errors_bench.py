@@ -50,14 +50,14 @@ def resumed_with_another_name():
 
 def over_the_bus_in_another_unit(monkeypatch):
     """A vehicle that says of itself that it takes µs, as one in another process would."""
-    from agvbench.running import opening
+    from agvbench.running import rig_checks
 
-    real = opening.open_rig
+    real = rig_checks.open_rig
 
     def in_microseconds(**options):
         return real(**options | {"command_unit": "us", "neutral": 1500.0})
 
-    monkeypatch.setattr(opening, "open_rig", in_microseconds)
+    monkeypatch.setattr(rig_checks, "open_rig", in_microseconds)
     opened(vehicle=str(example_path("front_steered")))()
 
 

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import subprocess
+import sys
 
 import pytest
 
-from agvbench.model import thesis_vehicle
+from agvbench.campaign import CampaignHeader
+from agvbench.campaign.header import FILE_NAME
+from agvbench.model import example_vehicle, thesis_vehicle
 from agvbench.running.opening import open_session
 from agvbench.running.vehicles import expected_calibration, uncalibrated_vehicle
 from agvbench.workflows.init import make_lab
@@ -34,3 +38,27 @@ def test_half_speed_is_expected_halfway_and_the_rest_is_believed(tmp_path):
 def test_a_drive_that_is_known_stays(tmp_path):
     thesis_vehicle().save(tmp_path / "vehicle.toml")
     assert expected_calibration(str(tmp_path / "vehicle.toml")) == uncalibrated_vehicle(str(tmp_path / "vehicle.toml"))
+
+
+def test_a_vehicle_keeps_its_name(tmp_path):
+    dataclasses.replace(uncalibrated_vehicle(), name="red car").save(tmp_path / "vehicle.toml")
+    options = {"vehicle": str(tmp_path / "vehicle.toml")}
+    for resume in (False, True):
+        with open_session(options, out=str(tmp_path / "c"), resume=resume, dry_run=False):
+            assert CampaignHeader.load(tmp_path / "c" / FILE_NAME).vehicle_name == "red car"
+
+
+def test_a_folder_with_a_car_drives_its_own_trajectory_too_and_steers_in_front(tmp_path):
+    example_vehicle("front_steered").save(tmp_path / "vehicle.toml")
+    (tmp_path / "trajectories").mkdir()
+    text = 'schema = 1\nname = "wide"\n[[segments]]\nkind = "arc"\nturn = "left"\nradius_m = 1.5\nangle_deg = 45.0'
+    (tmp_path / "trajectories" / "wide.toml").write_text(text)
+    program = "import sys; from agvbench.cli import main; sys.exit(main(sys.argv[1:]))"
+    command = ["bench", "trajectories", "--dry-run", "--repeats=1", "-k", "wide or 5-uncalibrated"]
+    done = subprocess.run(
+        [sys.executable, "-c", program, *command], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "3 runs" in done.stdout
+    for words in ("wide", "calibrated"), ("wide", "uncalibrated"), ("5", "uncalibrated"):
+        assert any(set(words) <= set(line.replace("│", " ").split()) for line in done.stdout.splitlines())

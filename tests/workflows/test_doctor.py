@@ -16,9 +16,19 @@ from agvbench.adapters.natnet.encode import Model
 from agvbench.adapters.natnet.frame import FrameOfData
 from agvbench.adapters.natnet.layout import BODY, MARKER
 from agvbench.cli import main
-from agvbench.model import thesis_vehicle
+from agvbench.errors import AgvbenchError, VehicleError
+from agvbench.model import example_vehicle, thesis_vehicle
+from agvbench.running.settings import BenchSettings
 from agvbench.running.vehicles import uncalibrated_vehicle
 from agvbench.workflows.doctor import Lab, State, examine
+from agvbench.workflows.doctor.checks.adapters import Adapters
+from agvbench.workflows.doctor.checks.ports import Ports
+from agvbench.workflows.doctor.checks.workspace import Floor
+
+
+def lab(folder: Path, **settings: str) -> Lab:
+    """Return a lab that records into `folder`."""
+    return Lab(BenchSettings.given(settings), folder)
 
 
 def found(lab: Lab) -> dict[str, tuple[State, str]]:
@@ -33,6 +43,7 @@ def test_a_simulation_is_ready(
     assert main(["doctor"]) == 0
     said = capsys.readouterr().out
     for name in (
+        "adapters",
         "bus",
         "calibration",
         "certificates",
@@ -66,27 +77,27 @@ def test_a_calibration_grows_old(tmp_path: Path) -> None:
 
 
 def test_a_small_floor_is_said(tmp_path: Path) -> None:
-    state, said = found(Lab(workspace="circle:2", folder=tmp_path))["workspace"]
+    state, said = found(lab(tmp_path, workspace="circle:2"))["workspace"]
     assert state is State.DOUBTFUL
-    assert "do not fit circle:2" in said
-    assert found(Lab(workspace="circle:x", folder=tmp_path))["workspace"][0] is State.BAD
+    assert "cannot be driven by the thesis' vehicle on circle:2" in said
+    assert found(lab(tmp_path, workspace="circle:x"))["workspace"][0] is State.BAD
 
 
-def test_a_port_is_looked_at_and_not_opened(tmp_path: Path) -> None:
+def test_a_port_is_looked_at(tmp_path: Path) -> None:
     master, slave = os.openpty()
     try:
-        state, said = found(Lab(agv=f"serial:{os.ttyname(slave)}", folder=tmp_path))["serial ports"]
-        assert (state, "may be used" in said) == (State.GOOD, True)
+        finding = Ports().examine(lab(tmp_path, agv=f"serial:{os.ttyname(slave)}"))
+        assert (finding.state, "may be used" in finding.found) == (State.GOOD, True)
     finally:
         os.close(master)
         os.close(slave)
-    state, said = found(Lab(agv="serial:/dev/none", folder=tmp_path))["serial ports"]
+    state, said = found(lab(tmp_path, agv="serial:/dev/none"))["serial ports"]
     assert (state, "no port '/dev/none'" in said) == (State.BAD, True)
 
 
 def test_a_bus_that_is_not_secured_has_no_certificates(tmp_path: Path) -> None:
     assert found(Lab(folder=tmp_path))["certificates"][0] is State.IDLE
-    state, said = found(Lab(folder=tmp_path, bus_config=str(tmp_path / "none.json5")))["certificates"]
+    state, said = found(lab(tmp_path, bus_config=str(tmp_path / "none.json5")))["certificates"]
     assert (state, "none.json5: cannot be read" in said) == (State.BAD, True)
 
 
@@ -114,11 +125,60 @@ def test_cameras_are_asked_for_the_vehicle(tmp_path: Path, body: str, state: Sta
     thread.start()
     try:
         host, port = server.address
-        lab = Lab(mocap=f"natnet:{host}:{port}", camera={"body": body}, folder=tmp_path)
-        found_state, found_text = found(lab)["mocap"]
+        asked = lab(tmp_path, mocap=f"natnet:{host}:{port}", camera=f"body={body}")
+        found_state, found_text = found(asked)["mocap"]
     finally:
         streaming = False
         thread.join()
         server.close()
     assert said in found_text
     assert found_state is state
+
+
+@pytest.mark.parametrize(("settings", "said"), [
+    ({"plant": "agvbench.simulator:make_none"}, "make_none"),
+    ({"agv": "serial:/dev/none"}, "/dev/none"),
+])  # fmt: skip
+def test_an_adapter_that_does_not_exist_fails(settings: dict[str, str], said: str, tmp_path: Path) -> None:
+    with pytest.raises(AgvbenchError, match=said):
+        Adapters().examine(lab(tmp_path, **settings))
+
+
+def test_what_fails_is_the_exit_code(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["doctor", "--plant=none.py:make_plant"]) == 1
+    assert "adapters      fails      none.py: there is no such file" in capsys.readouterr().out
+
+
+def test_a_vehicle_that_commands_in_another_unit_than_its_file_says_fails(tmp_path: Path) -> None:
+    file = tmp_path / "car.toml"
+    example_vehicle("front_steered").save(file)
+    own = tmp_path / "microseconds.py"
+    own.write_text(
+        "from agvbench.adapters import AdapterOptions\n"
+        "from agvbench.adapters.agv.live import LiveAgv\n"
+        "class Microseconds(LiveAgv):\n"
+        "    scheme = 'microseconds'\n"
+        "    @classmethod\n"
+        "    def open(cls, address, options):\n"
+        "        return super().open('', AdapterOptions(vehicle=options.vehicle))\n"
+    )
+    with pytest.raises(VehicleError, match="commands in another unit than its file says: normalised"):
+        Adapters().examine(lab(tmp_path, agv=str(own), vehicle=str(file)))
+
+
+def test_the_trajectories_of_this_folder_are_planned_for_its_vehicle(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    example_vehicle("front_steered").save(tmp_path / "vehicle.toml")
+    (tmp_path / "trajectories").mkdir()
+    tight = 'schema = 1\nname = "tight"\n[[segments]]\nkind = "arc"\nturn = "left"\nradius_m = 0.01\nangle_deg = 9'
+    (tmp_path / "trajectories" / "tight.toml").write_text(tight)
+    finding = Floor().examine(lab(tmp_path, vehicle="vehicle.toml"))
+    assert (finding.state, "trajectories tight cannot be driven" in finding.found) == (State.DOUBTFUL, True)
+    (tmp_path / "trajectories" / "tight.toml").write_text(tight.replace("0.01", "1.0"))
+    finding = Floor().examine(lab(tmp_path, vehicle="vehicle.toml"))
+    assert (finding.state, "eight trajectories and tight can be driven" in finding.found) == (State.GOOD, True)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 from typing import ClassVar
+
+from agvbench.running.settings import BenchSettings
 
 
 class State(Enum):
@@ -30,18 +31,10 @@ class Finding:
 
 @dataclass(frozen=True)
 class Lab:
-    """What is to be used: adapters as on the bench, the camera's options, workspace, and the folder to record into.
+    """What is to be driven, as a bench is asked for it, and the folder to record into."""
 
-    ``bus_config`` is the file of a secured bus, "" for none.
-    """
-
-    agv: str = "sim"
-    mocap: str = "sim"
-    camera: Mapping[str, str | float] = field(default_factory=dict)
-    vehicle: str = "agv1"
-    workspace: str = "circle:6.1"
+    settings: BenchSettings = field(default_factory=BenchSettings)
     folder: Path = Path()
-    bus_config: str = ""
 
 
 class Check(ABC):

@@ -28,7 +28,7 @@ def test_a_vehicle_is_seen_to_drive() -> None:
         "--emulate",
         "--port=0",
         "--natnet-version=3.1",
-        "--vehicle=blue",
+        "--vehicle-name=blue",
     ]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None

@@ -20,18 +20,20 @@ class Certificates(Check):
 
     def examine(self, lab: Lab) -> Finding:
         """Compare what is left of the authority's certificate with a month: it outlives those that it signed."""
-        if not lab.bus_config:
+        if not lab.settings.bus_config:
             return Finding(State.IDLE, "the bus is not secured", "give --bus-config FILE where it is to be")
-        config = BusConfig.load(lab.bus_config)
+        config = BusConfig.load(lab.settings.bus_config)
         who = "takes those with a certificate of the lab's" if config.asks_who else "does not ask who calls"
         if (authority := config.certificates.root_ca_certificate) is None:
-            return Finding(State.DOUBTFUL, f"{lab.bus_config} names no authority", "see docs/how-to/secure-the-bus.md")
+            return Finding(
+                State.DOUBTFUL, f"{lab.settings.bus_config} names no authority", "see docs/how-to/secure-the-bus.md"
+            )
         known = trusting(authority).get_ca_certs()
         ends_s = [ssl.cert_time_to_seconds(str(certificate["notAfter"])) for certificate in known]
         if not ends_s:
             return Finding(State.DOUBTFUL, f"{authority} is no authority's", "see docs/how-to/secure-the-bus.md")
         days = (min(ends_s) - time.time()) / _DAY_S
-        said = f"{lab.bus_config} {who}; its authority ends in {days:.0f} days"
+        said = f"{lab.settings.bus_config} {who}; its authority ends in {days:.0f} days"
         if days < _SOON_DAYS:
             state = State.BAD if days < 0.0 else State.DOUBTFUL
             return Finding(state, f"{said} (limit: {_SOON_DAYS:g})", "make new certificates")

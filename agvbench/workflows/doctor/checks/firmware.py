@@ -17,7 +17,7 @@ class Firmware(Check):
 
     def examine(self, lab: Lab) -> Finding:
         """Fail only where ``simavr`` is asked for."""
-        scheme, address = parse_spec(lab.agv)
+        scheme, address = parse_spec(lab.settings.agv)
         asked = scheme in _SCHEMES
         why = why_not_built(FirmwareAddress.parse(address, where=scheme).version) if asked else why_not_built()
         if not why:

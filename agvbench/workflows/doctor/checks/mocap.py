@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import threading
 
+from agvbench.adapters.camera_options import camera_options
 from agvbench.adapters.natnet.client import Client, Seen
 from agvbench.adapters.natnet.options import NatNetOptions
 from agvbench.adapters.registry import parse_spec
@@ -22,10 +23,13 @@ class Mocap(Check):
 
     def examine(self, lab: Lab) -> Finding:
         """Say version, rate, bodies, and how well the two clocks are known to each other."""
-        scheme, address = parse_spec(lab.mocap)
+        scheme, address = parse_spec(lab.settings.mocap)
         if scheme != "natnet" or address == "emulated":
-            return Finding(State.IDLE, f"{lab.mocap}: nothing to connect to", "give the cameras: --mocap natnet:HOST")
-        options = NatNetOptions.parse(address, lab.camera, lab.vehicle)
+            return Finding(
+                State.IDLE, f"{lab.settings.mocap}: nothing to connect to", "give the cameras: --mocap natnet:HOST"
+            )
+        camera = camera_options([lab.settings.camera])
+        options = NatNetOptions.parse(address, camera, lab.settings.vehicle_name)
         seen: list[Seen] = []
         client = Client(options.connection, WallClock(), seen.append)
         try:

@@ -10,7 +10,7 @@ from agvbench.workflows.doctor.finding import Check, Finding, Lab, State
 
 
 class Ports(Check):
-    """Lists serial ports, and looks at the one asked for; it is not opened, since that resets some vehicles."""
+    """Lists serial ports, and looks at the one asked for; that the vehicle answers there is asked by `Adapters`."""
 
     name = "serial ports"
 
@@ -19,7 +19,7 @@ class Ports(Check):
         from serial.tools.list_ports import comports
 
         there = " ".join(sorted(port.device for port in comports())) or "none"
-        scheme, address = parse_spec(lab.agv)
+        scheme, address = parse_spec(lab.settings.agv)
         if scheme != "serial":
             return Finding(State.IDLE, f"there are: {there}", "give the vehicle: --agv serial:PORT")
         if not address or not Path(address).exists():

@@ -1,38 +1,34 @@
-"""Whether the floor is large enough for the eight trajectories."""
+"""Whether the vehicle can drive the trajectories on this floor."""
 
 from __future__ import annotations
 
-from agvbench.errors import PlanError
-from agvbench.model import VehicleModel, thesis_vehicle
-from agvbench.planning import Workspace, load_trajectory, plan
+from agvbench.planning import Workspace, own_trajectories
 from agvbench.workflows.doctor.finding import Check, Finding, Lab, State
+from agvbench.workflows.plan import plan_trajectories
 
 _EIGHT = tuple(map(str, range(1, 9)))
 
 
 class Floor(Check):
-    """Plans the eight trajectories for the thesis' vehicle inside the workspace."""
+    """Plans what ``agvbench bench`` drives: the eight trajectories and the folder's own, with the bench's vehicle."""
 
     name = "workspace"
 
     def examine(self, lab: Lab) -> Finding:
-        """Say which do not fit."""
-        workspace = Workspace.parse(lab.workspace)
-        vehicle = thesis_vehicle()
-        outside = [name for name in _EIGHT if not _fits(name, workspace, vehicle)]
-        if outside:
-            said = (
-                f"trajectories {' '.join(outside)} do not fit {workspace.name} with {workspace.margin_m:g} m to spare"
-            )
-            return Finding(State.DOUBTFUL, said, "clear more floor, or drive the others")
-        return Finding(
-            State.GOOD, f"the eight trajectories fit {workspace.name} with {workspace.margin_m:g} m to spare"
+        """Say which cannot be driven, and why the first of them cannot."""
+        settings, own = lab.settings, own_trajectories()
+        workspace = Workspace.parse(settings.workspace)
+        made = plan_trajectories(
+            [*_EIGHT, *own], vehicle=settings.vehicle, workspace=workspace, steering=settings.steering
         )
+        vehicle = settings.vehicle or "the thesis' vehicle"
+        where = f"{vehicle} on {workspace.name} with {workspace.margin_m:g} m to spare"
+        if not made.problems:
+            return Finding(State.GOOD, f"the eight trajectories{_and(own)} can be driven by {where}")
+        names = dict.fromkeys(row.trajectory.name for row in made.rows if row.problem)
+        said = f"trajectories {' '.join(names)} cannot be driven by {where}: {made.problems[0]}"
+        return Finding(State.DOUBTFUL, said, "see agvbench plan, or drive the others")
 
 
-def _fits(name: str, workspace: Workspace, vehicle: VehicleModel) -> bool:
-    try:
-        plan(load_trajectory(name), vehicle, workspace=workspace)
-    except PlanError:
-        return False
-    return True
+def _and(own: list[str]) -> str:
+    return f" and {' '.join(own)}" if own else ""

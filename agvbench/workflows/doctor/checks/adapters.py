@@ -1,0 +1,68 @@
+"""Whether vehicle and camera answer, and understand what the vehicle file says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import closing
+
+from agvbench.adapters.registry import open_agv, open_mocap
+from agvbench.bus.identity_message import AgvIdentity, Identity, MocapIdentity
+from agvbench.model import VehicleModel
+from agvbench.running.placers.choosing import choose_placer
+from agvbench.running.rig_checks import adapter_options, check_commands, open_session_rig
+from agvbench.running.settings import BenchSettings
+from agvbench.running.vehicles import known_models
+from agvbench.workflows.doctor.finding import Check, Finding, Lab, State
+
+_SIM = BenchSettings().agv
+
+
+class Adapters(Check):
+    """Opens the rig as a bench does, with the vehicle stopped; an adapter that is named alone is opened alone."""
+
+    name = "adapters"
+
+    def examine(self, lab: Lab) -> Finding:
+        """Say who answers, and in which unit."""
+        settings = lab.settings
+        models = known_models(settings)
+        if not settings.connect and (settings.agv == _SIM) != (settings.mocap == _SIM):
+            return Finding(State.GOOD, _alone(settings, models))
+        with open_session_rig(settings, models) as link:
+            identity = link.identity()
+        choose_placer(settings.place, simulated=identity.simulated)
+        return Finding(State.GOOD, f"{_vehicle(identity.agv)}; {_camera(identity.mocap)}")
+
+
+def _alone(settings: BenchSettings, models: Mapping[str, VehicleModel]) -> str:
+    options = adapter_options(settings, models)
+    if settings.mocap != _SIM:
+        with closing(open_mocap(settings.mocap, options)) as camera:
+            camera.start(_Unheard())
+            return _camera(camera.identity())
+    with closing(open_agv(settings.agv, options)) as vehicle:
+        vehicle.start(_Unheard())
+        vehicle.stop()
+        identity = vehicle.identity()
+        check_commands(models, identity)
+        return _vehicle(identity)
+
+
+class _Unheard:
+    """Takes what an adapter reports, and leaves it."""
+
+    def truth(self, *_: object, **__: object) -> None: ...
+
+    def frames(self, *_: object, **__: object) -> None: ...
+
+    def frame(self, *_: object, **__: object) -> None: ...
+
+    def event(self, *_: object, **__: object) -> None: ...
+
+
+def _vehicle(identity: AgvIdentity | Identity) -> str:
+    return f"{identity.vehicle} answers ({identity.firmware}), commands in {identity.command_unit}"
+
+
+def _camera(identity: MocapIdentity) -> str:
+    return f"{identity.adapter} sees it at {identity.rate_hz:g} Hz"
