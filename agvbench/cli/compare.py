@@ -1,7 +1,8 @@
 """Compare two campaigns (firmware, nights, vehicles), or two conditions of one.
 
-Says per trajectory and condition whether |Δs| and |Δδ| are better, the same within a margin, worse, or whether the
-repeats cannot say. Two campaigns that do not differ report a regression with a chance of at most 1 %.
+Says per trajectory and condition whether end position error, heading error and |Δs| are better, the same within a
+margin, worse, or whether the repeats cannot say. Shows by how much the mean end position moved. Two campaigns that do
+not differ report a regression with a chance of at most 1 %.
 
 examples:
   agvbench compare campaigns/last-night campaigns/tonight
@@ -30,8 +31,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fail-on", choices=("regression", "any", "never"), default="regression", help="when to exit with 1"
     )
-    parser.add_argument("--margin-mm", metavar="MM", type=float, help="noise band of distances (default: 5)")
-    parser.add_argument("--margin-deg", metavar="DEG", type=float, help="noise band of headings (default: 1)")
+    parser.add_argument(
+        "--margin-mm", metavar="MM", type=float, help="noise band of end position error and |Δs| (default: 5)"
+    )
+    parser.add_argument("--margin-deg", metavar="DEG", type=float, help="noise band of the heading error (default: 1)")
     parser.add_argument("--json", metavar="F", type=Path, help="write the comparison as JSON, too")
 
 

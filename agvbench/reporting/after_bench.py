@@ -8,10 +8,10 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from agvbench.errors import AgvbenchError
-from agvbench.reporting.console import end_pose_summary
-from agvbench.reporting.content import Paragraph
+from agvbench.reporting.console import end_pose_summary, said_first
 from agvbench.reporting.text import as_text
 from agvbench.reporting.write import write_report
+from agvbench.statistics.quantities import DEFINITIONS
 from agvbench.workflows.report import ReportData, gather
 
 
@@ -22,15 +22,15 @@ def conclude(directory: Path, *, report: bool) -> str:
     """
     try:
         if not report:
-            return as_text(Group(*_end_poses(gather(directory)), Text(f"campaign: {directory}")))
+            defined = Text(f"{DEFINITIONS}\n")
+            return as_text(Group(*_end_poses(gather(directory), defined), Text(f"campaign: {directory}")))
         written = write_report(directory)
     except AgvbenchError as error:
         return f"no report: {error}\ncampaign: {directory}"
-    said = [Text(block.text) for block in written.sections[0].blocks if isinstance(block, Paragraph)]
     where = [Text(f"campaign: {directory}"), Text(f"report:   {written.files[0]}")]
-    return as_text(Group(*_end_poses(written.data), *said, Text(""), *where))
+    return as_text(Group(*_end_poses(written.data), *said_first(written), Text(""), *where))
 
 
-def _end_poses(data: ReportData) -> list[RenderableType]:
-    """Return the table of end poses, or nothing where no run had a target to miss."""
-    return [end_pose_summary(data)] if len(data.end_poses) else []
+def _end_poses(data: ReportData, *below: RenderableType) -> list[RenderableType]:
+    """Return the table of end poses and what stands below it, or nothing where no run had a target."""
+    return [end_pose_summary(data), *below] if len(data.end_poses) else []

@@ -5,6 +5,7 @@ from __future__ import annotations
 from agvbench.reporting.content import Column, Table, Value
 from agvbench.statistics import Comparison, Difference
 from agvbench.statistics.differences import ALL
+from agvbench.statistics.quantities import COMPONENT_DEFINITIONS
 from agvbench.statistics.verdict import ALPHA_SAME
 from agvbench.statistics.words import describe
 
@@ -28,7 +29,7 @@ def comparison_table(comparison: Comparison, slug: str) -> Table:
         Column("cliffs_delta", "Cliff's δ", 2),
         Column("words", "in words"),
     ]
-    rows = [_row(d, comparison) for d in comparison.differences]
+    rows = [_row(d, comparison) for d in comparison.worst_first]
     if len({d.condition for d in comparison.differences if d.trajectory != ALL}) == 1:
         # Named in the headings of both sides already.
         columns, rows = columns[:1] + columns[2:], [row[:1] + row[2:] for row in rows]
@@ -40,11 +41,29 @@ def comparison_table(comparison: Comparison, slug: str) -> Table:
     return Table(slug, f"{b} against {a}: smaller errors are better.", columns, rows, grouped=True, note=note)
 
 
+def shift_table(comparison: Comparison, slug: str) -> Table:
+    """Return by how much the mean end position of each trajectory moved from A to B."""
+    columns = [Column("trajectory", "trajectory"), Column("condition", "condition")]
+    for part in ("along", "across"):
+        columns += [
+            Column(f"{part}_mm", "mean", 1, group=f"{part} [mm]"),
+            Column(f"{part}_low", "95 % from", 1, group=f"{part} [mm]"),
+            Column(f"{part}_high", "to", 1, group=f"{part} [mm]"),
+        ]
+    rows: list[list[Value]] = [[s.trajectory, s.condition, *s.along, *s.across] for s in comparison.shifts]
+    caption = f"Mean end position of {comparison.name_b} minus that of {comparison.name_a}."
+    note = (
+        f"{COMPONENT_DEFINITIONS} Welch's intervals, each for itself. No verdict follows from this table; it "
+        "shows runs that end as far from the target as before, on its other side."
+    )
+    return Table(slug, caption, columns, rows, note=note)
+
+
 def _row(d: Difference, comparison: Comparison) -> list[Value]:
     return [
         d.trajectory,
         d.condition,
-        f"|{d.quantity.symbol}| [{d.quantity.unit}]",
+        d.quantity.labelled,
         *(d.a.repeats, d.a.median, d.b.repeats, d.b.median),
         *d.interval,
         str(d.verdict),

@@ -6,13 +6,16 @@ from typing import TYPE_CHECKING
 
 from agvbench.reporting.content import Column, Paragraph, Table, Value, plain
 from agvbench.statistics.differences import ALL
+from agvbench.statistics.quantities import COMPONENT_DEFINITIONS, DEFINITIONS
 from agvbench.statistics.words import headline
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
+    from rich.text import Text
 
     from agvbench.reporting.write import WrittenReport
     from agvbench.statistics import Comparison, Difference
+    from agvbench.statistics.bootstrap import Interval
     from agvbench.workflows.report import ReportData
 
 _VERDICT_STYLES = {"better": "green", "worse": "bold red", "same": "cyan", "cannot": "dim"}
@@ -48,16 +51,38 @@ def comparison_summary(comparison: Comparison) -> RenderableType:
     columns = [
         Column("trajectory", "trajectory"),
         Column("quantity", "error"),
+        Column("repeats", "n"),
         Column("median_a", heading_a, 2),
         Column("median_b", heading_b, 2),
         Column("difference", "difference", 2),
         Column("interval", "95 % interval"),
         Column("verdict", "verdict"),
     ]
-    several = len({d.condition for d in comparison.differences if d.trajectory != ALL}) > 1
-    rows = [_console_row(d, columns[4], several=several) for d in comparison.differences]
-    caption = f"{heading_b} against {heading_a} (medians; smaller is better)"
+    several = _several_conditions(comparison)
+    rows = [_console_row(d, columns[5], several=several) for d in comparison.worst_first]
+    caption = f"{heading_b} against {heading_a} (medians; smaller is better; worst first)"
     return console_table(Table("comparison", caption, columns, rows))
+
+
+def shift_summary(comparison: Comparison) -> RenderableType:
+    """Return how the mean end positions moved as a table that fits a console, the largest shift first."""
+    heading_a, heading_b = _headings(comparison)
+    columns = [Column("trajectory", "trajectory")]
+    for part in ("along", "across"):
+        columns += [Column(part, f"{part} mm", 1), Column(f"{part}_interval", "95 % interval")]
+    several, rows = _several_conditions(comparison), []
+    for shift in comparison.shifts:
+        name = f"{shift.trajectory} {shift.condition}" if several else shift.trajectory
+        cells: list[Value] = [name]
+        for part, column in ((shift.along, columns[1]), (shift.across, columns[3])):
+            cells += [part.estimate, _interval(part, column)]
+        rows.append(cells)
+    caption = f"Mean end position of {heading_b} minus that of {heading_a} (no verdict follows; largest first)"
+    return console_table(Table("end_shift", caption, columns, rows))
+
+
+def _several_conditions(comparison: Comparison) -> bool:
+    return len({d.condition for d in comparison.differences if d.trajectory != ALL}) > 1
 
 
 def _headings(comparison: Comparison) -> tuple[str, str]:
@@ -67,19 +92,20 @@ def _headings(comparison: Comparison) -> tuple[str, str]:
 
 def _console_row(d: Difference, difference: Column, *, several: bool) -> list[Value]:
     name = f"{d.trajectory} {d.condition}" if several and d.trajectory != ALL else d.trajectory
-    error = f"|{d.quantity.symbol}| {d.quantity.unit}"
     medians = d.a.median, d.b.median, d.interval.estimate
-    return [name, error, *medians, _interval(d, difference), str(d.verdict)]
+    a, b = d.a.repeats, d.b.repeats
+    repeats = str(a) if a == b else f"{a}, {b}"
+    return [name, d.quantity.labelled, repeats, *medians, _interval(d.interval, difference), str(d.verdict)]
 
 
-def _interval(d: Difference, column: Column) -> str:
-    low, high = column.shown(d.interval.low), column.shown(d.interval.high)
+def _interval(interval: Interval, column: Column) -> str:
+    low, high = column.shown(interval.low), column.shown(interval.high)
     return f"{low} … {high}" if low else ""
 
 
 def end_pose_summary(data: ReportData) -> RenderableType:
-    """Return medians and quartiles per trajectory and condition, with the thesis' medians."""
-    columns = (
+    """Return medians and quartiles per trajectory and condition, beside the thesis' medians where its vehicle drove."""
+    columns = [
         Column("trajectory", "trajectory"),
         Column("reading", "error"),
         Column("condition", "condition"),
@@ -87,10 +113,19 @@ def end_pose_summary(data: ReportData) -> RenderableType:
         Column("q1", "Q1", 2),
         Column("median", "MED", 2),
         Column("q3", "Q3", 2),
-        Column("published_median", "MED", 2, group="thesis"),
-    )
+    ]
+    if data.end_poses["published_median"].notna().any():
+        columns.append(Column("published_median", "MED", 2, group="thesis"))
     rows = [[row[c.name] for c in columns] for row in data.end_poses.to_dict("records")]
     return console_table(Table("end_poses", "End poses [mm, deg]", columns, rows))
+
+
+def said_first(report: WrittenReport) -> list[Text]:
+    """Return the paragraphs of a report's first section."""
+    from rich.text import Text
+
+    blocks = [block for block in report.sections[0].blocks if isinstance(block, Paragraph)]
+    return [Text(block.text, style="" if block.lead else "dim") for block in blocks]
 
 
 def print_report(console: Console, report: WrittenReport) -> None:
@@ -101,9 +136,8 @@ def print_report(console: Console, report: WrittenReport) -> None:
         console.print(comparison_summary(comparison))
     if not report.data.comparisons and len(report.data.end_poses):
         console.print(end_pose_summary(report.data))
-    for block in report.sections[0].blocks:
-        if isinstance(block, Paragraph):
-            console.print(Text(block.text))
+    for text in said_first(report):
+        console.print(text)
     console.print(Text(f"wrote {report.files[0]} and {len(report.files) - 1} more files"), soft_wrap=True)
 
 
@@ -114,6 +148,8 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
     if _headings(comparison) == ("A", "B"):
         console.print(Text(f"A: {plain(comparison.name_a)}\nB: {plain(comparison.name_b)}"))
     console.print(comparison_summary(comparison))
+    console.print(shift_summary(comparison))
+    console.print(Text(f"{DEFINITIONS} {COMPONENT_DEFINITIONS}", style="dim"))
     for line in comparison.left_out:
         console.print(Text(f"left out: {plain(line)}", style="dim"))
     for note in comparison.notes:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.errors import InputError
-from agvbench.statistics.quantities import QUANTITIES, Quantity
+from agvbench.statistics.quantities import ACROSS, ALONG, QUANTITIES, Quantity
 from agvbench.statistics.runs import valid
 from agvbench.types import Floats
 
@@ -26,9 +26,13 @@ _TARGET_TOLERANCE = np.array([1e-3, 1e-3, math.radians(0.1)])
 
 @dataclass(frozen=True)
 class Side:
-    """The runs of one side of a cell: absolute errors by column, sessions, and the target; arrays of shape (n,)."""
+    """The runs of one side of a cell: absolute errors by column and sessions, of shape (n,), and the target.
+
+    ``ends_mm`` (n, 2) are the end positions minus the target's, along and across.
+    """
 
     absolute: dict[str, Floats]
+    ends_mm: Floats
     session: NDArray[np.object_]
     target: Floats
 
@@ -101,10 +105,13 @@ def _sides(errors: pd.DataFrame, keys: list[str]) -> dict[_Key, Side]:
     named = list(zip(*(errors[key].astype(str) for key in keys), strict=True))
     absolute = {q.column: np.abs(errors[q.column].to_numpy(dtype=float)) for q in QUANTITIES}
     session, target = errors["session"].to_numpy(dtype=object), errors[_TARGET].to_numpy(dtype=float)
+    ends = errors[[ALONG.column, ACROSS.column]].to_numpy(dtype=float)
     sides = {}
     for key in dict.fromkeys(named):
         at = np.array([name == key for name in named])
-        sides[key] = Side({column: values[at] for column, values in absolute.items()}, session[at], target[at][0])
+        sides[key] = Side(
+            {column: values[at] for column, values in absolute.items()}, ends[at], session[at], target[at][0]
+        )
     return sides
 
 

@@ -1,7 +1,8 @@
 """Compare two sets of runs: where b is worse than a, and how sure that is.
 
-Every comparison is a rank-sum test of |Δs| or |Δδ|, exact for small samples. Holm's correction covers all of them,
-so that two campaigns that do not differ report a regression with a chance of at most 1 %, whatever their noise.
+Every comparison is a rank-sum test of end position error, heading error or |Δs|, exact for small samples. Holm's
+correction covers all of them, so that two campaigns that do not differ report a regression with a chance of at most
+1 %, whatever their noise.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from agvbench.errors import FlagError
 from agvbench.statistics.bootstrap import RESAMPLES
 from agvbench.statistics.cells import match_cells
 from agvbench.statistics.differences import Difference, judge, of_all, of_cell
+from agvbench.statistics.end_shifts import EndShift, end_shift
 from agvbench.statistics.quantities import QUANTITIES, Quantity
 from agvbench.statistics.sessions import session_note
 from agvbench.statistics.verdict import ALPHA, Verdict
@@ -28,11 +30,15 @@ MARGIN_DEG = 1.0
 
 @dataclass(frozen=True)
 class Comparison:
-    """All differences between two sets of runs, and what they do and do not mean."""
+    """All differences between two sets of runs, and what they do and do not mean.
+
+    ``shifts`` say how the mean end position moved; no verdict follows from them.
+    """
 
     name_a: str
     name_b: str
     differences: tuple[Difference, ...]
+    shifts: tuple[EndShift, ...]
     left_out: tuple[str, ...]
     notes: tuple[str, ...]
     alpha: float
@@ -41,6 +47,16 @@ class Comparison:
     def of(self, verdict: Verdict) -> list[Difference]:
         """Return the differences with this verdict."""
         return [difference for difference in self.differences if difference.verdict is verdict]
+
+    @property
+    def worst_first(self) -> list[Difference]:
+        """Return the differences for reading: worse, undecided, same, better, and in each the largest first."""
+        order = (Verdict.WORSE, Verdict.UNKNOWN, Verdict.SAME, Verdict.BETTER)
+
+        def rank(d: Difference) -> tuple[int, float]:
+            return order.index(d.verdict), -d.interval.estimate / (d.margin or 1.0)
+
+        return sorted(self.differences, key=rank)
 
     @property
     def is_regression(self) -> bool:
@@ -66,14 +82,15 @@ def compare(
     resamples: int = RESAMPLES,
     seed: int = 0,
 ) -> Comparison:
-    """Compare the errors of `b` with those of `a` in |Δs| and |Δδ|.
+    """Compare the errors of `b` with those of `a`: end position error, heading error and |Δs|.
 
     Parameters
     ----------
     a, b
         What `pose_errors` returns. Runs that were rejected or could not be measured do not count.
     margin_mm, margin_deg
-        The noise band: median differences within it are no regression, however significant.
+        The noise band, of end position error and |Δs|, and of the heading error: median differences within it are no
+        regression, however significant.
     conditions
         Compare the first condition of `a` with the second of `b`; without it, equal conditions are compared.
     same_campaign
@@ -82,7 +99,7 @@ def compare(
     names
         What to call the two sides.
     alpha
-        The chance of reporting any regression where there is none, over all trajectories and both quantities.
+        The chance of reporting any regression where there is none, over all trajectories and quantities.
     resamples, seed
         Of the bootstrap.
 
@@ -99,8 +116,9 @@ def compare(
     if len(cells) > 1:
         raw += [of_all(cells, q, margins[q], resamples, seed) for q in QUANTITIES]
     differences, tests = judge(raw, alpha)
+    shifts = sorted(map(end_shift, cells), key=lambda shift: -shift.length_mm)
     note = session_note(cells, same_campaign=same_campaign)
-    return Comparison(*names, tuple(differences), tuple(left_out), (note,), alpha, tests)
+    return Comparison(*names, tuple(differences), tuple(shifts), tuple(left_out), (note,), alpha, tests)
 
 
 def checked_margins(margin_mm: float, margin_deg: float) -> dict[Quantity, float]:
@@ -111,7 +129,7 @@ def checked_margins(margin_mm: float, margin_deg: float) -> dict[Quantity, float
     FlagError
         If one is negative or not finite.
     """
-    return {q: _margin(m, q) for q, m in zip(QUANTITIES, (margin_mm, margin_deg), strict=True)}
+    return {q: _margin({"mm": margin_mm, "deg": margin_deg}[q.unit], q) for q in QUANTITIES}
 
 
 def _margin(value: float, quantity: Quantity) -> float:

@@ -8,6 +8,8 @@ from typing import Any
 from agvbench.statistics.bootstrap import CONFIDENCE
 from agvbench.statistics.comparison import Comparison
 from agvbench.statistics.differences import Difference, Sample
+from agvbench.statistics.end_shifts import EndShift
+from agvbench.statistics.quantities import POSITION
 from agvbench.statistics.words import describe, headline
 
 SCHEMA = 1
@@ -25,6 +27,7 @@ def comparison_to_json(comparison: Comparison) -> dict[str, Any]:
         "alpha": comparison.alpha,
         "tests": comparison.tests,
         "differences": [_difference(d, comparison) for d in comparison.differences],
+        "end_shifts": [_shift(shift) for shift in comparison.shifts],
         "left_out": list(comparison.left_out),
         "notes": list(comparison.notes),
     }
@@ -34,7 +37,7 @@ def _difference(d: Difference, comparison: Comparison) -> dict[str, Any]:
     return {
         "trajectory": d.trajectory,
         "condition": d.condition,
-        "quantity": f"abs_{d.quantity.column}",
+        "quantity": d.quantity.column if d.quantity is POSITION else f"abs_{d.quantity.column}",
         "unit": d.quantity.unit,
         "margin": d.margin,
         "a": _sample(d.a),
@@ -48,6 +51,18 @@ def _difference(d: Difference, comparison: Comparison) -> dict[str, Any]:
         "smallest_visible_difference": _finite(d.visible),
         "verdict": str(d.verdict),
         "words": describe(d, comparison),
+    }
+
+
+def _shift(shift: EndShift) -> dict[str, Any]:
+    parts = {"along_mm": shift.along, "across_mm": shift.across}
+    return {
+        "trajectory": shift.trajectory,
+        "condition": shift.condition,
+        **{
+            name: {"difference": part.estimate, "low": _finite(part.low), "high": _finite(part.high)}
+            for name, part in parts.items()
+        },
     }
 
 

@@ -14,7 +14,7 @@ from agvbench.statistics.effect_size import cliffs_delta
 from agvbench.statistics.multiplicity import can_speak, holm_of_those_that_can_speak
 from agvbench.statistics.outliers import classify_outliers
 from agvbench.statistics.power import smallest_visible_difference
-from agvbench.statistics.quantities import Quantity
+from agvbench.statistics.quantities import DISTANCE, Quantity
 from agvbench.statistics.rank_test import rank_test
 from agvbench.statistics.verdict import Verdict, decide
 from agvbench.types import Floats
@@ -115,8 +115,12 @@ def _tested(
 
 
 def judge(raw: Sequence[Untold], alpha: float) -> tuple[list[Difference], int]:
-    """Return the differences with corrected p-values and verdicts, and how many tests the correction counted."""
-    least = [r.least_p for r in raw]
+    """Return the differences with corrected p-values and verdicts, and how many tests the correction counted.
+
+    |Δs| is not tested where counting its tests would leave too few repeats for a test of the end pose: of a run that
+    ends elsewhere it sees a part of what the end position error sees.
+    """
+    least = _least_p(raw, alpha)
     able = can_speak(least, alpha)
     tests = max(1, sum(able))
     worse = holm_of_those_that_can_speak([r.difference.p_worse for r in raw], least, alpha)
@@ -129,6 +133,14 @@ def judge(raw: Sequence[Untold], alpha: float) -> tuple[list[Difference], int]:
         )
         judged.append(replace(d, verdict=verdict, visible=_visible(d, alpha / tests) if spoke else math.inf))
     return judged, tests
+
+
+def _least_p(raw: Sequence[Untold], alpha: float) -> list[float]:
+    """Return the smallest p-values that tests could give, 1 for those that are not made."""
+    every = [r.least_p for r in raw]
+    end_poses = [1.0 if r.difference.quantity == DISTANCE else r.least_p for r in raw]
+    silenced = zip(can_speak(end_poses, alpha), can_speak(every, alpha), strict=True)
+    return end_poses if any(alone and not together for alone, together in silenced) else every
 
 
 def _visible(d: Difference, alpha: float) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from agvbench.statistics.outliers import classify_outliers
 from agvbench.statistics.published import published_end_poses, thesis_case
-from agvbench.statistics.quantities import QUANTITIES, Quantity
+from agvbench.statistics.quantities import DISTANCE, HEADING, POSITION, ROTATION, Quantity
 from agvbench.statistics.quartiles import five_numbers
 from agvbench.statistics.runs import valid
 from agvbench.types import CONDITIONS, Pose
@@ -25,22 +25,26 @@ COLUMNS = (
 )
 
 
-def end_pose_table(errors: pd.DataFrame) -> pd.DataFrame:
+def end_pose_table(errors: pd.DataFrame, *, thesis_vehicle: bool = True) -> pd.DataFrame:
     """Return MIN, Q1, MED, Q3 and MAX per trajectory, quantity and condition (thesis tables 8.3–8.10).
 
-    ``reading`` says what the row gives: ``|Δs|`` [mm], ``|Δδ|`` [deg], or, for trajectories that turn, the measured
-    ``rotation`` [deg] as in tables 8.7–8.10. ``case`` and the ``published_…`` columns are empty (NaN) where
-    the trajectory is not one of the thesis' eight.
+    ``reading`` says what the row gives: ``end position error`` [mm], ``heading error`` [deg], ``|Δs|`` [mm] and, for
+    trajectories that turn, the measured ``rotation`` [deg] as in tables 8.7–8.10. ``case`` and the ``published_…``
+    columns are empty (NaN) where the trajectory is not one of the thesis' eight, the latter also where the thesis has
+    no such reading.
 
     Parameters
     ----------
     errors
         What `pose_errors` returns.
+    thesis_vehicle
+        Whether the thesis' vehicle was driven. What the thesis published is not set beside another vehicle's errors.
     """
     import pandas as pd
 
     keys = ["trajectory", "quantity", "condition"]
-    published = {tuple(row[key] for key in keys): row for row in published_end_poses().to_dict("records")}
+    known = published_end_poses().to_dict("records") if thesis_vehicle else []
+    published = {tuple(row[key] for key in keys): row for row in known}
     rows = [
         row
         for name in dict.fromkeys(errors["trajectory"])
@@ -60,23 +64,28 @@ def _trajectory_rows(name: str, errors: pd.DataFrame, published: _Published) -> 
         return
     target = Pose(*errors[["target_x_m", "target_y_m", "target_heading_rad"]].iloc[0])
     case = thesis_case(name, target)
-    for quantity in QUANTITIES:
+    turns = abs(target.heading_rad) > 0.01
+    for quantity in (POSITION, HEADING, DISTANCE, *([ROTATION] if turns else [])):
         for condition in in_order(errors["condition"]):
-            group = errors[errors["condition"] == condition]
-            reading, values = _reading(group, quantity, turns=abs(target.heading_rad) > 0.01)
-            row: dict[str, Any] = {"trajectory": name, "case": case, "quantity": quantity.column, "reading": reading}
-            row |= {"condition": condition, "repeats": len(values)}
+            values = _values(errors[errors["condition"] == condition], quantity)
+            row: dict[str, Any] = {"trajectory": name, "case": case, "quantity": quantity.column}
+            row |= {"reading": quantity.name, "condition": condition, "repeats": len(values)}
             row |= dict(zip(STATISTICS, five_numbers(values), strict=True))
             row |= {"outliers": classify_outliers(values).count}
-            yield row | _published(published, case, quantity, condition)
+            yield row | _published(published, (case, _published_as(quantity, turns=turns), condition))
 
 
-def _reading(group: pd.DataFrame, quantity: Quantity, *, turns: bool) -> tuple[str, np.ndarray[Any, Any]]:
-    if turns and quantity.column == "delta_heading_deg":
-        return "rotation", group["rotation_deg"].to_numpy(dtype=float)
-    return f"|{quantity.symbol}|", group[quantity.column].abs().to_numpy(dtype=float)
+def _values(group: pd.DataFrame, quantity: Quantity) -> np.ndarray[Any, Any]:
+    values = group[quantity.column].to_numpy(dtype=float)
+    return values if quantity is ROTATION else np.abs(values)
 
 
-def _published(published: _Published, case: int | None, quantity: Quantity, condition: str) -> dict[str, float]:
-    key = (case, quantity.column, condition)
+def _published_as(quantity: Quantity, *, turns: bool) -> str:
+    """Return under which quantity the thesis' tables have a row: for turns they give the rotation as the heading."""
+    if turns and quantity in (HEADING, ROTATION):
+        return HEADING.column if quantity is ROTATION else ""
+    return quantity.column
+
+
+def _published(published: _Published, key: tuple[int | None, str, str]) -> dict[str, float]:
     return {f"published_{name}": published[key][name] for name in STATISTICS} if key in published else {}

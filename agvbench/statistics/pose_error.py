@@ -1,4 +1,4 @@
-"""The error of one run: Δs, Δδ and the full pose error, with standard errors."""
+"""The error of one run: end position error, heading error, Δs and Δδ, with standard errors."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from agvbench.types import Pose, wrap_angle
 class PoseError:
     """Where a run ended against where it should have ended; m and rad.
 
-    ``delta_s_m`` is ``|end − start| − target distance`` and ``delta_heading_rad`` the heading change minus the
-    target's, wrapped; both are signed (the thesis, section 8.2, reports them without sign). ``along_m`` and
-    ``across_m`` are the end position minus the target's along x and y of the start frame: Δs alone cannot see
-    sideways drift. ``end`` is the end pose in the start frame. Standard errors come from the frames at rest
-    and say nothing about the scatter between runs.
+    ``position_m`` is the distance of the end position from the target's, ``along_m`` and ``across_m`` are its
+    components along x and y of the start frame. ``delta_s_m`` is ``|end − start| − target distance``, which cannot see
+    sideways drift, and ``delta_heading_rad`` the heading change minus the target's, wrapped; both are signed (the
+    thesis, section 8.2, reports them without sign). ``end`` is the end pose in the start frame. Standard errors come
+    from the frames at rest and say nothing about the scatter between runs.
     """
 
     end: Pose
@@ -27,6 +27,11 @@ class PoseError:
     across_m: float
     stderr_position_m: float
     stderr_heading_rad: float
+
+    @property
+    def position_m(self) -> float:
+        """Return the end position error [m]."""
+        return math.hypot(self.along_m, self.across_m)
 
 
 def pose_error(start: RestPose, end: RestPose, target: Pose) -> PoseError:

@@ -1,4 +1,4 @@
-"""The two quantities that tables and comparisons are about."""
+"""The quantities that tables and comparisons are about, each with its definition."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Quantity:
-    """A column of the table of errors, with how it is written and how fine it is worth printing."""
+    """A column of the table of errors, with how it is written and how fine it is worth printing.
+
+    ``symbol`` names the signed value, ``name`` its magnitude.
+    """
 
     column: str
     symbol: str
@@ -15,7 +18,30 @@ class Quantity:
     name: str
     digits: int
 
+    @property
+    def labelled(self) -> str:
+        """Return the name of the magnitude with its unit, short enough for a column headed "error"."""
+        return f"{self.name.removesuffix(' error')} [{self.unit}]"
 
-DISTANCE = Quantity("delta_s_mm", "Δs", "mm", "distance", 1)
-HEADING = Quantity("delta_heading_deg", "Δδ", "deg", "heading", 2)
-QUANTITIES = (DISTANCE, HEADING)
+
+POSITION = Quantity("position_mm", "end position error", "mm", "end position error", 1)
+ALONG = Quantity("along_mm", "along", "mm", "|along|", 1)
+ACROSS = Quantity("across_mm", "across", "mm", "|across|", 1)
+HEADING = Quantity("delta_heading_deg", "heading error", "deg", "heading error", 2)
+DISTANCE = Quantity("delta_s_mm", "Δs", "mm", "|Δs|", 1)
+ROTATION = Quantity("rotation_deg", "rotation", "deg", "rotation", 2)
+
+QUANTITIES = (POSITION, HEADING, DISTANCE)
+"""What tables of end poses show and comparisons test."""
+COMPONENTS = (ALONG, ACROSS, HEADING)
+"""The signed components of an end pose's error, whose biases are tested."""
+THESIS = (DISTANCE, HEADING)
+"""What the thesis reports; its Δδ is the heading error."""
+
+DEFINITIONS = (
+    "End position error: distance of the end position from the target position, both in the start frame. "
+    "Heading error: heading change minus that of the target; the thesis calls it Δδ. "
+    "Δs, as in the thesis: distance from start to end minus distance from start to target; "
+    "it hardly changes when a run ends to the left or right of its target."
+)
+COMPONENT_DEFINITIONS = "Along and across: end position minus target position along x and y of the start frame."

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 COLUMNS = (
     *("run_id", "experiment", "trajectory", "condition", "repeat", "session", "firmware", "status", "problem"),
     *("target_x_m", "target_y_m", "target_heading_rad", "end_x_m", "end_y_m", "end_heading_rad"),
-    *("delta_s_mm", "delta_heading_deg", "along_mm", "across_mm", "heading_deg", "rotation_deg"),
+    *("position_mm", "along_mm", "across_mm", "heading_deg", "delta_s_mm", "delta_heading_deg", "rotation_deg"),
     *("stderr_position_mm", "stderr_heading_deg"),
 )
 
@@ -26,8 +26,9 @@ def pose_errors(runs: Iterable[Run]) -> pd.DataFrame:
     """Return one row per run that has a target: what it is, where it ended, and its errors.
 
     Columns: those of the runs table; ``problem`` (why the run has no error, else empty); the target and the end
-    pose in the start frame [m, rad]; ``delta_s_mm``, ``delta_heading_deg``, ``along_mm``, ``across_mm``,
-    ``heading_deg`` (signed; see `PoseError`); ``rotation_deg`` (the rotation made, positive in the target's sense);
+    pose in the start frame [m, rad]; ``position_mm`` (the end position error, not negative); ``along_mm``,
+    ``across_mm``, ``heading_deg``, ``delta_s_mm``, ``delta_heading_deg`` (signed; see `PoseError`; the heading error
+    and Δδ are one number); ``rotation_deg`` (the rotation made, positive in the target's sense);
     ``stderr_position_mm`` and ``stderr_heading_deg``. Runs that were rejected keep their row: choose them with `valid`.
     """
     import pandas as pd
@@ -68,11 +69,12 @@ def _errors(run: Run) -> dict[str, object]:
         "end_x_m": error.end.x_m,
         "end_y_m": error.end.y_m,
         "end_heading_rad": error.end.heading_rad,
-        "delta_s_mm": error.delta_s_m * 1e3,
-        "delta_heading_deg": heading_deg,
+        "position_mm": error.position_m * 1e3,
         "along_mm": error.along_m * 1e3,
         "across_mm": error.across_m * 1e3,
         "heading_deg": heading_deg,
+        "delta_s_mm": error.delta_s_m * 1e3,
+        "delta_heading_deg": heading_deg,
         "rotation_deg": sense * (math.degrees(run.target.heading_rad) + heading_deg),
         "stderr_position_mm": error.stderr_position_m * 1e3,
         "stderr_heading_deg": math.degrees(error.stderr_heading_rad),

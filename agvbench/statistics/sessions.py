@@ -25,9 +25,9 @@ def session_note(cells: Sequence[Cell], *, same_campaign: bool) -> str:
             f"Each side is one session: {_WITHIN}. Whatever else changed between the two ({_CAUSES}) is part of the "
             "difference; only more sessions of each could tell it apart."
         )
-    said = " and ".join(f"{sd:.{q.digits}f} {q.unit}" for sd, q in zip(scatter, QUANTITIES, strict=True))
+    said = ", ".join(f"{sd:.{q.digits}f} {q.unit} ({q.name})" for sd, q in zip(scatter, QUANTITIES, strict=True))
     return (
-        f"Sessions of one and the same side differ by a standard deviation of {said} in their medians: a difference "
+        f"Medians of sessions of one and the same side have a standard deviation of {said}: a difference "
         f"of that size between the sides may be a session's ({_CAUSES}), because {_WITHIN}."
     )
 

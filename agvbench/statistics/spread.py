@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
 FEWEST = 5
 COMPONENTS = {
-    "delta_s_mm": "Δs [mm]",
     "along_mm": "along [mm]",
     "across_mm": "across [mm]",
-    "delta_heading_deg": "Δδ [deg]",
+    "delta_heading_deg": "heading error [deg]",
+    "delta_s_mm": "Δs [mm]",
 }
 
 

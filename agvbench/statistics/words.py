@@ -7,6 +7,7 @@ import math
 from agvbench.statistics.comparison import Comparison
 from agvbench.statistics.differences import Difference
 from agvbench.statistics.power import fewest_repeats
+from agvbench.statistics.quantities import DISTANCE
 from agvbench.statistics.verdict import Verdict
 
 
@@ -40,7 +41,9 @@ def _amount(difference: Difference, value: float) -> str:
 def _too_few(difference: Difference, comparison: Comparison) -> str:
     a, b = difference.a.repeats, difference.b.repeats
     repeats = f"{a} repeats" if a == b else f"{a} against {b} repeats"
-    needed = fewest_repeats(comparison.alpha / len(comparison.differences))
+    # Where repeats are few, |Δs| is left out so that end poses can be judged.
+    among = [d for d in comparison.differences if difference.quantity == DISTANCE or d.quantity != DISTANCE]
+    needed = fewest_repeats(comparison.alpha / len(among))
     return f"{repeats} cannot show any difference here, however large; {needed} of each could"
 
 

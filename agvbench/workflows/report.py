@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -84,7 +85,7 @@ def gather(
         header=campaign.header,
         runs=runs,
         errors=errors,
-        end_poses=end_pose_table(errors),
+        end_poses=end_pose_table(errors, thesis_vehicle=_is_thesis_vehicle(campaign.header)),
         spread=bias_and_spread(errors),
         comparisons=_between_conditions(errors, margin_mm, margin_deg, problems),
         quality=run_quality(runs, rate_hz=campaign.header.mocap_rate_hz),
@@ -93,6 +94,16 @@ def gather(
         problems=problems,
         diagnosis=read_diagnosis(campaign.path),
     )
+
+
+def _is_thesis_vehicle(header: CampaignHeader) -> bool:
+    """Return whether axle distances and command unit are those of the vehicle that the thesis drove."""
+    from agvbench.model import thesis_vehicle
+
+    model = thesis_vehicle()
+    axles = (header.front_axle_m, header.rear_axle_m)
+    near = all(map(math.isclose, axles, (model.geometry.front_axle_m, model.geometry.rear_axle_m)))
+    return near and header.command_unit == model.command_unit
 
 
 def _between_conditions(

@@ -69,7 +69,7 @@ def make_campaign(
 ):
     """Write a campaign in which every trajectory was driven `repeats` times under every condition; return its path."""
     rng = np.random.default_rng(seed)
-    header = CampaignHeader(1, name, "thesis AGV", 0.18, 0.18, "us", 1500.0, 120.0)
+    header = CampaignHeader(1, name, "thesis AGV", 0.181, 0.121, "us", 1500.0, 120.0)
     writer = CampaignWriter.create(path, header, durable=False)
     commands = Commands(np.array([0.0, MOVE_S]), np.array([900.0, 1500.0]), np.full(2, 1500.0), np.full(2, 1500.0))
     started = 0.0

@@ -32,7 +32,8 @@ def test_report_writes_into_the_campaign_and_prints_a_summary(campaigns, capsys)
     code, out, err = run(capsys, "report", directory)
     assert (code, err) == (0, "")
     assert (directory / "report" / "report.html").exists()
-    assert "Calibration changed the median |Δs|" in out
+    assert "Calibration changed the median end position error from" in out
+    assert out.count("End position error: distance of the end position from the target position") == 1
     assert "1_forward" in out
 
 
@@ -51,14 +52,14 @@ def test_hostile_names_do_not_reach_the_terminal(campaigns, tmp_path, capsys):
 def test_nights_alike_are_no_regression(nights, capsys):
     code, out, err = run(capsys, "compare", nights[0], nights[1])
     assert (code, err) == (0, "")
-    assert "No regression shown: of 6 comparisons 0 worse" in out
+    assert "No regression shown: of 9 comparisons 0 worse" in out
     assert "Each side is one session" in out
 
 
 def test_a_vehicle_that_drives_too_far_is_a_regression(nights, capsys, tmp_path):
     code, out, _ = run(capsys, "compare", nights[0], nights[2], "--json", tmp_path / "c.json")
     assert code == 1
-    assert "Regression: of 6 comparisons" in out
+    assert "Regression: of 9 comparisons" in out
     made = json.loads((tmp_path / "c.json").read_text(encoding="utf-8"))
     assert made["regression"] is True
     worse = {d["trajectory"] for d in made["differences"] if d["verdict"] == "worse"}
@@ -78,7 +79,7 @@ def test_when_to_fail(nights, capsys, order, fail_on, code):
 def test_a_margin_wider_than_the_difference_makes_no_regression(nights, capsys):
     code, out, _ = run(capsys, "compare", nights[0], nights[2], "--margin-mm", "200", "--margin-deg", "10")
     assert code == 0
-    assert "6 the same within the margin" in out
+    assert "9 the same within the margin" in out
 
 
 def test_conditions_inside_one_campaign(campaigns, capsys):

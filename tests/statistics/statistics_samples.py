@@ -52,13 +52,16 @@ def make_run(start, end, *, target=AHEAD, noise_m=0.0, settle_s=0.0, seed=0, rat
 
 
 def error_table(draw, *, repeats, trajectories=tuple(TARGETS), conditions=("uncalibrated", "calibrated"), shift=()):
-    """Return a table of errors whose Δs and Δδ come from ``draw(size)``, plus ``shift[trajectory, condition]``."""
+    """Return a table of errors along, across and of heading from ``draw(size)``, plus ``shift[trajectory, condition]``.
+
+    A shift is along [mm], of the heading [deg] and, if given, across [mm]. Δs is the error along.
+    """
     shift = dict(shift)
     rows = []
     for trajectory in trajectories:
         for condition in conditions:
-            extra = shift.get((trajectory, condition), (0.0, 0.0))
-            delta_s, heading = draw(repeats) + extra[0], draw(repeats) / 10.0 + extra[1]
+            extra = (*shift.get((trajectory, condition), (0.0, 0.0)), 0.0)
+            along, heading, across = draw(repeats) + extra[0], draw(repeats) / 10.0 + extra[1], draw(repeats) + extra[2]
             rows += [
                 {
                     "run_id": f"{trajectory}-{condition}-{repeat}",
@@ -69,10 +72,11 @@ def error_table(draw, *, repeats, trajectories=tuple(TARGETS), conditions=("unca
                     "status": "ok",
                     "problem": "",
                     **dict(zip(("target_x_m", "target_y_m", "target_heading_rad"), TARGETS[trajectory], strict=True)),
-                    "delta_s_mm": delta_s[repeat],
+                    "position_mm": math.hypot(along[repeat], across[repeat]),
+                    "along_mm": along[repeat],
+                    "across_mm": across[repeat],
+                    "delta_s_mm": along[repeat],
                     "delta_heading_deg": heading[repeat],
-                    "along_mm": delta_s[repeat],
-                    "across_mm": heading[repeat],
                     "heading_deg": heading[repeat],
                     "rotation_deg": abs(math.degrees(TARGETS[trajectory][2])) + heading[repeat],
                 }

@@ -112,6 +112,61 @@ def test_the_four_verdicts_and_their_words():
     assert verdict in (Verdict.SAME, Verdict.UNKNOWN)
 
 
+@pytest.mark.parametrize("repeats", [5, 10])
+def test_runs_that_end_further_left_are_a_regression_although_distance_and_heading_are_the_same(repeats):
+    rng = np.random.default_rng(46)
+    make = {"repeats": repeats, "trajectories": ("1_forward",), "conditions": ("calibrated",)}
+    a, b = (error_table(normal(rng, 2.0), **make) for _ in range(2))
+    arc = 60.0 / 2000.0
+    b["along_mm"] += 2000.0 * (math.cos(arc) - 1.0)
+    b["across_mm"] += 2000.0 * math.sin(arc)
+    b["position_mm"] = np.hypot(b["along_mm"], b["across_mm"])
+    comparison = compare(a, b)
+    assert comparison.is_regression
+    verdicts = {d.quantity.column: d.verdict for d in comparison.differences}
+    assert [column for column, verdict in verdicts.items() if verdict is Verdict.WORSE] == ["position_mm"]
+    (shift,) = comparison.shifts
+    assert shift.across.low < 60.0 < shift.across.high
+    assert shift.along.covers(-0.9)
+    assert shift.across.high - shift.across.low < 10.0
+
+
+def test_the_other_side_of_the_target_is_no_regression_and_is_shown():
+    rng = np.random.default_rng(47)
+    make = {"repeats": 10, "trajectories": ("1_forward",), "conditions": ("calibrated",)}
+    right, left = (
+        error_table(normal(rng, 2.0), shift={("1_forward", "calibrated"): (0.0, 0.0, across)}, **make)
+        for across in (-30.0, 30.0)
+    )
+    comparison = compare(right, left)
+    assert not comparison.is_regression
+    made = comparison_to_json(comparison)["end_shifts"][0]
+    assert made["trajectory"] == "1_forward"
+    assert made["across_mm"]["low"] < 60.0 < made["across_mm"]["high"]
+    assert made["along_mm"]["low"] < 0.0 < made["along_mm"]["high"]
+
+
+def test_rows_come_worst_first():
+    rng = np.random.default_rng(48)
+    shift = {("2_backward", "calibrated"): (40.0, 0.0), ("5_forward_left", "calibrated"): (80.0, 0.0)}
+    make = {"repeats": 10, "trajectories": ("1_forward", "2_backward", "5_forward_left"), "conditions": ("calibrated",)}
+    comparison = compare(error_table(normal(rng), **make), error_table(normal(rng), shift=shift, **make))
+    rows = [d for d in comparison.worst_first if d.trajectory != ALL]
+    worse = [d.trajectory for d in rows if d.verdict is Verdict.WORSE]
+    assert worse == ["5_forward_left"] * 2 + ["2_backward"] * 2
+    assert rows[: len(worse)] == [d for d in rows if d.verdict is Verdict.WORSE]
+
+
+def test_where_repeats_are_few_the_distance_is_not_tested_before_the_end_pose():
+    rng = np.random.default_rng(49)
+    make = {"repeats": 5, "trajectories": ("1_forward",), "conditions": ("calibrated",)}
+    comparison = compare(error_table(normal(rng), **make), error_table(normal(rng), **make))
+    assert {d.quantity.column: d.able for d in comparison.differences} == {
+        "position_mm": True, "delta_heading_deg": True, "delta_s_mm": False,
+    }  # fmt: skip
+    assert "6 of each could" in describe(find(comparison, "1_forward"), comparison)
+
+
 def test_too_few_repeats_are_said_aloud():
     rng = np.random.default_rng(34)
     make = {"repeats": 3, "trajectories": ("1_forward",), "conditions": ("calibrated",)}
@@ -182,7 +237,9 @@ def test_notes_say_what_the_interval_means():
     assert "in the same campaign" in compare(a, b, same_campaign=True, resamples=2).notes[0]
     a["session"] = [f"s{repeat % 2}" for repeat in a["repeat"]]
     a.loc[a["repeat"] % 2 == 1, "delta_s_mm"] += 1000.0
-    assert "standard deviation of 70" in compare(a, b, resamples=2).notes[0]
+    note = compare(a, b, resamples=2).notes[0]
+    assert "Medians of sessions of one and the same side have a standard deviation of" in note
+    assert ", 70" in note
 
 
 def test_what_only_one_side_has_is_left_out_and_said():
@@ -226,6 +283,8 @@ def test_json_has_no_number_that_json_lacks():
     assert made["could_compare"] in (True, False)
     assert made["differences"][0]["interval"]["low"] is None
     assert {"trajectory", "condition", "verdict", "words", "p_worse"} <= set(made["differences"][0])
+    quantities = list(dict.fromkeys(d["quantity"] for d in made["differences"]))
+    assert quantities == ["position_mm", "abs_delta_heading_deg", "abs_delta_s_mm"]
 
 
 def test_the_same_inputs_give_the_same_comparison():

@@ -17,15 +17,15 @@ def table():
 
 
 def test_one_row_per_trajectory_quantity_and_condition_in_the_order_of_the_thesis(table):
-    assert len(table) == 8 * 2 * 2
+    assert len(table) == (4 * 3 + 4 * 4) * 2
     assert list(table.condition[:2]) == ["uncalibrated", "calibrated"]
     assert list(dict.fromkeys(table.trajectory)) == list(TARGETS)
 
 
-def test_straights_give_the_heading_error_and_turns_the_rotation(table):
-    readings = table[table.quantity == "delta_heading_deg"].groupby("trajectory").reading.first()
-    assert readings["2_backward"] == "|Δδ|"
-    assert readings["6_forward_right"] == "rotation"
+def test_end_position_and_heading_error_come_first_and_turns_have_their_rotation_too(table):
+    readings = {name: list(dict.fromkeys(rows.reading)) for name, rows in table.groupby("trajectory")}
+    assert readings["2_backward"] == ["end position error", "heading error", "|Δs|"]
+    assert readings["6_forward_right"] == ["end position error", "heading error", "|Δs|", "rotation"]
     rotations = table[table.reading == "rotation"]
     assert rotations["median"].between(80, 100).all()
 
@@ -42,6 +42,15 @@ def test_published_values_stand_beside_their_own_row(table):
     assert [row[f"published_{s}"] for s in ("min", "q1", "median", "q3", "max")] == [0.10, 5.89, 8.00, 9.49, 13.40]
     half_speed = table[(table.case == 3) & (table.condition == "uncalibrated")]
     assert half_speed.published_median.isna().all()
+    compared = table[table.published_median.notna()]
+    assert len(compared) == 28
+    assert set(compared[compared.case <= 4].reading) == {"|Δs|", "heading error"}
+    assert set(compared[compared.case > 4].reading) == {"|Δs|", "rotation"}
+
+
+def test_what_the_thesis_published_does_not_stand_beside_another_vehicle():
+    errors = error_table(np.zeros, repeats=2)
+    assert end_pose_table(errors, thesis_vehicle=False).published_median.isna().all()
 
 
 def test_published_tables_are_whole():

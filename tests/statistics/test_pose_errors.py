@@ -31,6 +31,7 @@ def test_errors_do_not_depend_on_where_on_the_floor_a_run_starts(x, y, heading, 
     assert row.problem == ""
     assert row.along_mm == pytest.approx(1e3 * along, abs=1e-6)
     assert row.across_mm == pytest.approx(1e3 * across, abs=1e-6)
+    assert row.position_mm == pytest.approx(1e3 * math.hypot(along, across), abs=1e-6)
     assert row.delta_heading_deg == pytest.approx(math.degrees(turn), abs=1e-6)
     assert row.delta_s_mm == pytest.approx(1e3 * (math.hypot(*reached) - math.hypot(*target[:2])), abs=1e-6)
     assert (row.end_x_m, row.end_y_m) == pytest.approx(reached, abs=1e-9)
@@ -66,4 +67,4 @@ def test_runs_without_target_have_no_row_and_rejected_runs_do_not_count():
 def test_no_runs_give_an_empty_table_with_its_columns():
     errors = table()
     assert errors.empty
-    assert {"delta_s_mm", "delta_heading_deg", "along_mm", "across_mm"} <= set(errors.columns)
+    assert {"position_mm", "delta_s_mm", "delta_heading_deg", "along_mm", "across_mm"} <= set(errors.columns)

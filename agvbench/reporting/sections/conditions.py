@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from agvbench.reporting.comparison_table import comparison_table
+from agvbench.reporting.comparison_table import comparison_table, shift_table
 from agvbench.reporting.content import Block, Paragraph
 from agvbench.reporting.sections.base import Section
 from agvbench.workflows.report import ReportData
 
 
 class Conditions(Section):
-    """One table per pair of conditions."""
+    """Two tables per pair of conditions: errors with verdicts, and the shift of the mean end position."""
 
     slug, title, order = "conditions", "Conditions compared", 20
 
@@ -20,5 +20,7 @@ class Conditions(Section):
         if not data.comparisons:
             return [Paragraph("No trajectory was driven under two conditions: nothing to compare.")]
         return [
-            comparison_table(comparison, f"comparison-{index}") for index, comparison in enumerate(data.comparisons, 1)
+            table(comparison, f"{slug}-{index}")
+            for index, comparison in enumerate(data.comparisons, 1)
+            for slug, table in (("comparison", comparison_table), ("end-shift", shift_table))
         ]

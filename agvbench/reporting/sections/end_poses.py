@@ -36,23 +36,24 @@ class EndPoses(Section):
         ]
         if not compared:
             columns, rows = columns[:11], [row[:11] for row in rows]
-        return [Table("end_poses", _CAPTION, columns, rows, grouped=True, note=_NOTE)]
+        note = _NOTE + _NOTE_THESIS if compared else _NOTE
+        return [Table("end_poses", _CAPTION, columns, rows, grouped=True, note=note)]
 
 
-_CAPTION = "Absolute errors of end position and heading; for turns the rotation made, as in the thesis."
+_CAPTION = "Absolute errors of end position and heading, |Δs|, and the rotation made in turns, as in the thesis."
 _NOTE = (
     "Quartiles interpolate linearly. Outliers lie beyond 1.5 interquartile ranges from the quartiles; they are "
-    "counted, not dropped. The thesis drove one vehicle ten times per row."
+    "counted, not dropped."
 )
+_NOTE_THESIS = " The thesis drove one vehicle ten times per row; it has no end position errors."
 
 
 def _row(row: dict[Any, Any]) -> list[Value]:
-    unit = "mm" if row["quantity"] == "delta_s_mm" else "deg"
     case = "" if row["case"] != row["case"] or row["case"] is None else f" · thesis trajectory {int(row['case'])}"
     return [
         f"{row['trajectory']}{case}",
         row["reading"],
-        unit,
+        "mm" if str(row["quantity"]).endswith("_mm") else "deg",
         row["condition"],
         row["repeats"],
         *(row[s] for s in STATISTICS),

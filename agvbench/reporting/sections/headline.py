@@ -11,7 +11,7 @@ from agvbench.reporting.content import Block, Bullets, Paragraph, plain, plain_s
 from agvbench.reporting.sections.base import Section
 from agvbench.statistics import Comparison, Difference, Verdict, valid
 from agvbench.statistics.differences import ALL
-from agvbench.statistics.quantities import QUANTITIES
+from agvbench.statistics.quantities import DEFINITIONS, QUANTITIES
 from agvbench.statistics.words import describe
 from agvbench.workflows.report import ReportData
 
@@ -27,7 +27,7 @@ _MOST_NAMED = 6
 
 
 class Headline(Section):
-    """One sentence per pair of conditions, then what got worse and what the repeats could not say."""
+    """One sentence per pair of conditions, what the errors are, what got worse and what the repeats could not say."""
 
     slug, title, order = "headline", "In short", 10
 
@@ -36,7 +36,8 @@ class Headline(Section):
         lead = [Paragraph(sentence, lead=True) for sentence in _lead(data)]
         said = (item for comparison in data.comparisons for item in _details(comparison))
         details = list(dict.fromkeys((*said, *data.problems)))
-        return [*lead, Bullets(details)] if details else lead
+        defined = [Paragraph(DEFINITIONS)] if len(data.end_poses) else []
+        return [*lead, *defined, *([Bullets(details)] if details else [])]
 
 
 def _lead(data: ReportData) -> list[str]:
@@ -57,13 +58,15 @@ def _bought(comparison: Comparison) -> str:
     counted = [d for d in comparison.differences if d.trajectory != ALL]
     trajectories = len({d.trajectory for d in counted})
     where = f"on average over {trajectories} trajectories" if trajectories > 1 else f"on {counted[0].trajectory}"
-    moved = " and ".join(_moved(d) for d in _summary(comparison))
+    *first, last = map(_moved, _summary(comparison))
+    moved = f"{', '.join(first)} and {last}"
     better, worse = (sum(d.verdict is v for d in counted) for v in (Verdict.BETTER, Verdict.WORSE))
     score = f"Of {len(counted)} medians {better or 'none'} improved beyond doubt, {worse or 'none'} got worse"
     return plain_sentences(f"{who} changed {moved}, {where}. {score}.")
 
 
 def _summary(comparison: Comparison) -> list[Difference]:
+    """Return the difference of each quantity, over all trajectories."""
     together = [d for d in comparison.differences if d.trajectory == ALL]
     return together or list(comparison.differences)
 
@@ -71,12 +74,12 @@ def _summary(comparison: Comparison) -> list[Difference]:
 def _moved(d: Difference) -> str:
     digits, unit = d.quantity.digits, d.quantity.unit
     numbers = f"from {d.a.median:.{digits}f} to {d.b.median:.{digits}f} {unit}"
-    return f"the median |{d.quantity.symbol}| {numbers} ({d.verdict})"
+    return f"the median {d.quantity.name} {numbers} ({d.verdict})"
 
 
 def _reached(rows: pd.DataFrame, condition: str) -> str:
-    medians = (f"|{q.symbol}| {np.median(rows[q.column].abs()):.{q.digits}f} {q.unit}" for q in QUANTITIES)
-    return f"Under the condition {condition}, {len(rows)} runs ended with median errors of {' and '.join(medians)}."
+    medians = (f"{q.name} {np.median(rows[q.column].abs()):.{q.digits}f} {q.unit}" for q in QUANTITIES)
+    return f"Under the condition {condition}, medians of {len(rows)} runs are: {', '.join(medians)}."
 
 
 def _details(comparison: Comparison) -> Iterator[str]:
@@ -85,7 +88,7 @@ def _details(comparison: Comparison) -> Iterator[str]:
         found = [d for d in comparison.of(verdict) if d.trajectory != ALL]
         if found:
             named = "; ".join(
-                f"{plain(d.trajectory)} |{d.quantity.symbol}| ({describe(d, comparison)})" for d in found[:_MOST_NAMED]
+                f"{plain(d.trajectory)} {d.quantity.name} ({describe(d, comparison)})" for d in found[:_MOST_NAMED]
             )
             more = f"; and {len(found) - _MOST_NAMED} more" if len(found) > _MOST_NAMED else ""
             yield f"{lead}, {pair}: {named}{more}."

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from agvbench.reporting.content import Block, Column, Paragraph, Table
 from agvbench.reporting.sections.base import Section
+from agvbench.statistics.quantities import COMPONENT_DEFINITIONS
 from agvbench.workflows.report import ReportData
 
 _COLUMNS = (
@@ -23,8 +24,8 @@ _COLUMNS = (
 )
 _CAPTION = "Signed errors: what calibration can remove (bias), and what no model can (spread between repeats)."
 _NOTE = (
-    "Along and across are in the start frame. Bias intervals by bootstrap, intervals of the standard deviation after "
-    "Bonett; fewer than three and five repeats have none."
+    f"{COMPONENT_DEFINITIONS} Bias intervals by bootstrap, intervals of the standard deviation after Bonett; "
+    "fewer than three and five repeats have none."
 )
 
 

@@ -1,4 +1,4 @@
-"""Every run's Δs and Δδ, by trajectory and condition."""
+"""Every run's end position error, heading error and Δs, by trajectory and condition."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from agvbench.reporting.figures.strips import Strip, draw_strips
 from agvbench.reporting.sections.base import Section
 from agvbench.statistics import valid
 from agvbench.statistics.published import CASES
-from agvbench.statistics.quantities import QUANTITIES, Quantity
+from agvbench.statistics.quantities import HEADING, QUANTITIES, ROTATION, Quantity
 from agvbench.workflows.report import ReportData
 
-_CAPTION = (
-    "One point per run, signed; the bar is the median. Hollow diamonds are the thesis' medians, which were published "
-    "without sign for distances and straight drives: both readings are drawn."
+_CAPTION = "One point per run, heading error and Δs signed; the bar is the median."
+_CAPTION_THESIS = (
+    " Hollow diamonds are the thesis' medians, which were published without sign for distances and straight drives: "
+    "both readings are drawn."
 )
 
 
@@ -31,6 +32,8 @@ class Strips(Section):
         if valid(data.errors).empty:
             return [Paragraph("No errors to draw.")]
         numbers = condition_numbers(data.conditions)
+        compared = bool(data.end_poses["published_median"].notna().any())
+        caption = _CAPTION + _CAPTION_THESIS if compared else _CAPTION
         panels = [
             Panel(
                 f"{q.symbol} [{q.unit}]",
@@ -38,12 +41,13 @@ class Strips(Section):
             )
             for q in QUANTITIES
         ]
-        return [FigureBlock("strips", _CAPTION, panels, legend(numbers), wide=True)]
+        return [FigureBlock("strips", caption, panels, legend(numbers), wide=True)]
 
 
 def _strips(data: ReportData, quantity: Quantity, numbers: dict[str, int]) -> list[Strip]:
     counted = valid(data.errors)
-    published = data.end_poses[data.end_poses["quantity"] == quantity.column]
+    rows_of = [quantity.column, ROTATION.column] if quantity is HEADING else [quantity.column]
+    published = data.end_poses[data.end_poses["quantity"].isin(rows_of) & data.end_poses["published_median"].notna()]
     medians = {
         (row["trajectory"], row["condition"]): _both_readings(row["published_median"], row["reading"], row["case"])
         for row in published.to_dict("records")
@@ -60,8 +64,6 @@ def _strips(data: ReportData, quantity: Quantity, numbers: dict[str, int]) -> li
 
 def _both_readings(median: float, reading: str, case: float) -> Sequence[float]:
     """Return the signed errors that a published median may mean."""
-    if not np.isfinite(median):
-        return ()
     if reading == "rotation":
         target = CASES[int(case)].heading_rad
         return (float(np.sign(target)) * (median - abs(np.degrees(target))),)
