@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from agvbench.reporting.content import Column, Paragraph, Table, Value, plain
 from agvbench.statistics.differences import ALL
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _VERDICT_STYLES = {"better": "green", "worse": "bold red", "same": "cyan", "cannot": "dim"}
 _LONGEST_HEADING, _NARROWEST = 14, 110
+_INTERVAL = "95 % interval"
 
 
 def console_table(table: Table) -> RenderableType:
@@ -31,7 +32,9 @@ def console_table(table: Table) -> RenderableType:
     shown = RichTable(title=Text(plain(table.caption)), box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
     for column in table.columns:
         heading = f"{column.group}\n{column.title}" if column.group else column.title
-        shown.add_column(Text(plain(heading)), justify="left" if column.digits is None else "right", overflow="fold")
+        number, whole = column.digits is not None, column.title == _INTERVAL
+        justify: Literal["left", "right"] = "right" if number else "left"
+        shown.add_column(Text(plain(heading)), justify=justify, overflow="fold", no_wrap=number or whole)
     for row in table.shown_rows():
         shown.add_row(*(_styled(cell, column) for cell, column in zip(row, table.columns, strict=True)))
     return shown
@@ -55,7 +58,7 @@ def comparison_summary(comparison: Comparison) -> RenderableType:
         Column("median_a", heading_a, 2),
         Column("median_b", heading_b, 2),
         Column("difference", "difference", 2),
-        Column("interval", "95 % interval"),
+        Column("interval", _INTERVAL),
         Column("verdict", "verdict"),
     ]
     several = _several_conditions(comparison)
@@ -68,16 +71,15 @@ def shift_summary(comparison: Comparison) -> RenderableType:
     """Return how the mean end positions moved as a table that fits a console, the largest shift first."""
     heading_a, heading_b = _headings(comparison)
     columns = [Column("trajectory", "trajectory")]
-    for part in ("along", "across"):
-        columns += [Column(part, f"{part} mm", 1), Column(f"{part}_interval", "95 % interval")]
+    for name in ("along", "across"):
+        columns += [Column(name, f"{name} mm", 1), Column(f"{name}_interval", _INTERVAL)]
     several, rows = _several_conditions(comparison), []
     for shift in comparison.shifts:
-        name = f"{shift.trajectory} {shift.condition}" if several else shift.trajectory
-        cells: list[Value] = [name]
-        for part, column in ((shift.along, columns[1]), (shift.across, columns[3])):
-            cells += [part.estimate, _interval(part, column)]
+        cells: list[Value] = [f"{shift.trajectory} {shift.condition}" if several else shift.trajectory]
+        for part in (shift.along, shift.across):
+            cells += [part.estimate, _interval(part, columns[1])]
         rows.append(cells)
-    caption = f"Mean end position of {heading_b} minus that of {heading_a} (no verdict follows; largest first)"
+    caption = f"Mean end position, {heading_b} minus {heading_a} (largest first; no verdict)"
     return console_table(Table("end_shift", caption, columns, rows))
 
 

@@ -21,7 +21,7 @@ class Quantity:
     @property
     def labelled(self) -> str:
         """Return the name of the magnitude with its unit, short enough for a column headed "error"."""
-        return f"{self.name.removesuffix(' error')} [{self.unit}]"
+        return f"{self.name.removeprefix('end ').removesuffix(' error')} [{self.unit}]"
 
 
 POSITION = Quantity("position_mm", "end position error", "mm", "end position error", 1)
