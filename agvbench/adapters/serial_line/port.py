@@ -10,6 +10,7 @@ from agvbench.errors import LinkError
 
 BAUD = 115200
 READ_LIMIT_S = 0.02
+WRITE_LIMIT_S = 0.2
 
 
 class SerialPort:
@@ -38,10 +39,11 @@ class SerialPort:
         self.wire: Callable[[bytes], bytes] = bytes
         try:
             self._port: Any = serial.Serial(
-                path, BAUD, timeout=READ_LIMIT_S, write_timeout=10 * READ_LIMIT_S, exclusive=True
+                path, BAUD, timeout=READ_LIMIT_S, write_timeout=WRITE_LIMIT_S, exclusive=True
             )
         except (serial.SerialException, OSError, ValueError) as error:
             raise _cannot_open(path, error) from error
+        self._stalled = serial.SerialTimeoutException
         self._broken = (serial.SerialException, OSError, TypeError)  # TypeError: closed while it was read
 
     def read(self) -> bytes:
@@ -56,6 +58,11 @@ class SerialPort:
         """Send `data`."""
         try:
             self._port.write(self.wire(data))
+        except self._stalled:
+            raise LinkError(
+                "the vehicle takes no more bytes", where=self.path, value=f"waited {WRITE_LIMIT_S:g} s",
+                remedy="see whether its program hangs: reset the board, and start the adapter again",
+            ) from None  # fmt: skip
         except self._broken as error:
             raise self._gone() from error
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import pty
 import threading
+import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +18,7 @@ from agvbench.adapters.agv import serial as module
 from agvbench.adapters.agv.serial import SerialAgv
 from agvbench.adapters.registry import open_agv
 from agvbench.adapters.serial_line import conversation
+from agvbench.adapters.serial_line.port import SerialPort
 from agvbench.bus.command_message import CommandMessage
 from agvbench.bus.event_message import Level
 from agvbench.bus.identity_message import decode_agv_identity, encode_agv_identity
@@ -201,6 +205,18 @@ def test_a_cable_that_is_pulled_is_one_line() -> None:
         assert "the serial port is gone; plug the vehicle in again" in events.wait_for("LinkError")
         with pytest.raises(LinkError, match="serial port is gone"):
             agv.apply(FORWARD)
+
+
+def test_a_board_that_takes_no_more_bytes_is_not_a_cable_that_was_pulled() -> None:
+    near, far = pty.openpty()
+    tty.setraw(far)
+    port = SerialPort(os.ttyname(far))
+    with pytest.raises(LinkError, match=r"the vehicle takes no more bytes: waited 0.2 s; see whether its program"):
+        for _ in range(100):
+            port.write(bytes(10_000))
+    port.close()
+    os.close(near)
+    os.close(far)
 
 
 def test_a_command_out_of_range_is_refused_here_and_breaks_nothing() -> None:
