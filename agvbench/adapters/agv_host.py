@@ -109,7 +109,7 @@ class AgvHost(Host):
                             self._heard_s = now()
                         apply(message)
             except Exception as error:  # noqa: BLE001  (whatever the adapter raises, the runner must hear of it)
-                self._fail(error, sequence)
+                self.failed(error, acknowledged=sequence)
             if sequence == loss.expected and source == loss.source:
                 loss.expected += 1
             else:
@@ -141,7 +141,7 @@ class AgvHost(Host):
                 with self._lock:
                     self._refrain(message)
             except Exception as error:  # noqa: BLE001  (as for every command)
-                self._fail(error, message.sequence)
+                self.failed(error, acknowledged=message.sequence)
         elif self.overtaken.add():
             text = f"commands that were overtaken by newer ones: {self.overtaken}"
             self.event(Level.WARNING, "commands_overtaken", text)
@@ -154,7 +154,7 @@ class AgvHost(Host):
         """Tell of a message that cannot be decoded, seldom where there are many."""
         if self.malformed.add():
             what = error.what if self.malformed.count == 1 else f"{error.what} ({self.malformed})"
-            self._fail(MessageError(what, value=error.value, limit=error.limit, remedy=error.remedy))
+            self.failed(MessageError(what, value=error.value, limit=error.limit, remedy=error.remedy))
 
     def _refrain(self, message: CommandMessage) -> None:
         """Stop, unless the command came too late for that, too."""
@@ -171,7 +171,7 @@ class AgvHost(Host):
             try:
                 self._stop_unheard()
             except Exception as error:  # noqa: BLE001  (whoever watches must go on watching, whatever a stop raises)
-                self._fail(error)
+                self.failed(error)
 
     def _is_silent(self) -> bool:
         heard_s = self._heard_s
@@ -201,7 +201,7 @@ class AgvHost(Host):
             "does not come back from a command", value=f"{SILENCE_LIMIT_S + _HANG_PATIENCE_S:g} s",
             remedy="see the vehicle and its cable, and start the adapter again",
         )  # fmt: skip
-        self._fail(error)
+        self.failed(error)
 
     def truth(
         self, t_s: Floats, poses: Floats, *, end_s: float, acknowledged: int = 0, flags: int = TruthFlags.LAST

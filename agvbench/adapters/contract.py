@@ -79,6 +79,9 @@ class AgvReports(Protocol):
     def event(self, level: Level, kind: str, text: str, *, acknowledged: int = 0) -> None:
         """Say something to whoever listens: one word for programs and a line for people."""
 
+    def failed(self, error: Exception, *, acknowledged: int = 0) -> None:
+        """Stop the run under way with `error`: the runner raises it with its fields and its remedy."""
+
 
 class MocapReports(Protocol):
     """What a mocap adapter can tell the bus. All methods may be called in any thread."""
@@ -104,6 +107,9 @@ class MocapReports(Protocol):
 
     def event(self, level: Level, kind: str, text: str, *, acknowledged: int = 0) -> None:
         """Say something to whoever listens: one word for programs and a line for people."""
+
+    def failed(self, error: Exception, *, acknowledged: int = 0) -> None:
+        """Stop the run under way with `error`: the runner raises it with its fields and its remedy."""
 
 
 class AgvAdapter(ABC):

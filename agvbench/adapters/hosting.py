@@ -8,6 +8,7 @@ from __future__ import annotations
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from agvbench.bus.clock import Clock
@@ -99,10 +100,18 @@ class Host(ABC):
 
     def event(self, level: Level, kind: str, text: str, *, acknowledged: int = 0) -> None:
         """Publish an event; also while the adapter hangs."""
+        self._publish_event(Event(0, self._role, level, kind, text, acknowledged))
+
+    def failed(self, error: Exception, *, acknowledged: int = 0) -> None:
+        """Tell the runner of `error`, with all its fields; `acknowledged` is the command that was not carried out."""
+        told = as_agvbench_error(error, self._role)
+        self._publish_event(Event.of_error(told, self._role, acknowledged=acknowledged))
+
+    def _publish_event(self, event: Event) -> None:
         with self._telling:
-            sequence = self._events.take()
-            event = Event(sequence, self._role, level, kind, text, acknowledged, self._clock.now(), self._events.source)
-            self._put(self._keys.report, encode_event(event))
+            sequence, t_s = self._events.take(), self._clock.now()
+            numbered = replace(event, sequence=sequence, t_s=t_s, source=self._events.source)
+            self._put(self._keys.report, encode_event(numbered))
 
     def _put(self, key: str, payload: bytes) -> None:
         import zenoh
@@ -112,11 +121,6 @@ class Host(ABC):
         except (self._zenoh_error, RuntimeError):
             # The session is closed, or just being closed by another thread: nobody is told any more.
             return
-
-    def _fail(self, error: Exception, acknowledged: int = 0) -> None:
-        """Tell the runner that a command could not be carried out."""
-        told = as_agvbench_error(error, self._role)
-        self.event(Level.ERROR, type(told).__name__, str(told), acknowledged=acknowledged)
 
     def close(self) -> None:
         """Leave the bus."""

@@ -82,7 +82,7 @@ class MocapHost(Host):
             try:
                 self.see(decode_truth(payload))
             except MessageError as error:
-                self._fail(error)
+                self.failed(error)
 
     def see(self, truth: Truth) -> None:
         """Let the adapter look at a simulated vehicle."""
@@ -92,7 +92,7 @@ class MocapHost(Host):
             with self._lock:
                 self._adapter.see(truth)
         except Exception as error:  # noqa: BLE001  (whatever the adapter raises, the runner must hear of it)
-            self._fail(error, truth.acknowledged)
+            self.failed(error, acknowledged=truth.acknowledged)
 
     def frames(self, frames: Frames, *, clock: FrameClock, acknowledged: int = 0) -> None:
         """Publish frames, in as many messages as they need."""

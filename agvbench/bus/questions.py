@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import islice
 from typing import Any
 
-from agvbench.bus.event_message import Event, Level, decode_event, encode_event
+from agvbench.bus.event_message import Event, decode_event, encode_event
 from agvbench.errors import AdapterGoneError, AgvbenchError, LinkError
 
 _ANSWERS_READ = 16
@@ -40,4 +40,4 @@ def ask(session: Any, key: str, payload: bytes, limit_s: float) -> bytes:
 
 def refusal(role: str, error: AgvbenchError) -> bytes:
     """Return the bytes of an error reply that `ask` turns into `error` again."""
-    return encode_event(Event(0, role, Level.ERROR, type(error).__name__, str(error)))
+    return encode_event(Event.of_error(error, role))

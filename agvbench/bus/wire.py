@@ -4,7 +4,7 @@
 offset   type    meaning
 =======  ======  ==========================================================================
 0        4 s     magic, ``AGVB``
-4        u8      version of the encoding, 2
+4        u8      version of the encoding, 3
 5        u8      kind of message (`Kind`)
 6        u16     flags, by kind
 8        u32     source: drawn by the sender when it starts, so that a restart is not a loss
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from agvbench.errors import MessageError
 
 MAGIC = b"AGVB"
-VERSION = 2
+VERSION = 3
 MAX_ROWS = 8192
 MAX_TEXT_BYTES = 4096
 MAX_MESSAGE_BYTES = 1 << 20

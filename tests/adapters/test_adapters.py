@@ -57,6 +57,9 @@ class Heard:
     def event(self, level: Any, kind: str, text: str, *, acknowledged: int = 0) -> None:
         assert level != Level.ERROR, text
 
+    def failed(self, error: Exception, *, acknowledged: int = 0) -> None:
+        raise AssertionError(error)
+
 
 @pytest.fixture(params=AGV_HERE)
 def agv(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Any:

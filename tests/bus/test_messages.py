@@ -46,8 +46,8 @@ from agvbench.bus.request_message import (
     encode_time,
 )
 from agvbench.bus.truth_message import Truth, decode_truth, encode_truth
-from agvbench.bus.wire import MAX_MESSAGE_BYTES, MAX_ROWS
-from agvbench.errors import MessageError
+from agvbench.bus.wire import MAX_MESSAGE_BYTES, MAX_ROWS, VERSION
+from agvbench.errors import LinkError, MessageError, PlanError
 from agvbench.types import Command, Commands, Frames, Pose
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
@@ -108,7 +108,8 @@ frame_messages = st.builds(
     st.integers(0, 1),
     u32,
 )
-events = st.builds(Event, u64, text, st.sampled_from(Level), text, text, u64, finite, u32)
+details = (st.none() | text,) * 4
+events = st.builds(Event, u64, text, st.sampled_from(Level), text, text, u64, finite, u32, *details)
 agv_identities = st.builds(
     AgvIdentity,
     *(text,) * 4,
@@ -219,7 +220,7 @@ def test_noise_is_refused(codec: Any, payload: bytes) -> None:
 def test_noise_behind_a_good_beginning_raises_nothing_else(codec: Any, payload: bytes, count: int, flags: int) -> None:
     _, encode, decode = codec
     kind = encode(_one(codec))[5:6]
-    head = b"AGVB\x01" + kind + flags.to_bytes(2, "little") + b"\0\0\0\0" + count.to_bytes(4, "little")
+    head = b"AGVB" + bytes([VERSION]) + kind + flags.to_bytes(2, "little") + b"\0\0\0\0" + count.to_bytes(4, "little")
     with suppress(MessageError):
         decode(head + payload)
 
@@ -243,11 +244,22 @@ def _one(codec: Any) -> Any:
     }[name]
 
 
+def test_an_error_arrives_with_all_its_fields() -> None:
+    sent = PlanError("radius is too small", where="plan", value="0.2 m", limit="0.3 m", remedy="widen the turn")
+    error = decode_event(encode_event(Event.of_error(sent, "agv"))).as_error()
+    assert type(error) is PlanError
+    assert (error.what, error.where, error.value, error.limit, error.remedy) == (
+        "radius is too small", "agv adapter: plan", "0.2 m", "0.3 m", "widen the turn",
+    )  # fmt: skip
+    bare = decode_event(encode_event(Event.of_error(LinkError("gone"), "agv"))).as_error()
+    assert (str(bare), bare.remedy) == ("agv adapter: gone", None)
+
+
 @every_codec
 def test_another_version_is_refused(codec: Any) -> None:
     payload = bytearray(codec[1](_one(codec)))
     payload[4] = 1
-    with pytest.raises(MessageError, match=r"another version: 1 \(limit: 2\)"):
+    with pytest.raises(MessageError, match=r"another version: 1 \(limit: 3\)"):
         codec[2](bytes(payload))
 
 

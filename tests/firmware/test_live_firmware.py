@@ -35,6 +35,9 @@ class Silent:
     def event(self, *_: object, **__: object) -> None:
         """Nobody listens."""
 
+    def failed(self, *_: object, **__: object) -> None:
+        """Nobody listens."""
+
     def truth(self, *_: object, **__: object) -> None:
         raise AssertionError
 

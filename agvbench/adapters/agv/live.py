@@ -11,7 +11,6 @@ from agvbench.adapters.contract import AdapterOptions, AgvReports
 from agvbench.adapters.simulated_agv import SimulatedAgv
 from agvbench.bus.clock import wait_until
 from agvbench.bus.command_message import CommandFlags, CommandMessage
-from agvbench.bus.event_message import Level
 from agvbench.bus.request_message import Replay, Reset
 from agvbench.bus.truth_message import TruthFlags
 from agvbench.errors import AgvbenchError
@@ -94,7 +93,7 @@ class LiveAgv(SimulatedAgv):
                 self._show(instant_s)
             except AgvbenchError as error:
                 self._sampling = None
-                self._reports.event(Level.ERROR, type(error).__name__, str(error))
+                self._reports.failed(error)
 
     def _show(self, instant_s: float) -> None:
         with self._lock:

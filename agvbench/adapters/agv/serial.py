@@ -164,7 +164,7 @@ class SerialAgv(AgvAdapter):
             self._failure = self._failure or error
         self.stop()
         if self._reports is not None:
-            self._reports.event(Level.ERROR, type(error).__name__, str(error))
+            self._reports.failed(error)
 
     def _tell(self) -> None:
         """Report what went wrong and was made good, seldom where there is much of it."""

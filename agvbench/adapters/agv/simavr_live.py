@@ -17,7 +17,6 @@ from agvbench.adapters.serial_line.port import SerialPort
 from agvbench.adapters.simavr.address import FRAME_S, FirmwareAddress
 from agvbench.adapters.simavr.host import SimavrHost
 from agvbench.bus.command_message import CommandMessage
-from agvbench.bus.event_message import Level
 from agvbench.bus.identity_message import AgvIdentity
 from agvbench.bus.request_message import Reset
 from agvbench.errors import AgvbenchError, LinkError
@@ -113,4 +112,4 @@ class SimavrLiveAgv(LiveAgv):
                 self._hold(Command(*held))
             self._hold(self._neutral)
         except AgvbenchError as error:  # of the plant
-            self._reports.event(Level.ERROR, type(error).__name__, str(error))
+            self._reports.failed(error)

@@ -63,6 +63,10 @@ class ImpairedMocap(MocapAdapter):
         """Pass on what the camera says."""
         self._reports.event(level, kind, text, acknowledged=acknowledged)
 
+    def failed(self, error: Exception, *, acknowledged: int = 0) -> None:
+        """Pass on what the camera failed with."""
+        self._reports.failed(error, acknowledged=acknowledged)
+
     def frames(self, frames: Frames, *, clock: FrameClock, acknowledged: int = 0) -> None:
         """Publish what the faults leave of the camera's frames."""
         for when, fault in self._faults:

@@ -100,10 +100,11 @@ class NatNetMocap(MocapAdapter):
         if now_s - self._began_s > _PATIENCE_S and now_s - self._told_s > _QUIET_S:
             self._told_s = now_s
             known = " ".join(sorted(names)) or "none"
-            text = (
-                f"no rigid body is called {name!r} (there are: {known}); rename it in Motive, or say --camera body=NAME"
+            error = LinkError(
+                f"no rigid body is called {name!r} (there are: {known})",
+                remedy="rename it in Motive, or say --camera body=NAME",
             )
-            self._reports.event(Level.ERROR, "body_unknown", text)
+            self._reports.failed(error)
         return None
 
     def _tell_what_went_wrong(self, now_s: float) -> None:

@@ -113,6 +113,10 @@ class EmulatedNatNet(MocapAdapter):
         """Pass on what the camera says."""
         self._reports.event(level, kind, text, acknowledged=acknowledged)
 
+    def failed(self, error: Exception, *, acknowledged: int = 0) -> None:
+        """Pass on what the camera failed with."""
+        self._reports.failed(error, acknowledged=acknowledged)
+
     def frame(self, *_: object, **__: object) -> None:
         """Refuse: simulated cameras publish batches."""
         raise NotImplementedError

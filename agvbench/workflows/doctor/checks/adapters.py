@@ -59,6 +59,8 @@ class _Unheard:
 
     def event(self, *_: object, **__: object) -> None: ...
 
+    def failed(self, *_: object, **__: object) -> None: ...
+
 
 def _vehicle(identity: AgvIdentity | Identity) -> str:
     return f"{identity.vehicle} answers ({identity.firmware}), commands in {identity.command_unit}"
