@@ -18,6 +18,7 @@
         ├── AdapterGoneError      an adapter that did not answer or vanished
         ├── PlacingError          a vehicle that was not brought to its start
         └── SafetyStopError       a vehicle that was stopped: lost, frozen, jumping, or about to leave the floor
+            └── RunStoppedError   the same, where no person is needed: lost, or about to leave the floor
 
 A message names *what* is wrong, *where*, the *value*, the *limit* with its unit and the *remedy*.
 """
@@ -123,6 +124,10 @@ class MessageError(LinkError):
 
 class SafetyStopError(LinkError):
     """A vehicle that was stopped while it drove, because something was not as it should be."""
+
+
+class RunStoppedError(SafetyStopError):
+    """A vehicle that was stopped for a reason that ends its run, but not the session: it is placed and drives again."""
 
 
 class PlacingError(LinkError):

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from agvbench.campaign import CampaignWriter
-from agvbench.errors import FlagError
+from agvbench.errors import FlagError, RunStoppedError, SafetyStopError
 from agvbench.model import VehicleModel
 from agvbench.planning import Departure, Workspace
 from agvbench.running.campaign_time import CampaignTime
@@ -17,13 +17,15 @@ from agvbench.running.pausing import Pause, standing
 from agvbench.running.placers.choosing import make_placer
 from agvbench.running.placers.placer import Rig
 from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess
-from agvbench.running.records import DriveOrder, record_aborted, recorded_run, times_stopped
+from agvbench.running.records import DriveOrder, record_aborted, recorded_run, stopped_drive, times_stopped
 from agvbench.running.session_began import SessionBegan
 from agvbench.running.settings import BenchSettings
 from agvbench.running.supervision import DEFAULT_SAFETY, Supervisor
 from agvbench.types import Command, Frames, Run
 
 _UNNAMED = SessionBegan()
+_MOST_UNSEEN = 3
+"""Runs in which the vehicle is not seen at all, one after another: then somebody has to look at the camera."""
 
 
 class Bench:
@@ -57,6 +59,7 @@ class Bench:
         self._identity = link.identity()
         self._latch, self.pause = Latch(), Pause(writer.path)
         self._recorded, self._session = recorded, session
+        self._unseen = 0
         workspace = Workspace.parse(settings.workspace)
         safety = replace(DEFAULT_SAFETY, flickers=not self._identity.simulated, exchange_s=settings.exchange)
         self._supervisor = Supervisor(workspace, nominal.neutral, safety)
@@ -130,13 +133,38 @@ class Bench:
         seen: list[Frames] = []
         try:
             driven = self._drive(order, run_id, seen)
+            status = self._status(order, driven)
+        except RunStoppedError as stop:
+            driven, status = self._stopped(order, seen, stop)
         except BaseException as error:
             record_aborted(self.writer, order, run_id, started_s, seen, error, self._identity.firmware)
             raise
-        run = recorded_run(order, run_id, started_s, self._status(order, driven), driven, self._identity.firmware)
+        run = recorded_run(order, run_id, started_s, status, driven, self._identity.firmware)
         self.writer.append(run)
         self._time.has_run(started_s, driven.duration_s)
+        self._check_seen(run)
         return run
+
+    def _stopped(self, order: DriveOrder, seen: list[Frames], stop: RunStoppedError) -> tuple[Drive, str]:
+        """Return what was driven of a run that the supervisor stopped, and its status: it does not count."""
+        self._placer.was_moved()
+        driven = stopped_drive(order.commands, seen, self._supervisor.exchanged_s, self._timing.rest_before_s)
+        return driven, f"rejected: {RunStoppedError(stop.what, value=stop.value, limit=stop.limit)}"
+
+    def _check_seen(self, run: Run) -> None:
+        """Drive no more where the vehicle is never seen.
+
+        Raises
+        ------
+        SafetyStopError
+            Then.
+        """
+        self._unseen = 0 if run.frames.tracked.any() else self._unseen + 1
+        if self._unseen >= _MOST_UNSEEN:
+            raise SafetyStopError(
+                "the vehicle is not seen", where=self.link.keys.root, value=f"in {self._unseen} runs in succession",
+                remedy="look at camera and markers, then continue with --resume",
+            )  # fmt: skip
 
     def _repeat_unseen(self, order: DriveOrder, run: Run) -> Run:
         if self._identity.simulated:

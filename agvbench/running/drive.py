@@ -90,7 +90,7 @@ def _check_seen(batches: list[Frames], timing: Timing, *, where: str) -> None:
     """Refuse to drive a vehicle that was never seen at rest: nobody would know where it goes."""
     if not any(frames.tracked.any() for frames in batches):
         value = f"not seen for {timing.rest_before_s:.2f} s, at rest"
-        raise safety_stop(0.0, "tracking was lost", where=where, value=value)
+        raise safety_stop(0.0, "tracking was lost", where=where, value=value, ends_session=False)
 
 
 def _settle(watched: Callable[..., None], commands: Commands, batches: list[Frames], timing: Timing) -> float:

@@ -6,6 +6,7 @@ import math
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 from agvbench.errors import PlacingError
 from agvbench.running.links import RunnerLink
@@ -47,23 +48,51 @@ def wait_for_start(
     PlacingError
         If it is not there after `patience_s` [s].
     """
+    x_m, y_m, heading_rad = start
+    where = f"x = {x_m:.3f} m, y = {y_m:.3f} m, heading {math.degrees(heading_rad):.1f}°"
+    asked = f"put {link.identity().vehicle} at {where}"
+    judge = partial(_place, start=start, limits=limits)
+    place = _wait(link, neutral, judge, asked, patience_s=patience_s, tell=tell)
+    if not place.good:
+        raise PlacingError(
+            "the vehicle was not put at the start", where=link.keys.root, value=place.said, limit=f"{patience_s:g} s",
+            remedy="go on with --resume",
+        )  # fmt: skip
+
+
+def wait_until_seen(
+    link: RunnerLink, neutral: Command, *, patience_s: float = PATIENCE_S, tell: Callable[[str], None] = say
+) -> None:
+    """Wait until the vehicle is seen anywhere, for at most `patience_s` [s]."""
+    _wait(link, neutral, _anywhere, f"waiting for {link.identity().vehicle}", patience_s=patience_s, tell=tell)
+
+
+def _wait(
+    link: RunnerLink,
+    neutral: Command,
+    judge: Callable[[Frames, float], _Place],
+    asked: str,
+    *,
+    patience_s: float,
+    tell: Callable[[str], None],
+) -> _Place:
+    """Let the vehicle stand until `judge` finds its place good, and tell every `TELL_S`; return its last place."""
     waited_s, told_s, place = 0.0, -math.inf, _Place("", False)
     while waited_s < patience_s:
         # The run's clock begins anew at its first exchange, which is before any of these.
         frames = link.exchange(neutral, t_s=waited_s, hold_s=LOOK_S)
         waited_s += LOOK_S
-        place = _place(frames, waited_s, start, limits)
+        place = judge(frames, waited_s)
         if place.good:
-            return
+            break
         if waited_s - told_s >= TELL_S:
-            x_m, y_m, heading_rad = start
-            where = f"x = {x_m:.3f} m, y = {y_m:.3f} m, heading {math.degrees(heading_rad):.1f}°"
-            tell(f"put {link.identity().vehicle} at {where}: {place.said}")
+            tell(f"{asked}: {place.said}")
             told_s = waited_s
-    raise PlacingError(
-        "the vehicle was not put at the start", where=link.keys.root, value=place.said, limit=f"{patience_s:g} s",
-        remedy="go on with --resume",
-    )  # fmt: skip
+    return place
+
+
+def _anywhere(frames: Frames, now_s: float) -> _Place:
+    return _Place("it is not seen", good=pose_before(frames, now_s) is not None)
 
 
 def _place(frames: Frames, now_s: float, start: Pose, limits: QualityLimits) -> _Place:

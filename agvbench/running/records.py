@@ -39,6 +39,14 @@ def recorded_run(order: DriveOrder, run_id: str, started_s: float, status: str, 
     return _run(order, run_id, started_s, status, driven.commands, driven.frames, firmware, extra)
 
 
+def stopped_drive(commands: Commands, seen: list[Frames], until_s: float, rest_before_s: float) -> Drive:
+    """Return what became of a run whose exchanges ended at `until_s` [s]: the commands sent by then."""
+    sent = np.asarray(commands.t_s < until_s)
+    sent[0] = True
+    commands = Commands(*(column[sent] for column in vars(commands).values()))
+    return Drive(commands, Frames.concatenate(seen), rest_before_s + until_s)
+
+
 def aborted_run(order: DriveOrder, run_id: str, started_s: float, status: str, frames: Frames, firmware: str) -> Run:
     """Return what is left of a run that was stopped: its frames, and the commands sent until the last of them."""
     last_s = float(np.max(frames.t_s))

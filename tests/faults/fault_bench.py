@@ -51,11 +51,14 @@ class Campaign:
         with witness() as seen:
             said, last_s = self._drive(path, {**struck, "workspace": self.workspace}, seen)
         self.undo(path)
-        attempts = _attempts(path)
+        statuses = _statuses(path)
         finished = _part(path, RUNS[0])
         resumed = self._resumed(path, {"agv": agv, "mocap": mocap, "camera": ""})
         intact = finished is not None and finished == _part(path, RUNS[0]) and finished == self._undisturbed(rig)
-        return Outcome(None if last_s is None else max(0.0, last_s - FROM_S), *said, intact, resumed == "", attempts)
+        reaction_s = None if last_s is None else max(0.0, last_s - FROM_S)
+        rejected = next((status for status in statuses if status.startswith("rejected")), "")
+        attempts = tuple(status.partition(":")[0] for status in statuses) or None
+        return Outcome(reaction_s, said[0] or rejected, said[1], intact, resumed == "", attempts)
 
     @property
     def _hold(self) -> tuple[float, float]:
@@ -63,10 +66,11 @@ class Campaign:
 
     def _drive(self, path: Path, options: dict[str, Any], seen: Witness) -> tuple[tuple[str, str], float | None]:
         said: dict[str, str] = {}
-        last_s = None
+        stops_s: list[float] = []
         given = {"vehicle": "", "seed": SEED, **options}
         # An interrupt ends the session, as it ends the program.
         with suppress(KeyboardInterrupt), open_session(given, out=str(path), resume=False, dry_run=False) as session:
+            _before_retries(session, lambda: stops_s.append(seen.last_s()))
             if self.do is not None:
                 _trip(session, partial(self.do, path))
             for number, name in enumerate(RUNS, 1):
@@ -76,9 +80,9 @@ class Campaign:
                     said[name] = f"{type(interrupt).__name__} {interrupt}".strip()
                     raise
                 finally:
-                    if said.get(name) and last_s is None:
-                        last_s = seen.last_s()
-        return (said.get(RUNS[1], ""), said.get(RUNS[2], "")), last_s
+                    if said.get(name) and not stops_s:
+                        stops_s.append(seen.last_s())
+        return (said.get(RUNS[1], ""), said.get(RUNS[2], "")), stops_s[0] if stops_s else None
 
     def _resumed(self, path: Path, options: dict[str, Any]) -> str:
         """Go on without the fault; return what went wrong."""
@@ -124,17 +128,25 @@ def _trip(session: BenchSession, do: Callable[[], None]) -> None:
     link.reset, link.exchange = reset, exchange  # type: ignore[method-assign]
 
 
+def _before_retries(session: BenchSession, do: Callable[[], None]) -> None:
+    """Call `do` when a run was stopped that is to be driven again."""
+    bench = session._bench
+    assert bench is not None
+    plain = bench._stopped
+    bench._stopped = lambda *stopped: (do(), plain(*stopped))[1]  # type: ignore[method-assign,func-returns-value]
+
+
 def _part(path: Path, name: str) -> dict[str, bytes] | None:
     parts = [path / f"{table}.parquet" / f"{name}.parquet" for table in ("runs", "commands", "poses")]
     return {part.parent.name: part.read_bytes() for part in parts} if all(part.exists() for part in parts) else None
 
 
-def _attempts(path: Path) -> tuple[str, ...] | None:
-    """Return what was recorded of the run that was befallen, the first word of each attempt's status."""
+def _statuses(path: Path) -> list[str]:
+    """Return what was recorded of the run that was befallen: the status of each attempt."""
     with suppress(AgvbenchError):
-        found = {run.run_id: run.status.partition(":")[0] for run in Recorded.open(path)}
-        return tuple(found[name] for name in sorted(found) if name.startswith(RUNS[1]))
-    return None
+        found = {run.run_id: run.status for run in Recorded.open(path)}
+        return [found[name] for name in sorted(found) if name.startswith(RUNS[1])]
+    return []
 
 
 @cache

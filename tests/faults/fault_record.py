@@ -23,6 +23,7 @@ class Then(StrEnum):
     STOPS = "stopped; the session drives no more"
     ENDS = "stopped; the program ends"
     REJECTS = "driven to its end, rejected, driven again"
+    RETRIES = "stopped, rejected, driven again"
     FAILS = "stopped; its run fails, the session goes on"
     GOES_ON = "driven to its end, and counts"
     REFUSES = "never moves: the session does not begin"
@@ -33,8 +34,9 @@ class Outcome:
     """What came of a fault.
 
     ``reaction_s`` [s] is how long the vehicle was told to drive after the fault began (None: to the end of its run),
-    ``said`` what the run that it befell failed with, ``later`` what the next failed with. ``intact`` is whether the run
-    that was finished before stayed as it was, byte by byte, ``resumed`` whether a session without the fault then drove
+    ``said`` what the run that it befell, or an attempt at it, failed with, ``later`` what the next failed with.
+    ``intact`` is whether the run that was finished before
+    stayed as it was, byte by byte, ``resumed`` whether a session without the fault then drove
     all that was missing; ``attempts`` is what was recorded of the run that it befell, attempt by attempt: "ok",
     "rejected" or "aborted". None is for what was not tried.
     """
@@ -64,12 +66,12 @@ class Outcome:
         return [promise for promise, kept in promises.items() if not kept]
 
     def _counts(self, then: Then) -> bool:
-        if self.attempts is None or then not in {Then.GOES_ON, Then.REJECTS}:
+        if self.attempts is None or then not in {Then.GOES_ON, Then.REJECTS, Then.RETRIES}:
             return True
         if then is Then.GOES_ON:
             return self.attempts == ("ok",)
         *before, last = self.attempts
-        return len(before) > 0 and set(before) == {"rejected"} and last == ("rejected" if self.said else "ok")
+        return len(before) > 0 and set(before) == {"rejected"} and last in {"ok", "rejected"}
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from agvbench.adapters import open_rig
 from agvbench.errors import FlagError
 from agvbench.model import nominal_model
 from agvbench.planning import Workspace
+from agvbench.running.opening import open_session
 from agvbench.running.placers.auto import Auto
 from agvbench.running.placers.choosing import PLACERS, choose_placer
 from agvbench.running.placers.placer import Rig
@@ -57,6 +58,16 @@ def test_a_session_is_driven_without_anybody_and_resumed(tmp_path: Path) -> None
     resumed = bench(tmp_path / "second", "--resume")
     assert resumed["status"].tolist() == ["ok", "ok"]
     assert resumed.loc["5", "placing_attempts"] == 0
+
+
+@pytest.mark.parametrize("lost_s", [1.5, 6.0], ids=["in a run", "on the way back"])
+def test_a_simulated_vehicle_that_was_lost_is_placed_by_software(tmp_path: Path, lost_s: float) -> None:
+    # The fault lasts until the vehicle is reset.
+    given = {"vehicle": "", "place": "auto", "mocap": f"impaired:untracked@1/{lost_s}:sim"}
+    with open_session(given, out=str(tmp_path / "c"), resume=False, dry_run=False) as session:
+        runs = [session.driver(name, experiment="free", repeat=1).hold(drive=0.5, for_s=1.0) for name in "ab"]
+    assert [run.status for run in runs] == ["ok", "ok"]
+    assert [run.run_id for run in runs] == (["a-attempt2", "b"] if lost_s < 3.0 else ["a", "b"])
 
 
 def test_who_can_place_what() -> None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import re
 import subprocess
 import sys
 
 import pytest
 
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
-from agvbench.errors import FitError, FlagError
+from agvbench.errors import FitError, FlagError, LinkError
 from agvbench.model import thesis_vehicle
 from agvbench.running.benchmark_files import benchmark_name, find_benchmark
 from agvbench.running.calibrating import VEHICLE_FILE, calibrate_campaign
@@ -61,20 +62,33 @@ def test_what_was_chosen_is_chosen_again(lab):
     assert {run.run_id for run in Campaign.open(lab / "c")} == first
 
 
-def test_a_simulated_vehicle_that_was_lost_is_not_lost_again_whenever_the_session_goes_on(lab):
+def test_a_run_that_lost_the_vehicle_is_rejected_and_driven_again(lab):
     lost = bench("bench_mine.py", "--repeats=2", "--seed=7", "-k=left", "--camera=untracked=0.003,burst_frames=60")
-    assert lost.returncode == 2
-    assert "tracking was lost" in lost.stderr
-    resumed = bench("--resume")
-    assert resumed.returncode == 0, resumed.stdout + resumed.stderr
-    (stopped,) = [run for run in Campaign.open(lab / "c") if "-aborted" in run.run_id]
-    assert "tracking was lost" in stopped.status
-    tables = [lab / "c" / f"{table}.parquet" / "left-0.5-r02.parquet" for table in ("runs", "commands", "poses")]
+    assert lost.returncode == 0, lost.stdout + lost.stderr
+    runs = {run.run_id: run for run in Campaign.open(lab / "c")}
+    (again,) = [name for name in runs if name.endswith("-attempt2")]
+    stopped = runs.pop(again.removesuffix("-attempt2"))
+    assert re.fullmatch(
+        r"rejected: stopped \d.\d s into the run: tracking was lost: not seen for 0.5.*", stopped.status
+    )
+    assert {run.status for run in runs.values()} == {"ok"}
+    tables = [lab / "c" / f"{table}.parquet" / f"{again}.parquet" for table in ("runs", "commands", "poses")]
     before = [table.read_bytes() for table in tables]
     for table in tables:
         table.unlink()
     assert bench("--resume").returncode == 0
     assert [table.read_bytes() for table in tables] == before
+
+
+def test_a_vehicle_that_is_never_seen_ends_the_session(tmp_path):
+    given = {"vehicle": "", "mocap": "impaired:silent:sim"}
+    with open_session(given, out=str(tmp_path / "c"), resume=False, dry_run=False) as session:
+        with pytest.raises(LinkError, match="the vehicle is not seen: in 3 runs in succession; look at camera"):
+            session.driver("left", experiment="free", repeat=1).hold(drive=0.5, for_s=0.3)
+        assert session.failure is not None
+    assert [path.name for path in sorted((tmp_path / "c" / "runs.parquet").iterdir())] == [
+        "left-attempt2.parquet", "left-attempt3.parquet", "left.parquet",
+    ]  # fmt: skip
 
 
 def test_one_that_drives_back_itself_begins_at_other_random_numbers_too(tmp_path, monkeypatch):

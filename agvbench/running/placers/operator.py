@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from agvbench.running.placers.placer import Placer
 from agvbench.running.placing import wait_for_start
-from agvbench.types import Command, Pose
+from agvbench.types import Pose
 
 
 class Operator(Placer):
@@ -14,6 +14,4 @@ class Operator(Placer):
 
     def place(self, start: Pose, run_id: str) -> None:
         """Wait."""
-        rig = self._rig
-        neutral = Command(rig.model.neutral, rig.model.neutral, rig.model.neutral)
-        wait_for_start(rig.link, neutral, start, limits=rig.limits)
+        wait_for_start(self._rig.link, self._neutral, start, limits=self._rig.limits)

@@ -12,7 +12,7 @@ from agvbench.running.links import RunnerLink
 from agvbench.running.quality import QualityLimits
 from agvbench.running.returning.placing import Placing
 from agvbench.running.supervision import Supervisor
-from agvbench.types import Pose
+from agvbench.types import Command, Pose
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,11 @@ class Placer(ABC):
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
 
+    @property
+    def _neutral(self) -> Command:
+        """The command at which the vehicle stands."""
+        return Command(*[self._rig.model.neutral] * 3)
+
     @abstractmethod
     def place(self, start: Pose, run_id: str) -> Placing | None:
         """Bring the vehicle to `start` (floor frame) for the run `run_id`; None if there is nothing to tell of it.
@@ -44,7 +49,7 @@ class Placer(ABC):
         PlacingError
             If it did not come there.
         LinkError
-            If the bus or an adapter fails, or the supervisor stopped the vehicle.
+            If the bus or an adapter fails, or the supervisor stopped the vehicle for what ends the session.
         """
 
     def run_key(self, run_id: str) -> str | None:
@@ -52,4 +57,4 @@ class Placer(ABC):
         return None
 
     def was_moved(self) -> None:  # noqa: B027  (most need not know)
-        """Take note that a simulated vehicle drove a recorded run unseen: it does not stand where it was left."""
+        """Take note that a simulated vehicle was stopped, or drove a recorded run unseen: nobody knows where it is."""

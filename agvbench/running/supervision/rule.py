@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -55,6 +56,9 @@ def middle(values: Floats) -> Floats:
 
 class Rule(ABC):
     """Watches one run; made anew for each."""
+
+    ends_session: ClassVar[bool] = True
+    """Whether a person has to look at vehicle or camera after a stop, before anything is driven again."""
 
     def __init__(self, limits: SafetyLimits, workspace: Workspace) -> None:
         self.limits, self.workspace = limits, workspace

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -35,6 +36,8 @@ class Supervisor:
         """Forget the last run."""
         self._rules = [rule(self._limits, self._workspace) for rule in self._classes]
         self._driving_since_s: float | None = None
+        self.exchanged_s = -math.inf
+        """Until when [s] commands of this run were exchanged."""
 
     def exchange(self, link: RunnerLink, command: Command, *, t_s: float, hold_s: float, seen: list[Frames]) -> None:
         """Exchange a command as `VehicleLink.exchange` does, watching; add the frames of every slice to `seen`.
@@ -42,7 +45,7 @@ class Supervisor:
         Raises
         ------
         SafetyStopError
-            If a rule complains; the vehicle was stopped before.
+            If a rule complains; the vehicle was stopped before. It is a `RunStoppedError` if the session may continue.
         LinkError
             As from the link.
         """
@@ -53,6 +56,7 @@ class Supervisor:
             self._driving_since_s = t_s
         for until_s in _parts(t_s, end_s, self._limits.exchange_s):
             seen.append(link.exchange(command, t_s=t_s, hold_s=until_s - t_s))
+            self.exchanged_s = until_s
             self._look_through(link, seen[-1], t_s, until_s)
             t_s = until_s
 
@@ -73,7 +77,9 @@ class Supervisor:
             if (complaint := rule.complaint(seen)) is not None:
                 link.stop()
                 what, value, limit = complaint
-                raise safety_stop(now_s, what, where=link.keys.root, value=value, limit=limit)
+                raise safety_stop(
+                    now_s, what, where=link.keys.root, value=value, limit=limit, ends_session=rule.ends_session
+                )
 
 
 def _parts(begin_s: float, end_s: float, length_s: float) -> Iterator[float]:

@@ -6,15 +6,21 @@ from fault_record import Fault, Then
 _LOST = "tracking was lost: not seen for 0.5"
 
 FAULTS = (
-    Fault("camera silent", "camera", "no frame comes any more", Then.STOPS, Campaign(mocap="silent"), _LOST, 0.65),
+    Fault("camera silent", "camera", "no frame comes any more", Then.RETRIES, Campaign(mocap="silent"), _LOST, 0.65),
     Fault(
-        "camera untracked", "camera", "the vehicle is in no frame", Then.STOPS, Campaign(mocap="untracked"), _LOST, 0.65
+        "camera untracked",
+        "camera",
+        "the vehicle is in no frame",
+        Then.RETRIES,
+        Campaign(mocap="untracked"),
+        _LOST,
+        0.65,
     ),
     Fault(
         "camera guessed",
         "camera",
         "frames say untracked, and show a plausible pose",
-        Then.STOPS,
+        Then.RETRIES,
         Campaign(mocap="guessed"),
         _LOST,
         0.65,
@@ -60,18 +66,25 @@ FAULTS = (
         "frames 0.6 s late",
         "camera",
         "frames arrive 0.6 s late: a consumer that cannot keep up",
-        Then.STOPS,
+        Then.RETRIES,
         Campaign(mocap="late=0.6"),
         _LOST,
         0.65,
     ),
     Fault("frames lost 1 %", "camera", "1 % of the frames are lost", Then.GOES_ON, Campaign(mocap="lost=0.01")),
-    Fault("frames lost 50 %", "camera", "half of the frames are lost", Then.REJECTS, Campaign(mocap="lost=0.5")),
+    Fault(
+        "frames lost 50 %",
+        "camera",
+        "half of the frames are lost",
+        Then.REJECTS,
+        Campaign(mocap="lost=0.5"),
+        "rejected: tracked share",
+    ),
     Fault(
         "leaves the volume",
         "camera",
         "the vehicle goes faster than its commands say, towards the edge of the floor",
-        Then.STOPS,
+        Then.RETRIES,
         Campaign(agv="faster=4", workspace="circle:1.6", hold_s=4.0, share=0.15),
         "vehicle is leaving the capture volume",
         instead="before the edge",

@@ -68,7 +68,7 @@ FAULTS = (
         "camera suspended",
         "bus",
         "the process of the camera's adapter hangs",
-        Then.STOPS,
+        Then.RETRIES,
         _sent("mocap", signal.SIGSTOP),
         "tracking was lost",
         0.75,

@@ -10,6 +10,8 @@ from agvbench.running.supervision.rule import Rule, Slice
 class Lost(Rule):
     """Stops on tracking that is lost, and on a camera that has fallen silent."""
 
+    ends_session = False
+
     _last_s = math.nan
 
     def complaint(self, seen: Slice) -> tuple[str, str, str] | None:

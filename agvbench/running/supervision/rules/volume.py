@@ -11,6 +11,8 @@ from agvbench.types import Floats
 class Volume(Rule):
     """Stops a vehicle that could not come to rest inside any more."""
 
+    ends_session = False
+
     _before: tuple[float, Floats] | None = None
 
     def complaint(self, seen: Slice) -> tuple[str, str, str] | None:
