@@ -35,10 +35,9 @@ class Outcome:
 
     ``reaction_s`` [s] is how long the vehicle was told to drive after the fault began (None: to the end of its run),
     ``said`` what the run that it befell, or an attempt at it, failed with, ``later`` what the next failed with.
-    ``intact`` is whether the run that was finished before
-    stayed as it was, byte by byte, ``resumed`` whether a session without the fault then drove
-    all that was missing; ``attempts`` is what was recorded of the run that it befell, attempt by attempt: "ok",
-    "rejected" or "aborted". None is for what was not tried.
+    ``intact`` is whether the run that was finished before stayed as it was, byte by byte, ``resumed`` whether a session
+    without the fault then drove all that was missing; ``attempts`` is what was recorded of the run that it befell,
+    attempt by attempt: "ok", "rejected" or "aborted". None is for what was not tried.
     """
 
     reaction_s: float | None

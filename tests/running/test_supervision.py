@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agvbench.adapters import open_rig
+from agvbench.bus.keys import Keys
 from agvbench.errors import SafetyStopError
 from agvbench.planning import Workspace
 from agvbench.running.drive import drive
@@ -108,3 +109,38 @@ def test_a_camera_that_repeats_itself_is_noticed_if_it_flickered_before() -> Non
     assert not any(watching.complaint(one) for one in slices(np.full(240, 0.5)))
     watching = Frozen(DEFAULT_SAFETY, ROOM)
     assert not any(watching.complaint(one) for one in slices(frozen, driving_s=0.0))
+
+
+class Scripted:
+    """A link on which these frames arrive."""
+
+    def __init__(self, frames: Frames) -> None:
+        self.keys, self._frames, self.stops = Keys("lab", "agv1"), frames, 0
+
+    def exchange(self, _: Command, *, t_s: float, hold_s: float) -> Frames:
+        """Return the frames that arrive in the interval."""
+        received = self._frames.received_s
+        return self._frames.select((received >= t_s) & (received < t_s + hold_s))
+
+    def stop(self) -> None:
+        """Count."""
+        self.stops += 1
+
+
+@pytest.mark.parametrize(
+    ("late_s", "aside_m"), [(0.45, 0.0), (0.0, 0.8), (-2.0, 0.0), (0.0, 40.0)], ids=["late", "wrong", "ahead", "far"]
+)
+@pytest.mark.parametrize("rate_hz", [120.0, 30.0])
+def test_a_lone_late_or_wrong_frame_stops_nobody(late_s: float, aside_m: float, rate_hz: float) -> None:
+    t_s = np.arange(0.0, 3.0, 1.0 / rate_hz)
+    x_m = 0.3 * t_s + 1e-4 * np.random.default_rng(0).standard_normal(len(t_s))
+    tracked = (t_s < 1.3) | (t_s > 1.7)
+    lone = int(1.5 * rate_hz)
+    tracked[lone], x_m[lone] = True, x_m[lone] - 0.3 * late_s
+    captured_s, y_m, zeros = t_s.copy(), np.zeros(len(t_s)), np.zeros(len(t_s))
+    captured_s[lone] -= late_s
+    y_m[lone] = aside_m
+    link = Scripted(Frames(captured_s, x_m, y_m, zeros, tracked, np.arange(len(t_s)), zeros, t_s))
+    watching = Supervisor(ROOM, 1500.0)
+    watching.exchange(link, Command(1900.0, 1500.0, 1500.0), t_s=0.0, hold_s=3.0, seen=[])
+    assert link.stops == 0

@@ -13,6 +13,33 @@ from agvbench.planning import Workspace
 from agvbench.running.supervision.limits import SafetyLimits
 from agvbench.types import Floats, Frames
 
+_FEWEST_FRAMES = 3
+"""A single wrong frame moves the median of fewer."""
+
+
+class Window:
+    """The tracked frames that rules judge by: those of a slice and, where they are fewer than three, the last before.
+
+    A slice of which only a late or wrong frame is tracked is thus judged by two right ones, too.
+    """
+
+    def __init__(self) -> None:
+        self._last = Frames.empty()
+
+    def with_slice(self, frames: Frames) -> Frames:
+        """Return what to judge by once `frames` arrived: nothing if none is tracked, or fewer than three ever were."""
+        tracked = frames.select(frames.tracked)
+        if not len(tracked):
+            return tracked
+        if len(tracked) < _FEWEST_FRAMES:
+            tracked = _last_of(Frames.concatenate([self._last, tracked]))
+        self._last = _last_of(tracked)
+        return tracked if len(tracked) >= _FEWEST_FRAMES else Frames.empty()
+
+
+def _last_of(frames: Frames) -> Frames:
+    return frames.select(np.arange(max(0, len(frames) - _FEWEST_FRAMES), len(frames)))
+
 
 @dataclass(frozen=True)
 class Slice:

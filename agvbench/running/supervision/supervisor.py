@@ -13,7 +13,7 @@ from agvbench.registry import classes_by_file
 from agvbench.running.links import RunnerLink
 from agvbench.running.supervision import rules
 from agvbench.running.supervision.limits import DEFAULT_SAFETY, SafetyLimits
-from agvbench.running.supervision.rule import Rule, Slice
+from agvbench.running.supervision.rule import Rule, Slice, Window
 from agvbench.running.supervision.stop import safety_stop
 from agvbench.types import Command, Frames
 
@@ -35,6 +35,7 @@ class Supervisor:
     def begin(self) -> None:
         """Forget the last run."""
         self._rules = [rule(self._limits, self._workspace) for rule in self._classes]
+        self._window = Window()
         self._driving_since_s: float | None = None
         self.exchanged_s = -math.inf
         """Until when [s] commands of this run were exchanged."""
@@ -72,7 +73,7 @@ class Supervisor:
 
     def _look(self, link: RunnerLink, frames: Frames, now_s: float) -> None:
         driving_s = 0.0 if self._driving_since_s is None else now_s - self._driving_since_s
-        seen = Slice.of(frames, now_s, driving_s)
+        seen = Slice.of(self._window.with_slice(frames), now_s, driving_s)
         for rule in self._rules:
             if (complaint := rule.complaint(seen)) is not None:
                 link.stop()
