@@ -92,6 +92,7 @@ def test_identity_survives_the_bus_and_stays(agv: AgvAdapter) -> None:
     assert identity.vehicle == OPTIONS.vehicle
 
 
+@pytest.mark.real_time
 def test_the_vehicle_stands_still_until_it_is_driven_and_moves_then(agv: Any) -> None:
     agv.reset(RESET)
     agv.apply(CommandMessage(1, 0.0, NEUTRAL, 0.1))
@@ -106,6 +107,7 @@ def test_the_vehicle_stands_still_until_it_is_driven_and_moves_then(agv: Any) ->
     pytest.fail("the vehicle did not move")
 
 
+@pytest.mark.real_time
 def test_stop_may_come_at_any_time_and_twice(agv: Any) -> None:
     agv.stop()
     agv.reset(RESET)
@@ -117,6 +119,7 @@ def test_stop_may_come_at_any_time_and_twice(agv: Any) -> None:
     agv.apply(CommandMessage(2, 0.0, NEUTRAL, 0.05, CommandFlags.NONE))
 
 
+@pytest.mark.real_time
 def test_replay_of_nothing_and_of_something(agv: Any) -> None:
     none = np.empty(0)
     agv.replay(Replay(RESET, Commands(none, none, none, none), 0.0))

@@ -28,6 +28,8 @@ from agvbench.bus.wire import MAX_MESSAGE_BYTES, MAX_ROWS
 from agvbench.errors import MessageError
 from agvbench.types import Frames
 
+pytestmark = pytest.mark.real_time
+
 KEYS = Keys("lab", "agv1")
 MOVING = NEUTRAL._replace(drive=1800.0)
 

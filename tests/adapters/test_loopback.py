@@ -51,6 +51,7 @@ def free_port() -> int:
         ("mocap", "--emulate", "--port", "0", "--multicast", "239.255.42.99"),
     ],
 )
+@pytest.mark.real_time
 def test_processes_listen_on_loopback(arguments: tuple[str, ...]) -> None:
     port = free_port()
     with process(*(one.format(port=port) for one in arguments)) as child:

@@ -20,6 +20,8 @@ from agvbench.cli import main
 from agvbench.errors import LinkError
 from agvbench.types import Command
 
+pytestmark = pytest.mark.real_time
+
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "write-an-adapter.md"
 
 

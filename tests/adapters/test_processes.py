@@ -17,6 +17,8 @@ from agvbench.bus.link import VehicleLink
 from agvbench.bus.session import open_session
 from agvbench.errors import AdapterGoneError, LinkError
 
+pytestmark = pytest.mark.real_time
+
 KEYS = ("a", "b")
 SEED = ("--seed", "11")
 

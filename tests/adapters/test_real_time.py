@@ -22,6 +22,8 @@ from agvbench.bus.session import open_session
 from agvbench.errors import LinkError
 from agvbench.types import Command, Frames
 
+pytestmark = pytest.mark.real_time
+
 
 def test_frames_carry_the_runs_clock_and_show_the_drive() -> None:
     perfect = dict.fromkeys(("lost", "doubled", "late", "wrong", "untracked", "marker_noise_m"), 0.0)

@@ -28,7 +28,10 @@ from agvbench.errors import AdapterGoneError, LinkError, PlantError
 from agvbench.workflows.doctor import Lab, State, examine
 
 KEYS = Keys("lab", "agv1")
-pytestmark = pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificates")
+pytestmark = [
+    pytest.mark.real_time,
+    pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificates"),
+]
 
 
 @pytest.fixture(scope="module")

@@ -59,6 +59,7 @@ def test_a_sender_that_starts_again_is_no_loss() -> None:
 
 
 @given(st.floats(0, 1e6), st.floats(-10, 1e4))
+@pytest.mark.real_time
 def test_a_deadline_is_kept(start_s: float, ahead_s: float) -> None:
     clock = SimulatedClock(start_s)
     late_s = wait_until(clock, start_s + ahead_s)

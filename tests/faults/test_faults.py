@@ -11,6 +11,8 @@ from fault_record import Fault, all_faults
 
 from agvbench.adapters.simavr.built import why_not_built
 
+pytestmark = pytest.mark.real_time
+
 FAULTS = all_faults()
 
 

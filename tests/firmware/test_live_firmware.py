@@ -21,7 +21,7 @@ from agvbench.bus.command_message import CommandMessage
 from agvbench.errors import LinkError
 from agvbench.types import Command, Pose
 
-pytestmark = pytest.mark.usefixtures("firmware")
+pytestmark = [pytest.mark.real_time, pytest.mark.usefixtures("firmware")]
 
 
 @pytest.fixture(autouse=True)

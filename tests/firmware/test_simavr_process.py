@@ -16,7 +16,7 @@ from agvbench.adapters.simavr.microcontroller import Microcontroller
 from agvbench.errors import AdapterGoneError
 from agvbench.types import Command, Pose
 
-pytestmark = pytest.mark.usefixtures("firmware")
+pytestmark = [pytest.mark.real_time, pytest.mark.usefixtures("firmware")]
 
 
 def test_a_process_that_was_killed_is_one_line_every_time(version_2: Microcontroller) -> None:

@@ -93,6 +93,7 @@ def test_another_seed_differs(in_process, tmp_path):
     assert all(other[name] != data for name, data in in_process.items() if name.startswith("poses"))
 
 
+@pytest.mark.real_time
 def test_simulator_in_a_process_of_its_own_over_tcp(in_process, tmp_path):
     endpoint = f"tcp/127.0.0.1:{(port := free_port())}"
     with running("sim", "--listen", endpoint, SEED):
@@ -100,6 +101,7 @@ def test_simulator_in_a_process_of_its_own_over_tcp(in_process, tmp_path):
         assert bench(tmp_path / "campaign", "--connect", endpoint) == in_process
 
 
+@pytest.mark.real_time
 def test_vehicle_and_camera_in_processes_of_their_own(in_process, tmp_path):
     endpoint = f"tcp/127.0.0.1:{(port := free_port())}"
     with running("agv", "sim", "--listen", endpoint, SEED):
@@ -110,6 +112,7 @@ def test_vehicle_and_camera_in_processes_of_their_own(in_process, tmp_path):
             assert bench(tmp_path / "campaign", "--connect", endpoint) == in_process
 
 
+@pytest.mark.real_time
 def test_a_simulator_with_another_seed_is_refused(tmp_path):
     endpoint = f"tcp/127.0.0.1:{(port := free_port())}"
     with running("sim", "--listen", endpoint, "--seed=99"):

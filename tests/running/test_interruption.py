@@ -14,6 +14,8 @@ import pytest
 
 from agvbench.campaign import Campaign
 
+pytestmark = pytest.mark.real_time
+
 KILLS = 30
 PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
 # Calibration and the eight trajectories, so that resuming in the middle of either is met.

@@ -19,6 +19,8 @@ from agvbench.running.opening import open_session
 from agvbench.running.pausing import PAUSE_FILE, Pause
 from agvbench.running.session import BenchSession
 
+pytestmark = pytest.mark.real_time
+
 OPTIONS = {"vehicle": "", "seed": 2}
 
 

@@ -9,6 +9,8 @@ from agvbench.errors import LinkError
 from agvbench.running.placing import wait_for_start
 from agvbench.types import Command, Pose
 
+pytestmark = pytest.mark.real_time
+
 NEUTRAL = Command(1500.0, 1500.0, 1500.0)
 START = Pose(0.5, -0.5, 1.0)
 

@@ -7,9 +7,13 @@ import subprocess
 import sys
 import time
 
+import pytest
+
 from agvbench.campaign import Campaign
 from agvbench.workflows.loop_driving import _run
 from agvbench.workflows.loop_settings import BEFORE, DIAGNOSIS
+
+pytestmark = pytest.mark.real_time
 
 PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
 

@@ -31,6 +31,8 @@ from agvbench.bus.session import open_session
 from agvbench.errors import FlagError
 from agvbench.types import Frames
 
+pytestmark = pytest.mark.real_time
+
 FRAME, MODELS = drawn()
 POSES = np.array([[1.25, -0.5, 0.3], [0.0, 2.0, -3.0], [-1.0, 0.25, 1.5]])
 

@@ -24,6 +24,8 @@ from agvbench.adapters.natnet.version import Version
 from agvbench.bus.clock import WallClock
 from agvbench.errors import AdapterGoneError, LinkError
 
+pytestmark = pytest.mark.real_time
+
 GROUP = "239.255.42.99"
 FRAME, MODELS = drawn()
 

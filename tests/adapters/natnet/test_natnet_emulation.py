@@ -17,6 +17,8 @@ from agvbench.adapters.natnet.client import Client, Seen
 from agvbench.bus.clock import WallClock
 from agvbench.cli import main
 
+pytestmark = pytest.mark.real_time
+
 
 def test_a_vehicle_is_seen_to_drive() -> None:
     program = "import sys; from agvbench.cli import main; sys.exit(main())"

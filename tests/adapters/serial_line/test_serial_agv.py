@@ -25,6 +25,8 @@ from agvbench.bus.identity_message import decode_agv_identity, encode_agv_identi
 from agvbench.errors import AgvbenchError, LinkError
 from agvbench.types import Command
 
+pytestmark = pytest.mark.real_time
+
 FORWARD = CommandMessage(1, 0.0, Command(1600.4, 1400.0, 1500.0), 0.1)
 
 
