@@ -14,7 +14,8 @@ import pyarrow as pa
 from agvbench.campaign.atomic import TEMPORARY_PREFIX, is_temporary
 from agvbench.campaign.checks import check_commands, check_poses, check_runs
 from agvbench.campaign.header import FILE_NAME, CampaignHeader
-from agvbench.campaign.manifest import Manifest, record
+from agvbench.campaign.lock import LOCK_FILE
+from agvbench.campaign.manifest import MANIFEST_FILE, Manifest, record
 from agvbench.campaign.parquet import to_parquet
 from agvbench.campaign.parts import part_name, parts_of, run_id_of
 from agvbench.campaign.schema import TABLES
@@ -65,9 +66,10 @@ class CampaignWriter:
         path = Path(path)
         try:
             refuse_occupied(path, "resume it, or choose another directory")
+            path.mkdir(parents=True, exist_ok=True)
+            header.save(path / FILE_NAME)  # first: what has a head can be resumed
             for name in TABLES:
-                (path / f"{name}.parquet").mkdir(parents=True)
-            header.save(path / FILE_NAME)
+                (path / f"{name}.parquet").mkdir()
         except OSError as error:
             raise CampaignError(
                 f"cannot be written ({error.strerror})", where=path, remedy="choose another directory"
@@ -213,6 +215,10 @@ def check_parts(tables: Mapping[str, pa.Table], where: Path, unit: CommandUnit) 
     check_poses(poses, status, commands.last("t_s"))
 
 
+_LEFT_OVER = frozenset((MANIFEST_FILE, LOCK_FILE))
+"""What a session leaves in a directory that ended before its campaign had a head."""
+
+
 def refuse_occupied(path: Path, remedy: str) -> None:
     """Refuse a path that is not a directory or has something in it.
 
@@ -223,5 +229,5 @@ def refuse_occupied(path: Path, remedy: str) -> None:
     """
     if path.exists() and not path.is_dir():
         raise CampaignError("is not a directory", where=path, remedy="choose another directory")
-    if path.exists() and any(path.iterdir()):
+    if path.exists() and any(file.name not in _LEFT_OVER and not is_temporary(file) for file in path.iterdir()):
         raise CampaignError("exists already and is not empty", where=path, remedy=remedy)

@@ -118,10 +118,12 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
     session = config.stash.get(SESSION, None)
     if session is None:
         return
+    from agvbench.running.directory import shown
+
     if INTERRUPT in config.stash:
         why = str(config.stash[INTERRUPT]) or "Ctrl-C"
         terminalreporter.write_line(
-            f"ended by {why}, the vehicle was stopped; go on with --resume --out {session.directory}"
+            f"ended by {why}, the vehicle was stopped; go on with --resume --out {shown(session.directory)}"
         )
         return
     if config.getoption("no_summary") and not session.is_dry:
@@ -132,4 +134,4 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
     if session.is_dry:
         terminalreporter.write_line(dry_run_table(session.planned))
         return
-    terminalreporter.write_line(conclude(session.directory, report=not option(config, "--no-report")))
+    terminalreporter.write_line(conclude(shown(session.directory), report=not option(config, "--no-report")))

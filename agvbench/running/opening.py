@@ -17,6 +17,8 @@ from agvbench.adapters import check_specs
 from agvbench.bus.link import VehicleLink
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
 from agvbench.campaign.header import FILE_NAME
+from agvbench.campaign.lock import locked
+from agvbench.campaign.writer import refuse_occupied
 from agvbench.model import VehicleModel
 from agvbench.planning import Workspace
 from agvbench.running.bench import Bench
@@ -47,7 +49,8 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
     AgvbenchError
         If an option, a file, the rig or the directory cannot be used.
     """
-    directory, settings = session_settings(given, out, resume=resume)
+    given_directory, settings = session_settings(given, out, resume=resume)
+    directory = given_directory.absolute()  # a benchmark may change the working directory
     models = known_models(settings)
     session_with = partial(
         BenchSession,
@@ -62,30 +65,27 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
         models.setdefault("calibrated", expected_calibration(settings.vehicle))
         yield session_with(bench=None)
         return
+    if not resume:
+        refuse_occupied(given_directory, "resume it, or choose another directory")
     with interruptible(), open_session_rig(settings, models) as link:
         choose_placer(settings.place, simulated=link.identity().simulated)
-        header = _header(directory, settings, models["uncalibrated"], link, resume=resume)
-        writer = _writer(directory, settings, header, resume=resume, simulated=link.identity().simulated)
-        recorded = _recorded(writer)
-        campaign_time = _campaign_time(link, writer, recorded, drives_back=settings.place == "auto")
-        bench = _bench(settings, models, link, writer, recorded, campaign_time)
-        session = session_with(bench=bench)
-        session.notices = _notices(settings, given, resume=resume, resumed=bool(recorded), where=directory)
-        session.notices += idle_notice(recorded.values(), campaign_time.now_s(), settings.session)
-        with bench.pause.by_signal():
-            yield session
+        with locked(given_directory):
+            header = _header(directory, settings, models["uncalibrated"], link, resume=resume)
+            writer = _writer(directory, settings, header, resume=resume, simulated=link.identity().simulated)
+            recorded = _recorded(writer)
+            campaign_time = _campaign_time(link, writer, recorded, drives_back=settings.place == "auto")
+            bench = _bench(settings, models, link, writer, recorded, campaign_time)
+            session = session_with(bench=bench)
+            session.notices = _notices(settings, given)
+            session.notices += idle_notice(recorded.values(), campaign_time.now_s(), settings.session)
+            with bench.pause.by_signal():
+                yield session
 
 
-def _notices(
-    settings: BenchSettings, given: Mapping[str, Any], *, resume: bool, resumed: bool, where: Path
-) -> list[str]:
+def _notices(settings: BenchSettings, given: Mapping[str, Any]) -> list[str]:
     """Return what was decided without being asked for."""
-    notices = []
-    if resume and not resumed:
-        notices.append(f"nothing to resume in {where}: a new session begins")
-    if settings.vehicle == LAB_VEHICLE and "vehicle" not in given:
-        notices.append(f"vehicle: {LAB_VEHICLE} of this folder")
-    return notices
+    is_found = settings.vehicle == LAB_VEHICLE and "vehicle" not in given
+    return [f"vehicle: {LAB_VEHICLE} of this folder"] if is_found else []
 
 
 def _header(

@@ -9,7 +9,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from agvbench.campaign.atomic import write_atomically
 from agvbench.errors import FileError
 from agvbench.text_files import read_json
 from agvbench.workflows.challenge_scores import plain, score
@@ -31,7 +30,7 @@ def write_trials(path: Path, repeats: int, trials: Sequence[Trial]) -> None:
     content: dict[str, Any] = {"schema": SCHEMA, "repeats": repeats, **score(ordered).to_json()}
     content["each"] = [plain(asdict(trial)) for trial in ordered]
     text = json.dumps(content, indent=1) + "\n"
-    write_file("--json", path, lambda whole: write_atomically(whole, text.encode()))
+    write_file("--json", path, lambda file: file.write_text(text, encoding="utf-8"))
 
 
 def known_trials(path: Path, repeats: int) -> dict[tuple[str, int], Trial]:

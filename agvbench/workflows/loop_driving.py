@@ -12,6 +12,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 from agvbench.errors import AgvbenchError
+from agvbench.running.directory import has_session
 from agvbench.running.settings import SETTINGS_FILE, BenchSettings
 from agvbench.running.signals import Terminated, interruptible
 
@@ -45,7 +46,7 @@ def drive(directory: Path, names: Sequence[str], settings: BenchSettings, more: 
         If it cannot be driven.
     """
     options = {name: value for name, value in asdict(settings).items() if value != getattr(BenchSettings(), name)}
-    options |= {**more, "out": str(directory), "resume": directory.exists(), "no_report": True}
+    options |= {**more, "out": str(directory), "resume": has_session(directory), "no_report": True}
     code, errors = _run([sys.executable, "-c", _PROGRAM, json.dumps([names, options])])
     if code not in _DONE:
         raise AgvbenchError(errors[-1] if errors else f"the bench ended with exit code {code}")

@@ -5,20 +5,28 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from agvbench.campaign.atomic import replace_whole
 from agvbench.errors import FileError
 
 
 def write_file(flag: str, path: Path, write: Callable[[Path], object]) -> None:
     """Have `write` write to `path`, whose folders are made; `flag` is the option that named it.
 
+    A file that is there is replaced by a whole one or stays as it is. Pipes and devices are written to directly.
+
     Raises
     ------
     FileError
         If the file cannot be written.
     """
+    remedy = f"give {flag} a place you may write to"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        write(path)
+        if path.exists() and not path.is_file():
+            write(path)
+        else:
+            replace_whole(path.resolve(), write)
     except OSError as error:
-        remedy = f"give {flag} a place you may write to"
         raise FileError("cannot be written", where=path, value=error.strerror, remedy=remedy) from None
+    except FileError as error:
+        raise FileError(error.what, where=path, value=error.value, remedy=error.remedy or remedy) from None

@@ -15,6 +15,7 @@ from told_to_drive import Witness, witness
 
 from agvbench.campaign import Campaign as Recorded
 from agvbench.errors import AgvbenchError
+from agvbench.running.directory import has_session
 from agvbench.running.opening import open_session
 from agvbench.running.session import BenchSession
 
@@ -86,7 +87,9 @@ class Campaign:
 
     def _resumed(self, path: Path, options: dict[str, Any]) -> str:
         """Go on without the fault; return what went wrong."""
-        with open_session({"vehicle": "", **options}, out=str(path), resume=True, dry_run=False) as session:
+        with open_session(
+            {"vehicle": "", **options}, out=str(path), resume=has_session(path), dry_run=False
+        ) as session:
             return "".join(drive(session, name, number, self._hold) for number, name in enumerate(RUNS, 1))
 
     def _undisturbed(self, rig: str) -> dict[str, bytes] | None:

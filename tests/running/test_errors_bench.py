@@ -42,6 +42,12 @@ def resumed_with_another_seed():
     opened("begun", resume=True, seed=2)()
 
 
+def resumed_elsewhere():
+    Path("begun").mkdir()
+    BenchSettings().save(Path("begun"))
+    opened("begum", resume=True)()
+
+
 def resumed_with_another_name():
     Path("begun").mkdir()
     BenchSettings().save(Path("begun"))
@@ -95,6 +101,7 @@ CASES = {
     "`--workspace oval:3`": opened(workspace="oval:3"),
     "`--out full` (not empty)": opened("full"),
     "`--resume` with nothing to resume": opened(None, resume=True),
+    "`--resume --out begum` beside `begun`": resumed_elsewhere,
     "`--resume --seed 2` after `--seed 1`": resumed_with_another_seed,
     "`--vehicle` in −1…1, vehicle in µs, over the bus": over_the_bus_in_another_unit,
     "`agvbench bench nosuch`": lambda: find_benchmark("nosuch"),

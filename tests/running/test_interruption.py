@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from agvbench.campaign import Campaign
+from agvbench.running.directory import has_session
 
 pytestmark = pytest.mark.real_time
 
@@ -72,7 +73,7 @@ def test_killed_thirty_times_nothing_finished_is_lost_and_the_end_is_the_same(un
     directory = tmp_path / "campaign"
     finished: set[str] = set()
     for _ in range(KILLS):
-        process = start(directory, "--resume")
+        process = start(directory, *(["--resume"] if has_session(directory) else []))
         if rng.random() < 0.7:
             until_another_run_is_finished(process, directory, len(finished))
             time.sleep(rng.uniform(0.0, 0.15))

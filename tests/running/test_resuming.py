@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import platform
 import re
 import subprocess
 import sys
@@ -11,10 +12,11 @@ import sys
 import pytest
 
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
-from agvbench.errors import FitError, FlagError, LinkError
+from agvbench.errors import CampaignError, FitError, FlagError, LinkError
 from agvbench.model import thesis_vehicle
 from agvbench.running.benchmark_files import benchmark_name, find_benchmark
 from agvbench.running.calibrating import VEHICLE_FILE, calibrate_campaign
+from agvbench.running.directory import shown
 from agvbench.running.opening import open_session
 from agvbench.running.placers.auto import Auto
 from agvbench.running.placers.choosing import PLACERS
@@ -155,3 +157,26 @@ def test_one_of_your_own_is_known_by_its_path_unless_it_lies_in_benchmarks(lab):
     (lab / "bench_mine.py").rename(lab / "benchmarks" / "bench_mine.py")
     assert benchmark_name("benchmarks/bench_mine.py") == "mine"
     assert benchmark_name("benchmarks/bench_mine.py::bench_left") == "benchmarks/bench_mine.py::bench_left"
+
+
+def test_runs_are_recorded_where_out_was_given_whatever_the_working_directory_becomes(lab, monkeypatch):
+    (lab / "elsewhere").mkdir()
+    with open_session({}, out="c", resume=False, dry_run=False) as session:
+        monkeypatch.chdir("elsewhere")
+        session.driver("left", experiment="free", repeat=1).hold(drive=0.5, front=0.5, rear=0.0, for_s=0.3)
+        assert shown(session.directory) == lab / "c"
+        monkeypatch.chdir(lab)
+        assert str(shown(session.directory)) == "c"
+    assert Campaign.open(lab / "c").run_ids == ["left"]
+
+
+def test_two_sessions_cannot_record_to_one_directory(lab):
+    holder = f"process {os.getpid()} on {platform.node()}"
+    with (
+        open_session({}, out="c", resume=False, dry_run=False),
+        pytest.raises(CampaignError, match=f"^c: another session is recording to it: {holder}; wait until it ends"),
+        open_session({}, out="c", resume=True, dry_run=False),
+    ):
+        pass
+    with open_session({}, out="c", resume=True, dry_run=False):  # released, whatever ended the first
+        pass

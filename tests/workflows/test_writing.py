@@ -1,0 +1,44 @@
+"""Files that an option names: replaced by whole ones, or left as they were."""
+
+from __future__ import annotations
+
+import errno
+import os
+import threading
+from pathlib import Path
+
+import pytest
+
+from agvbench.errors import FileError
+from agvbench.workflows.writing import write_file
+
+
+def run_out_of_space(path: Path) -> None:
+    path.write_text("half of it")
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@pytest.mark.parametrize("before", ["the calibration of last week", None])
+def test_a_full_disk_leaves_the_file_as_it_was(before: str | None, tmp_path: Path) -> None:
+    path = tmp_path / "calibrated.toml"
+    if before is not None:
+        path.write_text(before)
+    with pytest.raises(FileError, match=r"calibrated.toml: cannot be written: No space left on device; give --out"):
+        write_file("--out", path, run_out_of_space)
+    assert [file.read_text() for file in tmp_path.iterdir()] == ([] if before is None else [before])
+
+
+def test_a_link_is_followed_and_a_pipe_is_written_to(tmp_path: Path) -> None:
+    link, target, pipe = tmp_path / "link.toml", tmp_path / "target.toml", tmp_path / "pipe"
+    link.symlink_to(target)
+    write_file("--out", link, lambda path: path.write_text("whole"))
+    assert link.is_symlink()
+    assert target.read_text() == "whole"
+    os.mkfifo(pipe)
+    read: list[str] = []
+    reader = threading.Thread(target=lambda: read.append(pipe.read_text()))
+    reader.start()
+    write_file("--out", pipe, lambda path: path.write_text("through"))
+    reader.join()
+    assert read == ["through"]
+    assert pipe.is_fifo()
