@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cache
 from itertools import product
 
 import numpy as np
 
+from agvbench.diagnosis.terms import TERMS
 from agvbench.effects import Effect, effect_kinds
+from agvbench.effects.forms import effect_forms
 from agvbench.model import VehicleModel
 from agvbench.types import Floats
 
@@ -35,6 +38,11 @@ class Candidate:
     starts: Floats
     screened: bool = False
     foremost: bool = False
+
+    @property
+    def key(self) -> frozenset[tuple[str, bytes]]:
+        """What makes it another candidate than others of that name, to be compared."""
+        return frozenset({(self.name, self.starts.tobytes() + bytes((self.screened, self.foremost)))})
 
 
 def candidates(exclude: Iterable[str] = ()) -> dict[str, Candidate]:
@@ -72,6 +80,13 @@ def given_effects(vehicle: VehicleModel | None, tried: Iterable[str]) -> tuple[t
     return tuple(e.name for e in given), np.array([value for e in given for value in e.values.values()])
 
 
-def bounds_of(candidates_by_name: dict[str, Candidate], names: Iterable[str]) -> Floats:
+@cache
+def usual(name: str) -> Candidate:
+    """Return how the effect called `name` is tried unless asked otherwise: of the library, another law, or a term."""
+    kinds: dict[str, type[Effect]] = {**effect_kinds(), **effect_forms(), **{term.name: term for term in TERMS}}
+    return candidate(kinds[name])
+
+
+def bounds_of(names: Iterable[str]) -> Floats:
     """Return the bounds (p, 2) of all parameters of the effects called `names`."""
-    return np.concatenate([np.empty((0, 2)), *(candidates_by_name[name].bounds for name in names)])
+    return np.concatenate([np.empty((0, 2)), *(usual(name).bounds for name in names)])

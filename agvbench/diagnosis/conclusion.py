@@ -7,12 +7,10 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis.asked import Asked
 from agvbench.diagnosis.batch import Batch
-from agvbench.diagnosis.candidates import bounds_of, candidates
+from agvbench.diagnosis.candidates import bounds_of
 from agvbench.diagnosis.dependences import ALPHA, LIKELY, RANDOM_PHASE, Dependence, dependences
-from agvbench.diagnosis.empirical import term_candidates
 from agvbench.diagnosis.estimates import named_effects
 from agvbench.diagnosis.explained import Explained, described, with_term_first
-from agvbench.diagnosis.forms import form_candidates
 from agvbench.diagnosis.map_effects import map_effects
 from agvbench.diagnosis.next_experiment_propose import with_next_experiment
 from agvbench.diagnosis.prediction import Predictor
@@ -62,8 +60,7 @@ def conclude(
     if judged is None:
         return asked.cannot_tell(readings, "there are no repeats among the runs held out or fitted, and so no floor")
     rest, likely = _what_is_left(batch, poses, explained, asked.seed)
-    known = candidates() | term_candidates() | form_candidates()
-    effects = named_effects(selection, bounds_of(known, selection.chosen.names)) + map_effects(fit, asked.vehicle)
+    effects = named_effects(selection, bounds_of(selection.chosen.names)) + map_effects(fit, asked.vehicle)
     significant = explained is not None or judged.lacks or bool(rest)
     verdict, why = _verdict(effects, significant, rest, explained)
     if significant and not rest and likely:

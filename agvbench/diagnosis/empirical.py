@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from agvbench.diagnosis.beside_term import Settled, lacks, settled
-from agvbench.diagnosis.candidates import Candidate, candidate
+from agvbench.diagnosis.candidates import candidate
 from agvbench.diagnosis.empirical_regression import steering
 from agvbench.diagnosis.empirical_screen import Start, screen
 from agvbench.diagnosis.explained import Explained, gain_p_value
@@ -116,8 +116,9 @@ def _afresh(selection: Selection, explained: Explained, selector: Selector) -> E
         return explained
     wide, term = wider(selector), explained.term
     kind, values = candidate(term), np.array([list(explained.values.values())])
-    wide.candidates[term.name] = replace(kind, starts=values, screened=True, foremost=True)
-    alone = wide.grown(selection.base, term.name)
+    alone = wide.grown(selection.base, term.name, replace(kind, starts=values, screened=True, foremost=True))
+    if not alone.is_fitted:
+        return explained
     bare = replace(selection, chosen=selection.base, gains={}, rivals={})
     again = _explained(wide, selection, selector, [settled(wide, bare, alone, term)])
     return again if again is not None and again.selection.chosen.total < explained.selection.chosen.total else explained
@@ -139,9 +140,8 @@ def _best_term(wide: Selector, root: Scored, starts: list[Start]) -> tuple[Score
     for start in starts:
         kind = candidate(start.term)
         values = np.clip(start.values, kind.bounds[:, 0], kind.bounds[:, 1])
-        foremost = start is starts[0]
-        wide.candidates[start.term.name] = replace(kind, starts=values, screened=True, foremost=foremost)
-        offer = wide.grown(root, start.term.name)
+        screened = replace(kind, starts=values, screened=True, foremost=start is starts[0])
+        offer = wide.grown(root, start.term.name, screened)
         if wide.earns(root, offer) and (best is None or offer.total < best[0].total):
             best = offer, start.term
     return best
@@ -168,13 +168,7 @@ def _in_place(wide: Selector, selection: Selection) -> tuple[Scored, type[Empiri
     for name in selection.gains:
         rest = wide.shrunk(selection.base, selection.chosen, name)
         for term in (term for term in TERMS if not term.local):
-            wide.candidates[term.name] = candidate(term)
             offer = wide.grown(rest, term.name)
             if offer.total < (best[0] if best else selection.chosen).total and wide.earns(rest, offer):
                 best = offer, term
     return best
-
-
-def term_candidates() -> dict[str, Candidate]:
-    """Return every term by name, as effects are tried."""
-    return {term.name: candidate(term) for term in TERMS}

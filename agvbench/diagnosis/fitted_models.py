@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.diagnosis.batch import Batch
-from agvbench.diagnosis.candidates import Candidate, bounds_of
+from agvbench.diagnosis.candidates import Candidate, bounds_of, usual
 from agvbench.diagnosis.fitting import Fit, fit
 from agvbench.diagnosis.grouping import folds
 from agvbench.diagnosis.judging import FOLDS, cross_validated
@@ -28,13 +28,39 @@ _WORSE = 20.0  # a fit that has not ended yet may still be so much worse than wi
 _KEPT = 0.5  # of what is promised: a fit that gains less has lost its way
 
 
+Starts = frozenset[tuple[str, bytes]]
+"""Which effects were fitted from other values than the usual, and from which."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """A model that is asked for: its effects, and which of them start elsewhere than usual.
+
+    Equal requests have the same answer, whatever was asked for in between.
+    """
+
+    names: frozenset[str]
+    starts: Starts = frozenset()
+
+
 @dataclass(frozen=True)
 class Scored:
-    """A fitted model, the effects in it, and each run's cross-validated loss (R,)."""
+    """A fitted model, the effects in it, each run's cross-validated loss (R,), and its unusual starts."""
 
     names: tuple[str, ...]
     fit: Fit
     loss: Floats
+    starts: Starts = frozenset()
+
+    @property
+    def request(self) -> Request:
+        """What was asked for."""
+        return Request(frozenset(self.names), self.starts)
+
+    @property
+    def is_fitted(self) -> bool:
+        """Whether the effects were fitted; False for a model that is not worth it and predicts as without the last."""
+        return self.fit.predictor.effects == self.names
 
     @property
     def total(self) -> float:
@@ -67,7 +93,7 @@ class FittedModels:
     given_values: Floats = field(default_factory=lambda: np.empty(0))
     tried: int = 0
     _fold: NDArray[np.int64] = field(init=False)
-    _known: dict[tuple[str, ...], Scored] = field(init=False, default_factory=dict)
+    _known: dict[Request, Scored] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         self._fold = folds(fold_groups(self.batch.readings), FOLDS, self.seed)
@@ -79,12 +105,12 @@ class FittedModels:
     def adopt(self, scored: Scored) -> Scored:
         """Take over what was fitted elsewhere to runs that this model predicts alike, and return it as one's own."""
         fitted = replace(scored.fit, predictor=self._predictor(scored.names))
-        self._known[tuple(sorted(scored.names))] = own = replace(scored, fit=fitted)
+        own = self._known[scored.request] = replace(scored, fit=fitted)
         return own
 
     def known(self, names: tuple[str, ...]) -> Scored | None:
-        """Return the model with the effects `names` if it was fitted."""
-        return self._known.get(tuple(sorted(names)))
+        """Return the model with the effects `names`, all from their usual starts, if it was fitted."""
+        return self._known.get(Request(frozenset(names)))
 
     def shrunk(self, base: Scored, current: Scored, name: str) -> Scored:
         """Return the model without the effect called `name`."""
@@ -94,31 +120,35 @@ class FittedModels:
         own = current.fit.effect_values()
         kept = [value for key, value in own.items() if key.partition(".")[0] != name]
         maps = current.fit.parameters[: self.batch.maps.size]
-        return self.score(names, np.r_[maps, kept], current.fit)
+        starts = frozenset(start for start in current.starts if start[0] != name)
+        return self.score(names, np.r_[maps, kept], current.fit, starts=starts)
 
-    def grown(self, current: Scored, name: str) -> Scored:
-        """Return `current` with the effect called `name`, fitted from the best of its starts."""
+    def grown(self, current: Scored, name: str, unusual: Candidate | None = None) -> Scored:
+        """Return `current` with the effect called `name`, fitted from the best of its starts.
+
+        These are the usual ones, or those of the candidate `unusual`.
+        """
         names = (*current.names, name)
-        key = tuple(sorted(names))
-        if key in self._known:
-            return self._known[key]
+        starts = current.starts if unusual is None else current.starts | unusual.key
+        if found := self._known.get(Request(frozenset(names), starts)):
+            return found
         try:
-            return self._grown(current, self._predictor(names), self.candidates[name])
+            return self._grown(current, self._predictor(names), unusual or usual(name), starts)
         except np.linalg.LinAlgError:
             # What runs away to where nothing can be predicted describes nothing.
             return replace(current, names=names)
 
     def promise(self, current: Scored, name: str) -> float:
         """Return what the effect called `name` promises beside `current`, to first order, from its best start."""
-        return max(self._promises(current, self._predictor((*current.names, name)), self.candidates[name]))
+        return max(self._promises(current, self._predictor((*current.names, name)), usual(name)))
 
     @staticmethod
     def _promises(current: Scored, predictor: Predictor, candidate: Candidate) -> list[float]:
         return [promised_gain(current.fit, predictor, start, candidate.bounds) for start in candidate.starts]
 
-    def _grown(self, current: Scored, predictor: Predictor, candidate: Candidate) -> Scored:
+    def _grown(self, current: Scored, predictor: Predictor, candidate: Candidate, starts: Starts) -> Scored:
         names, now = predictor.effects, current.fit
-        bounds = bounds_of(self.candidates, names)
+        bounds = bounds_of(names)
         promises = self._promises(current, predictor, candidate)
         promise = max(promises)
         if promise < _HOPELESS:
@@ -129,8 +159,9 @@ class FittedModels:
         # What promises much may have to climb first: maps that took up a cause must give it back before it shows.
         if promise < _LIKELY and float(now.loss.sum() - short.loss.sum()) < _HOPELESS:
             self.tried += 1
-            self._known[tuple(sorted(names))] = Scored(names, short, cross_validated(short, self._fold, bounds))
-        return self.score(names, short.parameters, short, patient=believed and candidate.foremost)
+            tried = Scored(names, short, cross_validated(short, self._fold, bounds), starts)
+            return self._known.setdefault(tried.request, tried)
+        return self.score(names, short.parameters, short, starts=starts, patient=believed and candidate.foremost)
 
     def _begun(
         self, current: Scored, predictor: Predictor, starts: list[Floats], bounds: Floats, least: float | None
@@ -172,14 +203,22 @@ class FittedModels:
             near=now.linear,
         )
 
-    def score(self, names: tuple[str, ...], parameters: Floats, near: Fit | None, *, patient: bool = False) -> Scored:
+    def score(
+        self,
+        names: tuple[str, ...],
+        parameters: Floats,
+        near: Fit | None,
+        *,
+        starts: Starts = frozenset(),
+        patient: bool = False,
+    ) -> Scored:
         """Fit the model with the effects `names` and cross-validate it; what was fitted before is remembered.
 
-        A `patient` fit is given more steps while they are worth it.
+        Of these, `starts` begin elsewhere than usual. A `patient` fit is given more steps while they are worth it.
         """
-        key = tuple(sorted(names))
-        if key not in self._known:
-            bounds = bounds_of(self.candidates, names)
+        request = Request(frozenset(names), starts)
+        if request not in self._known:
+            bounds = bounds_of(names)
             fitted = fit(
                 self._predictor(names) if near is None or near.predictor.effects != names else near.predictor,
                 parameters,
@@ -191,8 +230,8 @@ class FittedModels:
                 near=None if near is None else near.linear,
             )
             self.tried += 1
-            self._known[key] = Scored(names, fitted, cross_validated(fitted, self._fold, bounds))
-        return self._known[key]
+            self._known[request] = Scored(names, fitted, cross_validated(fitted, self._fold, bounds), starts)
+        return self._known[request]
 
     def left(self, smaller: Scored, larger: Scored) -> Scored:
         """Return what is left of `larger` when an effect is dropped that it does not need.
@@ -201,7 +240,7 @@ class FittedModels:
         """
         if smaller.names == self.given:
             return smaller
-        again = self._known[tuple(sorted(smaller.names))] = self.retried(smaller, larger)
+        again = self._known[smaller.request] = self.retried(smaller, larger)
         return again
 
     def retried(self, model: Scored, beyond: Scored) -> Scored:
@@ -212,13 +251,13 @@ class FittedModels:
         """
         own = model.fit.effect_values() | beyond.fit.effect_values()
         kept = [value for name in model.names for key, value in own.items() if key.partition(".")[0] == name]
-        bounds = bounds_of(self.candidates, model.names)
+        bounds = bounds_of(model.names)
         again = fit(
             self._predictor(model.names), np.r_[beyond.fit.parameters[: self.batch.maps.size], kept], bounds,
             offsets=beyond.fit.offsets, scatter=beyond.fit.scatter, iterations=_LONG, patient=True,
         )  # fmt: skip
         self.tried += 1
-        scored = Scored(model.names, again, cross_validated(again, self._fold, bounds))
+        scored = Scored(model.names, again, cross_validated(again, self._fold, bounds), model.starts)
         return min(model, scored, key=lambda one: one.total)
 
     def _predictor(self, names: tuple[str, ...]) -> Predictor:

@@ -139,7 +139,6 @@ def stood_elsewhere(chosen: Scored, selector: Selector) -> bool:
     if not {*SLOW_STEERING} & {cause_of(name) for name in chosen.names}:
         return False
     there = otherwise(wider(selector))
-    there.candidates |= {kind.name: candidate(kind) for kind in TERMS if kind.name not in there.candidates}
     return there.score(chosen.names, chosen.fit.parameters, None).total < chosen.total - LEAST_GAIN
 
 
@@ -193,10 +192,10 @@ def _values(model: Scored, name: str) -> dict[str, float]:
 
 def _offers(wide: Selector, current: Scored, law: _Law) -> list[Scored]:
     """Return `current` with a law in its place, and with it in place of one effect more each."""
-    wide.candidates[law.form.name] = replace(candidate(law.form), starts=law.starts)
+    form = replace(candidate(law.form), starts=law.starts)
     # What stands beside a wrong law may only make up for it.
     others = [other for other in current.names if other != law.out and other not in wide.given]
-    return [_swapped(wide, current, {law.out, *more}, law.form.name) for more in ([], *([other] for other in others))]
+    return [_swapped(wide, current, {law.out, *more}, form) for more in ([], *([other] for other in others))]
 
 
 def _best(wide: Selector, current: Scored, offers: list[Scored]) -> Scored:
@@ -216,22 +215,23 @@ def _does(offer: Scored, current: Scored) -> bool:
     return offer.gain_over(current) > LEAST_GAIN
 
 
-def _swapped(wide: Selector, current: Scored, out: set[str], form: str) -> Scored:
+def _swapped(wide: Selector, current: Scored, out: set[str], form: Candidate) -> Scored:
     """Return `current` with a law in place of the effects `out`, fitted from the scatter and offsets that it has."""
     own = current.fit.effect_values()
     kept = [value for key, value in own.items() if key.partition(".")[0] not in out]
-    names = (*(name for name in current.names if name not in out), form)
+    names = (*(name for name in current.names if name not in out), form.name)
+    starts = frozenset(start for start in current.starts if start[0] not in out) | form.key
     maps = current.fit.parameters[: wide.batch.maps.size]
     near = current.fit
     tries = [
         fit(
-            Predictor(wide.batch, names), np.r_[maps, kept, start], bounds_of(wide.candidates, names),
+            Predictor(wide.batch, names), np.r_[maps, kept, start], bounds_of(names),
             offsets=near.offsets, scatter=near.scatter, iterations=_SHORT,
         )
-        for start in wide.candidates[form].starts
+        for start in form.starts
     ]  # fmt: skip
     best = min(tries, key=lambda one: float(one.loss.sum()))
-    return wide.score(names, best.parameters, best)
+    return wide.score(names, best.parameters, best, starts=starts)
 
 
 def _rivals(selection: Selection, name: str, better: float) -> dict[str, float]:

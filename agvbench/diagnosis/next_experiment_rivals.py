@@ -53,7 +53,7 @@ def swapped(chosen: Fit, name: str, other: str, candidates: Mapping[str, Candida
     """Return the model with the effect `other` in the place of `name`, fitted from the best of its starts."""
     names = (*(n for n in chosen.predictor.effects if n != name), other)
     predictor = Predictor(chosen.predictor.batch, names)
-    bounds = bounds_of(dict(candidates), names)
+    bounds = bounds_of(names)
     kept = [value for key, value in chosen.effect_values().items() if key.partition(".")[0] != name]
     maps = chosen.parameters[: chosen.predictor.maps.size]
 

@@ -171,6 +171,6 @@ class Selector(FittedModels):
     def _worse(self, offer: Scored, current: Scored) -> float:
         """Return by how much another effect predicts worse, its fit carried on from where the chosen one stands."""
         worse = offer.total - current.total
-        if RIVAL_MARGIN <= worse < _NEARLY_RIVAL and offer.fit.predictor.effects == offer.names:
+        if RIVAL_MARGIN <= worse < _NEARLY_RIVAL and offer.is_fitted:
             worse = self.retried(offer, current).total - current.total
         return worse

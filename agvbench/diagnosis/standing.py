@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from agvbench.diagnosis.batch import Batch
+from agvbench.diagnosis.candidates import usual
 from agvbench.diagnosis.fitted_models import Scored
 from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.promises import promised_gain
@@ -56,5 +57,5 @@ def otherwise(selector: Selector) -> Selector:
 
 
 def _promise(selector: Selector, base: Scored, name: str) -> float:
-    predictor, candidate = Predictor(selector.batch, (*base.names, name)), selector.candidates[name]
+    predictor, candidate = Predictor(selector.batch, (*base.names, name)), usual(name)
     return max(promised_gain(base.fit, predictor, start, candidate.bounds) for start in candidate.starts)

@@ -12,11 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.diagnosis.batch import Batch
-from agvbench.diagnosis.candidates import candidates
-from agvbench.diagnosis.empirical import term_candidates
 from agvbench.diagnosis.explained import Explained
 from agvbench.diagnosis.fitted_models import Scored
-from agvbench.diagnosis.forms import BEYOND, form_candidates
+from agvbench.diagnosis.forms import BEYOND
 from agvbench.diagnosis.reading import Readings
 from agvbench.diagnosis.selection import Selection, Selector
 from agvbench.diagnosis.windows_split import thinned
@@ -64,7 +62,6 @@ def measured_in_all(
     batch = selector.batch
     stood = replace(readings, stood=batch.readings.stood)
     whole = selector.over(Batch(stood, batch.maps, batch.geometry, kinds=BEYOND))
-    whole.candidates = candidates() | term_candidates() | form_candidates()
 
     def again(model: Scored) -> Scored:
         return whole.score(model.names, model.fit.parameters, None)

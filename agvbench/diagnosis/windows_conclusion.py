@@ -63,7 +63,7 @@ class WindowConclusion:
         if asked.vehicle is not None:
             before = predicted["believed"] = believed(asked.vehicle, self.judged, self.selector.batch.kinds)
         shaken = by_speed_error(Predictor(self._every, chosen.fit.predictor.effects), chosen.fit.parameters)
-        effects = named_effects(self.selection, bounds_of(self.selector.candidates, chosen.names))
+        effects = named_effects(self.selection, bounds_of(chosen.names))
         held_out = self._held_out(before, poses, shaken)
         # Small structure shows in many windows; what lies at the floor needs no further cause.
         rest = self._dependences(poses) if _above(held_out, AT_THE_FLOOR) else []

@@ -80,7 +80,7 @@ def test_a_fit_that_begins_on_a_plateau_ends_where_others_do(selector):
     node = rear.start + int(np.searchsorted(maps.nodes["rear"], NEARLY_STRAIGHT))
     begun = good.parameters.copy()
     begun[node] = rear_of(NEUTRAL) + 0.2 * PLAY_RAD
-    bounds = bounds_of(selector.candidates, ("steering_backlash",))
+    bounds = bounds_of(("steering_backlash",))
     again = fit(good.predictor, begun, bounds, offsets=good.offsets, scatter=good.scatter, iterations=10)
     assert again.loss.sum() == pytest.approx(good.loss.sum(), abs=1.0)
     assert again.parameters[node] == pytest.approx(rear_of(NEARLY_STRAIGHT), abs=3e-3)

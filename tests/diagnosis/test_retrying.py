@@ -9,17 +9,19 @@ import pytest
 from tiny_vehicle import FRONT_M, HEADER, NEUTRAL, REAR_M, Tiny
 
 from agvbench.calibration import measure_run
-from agvbench.diagnosis import forms
+from agvbench.diagnosis import empirical, forms
 from agvbench.diagnosis.batch import Batch
-from agvbench.diagnosis.candidates import bounds_of, candidates
+from agvbench.diagnosis.candidates import bounds_of, candidates, usual
+from agvbench.diagnosis.explained import Explained
 from agvbench.diagnosis.fitted_models import Scored
 from agvbench.diagnosis.fitting import fit
-from agvbench.diagnosis.forms import stood_elsewhere
+from agvbench.diagnosis.forms import stood_elsewhere, wider
 from agvbench.diagnosis.levels import ROLES, free_maps, start_values
 from agvbench.diagnosis.prediction import Predictor
 from agvbench.diagnosis.reading import read_runs
 from agvbench.diagnosis.selection import Selection, Selector
 from agvbench.diagnosis.standing import otherwise
+from agvbench.diagnosis.terms import SpeedInDisc
 from agvbench.vehicle.geometry import Geometry
 
 NO_LIMIT = np.array([[0.0, 5.0]])
@@ -37,7 +39,7 @@ def selector(tiny_campaign):
 
 def test_a_model_left_half_way_is_fitted_again_from_where_the_larger_one_stands(selector):
     lag = selector.grown(selector.base(), "steering_lag")
-    bounds = bounds_of(selector.candidates, lag.names)
+    bounds = bounds_of(lag.names)
     begun = fit(Predictor(selector.batch, lag.names), np.r_[selector.start, 0.02], bounds, iterations=1)
     early = Scored(lag.names, begun, begun.loss)
     larger = selector.grown(lag, "lateral_slip")
@@ -57,7 +59,7 @@ def test_what_is_left_of_a_model_is_not_what_once_ended_elsewhere(selector):
     lag = selector.grown(selector.base(), "steering_lag")
     larger = selector.score(("steering_lag", "lateral_slip"), np.r_[lag.fit.parameters, 0.01], lag.fit)
     poor = fit(Predictor(selector.batch, lag.names), np.r_[selector.start, 0.4], np.array([[0.4, 0.4]]), iterations=8)
-    selector._known[lag.names] = Scored(lag.names, poor, poor.loss)
+    selector.adopt(Scored(lag.names, poor, poor.loss))
     left, gains = selector.pruned(selector.base(), larger)
     assert left.names == lag.names
     assert list(gains) == ["steering_lag"]
@@ -106,3 +108,26 @@ def test_where_a_slow_servo_stood_can_be_decided_again(selector):
     assert stood_elsewhere(wrong, wrong_belief)
     assert not stood_elsewhere(right, selector)
     assert not stood_elsewhere(wrong_belief.base(), wrong_belief)
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_a_fit_does_not_depend_on_what_was_asked_for_before(selector, order):
+    base, tried = selector.base(), usual("steering_lag")
+    starts = [replace(tried, starts=np.array([[start]])) for start in (0.05, 0.3)]
+    fresh = selector.over(selector.batch)
+    found = {k: fresh.grown(fresh.base(), "steering_lag", starts[k]) for k in order}
+    alone = [selector.over(selector.batch).grown(base, "steering_lag", start) for start in starts]
+    assert [found[k].total for k in (0, 1)] == [model.total for model in alone]
+    assert alone[0].total != alone[1].total
+    assert fresh.grown(fresh.base(), "steering_lag", starts[1]) is found[1]
+
+
+def test_a_term_that_is_worth_nothing_alone_leaves_the_explanation_as_it_is(selector, monkeypatch):
+    base, wide = selector.base(), wider(selector)
+    elsewhere = np.array([0.1, 40.0, 40.0, 0.2])
+    with_term = wide.score((SpeedInDisc.name,), np.r_[base.fit.parameters, elsewhere], None)
+    chosen = Selection(base, with_term, {}, {}, {}, 1)
+    explained = Explained(chosen, SpeedInDisc, base, 0.0, 1.0)
+    monkeypatch.setattr(empirical, "explain", lambda *_: explained)
+    named = Selection(base, selector.grown(base, "lateral_slip"), {}, {"lateral_slip": 20.0}, {}, 1)
+    assert empirical.explain_and_resettle(named, selector) == (named, explained, selector)
