@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Hold the trials; return the exit code."""
+    """Hold the trials; return the exit code: 1 if a trial ended with an error."""
     from rich.console import Console
 
     from agvbench.reporting.challenge_console import print_scores
@@ -55,4 +55,4 @@ def run(arguments: argparse.Namespace) -> int:
         print(scores_markdown(scores), end="")
     else:
         print_scores(scores, Console())
-    return 0
+    return 1 if scores.errors else 0

@@ -36,3 +36,6 @@ def other_lines(scores: Scores) -> Iterator[str]:
     yield f"something predicted worse than before: {scores.worse_on} trials"
     middle, most = scores.seconds
     yield f"time of a diagnosis: median {middle:.1f} s, longest {most:.1f} s"
+    if scores.errors:
+        yield f"trials that ended with an error, which counts as a wrong answer: {len(scores.errors)}"
+        yield from scores.errors

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import traceback
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from dataclasses import replace
@@ -91,7 +92,7 @@ def run_challenge(
 def hold_trial(spec: str, seed: int, repeats: int) -> Trial:
     """Drive a campaign with one hidden plant, diagnose it, and only then unseal the truth.
 
-    A bench or a diagnosis that ends with an error is the answer ``"ERROR"``.
+    A bench or a diagnosis that ends with an error is the answer ``"ERROR"``, with the cause.
     """
     from agvbench.campaign import Campaign
     from agvbench.diagnosis import Diagnosis, Verdict, diagnose
@@ -101,13 +102,22 @@ def hold_trial(spec: str, seed: int, repeats: int) -> Trial:
         try:
             _drive(spec, seed, repeats, directory)
             began = time.process_time()
-            found, failed = diagnose(Campaign.open(directory)), False
-        # Hours of other trials must not be lost for one that has no answer, be it for a mistake of agvbench itself.
-        except (AgvbenchError, ArithmeticError, ValueError) as error:
-            found, failed = Diagnosis(Verdict.NOT_IDENTIFIABLE, str(error)), True
+            found, error = diagnose(Campaign.open(directory)), ""
+        # Hours of other trials must not be lost for one that has no answer, be it for an internal error.
+        except Exception as failure:  # noqa: BLE001
+            found, error = Diagnosis(Verdict.NOT_IDENTIFIABLE, str(failure)), _cause(failure)
         seconds = time.process_time() - began
     trial = unsealed(spec, seed, sealed_truth(spec, seed), found, seconds)
-    return replace(trial, verdict=_ERROR) if failed else trial
+    return replace(trial, verdict=_ERROR, error=error) if error else trial
+
+
+def _cause(error: Exception) -> str:
+    """Return in one line what an error says; of an internal error also its type, and where it was raised."""
+    said = " ".join(str(error).split())
+    if isinstance(error, AgvbenchError):
+        return said
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {said} ({Path(last.filename).name}, line {last.lineno}, in {last.name})"
 
 
 def unsealed(spec: str, seed: int, truth: SealedTruth, found: Diagnosis, seconds: float) -> Trial:

@@ -27,8 +27,9 @@ def write_trials(path: Path, repeats: int, trials: Sequence[Trial]) -> None:
         If it cannot be written.
     """
     ordered = sorted(trials, key=lambda trial: (trial.spec, trial.seed))
-    content: dict[str, Any] = {"schema": SCHEMA, "repeats": repeats, **score(ordered).to_json()}
-    content["each"] = [plain(asdict(trial)) for trial in ordered]
+    scores = _without_empty(score(ordered).to_json(), "errors")
+    content: dict[str, Any] = {"schema": SCHEMA, "repeats": repeats, **scores}
+    content["each"] = [_without_empty(plain(asdict(trial)), "error") for trial in ordered]
     text = json.dumps(content, indent=1) + "\n"
     write_file("--json", path, lambda file: file.write_text(text, encoding="utf-8"))
 
@@ -55,6 +56,10 @@ def known_trials(path: Path, repeats: int) -> dict[tuple[str, int], Trial]:
     if was != repeats:
         raise FileError("has trials with other repeats", where=path, value=was, limit=f"--repeats {repeats}")
     return {(trial.spec, trial.seed): trial for trial in found}
+
+
+def _without_empty(content: dict[str, Any], key: str) -> dict[str, Any]:
+    return {name: value for name, value in content.items() if name != key or value}
 
 
 def _with_nan(content: Any) -> Any:

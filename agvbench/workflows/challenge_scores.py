@@ -68,7 +68,7 @@ class Scores:
     ``shares`` by question; ``confusion`` by what was hidden, then by answer; ``list_length`` the mean number of
     effects in an AMBIGUOUS answer; ``coverage`` of 95 % intervals where the forms agree; ``removed`` quantiles of the
     share of excess held-out error removed (0, 0.5), by group, where free maps leave an excess; ``worse_on`` trials with
-    something predicted worse.
+    something predicted worse; ``errors`` the trials without an answer, each with its cause.
     """
 
     trials: int
@@ -79,6 +79,7 @@ class Scores:
     removed: Mapping[str, tuple[float, float]]
     worse_on: int
     seconds: tuple[float, float]
+    errors: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return plain content; numbers that are not finite are null."""
@@ -101,6 +102,7 @@ def score(trials: Sequence[Trial]) -> Scores:
         {name: _worst_and_median(t.removed for t in trials if counts(t)) for name, counts in GROUPS},
         sum(bool(t.worse_on) for t in trials),
         _median_and_most([t.seconds for t in trials]),
+        tuple(f"{t.spec}, seed {t.seed}: {t.error}" for t in trials if t.error),
     )
 
 

@@ -32,6 +32,8 @@ class Trial:
         True rivals of the hidden effects of the library, where they were asked for.
     seconds
         What the diagnosis took.
+    error
+        Why there is no answer, where the bench or the diagnosis ended with an error.
     """
 
     spec: str
@@ -52,6 +54,7 @@ class Trial:
     worse_on: tuple[str, ...] = ()
     rivals: tuple[str, ...] = ()
     seconds: float = math.nan
+    error: str = ""
 
     @property
     def outside(self) -> int:

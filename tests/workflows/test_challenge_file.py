@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import re
 import subprocess
 from pathlib import Path
 
@@ -128,14 +129,41 @@ def test_a_session_that_was_stopped_goes_on_and_one_that_failed_does_not(tmp_pat
     assert len(began) == 1
 
 
-def test_a_diagnosis_that_fails_is_an_answer_that_counts_as_wrong(monkeypatch):
+@pytest.mark.parametrize(
+    ("error", "cause"),
+    [
+        (FitError("nothing to fit", where="run 7"), r"run 7: nothing to fit"),
+        (KeyError("steering_lag"), r"KeyError: 'steering_lag' \(test_challenge_file.py, line \d+, in fails\)"),
+    ],
+)
+def test_a_diagnosis_that_fails_is_an_answer_that_counts_as_wrong(monkeypatch, error, cause):
     def fails(_):
-        raise FitError("nothing to fit")
+        raise error
 
     monkeypatch.setattr(challenge, "_drive", lambda *_: None)
     monkeypatch.setattr("agvbench.campaign.Campaign.open", lambda _: None)
     monkeypatch.setattr("agvbench.diagnosis.diagnose", fails)
-    assert hold_trial("nothing", 3, 5).verdict == "ERROR"
+    trial = hold_trial("nothing", 3, 5)
+    assert trial.verdict == "ERROR"
+    assert re.fullmatch(cause, trial.error)
+
+
+def one_without_an_answer(spec, seed, _):
+    """Stand in for a trial, in the process that holds it."""
+    return dataclasses.replace(LAG, spec=spec, seed=seed, verdict="ERROR", named=(), error="the disk is full")
+
+
+def test_a_trial_without_an_answer_is_told_with_its_cause_and_by_the_exit_code(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(challenge, "hold_trial", one_without_an_answer)
+    file = tmp_path / "challenge.json"
+    assert main(["challenge", "--first-seed=3", "--only", "steering_lag", "--jobs=1", f"--json={file}"]) == 1
+    shown = capsys.readouterr().out
+    assert "ended with an error, which counts as a wrong answer: 1" in shown
+    assert "steering_lag, seed 3: the disk is full" in shown
+    content = json.loads(file.read_text())
+    assert content["errors"] == ["steering_lag, seed 3: the disk is full"]
+    assert content["each"][0]["error"] == "the disk is full"
+    assert known_trials(file, 5)["steering_lag", 3].error == "the disk is full"
 
 
 def test_a_plant_that_cannot_be_driven_is_an_answer_that_counts_as_wrong(monkeypatch):
