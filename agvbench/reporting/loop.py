@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+import statistics
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,23 +27,37 @@ from agvbench.reporting.progress import track
 from agvbench.reporting.sections import all_sections
 from agvbench.reporting.sections.diagnosis import diagnosis_blocks
 from agvbench.statistics.equivalence import Bias
-from agvbench.statistics.quantities import QUANTITIES
+from agvbench.statistics.quantities import COMPONENT_DEFINITIONS, COMPONENTS, DEFINITIONS
 from agvbench.types import CONDITIONS
 from agvbench.workflows.diagnosis_files import ShownDiagnosis, read_diagnosis
 from agvbench.workflows.diagnosis_words import items, mapping
 from agvbench.workflows.loop import Loop
-from agvbench.workflows.loop_table import BeforeAfter, before_after, counts, root_mean_square_bias
+from agvbench.workflows.loop_table import (
+    BeforeAfter,
+    EndPosition,
+    before_after,
+    counts,
+    end_positions,
+    root_mean_square_bias,
+)
 from agvbench.workflows.report import gather
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 _NOTE = (
-    "Bias: mean of the signed errors; sd: standard deviation of one repeat. The last column tests the corrected bias "
-    "against ± 1 sd at the 5 % level: within, beyond, or too few repeats to say."
+    f"{COMPONENT_DEFINITIONS} Bias: mean of the signed errors; sd: standard deviation of one repeat. The last column "
+    "tests the corrected bias against ± 1 sd at the 5 % level: within, beyond, or too few repeats to say."
 )
 _LEARNED = ("along mm", "across mm", "heading deg")
-_CAPTION = "Before and after: bias of Δs [mm] and Δδ [deg]"
+_PLANNED = {
+    "along_mm": ("along mm", 1),
+    "across_mm": ("across mm", 1),
+    "delta_heading_deg": ("heading deg", 2),
+    "delta_s_mm": ("Δs mm", 1),
+}
+_CAPTION = "Before and after: bias along, across and of heading"
+_CAPTION_ENDS = "Before and after: median end position error [mm], and bias of Δs [mm]"
 
 
 @dataclass(frozen=True)
@@ -51,6 +66,7 @@ class LoopReport:
 
     loop: Loop
     rows: Sequence[BeforeAfter]
+    ends: Sequence[EndPosition]
     files: Sequence[Path]
 
 
@@ -65,8 +81,8 @@ def write_loop_report(loop: Loop) -> LoopReport:
         If the directory cannot be written.
     """
     data = gather(loop.after, track=lambda runs, total: track(runs, total, what="reading runs"))
-    rows = before_after(data.errors)
-    own = _sections(loop, rows)
+    rows, ends = before_after(data.errors), end_positions(data.errors)
+    own = _sections(loop, rows, ends)
     said = {section.slug for section in own}
     sections = [*own, *(section.content(data) for section in all_sections() if section.slug not in said)]
     subtitle = f"{plain(data.header.vehicle_name)} · {len(data.runs)} runs"
@@ -77,7 +93,7 @@ def write_loop_report(loop: Loop) -> LoopReport:
             (loop.directory / name).write_text(text, encoding="utf-8")
     except OSError as error:
         raise FileError("cannot be written", where=loop.directory, value=error.strerror) from None
-    return LoopReport(loop, rows, [loop.directory / name for name in texts])
+    return LoopReport(loop, rows, ends, [loop.directory / name for name in texts])
 
 
 def print_loop(console: Console, report: LoopReport) -> None:
@@ -85,20 +101,49 @@ def print_loop(console: Console, report: LoopReport) -> None:
     from rich.text import Text
 
     console.print(console_table(_narrow(before_after_table(report.rows), report.rows)))
-    for sentence in _headline(report.loop, report.rows):
+    console.print(console_table(_narrow_ends(report.ends)))
+    for sentence in _headline(report.loop, report.rows, report.ends):
         console.print(Text(sentence))
+    console.print(Text(f"{DEFINITIONS} {COMPONENT_DEFINITIONS}", style="dim"))
     console.print(Text(f"report: {report.files[0]}"), soft_wrap=True)
 
 
 def before_after_table(rows: Sequence[BeforeAfter]) -> Table:
     """Return the table of biases under each condition, and whether the corrected one is within the scatter."""
-    shown = _conditions(rows)
+    shown = _conditions(row.by_condition for row in rows)
     columns = [Column("trajectory", "trajectory"), Column("error", "error")]
     for condition in shown:
         columns.append(Column(f"{condition}_bias", "bias", 2, group=condition))
         columns.append(Column(f"{condition}_sd", "sd", 2, group=condition))
     columns += [Column("repeats", "n", 0), Column("verdict", "corrected bias ± 1 sd")]
     return Table("before_after", _CAPTION, columns, [_row(row, shown) for row in rows], note=_NOTE)
+
+
+def end_position_table(ends: Sequence[EndPosition]) -> Table:
+    """Return the table of end position errors and Δs, a row per trajectory."""
+    shown = _conditions(end.median_mm for end in ends)
+    columns = [Column("trajectory", "trajectory")]
+    for c in shown:
+        columns.append(Column(f"{c}_position_mm", "end position", 1, group=c))
+        columns += [Column(f"{c}_delta_s_bias", "Δs", 1, group=c), Column(f"{c}_delta_s_sd", "sd", 1, group=c)]
+    rows: list[list[Value]] = []
+    for end in ends:
+        cells = [(end.median_mm.get(c), end.delta_s.get(c)) for c in shown]
+        numbers = [(position, s.bias if s else None, s.sd if s else None) for position, s in cells]
+        rows.append([end.trajectory, *(number for three in numbers for number in three)])
+    return Table("end_position", _CAPTION_ENDS, columns, rows, note=DEFINITIONS)
+
+
+def _narrow_ends(ends: Sequence[EndPosition]) -> Table:
+    """Return the table of end positions for a console: one column per condition, without standard deviations."""
+    shown = _conditions(end.median_mm for end in ends)
+    columns = [Column("trajectory", "trajectory"), Column("error", "error"), *(Column(c, c, 1) for c in shown)]
+    rows: list[list[Value]] = []
+    for end in ends:
+        biases = {condition: found.bias for condition, found in end.delta_s.items()}
+        for error, values in (("end position error mm", end.median_mm), ("Δs mm", biases)):
+            rows.append([end.trajectory, error, *(values.get(c) for c in shown)])
+    return Table("end_position", _CAPTION_ENDS, columns, rows)
 
 
 def _row(row: BeforeAfter, shown: Sequence[str]) -> list[Value]:
@@ -109,13 +154,14 @@ def _row(row: BeforeAfter, shown: Sequence[str]) -> list[Value]:
     return [row.trajectory, f"{row.quantity.symbol} {row.quantity.unit}", *numbers, *ends]
 
 
-def _conditions(rows: Sequence[BeforeAfter]) -> list[str]:
-    return [c for c in CONDITIONS if any(c in row.by_condition for row in rows)]
+def _conditions(driven: Iterable[Mapping[str, object]]) -> list[str]:
+    known = {condition for by_condition in driven for condition in by_condition}
+    return [c for c in CONDITIONS if c in known]
 
 
 def _narrow(table: Table, rows: Sequence[BeforeAfter]) -> Table:
     """Return the table for a console: one column per condition."""
-    conditions = _conditions(rows)
+    conditions = _conditions(row.by_condition for row in rows)
     columns = [*table.columns[:2], *(Column(c, c, 2) for c in conditions), Column("sd", "± sd", 2), *table.columns[-2:]]
     shown = []
     for row, cells in zip(rows, table.rows, strict=True):
@@ -124,26 +170,30 @@ def _narrow(table: Table, rows: Sequence[BeforeAfter]) -> Table:
     return Table(table.slug, table.caption, columns, shown)
 
 
-def _sections(loop: Loop, rows: Sequence[BeforeAfter]) -> list[Content]:
+def _sections(loop: Loop, rows: Sequence[BeforeAfter], ends: Sequence[EndPosition]) -> list[Content]:
     said = [f"{plain(name)}: {sentence}" for name, sentence in _said(loop.plans)]
-    blocks: list[Block] = [Paragraph(sentence, lead=True) for sentence in _headline(loop, rows)]
+    blocks: list[Block] = [Paragraph(sentence, lead=True) for sentence in _headline(loop, rows, ends)]
+    tables = [end_position_table(ends), before_after_table(rows)]
     return [
-        Content("before-after", "Before and after", [*blocks, before_after_table(rows)]),
+        Content("before-after", "Before and after", [*blocks, *tables]),
         Content("diagnosis", "What the calibrated model lacks", _diagnosis(loop)),
         Content("plans", "What corrected plans make up for", [_plans(loop.plans), *([Bullets(said)] if said else [])]),
     ]
 
 
-def _headline(loop: Loop, rows: Sequence[BeforeAfter]) -> Iterator[str]:
-    for quantity in QUANTITIES:
+def _headline(loop: Loop, rows: Sequence[BeforeAfter], ends: Sequence[EndPosition]) -> Iterator[str]:
+    medians = {c: [end.median_mm[c] for end in ends if c in end.median_mm] for c in CONDITIONS}
+    positions = [f"{c} {statistics.fmean(found):.1f} mm" for c, found in medians.items() if found]
+    yield f"Median end position error, mean over trajectories: {', '.join(positions)}."
+    for quantity in COMPONENTS:
         biases = {c: root_mean_square_bias(list(rows), quantity, c) for c in CONDITIONS}
         known = [f"{c} {b:.{quantity.digits}f} {quantity.unit}" for c, b in biases.items() if b == b]  # noqa: PLR0124
         yield f"Bias of {quantity.symbol}, root mean square over trajectories: {', '.join(known)}."
     found = counts(list(rows))
     total = sum(found.values())
     yield (
-        f"Of {total} corrected biases {found[Bias.WITHIN]} are within ± 1 standard deviation of a repeat, "
-        f"{found[Bias.BEYOND]} beyond; of {found[Bias.UNKNOWN]} the repeats cannot say."
+        f"Of {total} corrected biases (along, across, heading) {found[Bias.WITHIN]} are within ± 1 standard deviation "
+        f"of a repeat, {found[Bias.BEYOND]} beyond; of {found[Bias.UNKNOWN]} the repeats cannot say."
     )
     moved = [entry["remainder"] for entry in loop.plans.values() if any(entry.get("remainder", {}).values())]
     if moved:
@@ -171,16 +221,11 @@ def _plans(plans: Mapping[str, Any]) -> Table:
     groups = {"uncorrected": "by the model, uncorrected", "remaining": "by the model, corrected"}
     columns = [Column("trajectory", "trajectory")]
     for key, group in groups.items():
-        columns += [
-            Column(f"{key}_delta_s_mm", "Δs mm", 1, group=group),
-            Column(f"{key}_across_mm", "across mm", 1, group=group),
-        ]
-        columns += [Column(f"{key}_delta_heading_deg", "Δδ deg", 2, group=group)]
+        columns += [Column(f"{key}_{field}", title, digits, group=group) for field, (title, digits) in _PLANNED.items()]
     columns += [Column(f"learned_{c.split()[0]}_{c.split()[1]}", c, 2, group="missed before") for c in _LEARNED]
-    fields = ("delta_s_mm", "across_mm", "delta_heading_deg")
     learned = ("along_mm", "across_mm", "heading_deg")
     rows: list[list[Value]] = [
-        [name, *(entry[key][field] for key in groups for field in fields), *(entry["remainder"][f] for f in learned)]
+        [name, *(entry[key][field] for key in groups for field in _PLANNED), *(entry["remainder"][f] for f in learned)]
         for name, entry in plans.items()
         if "remaining" in entry
     ]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from agvbench.statistics.quantities import QUANTITIES, Quantity
+from agvbench.statistics.quantities import COMPONENTS, Quantity
 from agvbench.statistics.runs import valid
 from agvbench.types import Floats
 
@@ -84,26 +85,36 @@ def equivalence(values: Floats, *, margin_sds: float = 1.0) -> Equivalence:
 
 
 def equivalences(
-    errors: pd.DataFrame, condition: str, *, margin_sds: float = 1.0
+    errors: pd.DataFrame,
+    condition: str,
+    quantities: Sequence[Quantity] = COMPONENTS,
+    *,
+    margin_sds: float = 1.0,
 ) -> dict[tuple[str, str], Equivalence]:
-    """Return the test of the signed Δs and Δδ of every trajectory under `condition`.
+    """Return the test of each signed error of every trajectory under `condition`.
 
     Parameters
     ----------
     errors
         What `pose_errors` returns.
+    condition
+        Whose runs count.
+    quantities
+        Which errors: along, across and heading by default.
+    margin_sds
+        The margin, in standard deviations of one repeat.
 
     Returns
     -------
     dict
-        By trajectory and the quantity's column (``"delta_s_mm"``, ``"delta_heading_deg"``); units of the column.
+        By trajectory and the quantity's column (``"along_mm"``, …); units of the column.
     """
     counted = valid(errors)
     counted = counted[counted["condition"] == condition]
     return {
         (str(name), quantity.column): equivalence(_signed(counted, name, quantity), margin_sds=margin_sds)
         for name in dict.fromkeys(counted["trajectory"])
-        for quantity in QUANTITIES
+        for quantity in quantities
     }
 
 

@@ -26,7 +26,7 @@ def plans_of(
     """Return, by trajectory, where the model would end uncorrected and ends corrected, and what to say about it.
 
     Keys: ``uncorrected``, ``remaining`` and, if the model has effects of the camera, ``beyond_camera``, each with
-    ``delta_s_mm``, ``delta_heading_deg``, ``along_mm``, ``across_mm``; ``remainder``, what the model
+    ``position_mm``, ``along_mm``, ``across_mm``, ``delta_s_mm``, ``delta_heading_deg``; ``remainder``, what the model
     missed before, in the frame of its end pose; ``said``, sentences; or ``problem`` where it
     cannot be driven.
     """
@@ -58,6 +58,7 @@ def _entry(correction: Correction) -> dict[str, Any]:
 
 def _numbers(miss: Miss) -> dict[str, float]:
     return {
+        "position_mm": round(1e3 * miss.distance_m, 3),
         "delta_s_mm": round(1e3 * miss.delta_s_m, 3),
         "delta_heading_deg": round(math.degrees(miss.delta_heading_rad), 4),
         "along_mm": round(1e3 * miss.along_m, 3),

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from agvbench.statistics.equivalence import Bias, Equivalence, equivalences
-from agvbench.statistics.quantities import QUANTITIES, Quantity
+from agvbench.statistics.quantities import COMPONENTS, DISTANCE, POSITION, Quantity
+from agvbench.statistics.runs import valid
 from agvbench.types import CONDITIONS
 
 if TYPE_CHECKING:
@@ -30,17 +32,40 @@ class BeforeAfter:
         return self.by_condition.get("corrected")
 
 
-def before_after(errors: pd.DataFrame) -> list[BeforeAfter]:
-    """Return a row per trajectory and quantity from what `pose_errors` returns."""
-    found = {condition: equivalences(errors, condition) for condition in CONDITIONS}
+@dataclass(frozen=True)
+class EndPosition:
+    """One trajectory: its median end position error [mm] and the bias of its Δs [mm], under each condition."""
+
+    trajectory: str
+    median_mm: dict[str, float]
+    delta_s: dict[str, Equivalence]
+
+
+def before_after(errors: pd.DataFrame, quantities: Sequence[Quantity] = COMPONENTS) -> list[BeforeAfter]:
+    """Return a row per trajectory and quantity from what `pose_errors` returns; along, across and heading by default.
+
+    The three components of the end pose's error are tested, and not Δs and Δδ: a bias across shows in neither.
+    """
+    found = {condition: equivalences(errors, condition, quantities) for condition in CONDITIONS}
     keys = dict.fromkeys(key for cells in found.values() for key in cells)
-    quantities = {quantity.column: quantity for quantity in QUANTITIES}
+    by_column = {quantity.column: quantity for quantity in quantities}
     order = {name: i for i, name in enumerate(dict.fromkeys(errors["trajectory"]))}
     return [
         BeforeAfter(
-            name, quantities[column], {c: cells[name, column] for c, cells in found.items() if (name, column) in cells}
+            name, by_column[column], {c: cells[name, column] for c, cells in found.items() if (name, column) in cells}
         )
         for name, column in sorted(keys, key=lambda key: order[key[0]])
+    ]
+
+
+def end_positions(errors: pd.DataFrame) -> list[EndPosition]:
+    """Return a row per trajectory from what `pose_errors` returns."""
+    medians = valid(errors).groupby(["trajectory", "condition"])[POSITION.column].median().to_dict()
+    return [
+        EndPosition(
+            row.trajectory, {c: float(medians[row.trajectory, c]) for c in row.by_condition}, dict(row.by_condition)
+        )
+        for row in before_after(errors, (DISTANCE,))
     ]
 
 

@@ -49,10 +49,12 @@ def test_scale_does_not_matter():
 
 def test_a_table_of_errors_by_trajectory():
     table = {"trajectory": ["a", "a", "a", "a", "b"], "condition": ["x", "x", "x", "y", "y"]}
-    table |= {"delta_s_mm": [1.0, -1.0, 0.0, 50.0, 1.0], "delta_heading_deg": [5.0, 5.1, 4.9, 0.0, 0.0]}
+    table |= {"along_mm": [1.0, -1.0, 0.0, 50.0, 1.0], "delta_heading_deg": [5.0, 5.1, 4.9, 0.0, 0.0]}
+    table |= {"across_mm": [60.0, 61.0, 59.0, 0.0, 0.0], "delta_s_mm": [1.0, -1.0, 0.0, 50.0, 1.0]}
     table |= {"status": ["ok"] * 5, "problem": [""] * 5}
     found = equivalences(pd.DataFrame(table), "x")
-    assert set(found) == {("a", "delta_s_mm"), ("a", "delta_heading_deg")}
-    assert found["a", "delta_s_mm"].bias == 0.0
+    assert set(found) == {("a", "along_mm"), ("a", "across_mm"), ("a", "delta_heading_deg")}
+    assert found["a", "along_mm"].bias == 0.0
+    assert found["a", "across_mm"].verdict is Bias.BEYOND
     assert found["a", "delta_heading_deg"].verdict is Bias.BEYOND
     assert found["a", "delta_heading_deg"].stderr == pytest.approx(0.1 / math.sqrt(3))

@@ -9,15 +9,20 @@ import subprocess
 import sys
 from dataclasses import replace
 
+import pandas as pd
 import pytest
 
 from agvbench.campaign import Campaign
 from agvbench.errors import FileError, FlagError
 from agvbench.model import VehicleModel
+from agvbench.reporting.loop import before_after_table, end_position_table
 from agvbench.running.remainders import read_remainders
 from agvbench.running.settings import BenchSettings
+from agvbench.statistics.equivalence import Bias
+from agvbench.statistics.quantities import THESIS
 from agvbench.workflows.loop_settings import MODEL_ONLY, NO_TRIAL, opened, write
 from agvbench.workflows.loop_stages import learned
+from agvbench.workflows.loop_table import before_after, end_positions
 
 PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
 
@@ -80,6 +85,27 @@ def test_a_file_is_whole_or_not_there(tmp_path):
         write(tmp_path / "missing" / "a.json", "{}")
 
 
+def test_a_bias_across_alone_is_beyond():
+    rows = [
+        {"trajectory": "1", "condition": condition, "status": "ok", "problem": "", "position_mm": abs(across),
+         "along_mm": off, "across_mm": across, "delta_heading_deg": off, "delta_s_mm": off}
+        for condition, bias in (("calibrated", 90.0), ("corrected", 60.0))
+        for off in (-1.0, 0.5, 1.0, -0.5) * 5
+        for across in [bias + off]
+    ]  # fmt: skip
+    errors = pd.DataFrame(rows)
+    found = before_after(errors)
+    assert {row.quantity.column: row.corrected.verdict for row in found} == {
+        "along_mm": Bias.WITHIN, "across_mm": Bias.BEYOND, "delta_heading_deg": Bias.WITHIN,
+    }  # fmt: skip
+    assert all(row.corrected.verdict is Bias.WITHIN for row in before_after(errors, THESIS))
+    (end,) = end_positions(errors)
+    assert end.median_mm == {"calibrated": 90.0, "corrected": 60.0}
+    assert end.delta_s["corrected"].bias == 0.0
+    assert [row[-1] for row in before_after_table(found).rows] == ["within", "beyond", "within"]
+    assert end_position_table([end]).rows[0][:3] == ["1", 90.0, 0.0]
+
+
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory):
     folder = tmp_path_factory.mktemp("loop")
@@ -97,8 +123,8 @@ def table(directory):
 def test_the_correction_takes_the_bias_away(driven):
     directory, said = driven
     rows = table(directory)
-    assert len(rows) == 16
-    for error in ("Δs mm", "Δδ deg"):
+    assert len(rows) == 24
+    for error in ("along mm", "across mm", "heading error deg"):
         biases = {
             c: [abs(float(row[f"{c}_bias"])) for row in rows if row["error"] == error]
             for c in ("calibrated", "corrected")
@@ -108,6 +134,7 @@ def test_the_correction_takes_the_bias_away(driven):
     for line in (*stages, "report: it/report.html"):
         assert line in said
     assert "lateral_slip" in said
+    assert "Median end position error, mean over trajectories: uncalibrated" in said
 
 
 @pytest.mark.slow
