@@ -10,6 +10,8 @@ from hypothesis import HealthCheck, settings
 # A mistake of agvbench itself is to be seen, not told in one line.
 os.environ.setdefault("AGVBENCH_DEBUG", "1")
 
+# The slowest test takes a minute on an idle machine.
+TIMEOUT_S = 300
 # `nox -s explore` sets how many times every property is tested, each time on fresh examples.
 ROUNDS = int(os.environ.get("AGVBENCH_EXPLORE", "0"))
 
@@ -23,10 +25,13 @@ settings.register_profile(
 settings.load_profile("agvbench")
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Repeat a failed test once where it depends on the clock of a machine that others use; not if it hung."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Limit the time of every test; repeat one that depends on the wall clock once where it fails without hanging."""
+    timed, repeated = (config.pluginmanager.has_plugin(name) for name in ("timeout", "rerunfailures"))
     for item in items:
-        if item.get_closest_marker("real_time"):
+        if timed and not item.get_closest_marker("timeout"):
+            item.add_marker(pytest.mark.timeout(TIMEOUT_S))
+        if repeated and item.get_closest_marker("real_time"):
             item.add_marker(pytest.mark.flaky(reruns=1, reruns_delay=1, rerun_except="Timeout"))
 
 
