@@ -41,6 +41,21 @@ class HeaderLike(Protocol):
         """Command at which the vehicle stands and steers straight."""
         ...
 
+    @property
+    def mocap_rate_hz(self) -> float:
+        """Frame rate of the camera [Hz]."""
+        ...
+
+    @property
+    def prediction_horizon_s(self) -> float | None:
+        """How far ahead free driving is predicted [s]; None where runs begin at rest."""
+        ...
+
+    @property
+    def prediction_stride_s(self) -> float | None:
+        """From one prediction to the next [s]; the horizon where None."""
+        ...
+
 
 class CampaignLike(Protocol):
     """A header and runs in order; `agvbench.campaign.Campaign` is one."""

@@ -14,6 +14,7 @@ import pyarrow as pa
 from agvbench.campaign.checks import check_commands, check_poses, check_runs
 from agvbench.campaign.header import FILE_NAME, CampaignHeader
 from agvbench.campaign.manifest import Manifest
+from agvbench.campaign.plausibility import check_motion
 from agvbench.campaign.schema import COMMANDS, POSES, RUNS, TABLES
 from agvbench.campaign.source import Source
 from agvbench.campaign.timed import TimedTable, blank_untracked
@@ -100,6 +101,7 @@ class Campaign:
         last_s = self._commands.last("t_s")
         table.shift(self._early_s)
         check_poses(table, self._runs["status"].to_pylist(), last_s)
+        check_motion(self.header, self._runs, self._commands, table)
         return table
 
     @cached_property

@@ -154,9 +154,10 @@ def check_poses(poses: TimedTable, status: list[str], last_command_s: Floats) ->
     for name in ("x_m", "y_m"):
         seen = np.abs(poses.column(name)[tracked])
         if len(seen) and (median := float(np.median(seen))) > FARTHEST_M:
+            first = poses.run_of_row[tracked][int(np.argmax(seen > FARTHEST_M))]
             raise CampaignError(
                 f"{name} is not in metres",
-                where=poses.path,
+                where=f"{poses.path}: run {poses.run_ids[first]}",
                 value=f"median |{name}| {median:.6g}",
                 limit=f"a median within {FARTHEST_M:g} m",
                 remedy="convert from mm",

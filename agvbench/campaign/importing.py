@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 
 from agvbench import __version__
 from agvbench.campaign.accounts import Account, account_for, why_nothing
@@ -18,7 +19,9 @@ from agvbench.campaign.manifest import sha256
 from agvbench.campaign.mapping import find_mapping, load_mapping
 from agvbench.campaign.mapping_schema import FileRule, Mapping
 from agvbench.campaign.parts import parts_of
+from agvbench.campaign.plausibility import check_motion
 from agvbench.campaign.recording import Recording, read_recording
+from agvbench.campaign.timed import TimedTable
 from agvbench.campaign.writer import CampaignWriter, check_parts, refuse_occupied
 from agvbench.errors import FileError
 from agvbench.types import NO_TARGET, RUN_OK, Commands, Floats, Frames, Run
@@ -73,9 +76,9 @@ def import_recordings(
         accounts.append(account_for(recording, pieces))
     if not runs:
         raise FileError(why_nothing(accounts), where=", ".join(path.name for path in paths), remedy=_REMEDY_NOTHING)
-    for run in runs:
-        check_parts(parts_of(run), Path(str(run.extra["source"])), mapping.vehicle.command_unit)
-    return _write(Path(out), mapping.header(mapping_path), clock.from_zero(runs), accounts, mapping_path)
+    header = mapping.header(mapping_path)
+    _check(runs, header, mapping_path)
+    return _write(Path(out), header, clock.from_zero(runs), accounts, mapping_path)
 
 
 _REMEDY_NOTHING = "check the mapping's columns.driven, columns.tracked, [gate] and [runs]"
@@ -115,6 +118,17 @@ def _distinct(files: Sequence[str | Path]) -> list[Path]:
         if stems.count(path.stem) > 1:
             raise FileError("two recordings have one name", where=path, value=path.stem, remedy="rename one")
     return paths
+
+
+def _check(runs: list[Run], header: CampaignHeader, mapping_path: Path) -> None:
+    """Check the runs before anything is written."""
+    parts = [parts_of(run) for run in runs]
+    for run, tables in zip(runs, parts, strict=True):
+        check_parts(tables, Path(str(run.extra["source"])), header.command_unit)
+    whole = {name: pa.concat_tables([tables[name] for tables in parts]) for name in ("runs", "commands", "poses")}
+    ids = [run.run_id for run in runs]
+    commands, poses = (TimedTable(mapping_path, whole[name], ids, in_parts=True) for name in ("commands", "poses"))
+    check_motion(header, whole["runs"], commands, poses)
 
 
 def _rule_for(path: Path, mapping: Mapping) -> FileRule:

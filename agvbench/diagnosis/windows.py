@@ -101,9 +101,8 @@ class Window:
 
 def horizon_of(header: HeaderLike, runs: Iterable[Run]) -> Horizon | None:
     """Return how to cut the campaign into windows; None if it says nothing and its runs begin at rest."""
-    horizon_s = getattr(header, "prediction_horizon_s", None)
-    if horizon_s is not None:
-        return Horizon(horizon_s, getattr(header, "prediction_stride_s", None) or horizon_s)
+    if header.prediction_horizon_s is not None:
+        return Horizon(header.prediction_horizon_s, header.prediction_stride_s or header.prediction_horizon_s)
     usable = [run for run in runs if run.is_ok and len(run.frames)]
     resting = sum(rests(run, header.neutral) for run in usable)
     return Horizon() if usable and resting < 0.5 * len(usable) else None

@@ -8,9 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from campaign_samples import HEADER, head, make_run, tables, write_campaign, write_csv, write_head
+from motion_samples import Change, bench, reversed_in_time, write
 
 from agvbench.campaign import Campaign, CampaignWriter
 from agvbench.campaign.parquet import read_parquet
@@ -72,6 +74,17 @@ def _file(name: str, change: Callable[[Path], object]) -> Callable[[], None]:
     def run() -> None:
         write_campaign(HERE)
         change(HERE / name)
+        _open()
+
+    return run
+
+
+def _moved(change: Change, speed_mps: float = 0.3, *, free: bool = False) -> Callable[[], None]:
+    """Open a campaign of a vehicle that drives, but for its poses."""
+
+    def run() -> None:
+        sound = bench(speed_mps, free=free)
+        write(HERE, sound | {"poses": change(sound["poses"])})
         _open()
 
     return run
@@ -242,6 +255,23 @@ CASES: Cases = {
         _column("poses", heading_rad=[0.0, 90.0, 179.5, -179.5, 5.0, 6.0], run_id=["a"] * 5 + ["b"]),
     ),
     "poses-millimetres": ("positions in millimetres", _column("poses", x_m=[1000.0, 1100.0, 1200.0] * 2)),
+    "poses-centimetres": (
+        "positions in centimetres: vehicles drive at most 20 m/s and 100 wheelbases a second",
+        _moved(lambda poses: poses.assign(x_m=100.0 * poses.x_m, y_m=100.0 * poses.y_m)),
+    ),
+    "poses-centimetres-slow": (
+        "positions in centimetres of a slow vehicle that had targets",
+        _moved(lambda poses: poses.assign(x_m=100.0 * poses.x_m, y_m=100.0 * poses.y_m), 0.05),
+    ),
+    "poses-degrees-of-turns": (
+        "headings in degrees that begin near 0",
+        _moved(lambda poses: poses.assign(heading_rad=np.degrees(poses.heading_rad))),
+    ),
+    "poses-reversed": ("poses in reversed time, of runs that had targets", _moved(reversed_in_time)),
+    "poses-reversed-free": (
+        "poses in reversed time, of runs with varied commands",
+        _moved(reversed_in_time, free=True),
+    ),
     "run-unknown": ("asking for a run that there is not", _unknown_run),
     "create-over": ("beginning a campaign where one is", _create_twice),
     "resume-otherwise": ("resuming with another vehicle", _resume_otherwise),

@@ -61,11 +61,6 @@ CASES: dict[str, tuple[str, Callable[[list[Run]], list[Run]]]] = {
     "never-seen": ("poses that are all untracked", _frames(lambda f: {"tracked": np.zeros(len(f), dtype=bool)})),
     "clock-set-back": ("a clock that is set back in the middle of runs", _frames(_clock_set_back)),
     "milliseconds": ("times in ms", _frames(lambda f: {"t_s": 1e3 * f.t_s})),
-    "millimetres": ("positions in mm", _frames(lambda f: {"x_m": 1e3 * f.x_m, "y_m": 1e3 * f.y_m})),
-    "degrees": (
-        "headings in degrees that never wrap",
-        _frames(lambda f: {"heading_rad": np.degrees(np.unwrap(f.heading_rad))}),
-    ),
     "mirrored": ("headings counted clockwise", _frames(lambda f: {"heading_rad": -f.heading_rad})),
     "axes-swapped": ("x and y swapped", _frames(lambda f: {"x_m": f.y_m, "y_m": f.x_m})),
     "no-heading": ("a heading that stays zero", _frames(lambda f: {"heading_rad": np.zeros(len(f))})),
