@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import stat
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -14,16 +15,32 @@ MAX_DEPTH = 100
 """How deep tables may be nested: parsers call themselves at each level, and Python allows a thousand calls."""
 
 
+def require_regular(path: Path) -> None:
+    """Refuse what can be read without end, or waits for a writer: pipes and devices.
+
+    Raises
+    ------
+    FileError
+        If `path` is one of them.
+    OSError
+        If there is nothing there.
+    """
+    mode = path.stat().st_mode
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):  # opening a directory says so itself
+        raise FileError("is a pipe or a device", where=path, limit="a regular file", remedy="give a file on disk")
+
+
 def read_text(path: Path, *, max_bytes: int = MAX_BYTES) -> str:
     """Return a file's text, UTF-8, that parsers can take without running out of stack.
 
     Raises
     ------
     FileError
-        If it is longer than `max_bytes`, or its brackets are nested deeper than `MAX_DEPTH`.
+        If it is no regular file, longer than `max_bytes`, or its brackets are nested deeper than `MAX_DEPTH`.
     OSError, UnicodeDecodeError
         If it cannot be read, or is not UTF-8.
     """
+    require_regular(path)
     with path.open("rb") as file:
         data = file.read(max_bytes + 1)
     if len(data) > max_bytes:

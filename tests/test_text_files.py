@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+import threading
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
+from agvbench.adapters.natnet.capture import datagrams_of
+from agvbench.campaign.csv_text import read_csv_text
 from agvbench.campaign.header import CampaignHeader
 from agvbench.campaign.mapping import load_mapping
+from agvbench.campaign.parquet import read_parquet
 from agvbench.errors import AgvbenchError, FileError
 from agvbench.model import VehicleModel
 from agvbench.planning.reading import load_trajectory
@@ -24,6 +29,11 @@ READERS: dict[str, Callable[[Path], object]] = {
     "remainders.json": lambda path: read_remainders(str(path)),
     "bench.toml": lambda path: BenchSettings.load(path.parent),
 }
+FURTHER: dict[str, Callable[[Path], object]] = {
+    "recording.csv": read_csv_text,
+    "poses.parquet": read_parquet,
+    "stream.pcap": lambda path: list(datagrams_of(path)),
+}
 TOO_MUCH = {
     "too long": "#" * (MAX_BYTES + 1),
     "nested too deep": "a = " + "[" * 5000 + "]" * 5000,
@@ -38,6 +48,29 @@ def test_every_reader_refuses_what_is_too_much(name: str, what: str, tmp_path: P
     with pytest.raises(AgvbenchError, match=r"is too l|is nested too deep") as caught:
         READERS[name](path)
     assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.fixture
+def pipe(tmp_path: Path) -> Iterator[Path]:
+    """A pipe with somebody who would write to it, so that reading it ends."""
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    writer = threading.Thread(target=lambda: path.open("wb").close())
+    writer.start()
+    yield path
+    while writer.is_alive():
+        os.close(os.open(path, os.O_RDONLY | os.O_NONBLOCK))
+        writer.join(0.01)
+
+
+@pytest.mark.parametrize("name", [*READERS, "recording.csv", "poses.parquet", "stream.pcap"])
+@pytest.mark.parametrize("kind", ["pipe", "device"])
+def test_every_reader_refuses_pipes_and_devices(name: str, kind: str, pipe: Path, tmp_path: Path) -> None:
+    path = tmp_path / name
+    path.symlink_to(pipe if kind == "pipe" else "/dev/null")
+    with pytest.raises(AgvbenchError, match=r": (is a pipe or a device|is neither a file nor a mapping)") as caught:
+        (READERS | FURTHER)[name](path)
     assert "\n" not in str(caught.value)
 
 

@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.csv as pa_csv
 
 from agvbench.errors import FileError
+from agvbench.text_files import require_regular
 
 MAX_BYTES = 4 << 30
 _DELIMITERS = {";": "semicolons", "\t": "tabs", "|": "bars"}
@@ -37,7 +38,7 @@ def read_csv_text(
     Raises
     ------
     FileError
-        If the file is missing, too large, in another encoding or delimiter, ragged, or has no header.
+        If the file is missing, no regular file, too large, in another encoding or delimiter, ragged, or has no header.
     """
     names = _header(path, delimiter, encoding, skip_rows)
     try:
@@ -60,6 +61,7 @@ def _header(path: Path, delimiter: str, encoding: str, skip_rows: int) -> list[s
     import csv
 
     try:
+        require_regular(path)
         if path.stat().st_size > MAX_BYTES:
             raise FileError(
                 "is too large", where=path, value=f"{path.stat().st_size} bytes", limit=f"{MAX_BYTES} bytes"

@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from agvbench.errors import CampaignError
+from agvbench.text_files import require_regular
 
 MAX_ROWS = 100_000_000
 _MAGIC = b"PAR1"
@@ -51,8 +52,11 @@ def read_parquet(path: Path, *, max_rows: int = MAX_ROWS) -> pa.Table:
     ------
     CampaignError
         If it is not parquet, cut off, damaged or has more than `max_rows` rows.
+    FileError
+        If it is no regular file.
     """
     try:
+        require_regular(path)
         with pa.OSFile(str(path)) as source:
             file = pq.ParquetFile(source, page_checksum_verification=True)
             if file.metadata.num_rows > max_rows:

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 from agvbench.adapters.natnet.packet import MAX_DATAGRAM_BYTES
 from agvbench.errors import FileError
+from agvbench.text_files import require_regular
 
 _PCAP = (b"\xd4\xc3\xb2\xa1", b"\xa1\xb2\xc3\xd4", b"\x4d\x3c\xb2\xa1", b"\xa1\xb2\x3c\x4d")
 _PCAPNG = b"\x0a\x0d\x0d\x0a"
@@ -37,10 +38,11 @@ def datagrams_of(path: Path) -> Iterator[Datagram]:
     Raises
     ------
     FileError
-        If the file is missing, no capture, and too long for one datagram; or if a capture is damaged, after what
-        stands before the damage.
+        If the file is missing, no regular file, no capture, and too long for one datagram; or if a capture is damaged,
+        after what stands before the damage.
     """
     try:
+        require_regular(path)
         size = path.stat().st_size
         if size > _MAX_CAPTURE_BYTES:
             raise FileError("capture is too long", where=path, value=f"{size} B", limit=f"{_MAX_CAPTURE_BYTES} B")

@@ -153,6 +153,8 @@ LINES = dict(re.findall(r"^\| ([^|]+) \| `(.+)` \|$", PAGE.read_text(), re.MULTI
 @pytest.mark.parametrize("mistake", LINES)
 def test_bad_input_gets_the_line_of_the_page(mistake: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "bad"
+    if mistake == "pipe or device":
+        path.symlink_to("/dev/zero")
     if mistake in CONTENTS:
         path.write_bytes(CONTENTS[mistake])
     options = OPTIONS.get(mistake, [])
@@ -161,7 +163,7 @@ def test_bad_input_gets_the_line_of_the_page(mistake: str, tmp_path: Path, capsy
 
 
 def test_every_mistake_of_the_page_is_tried() -> None:
-    assert {*CONTENTS, *OPTIONS} | {"missing file"} == {*LINES}
+    assert {*CONTENTS, *OPTIONS} | {"missing file", "pipe or device"} == {*LINES}
 
 
 def test_a_datagram_that_is_cut_off_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
