@@ -18,6 +18,7 @@ from agvbench.diagnosis.reading import Readings
 from agvbench.diagnosis.residual_rates import residual_rates
 from agvbench.diagnosis.residual_spread import end_spread
 from agvbench.diagnosis.residual_table import with_residuals
+from agvbench.diagnosis.residuals import MEDIAN
 from agvbench.diagnosis.result import Diagnosis, HeldOut, Verdict
 from agvbench.diagnosis.selection import Selection
 from agvbench.diagnosis.set_aside import Judged, judge, predicts
@@ -145,7 +146,7 @@ def _verdict(
 
 
 def _held_out(kept: Readings, judged: Judged) -> HeldOut:
-    before, after = judged.before.rms(), judged.after.rms()
+    before, after = ({MEDIAN: missed.median_mm()} | missed.rms() for missed in (judged.before, judged.after))
     errors = {name: {"before": before[name], "after": after[name], "floor": judged.floor[name]} for name in before}
     was, now = judged.before.squares()["position_rms_mm"], judged.after.squares()["position_rms_mm"]
     slack = (judged.floor["position_rms_mm"] / 1e3) ** 2

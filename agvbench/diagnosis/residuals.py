@@ -15,7 +15,12 @@ from agvbench.types import Floats
 if TYPE_CHECKING:
     from agvbench.diagnosis.residual_spread import EndSpread
 
-QUANTITIES = ("position_rms_mm", "heading_rms_deg", "delta_s_mm", "delta_heading_deg")
+QUANTITIES = (
+    *("end_position_mm", "along_mm", "across_mm", "delta_heading_deg", "delta_s_mm"),
+    *("position_rms_mm", "heading_rms_deg"),
+)
+"""Errors of the end pose first (along and across in the start frame), then those along the way."""
+MEDIAN = "end_position_median_mm"
 AT_THE_FLOOR = 1.25
 """What is left is at the floor up to this times it, or if repeats cannot tell it from the floor."""
 
@@ -24,12 +29,7 @@ LACK_OF_FIT = 0.01
 
 _LEAST = 1e-6  # m, rad: less scatter than any camera shows
 
-_UNITS = {
-    "position_rms_mm": 1e3,
-    "heading_rms_deg": 180.0 / np.pi,
-    "delta_s_mm": 1e3,
-    "delta_heading_deg": 180.0 / np.pi,
-}
+_UNITS = {name: 1e3 if name.endswith("_mm") else 180.0 / np.pi for name in QUANTITIES}
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,16 @@ class Misses:
     delta_s_m: Floats
     delta_heading_rad: Floats
 
+    @property
+    def ends(self) -> Floats:
+        """Return what is missed at the last sample of each run: along, across [m] and heading [rad], shape (R, 3)."""
+        last = self.seen.shape[1] - 1 - np.argmax(self.seen[:, ::-1], axis=1)
+        return np.asarray(self.path[np.arange(len(self.path)), last])
+
+    def median_mm(self) -> float:
+        """Return the median over runs of the end position error [mm]."""
+        return 1e3 * float(np.median(np.hypot(*self.ends[:, :2].T)))
+
     def rms(self) -> dict[str, float]:
         """Return each quantity's root mean square over runs, in the unit of its name."""
         squares = self.squares()
@@ -52,12 +62,15 @@ class Misses:
 
     def squares(self) -> Mapping[str, Floats]:
         """Return each quantity's mean square of each run (R,): a run counts once, however long it is."""
-        count = np.maximum(self.seen.sum(axis=1), 1)
+        count, ends = np.maximum(self.seen.sum(axis=1), 1), self.ends**2
         return {
+            "end_position_mm": ends[:, 0] + ends[:, 1],
+            "along_mm": ends[:, 0],
+            "across_mm": ends[:, 1],
+            "delta_heading_deg": self.delta_heading_rad**2,
+            "delta_s_mm": self.delta_s_m**2,
             "position_rms_mm": np.sum(self.path[..., :2] ** 2, axis=(1, 2)) / count,
             "heading_rms_deg": np.sum(self.path[..., 2] ** 2, axis=1) / count,
-            "delta_s_mm": self.delta_s_m**2,
-            "delta_heading_deg": self.delta_heading_rad**2,
         }
 
 
@@ -86,9 +99,12 @@ def floor(missed: Misses, group: NDArray[np.int64]) -> dict[str, float] | None:
 
     What repeats of one command have in common is the model's to predict; what differs between them is not. Taken
     from what the *final* model misses, so that a cause that depends on place or time does not pass for scatter. Groups
-    whose scatter is beyond four times the median's (one bad run) count as that.
+    whose scatter is beyond four times the median's (one bad run) count as that. `MEDIAN` is the median over runs of the
+    distance between end positions and their group's mean.
     """
     per_group: dict[str, list[tuple[float, float]]] = {name: [] for name in QUANTITIES}
+    apart_mm: list[float] = []
+    ends = missed.ends
     for g in np.unique(group):
         own = np.flatnonzero(group == g)
         if len(own) < 2:
@@ -97,7 +113,14 @@ def floor(missed: Misses, group: NDArray[np.int64]) -> dict[str, float] | None:
         path = missed.path[own][:, both]
         off = path - path.mean(axis=0)
         dof = len(own) - 1.0
+        # Distances from a mean of n are too short by √(1 − 1/n).
+        apart = (ends[own] - ends[own].mean(axis=0)) * np.sqrt(len(own) / dof)
+        apart_mm += (1e3 * np.hypot(*apart[:, :2].T)).tolist()
+        along, across = np.var(ends[own, :2], axis=0, ddof=1).tolist()
         values = {
+            "end_position_mm": along + across,
+            "along_mm": along,
+            "across_mm": across,
             "position_rms_mm": float(np.sum(off[..., :2] ** 2)) / dof / max(int(both.sum()), 1),
             "heading_rms_deg": float(np.sum(off[..., 2] ** 2)) / dof / max(int(both.sum()), 1),
             "delta_s_mm": float(np.var(missed.delta_s_m[own], ddof=1)),
@@ -112,7 +135,7 @@ def floor(missed: Misses, group: NDArray[np.int64]) -> dict[str, float] | None:
         value, runs = np.array(pairs).T
         most = 16.0 * np.median(value)
         out[name] = _UNITS[name] * float(np.sqrt(np.sum(np.minimum(value, most) * runs) / np.sum(runs)))
-    return out
+    return out | {MEDIAN: float(np.median(apart_mm))}
 
 
 def lack_of_fit(missed: Misses, group: NDArray[np.int64], spread: EndSpread | None = None) -> float | None:
@@ -130,9 +153,7 @@ def lack_of_fit(missed: Misses, group: NDArray[np.int64], spread: EndSpread | No
     within_dof, between_dof = 3 * (len(group) - len(names)), 3 * len(names)
     if within_dof < 9 or not between_dof:
         return None
-    rows = np.arange(len(group))
-    last = missed.seen.shape[1] - 1 - np.argmax(missed.seen[:, ::-1], axis=1)
-    ends = missed.path[rows, last]
+    ends = missed.ends
     means = _by_group(ends, index)
     apart = ends - means[index]
     if spread is None:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SCHEMA = 1
+_FIRST = ("end_position_mm", "end_position_median_mm", "along_mm", "across_mm")
+_ALWAYS = ("delta_heading_deg", "delta_s_mm", "position_rms_mm", "heading_rms_deg")
 
 
 class Verdict(StrEnum):
@@ -55,7 +57,10 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Errors on the runs set aside: by quantity (``position_rms_mm`` …) ``before``, ``after`` and ``floor``."""
+    """Errors on the runs set aside: by quantity (``end_position_mm`` …) ``before``, ``after`` and ``floor``.
+
+    ``floor`` is the repeatability.
+    """
 
     runs: int
     errors: Mapping[str, Mapping[str, float]]
@@ -107,10 +112,8 @@ class Diagnosis:
             },
             "held_out": {
                 "runs": self.held_out.runs if self.held_out else 0,
-                "position_rms_mm": dict(errors.get("position_rms_mm", {})),
-                "heading_rms_deg": dict(errors.get("heading_rms_deg", {})),
-                "delta_s_mm": dict(errors.get("delta_s_mm", {})),
-                "delta_heading_deg": dict(errors.get("delta_heading_deg", {})),
+                **{name: dict(errors[name]) for name in _FIRST if name in errors},
+                **{name: dict(errors.get(name, {})) for name in _ALWAYS},
                 "worse_on": list(self.held_out.worse_on) if self.held_out else [],
             },
             "next_experiment": None if self.next_experiment is None else self.next_experiment.to_table(),

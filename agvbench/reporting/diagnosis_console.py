@@ -13,7 +13,14 @@ from rich.text import Text
 from agvbench.diagnosis import Diagnosis
 from agvbench.diagnosis.result import HeldOut
 from agvbench.reporting.windows_table import windows_table
-from agvbench.workflows.diagnosis_words import QUANTITIES, effect_in_words, left_in_words, next_in_words
+from agvbench.workflows.diagnosis_words import (
+    COLUMNS,
+    DEFINITIONS,
+    QUANTITIES,
+    effect_in_words,
+    left_in_words,
+    next_in_words,
+)
 
 _MOST_DEPENDENCES = 5
 
@@ -26,8 +33,12 @@ def print_diagnosis(found: Diagnosis, console: Console) -> None:
     _say(lines, console)
     if found.held_out is not None:
         console.print()
-        console.print(f"Prediction errors of {found.held_out.runs} runs held out, root mean square:", highlight=False)
+        runs = found.held_out.runs
+        console.print(
+            f"Prediction errors of {runs} runs held out, root mean squares but for the median:", highlight=False
+        )
         console.print(errors_table(found.held_out))
+        console.print(Text(DEFINITIONS, style="dim"))
         if windows := found.provenance.get("windows"):
             console.print(windows_table(windows))
         if found.held_out.worse_on:
@@ -41,11 +52,12 @@ def _say(lines: Iterable[str], console: Console) -> None:
 
 
 def errors_table(held: HeldOut) -> Table:
-    """Return errors before and after beside the floor."""
+    """Return errors before and after beside the repeatability."""
     table = Table(box=box.SIMPLE_HEAD)
     table.add_column("")
-    for heading in ("before", "after", "floor"):
+    for heading in COLUMNS.values():
         table.add_column(heading, justify="right")
-    for name, errors in held.errors.items():
-        table.add_row(Text(QUANTITIES[name]), *(f"{errors[column]:.2f}" for column in ("before", "after", "floor")))
+    for name, title in QUANTITIES.items():
+        if errors := held.errors.get(name):
+            table.add_row(Text(title), *(f"{errors[column]:.2f}" for column in COLUMNS))
     return table

@@ -10,12 +10,23 @@ if TYPE_CHECKING:
     from agvbench.diagnosis import NamedEffect
 
 QUANTITIES = {
+    "end_position_mm": "end position error [mm]",
+    "end_position_median_mm": "end position error, median [mm]",
+    "along_mm": "along at the end [mm]",
+    "across_mm": "across at the end [mm]",
+    "delta_heading_deg": "heading error at the end [°]",
+    "delta_s_mm": "Δs at the end [mm]",
     "position_rms_mm": "position along the way [mm]",
     "heading_rms_deg": "heading along the way [°]",
-    "delta_s_mm": "Δs at the end [mm]",
-    "delta_heading_deg": "Δδ at the end [°]",
 }
 """What errors before and after are of, by their name in the JSON."""
+COLUMNS = {"before": "before", "after": "after", "floor": "repeatability"}
+"""Headings of the errors of a quantity, by their name in the JSON."""
+DEFINITIONS = (
+    "Errors are measured minus predicted. End position error: distance between the two end positions; along and "
+    "across: its components along x and y of the start frame. The heading error is the thesis' Δδ. Δs compares "
+    "distances from start to end, and hardly sees an error across."
+)
 
 
 def effect_in_words(effect: NamedEffect) -> str:

@@ -10,13 +10,13 @@ import pytest
 
 from agvbench.diagnosis.conclusion import _held_out, _verdict
 from agvbench.diagnosis.dependences import RANDOM_PHASE, Dependence
-from agvbench.diagnosis.residuals import QUANTITIES, Misses
+from agvbench.diagnosis.residuals import MEDIAN, QUANTITIES, Misses
 from agvbench.diagnosis.result import HeldOut, NamedEffect, Verdict
 from agvbench.diagnosis.set_aside import Judged
 from agvbench.diagnosis.windows_conclusion import AT_THE_FLOOR, FAR_ABOVE, _above
 from agvbench.diagnosis.windows_conclusion import _verdict as verdict_of_windows
 
-FLOOR = dict.fromkeys(QUANTITIES, 2.0)  # mm, degrees
+FLOOR = dict.fromkeys((*QUANTITIES, MEDIAN), 2.0)  # mm, degrees
 PATCH = Dependence("x_m", "speed", 1e-6, 0.3)
 
 

@@ -21,7 +21,8 @@ def test_json_and_vehicle_of_a_whole_command(adequate, tmp_path, capsys):
     assert main(["diagnose", str(adequate), "--json", str(found), "--out", str(out), "--check"]) == 0
     said = capsys.readouterr().out
     assert said.startswith("ADEQUATE")
-    assert "floor" in said
+    assert "repeatability" in said
+    assert said.index("end position error [mm]") < said.index("Δs at the end [mm]")
     assert "position along the way [mm]" in said
     content = json.loads(found.read_text())
     assert content["schema"] == 1
@@ -30,7 +31,9 @@ def test_json_and_vehicle_of_a_whole_command(adequate, tmp_path, capsys):
         "schema", "verdict", "effects", "unexplained", "held_out", "next_experiment", "provenance"
     }  # fmt: skip
     assert content["unexplained"] == {"significant": False, "depends_on": []}
-    assert set(content["held_out"]["position_rms_mm"]) == {"before", "after", "floor"}
+    end_pose = ["end_position_mm", "end_position_median_mm", "along_mm", "across_mm", "delta_heading_deg", "delta_s_mm"]
+    assert list(content["held_out"]) == ["runs", *end_pose, "position_rms_mm", "heading_rms_deg", "worse_on"]
+    assert all(set(content["held_out"][name]) == {"before", "after", "floor"} for name in end_pose)
     model = VehicleModel.load(out)
     assert float(model.speed(900.0)) == pytest.approx(0.32, rel=0.01)
     assert float(model.front(1300.0)) == pytest.approx(0.274, abs=0.003)

@@ -26,6 +26,21 @@ def test_the_floor_is_the_scatter_of_repeats_whatever_they_have_in_common():
         found = floor(scattered(1, scatter_m=0.004, common_m=common), GROUP)
         assert found["position_rms_mm"] == pytest.approx(4.0, rel=0.15)
         assert found["delta_s_mm"] == pytest.approx(4.0, rel=0.15)
+        assert found["along_mm"] == pytest.approx(4.0, rel=0.15)
+        assert found["end_position_mm"] == pytest.approx(4.0, rel=0.15)
+        assert found["end_position_median_mm"] == pytest.approx(4.0 * 0.6745, rel=0.2)
+        assert found["across_mm"] < 0.1
+
+
+def test_what_is_missed_across_shows_in_the_end_position_and_not_in_the_distance():
+    missed = scattered(5, scatter_m=1e-6, common_m=0.0)
+    missed.path[:, -1, 1] = 0.06
+    found = missed.rms()
+    assert found["end_position_mm"] == pytest.approx(60.0, rel=1e-3)
+    assert found["across_mm"] == pytest.approx(60.0, rel=1e-3)
+    assert missed.median_mm() == pytest.approx(60.0, rel=1e-3)
+    assert found["delta_s_mm"] < 0.01
+    assert found["along_mm"] < 0.01
 
 
 def test_one_spoilt_run_hardly_lifts_the_floor():

@@ -22,7 +22,16 @@ from agvbench.reporting.content import (
 from agvbench.reporting.figures.residuals import AFTER, BEFORE, draw_dependence, draw_floor
 from agvbench.reporting.sections.base import Section
 from agvbench.workflows.diagnosis_files import ShownDiagnosis
-from agvbench.workflows.diagnosis_words import QUANTITIES, items, left_in_words, mapping, next_in_words, number
+from agvbench.workflows.diagnosis_words import (
+    COLUMNS,
+    DEFINITIONS,
+    QUANTITIES,
+    items,
+    left_in_words,
+    mapping,
+    next_in_words,
+    number,
+)
 from agvbench.workflows.report import ReportData
 
 if TYPE_CHECKING:
@@ -99,10 +108,10 @@ def _errors(content: Mapping[str, Any]) -> Table:
     for name, title in QUANTITIES.items():
         errors = mapping(held.get(name))
         if errors:
-            rows.append([title, *(number(errors.get(key)) for key in ("before", "after", "floor"))])
-    columns = [Column("quantity", "root mean square"), *(Column(c, c, 2) for c in ("before", "after", "floor"))]
+            rows.append([title, *(number(errors.get(key)) for key in COLUMNS)])
+    columns = [Column("quantity", "root mean square"), *(Column(key, title, 2) for key, title in COLUMNS.items())]
     runs = number(held.get("runs"))
-    return Table("held_out", f"Prediction errors of {runs:.0f} runs held out.", columns, rows)
+    return Table("held_out", f"Prediction errors of {runs:.0f} runs held out.", columns, rows, note=DEFINITIONS)
 
 
 def _pictures(residuals: pd.DataFrame) -> list[Block]:
