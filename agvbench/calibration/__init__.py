@@ -1,5 +1,6 @@
 """From measured runs to static maps."""
 
+from agvbench.calibration.arc_samples import CALIBRATION_EXPERIMENTS
 from agvbench.calibration.axles import axle_angles_from_arc, axle_angles_from_curvature
 from agvbench.calibration.calibrate import Calibration, calibrate
 from agvbench.calibration.circle import CircleFit, CircleFits, fit_circle, fit_circles
@@ -18,6 +19,7 @@ from agvbench.calibration.points import CurvePoints
 from agvbench.calibration.quaternion import quaternion_to_heading
 
 __all__ = [
+    "CALIBRATION_EXPERIMENTS",
     "Calibration",
     "CircleFit",
     "CircleFits",

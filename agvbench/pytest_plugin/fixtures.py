@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from agvbench.errors import AgvbenchError
-from agvbench.pytest_plugin.collecting import chosen, experiment, is_bench, repeat, run_name
+from agvbench.pytest_plugin.collecting import chosen, experiment, is_bench, phase, repeat, run_name
 from agvbench.pytest_plugin.options import given_options, option
 
 if TYPE_CHECKING:
@@ -48,6 +48,10 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
             config.stash[SESSION] = bench_session = stack.enter_context(opened)
         except AgvbenchError as error:
             raise pytest.UsageError(str(error)) from None
+        benches = [item for item in session.items if is_bench(item)]
+        bench_session.expect(
+            [run_name(item) for item in benches], [run_name(item) for item in benches if phase(item) == 0]
+        )
         reporter = config.pluginmanager.get_plugin("terminalreporter")
         if reporter is not None:
             for notice in bench_session.notices:

@@ -7,8 +7,8 @@ from collections.abc import Generator
 
 import pytest
 
-from agvbench.errors import AgvbenchError
-from agvbench.pytest_plugin.collecting import is_bench
+from agvbench.errors import AgvbenchError, FlagError, PlanError
+from agvbench.pytest_plugin.collecting import is_bench, run_name
 from agvbench.pytest_plugin.fixtures import INTERRUPT, SESSION
 from agvbench.pytest_plugin.options import option
 
@@ -96,9 +96,18 @@ def pytest_runtest_makereport(
     report = yield
     if is_bench(item):
         report.user_properties.append(("agvbench", item.name))
+        if SESSION in item.config.stash and _is_conclusive(report, call):
+            item.config.stash[SESSION].concluded(run_name(item))
         if call.excinfo is not None and isinstance(call.excinfo.value, AgvbenchError):
             report.longrepr = f"{item.name}: {call.excinfo.value}"
     return report
+
+
+def _is_conclusive(report: pytest.TestReport, call: pytest.CallInfo[None]) -> bool:
+    """Whether nothing more is to be expected of a benchmark: it was driven, or cannot be."""
+    if call.excinfo is not None and isinstance(call.excinfo.value, PlanError | FlagError):
+        return True
+    return report.skipped or (report.when == "call" and report.passed)
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 
 from agvbench.campaign import CampaignWriter
@@ -31,7 +31,8 @@ _MOST_UNSEEN = 3
 class Bench:
     """Drives orders over `link` and records them with `writer`.
 
-    ``calibrate`` is called once, when the first order asks for the calibrated model; ``corrected`` is the model of the
+    ``calibrate`` is called once, with the calibration runs that are still `awaited`, when the first order asks for the
+    calibrated model; ``corrected`` is the model of the
     condition of that name, if there is one.
     """
 
@@ -43,7 +44,7 @@ class Bench:
         link: RunnerLink,
         writer: CampaignWriter,
         campaign_time: CampaignTime,
-        calibrate: Callable[[], VehicleModel],
+        calibrate: Callable[[Collection[str]], VehicleModel],
         recorded: Mapping[str, Run],
         corrected: VehicleModel | None = None,
         session: SessionBegan = _UNNAMED,
@@ -60,6 +61,7 @@ class Bench:
         self._latch, self.pause = Latch(), Pause(writer.path)
         self._recorded, self._session = recorded, session
         self._unseen = 0
+        self.awaited: set[str] = set()
         workspace = Workspace.parse(settings.workspace)
         safety = replace(DEFAULT_SAFETY, flickers=not self._identity.simulated, exchange_s=settings.exchange)
         self._supervisor = Supervisor(workspace, nominal.neutral, safety)
@@ -80,13 +82,30 @@ class Bench:
                 raise FlagError("no corrected model", where="--corrected", remedy="give what a diagnosis wrote")
             return self._corrected
         if self._calibrated is None:
-            self._calibrated = self._calibrate()
+            self._calibrated = self._calibrate(self.awaited)
         return self._calibrated
 
     @property
     def failure(self) -> Failure | None:
         """What ended the driving: the first failure of hardware, bus or disk."""
         return self._latch.failure
+
+    @property
+    def is_resumed(self) -> bool:
+        """Whether runs were recorded before this session."""
+        return bool(self._recorded)
+
+    def check(self) -> None:
+        """Raise `LinkError` if a failure ended the driving before."""
+        self._latch.check()
+
+    def outlook(self, run_ids: Collection[str]) -> str:
+        """Return in words what is left to drive of these runs, and which of them were rejected before."""
+        recorded = {run_id: [r for r in self._recorded.values() if _is_attempt(r, run_id)] for run_id in run_ids}
+        done = sum(any(run.is_ok for run in runs) for runs in recorded.values())
+        again = [run_id for run_id, runs in recorded.items() if runs and not any(run.is_ok for run in runs)]
+        words = f"resumed: {done} runs done, {len(recorded) - done} to drive"
+        return f"{words}; rejected before and tried again: {', '.join(again)}" if again else words
 
     @property
     def departure(self) -> Departure:
@@ -106,7 +125,7 @@ class Bench:
         RecordingError
             If the run was driven and cannot be recorded; the bench drives no more, either.
         """
-        self._latch.check()
+        self.check()
         order = replace(order, session=self._session.name)
         with self._latch.remembering():
             for attempt in range(1, self._attempts(order) + 1):
@@ -221,3 +240,7 @@ class Bench:
 
 def _attempt_id(order: DriveOrder, attempt: int) -> str:
     return order.run_id if attempt == 1 else f"{order.run_id}-attempt{attempt}"
+
+
+def _is_attempt(run: Run, run_id: str) -> bool:
+    return run.run_id == run_id or run.run_id.startswith(f"{run_id}-attempt")

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Collection
+from dataclasses import replace
+
 from agvbench.campaign import Campaign, CampaignWriter
-from agvbench.errors import AgvbenchError, FitError
+from agvbench.errors import AgvbenchError, FitError, VehicleError
 from agvbench.model import VehicleModel
 
 VEHICLE_FILE = "vehicle.toml"
 MEASUREMENTS_TABLE = "calibration"
+RUNS_DIGEST = "calibration_runs_sha256"
+"""The entry of a model's provenance that says from which runs a bench calibrated it."""
 
 
-def calibrate_campaign(writer: CampaignWriter, *, maps: str) -> VehicleModel:
+def calibrate_campaign(writer: CampaignWriter, *, maps: str, awaited: Collection[str] = ()) -> VehicleModel:
     """Fit the static maps from what `writer` recorded so far; keep model and measurements beside the campaign.
 
-    What was fitted before an interruption is taken as it is: runs driven before and after belong to one calibration.
+    ``awaited`` are calibration runs of the session that are still to be driven: there must be none. A model that was
+    kept is taken if it was fitted from the very runs that the campaign has, or if runs were driven with it.
 
     Raises
     ------
     FitError
-        If the campaign's calibration runs do not determine the maps.
+        If calibration runs are missing, or do not determine the maps.
     VehicleError
         If the model kept beside the campaign cannot be read.
     RecordingError
@@ -26,16 +33,42 @@ def calibrate_campaign(writer: CampaignWriter, *, maps: str) -> VehicleModel:
     """
     from agvbench.calibration import calibrate
 
-    if (writer.path / VEHICLE_FILE).exists():
-        return VehicleModel.load(writer.path / VEHICLE_FILE)
     try:
-        calibration = calibrate(Campaign.open(writer.path), maps=maps)
+        campaign = Campaign.open(writer.path)
+        digest = _runs_digest(campaign)
+        if (kept := _kept_model(writer, campaign, digest)) is not None:
+            return kept
+        if awaited:
+            value = f"{len(awaited)} calibration runs were not driven, {min(awaited)} among them"
+            raise FitError("the calibration is not complete", value=value)
+        calibration = calibrate(campaign, maps=maps)
+    except VehicleError:
+        raise
     except AgvbenchError as error:
         raise FitError(
             f"cannot calibrate ({error})",
             where=writer.path,
             remedy="drive bench_calibration.py first, or give --calibration FILE",
         ) from None
+    model = replace(calibration.model, provenance={**calibration.model.provenance, RUNS_DIGEST: digest})
     writer.write_table(MEASUREMENTS_TABLE, calibration.measurements)
-    writer.write_beside(VEHICLE_FILE, calibration.model.save)
-    return calibration.model
+    writer.write_beside(VEHICLE_FILE, model.save)
+    return model
+
+
+def _kept_model(writer: CampaignWriter, campaign: Campaign, digest: str) -> VehicleModel | None:
+    """Return the model beside the campaign, or None where there is none or it is of other calibration runs."""
+    path = writer.path / VEHICLE_FILE
+    if not path.exists():
+        return None
+    model = VehicleModel.load(path)
+    was_driven = any(run.condition == "calibrated" and run.is_ok for run in campaign)
+    return model if was_driven or model.provenance.get(RUNS_DIGEST) == digest else None
+
+
+def _runs_digest(campaign: Campaign) -> str:
+    """Return a digest of the ids of the calibration runs that count."""
+    from agvbench.calibration import CALIBRATION_EXPERIMENTS
+
+    used = sorted(run.run_id for run in campaign if run.is_ok and run.experiment in CALIBRATION_EXPERIMENTS)
+    return hashlib.sha256("\n".join(used).encode()).hexdigest()

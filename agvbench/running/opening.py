@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from datetime import datetime
@@ -131,8 +131,8 @@ def _bench(
     recorded: Mapping[str, Run],
     campaign_time: CampaignTime,
 ) -> Bench:
-    def calibrated() -> VehicleModel:
-        return models.get("calibrated") or calibrate_campaign(writer, maps=settings.maps)
+    def calibrated(awaited: Collection[str]) -> VehicleModel:
+        return models.get("calibrated") or calibrate_campaign(writer, maps=settings.maps, awaited=awaited)
 
     return Bench(
         settings,

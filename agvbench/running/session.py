@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 from agvbench.errors import PlanError
@@ -66,6 +66,18 @@ class BenchSession:
         """What ended the driving before its time, if anything did."""
         return None if self._bench is None else self._bench.failure
 
+    def expect(self, run_ids: Collection[str], calibration: Collection[str]) -> None:
+        """Take note of the runs that were chosen, and of those among them that calibrate: all are awaited."""
+        if self._bench is not None:
+            self._bench.awaited = set(calibration)
+            if self._bench.is_resumed:
+                self.notices.append(self._bench.outlook(run_ids))
+
+    def concluded(self, run_id: str) -> None:
+        """Take note of a run that was driven, rejected for good, or cannot be driven: it is awaited no more."""
+        if self._bench is not None:
+            self._bench.awaited.discard(run_id)
+
     def model(self, condition: str) -> VehicleModel:
         """Return the vehicle model that commands are computed with under `condition`."""
         return self._models[condition] if self._bench is None else self._bench.model(condition)
@@ -86,7 +98,11 @@ class BenchSession:
             If the vehicle cannot drive it, or not inside the workspace.
         NotDrivenError
             If that was said before.
+        LinkError
+            If the bench drives no more.
         """
+        if self._bench is not None:
+            self._bench.check()
         key = (trajectory, condition)
         if key in self._undrivable:
             raise NotDrivenError(f"cannot be driven, as its first repeat says: {self._undrivable[key]}")

@@ -11,11 +11,10 @@ import sys
 
 import pytest
 
-from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
-from agvbench.errors import CampaignError, FitError, FlagError, LinkError
+from agvbench.campaign import Campaign
+from agvbench.errors import CampaignError, FlagError, LinkError
 from agvbench.model import thesis_vehicle
 from agvbench.running.benchmark_files import benchmark_name, find_benchmark
-from agvbench.running.calibrating import VEHICLE_FILE, calibrate_campaign
 from agvbench.running.directory import shown
 from agvbench.running.opening import open_session
 from agvbench.running.placers.auto import Auto
@@ -105,17 +104,6 @@ def test_one_that_drives_back_itself_begins_at_other_random_numbers_too(tmp_path
     with open_session({"place": "auto"}, out=str(tmp_path / "c"), resume=False, dry_run=False) as session:
         session.driver("left", experiment="free", repeat=1).hold(drive=0.5, front=0.5, rear=0.0, for_s=0.3)
     assert asked == ["left-again2"]
-
-
-def test_a_calibration_that_was_made_before_an_interruption_is_kept(tmp_path):
-    nominal = thesis_vehicle()
-    writer = CampaignWriter.create(
-        tmp_path, CampaignHeader(1, "c", "v", 0.181, 0.121, nominal.command_unit, nominal.neutral, 100.0)
-    )
-    with pytest.raises(FitError, match="cannot calibrate"):
-        calibrate_campaign(writer, maps="default")
-    nominal.save(tmp_path / VEHICLE_FILE)
-    assert calibrate_campaign(writer, maps="default") == nominal
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,77 @@
+"""A session calibrates from all of its calibration runs or not at all, however often it is interrupted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from agvbench.errors import FitError, LinkError
+from agvbench.model import VehicleModel, thesis_vehicle
+from agvbench.running.calibrating import RUNS_DIGEST, VEHICLE_FILE
+from agvbench.running.opening import open_session
+from agvbench.running.session import BenchSession
+
+SHARES = (-0.8, -0.4, 0.4, 0.8)
+RUNS = {f"{axle}{share}": (axle, share) for axle in ("front", "rear", "drive") for share in SHARES}
+
+
+@contextmanager
+def session(path: Path, mocap: str = "sim") -> Iterator[BenchSession]:
+    given = {"vehicle": "", "seed": 3, "mocap": mocap}
+    with open_session(given, out=str(path), resume=path.exists(), dry_run=False) as opened:
+        opened.expect(RUNS, RUNS)
+        yield opened
+
+
+def calibrate(opened: BenchSession) -> None:
+    """Drive all calibration runs."""
+    for name, (axle, share) in RUNS.items():
+        experiment = "drive" if axle == "drive" else f"steering_{axle}"
+        opened.driver(name, experiment=experiment, repeat=1).hold(for_s=3.0, **{"drive": 1.0, axle: share})
+        opened.concluded(name)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("undisturbed") / "campaign"
+    with session(path) as opened:
+        calibrate(opened)
+        opened.model("calibrated")
+    return path
+
+
+@pytest.mark.parametrize("left_behind", [False, True], ids=["", "with a vehicle.toml of a part"])
+def test_after_a_stop_in_mid_calibration_the_resumed_session_calibrates_from_all(
+    undisturbed: Path, tmp_path: Path, left_behind: bool
+) -> None:
+    path = tmp_path / "campaign"
+    with session(path, "impaired:frozen@11/1.5:sim") as opened:
+        with pytest.raises(LinkError, match="tracking is frozen"):
+            calibrate(opened)
+        with pytest.raises(LinkError, match="drives no more"):
+            opened.plan(opened.trajectory("1"), "calibrated")
+    assert not (path / VEHICLE_FILE).exists()
+    if left_behind:
+        thesis_vehicle().save(path / VEHICLE_FILE)
+    with session(path) as opened:
+        assert "resumed: 10 runs done, 2 to drive" in opened.notices
+        with pytest.raises(FitError, match="12 calibration runs were not driven, drive-0"):
+            opened.model("calibrated")
+        calibrate(opened)
+        opened.model("calibrated")
+    # The run that was stopped draws other random numbers when it is driven again.
+    now, before = (VehicleModel.load(where / VEHICLE_FILE).provenance for where in (path, undisturbed))
+    for entry in ("runs_used", RUNS_DIGEST):
+        assert now[entry] == before[entry]
+
+
+def test_a_calibration_that_runs_were_driven_with_is_kept(undisturbed: Path) -> None:
+    with session(undisturbed) as opened:
+        calibrated = opened.model("calibrated")
+        opened.driver("turn", experiment="trajectory", repeat=1).trajectory("5", condition="calibrated")
+        opened.driver("more", experiment="drive", repeat=2).hold(for_s=3.0, drive=0.6)
+    with session(undisturbed) as opened:
+        assert opened.model("calibrated") == calibrated
