@@ -1,7 +1,7 @@
 """What calibration buys on vehicles drawn at random: whole bench sessions on ``random_plant``, one a seed.
 
-For each trajectory with both conditions: is the calibrated median of |Δs|, and of |Δδ|, smaller than the
-uncalibrated one?
+For each trajectory with both conditions: is the calibrated median of end position error, heading error and |Δs| smaller
+than the uncalibrated one?
 Prints the share over all plants and trajectories, and every exception. ``--plants 20 --repeats 10`` by default.
 """
 
@@ -19,10 +19,11 @@ from scipy.stats import binomtest
 
 from agvbench.campaign import Campaign
 from agvbench.statistics import pose_errors
+from agvbench.statistics.quantities import QUANTITIES
 
 FIRST_SEED = 1000
 PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
-QUANTITIES = ("delta_s_mm", "delta_heading_deg")
+COLUMNS = [quantity.column for quantity in QUANTITIES]
 
 
 def _drive(seed: int, repeats: int, folder: Path) -> pd.DataFrame:
@@ -38,10 +39,8 @@ def _drive(seed: int, repeats: int, folder: Path) -> pd.DataFrame:
 
 
 def _medians(errors: pd.DataFrame) -> pd.DataFrame:
-    absolute = errors.assign(**{name: errors[name].abs() for name in QUANTITIES})
-    table = absolute.pivot_table(
-        index=["plant", "trajectory"], columns="condition", values=list(QUANTITIES), aggfunc="median"
-    )
+    absolute = errors.assign(**{name: errors[name].abs() for name in COLUMNS})
+    table = absolute.pivot_table(index=["plant", "trajectory"], columns="condition", values=COLUMNS, aggfunc="median")
     long = table.stack(level=0, future_stack=True).rename_axis(["plant", "trajectory", "quantity"])
     return long.dropna(subset=["uncalibrated", "calibrated"])
 
@@ -57,7 +56,7 @@ def main() -> None:
         drives = list(pool.map(lambda seed: _drive(seed, arguments.repeats, Path(folder)), seeds))
     medians = _medians(pd.concat(drives))
     better = medians["calibrated"] < medians["uncalibrated"]
-    for name, cells in [("both", better), *((q, better.xs(q, level="quantity")) for q in QUANTITIES)]:
+    for name, cells in [("all", better), *((q, better.xs(q, level="quantity")) for q in COLUMNS)]:
         interval = binomtest(int(cells.sum()), len(cells)).proportion_ci(method="exact")
         print(
             f"{name:20s} calibrated better in {cells.sum():4d} of {len(cells):4d} medians: {cells.mean():6.1%}"
