@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from types import ModuleType
 
 from agvbench import __version__
+from agvbench.cli._interrupts import EXIT_CODE, Interrupts
 from agvbench.errors import AgvbenchError, FlagError
 
 _EPILOG = """\
@@ -85,27 +86,41 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code."""
     for name in _ONE_THREAD:
         os.environ.setdefault(name, "1")  # read when numpy is imported, which no command has done yet
+    given = sys.argv[1:] if argv is None else argv
+    who = " ".join(["agvbench", *given[:1]])
+    with Interrupts() as interrupts:
+        try:
+            code = _run(given)
+            if not interrupts.pressed or code in (0, EXIT_CODE):
+                return code
+        except AgvbenchError as error:
+            if not interrupts.pressed:
+                print(f"{who}: {error}", file=sys.stderr)
+                return error.exit_code
+        except KeyboardInterrupt as interrupt:
+            why = f": {interrupt}" if str(interrupt) else ""
+            print(f"{who}: interrupted{why}", file=sys.stderr)
+            return int(getattr(interrupt, "exit_code", EXIT_CODE))  # another signal than Ctrl-C brings its own
+        except BrokenPipeError:
+            # The reader (head, less) has gone: nothing is left to say, and nobody to say it to.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 0
+        except Exception as error:  # noqa: BLE001 - whatever it is, who runs a lab should not have to read a traceback
+            if not interrupts.pressed:
+                from agvbench.cli._own_mistake import tell_own_mistake
+
+                return tell_own_mistake(given[0], error)
+        print(f"{who}: interrupted", file=sys.stderr)
+        return EXIT_CODE
+
+
+def _run(given: Sequence[str]) -> int:
     parser = build_parser()
     if "_ARGCOMPLETE" in os.environ:
         import argcomplete
 
         argcomplete.autocomplete(parser)
-    arguments, unknown = parser.parse_known_args(argv)
-    try:
-        if unknown:
-            raise _unknown_option(parser, arguments.command, unknown[0])
-        return int(arguments.run(arguments))
-    except AgvbenchError as error:
-        print(f"agvbench {arguments.command}: {error}", file=sys.stderr)
-        return error.exit_code
-    except KeyboardInterrupt as interrupt:
-        print(f"agvbench {arguments.command}: interrupted", file=sys.stderr)
-        return int(getattr(interrupt, "exit_code", 130))  # another signal than Ctrl-C brings its own
-    except BrokenPipeError:
-        # The reader (head, less) has gone: nothing is left to say, and nobody to say it to.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
-    except Exception as error:  # noqa: BLE001 - whatever it is, who runs a lab should not have to read a traceback
-        from agvbench.cli._own_mistake import tell_own_mistake
-
-        return tell_own_mistake(arguments.command, error)
+    arguments, unknown = parser.parse_known_args(given)
+    if unknown:
+        raise _unknown_option(parser, arguments.command, unknown[0])
+    return int(arguments.run(arguments))

@@ -48,6 +48,9 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
             config.stash[SESSION] = bench_session = stack.enter_context(opened)
         except AgvbenchError as error:
             raise pytest.UsageError(str(error)) from None
+        except KeyboardInterrupt as interrupt:
+            config.stash[INTERRUPT] = interrupt
+            raise
         benches = [item for item in session.items if is_bench(item)]
         bench_session.expect(
             [run_name(item) for item in benches], [run_name(item) for item in benches if phase(item) == 0]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Generator
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -11,6 +12,9 @@ from agvbench.errors import AgvbenchError, FlagError, PlanError
 from agvbench.pytest_plugin.collecting import is_bench, run_name
 from agvbench.pytest_plugin.fixtures import INTERRUPT, SESSION
 from agvbench.pytest_plugin.options import option
+
+if TYPE_CHECKING:
+    from agvbench.running.session import BenchSession
 
 _BAR = 24
 _PROGRESS = pytest.StashKey["Progress"]()
@@ -124,23 +128,32 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
     """End with the summary table, and say where campaign and report are."""
     if _PROGRESS in config.stash:
         config.stash[_PROGRESS].end()
+    why = str(config.stash[INTERRUPT]) or "Ctrl-C" if INTERRUPT in config.stash else ""
     session = config.stash.get(SESSION, None)
     if session is None:
+        if why:
+            terminalreporter.write_line(f"ended by {why}, nothing was driven")
         return
     from agvbench.running.directory import shown
 
-    if INTERRUPT in config.stash:
-        why = str(config.stash[INTERRUPT]) or "Ctrl-C"
-        terminalreporter.write_line(
-            f"ended by {why}, the vehicle was stopped; go on with --resume --out {shown(session.directory)}"
-        )
+    directory = shown(session.directory)
+    if why:
+        terminalreporter.write_line(f"ended by {why}, the vehicle was stopped; go on with --resume --out {directory}")
         return
     if config.getoption("no_summary") and not session.is_dry:
         return
+    try:
+        _conclude(terminalreporter, config, session)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"no report; agvbench report {directory} writes it") from None
+
+
+def _conclude(terminalreporter: pytest.TerminalReporter, config: pytest.Config, session: BenchSession) -> None:
     from agvbench.reporting.after_bench import conclude
     from agvbench.reporting.dry_run import dry_run_table
+    from agvbench.running.directory import shown
 
     if session.is_dry:
         terminalreporter.write_line(dry_run_table(session.planned))
-        return
-    terminalreporter.write_line(conclude(shown(session.directory), report=not option(config, "--no-report")))
+    else:
+        terminalreporter.write_line(conclude(shown(session.directory), report=not option(config, "--no-report")))

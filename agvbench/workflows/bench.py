@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from typing import Any
 
 import pytest
@@ -13,6 +13,8 @@ from agvbench.running.directory import choose_directory
 from agvbench.running.options import OPTIONS, SESSION_OPTIONS, destination, prefixed
 from agvbench.running.settings import SETTINGS_FILE, BenchSettings
 
+_SIGNALLED = 128
+"""Exit codes above are those of sessions that a signal ended, and that have said so."""
 DEFAULT = ("calibration", "trajectories")
 # The command line has imported agvbench before pytest looks for plugins, which does no harm here.
 _IN_PROCESS = "ignore:Module already imported:pytest.PytestAssertRewriteWarning"
@@ -40,11 +42,32 @@ def run_benchmarks(
         arguments += ["-k", only]
     if not summary:
         arguments += ["--no-summary", "-q"]
-    code = pytest.main(arguments)
+    ending = _Ending()
+    try:
+        code = pytest.main(arguments, plugins=[ending])
+    except KeyboardInterrupt:
+        if ending.code < _SIGNALLED:
+            raise
+        code = ending.code
     if code == pytest.ExitCode.NO_TESTS_COLLECTED:
         where, value = ("-k", only) if only else ("agvbench bench", " ".join(names))
         raise FlagError("no run to drive", where=where, value=value, remedy="see what there is with --dry-run")
     return 2 if code == pytest.ExitCode.USAGE_ERROR else int(code)
+
+
+class _Ending:
+    """Ends pytest by Ctrl-C without its own words on it, and keeps the session's exit code."""
+
+    code = 0
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_keyboard_interrupt(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
+        raise excinfo.value
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_sessionfinish(self, session: pytest.Session) -> Generator[None, None, None]:
+        yield
+        self.code = int(session.exitstatus)
 
 
 def _begun_with(out: str | None) -> BenchSettings:
