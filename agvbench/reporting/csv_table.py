@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import unicodedata
 from typing import TYPE_CHECKING
 
 from agvbench.reporting.content import Table, Value, plain
@@ -26,7 +27,7 @@ def frame_to_csv(frame: pd.DataFrame) -> str:
 def _csv(header: list[str], rows: list[list[Value]]) -> str:
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
-    writer.writerow(header)
+    writer.writerow([_cell(name) for name in header])
     writer.writerows([_cell(value) for value in row] for row in rows)
     return file.getvalue()
 
@@ -38,4 +39,5 @@ def _cell(value: Value) -> Value:
     if not isinstance(value, str):
         return value
     text = plain(value)
-    return f"'{text}" if text[:1] in {"=", "+", "-", "@"} else text
+    # Spreadsheets may read full-width and superscript signs as the ASCII ones.
+    return f"'{text}" if unicodedata.normalize("NFKC", text[:1]) in {"=", "+", "-", "@"} else text

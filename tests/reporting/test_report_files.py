@@ -117,10 +117,13 @@ def test_figures_draw_every_condition_in_its_own_colour(report):
 
 
 def test_spreadsheets_take_no_name_for_a_formula():
-    frame = pd.DataFrame({"name": ["=1+1", "@x", "-2", HOSTILE], "value": [1.0, math.nan, -3.0, 4.0]})
+    frame = pd.DataFrame(
+        {"name": ["=1+1", "@x", "-2", "＝1+1", "⁺1", HOSTILE], "=v": [1.0, math.nan, -3.0, 4.0, 5.0, 6.0]}
+    )
     rows = list(csv.reader(frame_to_csv(frame).splitlines()))
-    assert [row[0][:2] for row in rows[1:]] == ["'=", "'@", "'-", "<s"]
-    assert [row[1] for row in rows[1:]] == ["1.0", "", "-3.0", "4.0"]
+    assert rows[0] == ["name", "'=v"]
+    assert [row[0][:2] for row in rows[1:]] == ["'=", "'@", "'-", "'＝", "'⁺", "<s"]
+    assert [row[1] for row in rows[1:]] == ["1.0", "", "-3.0", "4.0", "5.0", "6.0"]
 
 
 @pytest.mark.parametrize(
