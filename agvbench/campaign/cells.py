@@ -33,7 +33,7 @@ class Cells:
     def text(self, column: str) -> pa.ChunkedArray:
         """Return a column as text."""
         if column not in self.table.column_names:
-            names = ", ".join(self.table.column_names[:20])
+            names = ", ".join(name[:40] for name in self.table.column_names[:20])
             raise FileError(
                 f"has no column {column!r} (it has {names})", where=self.path, remedy="correct the mapping's columns"
             )

@@ -14,6 +14,7 @@ from agvbench.errors import CampaignError
 
 _TYPES: dict[Kind, pa.DataType] = {"text": pa.string(), "number": pa.float64(), "count": pa.int64(), "flag": pa.bool_()}
 _WORDS: dict[Kind, str] = {"text": "text", "number": "a number", "count": "a whole number", "flag": "true or false"}
+_LONGEST_VALUE = 80
 UNKNOWN_COUNT = -1
 
 
@@ -131,9 +132,17 @@ def _bad_cell(values: Any, column: Column, where: object, accepts: Callable[[Any
         if not good:
             remedy = "use a decimal point" if _has_decimal_comma(cell) else "correct the cell"
             return CampaignError(
-                f"row {row}: {column.name} is not {_WORDS[column.kind]}", where=where, value=repr(cell), remedy=remedy
+                f"row {row}: {column.name} is not {_WORDS[column.kind]}",
+                where=where,
+                value=_short(repr(cell)),
+                remedy=remedy,
             )
     return _wrong_type(column, where, values.type)
+
+
+def _short(text: str) -> str:
+    """Return text that fits a line: a cell may hold the rest of its file, if a quote is not closed."""
+    return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]}…"
 
 
 def _has_decimal_comma(cell: object) -> bool:

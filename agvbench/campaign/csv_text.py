@@ -74,8 +74,10 @@ def _header(path: Path, delimiter: str, encoding: str, skip_rows: int) -> list[s
         raise FileError(f"cannot be read ({error.strerror})", where=path, remedy="check the path") from None
     except UnicodeError:
         raise FileError(f"is not {encoding} text", where=path, remedy=f"save it as {encoding.upper()}") from None
-    except LookupError:
-        raise FileError("encoding is unknown", where=path, value=encoding, remedy="give utf-8 or latin-1") from None
+    except (LookupError, ValueError):  # ValueError: a name with a NUL
+        raise FileError(
+            "encoding is unknown", where=path, value=repr(encoding), remedy="give utf-8 or latin-1"
+        ) from None
     if not line.strip() or "\0" in line:
         raise FileError("has no header line", where=path, remedy="give a CSV whose first line names its columns")
     if not line.endswith(("\n", "\r")):
@@ -88,5 +90,5 @@ def _header(path: Path, delimiter: str, encoding: str, skip_rows: int) -> list[s
     names = [name.strip() for name in next(csv.reader([line], delimiter=delimiter))]
     for name in names:
         if names.count(name) > 1:
-            raise FileError("two columns have one name", where=path, value=name or "(empty)", remedy="rename one")
+            raise FileError("two columns have one name", where=path, value=name[:80] or "(empty)", remedy="rename one")
     return names

@@ -15,6 +15,7 @@ from agvbench.campaign.mapping_schema import ISO_8601, TABLES, Mapping, Quantity
 from agvbench.errors import FileError
 from agvbench.text_files import read_toml
 
+_DELIMITERS = ",;\t|: /#&!~^*%$"
 _SHIPPED = Path(__file__).parent / "mappings"
 
 
@@ -83,6 +84,11 @@ def _check(mapping: Mapping, path: Path) -> None:
         units.factor(quantity.unit, known, f"{path}: columns.{name}.unit")
     if columns.time.unit != ISO_8601:
         units.factor(columns.time.unit, {**units.TIME, ISO_8601: 1.0}, f"{path}: columns.time.unit")
+    if mapping.csv.delimiter not in _DELIMITERS:
+        raise FileError(
+            "csv.delimiter cannot separate cells", where=path, value=repr(mapping.csv.delimiter),
+            limit="one of " + " ".join(map(repr, _DELIMITERS)), remedy="save the recording with one of these",
+        )  # fmt: skip
     if columns.quaternion and columns.quaternion.floor_x[-1] == columns.quaternion.floor_y[-1]:
         where = f"{path}: columns.quaternion"
         raise FileError("floor_x and floor_y are one axis", where=where, remedy="give two of x, y, z")

@@ -13,8 +13,11 @@ from agvbench.types import CommandUnit
 Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
 ISO_8601 = "iso8601"
 
-_Positive = Annotated[float, msgspec.Meta(gt=0.0)]
-_NotNegative = Annotated[float, msgspec.Meta(ge=0.0)]
+# Bounded, so that no product of them overflows; NaN is within no bound.
+_MOST = 1e12
+_Number = Annotated[float, msgspec.Meta(ge=-_MOST, le=_MOST)]
+_Positive = Annotated[float, msgspec.Meta(gt=0.0, le=_MOST)]
+_NotNegative = Annotated[float, msgspec.Meta(ge=0.0, le=_MOST)]
 
 
 class _Strict(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
@@ -50,7 +53,7 @@ class Csv(_Strict, frozen=True):
     delimiter: Annotated[str, msgspec.Meta(min_length=1, max_length=1)] = ","
     decimal: Literal[".", ","] = "."
     encoding: str = "utf-8"
-    skip_rows: Annotated[int, msgspec.Meta(ge=0)] = 0
+    skip_rows: Annotated[int, msgspec.Meta(ge=0, le=10_000)] = 0
 
 
 class Time(_Strict, frozen=True):
@@ -66,16 +69,16 @@ class Quantity(_Strict, frozen=True):
 
     column: str
     unit: str
-    scale: float = 1.0
-    offset: float = 0.0
+    scale: _Number = 1.0
+    offset: _Number = 0.0
 
 
 class Signal(_Strict, frozen=True):
     """A command column: command = cell · scale + offset, in the vehicle's command unit."""
 
     column: str
-    scale: float = 1.0
-    offset: float = 0.0
+    scale: _Number = 1.0
+    offset: _Number = 0.0
 
 
 class Quaternion(_Strict, frozen=True):

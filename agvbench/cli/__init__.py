@@ -82,6 +82,19 @@ def _unknown_option(parser: argparse.ArgumentParser, command: str, given: str) -
     return FlagError("no such option", value=given, remedy=f"{meant}agvbench {command} --help lists all")
 
 
+def _require_utf_8(given: Sequence[str]) -> None:
+    """Refuse an argument of other bytes: tables, which keep names, hold UTF-8 only.
+
+    Raises
+    ------
+    FlagError
+        If there is one.
+    """
+    for argument in given:
+        if not argument.isascii() and any("\udc80" <= character <= "\udcff" for character in argument):
+            raise FlagError("argument is not UTF-8", value=repr(argument), remedy="rename the file or directory")
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code."""
     for name in _ONE_THREAD:
@@ -121,6 +134,7 @@ def _run(given: Sequence[str]) -> int:
 
         argcomplete.autocomplete(parser)
     arguments, unknown = parser.parse_known_args(given)
+    _require_utf_8(given)
     if unknown:
         raise _unknown_option(parser, arguments.command, unknown[0])
     return int(arguments.run(arguments))

@@ -94,6 +94,20 @@ CASES: Cases = {
     "recording-semicolons": ("semicolons that the mapping does not declare", _text(lambda b: b.replace(b",", b";"))),
     "recording-latin-1": ("Latin-1 where UTF-8 is declared", _text(lambda b: b.replace(b"yaw", b"gier\xe4"))),
     "recording-encoding": ("an encoding that there is not", lambda: _import(MAPPING + '\n[csv]\nencoding = "utf-9"\n')),
+    "recording-encoding-nul": (
+        "an encoding whose name has a NUL",
+        lambda: _import(MAPPING + '\n[csv]\nencoding = "utf\\u0000-8"\n'),
+    ),
+    "mapping-delimiter": ("a delimiter that is not ASCII", lambda: _import(MAPPING + '\n[csv]\ndelimiter = "é"\n')),
+    "mapping-delimiter-digit": ("a digit as delimiter", lambda: _import(MAPPING + '\n[csv]\ndelimiter = "0"\n')),
+    "mapping-skip-rows": (
+        "more lines before the header than any file has",
+        lambda: _import(MAPPING + "\n[csv]\nskip_rows = 99999999999\n"),
+    ),
+    "recording-cell-long": (
+        "a quoted cell that holds the rest of the file",
+        _cell("X", 6, '"' + 500 * "abcdefghi " + '"'),
+    ),
     "recording-not-driven": ("no row that was driven", lambda: _import(armed=[0] * 60)),
     "recording-too-short": ("nothing long enough for a run", _mapping("shortest_s = 0.2", "shortest_s = 5.0")),
     "recording-no-rows": ("a header and nothing else", _text(lambda b: b.splitlines()[0] + b"\n")),

@@ -102,3 +102,9 @@ def test_a_choice_of_no_run_is_said_in_one_line(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["bench", "-k", "nosuchrun"]) == 2
     assert "agvbench bench: -k: no run to drive: nosuchrun; see what there is with --dry-run" in capsys.readouterr().err
+
+
+def test_an_argument_that_is_not_utf_8_is_one_line(capsys):
+    assert main(["report", "campaigns/r\udcff"]) == 2
+    line = "agvbench report: argument is not UTF-8: 'campaigns/r\\udcff'; rename the file or directory\n"
+    assert capsys.readouterr().err == line
