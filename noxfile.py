@@ -17,6 +17,7 @@ nox.options.reuse_existing_virtualenvs = True
 nox.options.sessions = ["lint", "tests", "docs"]
 
 LOCK = "requirements.lock"
+PYTHONS = ("3.11", "3.12", "3.13")
 SIDE_BY_SIDE = ("-n", "2", "--dist", "worksteal")
 FIRMWARE_PACKAGES = ["make", "gcc", "libc6-dev", "gcc-avr", "avr-libc", "simavr", "libsimavr-dev"]
 
@@ -38,6 +39,19 @@ def bench(session: nox.Session) -> None:
 def tests(session: nox.Session) -> None:
     """Run all tests; those that depend on the wall clock are repeated once where they fail, and listed at the end."""
     install(session, "test")
+    session.run("pytest", *(session.posargs or SIDE_BY_SIDE))
+
+
+@nox.session(python=PYTHONS)
+def tests_all(session: nox.Session) -> None:
+    """Run all tests on each supported Python, one after another."""
+    tests(session)
+
+
+@nox.session(python=PYTHONS[0], venv_backend="uv")
+def lowest(session: nox.Session) -> None:
+    """Run all tests with the oldest dependencies that pyproject.toml allows, on the oldest Python."""
+    session.install("--quiet", "--resolution", "lowest-direct", "-e", ".[test]")
     session.run("pytest", *(session.posargs or SIDE_BY_SIDE))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -29,4 +30,14 @@ def test_the_page_says_what_the_file_scores(file):
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_the_file_is_as_it_would_be_written_now(file, tmp_path):
     write_trials(tmp_path / "again.json", 5, list(known_trials(file, 5).values()))
-    assert (tmp_path / "again.json").read_bytes() == file.read_bytes()
+    (text, numbers), (published, before) = map(apart, (tmp_path / "again.json", file))
+    assert text == published
+    # SciPy's quantiles differ between versions in the last digits.
+    assert numbers == pytest.approx(before, rel=1e-9, abs=0.0)
+
+
+def apart(file: Path) -> tuple[str, list[float]]:
+    """Return a file's text without its fractions, and the fractions."""
+    fraction = re.compile(r"-?\d+\.\d+(?:e-?\d+)?")
+    text = file.read_text(encoding="utf-8")
+    return fraction.sub("…", text), [float(number) for number in fraction.findall(text)]
