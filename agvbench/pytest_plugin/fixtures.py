@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 INTERRUPT = pytest.StashKey[KeyboardInterrupt]()
 """What ended the session before its time."""
+STOPPED_IN = pytest.StashKey[str]()
+"""The run in which a failure ended the driving."""
 SESSION = pytest.StashKey["BenchSession"]()
 
 
@@ -79,11 +81,19 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """Say last of all what ended the driving: later failures only repeat it."""
+    """Say last of all what ended the driving."""
+    if (line := stop_line(config)) is not None and INTERRUPT not in config.stash:
+        print(line, file=sys.stderr)
+
+
+def stop_line(config: pytest.Config) -> str | None:
+    """Return the line that says which failure ended the driving, and in which run; None where none did."""
     failure = config.stash[SESSION].failure if SESSION in config.stash else None
-    if failure is not None and INTERRUPT not in config.stash:
-        remedy = "" if failure.remedy else "; mend it, and go on with --resume"
-        print(f"ERROR: the bench was stopped: {failure}{remedy}", file=sys.stderr)
+    if failure is None:
+        return None
+    where = f" in run {config.stash[STOPPED_IN]}" if STOPPED_IN in config.stash else ""
+    remedy = "" if failure.remedy else "; correct it, then continue with --resume"
+    return f"ERROR: the bench was stopped{where}: {failure}{remedy}"
 
 
 @pytest.fixture(scope="session")

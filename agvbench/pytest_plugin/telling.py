@@ -10,14 +10,16 @@ import pytest
 
 from agvbench.errors import AgvbenchError, FlagError, PlanError
 from agvbench.pytest_plugin.collecting import is_bench, run_name
-from agvbench.pytest_plugin.fixtures import INTERRUPT, SESSION
+from agvbench.pytest_plugin.fixtures import INTERRUPT, SESSION, STOPPED_IN, stop_line
 from agvbench.pytest_plugin.options import option
 
 if TYPE_CHECKING:
     from agvbench.running.session import BenchSession
 
 _BAR = 24
+_STOPPED = "stopped"
 _PROGRESS = pytest.StashKey["Progress"]()
+_NOT_DRIVEN = pytest.StashKey[int]()
 
 
 class Progress:
@@ -70,13 +72,18 @@ def _progress(session: pytest.Session) -> Progress | None:
     return config.stash[_PROGRESS]
 
 
-@pytest.hookimpl(wrapper=True, tryfirst=True)
-def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
-    """Draw the progress line before each benchmark."""
-    progress = _progress(item.session) if is_bench(item) else None
-    if progress is not None:
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item) -> bool | None:
+    """Draw the progress line before each benchmark; after a failure that ended the driving, only count it."""
+    if not is_bench(item):
+        return None
+    stash = item.config.stash
+    if SESSION in stash and stash[SESSION].failure is not None:
+        stash[_NOT_DRIVEN] = stash.get(_NOT_DRIVEN, 0) + 1
+        return True
+    if (progress := _progress(item.session)) is not None:
         progress.begin(item.name.removeprefix("bench_"))
-    return (yield)
+    return None
 
 
 @pytest.hookimpl(wrapper=True)
@@ -104,7 +111,21 @@ def pytest_runtest_makereport(
             item.config.stash[SESSION].concluded(run_name(item))
         if call.excinfo is not None and isinstance(call.excinfo.value, AgvbenchError):
             report.longrepr = f"{item.name}: {call.excinfo.value}"
+        _tell_stop(item, report)
     return report
+
+
+def _tell_stop(item: pytest.Item, report: pytest.TestReport) -> None:
+    """Say at once what ended the driving, and in which run; its report is counted, and not printed again."""
+    stash = item.config.stash
+    if SESSION not in stash or stash[SESSION].failure is None or STOPPED_IN in stash:
+        return
+    stash[STOPPED_IN] = run_name(item)
+    report.user_properties.append((_STOPPED, True))
+    reporter = item.config.pluginmanager.get_plugin("terminalreporter")
+    if reporter is not None:
+        stash[_PROGRESS].end()
+        reporter.write_line(str(stop_line(item.config)))
 
 
 def _is_conclusive(report: pytest.TestReport, call: pytest.CallInfo[None]) -> bool:
@@ -119,6 +140,8 @@ def pytest_report_teststatus(report: pytest.TestReport | pytest.CollectReport) -
     """Leave the dots of passed benchmarks to the progress line."""
     if not isinstance(report, pytest.TestReport) or "agvbench" not in dict(report.user_properties):
         return None
+    if _STOPPED in dict(report.user_properties):
+        return _STOPPED, "", ""
     if report.when == "call":
         return report.outcome, "", ""
     return None
@@ -140,6 +163,8 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
     if why:
         terminalreporter.write_line(f"ended by {why}, the vehicle was stopped; go on with --resume --out {directory}")
         return
+    if count := config.stash.get(_NOT_DRIVEN, 0):
+        terminalreporter.write_line(f"{count} runs after it were not driven")
     if config.getoption("no_summary") and not session.is_dry:
         return
     try:

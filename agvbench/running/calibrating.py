@@ -35,12 +35,15 @@ def calibrate_campaign(writer: CampaignWriter, *, maps: str, awaited: Collection
 
     try:
         campaign = Campaign.open(writer.path)
-        digest = _runs_digest(campaign)
+        used = _calibration_runs(campaign)
+        digest = hashlib.sha256("\n".join(used).encode()).hexdigest()
         if (kept := _kept_model(writer, campaign, digest)) is not None:
             return kept
         if awaited:
             value = f"{len(awaited)} calibration runs were not driven, {min(awaited)} among them"
             raise FitError("the calibration is not complete", value=value)
+        if not used:
+            raise FitError("no calibration run counts")
         calibration = calibrate(campaign, maps=maps)
     except VehicleError:
         raise
@@ -66,9 +69,8 @@ def _kept_model(writer: CampaignWriter, campaign: Campaign, digest: str) -> Vehi
     return model if was_driven or model.provenance.get(RUNS_DIGEST) == digest else None
 
 
-def _runs_digest(campaign: Campaign) -> str:
-    """Return a digest of the ids of the calibration runs that count."""
+def _calibration_runs(campaign: Campaign) -> list[str]:
+    """Return the ids of the calibration runs that count, in order."""
     from agvbench.calibration import CALIBRATION_EXPERIMENTS
 
-    used = sorted(run.run_id for run in campaign if run.is_ok and run.experiment in CALIBRATION_EXPERIMENTS)
-    return hashlib.sha256("\n".join(used).encode()).hexdigest()
+    return sorted(run.run_id for run in campaign if run.is_ok and run.experiment in CALIBRATION_EXPERIMENTS)

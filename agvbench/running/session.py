@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
-from agvbench.errors import PlanError
+from agvbench.errors import FitError, PlanError
 from agvbench.model import VehicleModel
 from agvbench.planning import (
     NOTHING_LEFT,
@@ -53,6 +53,7 @@ class BenchSession:
         self._models, self._bench, self._remainders, self._steering = models, bench, remainders, steering
         self._plans: dict[tuple[Trajectory, str], Plan] = {}
         self._undrivable: dict[tuple[Trajectory, str], PlanError] = {}
+        self._not_calibrated: FitError | None = None
         self._hourly: set[tuple[Trajectory, str]] = set()
         self.notices: list[str] = []
 
@@ -117,7 +118,7 @@ class BenchSession:
         return self._plans[key]
 
     def _planned(self, trajectory: Trajectory, condition: str) -> Plan:
-        model = self.model(condition)
+        model = self._model_to_drive(condition)
         if condition != "corrected":
             return plan(trajectory, model, workspace=self.workspace)
         departure = Departure() if self._bench is None else self._bench.departure
@@ -126,6 +127,15 @@ class BenchSession:
         if depends_on_time(made, model, departure):
             self._hourly.add((trajectory, condition))
         return made
+
+    def _model_to_drive(self, condition: str) -> VehicleModel:
+        if condition == "calibrated" and self._not_calibrated is not None:
+            raise NotDrivenError(f"not calibrated, as the first such run says: {self._not_calibrated}")
+        try:
+            return self.model(condition)
+        except FitError as error:
+            self._not_calibrated = error
+            raise
 
     def driver(self, run_id: str, *, experiment: str, repeat: int) -> Driver:
         """Return what drives the run `run_id`."""

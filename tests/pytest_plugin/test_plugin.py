@@ -94,6 +94,30 @@ def test_parallel_workers_are_refused_since_there_is_one_vehicle(pytester):
     result.stdout.fnmatch_lines(["*one vehicle drives one run at a time: leave -n out*"])
 
 
+def test_a_failure_that_ends_the_session_is_said_first_and_last_with_the_name_of_its_run(pytester):
+    pytester.makepyfile(
+        bench_four="""
+        '''For agvbench.'''
+        import pytest
+
+        @pytest.mark.repeats(4)
+        def bench_straight(drive):
+            drive.hold(drive=1.0, for_s=0.3)
+        """
+    )
+    result = pytester.runpytest_subprocess(
+        "-q", "-p", "no:cacheprovider", "--agvbench-agv=impaired:fails@2/0:sim", "--agvbench-no-report"
+    )
+    said = "ERROR: the bench was stopped in run straight-r02: agv adapter: the agv adapter failed: RuntimeError"
+    lines = [line for line in result.outlines if line and "elapsed" not in line]
+    assert lines[0].startswith(said)
+    assert lines[1] == "2 runs after it were not driven"
+    assert lines[-1].startswith("1 passed, 1 stopped")
+    assert result.errlines[-1].startswith(said)
+    assert result.stdout.str().count("RuntimeError") == 1
+    assert result.ret == 2
+
+
 def test_two_benchmarks_of_one_run_name_are_refused(pytester):
     source = "# agvbench\ndef bench_a(drive):\n    drive.hold(drive=1.0, for_s=1.0)\n"
     pytester.makepyfile(bench_one=source, bench_two=source)

@@ -11,6 +11,7 @@ import pytest
 from agvbench.errors import FitError, LinkError
 from agvbench.model import VehicleModel, thesis_vehicle
 from agvbench.running.calibrating import RUNS_DIGEST, VEHICLE_FILE
+from agvbench.running.driver import NotDrivenError
 from agvbench.running.opening import open_session
 from agvbench.running.session import BenchSession
 
@@ -75,3 +76,13 @@ def test_a_calibration_that_runs_were_driven_with_is_kept(undisturbed: Path) -> 
         opened.driver("more", experiment="drive", repeat=2).hold(for_s=3.0, drive=0.6)
     with session(undisturbed) as opened:
         assert opened.model("calibrated") == calibrated
+
+
+def test_without_calibration_runs_the_first_run_that_needs_them_says_so(tmp_path: Path) -> None:
+    with session(tmp_path / "campaign") as opened:
+        opened.expect(["turn"], [])
+        opened.driver("turn", experiment="trajectory", repeat=1).trajectory("5", condition="uncalibrated")
+        with pytest.raises(FitError, match="no calibration run counts"):
+            opened.plan(opened.trajectory("5"), "calibrated")
+        with pytest.raises(NotDrivenError, match="not calibrated, as the first such run says"):
+            opened.plan(opened.trajectory("6"), "calibrated")
