@@ -16,7 +16,7 @@ from agvbench.campaign.header import FILE_NAME, CampaignHeader
 from agvbench.campaign.manifest import Manifest
 from agvbench.campaign.plausibility import check_motion
 from agvbench.campaign.schema import COMMANDS, POSES, RUNS, TABLES
-from agvbench.campaign.source import Source
+from agvbench.campaign.source import SUFFIXES, Source
 from agvbench.campaign.timed import TimedTable, blank_untracked
 from agvbench.errors import CampaignError
 from agvbench.types import Commands, Frames, Pose, Run
@@ -121,6 +121,10 @@ class Campaign:
         """The poses table, in the order of `run_ids` and then of arrival; NaN where not tracked."""
         frame: pd.DataFrame = self._poses.table.to_pandas()
         return frame
+
+    def has_table(self, name: str) -> bool:
+        """Return whether there is a further table of this name."""
+        return any((self.path / f"{name}{suffix}").exists() for suffix in SUFFIXES)
 
     def table(self, name: str) -> pd.DataFrame:
         """Return a further table (``"events"``, ``"provenance"``, …).

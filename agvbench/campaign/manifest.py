@@ -23,9 +23,15 @@ _LINE = re.compile(r"([0-9a-f]{64}) [ *](.+)")
 def record(directory: Path, files: Mapping[str, bytes | memoryview], *, durable: bool = True) -> None:
     """Write `files` (content by path inside the campaign), each whole or not at all, and list their hashes before."""
     hashes = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
-    _append(directory / MANIFEST_FILE, hashes, durable)
+    _append(directory / MANIFEST_FILE, hashes, durable=durable)
     for name, data in files.items():
         write_atomically(directory / name, data, durable=durable)
+
+
+def list_file(directory: Path, name: str, file: Path) -> None:
+    """List the hash of `file`, which is about to be renamed to `name`, if the campaign in `directory` has a list."""
+    if (directory / MANIFEST_FILE).is_file():
+        _append(directory / MANIFEST_FILE, {name: sha256(file)}, durable=True)
 
 
 def sha256(path: Path) -> str:
@@ -113,7 +119,7 @@ def _lines(hashes: Mapping[str, str]) -> bytes:
     return "".join(f"{digest}  {name}\n" for name, digest in hashes.items()).encode()
 
 
-def _append(path: Path, hashes: Mapping[str, str], durable: bool) -> None:
+def _append(path: Path, hashes: Mapping[str, str], *, durable: bool) -> None:
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
     try:
         size = os.fstat(descriptor).st_size

@@ -16,7 +16,7 @@ from agvbench.campaign.parquet import MAX_ROWS, read_parquet
 from agvbench.campaign.schema import Column
 from agvbench.errors import CampaignError
 
-_SUFFIXES = (".parquet", ".csv")
+SUFFIXES = (".parquet", ".csv")
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Source:
         CampaignError
             If it is absent, or present as parquet and as CSV.
         """
-        paths = [path for suffix in _SUFFIXES if (path := directory / f"{name}{suffix}").exists()]
+        paths = [path for suffix in SUFFIXES if (path := directory / f"{name}{suffix}").exists()]
         if not paths:
             raise CampaignError(
                 f"has no table {name}",
@@ -89,7 +89,7 @@ def parts(directory: Path) -> tuple[Path, ...]:
         If it cannot be listed.
     """
     try:
-        files = [file for file in directory.iterdir() if file.suffix in _SUFFIXES and not is_temporary(file)]
+        files = [file for file in directory.iterdir() if file.suffix in SUFFIXES and not is_temporary(file)]
     except OSError as error:
         raise CampaignError(f"cannot be read ({error.strerror})", where=directory, remedy="check permissions") from None
     return tuple(sorted(files, key=lambda file: file.name))

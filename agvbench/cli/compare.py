@@ -2,7 +2,8 @@
 
 Says per trajectory and condition whether end position error, heading error and |Δs| are better, the same within a
 margin, worse, or whether the repeats cannot say. Shows by how much the mean end position moved. Two campaigns that do
-not differ report a regression with a chance of at most 1 %.
+not differ report a regression with a chance of at most 1 %. What is missing from a campaign, and differences between
+vehicles, cameras, trajectories and calibrations, are listed first.
 
 examples:
   agvbench compare campaigns/last-night campaigns/tonight
@@ -10,7 +11,8 @@ examples:
   agvbench compare A --conditions uncalibrated calibrated
   agvbench compare A B --conditions calibrated corrected     calibrated of A, corrected of B
 
-exit codes: 0 no regression; 1 regression (with --fail-on any: any difference); 2 could not compare.
+exit codes: 0 no regression; 1 regression (with --fail-on any: any difference); 2 could not compare;
+3 inconclusive: a campaign is incomplete, or the vehicles take commands in different units.
 """
 
 from __future__ import annotations
@@ -35,15 +37,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--margin-mm", metavar="MM", type=float, help="noise band of end position error and |Δs| (default: 5)"
     )
     parser.add_argument("--margin-deg", metavar="DEG", type=float, help="noise band of the heading error (default: 1)")
+    parser.add_argument(
+        "--across-vehicles", action="store_true", help="compare vehicles that take commands in different units"
+    )
     parser.add_argument("--json", metavar="F", type=Path, help="write the comparison as JSON, too")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Compare, print the comparison, and return its exit code."""
-    from agvbench.reporting.console import print_comparison, wide_console
+    from agvbench.reporting.console import print_cautions, print_comparison, wide_console
     from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
+    from agvbench.workflows.comparability import comparability
     from agvbench.workflows.compare import compare_campaigns, exit_code, write_json
 
+    console = wide_console()
+    known = comparability(arguments.a, arguments.b, across_vehicles=arguments.across_vehicles)
+    print_cautions(console, known.sentences)
     comparison = compare_campaigns(
         arguments.a,
         arguments.b,
@@ -52,6 +61,6 @@ def run(arguments: argparse.Namespace) -> int:
         margin_deg=MARGIN_DEG if arguments.margin_deg is None else arguments.margin_deg,
     )
     if arguments.json:
-        write_json(comparison, arguments.json)
-    print_comparison(wide_console(), comparison)
-    return exit_code(comparison, arguments.fail_on)
+        write_json(comparison, arguments.json, known)
+    print_comparison(console, comparison)
+    return exit_code(comparison, arguments.fail_on, known)

@@ -37,17 +37,27 @@ def load_trajectory(name_or_path: str | Path, *, directory: Path | None = None) 
     >>> load_trajectory("5").description
     'quarter turn forward to the left, radius 1 m, full speed'
     """
+    return _read(trajectory_file(name_or_path, directory=directory))
+
+
+def trajectory_file(name_or_path: str | Path, *, directory: Path | None = None) -> Path:
+    """Return the file that `load_trajectory` reads.
+
+    Raises
+    ------
+    FileError
+        If there is no trajectory of that name.
+    """
     if isinstance(name_or_path, Path) or name_or_path.endswith(".toml"):
-        return _read(Path(name_or_path))
+        return Path(name_or_path)
     files = trajectory_files(directory) if directory else [*_local_files(), *_shipped_files()]
     for file in files:
         # The eight are called by number: reading one file is enough for them.
         if file.stem == name_or_path or file.stem.split("_")[0] == name_or_path:
-            return _read(file)
+            return file
     for file in files:
-        trajectory = _read(file)
-        if trajectory.name == name_or_path:
-            return trajectory
+        if _read(file).name == name_or_path:
+            return file
     raise FileError(
         f"there is no trajectory '{name_or_path}'",
         remedy=suggest(name_or_path, list(dict.fromkeys(file.stem for file in files))),

@@ -113,6 +113,23 @@ def chosen(config: pytest.Config, items: Iterable[pytest.Item]) -> dict[str, Any
     return {"benchmarks": tuple(map(benchmark_name, given)), "only": config.getoption("keyword")}
 
 
+def plan_of(items: Iterable[pytest.Item]) -> list[dict[str, object]]:
+    """Return the runs of this session as rows of the campaign's table ``planned``."""
+    return [_planned(item) for item in items if is_bench(item)]
+
+
+def _planned(item: pytest.Item) -> dict[str, object]:
+    given = parameters(item)
+    follows = {"trajectory", "condition"} <= given.keys()
+    return {
+        "run_id": run_name(item),
+        "experiment": experiment(item),
+        "trajectory": str(given["trajectory"]) if follows else "",
+        "condition": str(given["condition"]) if follows else "",
+        "repeat": repeat(item),
+    }
+
+
 def is_bench(item: pytest.Item) -> bool:
     """Return whether a test item is a benchmark."""
     return isinstance(item.getparent(BenchModule), BenchModule)

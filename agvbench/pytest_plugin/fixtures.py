@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from agvbench.errors import AgvbenchError
-from agvbench.pytest_plugin.collecting import chosen, experiment, is_bench, phase, repeat, run_name
+from agvbench.pytest_plugin.collecting import chosen, experiment, is_bench, phase, plan_of, repeat, run_name
 from agvbench.pytest_plugin.options import given_options, option
 
 if TYPE_CHECKING:
@@ -46,6 +46,7 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
                 out=option(config, "--out"),
                 resume=bool(option(config, "--resume")),
                 dry_run=bool(option(config, "--dry-run")),
+                plan=plan_of(session.items),
             )
             config.stash[SESSION] = bench_session = stack.enter_context(opened)
         except AgvbenchError as error:

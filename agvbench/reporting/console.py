@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-from agvbench.reporting.content import Column, Paragraph, Table, Value, plain
+from agvbench.reporting.content import Column, Paragraph, Table, Value, plain, plain_sentences
 from agvbench.statistics.differences import ALL
 from agvbench.statistics.quantities import COMPONENT_DEFINITIONS, DEFINITIONS
 from agvbench.statistics.words import headline
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rich.console import Console, RenderableType
     from rich.text import Text
 
@@ -141,6 +143,14 @@ def print_report(console: Console, report: WrittenReport) -> None:
     for text in said_first(report):
         console.print(text)
     console.print(Text(f"wrote {report.files[0]} and {len(report.files) - 1} more files"), soft_wrap=True)
+
+
+def print_cautions(console: Console, sentences: Sequence[str]) -> None:
+    """Print what to know before a comparison."""
+    from rich.text import Text
+
+    for sentence in sentences:
+        console.print(Text(plain_sentences(sentence), style="yellow"), soft_wrap=True)
 
 
 def print_comparison(console: Console, comparison: Comparison) -> None:

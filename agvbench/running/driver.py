@@ -67,6 +67,7 @@ class Driver:
         """Hold several commands one after another: (duration [s], shares of full command) each."""
         shares = self._session.shares
         if shares.rear == 0.0 and any(step.get("rear") for _, step in steps):
+            self._session.not_applicable.add(self._run_id)
             raise NotDrivenError("this vehicle does not steer its rear axle")
         commands = held(shares.neutral, [(duration_s, shares.command(**step)) for duration_s, step in steps])
         trajectory = _as_trajectory(self._experiment, commands, self._session.nominal.command_unit)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
@@ -16,16 +16,26 @@ import pandas as pd
 from agvbench.adapters import check_specs
 from agvbench.bus.link import VehicleLink
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
+from agvbench.campaign.completeness import PLANNED_TABLE
 from agvbench.campaign.header import FILE_NAME
 from agvbench.campaign.lock import locked
 from agvbench.campaign.writer import refuse_occupied
+from agvbench.errors import RecordingError
 from agvbench.model import VehicleModel
 from agvbench.planning import Workspace
 from agvbench.running.bench import Bench
-from agvbench.running.calibrating import calibrate_campaign
+from agvbench.running.calibrating import VEHICLE_FILE, calibrate_campaign
 from agvbench.running.campaign_time import TURNAROUND_S, CampaignTime, SimulatedCampaignTime, WallCampaignTime
 from agvbench.running.placers.choosing import choose_placer
-from agvbench.running.provenance import provenance
+from agvbench.running.provenance import (
+    INPUTS_TABLE,
+    Row,
+    input_files,
+    provenance,
+    recorded_rows,
+    require_same_inputs,
+    with_new,
+)
 from agvbench.running.remainders import read_remainders
 from agvbench.running.rig_checks import open_session_rig
 from agvbench.running.session import BenchSession
@@ -41,8 +51,17 @@ PROVENANCE_TABLE = "provenance"
 
 
 @contextmanager
-def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry_run: bool) -> Iterator[BenchSession]:
+def open_session(
+    given: Mapping[str, Any],
+    *,
+    out: str | None,
+    resume: bool,
+    dry_run: bool,
+    plan: Sequence[Row] = (),
+) -> Iterator[BenchSession]:
     """Open the session that the options `given` ask for, and close it whatever happens.
+
+    ``plan`` lists the runs that it is to drive, as rows of the campaign's table ``planned``.
 
     Raises
     ------
@@ -65,20 +84,24 @@ def open_session(given: Mapping[str, Any], *, out: str | None, resume: bool, dry
         models.setdefault("calibrated", expected_calibration(settings.vehicle))
         yield session_with(bench=None)
         return
-    if not resume:
+    inputs = input_files(settings, {str(row["trajectory"]) for row in plan if row["trajectory"]})
+    if resume:
+        require_same_inputs(recorded_rows(directory, INPUTS_TABLE), inputs)
+    else:
         refuse_occupied(given_directory, "resume it, or choose another directory")
     with interruptible(), open_session_rig(settings, models) as link:
         choose_placer(settings.place, simulated=link.identity().simulated)
         with locked(given_directory):
             header = _header(directory, settings, models["uncalibrated"], link, resume=resume)
             writer = _writer(directory, settings, header, resume=resume, simulated=link.identity().simulated)
+            _record_plan(writer, settings, inputs, plan)
             recorded = _recorded(writer)
             campaign_time = _campaign_time(link, writer, recorded, drives_back=settings.place == "auto")
             bench = _bench(settings, models, link, writer, recorded, campaign_time)
             session = session_with(bench=bench)
             session.notices = _notices(settings, given)
             session.notices += idle_notice(recorded.values(), campaign_time.now_s(), settings.session)
-            with bench.pause.by_signal():
+            with bench.pause.by_signal(), _leaving_out_undrivable(writer, session):
                 yield session
 
 
@@ -121,6 +144,29 @@ def _writer(
         facts = provenance(Path(__file__).parent)
         writer.write_table(PROVENANCE_TABLE, pd.DataFrame({"name": list(facts), "value": list(facts.values())}))
     return writer
+
+
+def _record_plan(writer: CampaignWriter, settings: BenchSettings, inputs: list[Row], plan: Sequence[Row]) -> None:
+    """Keep what decides what is driven: hashes of input files, the given calibration, the planned runs."""
+    for name, rows, key in ((INPUTS_TABLE, inputs, "input"), (PLANNED_TABLE, plan, "run_id")):
+        if rows := with_new(recorded_rows(writer.path, name), rows, key):
+            writer.write_table(name, pd.DataFrame(rows))
+    if settings.calibration and not (writer.path / VEHICLE_FILE).exists():
+        given = Path(settings.calibration).read_bytes()
+        writer.write_beside(VEHICLE_FILE, lambda path: path.write_bytes(given))
+
+
+@contextmanager
+def _leaving_out_undrivable(writer: CampaignWriter, session: BenchSession) -> Iterator[None]:
+    """Take runs that this kind of vehicle cannot drive out of the plan when the session ends."""
+    try:
+        yield
+    finally:
+        planned = recorded_rows(writer.path, PLANNED_TABLE)
+        drivable = [row for row in planned if row["run_id"] not in session.not_applicable]
+        if len(drivable) < len(planned):
+            with suppress(RecordingError):  # what ended the session is the error to report
+                writer.write_table(PLANNED_TABLE, pd.DataFrame(drivable, columns=list(planned[0])))
 
 
 def _bench(

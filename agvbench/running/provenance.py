@@ -1,13 +1,25 @@
-"""Where a campaign comes from: program, versions, revision, machine."""
+"""Where a campaign comes from: program, versions, revision, machine, and the files that decide what is driven."""
 
 from __future__ import annotations
 
 import platform
 import subprocess
 import sys
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
+
+from agvbench.campaign.manifest import Manifest, sha256
+from agvbench.campaign.parquet import read_parquet
+from agvbench.errors import FileError
+from agvbench.planning.reading import trajectory_file
+from agvbench.running.benchmark_files import find_benchmark
+from agvbench.running.settings import BenchSettings
+
+INPUTS_TABLE = "inputs"
+Row = Mapping[str, Any]
 
 _PACKAGES = ("agvbench", "eclipse-zenoh", "numba", "numpy", "pandas", "pyarrow", "pytest", "scipy")
 
@@ -39,3 +51,66 @@ def provenance(directory: Path) -> dict[str, str]:
         "host": platform.node(),
     }
     return facts | {package: _installed(package) for package in _PACKAGES}
+
+
+def input_files(settings: BenchSettings, trajectories: Iterable[str]) -> list[Row]:
+    """Return the files that decide what a session drives: ``input`` (option or kind and name), ``file``, ``sha256``.
+
+    Raises
+    ------
+    AgvbenchError
+        If one of them does not exist or cannot be read.
+    """
+    options = ("vehicle", "calibration", "corrected", "remainders")
+    files = {f"--{name}": str(getattr(settings, name)) for name in options}
+    files["--plant"] = settings.plant.rpartition(":")[0]
+    files |= {f"benchmark {name}": str(find_benchmark(name)).partition("::")[0] for name in settings.benchmarks}
+    files |= {f"trajectory {name}": str(trajectory_file(name)) for name in trajectories}
+    return [
+        {"input": name, "file": file, "sha256": _hash(Path(file))}
+        for name, file in files.items()
+        if Path(file).is_file()  # the plants and vehicles that ship are part of the program, whose version is recorded
+    ]
+
+
+def _hash(file: Path) -> str:
+    try:
+        return sha256(file)
+    except OSError as error:
+        raise FileError("cannot be read", where=file, value=error.strerror) from None
+
+
+def require_same_inputs(recorded: Iterable[Row], now: Iterable[Row]) -> None:
+    """Refuse to resume with files whose content is not that which the session began with.
+
+    Raises
+    ------
+    FileError
+        If one differs.
+    """
+    before = {row["input"]: row["sha256"] for row in recorded}
+    for row in now:
+        if before.get(row["input"], row["sha256"]) != row["sha256"]:
+            raise FileError(
+                f"has changed since the session began ({row['input']})", where=row["file"],
+                remedy="restore it from a copy, or start anew without --resume",
+            )  # fmt: skip
+
+
+def recorded_rows(directory: Path, table: str) -> list[Row]:
+    """Return the rows of a further table of the campaign in `directory`; none where it has no such table.
+
+    Raises
+    ------
+    CampaignError
+        If the table is damaged.
+    """
+    path = directory / f"{table}.parquet"
+    Manifest(directory).check(path)
+    return read_parquet(path).to_pylist() if path.exists() else []
+
+
+def with_new(recorded: Sequence[Row], now: Iterable[Row], key: str) -> list[Row]:
+    """Return the rows `recorded` and, after them, those of `now` with another `key`."""
+    known = {row[key] for row in recorded}
+    return [*recorded, *(row for row in now if row[key] not in known)]

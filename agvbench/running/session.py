@@ -56,6 +56,8 @@ class BenchSession:
         self._not_calibrated: FitError | None = None
         self._hourly: set[tuple[Trajectory, str]] = set()
         self.notices: list[str] = []
+        self.not_applicable: set[str] = set()
+        """The ids of runs that this kind of vehicle cannot drive."""
 
     @property
     def is_dry(self) -> bool:

@@ -7,10 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from agvbench.campaign import Campaign
-from agvbench.errors import AgvbenchError, FileError, FlagError
+from agvbench.errors import FileError, FlagError
 from agvbench.statistics import Comparison, Verdict, compare, pose_errors
 from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
 from agvbench.statistics.comparison_json import comparison_to_json
+from agvbench.workflows.comparability import NOTHING_KNOWN, Comparability
+
+_SAME_CAMPAIGN = "both sides are the same campaign: no difference can be found"
 
 
 def compare_campaigns(
@@ -45,61 +48,40 @@ def compare_campaigns(
         same_campaign=b is None,
         names=_names(Path(a), None if b is None else Path(b), conditions),
     )
-    notes = comparison.notes if b is None else (*comparison.notes, *_notes(Path(a), Path(b), comparison))
-    return replace(comparison, notes=notes)
+    if b is None or Path(a).resolve() != Path(b).resolve():
+        return comparison
+    return replace(comparison, notes=(*comparison.notes, _SAME_CAMPAIGN))
 
 
-def exit_code(comparison: Comparison, fail_on: str) -> int:
-    """Return 0 (no regression), 1 (regression, or any difference with ``any``) or 2 (could not compare)."""
+def exit_code(comparison: Comparison, fail_on: str, known: Comparability = NOTHING_KNOWN) -> int:
+    """Return 0 (no regression), 1 (regression, or any difference with ``any``), 2 (could not compare) or 3.
+
+    3, inconclusive: the campaigns are not comparable, or one is incomplete and no regression was found.
+    """
     if not comparison.could_compare:
         return 2
+    if known.incomparable:
+        return 3
     bad = {"regression": [Verdict.WORSE], "any": [Verdict.WORSE, Verdict.BETTER], "never": []}[fail_on]
-    return int(any(comparison.of(verdict) for verdict in bad))
+    if any(comparison.of(verdict) for verdict in bad):
+        return 1
+    return 3 if known.incomplete else 0
 
 
-def write_json(comparison: Comparison, path: str | Path) -> None:
-    """Write `comparison` as JSON (schema 1).
+def write_json(comparison: Comparison, path: str | Path, known: Comparability = NOTHING_KNOWN) -> None:
+    """Write `comparison` as JSON (schema 1), with what was `known` before it.
 
     Raises
     ------
     FileError
         If the file cannot be written.
     """
-    text = json.dumps(comparison_to_json(comparison), indent=2, ensure_ascii=False, allow_nan=False)
+    content = comparison_to_json(comparison) | {"complete": not known.incomplete, "cautions": list(known.sentences)}
+    text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
     try:
         Path(path).write_text(f"{text}\n", encoding="utf-8")
     except OSError as error:
         raise FileError(f"cannot be written ({error.strerror})", where=path, remedy="choose another file") from None
-
-
-def _notes(a: Path, b: Path, comparison: Comparison) -> tuple[str, ...]:
-    """Return what to know before believing a comparison of two campaigns."""
-    if a.resolve() == b.resolve():
-        return ("both sides are the same campaign: no difference can be found",)
-    return _calibration_note(a, b, comparison)
-
-
-def _calibration_note(a: Path, b: Path, comparison: Comparison) -> tuple[str, ...]:
-    """Return a warning where both sides were calibrated, each for itself."""
-    hashes = [_calibration_hash(side) for side in (a, b)]
-    uncalibrated = all(d.condition in {"uncalibrated", "all"} for d in comparison.differences)
-    if not all(hashes) or hashes[0] == hashes[1] or uncalibrated:
-        return ()
-    said = (
-        f"The sides were calibrated separately ({hashes[0]} and {hashes[1]}): what one calibration measured better or "
-        "worse than the other is part of every difference but the uncalibrated ones. To compare firmware or vehicles "
-        "alone, drive both with one calibration (bench --calibration FILE)."
-    )
-    return (said,)
-
-
-def _calibration_hash(campaign: Path) -> str:
-    from agvbench.model import VehicleModel
-
-    try:
-        return VehicleModel.load(campaign / "vehicle.toml").calibration_hash
-    except AgvbenchError:
-        return ""
 
 
 def _names(a: Path, b: Path | None, conditions: tuple[str, str] | None) -> tuple[str, str]:

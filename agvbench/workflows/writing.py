@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from agvbench.campaign.atomic import replace_whole
+from agvbench.campaign.manifest import list_file
 from agvbench.errors import FileError
 
 
@@ -25,8 +27,14 @@ def write_file(flag: str, path: Path, write: Callable[[Path], object]) -> None:
         if path.exists() and not path.is_file():
             write(path)
         else:
-            replace_whole(path.resolve(), write)
+            replace_whole(path.resolve(), partial(_write_listed, path.resolve(), write))
     except OSError as error:
         raise FileError("cannot be written", where=path, value=error.strerror, remedy=remedy) from None
     except FileError as error:
         raise FileError(error.what, where=path, value=error.value, remedy=error.remedy or remedy) from None
+
+
+def _write_listed(path: Path, write: Callable[[Path], object], temporary: Path) -> None:
+    """Have `write` write `temporary`; its hash is listed where it is to replace a file of a campaign."""
+    write(temporary)
+    list_file(path.parent, path.name, temporary)

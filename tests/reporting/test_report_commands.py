@@ -1,12 +1,19 @@
 """``agvbench report`` and ``agvbench compare`` as they are called."""
 
+import dataclasses
 import json
+import shutil
 
+import numpy as np
+import pandas as pd
 import pytest
 from conftest import TWO
 from report_samples import make_campaign
 
+from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
 from agvbench.cli import main
+from agvbench.running.settings import BenchSettings
+from agvbench.types import Commands
 
 
 @pytest.fixture(scope="module")
@@ -99,8 +106,64 @@ def test_too_few_repeats_are_exit_code_2_and_said(tmp_path, capsys):
 def test_separate_calibrations_are_said(tmp_path, capsys):
     make = {"repeats": 8, "rate_hz": 30.0, "trajectories": ("1_forward",), "conditions": ("calibrated",)}
     a, b = (make_campaign(tmp_path / name, seed=seed, **make) for seed, name in enumerate("ab"))
-    warning = "The sides were calibrated separately"
+    warning = "The calibrations differ"
     assert warning not in run(capsys, "compare", a, b)[1]
     text = (b / "vehicle.toml").read_text(encoding="utf-8")
     (b / "vehicle.toml").write_text(text.replace("neutral = 1500.0", "neutral = 1510.0"), encoding="utf-8")
     assert warning in run(capsys, "compare", a, b)[1]
+
+
+@pytest.fixture
+def copies(nights, tmp_path):
+    """Return copies of the nights, and of their writers."""
+    made = [shutil.copytree(night, tmp_path / night.name) for night in nights]
+    return made, [CampaignWriter.resume(path, CampaignHeader.load(path / "campaign.toml")) for path in made]
+
+
+def changed(path, **values):
+    header = dataclasses.replace(CampaignHeader.load(path / "campaign.toml"), **values)
+    header.save(path / "campaign.toml")
+
+
+@pytest.mark.parametrize(("judged", "code"), [(1, 3), (2, 1)])
+def test_an_incomplete_campaign_is_said_first_and_is_no_success(judged, code, copies, capsys, tmp_path):
+    paths, writers = copies
+    done = writers[judged].finished_ids
+    writers[judged].write_table("planned", pd.DataFrame({"run_id": [*done, "again", "never"]}))
+    writers[0].write_table("planned", pd.DataFrame({"run_id": writers[0].finished_ids}))
+    run_of = next(iter(Campaign.open(paths[judged])))
+    rejected = dataclasses.replace(run_of, run_id="again-attempt2", status="rejected: lost")
+    writers[judged].append(rejected)
+    found, out, _ = run(capsys, "compare", paths[0], paths[judged], "--json", tmp_path / "c.json")
+    assert found == code
+    assert out.startswith(f"{paths[judged]} is incomplete: 18 runs planned, 16 driven, 2 missing")
+    assert "(1 of them rejected): again, never;" in out
+    assert json.loads((tmp_path / "c.json").read_text(encoding="utf-8"))["complete"] is False
+
+
+def test_vehicles_of_different_units_are_compared_on_purpose_only(nights, capsys, tmp_path):
+    night = Campaign.open(nights[1])
+    writer = CampaignWriter.create(tmp_path / "c", dataclasses.replace(night.header, command_unit="normalised"))
+    for each in night:
+        still = np.zeros(len(each.commands))
+        writer.append(dataclasses.replace(each, commands=Commands(each.commands.t_s, still, still, still)))
+    for options, code in (([], 3), (["--across-vehicles"], 0)):
+        found, out, _ = run(capsys, "compare", nights[0], writer.path, *options)
+        assert found == code
+        assert out.startswith("The vehicles take commands in different units (us and normalised)")
+
+
+def test_what_differs_between_the_sides_is_said_first(copies, capsys):
+    paths, writers = copies
+    changed(paths[1], rear_axle_m=0.2, mocap_rate_hz=60.0)
+    for writer, digest in zip(writers, "abc", strict=True):
+        rows = {"input": ["trajectory 1", "trajectory 2"], "file": ["1.toml", "2.toml"], "sha256": ["same", digest]}
+        writer.write_table("inputs", pd.DataFrame(rows))
+    BenchSettings(mocap="natnet:lab").save(paths[0])
+    BenchSettings(steering="crab").save(paths[1])
+    code, out, _ = run(capsys, "compare", paths[0], paths[1])
+    assert code == 0
+    assert "The vehicles differ: rear_axle_m" in out
+    assert "The cameras differ: rate 120 Hz and 60 Hz, --mocap natnet:lab and sim." in out
+    assert "The files of trajectories differ: 2." in out
+    assert out.index("The trajectories were steered differently: --steering none and crab.") < out.index("worst first")

@@ -6,16 +6,21 @@ import dataclasses
 import os
 import platform
 import re
+import shutil
 import subprocess
 import sys
 
 import pytest
 
 from agvbench.campaign import Campaign
-from agvbench.errors import CampaignError, FlagError, LinkError
-from agvbench.model import thesis_vehicle
+from agvbench.campaign.completeness import Completeness
+from agvbench.errors import CampaignError, FileError, FlagError, LinkError
+from agvbench.model import VehicleModel, example_path, thesis_vehicle
+from agvbench.planning.reading import trajectory_file
 from agvbench.running.benchmark_files import benchmark_name, find_benchmark
+from agvbench.running.calibrating import VEHICLE_FILE
 from agvbench.running.directory import shown
+from agvbench.running.driver import NotDrivenError
 from agvbench.running.opening import open_session
 from agvbench.running.placers.auto import Auto
 from agvbench.running.placers.choosing import PLACERS
@@ -167,4 +172,44 @@ def test_two_sessions_cannot_record_to_one_directory(lab):
     ):
         pass
     with open_session({}, out="c", resume=True, dry_run=False):  # released, whatever ended the first
+        pass
+
+
+def test_what_was_planned_and_the_calibration_belong_to_the_campaign(lab):
+    rear = VehicleModel.load(example_path("front_steered")).rear
+    dataclasses.replace(thesis_vehicle(), rear=rear).save(lab / "cal.toml")
+    given = {"vehicle": "cal.toml", "calibration": "cal.toml"}
+    plan = [
+        {"run_id": name, "experiment": "free", "trajectory": "", "condition": "", "repeat": 1}
+        for name in ("left", "crab", "right")
+    ]
+    with open_session(given, out="c", resume=False, dry_run=False, plan=plan) as session:
+        session.driver("left", experiment="free", repeat=1).hold(drive=0.5, front=0.5, rear=0.0, for_s=0.3)
+        with pytest.raises(NotDrivenError):
+            session.driver("crab", experiment="free", repeat=1).hold(drive=0.5, front=0.5, rear=0.5, for_s=0.3)
+    campaign = Campaign.open(lab / "c")
+    done = Completeness.of(campaign)
+    assert done is not None
+    assert (done.planned, done.missing) == (("left", "right"), ("right",))
+    assert (lab / "c" / VEHICLE_FILE).read_bytes() == (lab / "cal.toml").read_bytes()
+    assert set(campaign.table("inputs")["input"]) == {"--vehicle", "--calibration"}
+
+
+@pytest.mark.parametrize("changed", ["cal.toml", "mine.py", "trajectories/own.toml", "bench_mine.py"])
+def test_a_session_is_not_resumed_with_files_of_other_content(lab, changed):
+    thesis_vehicle().save(lab / "cal.toml")
+    (lab / "mine.py").write_text("from agvbench.simulator import make_plant as make\n")
+    (lab / "trajectories").mkdir()
+    shutil.copy(trajectory_file("5"), lab / "trajectories" / "own.toml")
+    given = {"calibration": "cal.toml", "plant": "mine.py:make", "benchmarks": ("bench_mine.py",)}
+    plan = [{"run_id": "x", "experiment": "t", "trajectory": "own", "condition": "calibrated", "repeat": 1}]
+    with open_session(given, out="c", resume=False, dry_run=False, plan=plan):
+        pass
+    with open_session({}, out="c", resume=True, dry_run=False, plan=plan):
+        pass
+    (lab / changed).write_text((lab / changed).read_text() + "# another\n")
+    with (
+        pytest.raises(FileError, match=rf"{changed}: has changed since the session began \(.+\); restore it"),
+        open_session({}, out="c", resume=True, dry_run=False, plan=plan),
+    ):
         pass

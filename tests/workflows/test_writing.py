@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from agvbench.campaign.manifest import Manifest, record
 from agvbench.errors import FileError
 from agvbench.workflows.writing import write_file
 
@@ -26,6 +27,12 @@ def test_a_full_disk_leaves_the_file_as_it_was(before: str | None, tmp_path: Pat
     with pytest.raises(FileError, match=r"calibrated.toml: cannot be written: No space left on device; give --out"):
         write_file("--out", path, run_out_of_space)
     assert [file.read_text() for file in tmp_path.iterdir()] == ([] if before is None else [before])
+
+
+def test_a_file_of_a_campaign_is_replaced_with_its_hash(tmp_path: Path) -> None:
+    record(tmp_path, {"vehicle.toml": b"recorded"})
+    write_file("--out", tmp_path / "vehicle.toml", lambda path: path.write_text("calibrated anew"))
+    Manifest(tmp_path).check_beside()
 
 
 def test_a_link_is_followed_and_a_pipe_is_written_to(tmp_path: Path) -> None:
