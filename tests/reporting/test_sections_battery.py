@@ -1,11 +1,13 @@
 """Every section of every report passes these, a new one without being named here."""
 
+import pkgutil
 import re
 import xml.etree.ElementTree as ET
 
 import pytest
 from conftest import MAKERS
 
+from agvbench.reporting import sections
 from agvbench.reporting.content import Bullets, FigureBlock, Paragraph, Table
 from agvbench.reporting.csv_table import to_csv
 from agvbench.reporting.html import to_html
@@ -41,7 +43,18 @@ def content(request, section, contents):
 def test_slugs_and_places_are_unique():
     assert len({s.slug for s in SECTIONS}) == len({s.order for s in SECTIONS}) == len(SECTIONS)
     assert [s.order for s in SECTIONS] == sorted(s.order for s in SECTIONS)
-    assert len(SECTIONS) == len(Section.__subclasses__())
+
+
+def test_every_file_of_the_package_is_a_section_and_no_class_elsewhere_is():
+    class Elsewhere(Section):
+        slug, title, order = "elsewhere", "Elsewhere", 0
+
+        def blocks(self, data):
+            return [Paragraph("")]
+
+    files = {module.name for module in pkgutil.iter_modules(sections.__path__)}
+    found = [type(section).__module__.rpartition(".")[2] for section in all_sections()]
+    assert sorted(found) == sorted(files - {"base"})
 
 
 def test_section_says_what_it_is(section):

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
-
+from agvbench.registry import classes_by_file
 from agvbench.reporting.sections.base import Section
 
 __all__ = ["Section", "all_sections"]
@@ -12,6 +10,5 @@ __all__ = ["Section", "all_sections"]
 
 def all_sections() -> list[Section]:
     """Return one of each section, in the order of a report."""
-    for module in pkgutil.iter_modules(__path__):
-        importlib.import_module(f"{__name__}.{module.name}")
-    return sorted((section() for section in Section.__subclasses__()), key=lambda section: section.order)
+    found = classes_by_file(__name__, Section)  # type: ignore[type-abstract]
+    return sorted((section() for section in found), key=lambda section: section.order)
