@@ -17,5 +17,5 @@ THE_EIGHT = [str(number) for number in range(1, 9)]
 @pytest.mark.parametrize("condition", ["uncalibrated", "calibrated", "corrected"])
 @pytest.mark.parametrize("trajectory", [*THE_EIGHT, *own_trajectories()])
 def bench_trajectory(drive, trajectory, condition):
-    """Drive one trajectory under one condition; Δs and Δδ follow from where it ends."""
+    """Drive one trajectory under one condition; the errors of its end pose follow from where it ends."""
     drive.trajectory(trajectory, condition=condition)
