@@ -2,30 +2,93 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable
 from typing import Any
 
-from agvbench.adapters.contract import AgvAdapter
+from agvbench.adapters.contract import SILENCE_LIMIT_S, AgvAdapter
 from agvbench.adapters.hosting import Host
 from agvbench.bus.clock import Clock
 from agvbench.bus.command_message import CommandFlags, CommandMessage, decode_command
-from agvbench.bus.event_message import RUNNER_SILENT, Level
+from agvbench.bus.event_message import COMMANDS_LATE, COMMANDS_LOST, RUNNER_SILENT, Level
 from agvbench.bus.identity_message import encode_agv_identity
-from agvbench.bus.keys import AGV, REPLAY, RESET, Keys
-from agvbench.bus.request_message import decode_replay, decode_reset
+from agvbench.bus.keys import AGV, CLAIM, RELEASE, REPLAY, RESET, Keys
+from agvbench.bus.request_message import decode_claim, decode_replay, decode_reset
 from agvbench.bus.sequence import LossCounter, Sequence
 from agvbench.bus.tally import Tally
 from agvbench.bus.truth_message import Truth, TruthFlags
-from agvbench.errors import AdapterGoneError, MessageError
+from agvbench.bus.wire import Kind, prefix
+from agvbench.errors import AdapterGoneError, LinkError, MessageError, RunStoppedError
 from agvbench.types import Floats
 
-SILENCE_LIMIT_S = 0.5
 _COMMANDS_WAITING = 256
 _OVERTAKEN_TOLD = 10
 _STOP_PATIENCE_S = 0.5
 _HANG_PATIENCE_S = 0.1
 _STOP = CommandFlags.STOP
+_FOREIGN_TOLD_S = 1.0
+_COMMAND, _SOURCE = prefix(Kind.COMMAND), slice(8, 12)
+
+
+class Claim:
+    """Which runner has the vehicle: the first that claims it, until it releases it or its token vanishes.
+
+    Attributes
+    ----------
+    source
+        That of the runner's commands; None while nobody has the vehicle.
+    """
+
+    def __init__(self, session: Any, keys: Keys) -> None:
+        self.source: int | None = None
+        self._keys, self._lock = keys, threading.Lock()
+        self._subscriber = session.liveliness().declare_subscriber(keys.runner(), self._token_changed)
+
+    def take(self, payload: bytes) -> bytes:
+        """Give the vehicle to the runner that claims it.
+
+        Raises
+        ------
+        LinkError
+            If another runner has it.
+        """
+        source = decode_claim(payload)
+        with self._lock:
+            if self.source not in (None, source):
+                raise LinkError(
+                    "another runner drives this vehicle", where=self._keys.root,
+                    remedy="wait until it has ended, or end it; another vehicle has another --vehicle-name",
+                )  # fmt: skip
+            self.source = source
+        return b""
+
+    def release(self, payload: bytes) -> bytes:
+        """Take note that the runner has left."""
+        self._end(self._keys.runner(decode_claim(payload)))
+        return b""
+
+    def _token_changed(self, sample: Any) -> None:
+        import zenoh
+
+        if sample.kind == zenoh.SampleKind.DELETE:
+            self._end(str(sample.key_expr))
+
+    def _end(self, token: str) -> None:
+        with self._lock:
+            if self.source is not None and token == self._keys.runner(self.source):
+                self.source = None
+
+    def is_foreign(self, payload: bytes) -> bool:
+        """Whether a message is a command of another source than the runner that has the vehicle."""
+        source = self.source
+        if source is None or payload[: len(_COMMAND)] != _COMMAND:
+            return False
+        return int.from_bytes(payload[_SOURCE], "little") != source
+
+    def close(self) -> None:
+        """Watch no more tokens."""
+        self._subscriber.undeclare()
 
 
 class AgvHost(Host):
@@ -54,7 +117,13 @@ class AgvHost(Host):
         self._heard_s: float | None = None
         self._identity_bytes = encode_agv_identity(adapter.identity())
         self._lock_step = adapter.identity().lock_step
+        self._neutral_drive = adapter.identity().neutral
+        self._gap_limit_s = min(adapter.watchdog_s, SILENCE_LIMIT_S)
+        self._drives, self._driven_s, self._longest_s = False, math.nan, 0.0
+        self._claim = Claim(session, keys)
+        self.foreign, self._foreign_told = 0, (False, -math.inf)
         self._answers |= {RESET: self._reset, REPLAY: self._replay}
+        self._answers |= {CLAIM: self._take, RELEASE: self._claim.release}
         self._subscriber = session.declare_subscriber(keys.command, zenoh.handlers.FifoChannel(_COMMANDS_WAITING))
         self._closed, self._left = threading.Event(), False
         self._outdated: dict[int, int] = {}  # by source: the last command sent before the vehicle was placed anew
@@ -68,9 +137,16 @@ class AgvHost(Host):
     def _identity(self) -> bytes:
         return self._identity_bytes
 
+    def _take(self, payload: bytes) -> bytes:
+        """Give the vehicle to a runner; what the one before left unfinished is not its concern."""
+        answer = self._claim.take(payload)
+        self._drives, self._driven_s = False, math.nan
+        return answer
+
     def _reset(self, payload: bytes) -> bytes:
         request = decode_reset(payload)
         with self._lock:
+            self._drives, self._driven_s = False, math.nan
             self._outdated = {request.source: request.after}
             self._adapter.reset(request)
         return b""
@@ -86,7 +162,7 @@ class AgvHost(Host):
         # One function from the command to the adapter, and the adapter first, the book-keeping after: the thread has
         # just been woken, so that each further function, name and object is fetched from memory while the runner waits.
         receive, apply, lock = self._subscriber.handler.recv, self._adapter.apply, self._lock
-        loss, watched, now = self.loss, not self._lock_step, self._clock.now
+        loss, watched, now, claim = self.loss, not self._lock_step, self._clock.now, self._claim
         while True:
             try:
                 payload = receive().payload.to_bytes()
@@ -94,6 +170,9 @@ class AgvHost(Host):
                     payload = self._newest(payload)
             except self._zenoh_error:
                 return
+            if claim.is_foreign(payload):
+                self._pass_over(payload)
+                continue
             try:
                 message = decode_command(payload)
             except MessageError as error:
@@ -108,12 +187,27 @@ class AgvHost(Host):
                         if watched:
                             self._heard_s = now()
                         apply(message)
+                        self._drives = message.command.drive != self._neutral_drive
             except Exception as error:  # noqa: BLE001  (whatever the adapter raises, the runner must hear of it)
                 self.failed(error, acknowledged=sequence)
             if sequence == loss.expected and source == loss.source:
                 loss.expected += 1
             else:
                 self._note(source, sequence)
+            if watched:
+                self._check_gap()
+
+    def _check_gap(self) -> None:
+        """Tell of commands that were carried out further apart than the vehicle's watchdog allows, as it drove."""
+        now_s = self._clock.now()
+        gap_s = now_s - self._driven_s  # NaN, and so never too long, unless it drove
+        if gap_s > max(self._gap_limit_s, self._longest_s):
+            self._longest_s = gap_s
+            text = f"{gap_s:.2f} s between two commands (limit: {self._gap_limit_s:g} s, then the vehicle stops itself)"
+            self.event(Level.WARNING, COMMANDS_LATE, text)
+        self._driven_s = now_s if self._drives else math.nan
+        if not self._drives:
+            self._longest_s = 0.0
 
     def _newest(self, payload: bytes) -> bytes:
         """Return the last of the commands that wait, in real time: older ones are of no use to anybody, but stops are.
@@ -125,8 +219,10 @@ class AgvHost(Host):
             sample = try_receive()
             if sample is None:
                 break
-            self._pass_over(payload)
-            payload = sample.payload.to_bytes()
+            later = sample.payload.to_bytes()
+            if not self._claim.is_foreign(later):
+                payload, later = later, payload
+            self._pass_over(later)
         return payload
 
     def _pass_over(self, payload: bytes) -> None:
@@ -135,20 +231,40 @@ class AgvHost(Host):
         except MessageError as error:
             self._fail_malformed(error)
             return
-        self._note(message.source, message.sequence)
+        foreign = self._claim.is_foreign(payload)
+        if foreign:
+            self._tell_of_foreign(message)
+        else:
+            self._note(message.source, message.sequence)
         if message.flags & _STOP:
             try:
                 with self._lock:
                     self._refrain(message)
             except Exception as error:  # noqa: BLE001  (as for every command)
                 self.failed(error, acknowledged=message.sequence)
-        elif self.overtaken.add():
+        elif not foreign and self.overtaken.add():
             text = f"commands that were overtaken by newer ones: {self.overtaken}"
             self.event(Level.WARNING, "commands_overtaken", text)
 
+    def _tell_of_foreign(self, message: CommandMessage) -> None:
+        """Tell of commands that are not the runner's, at most once a second: an error while the vehicle drives."""
+        self.foreign += 1
+        (told_while_driving, told_s), now_s = self._foreign_told, self._clock.now()
+        if now_s - told_s < _FOREIGN_TOLD_S and told_while_driving >= self._drives:
+            return
+        self._foreign_told = self._drives, now_s
+        error = RunStoppedError(
+            "commands of another source", where=self._keys.command, value=f"{self.foreign}, of {message.source:08x}",
+            limit="only those of the runner that has the vehicle", remedy="end the program that sends them",
+        )  # fmt: skip
+        if self._drives:
+            self.failed(error)
+        else:
+            self.event(Level.WARNING, "foreign_commands", str(error))
+
     def _note(self, source: int, sequence: int) -> None:
         if lost := self.loss.saw(source, sequence):
-            self.event(Level.WARNING, "commands_lost", f"{lost} commands were lost before {sequence}")
+            self.event(Level.WARNING, COMMANDS_LOST, f"{lost} commands were lost before {sequence}")
 
     def _fail_malformed(self, error: MessageError) -> None:
         """Tell of a message that cannot be decoded, seldom where there are many."""
@@ -160,7 +276,7 @@ class AgvHost(Host):
         """Stop, unless the command came too late for that, too."""
         if self._left or message.sequence <= self._outdated.get(message.source, 0):
             return  # the vehicle was placed anew after this was sent: a runner was interrupted in between
-        self._heard_s = None
+        self._heard_s, self._drives, self._driven_s = None, False, math.nan
         self._adapter.stop()
 
     def _watch(self) -> None:
@@ -222,5 +338,6 @@ class AgvHost(Host):
             if locked:
                 self._lock.release()
             self._subscriber.undeclare()
+            self._claim.close()
             super().close()
             self._adapter.close()

@@ -26,6 +26,8 @@ from agvbench.errors import LinkError
 from agvbench.types import CommandUnit, Floats, Frames
 
 DEFAULT_PLANT = "agvbench.simulator:make_plant"
+SILENCE_LIMIT_S = 0.5
+"""How long [s] a host lets a vehicle drive without a command, in real time."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +123,11 @@ class AgvAdapter(ABC):
 
     scheme: ClassVar[str]
     """What users write before the colon: ``serial:/dev/ttyACM0`` is scheme ``serial``, address ``/dev/ttyACM0``."""
+    watchdog_s: float = 0.25
+    """How long [s] the vehicle drives on without a command: its own watchdog's limit, or `SILENCE_LIMIT_S` without one.
+
+    A run in which commands were carried out further apart is rejected.
+    """
 
     @classmethod
     @abstractmethod

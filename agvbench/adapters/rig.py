@@ -76,7 +76,13 @@ def open_rig(
             )
             stack.enter_context(host_adapters(session, lab, options, agv=agv, mocap=mocap))
         link = VehicleLink(
-            session, lab, vehicle, clock, answer_limit_s=answer_limit_s, discovery_limit_s=discovery_limit_s
+            session,
+            lab,
+            vehicle,
+            clock,
+            calibration_hash=calibration_hash,
+            answer_limit_s=answer_limit_s,
+            discovery_limit_s=discovery_limit_s,
         )
         stack.enter_context(link)
         _check_seed(link.identity(), seed)

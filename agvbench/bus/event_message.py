@@ -18,8 +18,10 @@ _BODY = struct.Struct("<QdB")
 _DETAILS = ("where", "value", "limit", "remedy")
 _ALL_DETAILS = (1 << len(_DETAILS)) - 1
 
-RUNNER_SILENT = "runner_silent"
-"""The kind of the event by which a vehicle says that it stopped itself, having heard nothing."""
+COMMANDS_LATE, COMMANDS_LOST, RUNNER_SILENT = "commands_late", "commands_lost", "runner_silent"
+VEHICLE_STOPPED_ITSELF = "vehicle_stopped_itself"
+NOT_AS_PLANNED = (COMMANDS_LATE, VEHICLE_STOPPED_ITSELF, RUNNER_SILENT, COMMANDS_LOST)
+"""Kinds of events after which a run was not driven as it was planned, those that say most first."""
 
 
 class Level(IntEnum):
@@ -62,6 +64,12 @@ class Event:
         details = (None if one is None else str(one) for one in said)
         kind = type(error).__name__
         return cls(sequence, role, Level.ERROR, kind, error.what, acknowledged, t_s, source, *details)
+
+    @property
+    def line(self) -> str:
+        """What people read of it."""
+        what = errors.AgvbenchError(self.text, where=self.where, value=self.value, limit=self.limit, remedy=self.remedy)
+        return str(what)
 
     def as_error(self) -> errors.AgvbenchError:
         """Return the error that this event tells of, of its own class where there is one."""

@@ -31,7 +31,7 @@ class Inbox:
     frames_loss
         What was lost of the frames messages.
     events
-        The last thousand events, oldest first; whoever reads them may clear them.
+        The last thousand events, oldest first, until they are taken.
     malformed
         How many messages could not be decoded.
     """
@@ -108,6 +108,10 @@ class Inbox:
         """Count a message that could not be decoded; keep an event of some."""
         if self.malformed.add():
             self.events.append(Event(0, "runner", Level.WARNING, "MessageError", f"{error} ({self.malformed})"))
+
+    def take_events(self) -> list[Event]:
+        """Return the events, oldest first, and forget them; safe beside a thread that adds some."""
+        return [self.events.popleft() for _ in range(len(self.events))]
 
     def close(self) -> None:
         """Receive no more; a thread that waits in `receive` gets its `LinkError`."""

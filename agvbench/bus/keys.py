@@ -3,11 +3,12 @@
 ::
 
     agvbench/v2/<lab>/<vehicle>/agv/command      commands, to the AGV adapter
-                               /agv/<question>   queryables: identity, reset, replay, time
+                               /agv/<question>   queryables: identity, claim, release, reset, replay, time
                                /mocap/<question> queryables: identity, reset, time
                                /report           all that is for the runner: frames, and what an adapter has to say
                                /truth            true poses, from a simulated AGV to a simulated camera
-                               /alive/<role>     liveliness tokens: agv, mocap, runner
+                               /alive/<role>     liveliness tokens: agv, mocap
+                               /alive/runner/<source>   and of every runner, by the source of its commands
 
 ``v2`` is the version of this layout; the messages carry the version of their own encoding. What a runner waits for
 is one key and no wildcard: Zenoh takes a twentieth longer over a message that a wildcard has to be matched with.
@@ -22,6 +23,7 @@ from agvbench.errors import LinkError
 
 AGV, MOCAP, RUNNER = "agv", "mocap", "runner"
 IDENTITY, RESET, REPLAY, TIME = "identity", "reset", "replay", "time"
+CLAIM, RELEASE = "claim", "release"
 
 _NAME = re.compile(r"[A-Za-z0-9_.-]{1,64}", re.ASCII)
 
@@ -89,3 +91,7 @@ class Keys:
     def alive(self, role: str) -> str:
         """Return the liveliness token of an adapter or runner (``"*"``: all of them)."""
         return f"{self.root}/alive/{role}"
+
+    def runner(self, source: int | None = None) -> str:
+        """Return the liveliness token of the runner whose commands are of `source` (None: all of them)."""
+        return self.alive(f"{RUNNER}/*" if source is None else f"{RUNNER}/{source:08x}")

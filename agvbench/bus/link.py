@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections import deque
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 from agvbench.bus.clock import Clock, SimulatedClock, WallClock
-from agvbench.bus.event_message import Event
+from agvbench.bus.event_message import Event, Level
 from agvbench.bus.identity_message import Identity, decode_agv_identity, decode_mocap_identity
 from agvbench.bus.inbox import Inbox
-from agvbench.bus.keys import AGV, IDENTITY, MOCAP, REPLAY, RESET, RUNNER, Keys
+from agvbench.bus.keys import AGV, CLAIM, IDENTITY, MOCAP, RELEASE, REPLAY, RESET, Keys
 from agvbench.bus.lock_step import LockStep
 from agvbench.bus.outbox import CommandOutbox
 from agvbench.bus.presence import Presence
@@ -22,15 +21,17 @@ from agvbench.bus.request_message import (
     Reset,
     Sampling,
     decode_sampling,
+    encode_claim,
     encode_replay,
     encode_reset,
 )
 from agvbench.bus.sequence import LossCounter
 from agvbench.bus.watchdog import Watchdog
-from agvbench.errors import LinkError
+from agvbench.errors import AgvbenchError, LinkError
 from agvbench.types import Command, Commands, Frames, Pose
 
 _ORIGIN = Pose(0.0, 0.0, 0.0)
+_RELEASE_LIMIT_S = 1.0
 _ANYWHERE = Sampling(rate_hz=1.0, phase_s=0.0)
 
 
@@ -48,6 +49,9 @@ class VehicleLink:
         real time.
     wall
         Real time, in which adapters are waited for.
+    calibration_hash
+        Of the calibration that the runner drives with: that of the vehicle's adapter unless given. A firmware that was
+        built for another is an event.
     answer_limit_s
         How long [s] of `wall` an exchange in lock step, a reset or a replay may take.
     discovery_limit_s
@@ -69,6 +73,7 @@ class VehicleLink:
         clock: Clock | None = None,
         *,
         wall: Clock | None = None,
+        calibration_hash: str = "",
         answer_limit_s: float = 60.0,
         discovery_limit_s: float = 5.0,
     ) -> None:
@@ -79,15 +84,26 @@ class VehicleLink:
         self._presence = Presence(session, self.keys, self._wall, self._inbox.wake)
         self._watchdog = Watchdog(self._wall, answer_limit_s, self._inbox.wake)
         self._closed = False
+        self._token = session.liveliness().declare_token(self.keys.runner(self._outbox.source))
         try:
             self._identity = self._meet(discovery_limit_s)
-            self._presence.refuse_other_runner(discovery_limit_s)
+            self._claim(CLAIM, discovery_limit_s)
+            self._compare_calibration(calibration_hash or self._identity.calibration_hash)
         except BaseException:
             self._release()
             raise
         self.clock = clock or (SimulatedClock() if self._identity.lock_step else WallClock())
         self._driver = self._make_driver()
-        self._token = session.liveliness().declare_token(self.keys.alive(RUNNER))
+
+    def _claim(self, question: str, limit_s: float) -> None:
+        """Claim the vehicle for this runner, or release it: its adapter obeys one runner at a time."""
+        ask(self._session, self.keys.question(AGV, question), encode_claim(self._outbox.source), limit_s)
+
+    def _compare_calibration(self, driven_with: str) -> None:
+        built_for = self._identity.agv.extra.get("firmware_calibration", "none")
+        if driven_with and built_for not in ("none", driven_with):
+            text = f"the vehicle's firmware was built for calibration {built_for}, the bench drives with {driven_with}"
+            self._inbox.events.append(Event(0, AGV, Level.WARNING, "calibration_differs", text))
 
     def _meet(self, limit_s: float) -> Identity:
         for role in (AGV, MOCAP):
@@ -200,10 +216,9 @@ class VehicleLink:
         """What was received and lost of the frames messages since the link was opened."""
         return self._inbox.frames_loss
 
-    @property
-    def events(self) -> deque[Event]:
-        """What the adapters had to say, oldest first, the last thousand; whoever reads them may clear them."""
-        return self._inbox.events
+    def take_events(self) -> list[Event]:
+        """Return what adapters and link reported since the last call, oldest first, the last thousand at most."""
+        return self._inbox.take_events()
 
     def close(self) -> None:
         """Stop the vehicle and leave the bus; again does nothing."""
@@ -211,11 +226,13 @@ class VehicleLink:
             return
         self.stop()
         self._closed = True
-        self._token.undeclare()
+        with suppress(AgvbenchError):  # an adapter that is gone has released it
+            self._claim(RELEASE, _RELEASE_LIMIT_S)
         self._release()
         self._driver.close()
 
     def _release(self) -> None:
+        self._token.undeclare()
         self._watchdog.close()
         self._presence.close()
         self._outbox.close()

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 from agvbench.bus.clock import Clock
-from agvbench.bus.keys import AGV, MOCAP, RUNNER, Keys
-from agvbench.errors import AdapterGoneError, LinkError
+from agvbench.bus.keys import AGV, MOCAP, Keys
+from agvbench.errors import AdapterGoneError
 
 
 class Presence:
@@ -85,19 +85,6 @@ class Presence:
                     value=f"{gone_s:.1f} s ago",
                     remedy="start it again; the run that was being driven does not count",
                 )
-
-    def refuse_other_runner(self, limit_s: float) -> None:
-        """Raise `LinkError` if a runner drives this vehicle already, asking the bus for at most `limit_s` [s].
-
-        Two would drive it by turns: a stop of one is a pause until the next command of the other.
-        """
-        replies = self._session.liveliness().get(self._keys.alive(RUNNER), timeout=limit_s)
-        if any(reply.ok is not None for reply in replies):
-            raise LinkError(
-                "another runner drives this vehicle",
-                where=self._keys.root,
-                remedy="wait until it has ended, or end it; another vehicle has another --vehicle-name",
-            )
 
     def close(self) -> None:
         """Stop watching."""

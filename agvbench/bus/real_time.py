@@ -12,7 +12,7 @@ import numpy as np
 from agvbench.bus.clock import Clock, wait_until
 from agvbench.bus.clock_offset import measure_offset
 from agvbench.bus.command_message import CommandFlags
-from agvbench.bus.event_message import RUNNER_SILENT, Event, Level
+from agvbench.bus.event_message import Event, Level
 from agvbench.bus.frames_message import FramesMessage, unpack_columns
 from agvbench.bus.heartbeat import Heartbeat
 from agvbench.bus.inbox import Inbox
@@ -20,7 +20,7 @@ from agvbench.bus.keys import AGV, MOCAP, TIME, Keys
 from agvbench.bus.outbox import CommandOutbox
 from agvbench.bus.presence import Presence
 from agvbench.bus.tally import Tally
-from agvbench.errors import AgvbenchError, LinkError, MessageError
+from agvbench.errors import AgvbenchError, LinkError, MessageError, RunStoppedError
 from agvbench.types import Command, Frames
 
 KEEP_ALIVE_S = 0.1
@@ -58,7 +58,6 @@ class RealTime:
         self._start_s: float | None = None
         self._last_t_s = -np.inf
         self._offset_s = 0.0
-        self._driven = False
         self._thread = threading.Thread(target=self._receive, name="agvbench-inbox", daemon=True)
         self._thread.start()
         self._heartbeat = Heartbeat(session, keys.question(AGV, TIME), clock, self._fail)
@@ -83,15 +82,6 @@ class RealTime:
     def _hear(self, event: Event) -> None:
         if event.level == Level.ERROR:
             self._failure = event.as_error()
-        elif event.kind == RUNNER_SILENT and self._driven:
-            self._fail(
-                LinkError(
-                    "the vehicle stopped itself while it was driven",
-                    where=self._keys.root,
-                    value=event.text,
-                    remedy="keep this machine free of other work; the run does not count",
-                )
-            )
 
     def _keep(self, message: FramesMessage) -> None:
         """Keep frames until they are taken; where nobody takes them for long, what comes then is dropped."""
@@ -115,7 +105,6 @@ class RealTime:
         self._last_t_s = t_s
         wait_until(self._clock, self._start_s + t_s)
         self._check()
-        self._driven = command.drive != self._neutral.drive
         self._outbox.send(command, t_s, hold_s)
         end_s = self._start_s + t_s + hold_s
         while (left_s := end_s - self._clock.now()) > KEEP_ALIVE_S:
@@ -126,6 +115,8 @@ class RealTime:
         return self._take()
 
     def _begin(self, t_s: float) -> None:
+        if isinstance(self._failure, RunStoppedError):
+            self._failure = None
         self._offset_s = measure_offset(self._session, self._keys.question(MOCAP, TIME), self._clock)
         while self._arrived:
             self._next()
@@ -138,7 +129,6 @@ class RealTime:
 
     def stop(self) -> None:
         """Command neutral, and wait for nothing."""
-        self._driven = False
         self._outbox.send(self._neutral, 0.0, 0.0, CommandFlags.STOP)
 
     def close(self) -> None:
@@ -148,8 +138,10 @@ class RealTime:
 
     def _check(self) -> None:
         self._presence.check(AGV, MOCAP)
-        if self._failure is not None:
-            raise self._failure
+        if (failure := self._failure) is not None:
+            if isinstance(failure, RunStoppedError):  # it is of one run only
+                self._failure = None
+            raise failure
 
     def _next(self) -> tuple[float, FramesMessage]:
         at_s, message = self._arrived.popleft()

@@ -1,7 +1,8 @@
-"""Requests to adapters that are not commands, and their replies: reset, sampling, replay, time.
+"""Requests to adapters that are not commands, and their replies: claim, reset, sampling, replay, time.
 
-Bodies after the header: reset is a pose and a sampling (5 f64) and the run key; sampling is rate and phase (2 f64);
-replay is a reset, ``until_s`` (f64), and columns ``t_s``, ``drive``, ``front``, ``rear``; time is one f64.
+Bodies after the header: claim has none, its runner is the header's source; reset is a pose and a sampling (5 f64) and
+the run key; sampling is rate and phase (2 f64); replay is a reset, ``until_s`` (f64), and columns ``t_s``, ``drive``,
+``front``, ``rear``; time is one f64.
 """
 
 from __future__ import annotations
@@ -12,7 +13,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agvbench.bus.wire import FLOAT, MAX_ROWS, Header, Kind, Reader, pack_column, pack_header, pack_text, unpack_header
+from agvbench.bus.wire import (
+    FLOAT,
+    HEADER_BYTES,
+    MAX_ROWS,
+    Header,
+    Kind,
+    Reader,
+    check_length,
+    pack_column,
+    pack_header,
+    pack_text,
+    unpack_header,
+)
 from agvbench.errors import MessageError
 from agvbench.types import Commands, Pose
 
@@ -51,6 +64,18 @@ class Replay:
     reset: Reset
     commands: Commands
     until_s: float
+
+
+def encode_claim(source: int) -> bytes:
+    """Return the bytes by which the runner whose commands are of `source` claims a vehicle, or releases it."""
+    return pack_header(Kind.CLAIM, count=1, source=source)
+
+
+def decode_claim(payload: bytes) -> int:
+    """Return the source of the runner that claims or releases the vehicle, or raise `MessageError`."""
+    header = unpack_header(payload, Kind.CLAIM)
+    check_length(payload, HEADER_BYTES)
+    return header.source
 
 
 def encode_sampling(sampling: Sampling) -> bytes:

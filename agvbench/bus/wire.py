@@ -51,6 +51,7 @@ class Kind(IntEnum):
     MOCAP_IDENTITY = 8
     TIME = 9
     TRUTH = 10
+    CLAIM = 11
 
 
 class Header(NamedTuple):

@@ -181,4 +181,6 @@ def _conclude(terminalreporter: pytest.TerminalReporter, config: pytest.Config, 
     if session.is_dry:
         terminalreporter.write_line(dry_run_table(session.planned))
     else:
+        for line in session.events:
+            terminalreporter.write_line(line)
         terminalreporter.write_line(conclude(shown(session.directory), report=not option(config, "--no-report")))

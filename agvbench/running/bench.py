@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
 from dataclasses import replace
 
 from agvbench.campaign import CampaignWriter
-from agvbench.errors import FlagError, RunStoppedError, SafetyStopError
+from agvbench.errors import CampaignError, FlagError, RunStoppedError, SafetyStopError
 from agvbench.model import VehicleModel
 from agvbench.planning import Departure, Workspace
 from agvbench.running.campaign_time import CampaignTime
 from agvbench.running.drive import DEFAULT_TIMING, Drive, Timing, drive, exchanged
+from agvbench.running.event_log import EventLog
 from agvbench.running.latch import Failure, Latch
 from agvbench.running.links import RunnerLink
 from agvbench.running.pausing import Pause, standing
 from agvbench.running.placers.choosing import make_placer
 from agvbench.running.placers.placer import Rig
-from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess
+from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess, not_as_planned
 from agvbench.running.records import DriveOrder, record_aborted, recorded_run, stopped_drive, times_stopped
 from agvbench.running.session_began import SessionBegan
 from agvbench.running.settings import BenchSettings
@@ -59,6 +61,7 @@ class Bench:
         self._time, self._timing, self._limits = campaign_time, timing, limits
         self._identity = link.identity()
         self._latch, self.pause = Latch(), Pause(writer.path)
+        self.log = EventLog(writer)
         self._recorded, self._session = recorded, session
         self._unseen = 0
         self.awaited: set[str] = set()
@@ -134,6 +137,12 @@ class Bench:
                     break
         return run
 
+    def close(self) -> None:
+        """Keep what was reported since the last run."""
+        self.log.take(self.link, "", self._time.now_s())
+        with suppress(CampaignError):  # what ended the session has to be told, not that this could not be recorded
+            self.log.save()
+
     def _attempts(self, order: DriveOrder) -> int:
         """Return how many attempts there are: as many again where all of an earlier session's were rejected."""
         limit = self.settings.attempts
@@ -149,6 +158,7 @@ class Bench:
         order = self._placed(order, run_id)
         started_s = self._time.now_s()
         self._session = self._session.with_run(started_s)
+        self.log.take(self.link, "", started_s)
         seen: list[Frames] = []
         try:
             driven = self._drive(order, run_id, seen)
@@ -157,9 +167,16 @@ class Bench:
             driven, status = self._stopped(order, seen, stop)
         except BaseException as error:
             record_aborted(self.writer, order, run_id, started_s, seen, error, self._identity.firmware)
+            self.log.take(self.link, run_id, started_s)
             raise
+        events = self.log.take(self.link, run_id, started_s + driven.duration_s)
+        if events:
+            order = replace(order, extra={**order.extra, "events": len(events)})
+        if (event := not_as_planned(events)) is not None:
+            status = f"rejected: {event.line}"
         run = recorded_run(order, run_id, started_s, status, driven, self._identity.firmware)
         self.writer.append(run)
+        self.log.save()
         self._time.has_run(started_s, driven.duration_s)
         self._check_seen(run)
         return run
@@ -167,7 +184,8 @@ class Bench:
     def _stopped(self, order: DriveOrder, seen: list[Frames], stop: RunStoppedError) -> tuple[Drive, str]:
         """Return what was driven of a run that the supervisor stopped, and its status: it does not count."""
         self._placer.was_moved()
-        driven = stopped_drive(order.commands, seen, self._supervisor.exchanged_s, self._timing.rest_before_s)
+        rest_s = self._timing.rest_before_s
+        driven = stopped_drive(order.commands, seen, max(self._supervisor.exchanged_s, -rest_s), rest_s)
         return driven, f"rejected: {RunStoppedError(stop.what, value=stop.value, limit=stop.limit)}"
 
     def _check_seen(self, run: Run) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from agvbench.bus.event_message import Event
 from agvbench.bus.identity_message import Identity
 from agvbench.bus.keys import Keys
 from agvbench.types import Command, Commands, Frames, Pose
@@ -28,6 +29,10 @@ class RunnerLink(Protocol):
 
     def flush(self) -> Frames:
         """Return the frames that were late."""
+        ...
+
+    def take_events(self) -> list[Event]:
+        """Return what adapters and link reported since the last call."""
         ...
 
     def stop(self) -> None:

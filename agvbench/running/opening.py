@@ -101,8 +101,11 @@ def open_session(
             session = session_with(bench=bench)
             session.notices = _notices(settings, given)
             session.notices += idle_notice(recorded.values(), campaign_time.now_s(), settings.session)
-            with bench.pause.by_signal(), _leaving_out_undrivable(writer, session):
-                yield session
+            try:
+                with bench.pause.by_signal(), _leaving_out_undrivable(writer, session):
+                    yield session
+            finally:
+                bench.close()
 
 
 def _notices(settings: BenchSettings, given: Mapping[str, Any]) -> list[str]:

@@ -1,13 +1,14 @@
-"""Does a run count? Tracked share, gaps, start pose, and rest at both ends."""
+"""Does a run count? Tracked share, gaps, start pose, rest at both ends, and what adapters reported meanwhile."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from agvbench.bus.event_message import NOT_AS_PLANNED, Event, Level
 from agvbench.running.rest import is_at_rest, pose_before
 from agvbench.types import RUN_OK, Frames, Pose, wrap_angle
 
@@ -56,6 +57,16 @@ class Quality:
             yield "moving before the first command"
         if not self.rests_after:
             yield "still moving when the run ended"
+
+
+def not_as_planned(events: Sequence[Event]) -> Event | None:
+    """Return the event that says best why a run was not driven as it was planned; None if none does.
+
+    An error is one, too. Of several of a kind it is the last: of gaps between commands the longest.
+    """
+    rank = {kind: number for number, kind in enumerate(NOT_AS_PLANNED)}
+    found = [event for event in events if event.kind in rank or event.level is Level.ERROR]
+    return min(reversed(found), key=lambda event: rank.get(event.kind, len(rank)), default=None)
 
 
 def assess(frames: Frames, *, start: Pose, begin_s: float, end_s: float, rate_hz: float) -> Quality:

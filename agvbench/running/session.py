@@ -81,6 +81,11 @@ class BenchSession:
         if self._bench is not None:
             self._bench.awaited.discard(run_id)
 
+    @property
+    def events(self) -> list[str]:
+        """What adapters and link reported in this session: a line for each kind, with how often it came."""
+        return [] if self._bench is None else self._bench.log.summary()
+
     def model(self, condition: str) -> VehicleModel:
         """Return the vehicle model that commands are computed with under `condition`."""
         return self._models[condition] if self._bench is None else self._bench.model(condition)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from agvbench.bus.event_message import Event
 from agvbench.bus.identity_message import Identity
 from agvbench.bus.link import VehicleLink
 from agvbench.types import Command, Commands, Frames, Pose
@@ -51,6 +52,10 @@ class UnbrokenLink:
     def flush(self) -> Frames:
         """Return the frames that were late."""
         return self._told(self._link.flush())
+
+    def take_events(self) -> list[Event]:
+        """Return what adapters and link reported since the last call."""
+        return self._link.take_events()
 
     def stop(self) -> None:
         """Command neutral at once."""

@@ -31,7 +31,8 @@ class ReportData:
 
     ``errors`` is what `pose_errors` returns, ``end_poses`` the table of tables 8.3–8.10, ``spread`` accuracy apart from
     repeatability, ``comparisons`` every condition against the next one, ``quality`` one row per run. ``problems`` are
-    sentences about what could not be read or compared; ``diagnosis`` lies in the directory, or None.
+    sentences about what could not be read or compared; ``events`` are what adapters
+    reported; ``diagnosis`` lies in the directory, or None.
     """
 
     path: Path
@@ -43,6 +44,7 @@ class ReportData:
     comparisons: list[Comparison]
     quality: pd.DataFrame
     curves: CalibrationCurves
+    events: pd.DataFrame
     provenance: dict[str, str] = field(default_factory=dict)
     problems: list[str] = field(default_factory=list)
     diagnosis: ShownDiagnosis | None = None
@@ -90,6 +92,7 @@ def gather(
         comparisons=_between_conditions(errors, margin_mm, margin_deg, problems),
         quality=run_quality(runs, rate_hz=campaign.header.mocap_rate_hz),
         curves=read_calibration_curves(campaign),
+        events=_events(campaign, problems),
         provenance=_provenance(campaign, problems),
         problems=problems,
         diagnosis=read_diagnosis(campaign.path),
@@ -128,9 +131,30 @@ def _between_conditions(
     return comparisons
 
 
+EVENT_COLUMNS = ("time_s", "run_id", "source", "level", "event", "text")
+
+
+def _events(campaign: Campaign, problems: list[str]) -> pd.DataFrame:
+    """Return what adapters and link reported, as far as the campaign says so; no rows where it does not."""
+    import pandas as pd
+
+    nothing = pd.DataFrame(columns=list(EVENT_COLUMNS))
+    if not _has_table(campaign, "events"):
+        return nothing
+    try:
+        return campaign.table("events")[list(EVENT_COLUMNS)]
+    except (InputError, KeyError) as error:
+        problems.append(f"The events table cannot be read: {error}.")
+        return nothing
+
+
+def _has_table(campaign: Campaign, name: str) -> bool:
+    return any((campaign.path / f"{name}{suffix}").exists() for suffix in (".parquet", ".csv"))
+
+
 def _provenance(campaign: Campaign, problems: list[str]) -> dict[str, str]:
     """Return the provenance table, if there is one, as names and values."""
-    if not any((campaign.path / f"provenance{suffix}").exists() for suffix in (".parquet", ".csv")):
+    if not _has_table(campaign, "provenance"):
         return {}
     try:
         table = campaign.table("provenance")

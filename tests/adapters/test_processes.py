@@ -7,12 +7,13 @@ import socket
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import pytest
 from rig_driving import HANGING, NEUTRAL, START, TINY, digest, drive_run, process
 
 from agvbench.adapters import AdapterOptions, host_adapters, open_rig
-from agvbench.bus.keys import RUNNER, Keys
 from agvbench.bus.link import VehicleLink
 from agvbench.bus.session import open_session
 from agvbench.errors import AdapterGoneError, LinkError
@@ -129,24 +130,39 @@ def test_signals_end_a_process_cleanly_also_in_quick_succession(
             signal.signal(number, handler)
 
 
-def wait_for_word(endpoint: str, *, of_a_runner: bool) -> None:
-    """Wait until everybody can know whether somebody drives the vehicle: that takes a moment to go round."""
-    deadline_s = time.monotonic() + 20.0
-    with open_session(connect=[endpoint]) as session:
-        while any(reply.ok for reply in session.liveliness().get(Keys("lab", "agv1").alive(RUNNER))) != of_a_runner:
-            assert time.monotonic() < deadline_s
-            time.sleep(0.01)
-
-
 def test_a_second_runner_of_one_vehicle_is_refused_until_the_first_has_gone(endpoint: str, expected: list[str]) -> None:
     with process("sim", *SEED, "--plant", TINY, "--listen", endpoint):
-        with open_rig(connect=endpoint, seed=11):
-            wait_for_word(endpoint, of_a_runner=True)
-            with (
-                pytest.raises(LinkError, match="another runner drives this vehicle"),
-                open_rig(connect=endpoint, seed=11),
-            ):
-                pass
-        wait_for_word(endpoint, of_a_runner=False)
+        with (
+            open_rig(connect=endpoint, seed=11),
+            pytest.raises(LinkError, match="another runner drives this vehicle"),
+            open_rig(connect=endpoint, seed=11),
+        ):
+            pass
         with open_rig(connect=endpoint, seed=11) as link:
             assert [digest(drive_run(link, key)) for key in KEYS] == expected
+
+
+def test_of_runners_that_start_together_one_has_the_vehicle_until_its_connection_ends(endpoint: str) -> None:
+    options = AdapterOptions(plant=TINY)
+    with open_session(listen=[endpoint]) as bus, host_adapters(bus, "lab", options, agv="sim", mocap="sim"):
+        sessions = [open_session(connect=[endpoint]) for _ in range(4)]
+
+        def start(session: Any) -> VehicleLink | str:
+            try:
+                return VehicleLink(session, "lab", "agv1")
+            except LinkError as error:
+                return error.what
+
+        with ThreadPoolExecutor(len(sessions)) as together:
+            started = list(together.map(start, sessions))
+        links = [link for link in started if isinstance(link, VehicleLink)]
+        assert len(links) == 1
+        assert started.count("another runner drives this vehicle") == 3
+        # It is gone without a word, as a runner that was killed.
+        sessions.pop(started.index(links[0])).close()
+        deadline_s = time.monotonic() + 20.0
+        while isinstance(start(sessions[0]), str):
+            assert time.monotonic() < deadline_s
+            time.sleep(0.01)
+        for session in sessions:
+            session.close()

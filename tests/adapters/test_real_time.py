@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 
@@ -15,11 +16,11 @@ from agvbench.adapters.contract import AgvAdapter
 from agvbench.bus.clock import SimulatedClock, WallClock
 from agvbench.bus.clock_offset import measure_offset
 from agvbench.bus.command_message import CommandMessage, encode_command
+from agvbench.bus.event_message import decode_event
 from agvbench.bus.identity_message import AgvIdentity
 from agvbench.bus.keys import Keys
 from agvbench.bus.request_message import encode_time
 from agvbench.bus.session import open_session
-from agvbench.errors import LinkError
 from agvbench.types import Command, Frames
 
 pytestmark = pytest.mark.real_time
@@ -146,13 +147,28 @@ def test_what_hangs_and_comes_back_driving_is_stopped_again() -> None:
         host.close()
 
 
-def test_a_run_in_which_the_vehicle_stopped_itself_does_not_count() -> None:
-    with open_rig("live", plant=TINY) as link:
-        link.reset(START, run_key="a")
-        link.exchange(Command(1900.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.1)
-        time.sleep(1.2)
-        with pytest.raises(LinkError, match="stopped itself while it was driven"):
-            link.exchange(Command(1900.0, 1500.0, 1500.0), t_s=0.1, hold_s=0.1)
+class Stuttering(Silent):
+    """Takes longer over a command than its vehicle waits for the next."""
+
+    def apply(self, message: CommandMessage) -> None:
+        time.sleep(0.3)
+        super().apply(message)
+
+
+def test_commands_further_apart_than_the_watchdog_allows_are_told_with_both_figures_while_it_drives() -> None:
+    adapter, keys, told = Stuttering(), Keys("lab", "agv1"), []
+    with open_session() as session:
+        events = session.declare_subscriber(keys.report, lambda sample: told.append(sample.payload.to_bytes()))
+        host = AgvHost(session, keys, adapter, WallClock(), show=lambda _: None)
+        for number, drive in enumerate((1500.0, 1500.0, 1800.0, 1500.0), start=1):
+            session.put(keys.command, encode_command(CommandMessage(number, 0.0, NEUTRAL._replace(drive=drive), 1.0)))
+            while len(adapter.applied) < number:
+                time.sleep(0.01)
+        host.close()
+        events.undeclare()
+    late = [decode_event(one).text for one in told if b"commands_late" in one]
+    assert len(late) == 1
+    assert re.fullmatch(r"0\.\d\d s between two commands \(limit: 0.25 s, then the vehicle stops itself\)", late[0])
 
 
 def test_lost_commands_and_nonsense_are_told_and_do_not_stop_the_host() -> None:

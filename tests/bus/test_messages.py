@@ -36,10 +36,12 @@ from agvbench.bus.request_message import (
     Replay,
     Reset,
     Sampling,
+    decode_claim,
     decode_replay,
     decode_reset,
     decode_sampling,
     decode_time,
+    encode_claim,
     encode_replay,
     encode_reset,
     encode_sampling,
@@ -131,6 +133,7 @@ CODECS: dict[str, tuple[Any, Callable[[Any], bytes], Callable[[bytes], Any]]] = 
     "sampling": (samplings, encode_sampling, decode_sampling),
     "replay": (replays(), encode_replay, decode_replay),
     "time": (finite, encode_time, decode_time),
+    "claim": (u32, encode_claim, decode_claim),
     "truth": (truths(), encode_truth, decode_truth),
 }
 few = settings(max_examples=40, deadline=None)
@@ -240,6 +243,7 @@ def _one(codec: Any) -> Any:
         "sampling": Sampling(120.0, 0.0),
         "replay": Replay(reset, Commands(none, none, none, none), 0.0),
         "time": 0.0,
+        "claim": 7,
         "truth": Truth(1, 1, 0.0, none, np.empty((0, 3))),
     }[name]
 

@@ -31,6 +31,7 @@ class ImpairedAgv(AgvAdapter):
             if fault.needs_line and self._line is None:
                 raise LinkError("vehicle has no serial line", where=f"{SCHEME}:{when.name}", value=vehicle.scheme)
         self._neutral = options.neutral_command
+        self.watchdog_s = vehicle.watchdog_s
 
     @classmethod
     def open(cls, address: str, options: AdapterOptions) -> ImpairedAgv:

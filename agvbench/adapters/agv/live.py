@@ -7,7 +7,7 @@ import threading
 
 import numpy as np
 
-from agvbench.adapters.contract import AdapterOptions, AgvReports
+from agvbench.adapters.contract import SILENCE_LIMIT_S, AdapterOptions, AgvReports
 from agvbench.adapters.simulated_agv import SimulatedAgv
 from agvbench.bus.clock import wait_until
 from agvbench.bus.command_message import CommandFlags, CommandMessage
@@ -26,6 +26,7 @@ class LiveAgv(SimulatedAgv):
 
     scheme = "live"
     lock_step = False
+    watchdog_s = SILENCE_LIMIT_S
 
     def __init__(self, plant: Plant, options: AdapterOptions) -> None:
         super().__init__(plant, options)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import threading
 
-from agvbench.adapters.contract import AdapterOptions, AgvAdapter, AgvReports
+from agvbench.adapters.contract import SILENCE_LIMIT_S, AdapterOptions, AgvAdapter, AgvReports
 from agvbench.adapters.serial_line.conversation import Conversation
 from agvbench.adapters.serial_line.dialect import check_unit
 from agvbench.adapters.serial_line.port import SerialPort
 from agvbench.bus.clock import Clock
 from agvbench.bus.command_message import CommandFlags, CommandMessage
-from agvbench.bus.event_message import Level
+from agvbench.bus.event_message import VEHICLE_STOPPED_ITSELF, Level
 from agvbench.bus.identity_message import AgvIdentity
 from agvbench.bus.tally import Tally
 from agvbench.errors import AgvbenchError, LinkError
@@ -48,7 +48,8 @@ class SerialAgv(AgvAdapter):
         self._conversation = Conversation(port.path)
         self._greet()
         self.hello = self._conversation.begin()
-        self._tallies = (Tally(), Tally(), Tally())
+        self.watchdog_s = self._conversation.watchdog_s or SILENCE_LIMIT_S
+        self._tallies = (Tally(), Tally())
         self._told = self._counts()  # half a line of a banner, heard while greeting, is nothing to tell
         self._thread = threading.Thread(target=self._listen, name="agvbench-serial", daemon=True)
 
@@ -108,10 +109,6 @@ class SerialAgv(AgvAdapter):
         """Begin to listen."""
         self._reports = reports
         self._thread.start()
-        built_for, believed = self.hello.calibration_hash, self._options.calibration_hash
-        if believed and built_for not in ("none", believed):
-            text = f"the vehicle's firmware was built for calibration {built_for}, the bench believes {believed}"
-            reports.event(Level.WARNING, "calibration_differs", text)
 
     def apply(self, message: CommandMessage) -> None:
         """Send the command; said again, it keeps the vehicle's watchdog quiet."""
@@ -174,11 +171,14 @@ class SerialAgv(AgvAdapter):
         kinds = (
             ("line_garbled", "the vehicle said something garbled"),
             ("command_resent", "the vehicle heard something garbled; the command was sent again"),
-            ("vehicle_stopped_itself", "the vehicle heard nothing for 250 ms and went to neutral"),
         )
-        for (kind, text), tally, count, before in zip(kinds, self._tallies, now, self._told, strict=True):
+        for (kind, text), tally, count, before in zip(kinds, self._tallies, now[:2], self._told[:2], strict=True):
             if count > before and tally.add(count - before):
                 self._reports.event(Level.WARNING, kind, f"{text} ({tally})")
+        if now[2] > self._told[2]:  # each of them spoils a run: none is left untold
+            gap_s, limit_s = self._conversation.bitten_after_s, self.watchdog_s
+            text = f"the vehicle's watchdog stopped it: {gap_s:.2f} s between two commands (limit: {limit_s:g} s)"
+            self._reports.event(Level.WARNING, VEHICLE_STOPPED_ITSELF, text)
         self._told = now
 
     def _counts(self) -> tuple[int, int, int]:

@@ -52,6 +52,7 @@ class SimavrLiveAgv(LiveAgv):
         except BaseException:
             self._microcontroller.close()
             raise
+        self.watchdog_s = self._serial.watchdog_s
         self._pulses = threading.Thread(target=self._take_pulses, name="agvbench-pulses", daemon=True)
 
     @property

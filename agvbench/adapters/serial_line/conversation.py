@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from agvbench.adapters.serial_line.dialect import DIALECTS, Dialect, dialect_of
@@ -27,6 +28,13 @@ class Conversation:
     ----------
     where
         The port, for messages.
+
+    Attributes
+    ----------
+    garbled, resent, watchdog_bites
+        How many lines were garbled, commands said again, and times the vehicle's watchdog stopped it.
+    bitten_after_s
+        The longest time [s] between two commands around the last of these.
     """
 
     def __init__(self, where: str) -> None:
@@ -38,6 +46,7 @@ class Conversation:
         self._sequence, self._failures = 0, 0
         self._waiting: tuple[int, float] | None = None  # the oldest number without an answer, and when it was sent
         self._last: Command | None = None
+        self._said_s, self._gap_s, self.bitten_after_s = math.inf, 0.0, 0.0
         self._heard = b""
 
     @property
@@ -77,6 +86,11 @@ class Conversation:
             "the vehicle does not answer", where=self._where, remedy="see whether it is switched on and the right port"
         )
 
+    @property
+    def watchdog_s(self) -> float | None:
+        """After how long [s] without a command the vehicle stops itself; None if it does not."""
+        return None if self._dialect is None else self._dialect.watchdog_s
+
     def command(self, command: Command, now_s: float) -> bytes:
         """Return the line that makes the vehicle hold `command` [µs], said at `now_s` [s]."""
         if self._dialect is None:
@@ -84,6 +98,7 @@ class Conversation:
         numbers = self._dialect.numbers(command, where=self._where)
         self._sequence = self._sequence % _NUMBERS + 1
         self._last = command
+        self._gap_s, self._said_s = max(0.0, now_s - self._said_s), now_s
         self._waiting = self._waiting or (self._sequence, now_s)
         text = f"S {self._sequence} {numbers[0]} {numbers[1]} {numbers[2]}"
         return encode_line(text, checksum=self._dialect.checksums)
@@ -139,7 +154,9 @@ class Conversation:
         elif isinstance(reply, Refused):
             return self._refuse(reply, now_s)
         elif isinstance(reply, WatchdogBit):
+            # The next command may have been said before the vehicle's word for the silence before it was read.
             self.watchdog_bites += 1
+            self.bitten_after_s = max(self._gap_s, now_s - self._said_s)
         elif isinstance(reply, Hello):
             raise LinkError(
                 "the vehicle was reset while it was driven",

@@ -16,12 +16,13 @@ _NEUTRAL_DEGREE = 90
 
 @dataclass(frozen=True)
 class Dialect:
-    """The numbers one version takes, and whether it knows checksums."""
+    """The numbers one version takes, whether it knows checksums, and after how long [s] its watchdog bites."""
 
     unit: str
     lowest: int
     highest: int
     checksums: bool
+    watchdog_s: float | None = None
 
     def numbers(self, command: Command, *, where: object = None) -> tuple[int, int, int]:
         """Return drive, front and rear [µs] as the firmware's whole numbers, nearest first.
@@ -51,7 +52,7 @@ class Dialect:
         return float(number) if self.unit == "us" else NEUTRAL_US + (number - _NEUTRAL_DEGREE) * US_PER_DEGREE
 
 
-DIALECTS = {1: Dialect("deg", 30, 150, checksums=False), 2: Dialect("us", 600, 2400, checksums=True)}
+DIALECTS = {1: Dialect("deg", 30, 150, checksums=False), 2: Dialect("us", 600, 2400, checksums=True, watchdog_s=0.25)}
 """By version of the firmware."""
 
 

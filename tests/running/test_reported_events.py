@@ -1,0 +1,109 @@
+"""What adapters report while a bench drives: it reaches the operator, the campaign, the run's status and the report."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from agvbench.adapters import AdapterOptions, host_adapters, open_rig
+from agvbench.bus.command_message import CommandFlags, pack_command
+from agvbench.bus.event_message import Event, Level
+from agvbench.bus.keys import Keys
+from agvbench.bus.session import open_session as open_bus
+from agvbench.campaign import Campaign
+from agvbench.errors import AgvbenchError
+from agvbench.reporting.sections import all_sections
+from agvbench.running.opening import open_session
+from agvbench.running.quality import not_as_planned
+from agvbench.types import Command
+from agvbench.workflows.report import gather
+
+VEHICLE = Path(__file__).with_name("watched_vehicle.py")
+PERFECT = dict.fromkeys(("lost", "doubled", "late", "wrong", "untracked"), 0.0)
+
+
+@pytest.fixture
+def endpoint() -> Iterator[str]:
+    """The vehicle and its camera, for whoever connects."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        where = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    options = AdapterOptions(camera=PERFECT)
+    with open_bus(listen=[where]) as bus, host_adapters(bus, "lab", options, agv=str(VEHICLE), mocap="sim"):
+        yield where
+
+
+def in_mid_run(link: Any, do: Callable[[], object]) -> None:
+    """Call `do` once while the vehicle drives in the next run."""
+    plain, left = link.exchange, [do]
+
+    def exchange(command: Command, *, t_s: float, hold_s: float) -> Any:
+        if left and command.drive != 1500.0 and t_s > 0.7:
+            left.pop()()
+        return plain(command, t_s=t_s, hold_s=hold_s)
+
+    link.exchange = exchange
+
+
+@pytest.mark.real_time
+def test_events_are_told_kept_counted_and_spoil_the_runs_that_were_not_driven_as_planned(
+    endpoint: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stranger = open_bus(connect=[endpoint])
+    wild = pack_command(1, 0.0, Command(2000.0, 1500.0, 1500.0), 1.0, CommandFlags.NONE, 666)
+    faults: dict[str, Callable[[], object]] = {
+        "quiet": lambda: None,
+        "stalled": lambda: time.sleep(0.4),
+        "stranger": lambda: stranger.put(Keys("lab", "agv1").command, wild),
+    }
+    given = {"connect": endpoint, "vehicle": "", "attempts": 1, "workspace": "circle:12"}
+    with open_session(given, out=str(tmp_path / "c"), resume=False, dry_run=False) as session, stranger:
+        assert session._bench is not None
+        for name, fault in faults.items():
+            in_mid_run(session._bench.link, fault)
+            with suppress(AgvbenchError):
+                session.driver(name, experiment="free", repeat=1).hold(for_s=0.8, drive=0.5)
+        summary = session.events
+    campaign = Campaign.open(tmp_path / "c")
+    runs = {run.run_id: run for run in campaign}
+    assert runs["quiet"].status == "ok"
+    assert runs["quiet"].extra["events"] == 1
+    assert "s between two commands (limit: 0.25 s, then the vehicle stops itself)" in runs["stalled"].status
+    assert runs["stalled"].status.startswith("rejected: 0.")
+    assert runs["stranger"].status.startswith("rejected: ")
+    assert "commands of another source: 1, of 0000029a" in runs["stranger"].status
+    table = campaign.table("events")
+    assert {"battery_low", "commands_late", "RunStoppedError"} <= set(table["event"])
+    assert set(table["run_id"][table["event"] == "battery_low"]) == set(faults)
+    assert capsys.readouterr().err.count("agv reports battery_low: 7.1 V") <= 1
+    assert "battery_low: 3 events, see the campaign's table events" in summary
+    [section] = [section for section in all_sections() if section.slug == "events"]
+    [shown] = [block for block in section.blocks(gather(tmp_path / "c")) if hasattr(block, "rows")]
+    assert ["agv", "info", "battery_low", 3, 3, "7.1 V"] in [list(row) for row in shown.rows]
+
+
+def test_a_vehicle_that_was_built_for_another_calibration_is_an_event(endpoint: str) -> None:
+    with open_rig(connect=endpoint, calibration_hash="ffff0000") as link:
+        [event] = link.take_events()
+    assert (event.kind, event.level) == ("calibration_differs", Level.WARNING)
+    assert event.text == "the vehicle's firmware was built for calibration 0123abcd, the bench drives with ffff0000"
+    with open_rig(connect=endpoint, calibration_hash="0123abcd") as link:
+        assert link.take_events() == []
+
+
+def test_the_event_that_says_most_of_why_a_run_does_not_count_is_chosen() -> None:
+    def event(kind: str, text: str, level: Level = Level.WARNING) -> Event:
+        return Event(1, "agv", level, kind, text)
+
+    short, long = event("commands_late", "0.3 s"), event("commands_late", "0.6 s")
+    silent, failed = event("runner_silent", "0.5 s"), event("LinkError", "broken", Level.ERROR)
+    assert not_as_planned([event("line_garbled", "x"), event("command_resent", "y")]) is None
+    assert not_as_planned([silent, short, failed, long]) is long
+    assert not_as_planned([failed, silent]) is silent
+    assert not_as_planned([failed]) is failed
