@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from agvbench.model import VehicleModel
 
 SHAPES = ("segments", "dubins", "s_curve", "slalom", "step_steer", "speed_steps", "endurance", "commands")
-_NAME = re.compile("[A-Za-z0-9][A-Za-z0-9_.-]*")
+TRAJECTORY_NAME = re.compile("[A-Za-z0-9][A-Za-z0-9_.-]*")
 Condition = Literal["uncalibrated", "calibrated", "corrected"]
 
 
@@ -76,7 +76,7 @@ class Trajectory(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, 
     commands: CommandTable | None = None
 
     def __post_init__(self) -> None:
-        if not _NAME.fullmatch(self.name):
+        if not TRAJECTORY_NAME.fullmatch(self.name):
             raise ValueError(f"name is not made of letters, digits, '_', '.' and '-': {self.name!r}")
         check_speed(self.speed)
         given = [shape for shape in SHAPES if getattr(self, shape) is not None]

@@ -1,7 +1,8 @@
-"""A recording for the Rerun viewer: every run's path, and its pose and commands over its own time."""
+"""A recording for the Rerun viewer: every run's path, plan and target, and its pose and commands over its own time."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,8 @@ from agvbench.reporting.content import plain
 from agvbench.reporting.figures.paths import smooth_poses
 from agvbench.reporting.figures.style import colour
 from agvbench.statistics.end_poses import in_order
-from agvbench.types import Floats, Run
+from agvbench.types import Commands, Floats, Pose, Run
+from agvbench.workflows.planned_path import PlannedPaths
 from agvbench.workflows.report import ReportData
 
 if TYPE_CHECKING:
@@ -21,24 +23,29 @@ if TYPE_CHECKING:
 TIMELINE = "run_time"
 _ARROW_M = 0.25
 _RATE_HZ = 60.0
+_PLANNED = (128, 128, 128)
 
 
 def write_recording(data: ReportData, path: Path) -> None:
     """Write `data` as a recording: columns of whole runs, never row by row.
 
-    Under ``/runs/TRAJECTORY/CONDITION/RUN``: ``path`` (a line, always there), ``vehicle`` (an arrow that moves on the
-    timeline ``run_time``, 0 at the first command) and ``commands`` (the three commands). Poses are thinned to 60 Hz.
+    Under ``/runs/TRAJECTORY/CONDITION/RUN``: ``path``, ``plan`` (lines) and ``target`` (an arrow), always there;
+    ``vehicle`` (an arrow that moves on the timeline ``run_time``, 0 at the first command) and ``commands`` (each of the
+    three, held until the next). Poses are thinned to 60 Hz. The viewer opens with all runs on one floor, and with a tab
+    for each trajectory, in it for each condition, in it for each run: its floor over its commands.
     """
     import pandas as pd
     import rerun as rr
 
+    counted = [run for run in data.runs if run.is_ok]
+    plans = PlannedPaths(data.path, data.header)
     recording = rr.RecordingStream("agvbench", recording_id=plain(data.header.name), send_properties=False)
-    recording.save(path, default_blueprint=_blueprint())
+    recording.save(path, default_blueprint=_blueprint(counted))
     numbers = condition_numbers(in_order(pd.Series([run.condition for run in data.runs], dtype=str)))
     recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    for run in data.runs:
-        if run.is_ok:
-            _send_run(recording, run, colour(numbers[run.condition]))
+    for run in counted:
+        _send_run(recording, run, colour(numbers[run.condition]))
+        _send_plan(recording, _entity(run), *plans.of(run))
     recording.flush()
     recording.disconnect()
 
@@ -49,7 +56,7 @@ def _send_run(recording: rr.RecordingStream, run: Run, shown: str) -> None:
     poses = _thinned(smooth_poses(run.frames))
     if len(poses) < 2:
         return
-    entity = rr.new_entity_path(["runs", *map(plain, (run.trajectory or run.experiment, run.condition, run.run_id))])
+    entity = _entity(run)
     rgb = [int(shown[i : i + 2], 16) for i in (1, 3, 5)]
     flat = np.column_stack([poses[:, 1:3], np.zeros(len(poses))])
     recording.log(f"{entity}/path", rr.LineStrips3D([flat], colors=[rgb], radii=[0.004]), static=True)
@@ -59,11 +66,41 @@ def _send_run(recording: rr.RecordingStream, run: Run, shown: str) -> None:
     moved = rr.Transform3D.columns(translation=flat, quaternion=turn)
     recording.send_columns(f"{entity}/vehicle", indexes=[_time(poses[:, 0])], columns=moved)
     if len(run.commands):
-        told = np.column_stack([run.commands.drive, run.commands.front, run.commands.rear])
-        names = rr.SeriesLines(names=["drive", "front", "rear"])
-        recording.log(f"{entity}/commands", names, static=True)
-        index = [_time(run.commands.t_s)]
-        recording.send_columns(f"{entity}/commands", indexes=index, columns=rr.Scalars.columns(scalars=told))
+        at, held = _steps(run.commands, float(poses[-1, 0]))
+        recording.log(f"{entity}/commands", rr.SeriesLines(names=["drive", "front", "rear"]), static=True)
+        columns = rr.Scalars.columns(scalars=held)
+        recording.send_columns(f"{entity}/commands", indexes=[_time(at)], columns=columns)
+
+
+def _send_plan(recording: rr.RecordingStream, entity: str, path: Floats | None, target: Pose | None) -> None:
+    import rerun as rr
+
+    if path is not None:
+        line = rr.LineStrips3D([np.column_stack([path, np.zeros(len(path))])], colors=[_PLANNED], radii=[0.002])
+        recording.log(f"{entity}/plan", line, static=True)
+    if target is not None:
+        ahead = [_ARROW_M * math.cos(target.heading_rad), _ARROW_M * math.sin(target.heading_rad), 0.0]
+        arrow = rr.Arrows3D(vectors=[ahead], origins=[[*target[:2], 0.0]], colors=[_PLANNED], radii=[0.008])
+        recording.log(f"{entity}/target", arrow, static=True)
+
+
+def _steps(commands: Commands, until_s: float) -> tuple[Floats, Floats]:
+    """Return times and commands with the corners of steps: each command again when the next one replaces it."""
+    told = np.column_stack([commands.drive, commands.front, commands.rear])
+    end = max(until_s, float(commands.t_s[-1]))
+    return np.append(np.repeat(commands.t_s, 2)[1:], end), np.repeat(told, 2, axis=0)
+
+
+def _place(run: Run) -> tuple[str, str, str]:
+    """Return the names under which a run is found: trajectory, condition, run."""
+    trajectory, condition, name = map(plain, (run.trajectory or run.experiment, run.condition, run.run_id))
+    return trajectory, condition, name
+
+
+def _entity(run: Run) -> str:
+    import rerun as rr
+
+    return str(rr.new_entity_path(["runs", *_place(run)]))
 
 
 def _time(t_s: Floats) -> rr.TimeColumn:
@@ -78,14 +115,27 @@ def _thinned(poses: Floats) -> Floats:
     return np.asarray(poses[np.unique(slots, return_index=True)[1]])
 
 
-def _blueprint() -> Any:
+def _blueprint(runs: list[Run]) -> Any:
     import rerun.blueprint as rrb
 
-    return rrb.Blueprint(
-        rrb.Vertical(
-            rrb.Spatial3DView(origin="/", contents=["/runs/**"], name="Floor"),
-            rrb.TimeSeriesView(origin="/runs", contents=["/runs/**"], name="Commands"),
-            row_shares=[4, 1],
-        ),
-        collapse_panels=True,
+    floor = rrb.Spatial3DView(origin="/", contents=["/runs/**"], name="All runs")
+    tabs: dict[str, dict[str, list[Any]]] = {}
+    for run in runs:
+        trajectory, condition, name = _place(run)
+        tabs.setdefault(trajectory, {}).setdefault(condition, []).append(_one_run(_entity(run), name))
+    inside = [
+        rrb.Tabs(*(rrb.Tabs(*views, name=condition) for condition, views in conditions.items()), name=trajectory)
+        for trajectory, conditions in tabs.items()
+    ]
+    return rrb.Blueprint(rrb.Tabs(floor, *inside), collapse_panels=True)
+
+
+def _one_run(entity: str, name: str) -> Any:
+    import rerun.blueprint as rrb
+
+    return rrb.Vertical(
+        rrb.Spatial3DView(origin="/", contents=[f"{entity}/**"], name="Floor"),
+        rrb.TimeSeriesView(origin=entity, contents=[f"{entity}/commands"], name="Commands"),
+        row_shares=[3, 1],
+        name=name,
     )

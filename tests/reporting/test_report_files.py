@@ -13,6 +13,7 @@ from report_samples import HOSTILE
 from agvbench.reporting import write_report
 from agvbench.reporting.content import Column, plain
 from agvbench.reporting.csv_table import frame_to_csv
+from agvbench.statistics.rest import start_pose
 
 VOID = {"meta", "link", "br", "img", "hr", "input", "path", "use", "rect"}
 
@@ -148,19 +149,48 @@ def test_plain_text_has_no_control_characters_and_fits_a_line():
     assert len(plain("x" * 1000)) == 120
 
 
-def test_recording_holds_every_run_in_columns(report):
+@pytest.fixture(scope="module")
+def recorded(report):
+    """Return the columns of the recording by entity: {path: {time or component: values}}."""
     chunks = pytest.importorskip("rerun.chunk", reason="this Rerun SDK cannot read recordings")
     path = next(p for p in report.files if p.name == "campaign.rrd")
-    moving, runs = 0, set()
+    found = {}
     for chunk in chunks.RrdReader(str(path)).stream().to_chunks():
-        if str(chunk.entity_path).endswith("/vehicle") and not chunk.is_static:
-            runs.add(str(chunk.entity_path))
-            moving += chunk.num_rows
-            assert "run_time" in chunk.timeline_names
+        columns = chunk.to_record_batch().to_pydict()
+        found.setdefault(str(chunk.entity_path), {}).update(columns)
+    return found
+
+
+def test_recording_holds_every_run_in_columns(report, recorded):
     counted = int((report.data.errors.status == "ok").sum())
-    assert len(runs) == counted
+    moving = [len(columns["run_time"]) for entity, columns in recorded.items() if entity.endswith("/vehicle")]
+    assert len(moving) == counted
     # 7.2 s at 30 Hz, of which about 1 % were not tracked.
-    assert 200 * counted < moving <= 217 * counted
+    assert 200 * counted < sum(moving) <= 217 * counted
+
+
+def test_recording_holds_commands_until_the_next(report, recorded):
+    run = next(run for run in report.data.runs if run.is_ok)
+    commands = next(columns for entity, columns in recorded.items() if entity.endswith(f"/{run.run_id}/commands"))
+    t_s = [at.total_seconds() for at in commands["run_time"]]
+    assert t_s[:3] == pytest.approx([0.0, 6.0, 6.0])
+    assert t_s[3] == pytest.approx(run.frames.t_s[-1], abs=0.1)
+    told = [list(values) for values in commands["Scalars:scalars"]]
+    assert told == [[900.0, 1500.0, 1500.0]] * 2 + [[1500.0, 1500.0, 1500.0]] * 2
+
+
+def test_recording_shows_where_each_run_was_to_go(report, recorded):
+    for run in (run for run in report.data.runs if run.is_ok):
+        columns = {entity.rpartition("/")[2]: c for entity, c in recorded.items() if f"/{run.run_id}/" in entity}
+        target = start_pose(run).pose.compose(run.target)
+        assert columns["target"]["Arrows3D:origins"][0][0][:2] == pytest.approx(target[:2], abs=1e-5)
+        # Trajectories that ship under these names: the others of this campaign have names of their own.
+        assert ("plan" in columns) == (run.trajectory[0] in "5678")
+        if "plan" in columns:
+            (planned,) = columns["plan"]["LineStrips3D:strips"][0]
+            (driven,) = columns["path"]["LineStrips3D:strips"][0]
+            assert planned[-1][:2] == pytest.approx(target[:2], abs=1e-4)
+            assert planned[0][:2] == pytest.approx(driven[0][:2], abs=0.01)
 
 
 def test_sections_with_nothing_to_show_are_listed_at_the_end(campaigns, tmp_path):
