@@ -13,8 +13,10 @@ from typing import Self
 
 from agvbench import errors
 from agvbench.bus.wire import MAX_TEXT_BYTES, Kind, Reader, pack_header, pack_text, unpack_header
+from agvbench.registry import own_classes
 
 _BODY = struct.Struct("<QdB")
+_ERRORS = {cls.__name__: cls for cls in own_classes(errors, errors.AgvbenchError)}
 _DETAILS = ("where", "value", "limit", "remedy")
 _ALL_DETAILS = (1 << len(_DETAILS)) - 1
 
@@ -73,11 +75,9 @@ class Event:
 
     def as_error(self) -> errors.AgvbenchError:
         """Return the error that this event tells of, of its own class where there is one."""
-        kind = getattr(errors, self.kind, None)
-        known = isinstance(kind, type) and issubclass(kind, errors.AgvbenchError)
+        kind = _ERRORS.get(self.kind, errors.LinkError)
         where = f"{self.role} adapter" if self.where is None else f"{self.role} adapter: {self.where}"
-        error = kind if known and kind else errors.LinkError
-        return error(self.text, where=where, value=self.value, limit=self.limit, remedy=self.remedy)
+        return kind(self.text, where=where, value=self.value, limit=self.limit, remedy=self.remedy)
 
 
 def encode_event(event: Event) -> bytes:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from typing import Any
 
 AGV_ENDPOINT = "tcp/127.0.0.1:7447"
@@ -71,17 +70,27 @@ def endpoints(arguments: argparse.Namespace, default_listen: str) -> dict[str, l
     return {"listen": listen, "connect": connect}
 
 
-def run_with(arguments: argparse.Namespace, default_listen: str, agv: str | None, mocap: str | None) -> int:
-    """Run adapters as the arguments say."""
+def vehicle_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Return what `add_vehicle_arguments` declares."""
+    return {"plant": arguments.plant, "command_unit": arguments.command_unit, "neutral": arguments.neutral}
+
+
+def camera_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Return what `add_camera_arguments` declares."""
     from agvbench.adapters.camera_options import camera_options
+
+    return {"camera": camera_options(arguments.camera)}
+
+
+def run_with(
+    arguments: argparse.Namespace, default_listen: str, options: dict[str, Any], *, agv: str | None, mocap: str | None
+) -> int:
+    """Run adapters as the arguments and the adapters' `options` say."""
     from agvbench.adapters.contract import AdapterOptions
     from agvbench.workflows.adapter_process import run_adapters
 
-    given: dict[str, Any] = {"vehicle": arguments.vehicle_name, "seed": arguments.seed}
-    readers: dict[str, Callable[[Any], Any]] = {"plant": str, "command_unit": str, "camera": camera_options}
-    given |= {name: read(getattr(arguments, name)) for name, read in readers.items() if hasattr(arguments, name)}
-    given["neutral"] = getattr(arguments, "neutral", None)
     return run_adapters(
-        AdapterOptions(**given), agv=agv, mocap=mocap, lab=arguments.lab, bus_config=arguments.bus_config,
+        AdapterOptions(vehicle=arguments.vehicle_name, seed=arguments.seed, **options),
+        agv=agv, mocap=mocap, lab=arguments.lab, bus_config=arguments.bus_config,
         **endpoints(arguments, default_listen),
     )  # fmt: skip

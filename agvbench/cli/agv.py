@@ -31,4 +31,5 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run until a signal ends it; return the exit code."""
-    return shared.run_with(arguments, shared.AGV_ENDPOINT, agv=arguments.adapter, mocap=None)
+    options = shared.vehicle_options(arguments)
+    return shared.run_with(arguments, shared.AGV_ENDPOINT, options, agv=arguments.adapter, mocap=None)

@@ -61,7 +61,9 @@ def run(arguments: argparse.Namespace) -> int:
     from agvbench.workflows.loop_settings import MODEL_ONLY, NO_TRIAL
 
     console = wide_console()
-    given = {destination(flag): getattr(arguments, destination(flag), None) for flag, _, _ in OPTIONS}
+    given = {
+        destination(flag): None if flag in _DECIDED else getattr(arguments, destination(flag)) for flag, _, _ in OPTIONS
+    }
     given["remainders"] = MODEL_ONLY if arguments.model_only else NO_TRIAL if arguments.no_trial else None
     loop = run_loop(
         given,

@@ -71,4 +71,5 @@ def run(arguments: argparse.Namespace) -> int:
 
         print_packets(arguments.decode, arguments.natnet_version)
         return 0
-    return shared.run_with(arguments, shared.MOCAP_ENDPOINT, agv=None, mocap=arguments.adapter)
+    given = {"plant": arguments.plant} | shared.camera_options(arguments)
+    return shared.run_with(arguments, shared.MOCAP_ENDPOINT, given, agv=None, mocap=arguments.adapter)

@@ -29,4 +29,5 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run until a signal ends it; return the exit code."""
-    return shared.run_with(arguments, shared.AGV_ENDPOINT, agv="sim", mocap="sim")
+    options = shared.vehicle_options(arguments) | shared.camera_options(arguments)
+    return shared.run_with(arguments, shared.AGV_ENDPOINT, options, agv="sim", mocap="sim")

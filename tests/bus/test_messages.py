@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from agvbench import errors
 from agvbench.bus.command_message import CommandMessage, decode_command, encode_command
 from agvbench.bus.event_message import Event, Level, decode_event, encode_event
 from agvbench.bus.frames_message import (
@@ -50,6 +51,7 @@ from agvbench.bus.request_message import (
 from agvbench.bus.truth_message import Truth, decode_truth, encode_truth
 from agvbench.bus.wire import MAX_MESSAGE_BYTES, MAX_ROWS, VERSION
 from agvbench.errors import LinkError, MessageError, PlanError
+from agvbench.registry import own_classes
 from agvbench.types import Command, Commands, Frames, Pose
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
@@ -257,6 +259,13 @@ def test_an_error_arrives_with_all_its_fields() -> None:
     )  # fmt: skip
     bare = decode_event(encode_event(Event.of_error(LinkError("gone"), "agv"))).as_error()
     assert (str(bare), bare.remedy) == ("agv adapter: gone", None)
+
+
+@pytest.mark.parametrize("kind", own_classes(errors, errors.AgvbenchError))
+def test_every_class_of_error_arrives(kind: type[errors.AgvbenchError]) -> None:
+    event = Event.of_error(kind("gone"), "agv")
+    assert type(decode_event(encode_event(event)).as_error()) is kind
+    assert type(replace(event, kind="annotations").as_error()) is LinkError
 
 
 @every_codec
