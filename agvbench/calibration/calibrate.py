@@ -60,7 +60,7 @@ def calibrate(campaign: CampaignLike, *, maps: Maps | str = "default", session: 
     Runs of the experiments ``steering_front``, ``steering_rear``, ``steering_opposite`` and ``drive`` hold one
     command each and are measured one by one (`measure_run`). A campaign without any, such as an imported recording
     of free driving, is read by windows instead (`read_free_driving`). Runs that are not ``ok`` or set aside
-    (``split`` = ``held_out``) are left alone.
+    (``split`` = ``held_out`` or ``validation``) are left alone.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def calibrate(campaign: CampaignLike, *, maps: Maps | str = "default", session: 
         raise InputError("unknown maps", where="maps", value=repr(maps), limit="default, thesis")
     header = campaign.header
     geometry = Geometry(header.front_axle_m, header.rear_axle_m)
-    runs = [run for run in campaign if run.split != "held_out" and session in (None, run.session)]
+    runs = [run for run in campaign if run.split not in {"held_out", "validation"} and session in (None, run.session)]
     if session is not None and not runs:
         raise InputError("no run belongs to this session", where=f"campaign {header.name}", value=repr(session))
     dedicated = [run for run in runs if run.experiment in CALIBRATION_EXPERIMENTS]

@@ -35,4 +35,4 @@ POSES = (
     *_columns("number", "mean_error_m received_s", required=False),
 )
 TABLES: dict[str, tuple[Column, ...]] = {"runs": RUNS, "commands": COMMANDS, "poses": POSES}
-SPLITS = ("fit", "held_out")
+SPLITS = ("fit", "validation", "held_out")

@@ -1,9 +1,8 @@
-"""What is concluded from the effects that were chosen: judged on the runs set aside, and put into a verdict."""
+"""What is concluded from the effects that were chosen: judged on the test runs, and put into a verdict."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agvbench.diagnosis.asked import Asked
 from agvbench.diagnosis.batch import Batch
@@ -11,6 +10,7 @@ from agvbench.diagnosis.candidates import bounds_of
 from agvbench.diagnosis.dependences import ALPHA, LIKELY, RANDOM_PHASE, Dependence, dependences
 from agvbench.diagnosis.estimates import named_effects
 from agvbench.diagnosis.explained import Explained, described, with_term_first
+from agvbench.diagnosis.grouping import Split
 from agvbench.diagnosis.map_effects import map_effects
 from agvbench.diagnosis.next_experiment_propose import with_next_experiment
 from agvbench.diagnosis.prediction import Predictor
@@ -34,19 +34,19 @@ _REMAINS = "structure remains that no effect explains: "
 def conclude(
     asked: Asked,
     readings: Readings,
-    held: NDArray[np.bool_],
+    split: Split,
     library: Selection,
     explained: Explained | None,
     searched: int,
 ) -> Diagnosis:
-    """Return the diagnosis that what was found amounts to, judged on the runs set aside.
+    """Return the diagnosis that what was found amounts to; the test runs are opened here, and nothing is chosen after.
 
     Parameters
     ----------
     asked, readings
         What was asked, and every run.
-    held
-        (R,): which runs were set aside.
+    split
+        What each run is for.
     library, explained
         What was chosen of the library, and what an empirical term adds to it.
     searched
@@ -57,9 +57,11 @@ def conclude(
     every = predicts(library, explained, readings)
     batch, reformed = every.batch, bool(effect_forms().keys() & set(selection.chosen.names))
     poses, before = every.predict(fit.parameters), _poses_before(asked.vehicle, batch, selection)
-    judged = judge(readings, held, before, poses, end_spread(every, fit))
-    if judged is None:
-        return asked.cannot_tell(readings, "there are no repeats among the runs held out or fitted, and so no floor")
+    spread = end_spread(every, fit)
+    # A test of fit needs all the groups that it can get; what is published is of the test runs alone.
+    judged, tested = (judge(readings, own, before, poses, spread) for own in (~split.training, split.test))
+    if judged is None or tested is None:
+        return asked.cannot_tell(readings, "there are no repeats among the runs, and so no floor")
     rest, likely = _what_is_left(batch, poses, explained, asked.seed)
     effects = named_effects(selection, bounds_of(selection.chosen.names)) + map_effects(fit, asked.vehicle)
     significant = explained is not None or judged.lacks or bool(rest)
@@ -72,16 +74,17 @@ def conclude(
         effects,
         significant,
         tuple(rest),
-        _held_out(readings.select(held), judged),
+        _held_out(readings.select(split.test), tested),
         corrected_vehicle(asked.header, asked.geometry, fit, fit.predictor.maps, asked.seed),
         selection.rejected,
         asked.provenance(readings)
         | _how_it_was_fitted(selection, readings)
-        | {"fit_runs": int((~held).sum()), "searched_runs": searched}
+        | {"fit_runs": int(split.training.sum()), "searched_runs": searched}
+        | {"validation_runs": int(split.validation.sum())}
         | {"lack_of_fit_p_value": judged.lack_of_fit}
         | ({"empirical_term": described(explained)} if explained else {}),
     )
-    found = with_residuals(found, readings, held, before, poses)
+    found = with_residuals(found, readings, split.test, before, poses)
     if explained or reformed:
         return found
     return with_next_experiment(found, selection, readings, asked.header, asked.seed)

@@ -18,7 +18,7 @@ from agvbench.diagnosis.empirical import explain_and_resettle, instead
 from agvbench.diagnosis.explained import Explained
 from agvbench.diagnosis.fitted_models import Tell
 from agvbench.diagnosis.forms import reform_and_resettle, tried_beside
-from agvbench.diagnosis.grouping import held_out_runs
+from agvbench.diagnosis.grouping import split_runs
 from agvbench.diagnosis.levels import ROLES, FreeMaps, free_maps, start_values
 from agvbench.diagnosis.plausibility import refuse_units
 from agvbench.diagnosis.reading import Readings, read_runs
@@ -54,7 +54,7 @@ def diagnose(
         The model before; effects that it has stay, and are not named again. By default static maps fitted to the
         campaign's own runs.
     seed
-        Draws which groups of runs are set aside, where the campaign has no column ``split``.
+        Draws which runs are for training, validation and test, where the campaign has no column ``split``.
     tell
         Called with a line whenever there is progress.
 
@@ -73,36 +73,36 @@ def diagnose(
     if reason := cannot_tell(readings, header):
         return asked.cannot_tell(readings, reason)
     refuse_contradictions(readings, where=f"campaign {header.name}")
-    held = held_out_runs(readings.runs, readings.group, seed)
-    if not held.any():
-        why = "no run can be set aside to judge on: drive repeats, or commands in more combinations"
+    split = split_runs(readings.runs, readings.group, seed)
+    if not split.test.any():
+        why = "no run can be spared for the test: drive repeats, or commands in more combinations"
         return asked.cannot_tell(readings, why)
-    fitted = readings.select(~held)
-    tell(f"{len(fitted)} runs to fit, {held.sum()} held out")
+    fitted = readings.select(split.training)
+    tell(f"{len(fitted)} training runs, {split.validation.sum()} validation runs, {split.test.sum()} test runs")
     selector = _selector(asked, fitted.select(some_repeats(fitted.group, MOST_RUNS)), tell)
     chosen, selector = resettle(selector.select(), selector)
     selection, selector = reform_and_resettle(chosen, selector)
     selection, explained, selector = explain_and_resettle(selection, selector)
     readings = replace(readings, stood=selector.batch.readings.stood)
-    kept = readings.select(held)
+    known, validation = readings.select(~split.test), readings.select(split.validation)
     if (searched := len(selector.batch.readings)) < len(fitted):
         tell(f"causes were looked for in {searched} runs; now they are measured in all {len(fitted)}")
-    found = _measured_and_kept(selection, explained, selector, fitted, kept)
-    if found[1] is None and found[0].gains and contradicts(found[0], readings, held):
-        tell("the runs set aside contradict what was found: a term is tried in its place")
+    found = _measured_and_kept(selection, explained, selector, fitted, validation)
+    if found[1] is None and found[0].gains and contradicts(found[0], known, split.validation[~split.test]):
+        tell("the validation runs contradict what was found: a term is tried in its place")
         if (other := instead(selection, selector)) is not None:
-            again = _measured_and_kept(selection, other, selector, fitted, kept)
+            again = _measured_and_kept(selection, other, selector, fitted, validation)
             found = found if again[1] is None else again
-    return conclude(asked, readings, held, *found, searched)
+    return conclude(asked, readings, split, *found, searched)
 
 
 def _measured_and_kept(
-    selection: Selection, explained: Explained | None, selector: Selector, fitted: Readings, kept: Readings
+    selection: Selection, explained: Explained | None, selector: Selector, fitted: Readings, validation: Readings
 ) -> tuple[Selection, Explained | None]:
-    """Return what was found measured in all runs `fitted`, or the maps alone where the runs `kept` say so."""
+    """Return what was found measured in all runs `fitted`, or the maps alone where the validation runs say so."""
     if len(selector.batch.readings) < len(fitted):
         selection, explained = measured_in_all(selection, explained, selector, fitted)
-    return withdrawn(selection, explained, kept, selector.tell)
+    return withdrawn(selection, explained, validation, selector.tell)
 
 
 def _selector(asked: Asked, some: Readings, tell: Tell) -> Selector:

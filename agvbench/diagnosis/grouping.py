@@ -1,9 +1,9 @@
-"""Which runs were told the same, and which are set aside before anything is fitted."""
+"""Which runs have the same commands, and which are for training, validation and test."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,29 +65,70 @@ def group_runs(runs: Sequence[Run]) -> NDArray[np.int64]:
     return numbers
 
 
-def held_out_runs(runs: Sequence[Run], group: NDArray[np.int64], seed: int) -> NDArray[np.bool_]:
-    """Return which runs are set aside, (R,).
+@dataclass(frozen=True)
+class Split:
+    """What each run is for, (R,) each.
 
-    The campaign's own ``split`` decides where it has one. Else whole groups are drawn, about a quarter of the
-    runs, such that every level of every command in them was also driven in a group that stays: what is judged is how
-    known commands combine, not how a map is interpolated. Of runs that steer while they drive at most a third is
-    drawn: they are few, and nothing else tells what depends on the way by which an angle was reached.
+    ``training`` runs are fitted, ``validation`` runs decide whether what was found is kept, and ``test`` runs are
+    opened once, at the end, for what is published.
+    """
+
+    training: NDArray[np.bool_]
+    validation: NDArray[np.bool_]
+    test: NDArray[np.bool_]
+
+    @property
+    def names(self) -> list[str]:
+        """What the column ``split`` of a campaign says of each run."""
+        return [
+            "held_out" if t else "validation" if v else "fit" for t, v in zip(self.test, self.validation, strict=True)
+        ]
+
+
+def split_runs(runs: Sequence[Run], group: NDArray[np.int64], seed: int) -> Split:
+    """Return which runs are for training, validation and test.
+
+    The campaign's own ``split`` decides where it has one; where it names no validation runs, an eighth of the others is
+    drawn. Else whole groups are drawn, about a quarter of the runs, half of them for validation and half for test, such
+    that every level of every command in them was also driven in a group that stays: what is judged is how known
+    commands combine, not how a map is interpolated. Of runs that steer while they drive at most a third is drawn: they
+    are few, and nothing else tells what depends on the way by which an angle was reached. Of a single run that can be
+    spared the test is made, and there is no validation.
 
     Raises
     ------
     FitError
-        If the campaign sets all or none of its runs aside.
+        If the campaign has no training runs, or no test runs.
     """
-    split = [run.split for run in runs]
-    if any(split):
-        held = np.array([name == "held_out" for name in split])
-        if held.all() or not held.any():
-            raise FitError("the column split must name runs to fit and runs held out", where="runs", value=set(split))
-        return held
-    return _drawn(runs, group, np.random.default_rng([0xD1A6, seed]))
+    split, rng = np.array([run.split or "" for run in runs]), np.random.default_rng([0xD1A6, seed])
+    if not np.any(split != ""):
+        held = _drawn(runs, group, rng, HELD_OUT_SHARE)
+        test = _for_test(runs, group, held)
+        return Split(~held, held & ~test, test)
+    test, validation = split == "held_out", split == "validation"
+    training = ~(test | validation)
+    if not training.any() or not test.any():
+        named = {run.split for run in runs}
+        raise FitError("the column split must name runs to fit and runs held out", where="runs", value=named)
+    if not validation.any():
+        rest = np.flatnonzero(training)
+        validation[rest[_drawn([runs[int(i)] for i in rest], group[rest], rng, HELD_OUT_SHARE / 2.0)]] = True
+    return Split(training & ~validation, validation, test)
 
 
-def _drawn(runs: Sequence[Run], group: NDArray[np.int64], rng: np.random.Generator) -> NDArray[np.bool_]:
+def _for_test(runs: Sequence[Run], group: NDArray[np.int64], held: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which of the runs `held` (R,) are for test: every other group, or every other run of a single one."""
+    test, validation = np.zeros_like(held), np.zeros_like(held)
+    parts = [np.flatnonzero(held & (group == g)) for g in np.unique(group[held])]
+    if len(parts) == 1:
+        parts = list(parts[0][:, None])
+    # Runs that steer while they drive come first: both halves need some.
+    for own in sorted(parts, key=lambda own: not _steers_while_driving(runs[own[0]].commands)):
+        (test if np.count_nonzero(test) <= np.count_nonzero(validation) else validation)[own] = True
+    return test
+
+
+def _drawn(runs: Sequence[Run], group: NDArray[np.int64], rng: np.random.Generator, share: float) -> NDArray[np.bool_]:
     levels = {int(g): _levels(runs[int(np.argmax(group == g))].commands) for g in np.unique(group)}
     uses: dict[tuple[str, float], int] = {}
     for own in levels.values():
@@ -97,7 +138,7 @@ def _drawn(runs: Sequence[Run], group: NDArray[np.int64], rng: np.random.Generat
     steering = np.array([_steers_while_driving(run.commands) for run in runs])
     for g in rng.permutation(np.unique(group)).tolist():
         own = group == g
-        if np.count_nonzero(held) + np.count_nonzero(own) > 1.1 * HELD_OUT_SHARE * len(runs):
+        if np.count_nonzero(held) + np.count_nonzero(own) > 1.1 * share * len(runs):
             continue
         if steering[own].any() and np.count_nonzero(held & steering) + np.count_nonzero(own) > np.sum(steering) / 3.0:
             continue

@@ -1,4 +1,4 @@
-"""What the runs set aside say of a model: how far it misses them, beside how far they scatter."""
+"""What validation or test runs say of a model: how far it misses them, beside how far they scatter."""
 
 from __future__ import annotations
 
@@ -58,7 +58,9 @@ def predicts(selection: Selection, explained: Explained | None, readings: Readin
 
 
 def contradicts(selection: Selection, readings: Readings, held: NDArray[np.bool_]) -> bool:
-    """Whether the runs `held` (R,) miss what was chosen by more than their scatter."""
+    """Whether the runs `held` (R,) miss what was chosen by more than their scatter; no runs do not."""
+    if not held.any():
+        return False
     kept = readings.select(held)
     judged = _judged(selection, kept, np.ones(len(kept), dtype=np.bool_)) or _judged(selection, readings, held)
     return judged is not None and judged.lacks

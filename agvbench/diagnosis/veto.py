@@ -1,4 +1,4 @@
-"""The last word of the runs that were set aside: what predicts them worse than the maps alone is not named."""
+"""What predicts the validation runs worse than the maps alone is not named."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from agvbench.diagnosis.selection import Selection
 def withdrawn(
     selection: Selection, explained: Explained | None, kept: Readings, tell: Callable[[str], None]
 ) -> tuple[Selection, Explained | None]:
-    """Return what was found, or the maps alone where they predict the runs set aside better.
+    """Return what was found, or the maps alone where they predict the validation runs better.
 
     Cross-validation asks the runs that were fitted, and may be led astray by all of them together. A cause at work
     improves what nobody looked at, too.
@@ -29,18 +29,18 @@ def withdrawn(
     selection, explained
         What was found.
     kept
-        The runs set aside.
+        The validation runs; without any, what was found is kept.
     tell
         Called with a line if it is withdrawn.
     """
     chosen = explained.selection.chosen if explained else selection.chosen
-    if chosen.names == selection.base.names:
+    if chosen.names == selection.base.names or not len(kept):
         return selection, explained
     fitted = chosen.fit.predictor.batch
     batch = Batch(kept, fitted.maps, fitted.geometry, kinds=fitted.kinds)
     if _missed(chosen, batch) <= _missed(selection.base, batch):
         return selection, explained
-    tell(f"{' + '.join(chosen.names)}: withdrawn, for the runs set aside are predicted better without")
+    tell(f"{' + '.join(chosen.names)}: withdrawn, for the validation runs are predicted better without")
     rejected = selection.rejected | selection.gains
     return replace(selection, chosen=selection.base, rivals={}, gains={}, rejected=rejected), None
 

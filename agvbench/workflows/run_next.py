@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from agvbench.campaign import Campaign, CampaignWriter
-from agvbench.diagnosis.grouping import held_out_runs
+from agvbench.diagnosis.grouping import split_runs
 from agvbench.diagnosis.next_experiment_result import NextExperiment
 from agvbench.diagnosis.reading import read_runs
 from agvbench.errors import FileError, PlanError
@@ -166,11 +166,10 @@ def _kept(campaign: Campaign, seed: int) -> Iterator[Run]:
         yield from runs
         return
     readings = read_runs(runs, campaign.header.neutral)
-    held = {
-        r.run_id for r, h in zip(readings.runs, held_out_runs(readings.runs, readings.group, seed), strict=True) if h
-    }
+    split = split_runs(readings.runs, readings.group, seed)
+    names = dict(zip((run.run_id for run in readings.runs), split.names, strict=True))
     for run in runs:
-        yield dataclasses.replace(run, split="held_out" if run.run_id in held else "fit")
+        yield dataclasses.replace(run, split=names.get(run.run_id, "fit"))
 
 
 def _later(runs: list[Run], campaign: Campaign) -> Iterator[Run]:

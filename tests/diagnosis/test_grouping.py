@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tiny_vehicle import NEUTRAL, experiments
 
-from agvbench.diagnosis.grouping import HELD_OUT_SHARE, folds, group_runs, held_out_runs
+from agvbench.diagnosis.grouping import HELD_OUT_SHARE, folds, group_runs, split_runs
 from agvbench.errors import FitError
 from agvbench.types import NO_TARGET, Commands, Frames, Run
 
@@ -42,7 +42,11 @@ def test_times_that_jitter_by_milliseconds_are_the_same_commands():
 def test_what_is_set_aside_is_whole_groups_whose_levels_were_driven_elsewhere_too(seed):
     runs = bare_runs()
     group = group_runs(runs)
-    held = held_out_runs(runs, group, seed)
+    split = split_runs(runs, group, seed)
+    held = ~split.training
+    assert np.array_equal(held, split.validation | split.test)
+    assert not set(group[split.validation]) & set(group[split.test])
+    assert abs(split.validation.sum() - split.test.sum()) <= 3
     assert 0 < held.sum() <= 1.1 * HELD_OUT_SHARE * len(runs)
     assert not set(group[held]) & set(group[~held])
     for role in ("drive", "front", "rear"):
@@ -54,22 +58,36 @@ def test_what_is_set_aside_is_whole_groups_whose_levels_were_driven_elsewhere_to
 @given(seed=st.integers(0, 200))
 def test_most_of_what_steers_while_it_drives_stays_to_be_fitted(seed):
     runs = bare_runs()
-    held = held_out_runs(runs, group_runs(runs), seed)
+    split = split_runs(runs, group_runs(runs), seed)
     steps = np.array([run.experiment == "step" for run in runs])
     assert steps.sum() > 0
-    assert (held & steps).sum() <= steps.sum() / 3.0
+    assert (~split.training & steps).sum() <= steps.sum() / 3.0
+    assert abs((split.validation & steps).sum() - (split.test & steps).sum()) <= 3
 
 
 def test_the_campaigns_own_split_is_kept():
     runs = [dataclasses.replace(r, split="held_out" if i % 3 == 0 else "fit") for i, r in enumerate(bare_runs())]
-    held = held_out_runs(runs, group_runs(runs), 0)
-    assert held.tolist() == [i % 3 == 0 for i in range(len(runs))]
+    split = split_runs(runs, group_runs(runs), 0)
+    assert split.test.tolist() == [i % 3 == 0 for i in range(len(runs))]
+    assert 0 < split.validation.sum() < 0.15 * len(runs)
+    assert not (split.validation & split.test).any()
+    named = [dataclasses.replace(r, split=name) for r, name in zip(runs, split.names, strict=True)]
+    assert split_runs(named, group_runs(named), 5).names == split.names
+
+
+def test_of_few_runs_the_test_is_made_first():
+    few = [dataclasses.replace(r, run_id=str(i)) for i, r in enumerate(bare_runs()[:1] * 4)]
+    split = split_runs(few, group_runs(few), 0)
+    assert (split.training.sum(), split.validation.sum(), split.test.sum()) == (3, 0, 1)
+    more = [dataclasses.replace(few[0], run_id=str(i)) for i in range(8)]
+    split = split_runs(more, group_runs(more), 0)
+    assert (split.training.sum(), split.validation.sum(), split.test.sum()) == (6, 1, 1)
 
 
 def test_a_split_that_leaves_nothing_to_fit_is_one_line():
     runs = [dataclasses.replace(r, split="held_out") for r in bare_runs()]
     with pytest.raises(FitError, match="must name runs to fit and runs held out"):
-        held_out_runs(runs, group_runs(runs), 0)
+        split_runs(runs, group_runs(runs), 0)
 
 
 @given(group=st.lists(st.integers(0, 12), min_size=5, max_size=60), seed=st.integers(0, 9))

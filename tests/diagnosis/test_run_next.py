@@ -9,7 +9,7 @@ from tiny_vehicle import HEADER, Tiny, campaign_runs
 
 from agvbench.campaign import Campaign, CampaignWriter
 from agvbench.cli import main
-from agvbench.diagnosis.grouping import held_out_runs
+from agvbench.diagnosis.grouping import split_runs
 from agvbench.diagnosis.reading import read_runs
 from agvbench.planning import load_trajectory
 from agvbench.running.settings import BenchSettings
@@ -47,10 +47,10 @@ def test_the_next_run_is_driven_and_added_to_a_copy(unexcited, tmp_path, capsys)
     assert {run.session for run in added} == {"next1"}
     assert {run.split for run in added} == {"fit"}
     readings = read_runs(list(old), HEADER.neutral)
-    held = held_out_runs(readings.runs, readings.group, 0)
-    set_aside = {run.run_id for run, is_held in zip(readings.runs, held, strict=True) if is_held}
-    assert {run.run_id for run in new if run.split == "held_out"} == set_aside
-    assert {run.split for run in new} == {"fit", "held_out"}
+    split = split_runs(readings.runs, readings.group, 0)
+    names = dict(zip((run.run_id for run in readings.runs), split.names, strict=True))
+    assert {run.run_id: run.split for run in new} == names | {run.run_id: "fit" for run in added}
+    assert set(names.values()) == {"fit", "validation", "held_out"}
     assert min(run.started_s for run in added) > max(run.started_s for run in old)
     assert len({round(run.frames.heading_rad[0], 1) for run in added}) == 4
     assert (out / "driven" / "campaign.toml").exists()

@@ -1,4 +1,4 @@
-"""The runs set aside have the last word."""
+"""Validation runs decide what is kept, and test runs decide nothing."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tiny_vehicle import FRONT_M, HEADER, NEUTRAL, REAR_M, Tiny
+from tiny_vehicle import FRONT_M, HEADER, NEUTRAL, REAR_M, InMemory, Tiny
 
 from agvbench.calibration import measure_run
+from agvbench.diagnosis import diagnose
 from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.candidates import candidates
 from agvbench.diagnosis.empirical import instead
 from agvbench.diagnosis.explained import Explained
-from agvbench.diagnosis.grouping import held_out_runs
+from agvbench.diagnosis.grouping import split_runs
 from agvbench.diagnosis.levels import ROLES, free_maps, start_values
 from agvbench.diagnosis.reading import read_runs
 from agvbench.diagnosis.selection import Selection, Selector
@@ -27,7 +28,7 @@ def chooser(campaign):
     """Return who chooses among causes of what a campaign shows, all its runs, and which are set aside."""
     runs = list(campaign)
     readings, geometry = read_runs(runs, HEADER.neutral), Geometry(FRONT_M, REAR_M)
-    held = held_out_runs(readings.runs, readings.group, 0)
+    held = ~split_runs(readings.runs, readings.group, 0).training
     maps = free_maps(readings.runs, NEUTRAL)
     believed = {role: np.zeros(len(maps.nodes[role])) for role in ROLES}
     start = start_values(maps, [measure_run(run, geometry, neutral=NEUTRAL) for run in runs], believed)
@@ -83,7 +84,7 @@ def test_a_cause_that_makes_it_worse_is_withdrawn(found, spoilt):
     assert left.chosen is spoilt.base
     assert left.gains == left.rivals == {}
     assert left.rejected == {"steering_lag": 500.0}
-    assert said == ["steering_lag: withdrawn, for the runs set aside are predicted better without"]
+    assert said == ["steering_lag: withdrawn, for the validation runs are predicted better without"]
 
 
 def test_runs_set_aside_contradict_maps_that_lack_the_cause_and_not_the_cause(tried, found):
@@ -91,6 +92,21 @@ def test_runs_set_aside_contradict_maps_that_lack_the_cause_and_not_the_cause(tr
     selection, _ = found
     assert not contradicts(selection, readings, held)
     assert contradicts(replace(selection, chosen=selection.base), readings, held)
+
+
+def test_test_runs_change_no_name_and_no_parameter(tiny_campaign):
+    tiring, opposite = (list(tiny_campaign(Tiny(droop_per_hour=droop))) for droop in (0.1, -0.1))
+    readings = read_runs(tiring, HEADER.neutral)
+    names = split_runs(readings.runs, readings.group, 0).names
+    runs = [
+        replace(other if name == "held_out" else own, split=name)
+        for own, other, name in zip(tiring, opposite, names, strict=True)
+    ]
+    found = diagnose(InMemory(runs))
+    assert [effect.name for effect in found.effects] == ["battery_droop"]
+    assert found.effects[0].parameters["per_hour"].value == pytest.approx(0.1, rel=0.05)
+    assert found.held_out.runs == names.count("held_out")
+    assert found.held_out.errors["position_rms_mm"]["after"] > found.held_out.errors["position_rms_mm"]["before"]
 
 
 def test_no_term_takes_the_place_of_the_cause(tried, found):
