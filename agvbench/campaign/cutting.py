@@ -40,6 +40,6 @@ def _duration(t_s: Floats, rows: NDArray[np.int64]) -> float:
 
 
 def _divide(t_s: Floats, rows: NDArray[np.int64], longest_s: float | None) -> Iterator[NDArray[np.int64]]:
-    count = 1 if longest_s is None else math.ceil(_duration(t_s, rows) / longest_s)
+    count = 1 if longest_s is None else min(math.ceil(_duration(t_s, rows) / longest_s), len(rows))
     edges = np.linspace(t_s[rows[0]], t_s[rows[-1]], count + 1)[1:-1]
     yield from np.split(rows, np.searchsorted(t_s[rows], edges))

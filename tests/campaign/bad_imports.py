@@ -110,6 +110,10 @@ CASES: Cases = {
     ),
     "recording-not-driven": ("no row that was driven", lambda: _import(armed=[0] * 60)),
     "recording-too-short": ("nothing long enough for a run", _mapping("shortest_s = 0.2", "shortest_s = 5.0")),
+    "recording-pieces": (
+        "runs that are to be shorter than the time from one pose to the next",
+        _mapping("shortest_s = 0.2", "shortest_s = 0.2\nlongest_s = 1e-9"),
+    ),
     "recording-no-rows": ("a header and nothing else", _text(lambda b: b.splitlines()[0] + b"\n")),
     "recording-no-end": ("a header without even the end of its line", _text(lambda b: b.splitlines()[0])),
     "recording-unit": ("commands of −1…1 where µs are declared", lambda: _import(throttle=[0.5] * 60)),
