@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import selectors
 import socket
+import struct
 from dataclasses import dataclass
 
 from agvbench.adapters.natnet.packet import MAX_DATAGRAM_BYTES, Message, join, split
@@ -17,6 +18,8 @@ _RECEIVE_BUFFER_BYTES = 4 << 20
 _MOST_AT_ONCE = 256
 POLL_S = 0.02
 _ATTEMPTS = 6
+_RELEARN_S = 2.0
+_FRAME = struct.pack("<H", Message.FRAMEOFDATA)
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ class Counters:
     malformed: int = 0
     first_malformed: str = ""
     foreign: int = 0
-    """Datagrams of somebody else than the server."""
+    """Datagrams of others than the server, of other sockets on its machine, too."""
 
     def note(self, error: MessageError) -> None:
         """Count what could not be decoded."""
@@ -62,6 +65,14 @@ class Counters:
 
 class Channel:
     """Sockets that hear the server only; ``told`` counts the packets that were sent to it.
+
+    The server sends from its command port and from its data port. No document says which port frames come from, so
+    frames from one other port of its machine are taken, too, until some come from those two.
+
+    Attributes
+    ----------
+    ports
+        Those two, as far as they are known.
 
     Raises
     ------
@@ -74,6 +85,9 @@ class Channel:
         self._connection, self._clock, self._counters = connection, WallClock(), counters
         self._selector = selectors.DefaultSelector()
         self.told = 0
+        self.ports = {connection.port, connection.data_port or DATA_PORT}
+        self._frames_port: int | None = None
+        self._frames_s = -math.inf
         try:
             self._server = (socket.gethostbyname(connection.server), connection.port)
             self._local = connection.local or self._route()
@@ -153,7 +167,7 @@ class Channel:
                     datagram, who = opened.recvfrom(MAX_DATAGRAM_BYTES)
                 except (BlockingIOError, ConnectionError):
                     break
-                if who[0] != self._server[0]:
+                if not self._is_of_server(datagram, *who):
                     self._counters.foreign += 1
                     continue
                 try:
@@ -161,6 +175,17 @@ class Channel:
                 except MessageError as error:
                     self._counters.note(error)
         return packets
+
+    def _is_of_server(self, datagram: bytes, host: str, port: int) -> bool:
+        known, is_frame = port in self.ports, datagram[: len(_FRAME)] == _FRAME
+        if host != self._server[0] or not (known or is_frame):
+            return False
+        now_s = self._clock.now()
+        if not known and port != self._frames_port and now_s - self._frames_s <= _RELEARN_S:
+            return False
+        if is_frame:
+            self._frames_port, self._frames_s = port, math.inf if known else now_s
+        return True
 
     def close(self) -> None:
         """Hear nothing any more."""

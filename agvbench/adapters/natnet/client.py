@@ -90,6 +90,7 @@ class Client:
         self._channel = Channel(connection, self.counters)
         try:
             self.info = self._connect()
+            self._channel.ports.add(self.info.data_port or DATA_PORT)
             self.version = self._agree()
             self.rate_hz = self._frame_rate()
             if (group := connection.group or self.info.multicast) is not None:

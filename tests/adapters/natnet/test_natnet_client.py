@@ -14,10 +14,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from streams import VERSIONS, drawn
 
-from agvbench.adapters.natnet.channel import Connection
+from agvbench.adapters.natnet.channel import Channel, Connection, Counters
 from agvbench.adapters.natnet.client import Client, Seen
 from agvbench.adapters.natnet.clock_sync import MAX_DRIFT, ClockSync
 from agvbench.adapters.natnet.emulator import MAX_CLIENTS, Emulator, Settings
+from agvbench.adapters.natnet.encode import encode_frame
 from agvbench.adapters.natnet.frame import MODELS_CHANGED
 from agvbench.adapters.natnet.packet import Message, join
 from agvbench.adapters.natnet.version import Version
@@ -156,6 +157,42 @@ def test_the_bound_holds_whatever_the_network_does(
         now_s += there_s + back_s + pause_s
     stamp = sync.host_time((now_s - 0.3) * (1.0 + drift) + offset_s)
     assert abs(stamp.time_s - (now_s - 0.3)) <= stamp.uncertainty_s + 1e-8
+
+
+def test_frames_of_other_sockets_on_the_servers_machine_are_no_poses(lab: Lab) -> None:
+    lab.open(Settings())
+    (address,) = lab.server.clients()
+    lab.send(1)
+    until(lambda: len(lab.seen) == 1)
+    made_up = encode_frame(FRAME._replace(number=2), lab.client.version)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        for payload in (join(Message.FRAMEOFDATA, made_up), join(Message.ECHO_RESPONSE, bytes(16))):
+            stranger.sendto(payload, address)
+    until(lambda: lab.client.counters.foreign == 2)
+    lab.send(3)
+    until(lambda: len(lab.seen) == 2)
+    assert [one.frame.number for one in lab.seen] == [1, 3]
+
+
+def test_frames_from_one_port_that_was_not_announced_are_taken_until_some_come_from_a_known_one() -> None:
+    frame = join(Message.FRAMEOFDATA, bytes(40))
+    server, data, another = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(3))
+    server.bind(("127.0.0.1", 0))
+    counters = Counters()
+    channel = Channel(Connection("127.0.0.1", server.getsockname()[1], data_port=free_port()), counters)
+    channel.tell(Message.KEEPALIVE)
+    client = server.recvfrom(100)[1]
+    taken = []
+    for sender in (data, another, data, server, data):
+        before = counters.foreign
+        sender.sendto(frame, client)
+        arrived = channel.arrived(5.0)
+        assert len(arrived) + counters.foreign - before == 1
+        taken.append(len(arrived))
+    assert taken == [1, 0, 1, 1, 0]
+    channel.close()
+    for one in (server, data, another):
+        one.close()
 
 
 def test_foreign_and_malformed_packets_are_counted_and_do_no_harm(lab: Lab) -> None:
