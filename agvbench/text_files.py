@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 import stat
+import sys
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +16,9 @@ from agvbench.errors import FileError
 MAX_BYTES = 4 << 20
 MAX_DEPTH = 100
 """How deep tables may be nested: parsers call themselves at each level, and Python allows a thousand calls."""
+_PART = r"""(?:[\w-]++|"(?:\\.|[^"\\\n])*+"|'[^'\n]*+')"""
+_DOTTED = re.compile(rf"(?<![\w-])(?:{_PART}[ \t]*+\.[ \t]*+){{{MAX_DEPTH}}}")
+"""A key of more parts than tables may be deep: the parser takes memory as the square of their number."""
 
 
 def require_regular(path: Path) -> None:
@@ -53,8 +59,10 @@ def read_text(path: Path, *, max_bytes: int = MAX_BYTES) -> str:
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Return a TOML file's content, or raise as `read_text` and `tomllib.loads`."""
-    content = tomllib.loads(read_text(path))
-    # Dotted keys nest without brackets.
+    text = read_text(path)
+    if text.count(".") > MAX_DEPTH and _DOTTED.search(text):  # dotted keys nest without brackets
+        raise _too_deep(path)
+    content: dict[str, Any] = _parsed(tomllib.loads, text, path)
     level: list[Any] = [content]
     for _ in range(MAX_DEPTH):
         level = [value for one in level for value in (one.values() if isinstance(one, dict) else one)]
@@ -66,7 +74,18 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 def read_json(path: Path) -> Any:
     """Return a JSON file's content, or raise as `read_text` and `json.loads`."""
-    return json.loads(read_text(path))
+    return _parsed(json.loads, read_text(path), path)
+
+
+def _parsed(parse: Callable[[str], Any], text: str, path: Path) -> Any:
+    """Return the content of `text`; the one error of parsers that does not name a line is that of `int`."""
+    try:
+        return parse(text)
+    except (tomllib.TOMLDecodeError, json.JSONDecodeError):
+        raise
+    except ValueError:
+        limit = f"{sys.get_int_max_str_digits()} digits"
+        raise FileError("has an integer that is too long", where=path, limit=limit, remedy="correct it") from None
 
 
 def _brackets(text: str) -> int:

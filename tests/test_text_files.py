@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+import tracemalloc
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -81,6 +82,32 @@ def test_dotted_keys_nest_too(tmp_path: Path) -> None:
         read_toml(path)
     path.write_text(".".join("a" * 50) + " = 1")
     assert read_toml(path)
+
+
+@pytest.mark.parametrize("part", ["a", "'a'", '"a\\"b"', "a "])
+def test_a_long_dotted_key_is_refused_before_the_parser_takes_memory_for_it(part: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    path.write_text(".".join([part] * 3_000) + " = 1")
+    tracemalloc.start()
+    with pytest.raises(FileError, match="is nested too deep"):
+        read_toml(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 5e6
+
+
+def test_dots_elsewhere_are_no_depth(tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    path.write_text(f"a = [{', '.join(['0.125'] * 500)}]\nb = '{'. '.join(['Word word'] * 300)}'\n")
+    assert len(read_toml(path)["a"]) == 500
+
+
+@pytest.mark.parametrize(("name", "form"), [("a.toml", "a = {}"), ("a.json", "[{}]")])
+def test_an_integer_of_too_many_digits_is_one_line(name: str, form: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    path.write_text(form.format("1" * 5000))
+    with pytest.raises(FileError, match=r"has an integer that is too long \(limit: 4300 digits\)"):
+        (read_toml if name.endswith(".toml") else read_json)(path)
 
 
 def test_many_brackets_side_by_side_are_no_depth(tmp_path: Path) -> None:

@@ -6,12 +6,16 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from agvbench.errors import CampaignError
 from agvbench.text_files import require_regular
 
 MAX_ROWS = 100_000_000
+MAX_BYTES = 4 << 30
+"""What a table may take in memory; at 120 Hz its rows would last for more than five days."""
+_TOO_LARGE = "is too large for memory"
 _MAGIC = b"PAR1"
 
 
@@ -45,30 +49,32 @@ def to_parquet(table: pa.Table) -> memoryview:
     return memoryview(sink.getvalue())
 
 
-def read_parquet(path: Path, *, max_rows: int = MAX_ROWS) -> pa.Table:
+def read_parquet(path: Path, *, max_rows: int = MAX_ROWS, max_bytes: int = MAX_BYTES) -> pa.Table:
     """Read a parquet file.
 
     Raises
     ------
     CampaignError
-        If it is not parquet, cut off, damaged or has more than `max_rows` rows.
+        If it is not parquet, cut off, damaged, has more than `max_rows` rows, or would take more than `max_bytes` of
+        memory: a small file can hold a value that is repeated for ever.
     FileError
         If it is no regular file.
     """
     try:
         require_regular(path)
         with pa.OSFile(str(path)) as source:
-            file = pq.ParquetFile(source, page_checksum_verification=True)
-            if file.metadata.num_rows > max_rows:
-                raise CampaignError(
-                    "has too many rows",
-                    where=path,
-                    value=file.metadata.num_rows,
-                    limit=f"{max_rows}",
-                    remedy="split the campaign",
-                )
-            return _plain(file.read(use_threads=False))
-    except (pa.ArrowException, OSError) as error:
+            file = pq.ParquetFile(source)
+            rows = file.metadata.num_rows
+            _require_room(path, "has too many rows", rows, max_rows, "")
+            _require_room(path, _TOO_LARGE, _least_bytes(file), max_bytes, " bytes")
+            texts = [field.name for field in file.schema_arrow if pa.types.is_string(field.type)]
+            file = pq.ParquetFile(
+                source, metadata=file.metadata, read_dictionary=texts, page_checksum_verification=True
+            )
+            table = file.read(use_threads=False)
+            _require_room(path, _TOO_LARGE, sum(map(_text_bytes, table.columns)), max_bytes, " bytes")
+            return _plain(table)
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise CampaignError(
             _what_is_wrong(path, error),
             where=path,
@@ -76,10 +82,44 @@ def read_parquet(path: Path, *, max_rows: int = MAX_ROWS) -> pa.Table:
         ) from None
 
 
+def _require_room(path: Path, what: str, value: int, limit: int, unit: str) -> None:
+    if value > limit:
+        raise CampaignError(
+            what, where=path, value=f"{value}{unit}", limit=f"{limit}{unit}", remedy="split the campaign"
+        )
+
+
+def _least_bytes(file: pq.ParquetFile) -> int:
+    """Return the memory that all values take: eight bytes each, or as many as are stored; repeated texts take more."""
+    metadata, kinds = file.metadata, file.schema_arrow.types
+    groups = [metadata.row_group(index) for index in range(metadata.num_row_groups)]
+    values = metadata.num_rows * len(kinds)
+    if any(map(pa.types.is_nested, kinds)):
+        values = sum(group.column(index).num_values for group in groups for index in range(metadata.num_columns))
+    stored = sum(int(group.total_byte_size) for group in groups)
+    return max(8 * int(values), stored)
+
+
+def _text_bytes(column: pa.ChunkedArray) -> int:
+    """Return the bytes of a column of texts once each row has its own; 0 for other columns."""
+    if not isinstance(column.type, pa.DictionaryType) or not pa.types.is_string(column.type.value_type):
+        return 0
+    lengths = (pc.sum(pc.binary_length(chunk.dictionary).take(chunk.indices)).as_py() for chunk in column.chunks)
+    return sum(length or 0 for length in lengths)
+
+
 def _plain(table: pa.Table) -> pa.Table:
-    """Decode dictionary columns, which pandas categoricals become, so that equal columns have equal types."""
+    """Decode dictionary columns, such as texts and pandas categoricals, so that equal columns have equal types.
+
+    Raises
+    ------
+    ArrowInvalid
+        If a text is not UTF-8.
+    """
     for index, kind in enumerate(table.schema.types):
         if isinstance(kind, pa.DictionaryType):
+            for chunk in table.column(index).chunks:
+                chunk.dictionary.validate(full=True)
             table = table.set_column(index, table.column_names[index], table.column(index).cast(kind.value_type))
     return table
 

@@ -12,7 +12,7 @@ from agvbench.campaign.atomic import is_temporary
 from agvbench.campaign.columns import fill_columns, type_columns
 from agvbench.campaign.csv_text import read_csv_text
 from agvbench.campaign.manifest import Manifest
-from agvbench.campaign.parquet import MAX_ROWS, read_parquet
+from agvbench.campaign.parquet import MAX_BYTES, MAX_ROWS, read_parquet
 from agvbench.campaign.schema import Column
 from agvbench.errors import CampaignError
 
@@ -61,11 +61,11 @@ class Source:
             If a file has changed since it was recorded, cannot be read, lacks a column, or holds a value of the wrong
             type.
         """
-        tables, room = [], MAX_ROWS
+        tables, room, room_bytes = [], MAX_ROWS, MAX_BYTES
         for file in self.files:
             self.manifest.check(file)
-            tables.append(type_columns(_read_file(file, columns, room), columns, file))
-            room -= tables[-1].num_rows
+            tables.append(type_columns(_read_file(file, columns, room, room_bytes), columns, file))
+            room, room_bytes = room - tables[-1].num_rows, room_bytes - tables[-1].nbytes
         if not tables:
             return type_columns(_nothing(columns), columns, self.path)
         try:
@@ -95,10 +95,10 @@ def parts(directory: Path) -> tuple[Path, ...]:
     return tuple(sorted(files, key=lambda file: file.name))
 
 
-def _read_file(file: Path, columns: Sequence[Column], max_rows: int) -> pa.Table:
+def _read_file(file: Path, columns: Sequence[Column], max_rows: int, max_bytes: int) -> pa.Table:
     if file.suffix == ".csv":
         return read_csv_text(file, columns=[column.name for column in columns])
-    return read_parquet(file, max_rows=max_rows)
+    return read_parquet(file, max_rows=max_rows, max_bytes=max_bytes)
 
 
 def _nothing(columns: Sequence[Column]) -> pa.Table:

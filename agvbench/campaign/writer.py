@@ -61,7 +61,7 @@ class CampaignWriter:
         Raises
         ------
         CampaignError
-            If `path` holds something already or cannot be written.
+            If `path` holds something already, or cannot be read or written.
         """
         path = Path(path)
         try:
@@ -227,7 +227,12 @@ def refuse_occupied(path: Path, remedy: str) -> None:
     CampaignError
         Then.
     """
-    if path.exists() and not path.is_dir():
-        raise CampaignError("is not a directory", where=path, remedy="choose another directory")
-    if path.exists() and any(file.name not in _LEFT_OVER and not is_temporary(file) for file in path.iterdir()):
-        raise CampaignError("exists already and is not empty", where=path, remedy=remedy)
+    try:
+        if path.exists() and not path.is_dir():
+            raise CampaignError("is not a directory", where=path, remedy="choose another directory")
+        if path.exists() and any(file.name not in _LEFT_OVER and not is_temporary(file) for file in path.iterdir()):
+            raise CampaignError("exists already and is not empty", where=path, remedy=remedy)
+    except OSError as error:
+        raise CampaignError(
+            f"cannot be read ({error.strerror})", where=path, remedy="choose another directory"
+        ) from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 import tempfile
@@ -21,6 +22,9 @@ def tell_own_mistake(command: str, error: Exception) -> int:
     Exception
         The exception itself where the environment variable ``AGVBENCH_DEBUG`` is set.
     """
+    if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:  # not ours: no file can have this name
+        print(f"agvbench {command}: {error.filename}: {error.strerror}; give a shorter path", file=sys.stderr)
+        return 2
     if os.environ.get(DEBUG):
         raise error
     last = traceback.extract_tb(error.__traceback__)[-1]

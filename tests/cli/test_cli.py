@@ -16,6 +16,7 @@ from agvbench.cli import main
 
 COMMANDS = sorted(m.name for m in pkgutil.iter_modules(agvbench.cli.__path__) if not m.name.startswith("_"))
 HEAVY = {"numpy", "pandas", "scipy", "numba", "matplotlib", "pyarrow", "zenoh", "rerun", "rich", "msgspec", "jinja2"}
+LONG = "x" * 300
 
 
 def test_help_lists_every_command(capsys):
@@ -108,3 +109,21 @@ def test_an_argument_that_is_not_utf_8_is_one_line(capsys):
     assert main(["report", "campaigns/r\udcff"]) == 2
     line = "agvbench report: argument is not UTF-8: 'campaigns/r\\udcff'; rename the file or directory\n"
     assert capsys.readouterr().err == line
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["compare", LONG, "b"],
+        ["report", LONG],
+        ["diagnose", LONG],
+        ["calibrate", LONG],
+        ["init", LONG],
+        ["bench", LONG],
+    ],
+    ids=lambda arguments: arguments[0],
+)
+def test_a_path_that_no_file_can_have_is_one_line(arguments, capsys):
+    assert main(arguments) == 2
+    errors = capsys.readouterr().err
+    assert errors == f"agvbench {arguments[0]}: {LONG}: File name too long; give a shorter path\n"

@@ -100,6 +100,7 @@ CASES = {
     "`--plant nope.py:x`": opened(plant="nope.py:x"),
     "`--workspace oval:3`": opened(workspace="oval:3"),
     "`--out full` (not empty)": opened("full"),
+    "`--out` of 300 letters": opened("x" * 300),
     "`--resume` with nothing to resume": opened(None, resume=True),
     "`--resume --out begum` beside `begun`": resumed_elsewhere,
     "`--resume --seed 2` after `--seed 1`": resumed_with_another_seed,
