@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Generator
-from contextlib import ExitStack
+from collections.abc import Callable, Generator
+from contextlib import ExitStack, nullcontext
 from typing import TYPE_CHECKING
 
 import pytest
@@ -47,6 +47,7 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
                 resume=bool(option(config, "--resume")),
                 dry_run=bool(option(config, "--dry-run")),
                 plan=plan_of(session.items),
+                tell=_teller(config),
             )
             config.stash[SESSION] = bench_session = stack.enter_context(opened)
         except AgvbenchError as error:
@@ -67,6 +68,19 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
         except KeyboardInterrupt as interrupt:
             config.stash[INTERRUPT] = interrupt
             raise
+
+
+def _teller(config: pytest.Config) -> Callable[[str], None]:
+    """Return what tells the operator something while a benchmark is driven, whose output pytest captures."""
+    from agvbench.running.placing import say
+
+    capture = config.pluginmanager.get_plugin("capturemanager")
+
+    def tell(text: str) -> None:
+        with capture.global_and_fixture_disabled() if capture is not None else nullcontext():
+            say(text)
+
+    return tell
 
 
 @pytest.hookimpl(trylast=True)

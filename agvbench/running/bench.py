@@ -18,6 +18,7 @@ from agvbench.running.links import RunnerLink
 from agvbench.running.pausing import Pause, standing
 from agvbench.running.placers.choosing import make_placer
 from agvbench.running.placers.placer import Rig
+from agvbench.running.placing import say
 from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess, not_as_planned
 from agvbench.running.records import DriveOrder, record_aborted, recorded_run, stopped_drive, times_stopped
 from agvbench.running.session_began import SessionBegan
@@ -36,6 +37,7 @@ class Bench:
     ``calibrate`` is called once, with the calibration runs that are still `awaited`, when the first order asks for the
     calibrated model; ``corrected`` is the model of the
     condition of that name, if there is one.
+    ``tell`` tells the operator.
     """
 
     def __init__(
@@ -52,15 +54,17 @@ class Bench:
         session: SessionBegan = _UNNAMED,
         timing: Timing = DEFAULT_TIMING,
         limits: QualityLimits = DEFAULT_LIMITS,
+        tell: Callable[[str], None] = say,
     ) -> None:
         self.settings = settings
         self.link, self.writer = link, writer
         self.nominal, self._calibrate = nominal, calibrate
         self._calibrated: VehicleModel | None = None
         self._corrected = corrected
+        self._tell = tell
         self._time, self._timing, self._limits = campaign_time, timing, limits
         self._identity = link.identity()
-        self._latch, self.pause = Latch(), Pause(writer.path)
+        self._latch, self.pause = Latch(), Pause(writer.path, tell)
         self.log = EventLog(writer)
         self._recorded, self._session = recorded, session
         self._unseen = 0
@@ -68,7 +72,7 @@ class Bench:
         workspace = Workspace.parse(settings.workspace)
         safety = replace(DEFAULT_SAFETY, flickers=not self._identity.simulated, exchange_s=settings.exchange)
         self._supervisor = Supervisor(workspace, nominal.neutral, safety)
-        self._placer = make_placer(settings.place, Rig(link, nominal, workspace, self._supervisor, limits))
+        self._placer = make_placer(settings.place, Rig(link, nominal, workspace, self._supervisor, limits, tell))
 
     def model(self, condition: str) -> VehicleModel:
         """Return the vehicle model that commands are computed with under `condition`.
@@ -165,6 +169,7 @@ class Bench:
             status = self._status(order, driven)
         except RunStoppedError as stop:
             driven, status = self._stopped(order, seen, stop)
+            self._tell(f"{run_id} {status}")
         except BaseException as error:
             record_aborted(self.writer, order, run_id, started_s, seen, error, self._identity.firmware)
             self.log.take(self.link, run_id, started_s)

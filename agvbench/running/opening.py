@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from datetime import datetime
@@ -27,6 +27,7 @@ from agvbench.running.bench import Bench
 from agvbench.running.calibrating import VEHICLE_FILE, calibrate_campaign
 from agvbench.running.campaign_time import TURNAROUND_S, CampaignTime, SimulatedCampaignTime, WallCampaignTime
 from agvbench.running.placers.choosing import choose_placer
+from agvbench.running.placing import say
 from agvbench.running.provenance import (
     INPUTS_TABLE,
     Row,
@@ -58,10 +59,11 @@ def open_session(
     resume: bool,
     dry_run: bool,
     plan: Sequence[Row] = (),
+    tell: Callable[[str], None] = say,
 ) -> Iterator[BenchSession]:
     """Open the session that the options `given` ask for, and close it whatever happens.
 
-    ``plan`` lists the runs that it is to drive, as rows of the campaign's table ``planned``.
+    ``plan`` lists the runs that it is to drive, as rows of the campaign's table ``planned``; `tell` tells the operator.
 
     Raises
     ------
@@ -97,7 +99,7 @@ def open_session(
             _record_plan(writer, settings, inputs, plan)
             recorded = _recorded(writer)
             campaign_time = _campaign_time(link, writer, recorded, drives_back=settings.place == "auto")
-            bench = _bench(settings, models, link, writer, recorded, campaign_time)
+            bench = _bench(settings, models, link, writer, recorded, campaign_time, tell)
             session = session_with(bench=bench)
             session.notices = _notices(settings, given)
             session.notices += idle_notice(recorded.values(), campaign_time.now_s(), settings.session)
@@ -179,6 +181,7 @@ def _bench(
     writer: CampaignWriter,
     recorded: Mapping[str, Run],
     campaign_time: CampaignTime,
+    tell: Callable[[str], None],
 ) -> Bench:
     def calibrated(awaited: Collection[str]) -> VehicleModel:
         return models.get("calibrated") or calibrate_campaign(writer, maps=settings.maps, awaited=awaited)
@@ -193,6 +196,7 @@ def _bench(
         session=SessionBegan.of(settings.session, recorded.values()),
         calibrate=calibrated,
         recorded=recorded,
+        tell=tell,
     )
 
 

@@ -16,7 +16,6 @@ from pathlib import Path
 from types import FrameType
 
 from agvbench.running.links import RunnerLink
-from agvbench.running.placing import say
 from agvbench.types import Command
 
 PAUSE_FILE = "pause"
@@ -39,7 +38,7 @@ def standing(link: RunnerLink, neutral: Command) -> Callable[[], None]:
 class Pause:
     """Whether the campaign in `directory` is to pause; `tell` tells the operator."""
 
-    def __init__(self, directory: Path, tell: Callable[[str], None] = say) -> None:
+    def __init__(self, directory: Path, tell: Callable[[str], None]) -> None:
         self._file, self._tell = directory / PAUSE_FILE, tell
         self._by_signal = False
 

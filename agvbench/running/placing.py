@@ -28,8 +28,9 @@ class _Place:
 
 
 def say(text: str) -> None:
-    """Tell the operator, past whatever captures output."""
-    print(f"\r{text}", file=sys.__stderr__, flush=True)
+    """Tell the operator, over a line of progress that may be there."""
+    to = sys.__stderr__
+    print(f"\r\x1b[K{text}" if to is not None and to.isatty() else text, file=to, flush=True)
 
 
 def wait_for_start(

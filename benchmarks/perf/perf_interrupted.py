@@ -54,7 +54,7 @@ def interrupt(session: subprocess.Popen[str], directory: Path, runs: int) -> Non
 
 def content(directory: Path) -> dict[str, bytes]:
     """Return the files that must be the same whether or not a session was interrupted."""
-    files = [directory / "vehicle.toml", directory / "calibration.parquet", *directory.glob("*.parquet/[!.]*.parquet")]
+    files = [directory / "vehicle.toml", *directory.glob("*.parquet/[!.]*.parquet")]
     return {str(file.relative_to(directory)): file.read_bytes() for file in files if "-aborted" not in file.name}
 
 

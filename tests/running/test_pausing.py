@@ -25,8 +25,8 @@ OPTIONS = {"vehicle": "", "seed": 2}
 
 
 @contextmanager
-def session(path: Path) -> Iterator[BenchSession]:
-    with open_session(OPTIONS, out=str(path), resume=False, dry_run=False) as opened:
+def session(path: Path, told: list[str]) -> Iterator[BenchSession]:
+    with open_session(OPTIONS, out=str(path), resume=False, dry_run=False, tell=told.append) as opened:
         yield opened
 
 
@@ -35,10 +35,8 @@ def drive(opened: BenchSession, name: str) -> None:
 
 
 @pytest.fixture
-def told(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    said: list[str] = []
-    monkeypatch.setattr(Pause.__init__, "__defaults__", (said.append,))
-    return said
+def told() -> list[str]:
+    return []
 
 
 @contextmanager
@@ -64,7 +62,7 @@ def once_paused(told: list[str], act: Callable[[], object]) -> Iterator[None]:
 
 def test_a_file_pauses_and_its_absence_goes_on(tmp_path: Path, told: list[str]) -> None:
     path = tmp_path / "campaign"
-    with session(path) as opened:
+    with session(path, told) as opened:
         drive(opened, "one")
         (path / PAUSE_FILE).touch()
         with once_paused(told, (path / PAUSE_FILE).unlink):
@@ -72,7 +70,7 @@ def test_a_file_pauses_and_its_absence_goes_on(tmp_path: Path, told: list[str]) 
     assert told[0].startswith("paused before two, the vehicle at neutral: press Ctrl-Z or remove ")
     assert told[1:] == ["going on"]
     undisturbed = tmp_path / "undisturbed"
-    with session(undisturbed) as opened:
+    with session(undisturbed, []) as opened:
         drive(opened, "one")
         drive(opened, "two")
     for paused, other in zip(Campaign.open(path), Campaign.open(undisturbed), strict=True):
@@ -83,7 +81,7 @@ def test_a_file_pauses_and_its_absence_goes_on(tmp_path: Path, told: list[str]) 
 def test_ctrl_z_pauses_and_again_goes_on(tmp_path: Path, told: list[str]) -> None:
     path = tmp_path / "campaign"
     before = signal.getsignal(signal.SIGTSTP)
-    with session(path) as opened:
+    with session(path, told) as opened:
         signal.raise_signal(signal.SIGTSTP)
         assert (path / PAUSE_FILE).exists()
         with once_paused(told, partial(os.kill, os.getpid(), signal.SIGTSTP)):
@@ -117,7 +115,7 @@ def test_ctrl_c_ends_a_pause(tmp_path: Path, told: list[str]) -> None:
     path = tmp_path / "campaign"
 
     def pause_and_interrupt() -> None:
-        with session(path) as opened:
+        with session(path, told) as opened:
             (path / PAUSE_FILE).touch()
             with once_paused(told, partial(os.kill, os.getpid(), signal.SIGINT)):
                 drive(opened, "one")

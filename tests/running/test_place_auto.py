@@ -87,15 +87,14 @@ class Real(UnbrokenLink):
         return SimpleNamespace(simulated=False, vehicle="agv1")
 
 
-def test_an_operator_is_asked_where_a_real_vehicle_does_not_come(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_operator_is_asked_where_a_real_vehicle_does_not_come() -> None:
     told: list[str] = []
-    monkeypatch.setattr("agvbench.running.placers.auto.say", told.append)
     model, room = nominal_model("agv", Geometry(0.181, 0.121), "us", 1500.0), Workspace.circle(6.1)
     with open_rig("sim", plant="returning_plants:Dead") as direct:
         link = Real(direct)
         # Nobody puts a real vehicle anywhere by software: it stands where it stands, 8 mm off.
         link.reset(Pose(0.008, 0.0, 0.0), run_key="a")
-        placer = Auto(Rig(link, model, room, Supervisor(room, 1500.0), DEFAULT_LIMITS))
+        placer = Auto(Rig(link, model, room, Supervisor(room, 1500.0), DEFAULT_LIMITS, told.append))
         assert placer.place(Pose(0.0, 0.0, 0.0), "run") is None
     assert len(told) == 1
     assert told[0].startswith("agvbench/v2/lab/agv1: the vehicle does not move: full drive for 2 s; see to its battery")

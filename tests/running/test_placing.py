@@ -2,6 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import pty
+import re
+import select
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 
 from agvbench.adapters import open_rig
@@ -34,3 +43,45 @@ def test_patience_ends() -> None:
         link.reset(Pose(0.5, -0.45, 1.0), run_key="a")
         with pytest.raises(LinkError, match=r"was not put at the start: it is 50 mm and 0.\d° off \(limit: 1 s\)"):
             wait_for_start(link, NEUTRAL, START, patience_s=1.0, tell=lambda _: None)
+
+
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "write-an-adapter.md"
+PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
+BENCHMARK = """
+'For agvbench.'
+def bench_straight(drive):
+    drive.hold(drive=0.5, for_s=0.3)
+"""
+
+
+def read_until(terminal: int, wanted: str) -> str:
+    """Return what appears at a terminal, at least until `wanted` does."""
+    said = b""
+    while wanted.encode() not in said and len(said) < 20_000 and select.select([terminal], [], [], 60.0)[0]:
+        said += os.read(terminal, 4096)
+    return said.decode()
+
+
+def test_an_operator_at_a_terminal_is_told_where_to_put_the_vehicle_and_of_a_pause(tmp_path: Path) -> None:
+    source = re.search(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    assert source is not None
+    (tmp_path / "my_lab.py").write_text(source[1], encoding="utf-8")
+    (tmp_path / "bench_one.py").write_text(BENCHMARK)
+    # A real vehicle, and a camera that sees nothing.
+    options = ["--agv=my_lab.py:127.0.0.1:9", "--mocap=my_lab.py:0", "--out=c", "--no-report"]
+    here, there = pty.openpty()
+    command = [sys.executable, "-c", PROGRAM, "bench", "bench_one.py", *options]
+    session = subprocess.Popen(command, cwd=tmp_path, stdin=there, stdout=there, stderr=there)
+    os.close(there)
+    try:
+        said = read_until(here, "it is not seen")
+        assert "put agv1 at x = -0.054 m, y = -0.000 m, heading 0.0°: it is not seen" in said
+        session.send_signal(signal.SIGTSTP)
+        said = read_until(here, "Ctrl-Z again")
+        assert "pausing when this run is finished; Ctrl-Z again" in said
+        session.send_signal(signal.SIGTERM)
+        assert "ended by SIGTERM" in read_until(here, "--resume --out c")
+    finally:
+        session.kill()
+        session.wait()
+        os.close(here)

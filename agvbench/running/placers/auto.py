@@ -5,7 +5,7 @@ from __future__ import annotations
 from agvbench.errors import PlacingError, RunStoppedError
 from agvbench.running.placers.operator import Operator
 from agvbench.running.placers.placer import Placer, Rig
-from agvbench.running.placing import say, wait_until_seen
+from agvbench.running.placing import wait_until_seen
 from agvbench.running.returning.placing import Placing
 from agvbench.running.returning.returner import Returner
 from agvbench.types import Pose
@@ -36,7 +36,7 @@ class Auto(Placer):
         except (PlacingError, RunStoppedError) as error:
             if self._is_simulated:
                 raise
-            say(str(error))
+            self._rig.tell(str(error))
         Operator(self._rig).place(start, run_id)
         return None
 
@@ -48,7 +48,7 @@ class Auto(Placer):
             except RunStoppedError:
                 self.was_moved()
                 if not self._is_simulated:
-                    wait_until_seen(self._rig.link, self._neutral)
+                    wait_until_seen(self._rig.link, self._neutral, tell=self._rig.tell)
         return self._returned(start, run_id)
 
     def _returned(self, start: Pose, run_id: str) -> Placing:

@@ -14,4 +14,4 @@ class Operator(Placer):
 
     def place(self, start: Pose, run_id: str) -> None:
         """Wait."""
-        wait_for_start(self._rig.link, self._neutral, start, limits=self._rig.limits)
+        wait_for_start(self._rig.link, self._neutral, start, limits=self._rig.limits, tell=self._rig.tell)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
 from agvbench.model import VehicleModel
 from agvbench.planning import Workspace
 from agvbench.running.links import RunnerLink
+from agvbench.running.placing import say
 from agvbench.running.quality import QualityLimits
 from agvbench.running.returning.placing import Placing
 from agvbench.running.supervision import Supervisor
@@ -17,13 +19,14 @@ from agvbench.types import Command, Pose
 
 @dataclass(frozen=True)
 class Rig:
-    """What vehicles are placed with: the link, what is believed of the vehicle, and who watches where."""
+    """What vehicles are placed with: link, nominal model, who watches where, and what tells the operator."""
 
     link: RunnerLink
     model: VehicleModel
     workspace: Workspace
     supervisor: Supervisor
     limits: QualityLimits
+    tell: Callable[[str], None] = say
 
 
 class Placer(ABC):
