@@ -21,6 +21,8 @@ FILE_NAME = "campaign.toml"
 _MAX_BYTES = 1 << 20
 
 _Positive = Annotated[float, msgspec.Meta(gt=0.0)]
+FrameRate = Annotated[float, msgspec.Meta(gt=0.0, le=1e6)]
+"""Of a camera [Hz]; above, times of frames cannot be told apart in nanoseconds."""
 
 
 @dataclass(frozen=True)
@@ -147,7 +149,7 @@ class _Vehicle(msgspec.Struct):
 
 
 class _Mocap(msgspec.Struct):
-    rate_hz: _Positive
+    rate_hz: FrameRate
 
 
 class _Prediction(msgspec.Struct):

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from agvbench.campaign.header import SCHEMA, CampaignHeader
+from agvbench.campaign.header import SCHEMA, CampaignHeader, FrameRate
 from agvbench.types import CommandUnit
 
 Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
@@ -37,7 +37,7 @@ class Vehicle(_Strict, frozen=True):
 class Mocap(_Strict, frozen=True):
     """As ``[mocap]`` of ``campaign.toml``."""
 
-    rate_hz: _Positive
+    rate_hz: FrameRate
 
 
 class Prediction(_Strict, frozen=True):

@@ -12,8 +12,9 @@ import importlib
 import os
 import pkgutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from types import ModuleType
+from typing import NoReturn
 
 from agvbench import __version__
 from agvbench.cli._interrupts import EXIT_CODE, Interrupts
@@ -41,14 +42,26 @@ class _CommandList(argparse.RawDescriptionHelpFormatter):
         self._action_max_length = 14
 
 
+def _command_names() -> dict[str, str]:
+    """Return the module of each command."""
+    modules = sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_"))
+    return {name.removesuffix("_"): name for name in modules}
+
+
 def _commands() -> dict[str, ModuleType]:
-    names = sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_"))
-    return {name.removesuffix("_"): importlib.import_module(f"{__name__}.{name}") for name in names}
+    return {name: importlib.import_module(f"{__name__}.{module}") for name, module in _command_names().items()}
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong as every other error is said, without the usage."""
+
+    def error(self, message: str) -> NoReturn:
+        raise FlagError(message, remedy=f"see {self.prog} --help")
 
 
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of ``agvbench`` with every command of this package."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="agvbench",
         description="Does the vehicle do what it is told, what does calibration buy, and what does the model not know?",
         epilog=_EPILOG,
@@ -71,14 +84,11 @@ def build_parser() -> argparse.ArgumentParser:
 
 def _unknown_option(parser: argparse.ArgumentParser, command: str, given: str) -> FlagError:
     """Return what to say of an argument that the command does not have, with the nearest that it has."""
-    import difflib
-
     if not given.startswith("-"):
         return FlagError("one argument too many", value=given, remedy=f"see agvbench {command} --help")
     subparsers = next(a for a in parser._actions if isinstance(a, argparse._SubParsersAction))
     known = [option for action in subparsers.choices[command]._actions for option in action.option_strings]
-    close = difflib.get_close_matches(given.partition("=")[0], known, n=1)
-    meant = f"did you mean {close[0]}? " if close else ""
+    meant = _meant(given.partition("=")[0], known)
     return FlagError("no such option", value=given, remedy=f"{meant}agvbench {command} --help lists all")
 
 
@@ -95,12 +105,20 @@ def _require_utf_8(given: Sequence[str]) -> None:
             raise FlagError("argument is not UTF-8", value=repr(argument), remedy="rename the file or directory")
 
 
+def _meant(given: str, known: Iterable[str]) -> str:
+    """Return the question whether the nearest of those `known` was meant, or "" if none is near."""
+    import difflib
+
+    close = difflib.get_close_matches(given, list(known), n=1)
+    return f"did you mean {close[0]}? " if close else ""
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code."""
     for name in _ONE_THREAD:
         os.environ.setdefault(name, "1")  # read when numpy is imported, which no command has done yet
     given = sys.argv[1:] if argv is None else argv
-    who = " ".join(["agvbench", *given[:1]])
+    who = f"agvbench {given[0]}" if given and given[0] in _command_names() else "agvbench"
     with Interrupts() as interrupts:
         try:
             code = _run(given)
@@ -133,8 +151,22 @@ def _run(given: Sequence[str]) -> int:
         import argcomplete
 
         argcomplete.autocomplete(parser)
+    if not given:
+        parser.print_help()
+        return 0
+    _check_words(given)
     arguments, unknown = parser.parse_known_args(given)
     _require_utf_8(given)
     if unknown:
         raise _unknown_option(parser, arguments.command, unknown[0])
     return int(arguments.run(arguments))
+
+
+def _check_words(given: Sequence[str]) -> None:
+    """Raise `FlagError` for a command that is none, and for a value that argparse takes for its own ``--``."""
+    if not given[0].startswith("-") and given[0] not in (known := _command_names()):
+        raise FlagError("no such command", value=given[0], remedy=f"{_meant(given[0], known)}agvbench --help lists all")
+    for word in given:
+        flag, _, value = word.partition("=")
+        if flag.startswith("--") and value == "--":
+            raise FlagError("value cannot be used", where=flag, value=value, remedy="give another")

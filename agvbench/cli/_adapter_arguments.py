@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from agvbench.running.options import number, whole_number
+
 AGV_ENDPOINT = "tcp/127.0.0.1:7447"
 MOCAP_ENDPOINT = "tcp/127.0.0.1:7448"
 
@@ -44,7 +46,7 @@ def add_vehicle_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--command-unit", choices=("us", "normalised"), default="us", help="what it understands (default: %(default)s)"
     )
-    group.add_argument("--neutral", type=float, metavar="COMMAND", help="where it stands still (default: 1500 or 0)")
+    group.add_argument("--neutral", type=number, metavar="COMMAND", help="where it stands still (default: 1500 or 0)")
 
 
 def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
@@ -60,7 +62,9 @@ def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
 
 def add_seed_argument(parser: argparse.ArgumentParser) -> None:
     """Declare the seed."""
-    parser.add_argument("--seed", type=int, default=0, help="of the simulation; the same as the bench's (default: 0)")
+    parser.add_argument(
+        "--seed", type=whole_number, default=0, help="of the simulation; the same as the bench's (default: 0)"
+    )
 
 
 def endpoints(arguments: argparse.Namespace, default_listen: str) -> dict[str, list[str]]:

@@ -36,6 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the benchmarks; return the exit code."""
+    from agvbench.cli._option_values import check_values
+
+    check_values(vars(arguments))
     from agvbench.workflows.bench import run_benchmarks
 
     return run_benchmarks(arguments.benchmarks, vars(arguments), only=arguments.only)

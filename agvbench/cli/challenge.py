@@ -17,18 +17,22 @@ from __future__ import annotations
 
 import argparse
 
+from agvbench.running.options import whole_number
+
 HELP = "blind trials of the diagnosis on plants with a hidden effect"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("--seeds", type=int, default=1, metavar="N", help="vehicles to draw (default 1)")
-    parser.add_argument("--first-seed", type=int, default=0, metavar="N", help="the first vehicle's seed (default 0)")
+    parser.add_argument("--seeds", type=whole_number, default=1, metavar="N", help="vehicles to draw (default 1)")
+    parser.add_argument(
+        "--first-seed", type=whole_number, default=0, metavar="N", help="the first vehicle's seed (default 0)"
+    )
     parser.add_argument(
         "--only", nargs="+", default=[], metavar="NAME", help="what to hide (default: everything, and some pairs)"
     )
-    parser.add_argument("--repeats", type=int, default=5, metavar="N", help="of each trajectory (default 5)")
-    parser.add_argument("--jobs", type=int, metavar="N", help="trials at a time (default: one per processor)")
+    parser.add_argument("--repeats", type=whole_number, default=5, metavar="N", help="of each trajectory (default 5)")
+    parser.add_argument("--jobs", type=whole_number, metavar="N", help="trials at a time (default: one per processor)")
     parser.add_argument("--json", metavar="FILE", dest="json_file", help="write scores and every trial there")
     parser.add_argument("--markdown", action="store_true", help="print the scores as Markdown")
     parser.add_argument("--resume", action="store_true", help="go on with the trials that the JSON file lacks")

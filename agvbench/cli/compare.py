@@ -20,6 +20,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from agvbench.running.options import number
+
 HELP = "compare two campaigns, or two conditions: better, same, worse, or cannot say"
 
 
@@ -34,9 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--fail-on", choices=("regression", "any", "never"), default="regression", help="when to exit with 1"
     )
     parser.add_argument(
-        "--margin-mm", metavar="MM", type=float, help="noise band of end position error and |Δs| (default: 5)"
+        "--margin-mm", metavar="MM", type=number, help="noise band of end position error and |Δs| (default: 5)"
     )
-    parser.add_argument("--margin-deg", metavar="DEG", type=float, help="noise band of the heading error (default: 1)")
+    parser.add_argument("--margin-deg", metavar="DEG", type=number, help="noise band of the heading error (default: 1)")
     parser.add_argument(
         "--across-vehicles", action="store_true", help="compare vehicles that take commands in different units"
     )

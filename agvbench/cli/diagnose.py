@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import argparse
 
-from agvbench.running.options import OPTIONS, destination
+from agvbench.running.options import OPTIONS, destination, whole_number
 
 _OF_THE_RIG = (
     "--agv", "--mocap", "--camera", "--plant", "--place", "--workspace", "--connect", "--bus-config", "--lab",
@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--vehicle", metavar="FILE", help="the model before (default: vehicle.toml in DIR, else maps fitted to DIR)"
     )
     parser.add_argument("--check", action="store_true", help="exit with 1 unless the answer is ADEQUATE")
-    parser.add_argument("--seed", type=int, default=0, help="draws which runs are set aside (default 0)")
+    parser.add_argument("--seed", type=whole_number, default=0, help="draws which runs are set aside (default 0)")
     parser.add_argument(
         "--next", metavar="FILE.toml", dest="next_file", help="write the trajectory to drive next there"
     )
@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for flag, keywords, text in OPTIONS:
         if flag in _OF_THE_RIG:
             rig.add_argument(flag, help=text, **keywords)
-    rig.add_argument("--plant-seed", type=int, metavar="N", help="seed of a simulated plant")
+    rig.add_argument("--plant-seed", type=whole_number, metavar="N", help="seed of a simulated plant")
 
 
 def run(arguments: argparse.Namespace) -> int:

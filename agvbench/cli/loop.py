@@ -56,6 +56,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Go round the loop and write its report; return the exit code."""
+    from agvbench.cli._option_values import check_values
+
+    check_values(vars(arguments))
     from agvbench.reporting.console import wide_console
     from agvbench.workflows.loop import run_loop
     from agvbench.workflows.loop_settings import MODEL_ONLY, NO_TRIAL

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from agvbench.cli import _adapter_arguments as shared
 from agvbench.errors import FlagError
+from agvbench.running.options import whole_number
 
 HELP = "run a motion capture adapter as its own process; decode or emulate a NatNet stream"
 
@@ -41,7 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--emulate", action="store_true", help="be a NatNet server that sees a plant drive in circles"
     )
     emulated.add_argument("--multicast", metavar="GROUP", help="stream to this group (default: unicast)")
-    emulated.add_argument("--port", type=int, default=1510, help="command port, 0 for any (default: %(default)s)")
+    emulated.add_argument(
+        "--port", type=whole_number, default=1510, help="command port, 0 for any (default: %(default)s)"
+    )
     emulated.add_argument(
         "--plant", default="agvbench.simulator:make_plant", metavar="MODULE_OR_FILE:FACTORY", help="what drives"
     )

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from agvbench.errors import FlagError, PlanError
+from agvbench.running.options import number, whole_number
 
 if TYPE_CHECKING:
     from agvbench.planning import DryRun
@@ -40,11 +41,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--workspace", default="circle:6.1", metavar="SHAPE", help="circle:D, ellipse:WxH, rectangle:WxH, polygon:X,Y …"
     )
-    add("--margin", type=float, metavar="M", help="how far the axles stay inside its edge [m] (default: 0.25)")
+    add("--margin", type=number, metavar="M", help="how far the axles stay inside its edge [m] (default: 0.25)")
     add("--start", metavar="X,Y,DEG", help="start pose on the floor [m, m, °] (default: where there is most room)")
     add("--steering", choices=_MODES, help="steer in this mode instead of the trajectory's")
     add("--directory", type=Path, metavar="DIR", help="where names are looked for")
-    add("--repeats", type=int, default=1, metavar="N", help="repeats of each, for the total time (default: 1)")
+    add("--repeats", type=whole_number, default=1, metavar="N", help="repeats of each, for the total time (default: 1)")
     output = parser.add_mutually_exclusive_group()
     output.add_argument("--commands", action="store_true", help="print the timed commands as CSV")
     output.add_argument("--json", action="store_true", help="print the table as JSON")

@@ -14,6 +14,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from agvbench.running.options import number
+
 HELP = "write the report of a campaign: HTML, tables, figures, Rerun recording"
 
 
@@ -21,8 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``agvbench report``."""
     parser.add_argument("campaign", metavar="DIR", type=Path, help="campaign directory")
     parser.add_argument("--out", metavar="DIR", type=Path, help="where to write (default: report/ in the campaign)")
-    parser.add_argument("--margin-mm", metavar="MM", type=float, help="noise band of distances (default: 5)")
-    parser.add_argument("--margin-deg", metavar="DEG", type=float, help="noise band of headings (default: 1)")
+    parser.add_argument("--margin-mm", metavar="MM", type=number, help="noise band of distances (default: 5)")
+    parser.add_argument("--margin-deg", metavar="DEG", type=number, help="noise band of headings (default: 1)")
     parser.add_argument("--no-recording", action="store_true", help="leave out campaign.rrd")
 
 

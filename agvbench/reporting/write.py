@@ -70,12 +70,19 @@ def write_report(
         sections = [s.content(data) for s in track(registry, len(registry), what="drawing")]
         files = [_write(out / name, text) for name, text in _texts(data, sections)]
         if recording:
-            write_recording(data, out / RECORDING)
+            _record(data, out / RECORDING)
             files.append(out / RECORDING)
     except OSError as error:
         why = error.strerror or str(error)
         raise FileError(f"cannot be written ({why})", where=out, remedy="choose another directory with --out") from None
     return WrittenReport(data, sections, files)
+
+
+def _record(data: ReportData, path: Path) -> None:
+    try:
+        write_recording(data, path)
+    except RuntimeError as error:  # rerun's word for a full disk
+        raise OSError(f"{path.name}: {error}") from None
 
 
 def _texts(data: ReportData, sections: Sequence[Content]) -> Iterator[tuple[str, str]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -18,6 +19,26 @@ class Joined(argparse.Action):
         """Add a value to those before."""
         before = getattr(namespace, self.dest, None)
         setattr(namespace, self.dest, f"{before},{values}" if before else values)
+
+
+def whole_number(text: str) -> int:
+    """Return the whole number that an option says in the digits 0 to 9, without separators.
+
+    Raises
+    ------
+    ArgumentTypeError
+        If it says none.
+    """
+    if not re.fullmatch(r"[+-]?[0-9]{1,30}", text):
+        raise argparse.ArgumentTypeError(f"not a whole number: {text!r}")
+    return int(text)
+
+
+def number(text: str) -> float:
+    """Return the number that an option says, as `whole_number` with a point and an exponent, or nan or inf."""
+    if not re.fullmatch(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?|nan|[+-]?inf", text):
+        raise argparse.ArgumentTypeError(f"not a number: {text!r}")
+    return float(text)
 
 
 # Not given is None everywhere, so that a resumed session can tell what was asked from what is usual.
@@ -61,15 +82,15 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
         "what the corrected model still misses, by trajectory (agvbench loop writes it)",
     ),
     ("--maps", {"choices": ("default", "thesis")}, "maps to calibrate: default, or the thesis' line and cubic"),
-    ("--repeats", {"type": int, "metavar": "N"}, "repeats of each trajectory and condition (default: 10)"),
+    ("--repeats", {"type": whole_number, "metavar": "N"}, "repeats of each trajectory and condition (default: 10)"),
     (
         "--order",
         {"choices": ("interleaved", "blocked", "shuffled")},
         "order of runs (default: interleaved; the thesis drove blocked)",
     ),
-    ("--seed", {"type": int, "metavar": "N"}, "seed of everything random (default: 0)"),
+    ("--seed", {"type": whole_number, "metavar": "N"}, "seed of everything random (default: 0)"),
     ("--full", _FLAG, "every pulse, configuration and repeat of the thesis' calibration"),
-    ("--attempts", {"type": int, "metavar": "N"}, "attempts at a run that is rejected (default: 3)"),
+    ("--attempts", {"type": whole_number, "metavar": "N"}, "attempts at a run that is rejected (default: 3)"),
     (
         "--place",
         {"choices": ("auto", "operator", "teleport")},
@@ -92,7 +113,7 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
     ),
     (
         "--exchange",
-        {"type": float, "metavar": "S"},
+        {"type": number, "metavar": "S"},
         "tell a simulated vehicle for S seconds at a time: sooner driven, later stopped (default: 0.1, as a real one)",
     ),
     (

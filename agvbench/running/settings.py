@@ -11,8 +11,6 @@ from typing import Any, get_args
 
 import tomli_w
 
-from agvbench.adapters.impairment.spec import unimpaired, without_packet_faults
-from agvbench.campaign.manifest import record
 from agvbench.errors import FileError, FlagError
 from agvbench.planning.segments import Steering
 from agvbench.running.supervision.limits import DEFAULT_SAFETY
@@ -26,7 +24,7 @@ _LARGEST_SEED = 2**63 - 1
 # What may differ between a session and the one that resumes it: none of these changes what is driven.
 _FREE_ON_RESUME = frozenset({"benchmarks", "only", "connect", "bus_config", "lab", "exchange", "session"})
 # A fault that was rehearsed may be taken away, or another one put in.
-_WITHOUT_FAULTS = {"agv": unimpaired, "mocap": unimpaired, "camera": without_packet_faults}
+_MAY_HAVE_FAULTS = ("agv", "mocap", "camera")
 
 
 @dataclass(frozen=True)
@@ -117,6 +115,8 @@ class BenchSettings:
         FileError
             If they cannot be written.
         """
+        from agvbench.campaign.manifest import record
+
         path = directory / SETTINGS_FILE
         try:
             record(directory, {SETTINGS_FILE: tomli_w.dumps(asdict(self)).encode()})
@@ -166,7 +166,7 @@ def settings_for_resume(saved: BenchSettings, given: Mapping[str, Any]) -> Bench
         if name not in known or name in _FREE_ON_RESUME:
             continue
         before = getattr(saved, name)
-        if name in _WITHOUT_FAULTS and _WITHOUT_FAULTS[name](value) == _WITHOUT_FAULTS[name](before):
+        if name in _MAY_HAVE_FAULTS and _without_faults(name, value) == _without_faults(name, before):
             continue
         if value != before:
             flag = f"--{name.replace('_', '-')}"
@@ -177,9 +177,15 @@ def settings_for_resume(saved: BenchSettings, given: Mapping[str, Any]) -> Bench
                 limit=before,
                 remedy=f"leave {flag} out, or start anew without --resume",
             )
-    free = {name: given[name] for name in (*_FREE_ON_RESUME, *_WITHOUT_FAULTS) if name in given}
+    free = {name: given[name] for name in (*_FREE_ON_RESUME, *_MAY_HAVE_FAULTS) if name in given}
     # What the first runs were called is not what the last were: that is read off the runs.
     return replace(saved, **{"session": "", **free})
+
+
+def _without_faults(name: str, value: str) -> str:
+    from agvbench.adapters.impairment.spec import unimpaired, without_packet_faults
+
+    return without_packet_faults(value) if name == "camera" else unimpaired(value)
 
 
 def _check(condition: bool, flag: str, value: object, limit: str, remedy: str) -> None:

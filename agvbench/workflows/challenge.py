@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 _PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
 _POSITION = "position_rms_mm"
+_MOST_SEEDS = 100_000
 _ERROR = "ERROR"
 _SESSIONS = 9
 PAIRS = (
@@ -71,6 +72,9 @@ def run_challenge(
     for where, value, least in (("--first-seed", first_seed, 0), ("--jobs", 1 if jobs is None else jobs, 1)):
         if value < least:
             raise FlagError("is too small", where=where, value=value, limit=f"at least {least}")
+    for where, value, most in (("--seeds", seeds, _MOST_SEEDS), ("--first-seed", first_seed, 2**62)):
+        if value > most:
+            raise FlagError("is too large", where=where, value=value, limit=f"at most {most}")
     for spec in specs:
         try:
             recipes(spec)

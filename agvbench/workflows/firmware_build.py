@@ -37,7 +37,7 @@ def build_firmware(calibration: Path | None = None, out: Path | None = None) -> 
             "tools are missing", where="firmware", value=" ".join(missing),
             remedy=f"on Debian: sudo apt-get install {' '.join(missing)}",
         )  # fmt: skip
-    directory = (out or build_directory()).resolve()
+    directory = (out or build_directory()).absolute()
     if calibration is not None and not calibration.is_file():
         raise FileError("no such file", where=calibration, remedy="agvbench calibrate DIR --firmware FILE.h writes one")
     try:
@@ -49,10 +49,10 @@ def build_firmware(calibration: Path | None = None, out: Path | None = None) -> 
 
 def _made(directory: Path, calibration: Path | None) -> str:
     command = ["make", "-s", "-C", str(firmware_sources()), f"BUILD={directory}"]
-    command += [] if calibration is None else [f"CALIBRATION={calibration.resolve()}"]
+    command += [] if calibration is None else [f"CALIBRATION={calibration.absolute()}"]
     try:
         done = subprocess.run(  # noqa: S603  (our own Makefile)
-            command, capture_output=True, text=True, check=False, timeout=_LIMIT_S
+            command, capture_output=True, encoding="utf-8", errors="replace", check=False, timeout=_LIMIT_S
         )
     except subprocess.TimeoutExpired:
         raise LinkError("the build does not end", where="firmware", limit=f"{_LIMIT_S:g} s") from None

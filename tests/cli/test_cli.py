@@ -85,9 +85,25 @@ def test_a_reader_that_left_is_no_error():
         ),
         (["report", "somewhere", "--zzz"], "no such option: --zzz; agvbench report --help lists all"),
         (["init", "here", "there"], "one argument too many: there; see agvbench init --help"),
+        (["plan", "--start=--"], "--start: value cannot be used: --; give another"),
+        (["compare", "a", "b", "--fail-on=--"], "--fail-on: value cannot be used: --; give another"),
+        (["report"], "the following arguments are required: DIR; see agvbench report --help"),
+        (
+            ["challenge", "--seeds", "1_000"],
+            "argument --seeds: not a whole number: '1_000'; see agvbench challenge --help",
+        ),
+        (["bench", "--seed", "１０"], "argument --seed: not a whole number: '１０'; see agvbench bench --help"),
+        (
+            ["report", "c", "--margin-mm=1_0"],
+            "argument --margin-mm: not a number: '1_0'; see agvbench report --help",
+        ),
+        (
+            ["challenge", "--seeds", "18446744073709551616"],
+            "--seeds: is too large: 18446744073709551616 (limit: at most 100000)",
+        ),
     ],
 )
-def test_an_option_that_is_not_there_is_one_line(arguments, told, capsys):
+def test_a_command_line_that_cannot_be_used_is_one_line(arguments, told, capsys):
     assert main(arguments) == 2
     assert capsys.readouterr().err == f"agvbench {arguments[0]}: {told}\n"
 
@@ -127,3 +143,33 @@ def test_a_path_that_no_file_can_have_is_one_line(arguments, capsys):
     assert main(arguments) == 2
     errors = capsys.readouterr().err
     assert errors == f"agvbench {arguments[0]}: {LONG}: File name too long; give a shorter path\n"
+
+
+def test_alone_it_prints_help(capsys):
+    assert main([]) == 0
+    assert "\n    bench " in capsys.readouterr().out
+
+
+def test_an_unknown_command_suggests_the_nearest(capsys):
+    assert main(["bnech"]) == 2
+    said = "agvbench: no such command: bnech; did you mean bench? agvbench --help lists all\n"
+    assert capsys.readouterr().err == said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["bench", "--repeats=0"], "--repeats: value cannot be used: 0"),
+        (["bench", "--workspace=hall"], "workspace cannot be read: 'hall'"),
+        (["loop", "--vehicle=none.toml"], "none.toml: cannot read the vehicle file"),
+    ],
+)
+def test_a_wrong_value_is_refused_before_what_takes_long_to_import(arguments, told, tmp_path):
+    program = (
+        "import sys; from agvbench.cli import main; code = main(sys.argv[1:])\n"
+        "print(*{'pandas', 'numba', 'zenoh', 'scipy', 'pytest'} & set(sys.modules)); sys.exit(code)"
+    )
+    command = [sys.executable, "-c", program, *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert (done.returncode, done.stdout.strip()) == (2, "")
+    assert told in done.stderr

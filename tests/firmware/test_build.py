@@ -58,3 +58,17 @@ def test_what_cannot_be_built_is_one_line(firmware: Path, tmp_path: Path, monkey
     monkeypatch.setattr(firmware_build, "missing_packages", lambda: ["gcc-avr", "avr-libc"])
     with pytest.raises(LinkError, match="tools are missing: gcc-avr avr-libc; on Debian: sudo apt-get install gcc-avr"):
         firmware_build.build_firmware(None, tmp_path / "out")
+
+
+def test_a_header_that_is_not_utf_8_and_a_directory_that_leads_to_itself_are_one_line(
+    firmware: Path, tmp_path: Path
+) -> None:
+    from agvbench.workflows.firmware_build import build_firmware
+
+    header, loop = tmp_path / "latin.h", tmp_path / "loop"
+    header.write_bytes(b"#error \xe9\n")
+    loop.symlink_to(loop)
+    with pytest.raises(LinkError, match="the sources cannot be built"):
+        build_firmware(header, tmp_path / "out")
+    with pytest.raises(FileError, match="cannot be written"):
+        build_firmware(None, loop)

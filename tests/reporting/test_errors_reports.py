@@ -37,3 +37,11 @@ def test_bad_input_is_one_line(arguments, line, folder, capsys, monkeypatch):
     assert main([command, *rest]) == 2
     said = capsys.readouterr()
     assert said.err == f"agvbench {command}: {line}\n"
+
+
+def test_a_disk_that_is_full_when_the_recording_is_written_is_one_line(folder, tmp_path, capsys):
+    (tmp_path / "campaign.rrd").symlink_to("/dev/full")
+    assert main(["report", str(folder / "c"), "--out", str(tmp_path)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"agvbench report: {tmp_path}: cannot be written (campaign.rrd: ")
+    assert "No space left on device" in line

@@ -102,7 +102,7 @@ def test_interrupt_stops_the_vehicle_keeps_the_run_as_aborted_and_can_be_resumed
         output, _ = process.communicate(timeout=60)
         assert process.returncode == code
         assert "Traceback" not in output
-        assert f"the vehicle was stopped; go on with --resume --out {directory}" in output
+        assert f"the vehicle was stopped; go on with --resume --out {directory.name}\n" in output
     finish(start(directory, "--resume"))
     successful = {name: data for name, data in parts(directory).items() if "-aborted" not in name}
     assert successful == uninterrupted

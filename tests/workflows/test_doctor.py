@@ -108,6 +108,7 @@ def test_a_folder_that_is_not_there_is_said(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("body", "state", "said"), [
     ("agv1", State.GOOD, "streams NatNet 4.1 at 120 Hz; agv1; capture times known to ±"),
     ("agv7", State.BAD, "no rigid body is called 'agv7' (there are: agv1) rename"),
+    ("²", State.BAD, "no rigid body is called '²' (there are: agv1) rename"),
 ])  # fmt: skip
 @pytest.mark.real_time
 def test_cameras_are_asked_for_the_vehicle(tmp_path: Path, body: str, state: State, said: str) -> None:

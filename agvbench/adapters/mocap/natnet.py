@@ -95,7 +95,7 @@ class NatNetMocap(MocapAdapter):
         name, names = self._options.body, self._client.names
         if name in names:
             return names[name]
-        if name.isdigit():
+        if name.isascii() and name.isdigit():
             return int(name)
         if now_s - self._began_s > _PATIENCE_S and now_s - self._told_s > _QUIET_S:
             self._told_s = now_s

@@ -44,7 +44,7 @@ class Mocap(Check):
         known = " ".join(sorted(client.names)) or "none"
         if not seen:
             return Finding(State.BAD, f"{said}, but no frame came", "start streaming; see unicast, interface, firewall")
-        if body not in client.names and not body.isdigit():
+        if body not in client.names and not (body.isascii() and body.isdigit()):
             remedy = "rename the rigid body in Motive, or say --camera body=NAME"
             return Finding(State.BAD, f"{said}; no rigid body is called {body!r} (there are: {known})", remedy)
         bound_s = min(one.captured.uncertainty_s for one in seen)
