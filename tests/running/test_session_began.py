@@ -10,7 +10,7 @@ import pytest
 
 from agvbench.campaign import Campaign
 from agvbench.campaign.sessions import session_starts
-from agvbench.running import opening, session_began
+from agvbench.running import rig_checks, session_began
 from agvbench.running.driver import Driver
 from agvbench.running.opening import open_session
 from agvbench.running.session_began import SessionBegan, idle_notice, last_end_s
@@ -82,7 +82,7 @@ def test_a_name_is_free_on_resuming_and_not_that_of_the_first_runs():
 @pytest.fixture
 def charged(monkeypatch):
     """Let simulated vehicles have sessions, and any pause be a long one."""
-    monkeypatch.setattr(opening, "check_rig", lambda *_: None)
+    monkeypatch.setattr(rig_checks, "check_rig", lambda *_: None)
     monkeypatch.setattr(session_began, "_LONG_AGO_S", -math.inf)
 
 
