@@ -14,7 +14,7 @@ from agvbench import __version__
 from agvbench.campaign.accounts import Account, account_for, why_nothing
 from agvbench.campaign.campaign import Campaign
 from agvbench.campaign.cutting import cut
-from agvbench.campaign.header import CampaignHeader
+from agvbench.campaign.header import FILE_NAME, CampaignHeader
 from agvbench.campaign.manifest import sha256
 from agvbench.campaign.mapping import find_mapping, load_mapping
 from agvbench.campaign.mapping_schema import FileRule, Mapping
@@ -23,10 +23,11 @@ from agvbench.campaign.plausibility import check_motion
 from agvbench.campaign.recording import Recording, read_recording
 from agvbench.campaign.timed import TimedTable
 from agvbench.campaign.writer import CampaignWriter, check_parts, refuse_occupied
-from agvbench.errors import FileError
+from agvbench.errors import FileError, RecordingError
 from agvbench.types import NO_TARGET, RUN_OK, Commands, Floats, Frames, Run
 
 IMPORT_TABLE = "import"
+_UNFINISHED = ".tmp-import"
 _YEAR_2000_S = 946_684_800.0
 
 
@@ -198,9 +199,31 @@ def _frames(recording: Recording, rows: slice, start_s: float) -> Frames:
 
 
 def _write(out: Path, header: CampaignHeader, runs: list[Run], accounts: list[Account], mapping_path: Path) -> Campaign:
+    """Write the campaign whole or not at all: some of its runs would pass for all of them."""
+    import shutil
+
+    unfinished, is_new = out / _UNFINISHED, not out.exists()
+    try:
+        _fill(unfinished, header, runs, accounts, mapping_path)
+        # Without its head, which comes last, it is no campaign.
+        for path in sorted(unfinished.iterdir(), key=lambda path: path.name == FILE_NAME):
+            path.rename(out / path.name)
+        unfinished.rmdir()
+    except BaseException as error:
+        shutil.rmtree(out if is_new else unfinished, ignore_errors=True)
+        if isinstance(error, RecordingError):
+            remedy = "free some space, or choose another directory"
+            raise RecordingError(error.what, where=out, remedy=remedy) from None
+        raise
+    return Campaign.open(out)
+
+
+def _fill(
+    directory: Path, header: CampaignHeader, runs: list[Run], accounts: list[Account], mapping_path: Path
+) -> None:
     import pandas as pd
 
-    writer = CampaignWriter.create(out, header)
+    writer = CampaignWriter.create(directory, header)
     for run in runs:
         writer.append(run)
     table = pd.DataFrame(accounts)
@@ -208,4 +231,4 @@ def _write(out: Path, header: CampaignHeader, runs: list[Run], accounts: list[Ac
     table["mappingsha256"] = sha256(mapping_path)
     table["agvbench"] = __version__
     writer.write_table(IMPORT_TABLE, table)
-    return Campaign.open(out).check()
+    Campaign.open(directory).check()

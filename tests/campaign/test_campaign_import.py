@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import resource
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 from agvbench.campaign import Campaign, import_recordings
 from agvbench.campaign.orientation import heading_of
 from agvbench.cli import main
+from agvbench.errors import RecordingError
 
 
 def _imported(directory: Path, mapping: str = MAPPING, **recordings: dict[str, list[object]]) -> Campaign:
@@ -166,3 +168,25 @@ def test_the_command_tells_what_became_of_the_rows(tmp_path: Path, capsys: pytes
     assert "one.csv" in out
     assert "120" in out
     assert "runs: 2, sessions: 2" in out
+
+
+@pytest.mark.parametrize("is_new", [True, False])
+def test_an_import_that_cannot_be_written_to_its_end_leaves_no_campaign(is_new: bool, tmp_path: Path) -> None:
+    """A campaign with some of its runs would pass for a whole one."""
+    (tmp_path / "lab.toml").write_text(MAPPING)
+    long = recording(6000) | {"Z": [-5.0 * row + row * 7919 % 1009 / 1009 for row in range(6000)]}
+    files = [write_csv(tmp_path / "a.csv", recording()), write_csv(tmp_path / "b.csv", long)]
+    out = tmp_path / "c"
+    if not is_new:
+        out.mkdir()
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
+    try:
+        with pytest.raises(RecordingError, match=r"c: cannot be written .*; free some space, or choose another"):
+            import_recordings(tmp_path / "lab.toml", files, out)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert not out.exists() if is_new else not list(out.iterdir())
+    campaign = import_recordings(tmp_path / "lab.toml", files, out)
+    assert campaign.run_ids == ["a-001", "b-001"]
+    assert not list(out.glob(".tmp*"))
