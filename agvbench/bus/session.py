@@ -139,6 +139,9 @@ def _settings(listen: Sequence[str], connect: Sequence[str], timeout_s: float) -
         "transport/link/tx/lease": 3000,
         # How long a flooded receiver may hold up a sender before its connection is given up.
         "transport/link/tx/queue/congestion_control/block/wait_before_close": 60_000_000,
+        # Connections that never say who they are must not lock out those that do: as many as wait, each for this long.
+        "transport/unicast/accept_pending": 1000,
+        "transport/unicast/accept_timeout": 1000,
         "transport/link/rx/max_message_size": MAX_MESSAGE_BYTES + _ENVELOPE_BYTES,
         "transport/shared_memory/enabled": False,
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+from contextlib import ExitStack
 
 import pytest
 
@@ -54,6 +55,15 @@ def test_a_port_that_is_taken() -> None:
             open_session(listen=[f"tcp/127.0.0.1:{taken.getsockname()[1]}"])
     assert ".rs" not in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_connections_that_never_say_who_they_are_do_not_lock_out_others() -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    address = parse_endpoint(endpoint)[1:]
+    with open_session(listen=[endpoint]), ExitStack() as idle:
+        for _ in range(300):
+            idle.enter_context(socket.create_connection(address))
+        open_session(connect=[endpoint]).close()
 
 
 def free_port() -> int:
