@@ -142,12 +142,14 @@ class SerialAgv(AgvAdapter):
     def _listen(self) -> None:
         while not self._closed.is_set():
             try:
+                # An answer that had come by then is in what is read: a process that was suspended blames no vehicle.
+                before_s = self._clock.now()
                 data = self._port.read()
                 with self._lock:
                     now_s = self._clock.now()
                     if again := self._conversation.receive(data, now_s):
                         self._port.write(again)
-                    self._conversation.check(now_s)
+                    self._conversation.check(before_s)
             except LinkError as error:
                 if self._closed.is_set():
                     return

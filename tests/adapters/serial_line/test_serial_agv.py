@@ -6,6 +6,7 @@ import os
 import pty
 import re
 import threading
+import time
 import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -20,6 +21,7 @@ from agvbench.adapters.agv.serial import SerialAgv
 from agvbench.adapters.registry import open_agv
 from agvbench.adapters.serial_line import conversation
 from agvbench.adapters.serial_line.port import SerialPort
+from agvbench.bus.clock import WallClock
 from agvbench.bus.command_message import CommandMessage
 from agvbench.bus.event_message import Level
 from agvbench.bus.identity_message import decode_agv_identity, encode_agv_identity
@@ -58,7 +60,7 @@ class Events:
 
 
 @contextmanager
-def connected(vehicle: ScriptedVehicle, **options: str) -> Iterator[tuple[SerialAgv, Events]]:
+def connected(vehicle: ScriptedVehicle, **options: object) -> Iterator[tuple[SerialAgv, Events]]:
     with vehicle:
         agv, events = open_agv(f"serial:{vehicle.port}", AdapterOptions(**options)), Events()  # type: ignore[arg-type]
         assert isinstance(agv, SerialAgv)
@@ -177,6 +179,37 @@ def test_what_goes_wrong_while_driving_is_one_line_and_stays(answer: bytes, line
             agv.apply(FORWARD)
         assert line in str(caught.value)
         assert vehicle.wait_for("1500 1500 1500")
+
+
+class Suspended(WallClock):
+    """The clock of a process that is suspended for 5 s, once."""
+
+    def __init__(self) -> None:
+        self.offset_s = 0.0
+
+    def now(self) -> float:
+        return time.monotonic() + self.offset_s
+
+
+def test_a_process_that_was_suspended_before_it_read_the_answer_blames_no_vehicle() -> None:
+    vehicle, clock = ScriptedVehicle(), Suspended()
+    with connected(vehicle, clock=clock) as (agv, events):
+        plain, reads = agv.line.read, []
+
+        def read() -> bytes:
+            if not reads and vehicle.wait_for("S 1"):
+                time.sleep(0.05)  # the answer comes after the read has ended with nothing
+                clock.offset_s = 5.0
+                reads.append(b"")
+                return b""
+            reads.append(plain())
+            return reads[-1]
+
+        agv.line.read = read  # type: ignore[method-assign]
+        agv.apply(FORWARD)
+        while len(reads) < 4 and not events.heard:
+            time.sleep(0.01)
+        assert events.heard == []
 
 
 def test_noise_on_the_way_to_the_vehicle_is_made_good_and_told() -> None:
