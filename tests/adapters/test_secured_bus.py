@@ -25,6 +25,7 @@ from agvbench.bus.questions import ask
 from agvbench.bus.session import open_session
 from agvbench.campaign import Campaign
 from agvbench.errors import AdapterGoneError, LinkError, PlantError
+from agvbench.running.settings import BenchSettings
 from agvbench.workflows.doctor import Lab, State, examine
 
 KEYS = Keys("lab", "agv1")
@@ -86,11 +87,12 @@ def _name_a_certificate_that_signs_nothing(config: Path, folder: Path) -> None:
 
 
 def test_the_doctor_looks_at_certificates_before_anybody_is_called(tmp_path: Path) -> None:
-    lab = Lab(folder=tmp_path, bus_config=str(set_up(tmp_path)["bench-pc"]))
+    config = set_up(tmp_path)["bench-pc"]
+    lab = Lab(BenchSettings(bus_config=str(config)), tmp_path)
     finding = dict(examine(lab))["certificates"]
     assert finding.state is State.GOOD
     assert "takes those with a certificate of the lab's; its authority ends in" in finding.found
-    _name_a_certificate_that_signs_nothing(Path(lab.bus_config), tmp_path)
+    _name_a_certificate_that_signs_nothing(config, tmp_path)
     finding = dict(examine(lab))["certificates"]
     assert (finding.state, "is no authority's" in finding.found) == (State.DOUBTFUL, True)
     for file in tmp_path.rglob("*bench-pc*"):

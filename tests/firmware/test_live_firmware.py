@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,8 +21,10 @@ from agvbench.adapters.agv.serial import SerialAgv
 from agvbench.adapters.serial_line import conversation
 from agvbench.adapters.simavr.host import Pulse, SimavrHost
 from agvbench.bus.command_message import CommandMessage
-from agvbench.errors import LinkError
-from agvbench.types import Command, Pose
+from agvbench.campaign import Campaign
+from agvbench.errors import AgvbenchError, LinkError
+from agvbench.running.opening import open_session
+from agvbench.types import Command, Frames, Pose
 
 pytestmark = [pytest.mark.real_time, pytest.mark.usefixtures("firmware")]
 
@@ -134,6 +139,35 @@ def test_a_campaigns_link_drives_the_firmware_in_real_time() -> None:
                     break
             else:
                 pytest.fail("the vehicle did not move")
+
+
+def test_a_run_in_which_the_firmwares_watchdog_bit_is_rejected_with_both_figures(tmp_path: Path) -> None:
+    given = {
+        "agv": "simavr-live",
+        "vehicle": "",
+        "attempts": 1,
+        "camera": "lost=0,doubled=0,late=0,wrong=0,untracked=0",
+    }
+    with open_session(given, out=str(tmp_path / "c"), resume=False, dry_run=False) as session:
+        assert session._bench is not None
+        link = session._bench.link
+        plain, stalls_s = link.exchange, [0.4]
+
+        def exchange(command: Command, *, t_s: float, hold_s: float) -> Frames:
+            if command.drive != 1500.0 and t_s > 0.7 and stalls_s:
+                time.sleep(stalls_s.pop())
+            return plain(command, t_s=t_s, hold_s=hold_s)
+
+        link.exchange = exchange  # type: ignore[method-assign]
+        with pytest.raises(AgvbenchError, match="no attempt counted"):
+            session.driver("stalled", experiment="free", repeat=1).hold(for_s=0.8, drive=0.5)
+    campaign = Campaign.open(tmp_path / "c")
+    status = campaign.run("stalled").status
+    assert re.match(
+        r"rejected: \d\.\d\d s between two commands \(limit: 0.25 s, then the vehicle stops itself\)", status
+    )
+    [bite] = campaign.table("events").query("event == 'vehicle_stopped_itself'")["text"]
+    assert re.fullmatch(r"the vehicle's watchdog stopped it: \d\.\d\d s between two commands \(limit: 0.25 s\)", bite)
 
 
 def test_a_microcontroller_that_dies_while_it_is_driven_stops_the_run() -> None:
