@@ -26,6 +26,15 @@ A message names *what* is wrong, *where*, the *value*, the *limit* with its unit
 from __future__ import annotations
 
 
+def visible(text: str) -> str:
+    r"""Return `text` with every character that is not shown, such as a terminal's escape sequences, written out.
+
+    >>> print(visible("slalom\x1b[2J"))
+    slalom\x1b[2J
+    """
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
 class AgvbenchError(Exception):
     """Bad input or set-up, told in one line.
 
@@ -71,7 +80,7 @@ class AgvbenchError(Exception):
             line += f" (limit: {self.limit})"
         if self.remedy is not None:
             line += f"; {self.remedy}"
-        return " ".join(line.split())
+        return visible(" ".join(line.split()))
 
 
 class InputError(AgvbenchError):

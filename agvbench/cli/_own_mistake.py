@@ -8,6 +8,8 @@ import sys
 import tempfile
 import traceback
 
+from agvbench.errors import visible
+
 EXIT_CODE = 70
 """Software error, as ``sysexits.h`` calls it: neither a bad input (2) nor a failed run (1)."""
 
@@ -30,7 +32,7 @@ def tell_own_mistake(command: str, error: Exception) -> int:
     last = traceback.extract_tb(error.__traceback__)[-1]
     what = " ".join(f"{type(error).__name__} {error}".split())
     print(
-        f"agvbench {command}: {what} at {last.filename}:{last.lineno}: a mistake of agvbench itself; "
+        f"agvbench {command}: {visible(what)} at {last.filename}:{last.lineno}: a mistake of agvbench itself; "
         f"please report it with {_kept(error)}",
         file=sys.stderr,
     )

@@ -60,6 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     check_values(vars(arguments))
     from agvbench.reporting.console import wide_console
+    from agvbench.reporting.content import plain_sentences
     from agvbench.workflows.loop import run_loop
     from agvbench.workflows.loop_settings import MODEL_ONLY, NO_TRIAL
 
@@ -72,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
         given,
         out=arguments.out,
         resume=arguments.resume,
-        tell=lambda line: console.print(line, highlight=False, markup=False, soft_wrap=True),
+        tell=lambda line: console.print(plain_sentences(line), highlight=False, markup=False, soft_wrap=True),
     )
     from agvbench.reporting.loop import print_loop, write_loop_report
 

@@ -10,7 +10,7 @@ from agvbench.model import VehicleModel
 from agvbench.planning.corrected import corrected_plan
 from agvbench.planning.planner import Plan, plan
 from agvbench.planning.trajectory import Trajectory
-from agvbench.planning.workspace import Workspace
+from agvbench.planning.workspace import DEFAULT_MARGIN_M, Workspace
 from agvbench.types import Pose
 
 BETWEEN_RUNS_S = 17.0
@@ -29,11 +29,20 @@ class DryRunRow:
 
 @dataclass(frozen=True)
 class DryRun:
-    """What would be driven, `repeats` times each, with `between_runs_s` between two runs."""
+    """What would be driven, `repeats` times each, with `between_runs_s` between two runs.
+
+    ``margin_m`` is what the vehicle needs around its axles' centres [m].
+    """
 
     rows: tuple[DryRunRow, ...]
     repeats: int
     between_runs_s: float
+    margin_m: float = DEFAULT_MARGIN_M
+
+    def floor_of(self, plan: Plan) -> tuple[float, float]:
+        """Return width and height [m] of the floor that a plan needs, in its start frame, with the margin around it."""
+        width, height = plan.floor_m
+        return width + 2.0 * self.margin_m, height + 2.0 * self.margin_m
 
     @property
     def plans(self) -> list[Plan]:
@@ -62,8 +71,8 @@ class DryRun:
 
     @property
     def floor_m(self) -> tuple[float, float]:
-        """Width and height [m] of the largest box that a trajectory sweeps, in its start frame."""
-        widths, heights = zip(*(plan.floor_m for plan in self.plans), strict=True) if self.plans else ([0.0], [0.0])
+        """Width and height [m] of the floor on which each plan has room, in its start frame, with the margin."""
+        widths, heights = zip(*map(self.floor_of, self.plans), strict=True) if self.plans else ([0.0], [0.0])
         return max(widths), max(heights)
 
 
@@ -86,7 +95,8 @@ def dry_run(
         for condition, model in models.items()
         if condition in trajectory.conditions
     ]
-    return DryRun(tuple(rows), repeats, between_runs_s)
+    margin_m = DEFAULT_MARGIN_M if workspace is None else workspace.margin_m
+    return DryRun(tuple(rows), repeats, between_runs_s, margin_m)
 
 
 def _row(

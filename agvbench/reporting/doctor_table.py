@@ -5,6 +5,7 @@ from __future__ import annotations
 from rich.markup import escape
 
 from agvbench.reporting.console import wide_console
+from agvbench.reporting.content import plain_sentences
 from agvbench.workflows.doctor import Finding, State
 
 _COLOURS = {State.GOOD: "green", State.DOUBTFUL: "yellow", State.BAD: "bold red", State.IDLE: "dim"}
@@ -16,8 +17,8 @@ def tell(name: str, finding: Finding) -> State:
     """Print a finding; return its state."""
     colour = _COLOURS[finding.state]
     state = f"[{colour}]{finding.state.value:<{_STATE_WIDTH}}[/{colour}]"
-    line = f"{name:<{_NAME_WIDTH}} {state}  {escape(finding.found)}"
+    line = f"{name:<{_NAME_WIDTH}} {state}  {escape(plain_sentences(finding.found))}"
     if finding.remedy:
-        line += f"\n{'':<{_NAME_WIDTH + _STATE_WIDTH + 3}}→ {escape(finding.remedy)}"
+        line += f"\n{'':<{_NAME_WIDTH + _STATE_WIDTH + 3}}→ {escape(plain_sentences(finding.remedy))}"
     wide_console().print(line)
     return finding.state

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from agvbench.planning import Plan
+from agvbench.planning.workspace import DEFAULT_MARGIN_M
 from agvbench.running.campaign_time import TURNAROUND_S
 from agvbench.running.drive import DEFAULT_TIMING
 from agvbench.running.records import DriveOrder
@@ -32,7 +33,10 @@ def dry_run_table(planned: Sequence[tuple[DriveOrder, Plan]]) -> str:
         table.add_column(Text(column), justify="right")
     for (experiment, trajectory, condition), plans in cells.items():
         longest = max(plan.duration_s for plan in plans)
-        floor = " × ".join(f"{max(sides):.2f}" for sides in zip(*(plan.floor_m for plan in plans), strict=True))
+        floor = " × ".join(
+            f"{max(sides) + 2.0 * DEFAULT_MARGIN_M:.2f}"
+            for sides in zip(*(plan.floor_m for plan in plans), strict=True)
+        )
         minutes = _total_s(plans) / 60.0
         table.add_row(
             *map(Text, (experiment, trajectory or "–", condition, str(len(plans)))),
@@ -49,7 +53,8 @@ def _sum(planned: Sequence[tuple[DriveOrder, Plan]]) -> str:
     hours = _total_s(plans) / 3600.0
     return (
         f"{len(plans)} runs, {hours:.1f} h with the way back to the start; "
-        f"the axles stay within {radius_m:.2f} m of the floor's origin"
+        f"the vehicle stays within {radius_m:.2f} m of the floor's origin, "
+        f"with {DEFAULT_MARGIN_M:.2f} m around its axles"
     )
 
 
@@ -65,4 +70,4 @@ def _reach(order: DriveOrder, plan: Plan) -> float:
     turn = np.exp(1j * start.heading_rad)
     floor = complex(start.x_m, start.y_m) + turn * (path[:, 1] + 1j * path[:, 2])
     longest_axle = max(plan.geometry.front_axle_m, plan.geometry.rear_axle_m)
-    return float(np.abs(floor).max() + longest_axle)
+    return float(np.abs(floor).max() + longest_axle + DEFAULT_MARGIN_M)

@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from agvbench.planning import DryRun, DryRunRow, Plan
+from agvbench.reporting.content import plain
 from agvbench.types import Pose
 
 _WIDE = 120
@@ -21,7 +22,8 @@ def print_dry_run(made: DryRun, console: Console) -> None:
     width, height = made.floor_m
     console.print(
         f"{made.runs} runs: {_duration(made.driving_s)} driving, {_duration(made.total_s)} with "
-        f"{made.between_runs_s:g} s between runs; largest floor {width:.2f} m × {height:.2f} m",
+        f"{made.between_runs_s:g} s between runs; largest floor {width:.2f} m × {height:.2f} m, "
+        f"with {made.margin_m:.2f} m around the axles for the vehicle",
         highlight=False,
         soft_wrap=True,
     )
@@ -34,19 +36,19 @@ def _table(made: DryRun, *, wide: bool) -> Table:
     if wide:
         table.add_column("what")
     for row in made.rows:
-        table.add_row(*map(Text, _cells(row)[: len(table.columns)]))
+        table.add_row(*map(Text, _cells(row, made)[: len(table.columns)]))
     return table
 
 
-def _cells(row: DryRunRow) -> list[str]:
-    names = [row.trajectory.name, row.condition]
+def _cells(row: DryRunRow, of: DryRun) -> list[str]:
+    names, description = [row.trajectory.name, row.condition], plain(row.trajectory.description)
     if row.plan is None:
-        return [*names, "cannot", "–", "–", "–", row.trajectory.description]
+        return [*names, "cannot", "–", "–", "–", description]
     made = row.plan
-    width, height = made.floor_m
+    width, height = of.floor_of(made)
     target = _pose(made.target) if made.target.is_finite else "none"
     floor = f"{width:.2f}×{height:.2f}"
-    return [*names, f"{made.duration_s:.2f}", floor, target, _pose(made.start), row.trajectory.description]
+    return [*names, f"{made.duration_s:.2f}", floor, target, _pose(made.start), description]
 
 
 def _pose(pose: Pose) -> str:
@@ -65,16 +67,21 @@ def to_json(made: DryRun) -> str:
     """Return a dry run as JSON, for other programs."""
     rows = [
         {"trajectory": row.trajectory.name, "condition": row.condition, "problem": row.problem and str(row.problem)}
-        | (_plan_table(row.plan) if row.plan else {})
+        | (_plan_table(row.plan, made) if row.plan else {})
         for row in made.rows
     ]
     total = {"runs": made.runs, "driving_s": made.driving_s, "total_s": made.total_s, "floor_m": made.floor_m}
     return json.dumps({"schema": 1, "rows": rows, "total": total}, indent=2)
 
 
-def _plan_table(made: Plan) -> dict[str, object]:
+def _plan_table(made: Plan, of: DryRun) -> dict[str, object]:
     target = made.target._asdict() if made.target.is_finite else None
-    return {"duration_s": made.duration_s, "floor_m": made.floor_m, "target": target, "start": made.start._asdict()}
+    return {
+        "duration_s": made.duration_s,
+        "floor_m": of.floor_of(made),
+        "target": target,
+        "start": made.start._asdict(),
+    }
 
 
 def commands_csv(made: DryRun) -> str:

@@ -84,6 +84,7 @@ def test_a_reader_that_left_is_no_error():
             "no such option: --repeat=3; did you mean --repeats? agvbench bench --help lists all",
         ),
         (["report", "somewhere", "--zzz"], "no such option: --zzz; agvbench report --help lists all"),
+        (["bench", "--vehicle=v\x1b[2J"], "v\\x1b[2J: cannot read the vehicle file: No such file or directory"),
         (["init", "here", "there"], "one argument too many: there; see agvbench init --help"),
         (["plan", "--start=--"], "--start: value cannot be used: --; give another"),
         (["compare", "a", "b", "--fail-on=--"], "--fail-on: value cannot be used: --; give another"),
