@@ -188,7 +188,7 @@ class AgvHost(Host):
                             self._heard_s = now()
                         apply(message)
                         self._drives = message.command.drive != self._neutral_drive
-            except Exception as error:  # noqa: BLE001  (whatever the adapter raises, the runner must hear of it)
+            except BaseException as error:  # noqa: BLE001  (whatever the adapter raises, the runner must hear of it)
                 self.failed(error, acknowledged=sequence)
             if sequence == loss.expected and source == loss.source:
                 loss.expected += 1
@@ -240,7 +240,7 @@ class AgvHost(Host):
             try:
                 with self._lock:
                     self._refrain(message)
-            except Exception as error:  # noqa: BLE001  (as for every command)
+            except BaseException as error:  # noqa: BLE001  (as for every command)
                 self.failed(error, acknowledged=message.sequence)
         elif not foreign and self.overtaken.add():
             text = f"commands that were overtaken by newer ones: {self.overtaken}"
@@ -340,4 +340,4 @@ class AgvHost(Host):
             self._subscriber.undeclare()
             self._claim.close()
             super().close()
-            self._adapter.close()
+            self._close_adapter(self._adapter.close)

@@ -22,7 +22,7 @@ from agvbench.errors import AgvbenchError, LinkError
 _QUESTIONS_WAITING = 64
 
 
-def as_agvbench_error(error: Exception, role: str) -> AgvbenchError:
+def as_agvbench_error(error: BaseException, role: str) -> AgvbenchError:
     """Return `error` if a user can have caused it, else a `LinkError` that names the fault in the adapter."""
     if isinstance(error, AgvbenchError):
         return error
@@ -95,14 +95,14 @@ class Host(ABC):
             query.reply(query.key_expr, answer(payload))
         except self._zenoh_error:
             return
-        except Exception as error:  # noqa: BLE001  (whatever the adapter raises, the asker must hear of it)
+        except BaseException as error:  # noqa: BLE001  (whatever the adapter raises, the asker must hear of it)
             query.reply_err(refusal(self._role, as_agvbench_error(error, self._role)))
 
     def event(self, level: Level, kind: str, text: str, *, acknowledged: int = 0) -> None:
         """Publish an event; also while the adapter hangs."""
         self._publish_event(Event(0, self._role, level, kind, text, acknowledged))
 
-    def failed(self, error: Exception, *, acknowledged: int = 0) -> None:
+    def failed(self, error: BaseException, *, acknowledged: int = 0) -> None:
         """Tell the runner of `error`, with all its fields; `acknowledged` is the command that was not carried out."""
         told = as_agvbench_error(error, self._role)
         self._publish_event(Event.of_error(told, self._role, acknowledged=acknowledged))
@@ -121,6 +121,13 @@ class Host(ABC):
         except (self._zenoh_error, RuntimeError):
             # The session is closed, or just being closed by another thread: nobody is told any more.
             return
+
+    def _close_adapter(self, close: Callable[[], None]) -> None:
+        """Release the adapter; what it raises names it."""
+        try:
+            close()
+        except (Exception, SystemExit) as error:
+            raise as_agvbench_error(error, self._role) from error
 
     def close(self) -> None:
         """Leave the bus."""

@@ -91,7 +91,7 @@ class MocapHost(Host):
                 raise LinkError("true poses were lost on the bus", where=self._keys.truth, value=f"{lost} messages")
             with self._lock:
                 self._adapter.see(truth)
-        except Exception as error:  # noqa: BLE001  (whatever the adapter raises, the runner must hear of it)
+        except BaseException as error:  # noqa: BLE001  (whatever the adapter raises, the runner must hear of it)
             self.failed(error, acknowledged=truth.acknowledged)
 
     def frames(self, frames: Frames, *, clock: FrameClock, acknowledged: int = 0) -> None:
@@ -139,4 +139,4 @@ class MocapHost(Host):
         if self._subscriber is not None:
             self._subscriber.undeclare()
         super().close()
-        self._adapter.close()
+        self._close_adapter(self._adapter.close)

@@ -57,11 +57,15 @@ def open_own(adapter: type[_Adapter], path: str, address: str, options: AdapterO
         If that fails; the line of the file is named.
     """
     try:
-        return adapter.open(address, options)
+        opened: object = adapter.open(address, options)
     except AgvbenchError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise _told(error, path) from error
+    if not isinstance(opened, adapter):
+        remedy = f"return an instance of {adapter.__name__}"
+        raise LinkError("open returned something else", where=path, value=repr(opened), remedy=remedy)
+    return opened
 
 
 def _not_one(path: str, own: list[type], whole: list[type], base: type) -> LinkError:
@@ -74,6 +78,6 @@ def _not_one(path: str, own: list[type], whole: list[type], base: type) -> LinkE
     return LinkError(f"no {base.__name__}", where=path, remedy=f"derive a class from agvbench.adapters.{base.__name__}")
 
 
-def _told(error: Exception, path: str) -> LinkError:
+def _told(error: BaseException, path: str) -> LinkError:
     said = error if isinstance(error, AgvbenchError) else explain(error, path)
     return LinkError(said.what, where=said.where, value=said.value, limit=said.limit, remedy=said.remedy)

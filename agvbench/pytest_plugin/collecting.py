@@ -66,7 +66,10 @@ def _repeats(mark: pytest.Mark, settings: BenchSettings) -> int:
     fixed = mark.args[0] if mark.args else None
     if fixed is None:
         return settings.repeats or _DEFAULT_REPEATS
-    return int(mark.kwargs.get("full") or fixed) if settings.full else int(fixed)
+    n = mark.kwargs.get("full") or fixed if settings.full else fixed
+    if not isinstance(n, int) or n < 1:
+        raise pytest.Collector.CollectError(f"repeats: value cannot be used: {n!r} (limit: a whole number, at least 1)")
+    return n
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)

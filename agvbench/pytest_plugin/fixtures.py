@@ -22,6 +22,8 @@ INTERRUPT = pytest.StashKey[KeyboardInterrupt]()
 STOPPED_IN = pytest.StashKey[str]()
 """The run in which a failure ended the driving."""
 SESSION = pytest.StashKey["BenchSession"]()
+ENDS_PROGRAM = pytest.StashKey[bool]()
+"""Whether a benchmark called `sys.exit`."""
 
 
 @pytest.fixture
@@ -64,10 +66,14 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
             for notice in bench_session.notices:
                 reporter.write_line(notice)
         try:
-            return (yield)
+            done = yield
+            stack.close()
+        except AgvbenchError as error:
+            raise pytest.UsageError(str(error)) from None
         except KeyboardInterrupt as interrupt:
             config.stash[INTERRUPT] = interrupt
             raise
+        return done
 
 
 def _teller(config: pytest.Config) -> Callable[[str], None]:
@@ -91,7 +97,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         from agvbench.running.signals import exit_code
 
         session.exitstatus = exit_code(stash[INTERRUPT])
-    elif SESSION in stash and stash[SESSION].failure is not None:
+    elif ENDS_PROGRAM in stash or (SESSION in stash and stash[SESSION].failure is not None):
         session.exitstatus = pytest.ExitCode.INTERRUPTED
 
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from agvbench.errors import AgvbenchError, FlagError, PlanError
+from agvbench.errors import AgvbenchError, FlagError, InputError, PlanError
 from agvbench.pytest_plugin.collecting import is_bench, run_name
-from agvbench.pytest_plugin.fixtures import INTERRUPT, SESSION, STOPPED_IN, stop_line
+from agvbench.pytest_plugin.fixtures import ENDS_PROGRAM, INTERRUPT, SESSION, STOPPED_IN, stop_line
 from agvbench.pytest_plugin.options import option
 
 if TYPE_CHECKING:
@@ -97,6 +97,10 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, object, o
         return (yield)
     except NotDrivenError as reason:
         pytest.skip(str(reason))
+    except SystemExit as error:
+        pyfuncitem.config.stash[ENDS_PROGRAM] = True
+        remedy = "return, or raise an error that says what is wrong"
+        raise InputError("a benchmark called sys.exit", value=error.code, remedy=remedy) from None
 
 
 @pytest.hookimpl(wrapper=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 import traceback
 from collections.abc import Callable, Iterable, Mapping, Sized
 from pathlib import Path
@@ -50,8 +51,8 @@ class CheckedPlant:
         """Hold the command for `dt` seconds; return the pose (m, m, rad), three finite floats."""
         try:
             answer = self._plant.advance(drive, front, rear, dt)
-        except Exception as error:
-            raise explain(error, f"{self.name}: advance") from error
+        except BaseException as error:
+            raise raised(error, f"{self.name}: advance") from error
         return self._pose(answer)
 
     def true_state(self) -> Mapping[str, float]:
@@ -69,8 +70,8 @@ class CheckedPlant:
     def _guard(self, method: str, call: Callable[[], Answer]) -> Answer:
         try:
             return call()
-        except Exception as error:
-            raise explain(error, f"{self.name}: {method}") from error
+        except BaseException as error:
+            raise raised(error, f"{self.name}: {method}") from error
 
     def _pose(self, answer: object) -> tuple[float, float, float]:
         pose = _three_numbers(answer)
@@ -98,6 +99,15 @@ def _three_numbers(answer: object) -> tuple[float, float, float] | None:
         return float(x), float(y), float(heading)
     except (TypeError, ValueError):
         return None
+
+
+def raised(error: BaseException, where: str) -> BaseException:
+    """Return what to raise for whatever a plant raised: a `PlantError`, or Ctrl-C, which only the main thread gets.
+
+    A plant that ends the thread in which it is driven (`sys.exit`) would leave its runner without an answer.
+    """
+    in_main = threading.current_thread() is threading.main_thread()
+    return error if isinstance(error, KeyboardInterrupt) and in_main else explain(error, where)
 
 
 def explain(error: BaseException, where: str) -> PlantError:

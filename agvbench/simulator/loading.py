@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 
 from agvbench.errors import PlantError
-from agvbench.simulator.checked import CheckedPlant, explain
+from agvbench.simulator.checked import CheckedPlant, explain, raised
 from agvbench.types import PlantFactory
 
 _FORM = "write MODULE:FACTORY or path/to/FILE.py:FACTORY"
@@ -34,8 +34,8 @@ class CheckedFactory:
         """
         try:
             plant = self._factory(seed)
-        except Exception as error:
-            raise explain(error, self.name) from error
+        except BaseException as error:
+            raise raised(error, self.name) from error
         return CheckedPlant(plant, self.name)
 
 

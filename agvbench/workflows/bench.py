@@ -62,7 +62,9 @@ class _Ending:
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_keyboard_interrupt(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
-        raise excinfo.value
+        # pytest interrupts itself, too: where a file cannot be collected.
+        if not isinstance(excinfo.value, pytest.Session.Interrupted):
+            raise excinfo.value
 
     @pytest.hookimpl(wrapper=True)
     def pytest_sessionfinish(self, session: pytest.Session) -> Generator[None, None, None]:

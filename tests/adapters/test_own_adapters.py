@@ -141,3 +141,13 @@ def test_what_opening_it_raises_is_one_line(file: Path, capsys: pytest.CaptureFi
     said = capsys.readouterr()
     line = "my_lab.py: raised ValueError: invalid literal for int() with base 10: 'port'; look at my_lab.py, line 24"
     assert line in said.out + said.err
+
+
+def test_what_opening_and_closing_it_does_wrong_is_one_line(file: Path) -> None:
+    source = file.read_text(encoding="utf-8")
+    file.write_text(source + "\n    @classmethod\n    def open(cls, address, options): pass\n", encoding="utf-8")
+    with pytest.raises(LinkError, match=r"my_lab.py: open returned something else: None; return an instance of"):
+        open_mocap(f"{file}:0", AdapterOptions())
+    file.write_text(source + "\n    def close(self): raise RuntimeError('stuck')\n", encoding="utf-8")
+    with pytest.raises(LinkError, match="the mocap adapter failed: RuntimeError: stuck"), open_rig(mocap=f"{file}:0"):
+        pass

@@ -187,3 +187,21 @@ def test_an_interrupted_wait_leaves_nothing_behind_for_the_next_run() -> None:
         assert link.loss.lost == 0
     with open_rig(plant=TINY) as link:
         assert digest(drive_run(link, "a")) == expected
+
+
+@pytest.mark.parametrize("error", ["SystemExit", "KeyboardInterrupt", "GeneratorExit"])
+@pytest.mark.parametrize("method", ["reset", "advance"])
+def test_a_plant_that_ends_its_thread_is_one_line_at_once(tmp_path, error, method):
+    (tmp_path / "plant.py").write_text(
+        "from agvbench.simulator import make_plant\n"
+        "def make(seed):\n"
+        "    plant = make_plant(seed)\n"
+        "    def fail(*_, **__):\n"
+        f"        raise {error}\n"
+        f"    plant.{method} = fail\n"
+        "    return plant\n"
+    )
+    line = f"plant.py:make: {method}: raised {error}; look at plant.py, line 5"
+    with pytest.raises(PlantError, match=line), open_rig(plant=f"{tmp_path / 'plant.py'}:make") as link:  # noqa: PT012
+        link.reset(Pose(0.0, 0.0, 0.0), run_key="a")
+        link.exchange(Command(1500.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.1)

@@ -118,6 +118,24 @@ def test_a_failure_that_ends_the_session_is_said_first_and_last_with_the_name_of
     assert result.ret == 2
 
 
+@pytest.mark.parametrize(
+    ("source", "line"),
+    [
+        (
+            "@pytest.mark.repeats(0)\ndef bench_a(drive): pass",
+            "repeats: value cannot be used: 0 (limit: a whole",
+        ),
+        ("def bench_a(drive): raise SystemExit(3)", "bench_a: a benchmark called sys.exit: 3; return, or raise"),
+    ],
+)
+def test_a_benchmark_that_cannot_be_driven_is_one_line(pytester, source, line):
+    pytester.makepyfile(bench_it=f"'For agvbench.'\nimport pytest\n\n{source}\n")
+    result = pytester.runpytest_subprocess("-q", "-p", "no:cacheprovider", "--agvbench-no-report")
+    assert result.ret == 2
+    assert any(said.startswith(line) for said in result.outlines), result.outlines
+    assert "Traceback" not in result.stdout.str() + result.stderr.str()
+
+
 def test_two_benchmarks_of_one_run_name_are_refused(pytester):
     source = "# agvbench\ndef bench_a(drive):\n    drive.hold(drive=1.0, for_s=1.0)\n"
     pytester.makepyfile(bench_one=source, bench_two=source)
