@@ -63,9 +63,14 @@ def run(arguments: argparse.Namespace) -> int:
     from rich.console import Console
 
     from agvbench.reporting.diagnosis_console import print_diagnosis
+    from agvbench.reporting.progress import searching
     from agvbench.workflows.diagnose import run_diagnose
 
     console = Console()
+
+    def wrote(path: str) -> None:
+        console.print(f"wrote {path}", highlight=False, markup=False, soft_wrap=True)
+
     found = run_diagnose(
         arguments.directory,
         tell=lambda answer: print_diagnosis(answer, console),
@@ -78,9 +83,12 @@ def run(arguments: argparse.Namespace) -> int:
         next_out=arguments.next_out,
         rig={destination(flag): getattr(arguments, destination(flag)) for flag in _OF_THE_RIG}
         | {"seed": arguments.plant_seed},
+        progress=searching,
+        wrote=wrote,
     )
     if arguments.report is not None:
         from agvbench.reporting.diagnosis_report import write_diagnosis_report
 
         write_diagnosis_report(found, arguments.report)
+        wrote(arguments.report)
     return 1 if arguments.check and not found.adequate else 0

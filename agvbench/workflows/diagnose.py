@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,14 @@ from agvbench.model import VehicleModel
 from agvbench.workflows.diagnosis_files import keep
 from agvbench.workflows.writing import write_file
 
+_RUNS_COUNTED = 5
+Progress = Callable[[int, int], AbstractContextManager[Callable[[str], None]]]
+"""Given the numbers of runs and frames, shows the lines told while the context lasts."""
+
+
+def _silent(runs: int, frames: int) -> AbstractContextManager[Callable[[str], None]]:
+    return nullcontext(lambda line: None)
+
 
 def run_diagnose(
     directory: str,
@@ -30,12 +39,14 @@ def run_diagnose(
     drive_next: bool = False,
     next_out: str | None = None,
     rig: Mapping[str, Any] | None = None,
+    progress: Progress = _silent,
+    wrote: Callable[[str], None] = lambda path: None,
 ) -> Diagnosis:
     """Diagnose the campaign in `directory`, `tell` the answer, and write JSON and the corrected vehicle if asked for.
 
     With `drive_next` the run that the diagnosis proposes is driven with the `rig`, added to a copy of the campaign, and
     that is diagnosed and told: what is written and returned is the second answer. ``next_file`` takes the trajectory
-    proposed.
+    proposed. `progress` is given the numbers of runs and frames, and `wrote` each file that was written.
 
     Raises
     ------
@@ -51,29 +62,36 @@ def run_diagnose(
     campaign = Campaign.open(directory).check()
     believed = Path(vehicle) if vehicle is not None else campaign.path / "vehicle.toml"
     model = VehicleModel.load(believed) if vehicle is not None or believed.exists() else None
-    found = _diagnosed(campaign, model, seed)
+    found = _diagnosed(campaign, model, seed, progress)
     tell(found)
     if next_file is not None and found.next_experiment is not None:
         trajectory = found.next_experiment.trajectory
         text = tomli_w.dumps(trajectory.to_table())
         write_file("--next", Path(next_file), lambda path: path.write_text(text, encoding="utf-8"))
+        wrote(next_file)
     if drive_next:
-        found = _decided(campaign, found, tell, model, seed, next_out, rig or {})
+        found = _decided(campaign, found, tell, model, seed, next_out, rig or {}, progress)
     if json_file is not None:
         text = found.to_text()
         write_file("--json", Path(json_file), lambda path: path.write_text(text, encoding="utf-8"))
         keep(found, Path(json_file))
+        wrote(json_file)
     if out is not None and found.model is not None:
         write_file("--out", Path(out), found.model.save)
+        wrote(out)
     return found
 
 
-def _diagnosed(campaign: Campaign, model: VehicleModel | None, seed: int) -> Diagnosis:
-    errors = Console(stderr=True)
-    if not errors.is_terminal:
-        return with_first_experiment(diagnose(campaign, vehicle=model, seed=seed))
-    with errors.status("reading runs") as status:
-        return with_first_experiment(diagnose(campaign, vehicle=model, seed=seed, tell=status.update))
+def _diagnosed(campaign: Campaign, model: VehicleModel | None, seed: int, progress: Progress) -> Diagnosis:
+    with progress(len(campaign), _frames(campaign)) as told:
+        return with_first_experiment(diagnose(campaign, vehicle=model, seed=seed, tell=told))
+
+
+def _frames(campaign: Campaign) -> int:
+    """Return about how many frames there are, from a few runs."""
+    ids = campaign.run_ids
+    some = ids[:: max(1, len(ids) // _RUNS_COUNTED)]
+    return round(len(ids) * sum(len(campaign.run(run_id).frames) for run_id in some) / max(1, len(some)))
 
 
 def _decided(
@@ -84,6 +102,7 @@ def _decided(
     seed: int,
     out: str | None,
     rig: Mapping[str, Any],
+    progress: Progress,
 ) -> Diagnosis:
     """Drive the run that `found` proposes and return what is then found."""
     from agvbench.workflows.run_next import run_next
@@ -95,6 +114,6 @@ def _decided(
     extended = run_next(campaign, found.next_experiment, found.model or model, rig, out=out, seed=seed)
     name = found.next_experiment.trajectory.name
     console.print(f"drove {name}; the campaign with it: {extended.path}", highlight=False, soft_wrap=True)
-    again = _diagnosed(extended.check(), model, seed)
+    again = _diagnosed(extended.check(), model, seed, progress)
     tell(again)
     return again

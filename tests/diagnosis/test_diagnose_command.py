@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 
 import numpy as np
 import pytest
@@ -19,8 +20,13 @@ def adequate(tmp_path_factory, tiny_campaign, write_campaign):
 def test_json_and_vehicle_of_a_whole_command(adequate, tmp_path, capsys):
     found, out = tmp_path / "new" / "d.json", tmp_path / "v.toml"
     assert main(["diagnose", str(adequate), "--json", str(found), "--out", str(out), "--check"]) == 0
-    said = capsys.readouterr().out
+    said, told = capsys.readouterr()
     assert said.startswith("ADEQUATE")
+    assert said.splitlines()[-2:] == [f"wrote {found}", f"wrote {out}"]
+    expected, *steps = told.splitlines()
+    assert re.fullmatch(r"\d+ runs, about \d+ frames: takes \d+:\d\d to \d+:\d\d \(min:s\)", expected)
+    assert steps
+    assert all(re.fullmatch(r"\d+:\d\d  .+; \d+:\d\d to \d+:\d\d left", step) for step in steps)
     assert "repeatability" in said
     assert said.index("end position error [mm]") < said.index("Δs at the end [mm]")
     assert "position along the way [mm]" in said
