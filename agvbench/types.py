@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Literal, NamedTuple, Protocol, runtime_checkable
+from typing import Literal, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,11 @@ RUN_OK = "ok"
 CONDITIONS = ("uncalibrated", "calibrated", "corrected")
 
 
-def wrap_angle(angle_rad: float) -> float:
-    """Wrap an angle to (−π, π].
+_Angle = TypeVar("_Angle", float, Floats)
+
+
+def wrap_angle(angle_rad: _Angle) -> _Angle:
+    """Wrap an angle, or an array of them, to (−π, π].
 
     >>> round(wrap_angle(3 * math.pi / 2), 6)
     -1.570796

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from agvbench.calibration.map_fit import r_squared, rounded
 from agvbench.errors import FitError
+from agvbench.signals import robust_std
 from agvbench.types import Floats
 from agvbench.vehicle.maps import DeadBandWithSaturation, MonotoneTable, StaticMap
 
@@ -181,7 +182,7 @@ class _Problem:
         ]
         best = min(solutions, key=lambda solution: float(solution.cost))
         p, jacobian = np.asarray(best.x, dtype=np.float64), np.asarray(best.jac, dtype=np.float64)
-        scatter = 1.4826 * float(np.median(np.abs(misfit(p))))
+        scatter = robust_std(misfit(p))
         errors = scatter * np.sqrt(np.diag(np.linalg.pinv(jacobian.T @ jacobian)))
         return p, np.asarray(errors, dtype=np.float64)
 

@@ -12,6 +12,7 @@ from agvbench.calibration.map_fit import LeftOut, MapFit, judge, require_points,
 from agvbench.calibration.points import CurvePoints
 from agvbench.calibration.polynomial_fits import polynomial
 from agvbench.errors import FitError
+from agvbench.signals import robust_std
 from agvbench.types import Floats
 from agvbench.vehicle.maps import LineWithEndStops
 
@@ -42,9 +43,7 @@ def fit_line_with_end_stops(points: CurvePoints) -> MapFit:
         kept = points.select(without(points, reasons))
         best = _best_split(kept)
         residual = kept.value - best.predict(kept.command)
-        limit = max(
-            _OUTLIER_SIGMAS * 1.4826 * float(np.median(np.abs(residual))), _OUTLIER_SHARE * float(np.ptp(kept.value))
-        )
+        limit = max(_OUTLIER_SIGMAS * robust_std(residual), _OUTLIER_SHARE * float(np.ptp(kept.value)))
         worst = int(np.argmax(np.abs(residual)))
         if abs(residual[worst]) <= limit or len(reasons) + 1 > _MOST_OUTLIERS * len(points):
             break

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.types import Floats, Frames
+from agvbench.types import Floats, Frames, wrap_angle
 
 # A frame that arrives this much behind later ones is late; further behind, its time stamp is wrong.
 _LATEST_S = 1.0
@@ -184,7 +184,7 @@ def _longest_chain(frames: Frames, max_speed_mps: float | None) -> NDArray[np.in
     ) -> NDArray[np.bool_]:
         dt = frames.t_s[later] - frames.t_s[earlier]
         moved = np.hypot(*(positions[later] - positions[earlier]).T) - np.where(kicked, _KICK_M, 0.0)
-        turned = np.abs((headings[later] - headings[earlier] + np.pi) % (2.0 * np.pi) - np.pi)
+        turned = np.abs(wrap_angle(headings[later] - headings[earlier]))
         turned -= np.where(kicked, _KICK_RAD, 0.0)
         return np.asarray((moved <= speed * dt + wander) & (turned <= yaw * dt + turn))
 

@@ -12,7 +12,8 @@ from agvbench.calibration.frames import FrameQuality, inspect_frames
 from agvbench.calibration.path import correlation_factor, fit_path, robust_slope, slope_stderr
 from agvbench.calibration.steady import MIN_FRAMES, Segment, driven_segment, steady_frames
 from agvbench.errors import FitError
-from agvbench.types import Command, Floats, Frames, Run
+from agvbench.signals import robust_std
+from agvbench.types import Command, Floats, Frames, Run, wrap_angle
 from agvbench.vehicle.geometry import Geometry
 
 _STANDS_M = 0.01
@@ -185,9 +186,9 @@ def _moves(run_id: str, segment: Segment, frames: Frames, geometry: Geometry, qu
 def _robust_mean_angle(angle_rad: Floats) -> tuple[float, float]:
     """Return the mean of angles in (−π, π] without those far off, and its standard error."""
     first = math.atan2(float(np.mean(np.sin(angle_rad))), float(np.mean(np.cos(angle_rad))))
-    off = (angle_rad - first + math.pi) % (2.0 * math.pi) - math.pi
+    off = wrap_angle(angle_rad - first)
     off = off - np.median(off) if len(off) else off
-    middle = float(np.median((angle_rad - first + math.pi) % (2.0 * math.pi) - math.pi))
-    near = off[np.abs(off) <= 5.0 * 1.4826 * max(float(np.median(np.abs(off))), 1e-12)]
+    middle = float(np.median(wrap_angle(angle_rad - first)))
+    near = off[np.abs(off) <= 5.0 * max(robust_std(off), 1e-12)]
     stderr = float(np.std(near)) / math.sqrt(len(near)) * correlation_factor(near)
     return math.remainder(first + middle + float(np.mean(near)), 2.0 * math.pi), stderr

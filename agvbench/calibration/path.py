@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from agvbench.calibration import _circle_kernel as kernel
 from agvbench.errors import FitError
+from agvbench.signals import robust_std
 from agvbench.types import Floats
 
 _OUTLIER_SIGMAS = 5.0
@@ -48,7 +49,7 @@ def fit_path(t_s: Floats, points: Floats, *, where: str) -> Path:
         if not math.isfinite(row[kernel.CURVATURE]):
             raise FitError("the path is neither an arc nor a line", where=where, value=f"{len(points)} frames")
         along, distance = _coordinates(points, row)
-        scatter = 1.4826 * float(np.median(np.abs(distance)))
+        scatter = robust_std(distance)
         keep = np.abs(distance) <= _OUTLIER_SIGMAS * max(scatter, 1e-9)
         if np.array_equal(keep, used):
             break
@@ -95,7 +96,7 @@ def slope_stderr(t_s: Floats, values: Floats, slope: float) -> float:
     """Return the standard error of `robust_slope`, from the scatter about the line and its correlation in time."""
     residual = values - slope * t_s
     residual = residual - np.median(residual)
-    scatter = 1.4826 * float(np.median(np.abs(residual)))
+    scatter = robust_std(residual)
     spread = float(np.sqrt(np.sum((t_s - t_s.mean()) ** 2)))
     return 1.3 * scatter / spread * correlation_factor(residual)  # a median of pairs has 1.3 times the error of a line
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from agvbench.errors import InputError
-from agvbench.types import Floats
+from agvbench.types import Floats, wrap_angle
 
 Up = Literal["y", "z"]
 
@@ -69,7 +69,7 @@ def quaternion_to_heading(
     at_pole = np.hypot(forward, left) <= _POLE_SINE * norm
     pitched = np.copysign(2.0, rise) * np.arctan2(x, w)  # eq. 6.3 nose up, eq. 6.4 nose down
     heading = np.where(at_pole, pitched, np.arctan2(left, forward))
-    wrapped = np.pi - (np.pi - heading) % (2.0 * np.pi)
+    wrapped = wrap_angle(heading)
     usable = np.isfinite(norm) & (norm > 0.0)
     result: Floats = np.where(usable, wrapped, np.nan)
     return result[()]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from agvbench.errors import FitError
+from agvbench.signals import robust_std
 from agvbench.types import Command, Commands, Floats, Frames
 
 MIN_SETTLE_S = 0.3
@@ -94,6 +95,6 @@ def _last_off_level(rate: Floats, t_s: Floats, middle_s: float) -> float:
     if not len(second):
         return -np.inf
     level = float(np.median(second))
-    scatter = 1.4826 * float(np.median(np.abs(second - level)))
+    scatter = robust_std(second - level)
     off = (np.abs(rate - level) > max(_TOLERANCE * abs(level), 4.0 * scatter)) & (t_s < middle_s)
     return float(t_s[off][-1]) + _STRIDE_S / 2.0 if off.any() else -np.inf

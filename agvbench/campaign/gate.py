@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from agvbench.campaign.mapping_schema import Gate
 from agvbench.errors import InputError
-from agvbench.types import Floats
+from agvbench.types import Floats, wrap_angle
 
 Indices = NDArray[np.int64]
 
@@ -68,7 +68,7 @@ def _driven(poses: Floats, first: Indices, last: Indices, slack_m: float) -> Flo
 def _reachable(before: Floats, after: Floats, gate: Gate) -> NDArray[np.bool_]:
     elapsed = after[:, 0] - before[:, 0]
     distance = np.hypot(after[:, 1] - before[:, 1], after[:, 2] - before[:, 2])
-    turn = np.abs((after[:, 3] - before[:, 3] + np.pi) % (2.0 * np.pi) - np.pi)
+    turn = np.abs(wrap_angle(after[:, 3] - before[:, 3]))
     near = distance <= gate.max_speed_m_per_s * elapsed + gate.slack_m
     return near & (turn <= gate.max_yaw_rate_rad_per_s * elapsed + gate.slack_rad)
 

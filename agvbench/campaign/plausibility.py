@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from agvbench.campaign.header import CampaignHeader
 from agvbench.campaign.timed import TimedTable
 from agvbench.errors import CampaignError
-from agvbench.types import RUN_OK, Floats
+from agvbench.types import RUN_OK, Floats, wrap_angle
 
 _MOST_RUNS = 100
 _STEP_S = 0.2
@@ -64,11 +64,11 @@ class _Steps:
     def heading(self, unit_rad: float = 1.0) -> Floats:
         """Return the heading halfway [rad], its numbers read as so many radians each."""
         first = unit_rad * self.start[:, 2]
-        return np.asarray(first + 0.5 * _wrapped(unit_rad * self.end[:, 2] - first))
+        return np.asarray(first + 0.5 * wrap_angle(unit_rad * self.end[:, 2] - first))
 
     def turned(self, unit_rad: float = 1.0) -> Floats:
         """Return the change of heading [rad], its numbers read as so many radians each."""
-        return _wrapped(unit_rad * (self.end[:, 2] - self.start[:, 2]))
+        return wrap_angle(unit_rad * (self.end[:, 2] - self.start[:, 2]))
 
     def sums(self, values: Floats) -> Floats:
         """Return the sum over each judged run, shape (runs,)."""
@@ -112,10 +112,6 @@ def check_motion(header: CampaignHeader, runs: pa.Table, commands: TimedTable, p
     _check_heading(moving, poses)
     _check_targets(steps, runs, poses)
     _check_time(steps, header, commands, poses)
-
-
-def _wrapped(angle_rad: Floats) -> Floats:
-    return np.asarray((angle_rad + math.pi) % (2.0 * math.pi) - math.pi)
 
 
 def _steps(poses: TimedTable, judged: Indices) -> _Steps:
@@ -171,7 +167,7 @@ def _check_heading(moving: _Steps, poses: TimedTable) -> None:
     wrong: Mask = turns & (degrees < _HALF * none) & (degrees < _HALF * radians)
     if 2 * np.count_nonzero(wrong) > np.count_nonzero(turns):
         run = int(np.argmax(wrong))
-        path = 0.5 * _wrapped(2.0 * np.diff(course[moving.run == run])).sum()  # the same driven backward
+        path = 0.5 * wrap_angle(2.0 * np.diff(course[moving.run == run])).sum()  # the same driven backward
         turned = np.degrees(moving.turned(math.radians(1.0))[moving.run == run].sum())
         raise CampaignError(
             "heading_rad is not in radians",

@@ -19,7 +19,7 @@ from agvbench.diagnosis.residual_rates import residual_rates
 from agvbench.diagnosis.residual_spread import end_spread
 from agvbench.diagnosis.residual_table import with_residuals
 from agvbench.diagnosis.residuals import MEDIAN
-from agvbench.diagnosis.result import Diagnosis, HeldOut, Verdict
+from agvbench.diagnosis.result import Diagnosis, HeldOut, NamedEffect, Verdict
 from agvbench.diagnosis.selection import Selection
 from agvbench.diagnosis.set_aside import Judged, judge, predicts
 from agvbench.diagnosis.swing import swing
@@ -132,7 +132,7 @@ def _how_it_was_fitted(selection: Selection, readings: Readings) -> dict[str, ob
 
 
 def _verdict(
-    effects: tuple[object, ...], significant: bool, rest: list[Dependence], explained: Explained | None
+    effects: tuple[NamedEffect, ...], significant: bool, rest: list[Dependence], explained: Explained | None
 ) -> tuple[Verdict, str]:
     if significant:
         on = f"it depends on {rest[0].covariate if rest else 'none of the covariates looked at'}"
@@ -143,7 +143,7 @@ def _verdict(
         return Verdict.UNKNOWN, _REMAINS + on
     if not effects:
         return Verdict.ADEQUATE, "the model, its maps fitted again, predicts as well as repeats agree with one another"
-    if any(getattr(effect, "confounded_with", ()) for effect in effects):
+    if any(effect.confounded_with for effect in effects):
         return Verdict.AMBIGUOUS, "several effects explain the residual equally well"
     return Verdict.NAMED, "the effects named bring the prediction to the floor"
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from agvbench.errors import FitError
+from agvbench.signals import MAD_TO_STD
 from agvbench.statistics.rest import start_pose
 from agvbench.types import Floats, Frames, Run
 
@@ -117,5 +118,5 @@ def frame_noise(motion: Floats) -> Floats:
     bends = np.abs(np.diff(motion, 3, axis=0)) / np.sqrt(20.0)
     if not len(bends):
         return np.array([_LEAST_M, _LEAST_RAD])
-    scale = 1.4826 * np.median(bends, axis=0)
+    scale = MAD_TO_STD * np.median(bends, axis=0)
     return np.maximum([float(np.hypot(scale[0], scale[1])) / np.sqrt(2.0), float(scale[2])], [_LEAST_M, _LEAST_RAD])

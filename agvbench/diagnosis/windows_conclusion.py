@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,10 +101,12 @@ class WindowConclusion:
 
     def _poses(self, model: Scored) -> Floats:
         """Return what `model` predicts for every window that is judged."""
-        batch = self.selector.batch
-        if not hasattr(self, "_every"):
-            self._every = Batch(self.judged, batch.maps, self.asked.geometry, batch.level_scatter, kinds=batch.kinds)
         return Predictor(self._every, model.fit.predictor.effects).predict(model.fit.parameters)
+
+    @cached_property
+    def _every(self) -> Batch:
+        batch = self.selector.batch
+        return Batch(self.judged, batch.maps, self.asked.geometry, batch.level_scatter, kinds=batch.kinds)
 
     def _held_out(self, before: Floats, after: Floats, shaken: Floats) -> HeldOut:
         kept = self.judged.select(self.held)

@@ -16,6 +16,7 @@ from agvbench.effects import Effect
 from agvbench.model import VehicleModel
 from agvbench.model.simulated_run import SimulatedRun
 from agvbench.model.simulation import Simulation
+from agvbench.signals import robust_std
 from agvbench.types import Floats
 
 
@@ -88,7 +89,7 @@ def level_scatter(predictor: Predictor, parameters: Floats) -> float:
     session = begins.session[use]
     for name in np.unique(session):
         off[session == name] -= np.median(off[session == name])
-    return max(_LEAST_SCATTER, 2.0 * 1.4826 * float(np.median(np.abs(off)))) if len(off) else _LEAST_SCATTER
+    return max(_LEAST_SCATTER, 2.0 * robust_std(off)) if len(off) else _LEAST_SCATTER
 
 
 def redundancy(fitted: Fit) -> float:

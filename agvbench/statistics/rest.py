@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.errors import FitError
+from agvbench.signals import MAD_TO_STD
 from agvbench.types import Floats, Frames, Pose, Run, wrap_angle
 
 WINDOW_S = 0.5
 SPEED_LIMIT_MPS = 0.02
 _FEWEST_FRAMES = 8
 _WILD_SCALES = 6.0
-_MAD_TO_SD = 1.4826
 # The least scatter that is believed: cameras quantise, and a scatter of zero would make every frame but one wild.
 _LEAST_M, _LEAST_RAD = 1e-4, 2e-4
 
@@ -105,7 +105,7 @@ def _drift(window: Frames) -> tuple[float, float, float]:
     apart_s = float(np.median(window.t_s[newer]) - np.median(window.t_s[older]))
     # The scatter is read from second differences, which steady motion does not change.
     bends = np.concatenate([np.diff(window.x_m, 2), np.diff(window.y_m, 2)])
-    noise = _MAD_TO_SD * float(np.median(np.abs(bends))) / math.sqrt(6.0)
+    noise = MAD_TO_STD * float(np.median(np.abs(bends))) / math.sqrt(6.0)
     tolerance = _LEAST_M + 4.0 * 1.2533 * noise * math.sqrt(2.0 / half)
     return moved, max(0.0, moved - tolerance) / apart_s, tolerance
 
@@ -128,7 +128,7 @@ def _unwrapped(heading: Floats) -> tuple[float, Floats]:
 
 def _wild(values: Floats, least: float) -> NDArray[np.bool_]:
     away = np.abs(values - np.median(values))
-    wild: NDArray[np.bool_] = away > _WILD_SCALES * max(least, _MAD_TO_SD * float(np.median(away)))
+    wild: NDArray[np.bool_] = away > _WILD_SCALES * max(least, MAD_TO_STD * float(np.median(away)))
     return wild
 
 

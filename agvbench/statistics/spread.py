@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from agvbench.signals import robust_std
 from agvbench.statistics.bootstrap import Interval, median_interval
 from agvbench.statistics.end_poses import in_order
 from agvbench.statistics.runs import valid
@@ -45,7 +46,7 @@ def spread(values: Floats, *, confidence: float = 0.95) -> Spread:
     (1.871, 2.224)
     """
     sd = float(np.std(values, ddof=1)) if len(values) > 1 else math.nan
-    robust = 1.4826 * float(np.median(np.abs(values - np.median(values))))
+    robust = robust_std(values - np.median(values))
     return Spread(Interval(sd, *_bonett(values, sd, confidence)), robust)
 
 
