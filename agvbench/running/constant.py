@@ -68,3 +68,17 @@ def held(neutral: float, steps: Sequence[tuple[float, Command]], *, presteer_s: 
     times = np.concatenate([[0.0, presteer_s], presteer_s + np.cumsum([duration for duration, _ in steps])])
     columns = np.array(rows, dtype=float)
     return Commands(times, columns[:, 0], columns[:, 1], columns[:, 2])
+
+
+def falling(first: float, last: float) -> list[float]:
+    """Return numbers from `first` down to `last`, a tenth less each.
+
+    >>> falling(1.0, 0.8)
+    [1.0, 0.9, 0.81, 0.8]
+    >>> falling(2.0, 2.0)
+    [2.0]
+    """
+    numbers = [first]
+    while numbers[-1] > last:
+        numbers.append(max(last, round(0.9 * numbers[-1], 3)))
+    return numbers

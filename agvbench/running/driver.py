@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 from agvbench.errors import FlagError, PlanError
 from agvbench.planning import Plan, Trajectory
 from agvbench.planning.shapes import CommandTable
-from agvbench.running.constant import held
+from agvbench.running.constant import falling, held
 from agvbench.running.records import DriveOrder
 from agvbench.types import CONDITIONS, Commands, CommandUnit, Run
+
+_LEAST_SHARE = 0.2
 
 if TYPE_CHECKING:
     from agvbench.running.session import BenchSession
@@ -18,6 +20,10 @@ if TYPE_CHECKING:
 
 class NotDrivenError(Exception):
     """Nothing was driven, and that is no failure: a dry run, or an axle that this vehicle does not steer."""
+
+
+class UndrivableError(NotDrivenError):
+    """A trajectory of which an earlier run said that it cannot be driven here."""
 
 
 class RunRejectedError(PlanError):
@@ -59,19 +65,52 @@ class Driver:
             raise FlagError("unknown condition", value=condition, limit=", ".join(CONDITIONS), where=self._run_id)
         return self._drive(self._session.plan(self._session.trajectory(name), condition), condition)
 
-    def hold(self, *, for_s: float, drive: float = 0.0, front: float = 0.0, rear: float = 0.0) -> Run:
-        """Hold shares of full command for `for_s` seconds: drive 1 is full speed forward, steering 1 full left."""
-        return self.steps([(for_s, {"drive": drive, "front": front, "rear": rear})])
+    def hold(
+        self,
+        *,
+        for_s: float,
+        drive: float = 0.0,
+        front: float = 0.0,
+        rear: float = 0.0,
+        least_s: float | None = None,
+        slower: bool = False,
+    ) -> Run:
+        """Hold shares of full command for `for_s` seconds: drive 1 is full speed forward, steering 1 full left.
+
+        With `least_s` the time is shortened, down to that, until the path fits the workspace; with `slower` the drive
+        is then lowered, without it the run is left out.
+        """
+        times = [for_s] if least_s is None else falling(for_s, least_s)
+        shares = falling(1.0, _LEAST_SHARE)[1:] if slower else []
+        tries = [(s, drive) for s in times] + [(times[-1], drive * share) for share in shares]
+        steps = [[(s, {"drive": share, "front": front, "rear": rear})] for s, share in tries]
+        fitting = next((one for one in steps if self._fits(one)), None)
+        if fitting is None and least_s is not None and not slower:
+            self._session.not_applicable.add(self._run_id)
+            raise NotDrivenError(
+                f"too fast for this floor: {least_s:g} s of it do not fit {self._session.workspace.name}"
+            )
+        return self.steps(fitting or steps[-1])
 
     def steps(self, steps: Sequence[tuple[float, Mapping[str, float]]]) -> Run:
         """Hold several commands one after another: (duration [s], shares of full command) each."""
+        return self._drive(self._held(steps), "uncalibrated", trajectory="")
+
+    def _fits(self, steps: Sequence[tuple[float, Mapping[str, float]]]) -> bool:
+        try:
+            self._held(steps)
+        except (PlanError, UndrivableError):
+            return False
+        return True
+
+    def _held(self, steps: Sequence[tuple[float, Mapping[str, float]]]) -> Plan:
         shares = self._session.shares
         if shares.rear == 0.0 and any(step.get("rear") for _, step in steps):
             self._session.not_applicable.add(self._run_id)
             raise NotDrivenError("this vehicle does not steer its rear axle")
         commands = held(shares.neutral, [(duration_s, shares.command(**step)) for duration_s, step in steps])
         trajectory = _as_trajectory(self._experiment, commands, self._session.nominal.command_unit)
-        return self._drive(self._session.plan(trajectory, "uncalibrated"), "uncalibrated", trajectory="")
+        return self._session.plan(trajectory, "uncalibrated")
 
     def _drive(self, planned: Plan, condition: str, *, trajectory: str | None = None) -> Run:
         order = DriveOrder(

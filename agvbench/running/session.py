@@ -21,7 +21,7 @@ from agvbench.planning import (
 )
 from agvbench.running.bench import Bench
 from agvbench.running.constant import Shares
-from agvbench.running.driver import Driver, NotDrivenError
+from agvbench.running.driver import Driver, NotDrivenError, UndrivableError
 from agvbench.running.latch import Failure
 from agvbench.running.records import DriveOrder
 from agvbench.running.remainders import NO_REMAINDERS
@@ -113,7 +113,7 @@ class BenchSession:
             self._bench.check()
         key = (trajectory, condition)
         if key in self._undrivable:
-            raise NotDrivenError(f"cannot be driven, as its first repeat says: {self._undrivable[key]}")
+            raise UndrivableError(f"cannot be driven, as its first repeat says: {self._undrivable[key]}")
         if key not in self._plans:
             try:
                 self._plans[key] = self._planned(trajectory, condition)

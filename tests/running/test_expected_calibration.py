@@ -11,6 +11,7 @@ import pytest
 from agvbench.campaign import CampaignHeader
 from agvbench.campaign.header import FILE_NAME
 from agvbench.model import example_vehicle, thesis_vehicle
+from agvbench.running.driver import NotDrivenError
 from agvbench.running.opening import open_session
 from agvbench.running.vehicles import expected_calibration, uncalibrated_vehicle
 from agvbench.workflows.init import make_lab
@@ -62,3 +63,34 @@ def test_a_folder_with_a_car_drives_its_own_trajectory_too_and_steers_in_front(t
     assert "3 runs" in done.stdout
     for words in ("wide", "calibrated"), ("wide", "uncalibrated"), ("5", "uncalibrated"):
         assert any(set(words) <= set(line.replace("│", " ").split()) for line in done.stdout.splitlines())
+
+
+def held_for(tmp_path, speed_mps, workspace="circle:6.1", **held):
+    """Return how long [s] a calibration run is planned to be driven, and with which share of full command."""
+    believed = uncalibrated_vehicle()
+    drive = dataclasses.replace(believed.drive, output_low=speed_mps, output_high=-speed_mps)
+    dataclasses.replace(believed, drive=drive).save(tmp_path / "vehicle.toml")
+    options = {"vehicle": str(tmp_path / "vehicle.toml"), "workspace": workspace}
+    with open_session(options, out=str(tmp_path / "c"), resume=False, dry_run=True) as session:
+        with pytest.raises(NotDrivenError) as reason:
+            session.driver("run", experiment="steering_front", repeat=1).hold(**held)
+        if str(reason.value) != "dry run":
+            raise reason.value
+        ((order, _),) = session.planned
+    _, start_s, stop_s = order.commands.t_s
+    return stop_s - start_s, (1500.0 - order.commands.drive[1]) / 600.0
+
+
+ARC = {"for_s": 8.0, "drive": 1.0, "front": 0.0, "least_s": 4.0, "slower": True}
+
+
+def test_calibration_runs_are_as_long_and_fast_as_the_floor_allows(tmp_path):
+    assert held_for(tmp_path, 0.32, **ARC) == (8.0, 1.0)
+    shorter_s, share = held_for(tmp_path, 1.0, **ARC)
+    assert 4.5 < shorter_s < 5.5
+    assert share == 1.0
+    least_s, share = held_for(tmp_path, 3.0, **ARC)
+    assert least_s == 4.0
+    assert 0.35 < share < 0.45
+    with pytest.raises(NotDrivenError, match="too fast for this floor: 2 s of it do not fit"):
+        held_for(tmp_path, 3.0, for_s=6.0, drive=1.0, least_s=2.0)
