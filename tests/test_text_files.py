@@ -13,6 +13,7 @@ import pytest
 from agvbench.adapters.natnet.capture import datagrams_of
 from agvbench.campaign.csv_text import read_csv_text
 from agvbench.campaign.header import CampaignHeader
+from agvbench.campaign.manifest import Manifest
 from agvbench.campaign.mapping import load_mapping
 from agvbench.campaign.parquet import read_parquet
 from agvbench.errors import AgvbenchError, FileError
@@ -33,6 +34,7 @@ READERS: dict[str, Callable[[Path], object]] = {
 FURTHER: dict[str, Callable[[Path], object]] = {
     "recording.csv": read_csv_text,
     "poses.parquet": read_parquet,
+    "SHA256SUMS": lambda path: Manifest(path.parent),
     "stream.pcap": lambda path: list(datagrams_of(path)),
 }
 TOO_MUCH = {
@@ -65,7 +67,7 @@ def pipe(tmp_path: Path) -> Iterator[Path]:
         writer.join(0.01)
 
 
-@pytest.mark.parametrize("name", [*READERS, "recording.csv", "poses.parquet", "stream.pcap"])
+@pytest.mark.parametrize("name", [*READERS, *FURTHER])
 @pytest.mark.parametrize("kind", ["pipe", "device"])
 def test_every_reader_refuses_pipes_and_devices(name: str, kind: str, pipe: Path, tmp_path: Path) -> None:
     path = tmp_path / name

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from agvbench.campaign.atomic import write_atomically
 from agvbench.errors import CampaignError
+from agvbench.text_files import require_regular
 
 MANIFEST_FILE = "SHA256SUMS"
 _LINE = re.compile(r"([0-9a-f]{64}) [ *](.+)")
@@ -50,6 +51,7 @@ class Manifest:
     def _read(self) -> dict[str, set[str]]:
         """Return the hashes by path; a line that an interruption cut off is left out."""
         try:
+            require_regular(self._directory / MANIFEST_FILE)
             text = (self._directory / MANIFEST_FILE).read_text(encoding="utf-8", errors="replace")
         except OSError:
             return {}
