@@ -94,6 +94,13 @@ def docs(session: nox.Session) -> None:
 
 
 @nox.session
+def documents(session: nox.Session) -> None:
+    """Run every shell block of README, tutorial and how-tos as it stands; AGVBENCH_SEED=N sets the seed."""
+    install(session, "test")
+    session.run("pytest", "tests/documents", "-q", *session.posargs, env={"AGVBENCH_DOCUMENTS": "full"})
+
+
+@nox.session
 def perf(session: nox.Session) -> None:
     """Measure speed and accuracy against peers, in one run, and print the ratios."""
     install(session, "test")
