@@ -10,6 +10,7 @@ from agvbench.campaign import CampaignWriter
 from agvbench.errors import CampaignError, FlagError, RunStoppedError, SafetyStopError
 from agvbench.model import VehicleModel
 from agvbench.planning import Departure, Workspace
+from agvbench.running.calibrating import unfinished_calibration
 from agvbench.running.campaign_time import CampaignTime
 from agvbench.running.drive import DEFAULT_TIMING, Drive, Timing, drive, exchanged
 from agvbench.running.event_log import EventLog
@@ -20,7 +21,7 @@ from agvbench.running.placers.choosing import make_placer
 from agvbench.running.placers.placer import Rig
 from agvbench.running.placing import say
 from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess, not_as_planned
-from agvbench.running.records import DriveOrder, record_aborted, recorded_run, stopped_drive, times_stopped
+from agvbench.running.records import DriveOrder, is_attempt, record_aborted, recorded_run, stopped_drive, times_stopped
 from agvbench.running.session_began import SessionBegan
 from agvbench.running.settings import BenchSettings
 from agvbench.running.supervision import DEFAULT_SAFETY, Supervisor
@@ -106,9 +107,14 @@ class Bench:
         """Raise `LinkError` if a failure ended the driving before."""
         self._latch.check()
 
+    def expect_calibration(self, run_ids: Collection[str]) -> None:
+        """Await the calibration runs `run_ids`, and those that were planned earlier and are not finished."""
+        earlier = unfinished_calibration(self.writer.path, self._recorded, self.settings.attempts)
+        self.awaited = earlier.union(run_ids)
+
     def outlook(self, run_ids: Collection[str]) -> str:
         """Return in words what is left to drive of these runs, and which of them were rejected before."""
-        recorded = {run_id: [r for r in self._recorded.values() if _is_attempt(r, run_id)] for run_id in run_ids}
+        recorded = {run_id: [r for r in self._recorded.values() if is_attempt(r, run_id)] for run_id in run_ids}
         done = sum(any(run.is_ok for run in runs) for runs in recorded.values())
         again = [run_id for run_id, runs in recorded.items() if runs and not any(run.is_ok for run in runs)]
         words = f"resumed: {done} runs done, {len(recorded) - done} to drive"
@@ -263,7 +269,3 @@ class Bench:
 
 def _attempt_id(order: DriveOrder, attempt: int) -> str:
     return order.run_id if attempt == 1 else f"{order.run_id}-attempt{attempt}"
-
-
-def _is_attempt(run: Run, run_id: str) -> bool:
-    return run.run_id == run_id or run.run_id.startswith(f"{run_id}-attempt")

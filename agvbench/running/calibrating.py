@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import replace
+from pathlib import Path
 
 from agvbench.campaign import Campaign, CampaignWriter
+from agvbench.campaign.completeness import PLANNED_TABLE
 from agvbench.errors import AgvbenchError, FitError, VehicleError
 from agvbench.model import VehicleModel
+from agvbench.running.provenance import recorded_rows
+from agvbench.running.records import is_attempt
+from agvbench.types import Run
 
 VEHICLE_FILE = "vehicle.toml"
 MEASUREMENTS_TABLE = "calibration"
@@ -51,12 +56,34 @@ def calibrate_campaign(writer: CampaignWriter, *, maps: str, awaited: Collection
         raise FitError(
             f"cannot calibrate ({error})",
             where=writer.path,
-            remedy="drive bench_calibration.py first, or give --calibration FILE",
+            remedy="drive bench_calibration.py too, or begin a session with --calibration FILE",
         ) from None
     model = replace(calibration.model, provenance={**calibration.model.provenance, RUNS_DIGEST: digest})
     writer.write_table(MEASUREMENTS_TABLE, calibration.measurements)
     writer.write_beside(VEHICLE_FILE, model.save)
     return model
+
+
+def unfinished_calibration(directory: Path, recorded: Mapping[str, Run], attempts: int) -> set[str]:
+    """Return the planned calibration runs of the campaign in `directory` that its earlier sessions did not finish.
+
+    A run is finished if one of its ``recorded`` attempts counts, or if all its ``attempts`` were rejected.
+
+    Raises
+    ------
+    CampaignError
+        If the campaign's plan is damaged.
+    """
+    from agvbench.calibration import CALIBRATION_EXPERIMENTS
+
+    rows = recorded_rows(directory, PLANNED_TABLE)
+    planned = {str(row["run_id"]) for row in rows if row["experiment"] in CALIBRATION_EXPERIMENTS}
+    tried = {run_id: [run for run in recorded.values() if is_attempt(run, run_id)] for run_id in planned}
+    return {
+        run_id
+        for run_id, runs in tried.items()
+        if not any(run.is_ok for run in runs) and sum(run.status.startswith("rejected") for run in runs) < attempts
+    }
 
 
 def _kept_model(writer: CampaignWriter, campaign: Campaign, digest: str) -> VehicleModel | None:

@@ -80,6 +80,11 @@ def times_stopped(run_id: str, recorded: Mapping[str, Run]) -> int:
     return sum(name.startswith(run_id + _ABORTED) and STOPPED in run.status for name, run in recorded.items())
 
 
+def is_attempt(run: Run, run_id: str) -> bool:
+    """Whether `run` is an attempt at the run `run_id`."""
+    return run.run_id == run_id or run.run_id.startswith(f"{run_id}-attempt")
+
+
 def free_name(stem: str, taken: Collection[str]) -> str:
     """Return the first of ``stem1``, ``stem2``, … that is not taken.
 

@@ -72,7 +72,7 @@ class BenchSession:
     def expect(self, run_ids: Collection[str], calibration: Collection[str]) -> None:
         """Take note of the runs that were chosen, and of those among them that calibrate: all are awaited."""
         if self._bench is not None:
-            self._bench.awaited = set(calibration)
+            self._bench.expect_calibration(calibration)
             if self._bench.is_resumed:
                 self.notices.append(self._bench.outlook(run_ids))
 
