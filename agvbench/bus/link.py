@@ -97,7 +97,14 @@ class VehicleLink:
 
     def _claim(self, question: str, limit_s: float) -> None:
         """Claim the vehicle for this runner, or release it: its adapter obeys one runner at a time."""
-        ask(self._session, self.keys.question(AGV, question), encode_claim(self._outbox.source), limit_s)
+        self._ask(AGV, question, encode_claim(self._outbox.source), limit_s)
+
+    def _ask(self, role: str, question: str, payload: bytes, limit_s: float) -> bytes:
+        """Return the answer of the adapter in this role; an adapter that vanishes ends the wait."""
+        return ask(self._session, self.keys.question(role, question), payload, limit_s, self._check_presence)
+
+    def _check_presence(self) -> None:
+        self._presence.check(AGV, MOCAP)
 
     def _compare_calibration(self, driven_with: str) -> None:
         built_for = self._identity.agv.extra.get("firmware_calibration", "none")
@@ -108,8 +115,8 @@ class VehicleLink:
     def _meet(self, limit_s: float) -> Identity:
         for role in (AGV, MOCAP):
             self._presence.wait_for(role, limit_s)
-        agv = decode_agv_identity(ask(self._session, self.keys.question(AGV, IDENTITY), b"", limit_s))
-        mocap = decode_mocap_identity(ask(self._session, self.keys.question(MOCAP, IDENTITY), b"", limit_s))
+        agv = decode_agv_identity(self._ask(AGV, IDENTITY, b"", limit_s))
+        mocap = decode_mocap_identity(self._ask(MOCAP, IDENTITY, b"", limit_s))
         return Identity.of(agv, mocap)
 
     def _make_driver(self) -> LockStep | RealTime:
@@ -149,7 +156,7 @@ class VehicleLink:
             If an adapter vanished or does not answer.
         """
         payload = encode_reset(self._prepare(run_key, pose))
-        ask(self._session, self.keys.question(AGV, RESET), payload, self._limit_s)
+        self._ask(AGV, RESET, payload, self._limit_s)
         self._driver.start()
 
     def exchange(self, command: Command, *, t_s: float, hold_s: float) -> Frames:
@@ -196,7 +203,7 @@ class VehicleLink:
         if until_s is None:
             until_s = float(commands.t_s[-1]) if len(commands) else 0.0
         payload = encode_replay(Replay(reset, commands, until_s))
-        ask(self._session, self.keys.question(AGV, REPLAY), payload, self._limit_s)
+        self._ask(AGV, REPLAY, payload, self._limit_s)
 
     def _prepare(self, run_key: str, pose: Pose) -> Reset:
         """Let the camera begin a run; return what the vehicle is to be told."""
@@ -206,9 +213,9 @@ class VehicleLink:
                 where=self.keys.root,
                 remedy="place it by hand, or drive it back",
             )
-        self._presence.check(AGV, MOCAP)
+        self._check_presence()
         request = Reset(run_key, pose, _ANYWHERE, self._outbox.source, self._outbox.last)
-        answer = ask(self._session, self.keys.question(MOCAP, RESET), encode_reset(request), self._limit_s)
+        answer = self._ask(MOCAP, RESET, encode_reset(request), self._limit_s)
         return replace(request, sampling=decode_sampling(answer))
 
     @property

@@ -62,13 +62,26 @@ def test_same_frames_from_a_vehicle_and_a_camera_process(expected: list[str], en
         assert [digest(drive_run(link, key)) for key in KEYS] == expected
 
 
+def killing(child: subprocess.Popen[str]) -> subprocess.Popen[bytes]:
+    """Kill `child` while the next call waits for it."""
+    program = f"import os, time; time.sleep(0.3); os.kill({child.pid}, {int(signal.SIGKILL)})"
+    return subprocess.Popen([sys.executable, "-c", program])
+
+
+def test_a_simulator_that_is_killed_ends_the_reset(endpoint: str) -> None:
+    plant = HANGING.replace("HangingPlant", "HangingInResetPlant")
+    with process("sim", "--plant", plant, "--listen", endpoint) as child, open_rig(connect=endpoint) as link:
+        killer = killing(child)
+        with pytest.raises(AdapterGoneError, match=r"the (agv|mocap) adapter vanished: .* ago"):
+            link.reset(START, run_key="a")
+        killer.wait()
+
+
 def test_a_simulator_that_is_killed_ends_the_exchange(endpoint: str) -> None:
     with process("sim", "--plant", HANGING, "--listen", endpoint) as child, open_rig(connect=endpoint) as link:
         link.reset(START, run_key="a")
         link.exchange(NEUTRAL, t_s=0.0, hold_s=0.1)
-        killer = subprocess.Popen(
-            [sys.executable, "-c", f"import os, time; time.sleep(0.3); os.kill({child.pid}, {int(signal.SIGKILL)})"]
-        )
+        killer = killing(child)
         with pytest.raises(AdapterGoneError, match=r"the (agv|mocap) adapter vanished: .* ago"):
             link.exchange(NEUTRAL._replace(drive=1700.0), t_s=0.1, hold_s=0.1)
         killer.wait()

@@ -44,3 +44,10 @@ class FailingPlant(TinyPlant):
         if drive > 1600.0:
             raise ZeroDivisionError("speed of light reached")
         return super().advance(drive, front, rear, dt)
+
+
+class HangingInResetPlant(TinyPlant):
+    def reset(self, pose: tuple[float, float, float], *, seed: int) -> None:
+        import time
+
+        time.sleep(3600.0)
