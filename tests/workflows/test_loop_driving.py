@@ -45,7 +45,7 @@ def test_whoever_ends_the_loop_ends_its_bench_which_stops_the_vehicle_first(tmp_
     process.send_signal(signal.SIGTERM)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 143
-    assert errors == "agvbench loop: interrupted\n"
+    assert errors == "agvbench loop: interrupted: SIGTERM\n"
     last = list(Campaign.open(tmp_path / "x" / BEFORE))[-1]
     assert last.is_ok or last.status == "aborted: interrupted"
     recorded = len(list(parts.glob("[!.]*.parquet")))
