@@ -5,6 +5,7 @@ from __future__ import annotations
 from agvbench.pytest_plugin.collecting import (
     pytest_collection_modifyitems,
     pytest_generate_tests,
+    pytest_make_collect_report,
 )
 from agvbench.pytest_plugin.fixtures import (
     agvbench_repeat,
@@ -30,6 +31,7 @@ __all__ = [
     "pytest_collection_modifyitems",
     "pytest_configure",
     "pytest_generate_tests",
+    "pytest_make_collect_report",
     "pytest_pyfunc_call",
     "pytest_report_teststatus",
     "pytest_runtest_makereport",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import pytest
 
-from agvbench.errors import AgvbenchError
+from agvbench.errors import AgvbenchError, InputError
 from agvbench.pytest_plugin.options import settings_from
 
 if TYPE_CHECKING:
@@ -21,12 +21,34 @@ _DEFAULT_REPEATS = 10
 _SETTINGS = pytest.StashKey["BenchSettings"]()
 
 
+def is_bench_file(path: Path) -> bool:
+    """Return whether the Python file `path` is a file of benchmarks for agvbench."""
+    return path.name.startswith("bench_") and b"agvbench" in path.read_bytes()
+
+
 class BenchModule(pytest.Module):
     """A ``bench_*.py`` file: its ``bench_*`` functions are benchmarks."""
 
     def funcnamefilter(self, name: str) -> bool:
         """Collect functions by the prefix that names benchmarks."""
         return name.startswith("bench_")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(
+    collector: pytest.Collector,
+) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    """Report a file of benchmarks that calls `sys.exit` when it is imported: once, though pytest may collect it too."""
+    try:
+        return (yield)
+    except SystemExit as error:
+        if not is_bench_file(collector.path):
+            raise
+        if not isinstance(collector, BenchModule):
+            return pytest.CollectReport(collector.nodeid, "passed", None, [])
+        remedy = "remove the call, or put it below `if __name__ == '__main__':`"
+        line = InputError("calls sys.exit when it is imported", where=collector.path, value=error.code, remedy=remedy)
+        return pytest.CollectReport(collector.nodeid, "failed", str(line), [])
 
 
 @pytest.hookimpl(trylast=True)

@@ -136,6 +136,17 @@ def test_a_benchmark_that_cannot_be_driven_is_one_line(pytester, source, line):
     assert "Traceback" not in result.stdout.str() + result.stderr.str()
 
 
+@pytest.mark.parametrize("named", [[], ["bench_it.py"]], ids=["found", "named"])
+def test_a_file_that_calls_sys_exit_is_one_line(pytester, named):
+    pytester.makepyfile(bench_it="# agvbench\nraise SystemExit(3)\n")
+    result = pytester.runpytest_subprocess("-q", "-p", "no:cacheprovider", "--agvbench-no-report", *named)
+    assert result.ret == 2
+    text = result.stdout.str() + result.stderr.str()
+    assert text.count("bench_it.py: calls sys.exit when it is imported: 3; ") == 1
+    assert "Traceback" not in text
+    assert "INTERNALERROR" not in text
+
+
 def test_two_benchmarks_of_one_run_name_are_refused(pytester):
     source = "# agvbench\ndef bench_a(drive):\n    drive.hold(drive=1.0, for_s=1.0)\n"
     pytester.makepyfile(bench_one=source, bench_two=source)
