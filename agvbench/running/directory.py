@@ -7,6 +7,7 @@ from datetime import datetime
 from pathlib import Path
 
 from agvbench.campaign.header import FILE_NAME
+from agvbench.campaign.source import parts
 from agvbench.errors import FlagError
 from agvbench.running.settings import SETTINGS_FILE
 
@@ -37,6 +38,12 @@ def has_session(directory: Path) -> bool:
         return any((directory / name).is_file() for name in (SETTINGS_FILE, FILE_NAME))
     except OSError:  # not a name that a directory can have
         return False
+
+
+def has_runs(directory: Path) -> bool:
+    """Return whether a run is recorded in `directory`."""
+    runs = directory / "runs.parquet"
+    return runs.is_dir() and bool(parts(runs))
 
 
 def _no_session_in(out: Path) -> FlagError:

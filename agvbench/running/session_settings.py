@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from agvbench.running.directory import choose_directory
+from agvbench.campaign.header import FILE_NAME
+from agvbench.errors import CampaignError
+from agvbench.running.directory import choose_directory, has_runs
 from agvbench.running.settings import SETTINGS_FILE, BenchSettings, settings_for_resume
 from agvbench.running.vehicles import lab_vehicle
 
@@ -20,8 +22,22 @@ def session_settings(given: Mapping[str, Any], out: str | None, *, resume: bool)
         If an option cannot be used or contradicts what the session began with, or there is none to resume.
     FileError
         If what it began with cannot be read.
+    CampaignError
+        If a campaign that is to be resumed lacks its header, or its runs lack the settings of their session.
     """
     directory = choose_directory(out, resume=resume)
     if resume and (directory / SETTINGS_FILE).exists():
-        return directory, settings_for_resume(BenchSettings.load(directory), given)
+        settings = settings_for_resume(BenchSettings.load(directory), given)
+        _require(directory, FILE_NAME, "the header of the campaign")
+        return directory, settings
+    if resume and has_runs(directory):  # a session that ended between header and settings has no runs
+        _require(directory, SETTINGS_FILE, "the settings of its session")
     return directory, BenchSettings.given({"vehicle": lab_vehicle(), **given})
+
+
+def _require(directory: Path, name: str, what: str) -> None:
+    if not (directory / name).exists():
+        raise CampaignError(
+            f"cannot be resumed without {name} ({what})", where=directory,
+            remedy="restore it from a copy, or begin a new campaign in another directory",
+        )  # fmt: skip

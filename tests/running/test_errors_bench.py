@@ -20,6 +20,8 @@ from agvbench.workflows.init import make_lab
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "errors-bench.md"
 ROWS = dict(re.findall(r"^\| (.+?) \| `(.+)` \|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE))
 
+HEADER = CampaignHeader(1, "full", "agv1", 0.181, 0.121, "us", 1500.0, 120.0)
+
 
 @pytest.fixture(autouse=True)
 def elsewhere(tmp_path, monkeypatch):
@@ -46,6 +48,17 @@ def resumed_elsewhere():
     Path("begun").mkdir()
     BenchSettings().save(Path("begun"))
     opened("begum", resume=True)()
+
+
+def resumed_without(name):
+    def act():
+        CampaignWriter.create("begun", HEADER)
+        BenchSettings().save(Path("begun"))
+        Path("begun/runs.parquet/left.parquet").touch()
+        Path("begun", name).unlink()
+        opened("begun", resume=True)()
+
+    return act
 
 
 def resumed_with_another_name():
@@ -77,9 +90,8 @@ def driven(**arguments):
 
 
 def calibrated_from_nothing():
-    header = CampaignHeader(1, "full", "agv1", 0.181, 0.121, "us", 1500.0, 120.0)
     Path("full/something").unlink()
-    calibrate_campaign(CampaignWriter.create("full", header), maps="default")
+    calibrate_campaign(CampaignWriter.create("full", HEADER), maps="default")
 
 
 CASES = {
@@ -105,6 +117,8 @@ CASES = {
     "`--resume --out begum` beside `begun`": resumed_elsewhere,
     "`--resume --seed 2` after `--seed 1`": resumed_with_another_seed,
     "`--vehicle` in −1…1, vehicle in µs, over the bus": over_the_bus_in_another_unit,
+    "`--resume` of runs without `bench.toml`": resumed_without("bench.toml"),
+    "`--resume` without `campaign.toml`": resumed_without("campaign.toml"),
     "`agvbench bench nosuch`": lambda: find_benchmark("nosuch"),
     "`agvbench init full` (not empty)": lambda: make_lab("full"),
     "`drive.hold(drive=2.0, …)`": driven(for_s=1.0, drive=2.0),
