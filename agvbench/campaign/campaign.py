@@ -63,6 +63,7 @@ class Campaign:
         manifest.check_beside()
         header = CampaignHeader.load(path / FILE_NAME)
         sources = {name: Source.find(path, name, manifest) for name in TABLES}
+        manifest.require_files()
         runs = sources["runs"].read(RUNS)
         check_runs(runs, sources["runs"].path)
         if not runs.num_rows:

@@ -6,9 +6,9 @@ import re
 from dataclasses import dataclass
 
 from agvbench.campaign.campaign import Campaign
+from agvbench.campaign.schema import PLANNED_TABLE
 from agvbench.types import RUN_OK
 
-PLANNED_TABLE = "planned"
 _ATTEMPT = re.compile(r"(-attempt\d+)?(-aborted\d+)?$")
 _SHOWN = 3
 

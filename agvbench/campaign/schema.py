@@ -35,4 +35,5 @@ POSES = (
     *_columns("number", "mean_error_m received_s", required=False),
 )
 TABLES: dict[str, tuple[Column, ...]] = {"runs": RUNS, "commands": COMMANDS, "poses": POSES}
+PLANNED_TABLE = "planned"
 SPLITS = ("fit", "validation", "held_out")

@@ -12,6 +12,7 @@ from campaign_samples import HEADER, make_run, write_campaign
 from agvbench.campaign import Campaign, CampaignWriter
 from agvbench.campaign.manifest import MANIFEST_FILE
 from agvbench.campaign.parquet import read_parquet
+from agvbench.campaign.schema import TABLES
 from agvbench.errors import CampaignError
 
 BESIDE = "vehicle.toml"
@@ -99,4 +100,49 @@ def test_campaigns_without_a_list_are_read_and_resumed(writer: CampaignWriter, t
     Campaign.open(write_campaign(tmp_path / "foreign")).check()
     (writer.path / MANIFEST_FILE).unlink()
     assert CampaignWriter.resume(writer.path, HEADER).finished_ids == ["a"]
-    assert len((writer.path / MANIFEST_FILE).read_text().splitlines()) == len(FILES)
+    assert [name for name in FILES if name not in (writer.path / MANIFEST_FILE).read_text()] == []
+
+
+RUN_A = [f"{table}.parquet/a.parquet" for table in ("poses", "commands", "runs")]
+
+
+@pytest.mark.parametrize("names", [RUN_A, RUN_A[2:], [BESIDE], ["events.parquet"]])
+def test_a_recorded_file_that_is_missing_is_named(names: list[str], writer: CampaignWriter) -> None:
+    writer.append(make_run("b", started_s=1.0))
+    for _ in range(2):
+        for name in names:
+            (writer.path / name).rename(writer.path.parent / name.replace("/", "-"))
+        with pytest.raises(CampaignError, match=f"lacks files that {MANIFEST_FILE} lists: {', '.join(names)}; restore"):
+            Campaign.open(writer.path)
+        for name in names:
+            (writer.path.parent / name.replace("/", "-")).rename(writer.path / name)
+        CampaignWriter.resume(writer.path, HEADER)  # lists them anew
+    (writer.path / names[-1]).unlink()
+    CampaignWriter.resume(writer.path, HEADER)
+    Campaign.open(writer.path).check()
+
+
+def test_a_run_that_an_interruption_cut_off_is_not_missed_later(writer: CampaignWriter) -> None:
+    listed = writer.path / MANIFEST_FILE
+    listed.write_text(listed.read_text() + "".join(f"{'0' * 64}  {table}.parquet/b.parquet\n" for table in TABLES))
+    writer.append(make_run("c", started_s=1.0))
+    assert Campaign.open(writer.path).check().run_ids == ["a", "c"]
+
+
+@pytest.mark.parametrize(
+    "content", [None, b"", b"12ab", b"\x8f\x02\x00k\xff\x90", b"\xfe\n" * 40, b"colour = 1\n"], ids=repr
+)
+def test_a_list_that_is_damaged_or_lost_is_refused_on_reading_and_on_resuming(
+    content: bytes | None, writer: CampaignWriter
+) -> None:
+    writer.write_table("planned", pd.DataFrame({"run_id": ["a"]}))  # as agvbench bench does
+    listed = writer.path / MANIFEST_FILE
+    listed.unlink() if content is None else listed.write_bytes(content)
+    for use in (lambda: Campaign.open(writer.path), lambda: CampaignWriter.resume(writer.path, HEADER)):
+        with pytest.raises(CampaignError, match=rf"^{listed}: [^\n]+; restore it from a copy, or list the files again"):
+            use()
+    page = (Path(__file__).parents[2] / "docs/reference/campaign-directory.md").read_text(encoding="utf-8")
+    (command,) = (line for line in page.splitlines() if line.startswith("find "))
+    subprocess.run(["sh", "-c", command], cwd=writer.path, check=True)
+    CampaignWriter.resume(writer.path, HEADER)
+    Campaign.open(writer.path).check()

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -16,13 +17,16 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from agvbench.campaign import Campaign, CampaignWriter
+from agvbench.campaign.manifest import MANIFEST_FILE
 from agvbench.campaign.parts import part_name, run_id_of
 from agvbench.errors import CampaignError
 from agvbench.types import NO_TARGET, Commands, Frames
 
 
 def _bytes(directory: Path) -> dict[str, bytes]:
-    return {str(file.relative_to(directory)): file.read_bytes() for file in directory.rglob("*") if file.is_file()}
+    """Return every file's content by path, of the list of hashes without comments."""
+    files = {str(file.relative_to(directory)): file.read_bytes() for file in directory.rglob("*") if file.is_file()}
+    return files | {MANIFEST_FILE: re.sub(rb"#.*\n", b"", files[MANIFEST_FILE])}
 
 
 def test_what_is_appended_is_read_again_bit_by_bit(tmp_path: Path) -> None:
@@ -80,6 +84,8 @@ def test_resume_removes_what_was_never_finished(tmp_path: Path) -> None:
         writer.append(make_run(run_id))
     whole = _bytes(tmp_path)
     (tmp_path / "runs.parquet" / "b.parquet").unlink()  # killed between the poses and the runs part
+    listed = tmp_path / MANIFEST_FILE
+    listed.write_text(listed.read_text().rpartition("#")[0])
     (tmp_path / "poses.parquet" / ".tmp-c.parquet").write_bytes(b"PAR1 half")
     # What somebody else put there is nobody's unfinished run.
     (tmp_path / "poses.parquet" / "notes.txt").write_text("the floor was wet")
