@@ -12,7 +12,7 @@ from agvbench.bus.bus_config import BusConfig
 from agvbench.bus.clock import Clock
 from agvbench.bus.identity_message import Identity
 from agvbench.bus.link import VehicleLink
-from agvbench.bus.session import open_session
+from agvbench.bus.session import bus_session
 from agvbench.errors import LinkError
 from agvbench.types import CommandUnit
 
@@ -63,7 +63,7 @@ def open_rig(
     """
     endpoints = [connect] if isinstance(connect, str) else list(connect or ())
     with ExitStack() as stack:
-        session: Any = stack.enter_context(open_session(connect=endpoints, config=bus_config))
+        session: Any = stack.enter_context(bus_session(connect=endpoints, config=bus_config))
         if not endpoints:
             options = AdapterOptions(
                 vehicle=vehicle,

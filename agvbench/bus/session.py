@@ -9,7 +9,8 @@ from __future__ import annotations
 import ipaddress
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 from agvbench.bus.bus_config import BusConfig
@@ -117,6 +118,33 @@ def open_session(
                 remedy="pass allow_remote=True, on a network that you trust",
             )
     return _open(_settings(listen, connect, timeout_s), listen, connect, timeout_s, config)
+
+
+@contextmanager
+def bus_session(
+    *,
+    listen: Sequence[str] = (),
+    connect: Sequence[str] = (),
+    allow_remote: bool = False,
+    config: BusConfig | None = None,
+) -> Iterator[zenoh.Session]:
+    """Open a session (`open_session`) while the context lasts, and close it also where a receiver takes nothing.
+
+    Zenoh waits up to 10 s for a message that a receiver does not take, and then gives the session up with an error.
+
+    Raises
+    ------
+    LinkError
+        As `open_session`.
+    """
+    import zenoh
+
+    session = open_session(listen=listen, connect=connect, allow_remote=allow_remote, config=config)
+    try:
+        yield session
+    finally:
+        with suppress(zenoh.ZError, RuntimeError):  # RuntimeError: another thread is sending
+            session.close()  # type: ignore[no-untyped-call]
 
 
 def _reason(text: str) -> str:

@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from agvbench.adapters.contract import AdapterOptions
 from agvbench.adapters.node import host_adapters
 from agvbench.bus.bus_config import BusConfig
-from agvbench.bus.session import is_open_to_anybody, open_session
+from agvbench.bus.session import bus_session, is_open_to_anybody
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _POLL_S = 0.1
@@ -38,7 +38,7 @@ def run_adapters(
     _warn_of_remote_access(listen, config)
     with (
         stop_signal() as stopped,
-        open_session(listen=listen, connect=connect, allow_remote=True, config=config) as session,
+        bus_session(listen=listen, connect=connect, allow_remote=True, config=config) as session,
         host_adapters(session, lab, options, agv=agv, mocap=mocap),
     ):
         what = " and ".join(f"{role} {spec}" for role, spec in (("agv", agv), ("mocap", mocap)) if spec is not None)

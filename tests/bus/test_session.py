@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import signal
 import socket
+import subprocess
+import sys
 from contextlib import ExitStack
+from pathlib import Path
 
 import pytest
 
@@ -70,3 +74,26 @@ def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
+
+
+@pytest.mark.slow
+@pytest.mark.real_time
+def test_a_process_leaves_the_bus_without_an_error_where_a_receiver_takes_nothing() -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    with ExitStack() as stack:
+
+        def start(script: Path) -> subprocess.Popen[str]:
+            pipe = subprocess.PIPE
+            command = [sys.executable, str(script), endpoint]
+            process = stack.enter_context(subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True))
+            stack.callback(process.kill)
+            assert process.stdout is not None
+            assert process.stdout.readline() == "listening\n"
+            return process
+
+        sender = start(Path(__file__).with_name("send_too_much.py"))
+        start(Path(__file__).parents[1] / "faults" / "never_take.py").send_signal(signal.SIGSTOP)
+        assert sender.communicate("send\n", timeout=60.0) == ("left\n", "")
+        assert sender.returncode == 0
