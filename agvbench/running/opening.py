@@ -46,6 +46,7 @@ from agvbench.running.settings import SETTINGS_FILE, BenchSettings
 from agvbench.running.signals import interruptible
 from agvbench.running.unbroken import UnbrokenLink
 from agvbench.running.vehicles import LAB_VEHICLE, expected_calibration, known_models
+from agvbench.simulator import load_plant
 from agvbench.types import Run
 
 PROVENANCE_TABLE = "provenance"
@@ -83,6 +84,7 @@ def open_session(
     )
     if dry_run:
         check_specs(settings.agv, settings.mocap)
+        load_plant(settings.plant)
         models.setdefault("calibrated", expected_calibration(settings.vehicle))
         yield session_with(bench=None)
         return

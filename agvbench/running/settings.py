@@ -20,6 +20,8 @@ SETTINGS_FILE = "bench.toml"
 ORDERS = ("interleaved", "blocked", "shuffled")
 PLACES = ("auto", "operator", "teleport")
 MAPS = ("default", "thesis")
+_MOST_REPEATS = 1000
+"""A thousand repeats of the shipped benchmarks take days; all runs are planned before the first is driven."""
 _LARGEST_SEED = 2**63 - 1
 # What may differ between a session and the one that resumes it: none of these changes what is driven.
 _FREE_ON_RESUME = frozenset({"benchmarks", "only", "connect", "bus_config", "lab", "exchange", "session"})
@@ -69,7 +71,8 @@ class BenchSettings:
     only: str = ""
 
     def __post_init__(self) -> None:
-        _check(self.repeats >= 0, "--repeats", self.repeats, "at least 1", "give a whole number of repeats")
+        repeats = f"1 to {_MOST_REPEATS}"
+        _check(0 <= self.repeats <= _MOST_REPEATS, "--repeats", self.repeats, repeats, "give a whole number of repeats")
         _check(self.attempts >= 1, "--attempts", self.attempts, "at least 1", "give a whole number of attempts")
         _check(0 <= self.seed <= _LARGEST_SEED, "--seed", self.seed, f"0 to {_LARGEST_SEED}", "choose another seed")
         _check(self.order in ORDERS, "--order", self.order, ", ".join(ORDERS), "choose one of these")
@@ -90,7 +93,7 @@ class BenchSettings:
             If a value cannot be used.
         """
         repeats = options.get("repeats", 1)
-        _check(repeats >= 1, "--repeats", repeats, "at least 1", "give a whole number of repeats")
+        _check(repeats >= 1, "--repeats", repeats, f"1 to {_MOST_REPEATS}", "give a whole number of repeats")
         known = {f.name for f in fields(cls)}
         return cls(**{name: value for name, value in options.items() if name in known})
 

@@ -96,6 +96,7 @@ def calibrated_from_nothing():
 
 CASES = {
     "`--repeats -1`": opened(repeats=-1),
+    "`--repeats 1001`": opened(repeats=1001),
     "`--attempts 0`": opened(attempts=0),
     "`--seed -1`": opened(seed=-1),
     "`--order odd`": opened(order="odd"),
@@ -110,6 +111,7 @@ CASES = {
     "`--vehicle nope.toml`": opened(vehicle="nope.toml"),
     "`--calibration nope.toml`": opened(calibration="nope.toml"),
     "`--plant nope.py:x`": opened(plant="nope.py:x"),
+    "`--plant=-1 --dry-run`": opened(plant="-1", dry_run=True),
     "`--workspace oval:3`": opened(workspace="oval:3"),
     "`--out full` (not empty)": opened("full"),
     "`--out` of 300 letters": opened("x" * 300),
