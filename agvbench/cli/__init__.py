@@ -25,6 +25,7 @@ exit codes: 0 done; 1 the answer is "no" (compare: a regression,
 diagnose --check: not adequate, bench: a run failed, doctor: not ready);
 130, 143, 129 ended by Ctrl-C, SIGTERM, SIGHUP, the vehicle stopped first;
 2 bad input or set-up, with one line that says what to do;
+3 inconclusive (compare: a campaign is incomplete or not comparable);
 70 a mistake of agvbench itself, with the file to report.
 shell completion: eval "$(register-python-argcomplete agvbench)"
 """

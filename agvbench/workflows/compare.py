@@ -7,11 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from agvbench.campaign import Campaign
-from agvbench.errors import FileError, FlagError
+from agvbench.errors import FlagError
 from agvbench.statistics import Comparison, Verdict, compare, pose_errors
 from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
 from agvbench.statistics.comparison_json import comparison_to_json
 from agvbench.workflows.comparability import NOTHING_KNOWN, Comparability
+from agvbench.workflows.writing import write_file
 
 _SAME_CAMPAIGN = "both sides are the same campaign: no difference can be found"
 
@@ -78,10 +79,7 @@ def write_json(comparison: Comparison, path: str | Path, known: Comparability = 
     """
     content = comparison_to_json(comparison) | {"complete": not known.incomplete, "cautions": list(known.sentences)}
     text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
-    try:
-        Path(path).write_text(f"{text}\n", encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"cannot be written ({error.strerror})", where=path, remedy="choose another file") from None
+    write_file("--json", Path(path), lambda file: file.write_text(f"{text}\n", encoding="utf-8"))
 
 
 def _names(a: Path, b: Path | None, conditions: tuple[str, str] | None) -> tuple[str, str]:

@@ -5,13 +5,18 @@ from __future__ import annotations
 import errno
 import os
 import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from agvbench.campaign.manifest import Manifest, record
 from agvbench.errors import FileError
+from agvbench.statistics import Comparison
+from agvbench.workflows import compare, thesis
 from agvbench.workflows.writing import write_file
+
+NOTHING_COMPARED = Comparison("A", "B", (), (), (), (), alpha=0.01, tests=0)
 
 
 def run_out_of_space(path: Path) -> None:
@@ -49,3 +54,22 @@ def test_a_link_is_followed_and_a_pipe_is_written_to(tmp_path: Path) -> None:
     reader.join()
     assert read == ["through"]
     assert pipe.is_fifo()
+
+
+@pytest.mark.parametrize(
+    ("name", "write"),
+    [
+        ("comparison.json", lambda path: compare.write_json(NOTHING_COMPARED, path)),
+        ("thesis.json", lambda path: thesis.write_json([], path)),
+        ("thesis.md", lambda path: thesis.write_tables([], path.parent)),
+    ],
+)
+def test_results_for_programs_replace_a_file_as_a_whole(
+    name: str, write: Callable[[Path], object], tmp_path: Path
+) -> None:
+    path, before = tmp_path / name, tmp_path / "before"
+    path.write_text("before")
+    before.hardlink_to(path)
+    write(path)
+    assert before.read_text() == "before"
+    assert path.read_text().endswith("\n")

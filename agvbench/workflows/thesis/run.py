@@ -7,8 +7,9 @@ import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from agvbench.errors import FileError, FlagError
+from agvbench.errors import FlagError
 from agvbench.workflows.thesis.layout import Section
+from agvbench.workflows.writing import write_file
 
 SCHEMA = 1
 
@@ -54,28 +55,31 @@ def _section(name: str) -> Section:
 
 
 def write_json(sections: Sequence[Section], path: Path) -> None:
-    """Write all sections as one JSON file (``schema``, ``sections``)."""
+    """Write all sections as one JSON file (``schema``, ``sections``).
+
+    Raises
+    ------
+    FileError
+        If the file cannot be written.
+    """
     document = {"schema": SCHEMA, "sections": {s.name: s.as_json() for s in sections}}
-    _write(path, json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    _write("--json", path, json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 
 def write_tables(sections: Sequence[Section], directory: Path) -> list[Path]:
-    """Write one CSV per table and ``thesis.md`` with everything; return the paths."""
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError("cannot make the directory", where=directory, value=error.strerror) from None
+    """Write one CSV per table and ``thesis.md`` with everything; return the paths.
+
+    Raises
+    ------
+    FileError
+        If a file cannot be written.
+    """
     files = {f"{table.name}.csv": table.csv() for section in sections for table in section.tables}
     files["thesis.md"] = "\n".join(["# The thesis, refitted and predicted", "", *(s.markdown() for s in sections)])
     for name, text in files.items():
-        _write(directory / name, text)
+        _write("--out", directory / name, text)
     return [directory / name for name in files]
 
 
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise FileError(
-            "cannot write the file", where=path, value=error.strerror, remedy="choose a writable place"
-        ) from None
+def _write(flag: str, path: Path, text: str) -> None:
+    write_file(flag, path, lambda file: file.write_text(text, encoding="utf-8", newline="\n"))
