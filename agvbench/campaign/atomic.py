@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 TEMPORARY_PREFIX = ".tmp-"
@@ -30,17 +31,33 @@ def write_atomically(path: Path, data: bytes | memoryview, *, durable: bool = Tr
         _force_to_disk(path.parent)
 
 
-def replace_whole(path: Path, write: Callable[[Path], object]) -> None:
-    """Have `write` write a file beside `path`, and put it in its place once it is whole and on the disk."""
+def replace_whole(path: Path, write: Callable[[Path], object], *, durable: bool = True) -> None:
+    """Have `write` write a file beside `path`, and put it in its place once it is whole and, if `durable`, on disk."""
     temporary = path.with_name(TEMPORARY_PREFIX + path.name)
     try:
         write(temporary)
-        _force_to_disk(temporary)
+        if durable:
+            _force_to_disk(temporary)
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
     temporary.replace(path)
-    _force_to_disk(path.parent)
+    if durable:
+        _force_to_disk(path.parent)
+
+
+@contextmanager
+def made_folder(path: Path) -> Iterator[None]:
+    """Make the folder `path` and those above it; if the context fails, those that are new and empty are removed."""
+    new = [folder for folder in (path, *path.parents) if not folder.exists()]
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        yield
+    except BaseException:
+        with suppress(OSError):
+            for folder in new:
+                folder.rmdir()
+        raise
 
 
 def _force_to_disk(path: Path) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
+from agvbench.campaign.atomic import made_folder, replace_whole
 from agvbench.errors import FileError
 from agvbench.reporting.content import Content, plain
 from agvbench.reporting.csv_table import frame_to_csv
@@ -65,13 +67,13 @@ def write_report(
     )
     out = data.path / "report" if out is None else Path(out)
     try:
-        out.mkdir(parents=True, exist_ok=True)
         registry = all_sections()
-        sections = [s.content(data) for s in track(registry, len(registry), what="drawing")]
-        files = [_write(out / name, text) for name, text in _texts(data, sections)]
-        if recording:
-            _record(data, out / RECORDING)
-            files.append(out / RECORDING)
+        with made_folder(out):
+            sections = [s.content(data) for s in track(registry, len(registry), what="drawing")]
+            files = [_write(out / name, text) for name, text in _texts(data, sections)]
+            if recording:
+                _replace(out / RECORDING, partial(_record, data))
+                files.append(out / RECORDING)
     except OSError as error:
         why = error.strerror or str(error)
         raise FileError(f"cannot be written ({why})", where=out, remedy="choose another directory with --out") from None
@@ -82,7 +84,7 @@ def _record(data: ReportData, path: Path) -> None:
     try:
         write_recording(data, path)
     except RuntimeError as error:  # rerun's word for a full disk
-        raise OSError(f"{path.name}: {error}") from None
+        raise OSError(f"{RECORDING}: {error}") from None
 
 
 def _texts(data: ReportData, sections: Sequence[Content]) -> Iterator[tuple[str, str]]:
@@ -92,6 +94,14 @@ def _texts(data: ReportData, sections: Sequence[Content]) -> Iterator[tuple[str,
 
 
 def _write(path: Path, text: str) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8")
+    with made_folder(path.parent):
+        _replace(path, lambda file: file.write_text(text, encoding="utf-8"))
     return path
+
+
+def _replace(path: Path, write: Callable[[Path], object]) -> None:
+    """Have `write` write `path`: a device directly, a file of an earlier report by a whole one or not at all."""
+    if path.exists() and not path.is_file():
+        write(path)
+    else:
+        replace_whole(path.resolve(), write, durable=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+from agvbench.campaign.atomic import made_folder
 from agvbench.errors import FileError
 from agvbench.resources import resource_directory
 from agvbench.running.vehicles import uncalibrated_vehicle
@@ -18,13 +19,22 @@ def make_lab(directory: str | Path) -> list[str]:
     Raises
     ------
     FileError
-        If it exists and is not empty, or cannot be written.
+        If it exists and is not empty, or cannot be written; what was written until then is removed.
     """
     root = Path(directory)
     if root.exists() and (not root.is_dir() or any(root.iterdir())):
         raise FileError("exists already and is not empty", where=root, remedy="choose another folder")
     try:
-        root.mkdir(parents=True, exist_ok=True)
+        with made_folder(root):
+            _fill(root)
+    except OSError as error:
+        raise FileError(f"cannot be written ({error.strerror})", where=root, remedy="choose another folder") from None
+    return [f"made the lab folder {root}", f"next: cd {root} && agvbench bench --dry-run"]
+
+
+def _fill(root: Path) -> None:
+    """Write everything into the empty folder `root`, or nothing."""
+    try:
         for folder, pattern in {"benchmarks": "bench_*.py", "trajectories": "*.toml"}.items():
             _copy(resource_directory(folder), root / folder, pattern)
         shutil.copy(resource_directory("benchmarks") / "pytest.ini", root / "benchmarks" / "pytest.ini")
@@ -32,9 +42,10 @@ def make_lab(directory: str | Path) -> list[str]:
         shutil.copy(_TEMPLATES / "README.md", root / "README.md")
         shutil.copy(_TEMPLATES / "noxfile.py.txt", root / "noxfile.py")
         (root / ".gitignore").write_text("campaigns/\n.nox/\n", encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"cannot be written ({error.strerror})", where=root, remedy="choose another folder") from None
-    return [f"made the lab folder {root}", f"next: cd {root} && agvbench bench --dry-run"]
+    except BaseException:
+        for entry in root.iterdir():
+            shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
+        raise
 
 
 def _copy(source: Path, target: Path, pattern: str) -> None:

@@ -1,6 +1,7 @@
 """Every line of docs/reference/errors-reports.md, word for word."""
 
 import re
+import resource
 from pathlib import Path
 
 import pytest
@@ -45,3 +46,16 @@ def test_a_disk_that_is_full_when_the_recording_is_written_is_one_line(folder, t
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"agvbench report: {tmp_path}: cannot be written (campaign.rrd: ")
     assert "No space left on device" in line
+
+
+def test_a_disk_that_is_full_leaves_no_empty_files_and_folders_and_an_earlier_report_as_it_was(folder, tmp_path):
+    (tmp_path / "report.html").write_text("of last week")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (3000, limits[1]))
+    try:
+        for out in (tmp_path, tmp_path / "new" / "report"):
+            assert main(["report", str(folder / "c"), "--out", str(out)]) == 2
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert [path.name for path in tmp_path.rglob("*")] == ["report.html"]
+    assert (tmp_path / "report.html").read_text() == "of last week"

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import errno
 import os
+import resource
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from agvbench.campaign.manifest import Manifest, record
 from agvbench.errors import FileError
 from agvbench.statistics import Comparison
 from agvbench.workflows import compare, thesis
+from agvbench.workflows.init import make_lab
 from agvbench.workflows.writing import write_file
 
 NOTHING_COMPARED = Comparison("A", "B", (), (), (), (), alpha=0.01, tests=0)
@@ -32,6 +34,26 @@ def test_a_full_disk_leaves_the_file_as_it_was(before: str | None, tmp_path: Pat
     with pytest.raises(FileError, match=r"calibrated.toml: cannot be written: No space left on device; give --out"):
         write_file("--out", path, run_out_of_space)
     assert [file.read_text() for file in tmp_path.iterdir()] == ([] if before is None else [before])
+
+
+@pytest.fixture
+def full(tmp_path: Path) -> Iterator[None]:
+    """A disk on which no file can be longer than 300 bytes."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (300, limits[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+@pytest.mark.parametrize("existing", [".", "empty"])
+@pytest.mark.usefixtures("full")
+def test_a_lab_folder_is_made_as_a_whole_or_not_at_all(existing: str, tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(FileError, match=r"lab: cannot be written \(File too large\); choose another folder"):
+        make_lab(tmp_path / existing / "new" / "lab")
+    with pytest.raises(FileError, match=r"cannot be written"):
+        make_lab(tmp_path / "empty")
+    assert list(tmp_path.rglob("*")) == [tmp_path / "empty"]
 
 
 def test_a_file_of_a_campaign_is_replaced_with_its_hash(tmp_path: Path) -> None:
