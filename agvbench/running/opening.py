@@ -103,7 +103,7 @@ def open_session(
             campaign_time = _campaign_time(link, writer, recorded, drives_back=settings.place == "auto")
             bench = _bench(settings, models, link, writer, recorded, campaign_time, tell)
             session = session_with(bench=bench)
-            session.notices = _notices(settings, given)
+            session.notices = _notices(settings, given, given_directory)
             session.notices += idle_notice(recorded.values(), campaign_time.now_s(), settings.session)
             try:
                 with bench.pause.by_signal(), _leaving_out_undrivable(writer, session):
@@ -112,10 +112,13 @@ def open_session(
                 bench.close()
 
 
-def _notices(settings: BenchSettings, given: Mapping[str, Any]) -> list[str]:
+def _notices(settings: BenchSettings, given: Mapping[str, Any], directory: Path) -> list[str]:
     """Return what was decided without being asked for."""
     is_found = settings.vehicle == LAB_VEHICLE and "vehicle" not in given
-    return [f"vehicle: {LAB_VEHICLE} of this folder"] if is_found else []
+    is_copy = settings.calibration == str(directory / VEHICLE_FILE)
+    return [f"vehicle: {LAB_VEHICLE} of this folder"] * is_found + [
+        f"calibration: the campaign's copy {settings.calibration}, since the file given before is gone"
+    ] * is_copy
 
 
 def _header(

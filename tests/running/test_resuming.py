@@ -195,6 +195,23 @@ def test_what_was_planned_and_the_calibration_belong_to_the_campaign(lab):
     assert set(campaign.table("inputs")["input"]) == {"--vehicle", "--calibration"}
 
 
+def test_the_campaigns_copy_stands_in_for_a_calibration_that_is_gone_unless_it_was_changed(lab):
+    thesis_vehicle().save(lab / "cal.toml")
+    with open_session({"calibration": "cal.toml"}, out="c", resume=False, dry_run=False):
+        pass
+    (lab / "cal.toml").unlink()
+    with open_session({}, out="c", resume=True, dry_run=False) as session:
+        assert "calibration: the campaign's copy c/vehicle.toml, since the file given before is gone" in session.notices
+        assert session.model("calibrated") == thesis_vehicle()
+    copy = lab / "c" / VEHICLE_FILE
+    copy.write_text(copy.read_text() + "# another\n")
+    with (
+        pytest.raises(FileError, match=r"c/vehicle.toml: has changed since the session began"),
+        open_session({}, out="c", resume=True, dry_run=False),
+    ):
+        pass
+
+
 @pytest.mark.parametrize("changed", ["cal.toml", "mine.py", "trajectories/own.toml", "bench_mine.py"])
 def test_a_session_is_not_resumed_with_files_of_other_content(lab, changed):
     thesis_vehicle().save(lab / "cal.toml")
