@@ -12,11 +12,11 @@ import numpy as np
 
 from agvbench.errors import FitError
 from agvbench.signals import MAD_TO_STD
-from agvbench.statistics.rest import start_pose
+from agvbench.statistics.rest import SPEED_LIMIT_MPS, start_pose
 from agvbench.types import Floats, Frames, Run
 
 _LAST_S = 0.2
-_STILL_MPS, _STILL_M = 0.02, 0.005
+_STILL_M = 0.005
 _ENOUGH_FRAMES = 8
 _LATEST_S = 0.1
 _LIKELY_MPS = 0.3
@@ -65,7 +65,7 @@ def _still(frames: Frames) -> bool:
     span_s = float(last.t_s[-1] - last.t_s[0])
     half = max(len(last) // 2, 1)
     older, newer = (np.array([np.median(v[part]) for v in (last.x_m, last.y_m)]) for part in _halves(half))
-    return float(np.hypot(*(newer - older))) <= max(_STILL_MPS * span_s, _STILL_M)
+    return float(np.hypot(*(newer - older))) <= max(SPEED_LIMIT_MPS * span_s, _STILL_M)
 
 
 def _halves(half: int) -> tuple[slice, slice]:

@@ -17,6 +17,7 @@ from agvbench.calibration import inspect_frames
 from agvbench.calibration.source import HeaderLike
 from agvbench.diagnosis.resting import frame_noise, rests
 from agvbench.model.simulation_loop import LATELY_S
+from agvbench.statistics.rest import SPEED_LIMIT_MPS
 from agvbench.types import Commands, Floats, Frames, Run
 
 SUPPORT_S = 0.2
@@ -36,7 +37,6 @@ _NEAR_S = 0.04
 _LATELY_SPANS = 4.0
 _FEWEST_FRAMES = 6
 _HELD_S = 1e3
-_STILL_MPS = 0.02
 _BLOCK_S = 10.0
 _BLOCK_HORIZONS = 4.0
 
@@ -193,7 +193,7 @@ def _window(
         return None
     poses[~near] = np.nan
     commands = _told(run, t0, t0 + horizon.horizon_s)
-    if abs(state.speed_mps) < _STILL_MPS and np.all(commands.drive[commands.t_s > t0 - SUPPORT_S] == neutral):
+    if abs(state.speed_mps) < SPEED_LIMIT_MPS and np.all(commands.drive[commands.t_s > t0 - SUPPORT_S] == neutral):
         return None  # it stands, and is told to
     piece = replace(run, run_id=f"{run.run_id}@{t0:.2f}", commands=commands, frames=Frames.empty())
     return Window(

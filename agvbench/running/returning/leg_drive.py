@@ -19,6 +19,7 @@ _SHORTEST_TICK_S = 0.05
 _LATE_TICKS = 2
 """Servo and camera show a command about so late."""
 _REST_MPS = 0.004
+"""In `_REST_TICKS` looks in succession; lower than at the end of a run, since how far it rolled is learnt from it."""
 _REST_TICKS = 4
 _STUCK_S = 2.0
 _WRONG_WAY_MPS = -0.08
