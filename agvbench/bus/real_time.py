@@ -63,7 +63,9 @@ class RealTime:
         self._heartbeat = Heartbeat(session, keys.question(AGV, TIME), clock, self._fail)
 
     def _fail(self, error: AgvbenchError) -> None:
-        self._failure = self._failure or error
+        """Keep what failed first, and rather what ends the session than what ends one run."""
+        if self._failure is None or isinstance(self._failure, RunStoppedError):
+            self._failure = error
 
     def _receive(self) -> None:
         while True:
@@ -81,7 +83,7 @@ class RealTime:
 
     def _hear(self, event: Event) -> None:
         if event.level == Level.ERROR:
-            self._failure = event.as_error()
+            self._fail(event.as_error())
 
     def _keep(self, message: FramesMessage) -> None:
         """Keep frames until they are taken; where nobody takes them for long, what comes then is dropped."""

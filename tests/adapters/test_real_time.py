@@ -16,11 +16,12 @@ from agvbench.adapters.contract import AgvAdapter
 from agvbench.bus.clock import SimulatedClock, WallClock
 from agvbench.bus.clock_offset import measure_offset
 from agvbench.bus.command_message import CommandMessage, encode_command
-from agvbench.bus.event_message import decode_event
+from agvbench.bus.event_message import Event, decode_event, encode_event
 from agvbench.bus.identity_message import AgvIdentity
-from agvbench.bus.keys import Keys
+from agvbench.bus.keys import AGV, Keys
 from agvbench.bus.request_message import encode_time
 from agvbench.bus.session import open_session
+from agvbench.errors import AgvbenchError, LinkError, RunStoppedError
 from agvbench.types import Command, Frames
 
 pytestmark = pytest.mark.real_time
@@ -55,6 +56,17 @@ def test_a_second_run_begins_at_its_own_zero() -> None:
             link.reset(START, run_key=run_key)
             frames = link.exchange(NEUTRAL, t_s=-0.2, hold_s=0.2)
             assert np.all(frames.t_s < 0.1)
+
+
+@pytest.mark.parametrize("order", [(LinkError, RunStoppedError), (RunStoppedError, LinkError)])
+def test_what_ends_a_run_does_not_replace_what_ends_the_session(order: tuple[type[AgvbenchError], ...]) -> None:
+    with open_rig("live", plant=TINY) as link:
+        for error in order:
+            link._session.put(link.keys.report, encode_event(Event.of_error(error(f"made up {error.__name__}"), AGV)))
+        while len(link._inbox.events) < len(order):
+            time.sleep(0.01)
+        with pytest.raises(LinkError, match="made up LinkError"):
+            link.exchange(NEUTRAL, t_s=0.0, hold_s=0.05)
 
 
 class Silent(AgvAdapter):
