@@ -66,7 +66,7 @@ class Bench:
         self._time, self._timing, self._limits = campaign_time, timing, limits
         self._identity = link.identity()
         self._latch, self.pause = Latch(), Pause(writer.path, tell)
-        self.log = EventLog(writer)
+        self.log = EventLog(writer, tell)
         self._recorded, self._session = recorded, session
         self._unseen = 0
         self.awaited: set[str] = set()

@@ -9,7 +9,6 @@ import pandas as pd
 from agvbench.bus.event_message import Event
 from agvbench.campaign import CampaignWriter
 from agvbench.running.links import RunnerLink
-from agvbench.running.placing import say
 from agvbench.running.provenance import recorded_rows
 
 EVENTS_TABLE = "events"
@@ -27,7 +26,7 @@ class EventLog:
         Tells the operator, of each kind of event the first.
     """
 
-    def __init__(self, writer: CampaignWriter, tell: Callable[[str], None] = say) -> None:
+    def __init__(self, writer: CampaignWriter, tell: Callable[[str], None]) -> None:
         self._writer, self._tell = writer, tell
         self._rows = recorded_rows(writer.path, EVENTS_TABLE)
         self._saved = self._earlier = len(self._rows)
