@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -48,6 +50,22 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if ROUNDS and hasattr(metafunc.function, "hypothesis"):
         metafunc.fixturenames.append("exploration_round")
         metafunc.parametrize("exploration_round", range(1, ROUNDS + 1))
+
+
+@pytest.fixture
+def give_up() -> Callable[[Path, str], None]:
+    """Return what takes a run out of a campaign to drive it again: its parts and their lines in SHA256SUMS."""
+
+    def remove(campaign: Path, run_id: str) -> None:
+        names = tuple(f"{table}.parquet/{run_id}.parquet" for table in ("runs", "commands", "poses"))
+        for name in names:
+            (campaign / name).unlink(missing_ok=True)
+        listed = campaign / "SHA256SUMS"
+        lines = listed.read_text(encoding="utf-8").splitlines(keepends=True)
+        kept = [line for line in lines if not line.rstrip().endswith(names)]
+        listed.write_text("".join(kept), encoding="utf-8")
+
+    return remove
 
 
 @pytest.fixture

@@ -107,8 +107,18 @@ class Manifest:
             raise CampaignError(
                 f"lacks files that {MANIFEST_FILE} lists", where=self._directory,
                 value=", ".join(missing[:_SHOWN]) + more,
-                remedy="restore them from a copy, drive their runs again with --resume, or delete their lines",
+                remedy="restore them from a copy, or delete their lines; of a run delete all parts and their lines, "
+                "then drive it again with --resume",
             )  # fmt: skip
+
+    @property
+    def names_beside(self) -> list[str]:
+        """The listed files that lie beside the tables' parts, such as ``vehicle.toml``."""
+        return [name for name in self._hashes if "/" not in name]
+
+    def is_in_place(self, file: Path) -> bool:
+        """Whether the list says that `file` was in place."""
+        return file.relative_to(self._directory).as_posix() in self._in_place
 
     def check(self, file: Path) -> None:
         """Compare `file` with its hash, if it is listed.
@@ -138,9 +148,8 @@ class Manifest:
         CampaignError
             As `check`.
         """
-        for name in self._hashes:
-            if "/" not in name:
-                self.check(self._directory / name)
+        for name in self.names_beside:
+            self.check(self._directory / name)
 
     def renew(self, files: Iterable[Path], *, durable: bool = True) -> None:
         """Check `files` and write the list again: one line for each of them, listed before or not.

@@ -18,7 +18,7 @@ from agvbench.campaign.lock import LOCK_FILE
 from agvbench.campaign.manifest import MANIFEST_FILE, Manifest, record
 from agvbench.campaign.parquet import to_parquet
 from agvbench.campaign.parts import part_name, parts_of, run_id_of
-from agvbench.campaign.schema import TABLES
+from agvbench.campaign.schema import PLANNED_TABLE, TABLES
 from agvbench.campaign.source import parts
 from agvbench.campaign.timed import TimedTable, blank_untracked
 from agvbench.errors import CampaignError, RecordingError
@@ -28,7 +28,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-_LISTED = frozenset((".toml", ".parquet"))
+_HEADS = (FILE_NAME, "bench.toml", "vehicle.toml")
+_FURTHER_TABLES = (PLANNED_TABLE, "inputs", "provenance", "events", "calibration", "import")
+_BESIDE = frozenset((*_HEADS, *(f"{name}.parquet" for name in (*TABLES, *_FURTHER_TABLES))))
 _FULL = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EFBIG))
 
 
@@ -83,11 +85,13 @@ class CampaignWriter:
         Raises
         ------
         CampaignError
-            If there is no campaign, it was begun with another header, its tables are single files, or a file has
-            changed since it was recorded.
+            If there is no campaign, it was begun with another header, its tables are single files, or a recorded file
+            is missing or has changed.
         """
         path = Path(path)
-        Manifest(path).check_beside()
+        manifest = Manifest(path)
+        manifest.check_beside()
+        manifest.require_files()
         stored = CampaignHeader.load(path / FILE_NAME)
         for field in fields(header):
             old, new = getattr(stored, field.name), getattr(header, field.name)
@@ -108,17 +112,19 @@ class CampaignWriter:
 
     def _recover(self) -> None:
         self._finished = {run_id_of(part): None for part in parts(self.path / "runs.parquet")}
+        manifest = Manifest(self.path)
         for name in TABLES:
             orphans = (part for part in parts(self.path / f"{name}.parquet") if run_id_of(part) not in self._finished)
-            self._remove(orphans)
+            self._remove(part for part in orphans if not manifest.is_in_place(part))
         for directory in (self.path, *(self.path / f"{name}.parquet" for name in TABLES)):
             self._remove(file for file in sorted(directory.iterdir()) if is_temporary(file) and file.is_file())
         with self._recording():
-            Manifest(self.path).renew(self._files(), durable=self._durable)
+            manifest.renew(self._files(manifest), durable=self._durable)
 
-    def _files(self) -> list[Path]:
-        """Return the files that belong to the campaign: heads, further tables and parts."""
-        beside = (file for file in sorted(self.path.iterdir()) if file.suffix in _LISTED and file.is_file())
+    def _files(self, manifest: Manifest) -> list[Path]:
+        """Return the files that belong to the campaign: what is listed already, heads, further tables and parts."""
+        names = sorted(_BESIDE.union(manifest.names_beside))
+        beside = (file for name in names if (file := self.path / name).is_file())
         return [*beside, *(part for name in TABLES for part in parts(self.path / f"{name}.parquet"))]
 
     def _remove(self, files: Iterable[Path]) -> None:

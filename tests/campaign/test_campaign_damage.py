@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
@@ -106,18 +107,47 @@ def test_campaigns_without_a_list_are_read_and_resumed(writer: CampaignWriter, t
 RUN_A = [f"{table}.parquet/a.parquet" for table in ("poses", "commands", "runs")]
 
 
-@pytest.mark.parametrize("names", [RUN_A, RUN_A[2:], [BESIDE], ["events.parquet"]])
-def test_a_recorded_file_that_is_missing_is_named(names: list[str], writer: CampaignWriter) -> None:
+@pytest.mark.parametrize("names", [RUN_A, RUN_A[2:], RUN_A[:1], [BESIDE], ["events.parquet"]])
+def test_a_recorded_file_that_is_missing_is_named_and_nothing_is_removed(
+    names: list[str], writer: CampaignWriter, give_up: Callable[[Path, str], None]
+) -> None:
     writer.append(make_run("b", started_s=1.0))
+    listed = writer.path / MANIFEST_FILE
     for _ in range(2):
         for name in names:
             (writer.path / name).rename(writer.path.parent / name.replace("/", "-"))
-        with pytest.raises(CampaignError, match=f"lacks files that {MANIFEST_FILE} lists: {', '.join(names)}; restore"):
-            Campaign.open(writer.path)
+        before = {file: file.read_bytes() for file in writer.path.rglob("*") if file.is_file()}
+        for use in (lambda: Campaign.open(writer.path), lambda: CampaignWriter.resume(writer.path, HEADER)):
+            with pytest.raises(CampaignError, match=f"lacks files that {MANIFEST_FILE} lists: {', '.join(names)};"):
+                use()
+        assert {file: file.read_bytes() for file in writer.path.rglob("*") if file.is_file()} == before
         for name in names:
             (writer.path.parent / name.replace("/", "-")).rename(writer.path / name)
         CampaignWriter.resume(writer.path, HEADER)  # lists them anew
-    (writer.path / names[-1]).unlink()
+    (writer.path / names[0]).unlink()
+    if names[0] in RUN_A:  # as the message advises
+        give_up(writer.path, "a")
+        CampaignWriter.resume(writer.path, HEADER).append(make_run("a"))
+    else:
+        listed.write_text("".join(line for line in listed.read_text().splitlines(True) if names[0] not in line))
+        CampaignWriter.resume(writer.path, HEADER)
+    assert Campaign.open(writer.path).check().run_ids == ["a", "b"]
+
+
+def test_a_table_that_is_missing_as_a_whole_is_refused_before_anything_is_removed(writer: CampaignWriter) -> None:
+    (writer.path / "runs.parquet").rename(writer.path.parent / "runs.parquet")
+    with pytest.raises(CampaignError, match="lacks files"):
+        CampaignWriter.resume(writer.path, HEADER)
+    (writer.path.parent / "runs.parquet").rename(writer.path / "runs.parquet")
+    assert Campaign.open(writer.path).check().run_ids == ["a"]
+
+
+def test_a_users_own_files_are_not_listed(writer: CampaignWriter) -> None:
+    for name in ("next.toml", "mine.parquet"):
+        (writer.path / name).write_text("1")
+    CampaignWriter.resume(writer.path, HEADER)
+    (writer.path / "next.toml").write_text("2")
+    (writer.path / "mine.parquet").unlink()
     CampaignWriter.resume(writer.path, HEADER)
     Campaign.open(writer.path).check()
 

@@ -57,18 +57,17 @@ def bench(*arguments):
     return subprocess.run(command, capture_output=True, text=True, check=False, env=os.environ)
 
 
-def test_what_was_chosen_is_chosen_again(lab):
+def test_what_was_chosen_is_chosen_again(lab, give_up):
     assert bench(*BEGAN).returncode == 0
     first = {run.run_id for run in Campaign.open(lab / "c")}
     assert len(first) == 4
-    for table in ("runs", "commands", "poses"):
-        (lab / "c" / f"{table}.parquet" / "left-1-r02.parquet").unlink()
+    give_up(lab / "c", "left-1-r02")
     resumed = bench("--resume")
     assert resumed.returncode == 0, resumed.stdout + resumed.stderr
     assert {run.run_id for run in Campaign.open(lab / "c")} == first
 
 
-def test_a_run_that_lost_the_vehicle_is_rejected_and_driven_again(lab):
+def test_a_run_that_lost_the_vehicle_is_rejected_and_driven_again(lab, give_up):
     lost = bench("bench_mine.py", "--repeats=2", "--seed=7", "-k=left", "--camera=untracked=0.003,burst_frames=60")
     assert lost.returncode == 0, lost.stdout + lost.stderr
     runs = {run.run_id: run for run in Campaign.open(lab / "c")}
@@ -80,8 +79,7 @@ def test_a_run_that_lost_the_vehicle_is_rejected_and_driven_again(lab):
     assert {run.status for run in runs.values()} == {"ok"}
     tables = [lab / "c" / f"{table}.parquet" / f"{again}.parquet" for table in ("runs", "commands", "poses")]
     before = [table.read_bytes() for table in tables]
-    for table in tables:
-        table.unlink()
+    give_up(lab / "c", again)
     assert bench("--resume").returncode == 0
     assert [table.read_bytes() for table in tables] == before
 
