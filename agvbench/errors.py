@@ -25,6 +25,9 @@ A message names *what* is wrong, *where*, the *value*, the *limit* with its unit
 
 from __future__ import annotations
 
+INTERNAL_ERROR_EXIT_CODE = 70
+"""Of an error in agvbench itself, as in ``sysexits.h``: neither bad input (2) nor a failed run (1)."""
+
 
 def visible(text: str) -> str:
     r"""Return `text` with every character that is not shown, such as a terminal's escape sequences, written out.

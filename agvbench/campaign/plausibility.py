@@ -205,11 +205,12 @@ def _check_targets(steps: _Steps, runs: pa.Table, poses: TimedTable) -> None:
     away, towards = went & (along < -_HALF * reached), went & (along > _HALF * reached)
     if _outweighs(away, towards):
         raise CampaignError(
-            "poses run backward in time, or heading_rad is turned by 180°",
+            "poses run backward in time, heading_rad is turned by 180°, or the drive runs the other way",
             where=_where(poses, steps, away),
             value=f"it ends {-along[away][0]:.3g} m in the direction opposite to its target{_as_in(away, aimed)}",
             limit=f"its target is {distance[away][0]:.3g} m away",
-            remedy="let t_s grow with time, and measure the heading along the vehicle's forward axis",
+            remedy="let t_s grow with time, measure the heading along the vehicle's forward axis, or exchange "
+            "output_low and output_high of the drive in vehicle.toml and drive again",
         )
 
 

@@ -8,10 +8,7 @@ import sys
 import tempfile
 import traceback
 
-from agvbench.errors import visible
-
-EXIT_CODE = 70
-"""Software error, as ``sysexits.h`` calls it: neither a bad input (2) nor a failed run (1)."""
+from agvbench.errors import INTERNAL_ERROR_EXIT_CODE, visible
 
 DEBUG = "AGVBENCH_DEBUG"
 
@@ -36,7 +33,7 @@ def tell_own_mistake(command: str, error: Exception) -> int:
         f"please report it with {_kept(error)}",
         file=sys.stderr,
     )
-    return EXIT_CODE
+    return INTERNAL_ERROR_EXIT_CODE
 
 
 def _kept(error: Exception) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from agvbench.errors import FlagError
+from agvbench.errors import INTERNAL_ERROR_EXIT_CODE, FlagError
 from agvbench.running.benchmark_files import find_benchmark
 from agvbench.running.directory import choose_directory
 from agvbench.running.options import OPTIONS, SESSION_OPTIONS, destination, prefixed
@@ -52,7 +52,9 @@ def run_benchmarks(
     if code == pytest.ExitCode.NO_TESTS_COLLECTED:
         where, value = ("-k", only) if only else ("agvbench bench", " ".join(names))
         raise FlagError("no run to drive", where=where, value=value, remedy="see what there is with --dry-run")
-    return 2 if code == pytest.ExitCode.USAGE_ERROR else int(code)
+    # Codes of pytest that agvbench uses for something else.
+    own = {int(pytest.ExitCode.USAGE_ERROR): 2, int(pytest.ExitCode.INTERNAL_ERROR): INTERNAL_ERROR_EXIT_CODE}
+    return own.get(int(code), int(code))
 
 
 class _Ending:
