@@ -28,11 +28,18 @@ _STOP_PATIENCE_S = 0.5
 _HANG_PATIENCE_S = 0.1
 _STOP = CommandFlags.STOP
 _FOREIGN_TOLD_S = 1.0
-_COMMAND, _SOURCE = prefix(Kind.COMMAND), slice(8, 12)
+_COMMAND, _FLAGS, _SOURCE = prefix(Kind.COMMAND), slice(6, 8), slice(8, 12)
 
 
 class Claim:
     """Which runner has the vehicle: the first that claims it, until it releases it or its token vanishes.
+
+    Parameters
+    ----------
+    session, keys
+        As for `Host`.
+    required
+        Whether a vehicle that no runner has takes stops only; else it takes every command.
 
     Attributes
     ----------
@@ -40,9 +47,9 @@ class Claim:
         That of the runner's commands; None while nobody has the vehicle.
     """
 
-    def __init__(self, session: Any, keys: Keys) -> None:
+    def __init__(self, session: Any, keys: Keys, *, required: bool) -> None:
         self.source: int | None = None
-        self._keys, self._lock = keys, threading.Lock()
+        self._keys, self._required, self._lock = keys, required, threading.Lock()
         self._subscriber = session.liveliness().declare_subscriber(keys.runner(), self._token_changed)
 
     def take(self, payload: bytes) -> bytes:
@@ -82,8 +89,10 @@ class Claim:
     def is_foreign(self, payload: bytes) -> bool:
         """Whether a message is a command of another source than the runner that has the vehicle."""
         source = self.source
-        if source is None or payload[: len(_COMMAND)] != _COMMAND:
+        if payload[: len(_COMMAND)] != _COMMAND:
             return False
+        if source is None:
+            return self._required and not int.from_bytes(payload[_FLAGS], "little") & _STOP
         return int.from_bytes(payload[_SOURCE], "little") != source
 
     def close(self) -> None:
@@ -120,7 +129,7 @@ class AgvHost(Host):
         self._neutral_drive = adapter.identity().neutral
         self._gap_limit_s = min(adapter.watchdog_s, SILENCE_LIMIT_S)
         self._drives, self._driven_s, self._longest_s = False, math.nan, 0.0
-        self._claim = Claim(session, keys)
+        self._claim = Claim(session, keys, required=not self._lock_step)
         self.foreign, self._foreign_told = 0, (False, -math.inf)
         self._answers |= {RESET: self._reset, REPLAY: self._replay}
         self._answers |= {CLAIM: self._take, RELEASE: self._claim.release}
@@ -140,13 +149,17 @@ class AgvHost(Host):
     def _take(self, payload: bytes) -> bytes:
         """Give the vehicle to a runner; what the one before left unfinished is not its concern."""
         answer = self._claim.take(payload)
-        self._drives, self._driven_s = False, math.nan
+        self._rest()
         return answer
+
+    def _rest(self) -> None:
+        """Take note that the vehicle stands: no gap between commands counts, and none was told."""
+        self._drives, self._driven_s, self._longest_s = False, math.nan, 0.0
 
     def _reset(self, payload: bytes) -> bytes:
         request = decode_reset(payload)
         with self._lock:
-            self._drives, self._driven_s = False, math.nan
+            self._rest()
             self._outdated = {request.source: request.after}
             self._adapter.reset(request)
         return b""
@@ -276,11 +289,12 @@ class AgvHost(Host):
         """Stop, unless the command came too late for that, too."""
         if self._left or message.sequence <= self._outdated.get(message.source, 0):
             return  # the vehicle was placed anew after this was sent: a runner was interrupted in between
-        self._heard_s, self._drives, self._driven_s = None, False, math.nan
+        self._heard_s = None
+        self._rest()
         self._adapter.stop()
 
     def _watch(self) -> None:
-        """Stop a vehicle whose runner has fallen silent, or whose adapter does not come back from a command."""
+        """Stop a vehicle whose runner has left or fallen silent, or whose adapter does not come back from a command."""
         while not self._clock.wait(self._closed, SILENCE_LIMIT_S / 5.0):
             if not self._is_silent():
                 continue
@@ -291,7 +305,9 @@ class AgvHost(Host):
 
     def _is_silent(self) -> bool:
         heard_s = self._heard_s
-        return heard_s is not None and self._clock.now() - heard_s > SILENCE_LIMIT_S
+        if heard_s is None:
+            return False
+        return self._claim.source is None or self._clock.now() - heard_s > SILENCE_LIMIT_S
 
     def _stop_unheard(self) -> None:
         if not self._lock.acquire(timeout=_HANG_PATIENCE_S):
@@ -308,9 +324,12 @@ class AgvHost(Host):
                 return
             self._adapter.stop()
             self._heard_s = None
+            drove, self._drives = self._drives, False
         finally:
             self._lock.release()
-        self.event(Level.WARNING, RUNNER_SILENT, f"no command for {SILENCE_LIMIT_S} s: vehicle stopped")
+        if drove:
+            why = "its runner is gone" if self._claim.source is None else f"no command for {SILENCE_LIMIT_S} s"
+            self.event(Level.WARNING, RUNNER_SILENT, f"{why}: vehicle stopped")
 
     def _tell_of_hanging(self) -> None:
         error = AdapterGoneError(

@@ -10,9 +10,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import zenoh
-from test_real_time import NEUTRAL, Silent
+from test_real_time import MOVING, NEUTRAL, Silent, claimed_host
 
-from agvbench.adapters.agv_host import AgvHost
 from agvbench.bus.clock import WallClock
 from agvbench.bus.command_message import CommandFlags, CommandMessage, pack_command
 from agvbench.bus.event_message import Event, Level, encode_event
@@ -31,7 +30,6 @@ from agvbench.types import Frames
 pytestmark = pytest.mark.real_time
 
 KEYS = Keys("lab", "agv1")
-MOVING = NEUTRAL._replace(drive=1800.0)
 
 
 class Slow(Silent):
@@ -64,7 +62,7 @@ def test_a_stop_passes_commands_that_wait() -> None:
     adapter, told = Slow(), []
     with open_session() as session:
         events = session.declare_subscriber(KEYS.report, lambda sample: told.append(sample.payload.to_bytes()))
-        host = AgvHost(session, KEYS, adapter, WallClock(), show=lambda _: None)
+        host = claimed_host(session, KEYS, adapter, 7)
         for number in range(1, 2001):
             session.put(KEYS.command, pack_command(number, 0.0, MOVING, 10.0, CommandFlags.NONE, 7))
         session.put(KEYS.command, pack_command(2001, 0.0, NEUTRAL, 0.0, CommandFlags.STOP, 7))
@@ -82,7 +80,7 @@ def test_a_stop_passes_commands_that_wait() -> None:
 def test_a_stop_between_commands_that_wait_is_carried_out_and_so_is_what_came_after() -> None:
     adapter = Slow()
     with open_session() as session:
-        host = AgvHost(session, KEYS, adapter, WallClock(), show=lambda _: None)
+        host = claimed_host(session, KEYS, adapter, 7)
         flags = [CommandFlags.NONE] * 50 + [CommandFlags.STOP] + [CommandFlags.NONE] * 50
         for number, flag in enumerate(flags, start=1):
             session.put(KEYS.command, pack_command(number, 0.0, MOVING, 10.0, flag, 7))
@@ -95,7 +93,7 @@ def test_nonsense_is_counted_told_seldom_and_does_not_hold_up_a_stop() -> None:
     adapter, told = Silent(), []
     with open_session() as session:
         events = session.declare_subscriber(KEYS.report, lambda sample: told.append(sample.payload.to_bytes()))
-        host = AgvHost(session, KEYS, adapter, WallClock(), show=lambda _: None)
+        host = claimed_host(session, KEYS, adapter, 7)
         for _ in range(5000):
             session.put(KEYS.command, b"nonsense")
         session.put(KEYS.command, pack_command(1, 0.0, NEUTRAL, 0.0, CommandFlags.STOP, 7))

@@ -8,6 +8,7 @@ import time
 
 import numpy as np
 import pytest
+import zenoh
 from rig_driving import NEUTRAL, START, TINY
 
 from agvbench.adapters import AdapterOptions, open_rig
@@ -15,16 +16,19 @@ from agvbench.adapters.agv_host import AgvHost
 from agvbench.adapters.contract import AgvAdapter
 from agvbench.bus.clock import SimulatedClock, WallClock
 from agvbench.bus.clock_offset import measure_offset
-from agvbench.bus.command_message import CommandMessage, encode_command
+from agvbench.bus.command_message import CommandFlags, CommandMessage, encode_command, pack_command
 from agvbench.bus.event_message import Event, decode_event, encode_event
 from agvbench.bus.identity_message import AgvIdentity
-from agvbench.bus.keys import AGV, Keys
-from agvbench.bus.request_message import encode_time
+from agvbench.bus.keys import AGV, CLAIM, Keys
+from agvbench.bus.questions import ask
+from agvbench.bus.request_message import encode_claim, encode_time
 from agvbench.bus.session import open_session
 from agvbench.errors import AgvbenchError, LinkError, RunStoppedError
 from agvbench.types import Command, Frames
 
 pytestmark = pytest.mark.real_time
+
+MOVING = NEUTRAL._replace(drive=1800.0)
 
 
 def test_frames_carry_the_runs_clock_and_show_the_drive() -> None:
@@ -98,18 +102,58 @@ class Silent(AgvAdapter):
         pass
 
 
+def claimed_host(session: zenoh.Session, keys: Keys, adapter: AgvAdapter, source: int = 0) -> AgvHost:
+    """Put a vehicle on the bus, and claim it for the runner `source`."""
+    host = AgvHost(session, keys, adapter, WallClock(), show=lambda _: None)
+    ask(session, keys.question(AGV, CLAIM), encode_claim(source), 5.0)
+    return host
+
+
 def test_a_vehicle_whose_runner_falls_silent_is_stopped() -> None:
     adapter, keys = Silent(), Keys("lab", "agv1")
     with open_session() as session:
         events = session.declare_subscriber(keys.report)
-        host = AgvHost(session, keys, adapter, WallClock(), show=lambda _: None)
-        session.put(keys.command, encode_command(CommandMessage(1, 0.0, NEUTRAL, 10.0)))
+        host = claimed_host(session, keys, adapter)
+        session.put(keys.command, encode_command(CommandMessage(1, 0.0, MOVING, 10.0)))
         assert adapter.stopped.wait(10.0)
         assert b"runner_silent" in events.recv().payload.to_bytes()
         assert len(adapter.applied) == 1
         adapter.stopped.clear()
         host.close()
         assert adapter.stopped.is_set()
+
+
+def test_a_vehicle_at_rest_is_stopped_without_an_event_when_no_command_comes() -> None:
+    adapter, keys, told = Silent(), Keys("lab", "agv1"), []
+    with open_session() as session:
+        events = session.declare_subscriber(keys.report, lambda sample: told.append(sample.payload.to_bytes()))
+        host = claimed_host(session, keys, adapter)
+        session.put(keys.command, encode_command(CommandMessage(1, 0.0, NEUTRAL, 10.0)))
+        assert adapter.stopped.wait(10.0)
+        host.close()
+        events.undeclare()
+    assert told == []
+
+
+def test_a_vehicle_that_no_runner_has_takes_stops_only_and_is_stopped_when_its_runner_vanishes() -> None:
+    adapter, keys = Silent(), Keys("lab", "agv1")
+    with open_session() as session:
+        events = session.declare_subscriber(keys.report)
+        token = session.liveliness().declare_token(keys.runner(7))
+        host = claimed_host(session, keys, adapter, 7)
+        session.put(keys.command, pack_command(1, 0.0, MOVING, 10.0, CommandFlags.NONE, 7))
+        while not adapter.applied:
+            time.sleep(0.01)
+        token.undeclare()
+        assert b"its runner is gone: vehicle stopped" in events.recv().payload.to_bytes()
+        assert adapter.stopped.is_set()
+        adapter.stopped.clear()
+        session.put(keys.command, pack_command(1, 0.0, MOVING, 10.0, CommandFlags.NONE, 666))
+        assert b"foreign_commands" in events.recv().payload.to_bytes()
+        session.put(keys.command, pack_command(2, 0.0, NEUTRAL, 0.0, CommandFlags.STOP, 666))
+        assert adapter.stopped.wait(10.0)
+        host.close()
+    assert len(adapter.applied) == 1
 
 
 class Jammed(Silent):
@@ -126,7 +170,7 @@ def test_a_stop_that_fails_is_told_and_tried_again() -> None:
     adapter, keys = Jammed(), Keys("lab", "agv1")
     with open_session() as session:
         events = session.declare_subscriber(keys.report)
-        host = AgvHost(session, keys, adapter, WallClock(), show=lambda _: None)
+        host = claimed_host(session, keys, adapter)
         session.put(keys.command, encode_command(CommandMessage(1, 0.0, NEUTRAL, 10.0)))
         assert b"jammed" in events.recv().payload.to_bytes()
         assert adapter.fourth_came.wait(10.0)
@@ -151,7 +195,7 @@ class Hanging(Silent):
 def test_what_hangs_and_comes_back_driving_is_stopped_again() -> None:
     adapter, keys = Hanging(), Keys("lab", "agv1")
     with open_session() as session:
-        host = AgvHost(session, keys, adapter, WallClock(), show=lambda _: None)
+        host = claimed_host(session, keys, adapter)
         session.put(keys.command, encode_command(CommandMessage(1, 0.0, NEUTRAL, 10.0)))
         assert adapter.stopped.wait(10.0)
         adapter.let_go.set()
@@ -167,11 +211,26 @@ class Stuttering(Silent):
         super().apply(message)
 
 
+def test_a_gap_is_told_to_each_runner_even_if_the_one_before_had_a_longer_one() -> None:
+    adapter, keys, told = Silent(), Keys("lab", "agv1"), []
+    with open_session() as session:
+        events = session.declare_subscriber(keys.report, lambda sample: told.append(sample.payload.to_bytes()))
+        host = claimed_host(session, keys, adapter)
+        for number, pause_s in enumerate((0.45, 0.1, 0.3, 0.1), start=1):
+            if number == 3:
+                ask(session, keys.question(AGV, CLAIM), encode_claim(0), 5.0)
+            session.put(keys.command, encode_command(CommandMessage(number, 0.0, MOVING, 1.0)))
+            time.sleep(pause_s)
+        host.close()
+        events.undeclare()
+    assert sum(b"commands_late" in one for one in told) == 2
+
+
 def test_commands_further_apart_than_the_watchdog_allows_are_told_with_both_figures_while_it_drives() -> None:
     adapter, keys, told = Stuttering(), Keys("lab", "agv1"), []
     with open_session() as session:
         events = session.declare_subscriber(keys.report, lambda sample: told.append(sample.payload.to_bytes()))
-        host = AgvHost(session, keys, adapter, WallClock(), show=lambda _: None)
+        host = claimed_host(session, keys, adapter)
         for number, drive in enumerate((1500.0, 1500.0, 1800.0, 1500.0), start=1):
             session.put(keys.command, encode_command(CommandMessage(number, 0.0, NEUTRAL._replace(drive=drive), 1.0)))
             while len(adapter.applied) < number:
@@ -187,7 +246,7 @@ def test_lost_commands_and_nonsense_are_told_and_do_not_stop_the_host() -> None:
     adapter, keys = Silent(), Keys("lab", "agv1")
     with open_session() as session:
         events = session.declare_subscriber(keys.report)
-        host = AgvHost(session, keys, adapter, WallClock(), show=lambda _: None)
+        host = claimed_host(session, keys, adapter)
         session.put(keys.command, b"nonsense")
         assert b"message is cut off" in events.recv().payload.to_bytes()
         for number in (1, 4):
