@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import replace
 
+from agvbench.bus.event_message import Event
 from agvbench.campaign import CampaignWriter
 from agvbench.errors import CampaignError, FlagError, RunStoppedError, SafetyStopError
 from agvbench.model import VehicleModel
@@ -170,10 +171,15 @@ class Bench:
         self._session = self._session.with_run(started_s)
         self.log.take(self.link, "", started_s)
         seen: list[Frames] = []
+        before: list[Event] = []
+        stopped = False
         try:
-            driven = self._drive(order, run_id, seen)
+            driven = self._drive(
+                order, run_id, seen, at_rest=lambda: before.extend(self.log.take(self.link, run_id, started_s))
+            )
             status = self._status(order, driven)
         except RunStoppedError as stop:
+            stopped = True
             driven, status = self._stopped(order, seen, stop)
             self._tell(f"{run_id} {status}")
         except BaseException as error:
@@ -181,9 +187,9 @@ class Bench:
             self.log.take(self.link, run_id, started_s)
             raise
         events = self.log.take(self.link, run_id, started_s + driven.duration_s)
-        if events:
-            order = replace(order, extra={**order.extra, "events": len(events)})
-        if (event := not_as_planned(events)) is not None:
+        if (count := len(before) + len(events)) and not self._identity.lock_step:
+            order = replace(order, extra={**order.extra, "events": count})
+        if not stopped and (event := not_as_planned(events)) is not None:
             status = f"rejected: {event.line}"
         run = recorded_run(order, run_id, started_s, status, driven, self._identity.firmware)
         self.writer.append(run)
@@ -235,7 +241,7 @@ class Bench:
         """Return the command before a run: everything neutral, since a run's first command is the first recorded."""
         return Command(self.nominal.neutral, self.nominal.neutral, self.nominal.neutral)
 
-    def _drive(self, order: DriveOrder, run_id: str, seen: list[Frames]) -> Drive:
+    def _drive(self, order: DriveOrder, run_id: str, seen: list[Frames], at_rest: Callable[[], object]) -> Drive:
         return drive(
             self.link,
             order.commands,
@@ -245,6 +251,7 @@ class Bench:
             supervisor=self._supervisor,
             timing=self._timing,
             seen=seen,
+            at_rest=at_rest,
         )
 
     def _drawn_as(self, run_id: str) -> str:

@@ -51,12 +51,14 @@ def drive(
     supervisor: Supervisor,
     timing: Timing = DEFAULT_TIMING,
     seen: list[Frames] | None = None,
+    at_rest: Callable[[], object] = lambda: None,
 ) -> Drive:
     """Drive `commands` from `start` and return everything seen.
 
     The last row of `commands` stops the vehicle. `run_key` names a simulated run, whose randomness follows from it;
     None is for real vehicles, which stand at `start` already. `supervisor` stops the vehicle when something is wrong.
     `seen` is filled batch by batch, for a caller who wants to keep what was seen of a run that failed.
+    `at_rest` is called after the rest, before the first of `commands`.
 
     Raises
     ------
@@ -73,6 +75,7 @@ def drive(
             link.reset(start, run_key=run_key)
         watched(neutral, t_s=-timing.rest_before_s, hold_s=timing.rest_before_s)
         _check_seen(batches, timing, where=link.keys.root)
+        at_rest()
         for i in range(len(commands) - 1):
             hold_s = float(commands.t_s[i + 1] - commands.t_s[i])
             watched(commands.at(i), t_s=float(commands.t_s[i]), hold_s=hold_s)

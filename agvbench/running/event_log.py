@@ -34,9 +34,11 @@ class EventLog:
     def take(self, link: RunnerLink, run_id: str, now_s: float) -> list[Event]:
         """Take what was reported during the run `run_id`, or between runs (``""``), by `now_s` [s] of the campaign."""
         events = link.take_events()
+        lock_step = link.identity().lock_step  # an adapter's wall clock would differ from campaign to campaign
         known = {row["event"] for row in self._rows[self._earlier :]}
         for event in events:
-            row = (now_s, run_id, event.role, event.level.name.lower(), event.kind, event.line, event.t_s)
+            adapter_s = 0.0 if lock_step else event.t_s
+            row = (now_s, run_id, event.role, event.level.name.lower(), event.kind, event.line, adapter_s)
             self._rows.append(dict(zip(_COLUMNS, row, strict=True)))
             if event.kind not in known:
                 known.add(event.kind)

@@ -13,7 +13,7 @@ import pytest
 
 from agvbench.adapters import AdapterOptions, host_adapters, open_rig
 from agvbench.bus.command_message import CommandFlags, pack_command
-from agvbench.bus.event_message import Event, Level
+from agvbench.bus.event_message import Event, Level, encode_event
 from agvbench.bus.keys import Keys
 from agvbench.bus.session import open_session as open_bus
 from agvbench.campaign import Campaign
@@ -57,11 +57,13 @@ def test_events_are_told_kept_counted_and_spoil_the_runs_that_were_not_driven_as
 ) -> None:
     told: list[str] = []
     stranger = open_bus(connect=[endpoint])
+    bitten = encode_event(Event(1, "agv", Level.WARNING, "vehicle_stopped_itself", "the watchdog stopped it"))
+    keys = Keys("lab", "agv1")
     wild = pack_command(1, 0.0, Command(2000.0, 1500.0, 1500.0), 1.0, CommandFlags.NONE, 666)
     faults: dict[str, Callable[[], object]] = {
         "quiet": lambda: None,
         "stalled": lambda: time.sleep(0.4),
-        "stranger": lambda: stranger.put(Keys("lab", "agv1").command, wild),
+        "stranger": lambda: (stranger.put(keys.report, bitten), stranger.put(keys.command, wild)),
     }
     given = {"connect": endpoint, "vehicle": "", "attempts": 1, "workspace": "circle:12"}
     with (
@@ -77,7 +79,7 @@ def test_events_are_told_kept_counted_and_spoil_the_runs_that_were_not_driven_as
     campaign = Campaign.open(tmp_path / "c")
     runs = {run.run_id: run for run in campaign}
     assert runs["quiet"].status == "ok"
-    assert runs["quiet"].extra["events"] == 1
+    assert runs["quiet"].extra["events"] == 2
     assert "s between two commands (limit: 0.25 s, then the vehicle stops itself)" in runs["stalled"].status
     assert runs["stalled"].status.startswith("rejected: 0.")
     assert runs["stranger"].status.startswith("rejected: ")
@@ -90,6 +92,18 @@ def test_events_are_told_kept_counted_and_spoil_the_runs_that_were_not_driven_as
     [section] = [section for section in all_sections() if section.slug == "events"]
     [shown] = [block for block in section.blocks(gather(tmp_path / "c")) if hasattr(block, "rows")]
     assert ["agv", "info", "battery_low", 3, 3, "7.1 V"] in [list(row) for row in shown.rows]
+
+
+def test_events_in_lock_step_leave_no_times_of_the_wall_clock(tmp_path: Path) -> None:
+    event = encode_event(Event(1, "agv", Level.INFO, "battery_low", "7.1 V", t_s=123.4))
+    with open_session({"attempts": 1}, out=str(tmp_path / "c"), resume=False, dry_run=False) as session:
+        assert session._bench is not None
+        link: Any = session._bench.link
+        in_mid_run(link, lambda: link._session.put(link.keys.report, event))
+        session.driver("quiet", experiment="free", repeat=1).hold(for_s=0.8, drive=0.5)
+    campaign = Campaign.open(tmp_path / "c")
+    assert [list(campaign.table("events")[name]) for name in ("event", "adapter_s")] == [["battery_low"], [0.0]]
+    assert all("events" not in run.extra for run in campaign)
 
 
 def test_a_vehicle_that_was_built_for_another_calibration_is_an_event(endpoint: str) -> None:

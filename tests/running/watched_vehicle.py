@@ -7,7 +7,7 @@ from agvbench.bus.event_message import Level
 
 
 class WatchedVehicle(LiveAgv):
-    """Reports a low battery whenever it is placed."""
+    """Reports a low battery and that it stopped itself whenever it is placed."""
 
     scheme = "watched"
     watchdog_s = 0.25
@@ -19,3 +19,4 @@ class WatchedVehicle(LiveAgv):
     def reset(self, request):
         super().reset(request)
         self._reports.event(Level.INFO, "battery_low", "7.1 V")
+        self._reports.event(Level.WARNING, "vehicle_stopped_itself", "while it was placed")
