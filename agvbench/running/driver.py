@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from agvbench.errors import FlagError, PlanError
@@ -63,7 +64,10 @@ class Driver:
         """
         if condition not in CONDITIONS:
             raise FlagError("unknown condition", value=condition, limit=", ".join(CONDITIONS), where=self._run_id)
-        return self._drive(self._session.plan(self._session.trajectory(name), condition), condition)
+        trajectory = self._session.trajectory(name)
+        with self._planning():
+            planned = self._session.plan(trajectory, condition)
+        return self._drive(planned, condition)
 
     def hold(
         self,
@@ -94,7 +98,18 @@ class Driver:
 
     def steps(self, steps: Sequence[tuple[float, Mapping[str, float]]]) -> Run:
         """Hold several commands one after another: (duration [s], shares of full command) each."""
-        return self._drive(self._held(steps), "uncalibrated", trajectory="")
+        with self._planning():
+            planned = self._held(steps)
+        return self._drive(planned, "uncalibrated", trajectory="")
+
+    @contextmanager
+    def _planning(self) -> Iterator[None]:
+        """Take note of a run that has no plan: it is not among those that a campaign lacks."""
+        try:
+            yield
+        except (PlanError, UndrivableError):
+            self._session.not_applicable.add(self._run_id)
+            raise
 
     def _fits(self, steps: Sequence[tuple[float, Mapping[str, float]]]) -> bool:
         try:

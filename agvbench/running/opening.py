@@ -30,10 +30,12 @@ from agvbench.running.placers.choosing import choose_placer
 from agvbench.running.placing import say
 from agvbench.running.provenance import (
     INPUTS_TABLE,
+    RecordedInputs,
     Row,
     input_files,
     provenance,
     recorded_rows,
+    recorded_trajectories,
     require_same_inputs,
     with_new,
 )
@@ -88,21 +90,24 @@ def open_session(
         models.setdefault("calibrated", expected_calibration(settings.vehicle))
         yield session_with(bench=None)
         return
-    inputs = input_files(settings, {str(row["trajectory"]) for row in plan if row["trajectory"]})
-    if resume:
-        require_same_inputs(recorded_rows(directory, INPUTS_TABLE), inputs)
-    else:
+    recorded_inputs = recorded_rows(directory, INPUTS_TABLE) if resume else []
+    trajectories = {str(row["trajectory"]) for row in plan if row["trajectory"]}
+    inputs = input_files(settings, sorted(trajectories | recorded_trajectories(recorded_inputs)))
+    require_same_inputs(recorded_inputs, inputs)
+    if not resume:
         refuse_occupied(given_directory, "resume it, or choose another directory")
     with interruptible(), open_session_rig(settings, models) as link:
         choose_placer(settings.place, simulated=link.identity().simulated)
         with locked(given_directory):
             header = _header(directory, settings, models["uncalibrated"], link, resume=resume)
             writer = _writer(directory, settings, header, resume=resume, simulated=link.identity().simulated)
-            _record_plan(writer, settings, inputs, plan)
+            recorded_files = RecordedInputs(writer)
+            recorded_files.add(inputs)
+            _record_plan(writer, settings, plan)
             recorded = _recorded(writer)
             campaign_time = _campaign_time(link, writer, recorded, drives_back=settings.place == "auto")
             bench = _bench(settings, models, link, writer, recorded, campaign_time, tell)
-            session = session_with(bench=bench)
+            session = session_with(bench=bench, inputs=recorded_files)
             session.notices = _notices(settings, given, given_directory)
             session.notices += idle_notice(recorded.values(), campaign_time.now_s(), settings.session)
             try:
@@ -156,11 +161,10 @@ def _writer(
     return writer
 
 
-def _record_plan(writer: CampaignWriter, settings: BenchSettings, inputs: list[Row], plan: Sequence[Row]) -> None:
-    """Keep what decides what is driven: hashes of input files, the given calibration, the planned runs."""
-    for name, rows, key in ((INPUTS_TABLE, inputs, "input"), (PLANNED_TABLE, plan, "run_id")):
-        if rows := with_new(recorded_rows(writer.path, name), rows, key):
-            writer.write_table(name, pd.DataFrame(rows))
+def _record_plan(writer: CampaignWriter, settings: BenchSettings, plan: Sequence[Row]) -> None:
+    """Keep what decides what is driven: the planned runs, the given calibration."""
+    if rows := with_new(recorded_rows(writer.path, PLANNED_TABLE), plan, "run_id"):
+        writer.write_table(PLANNED_TABLE, pd.DataFrame(rows))
     if settings.calibration and not (writer.path / VEHICLE_FILE).exists():
         given = Path(settings.calibration).read_bytes()
         writer.write_beside(VEHICLE_FILE, lambda path: path.write_bytes(given))
@@ -168,7 +172,7 @@ def _record_plan(writer: CampaignWriter, settings: BenchSettings, inputs: list[R
 
 @contextmanager
 def _leaving_out_undrivable(writer: CampaignWriter, session: BenchSession) -> Iterator[None]:
-    """Take runs that this kind of vehicle cannot drive out of the plan when the session ends."""
+    """Take runs that this vehicle cannot drive here out of the plan when the session ends."""
     try:
         yield
     finally:

@@ -11,6 +11,9 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
+from agvbench.campaign import CampaignWriter
 from agvbench.campaign.manifest import Manifest, sha256
 from agvbench.campaign.parquet import read_parquet
 from agvbench.errors import FileError
@@ -19,6 +22,7 @@ from agvbench.running.benchmark_files import find_benchmark
 from agvbench.running.settings import BenchSettings
 
 INPUTS_TABLE = "inputs"
+_TRAJECTORY = "trajectory "
 Row = Mapping[str, Any]
 
 _PACKAGES = ("agvbench", "eclipse-zenoh", "numba", "numpy", "pandas", "pyarrow", "pytest", "scipy")
@@ -65,7 +69,26 @@ def input_files(settings: BenchSettings, trajectories: Iterable[str]) -> list[Ro
     files = {f"--{name}": str(getattr(settings, name)) for name in options}
     files["--plant"] = settings.plant.rpartition(":")[0]
     files |= {f"benchmark {name}": str(find_benchmark(name)).partition("::")[0] for name in settings.benchmarks}
-    files |= {f"trajectory {name}": str(trajectory_file(name)) for name in trajectories}
+    return [*_rows(files), *trajectory_inputs(trajectories)]
+
+
+def trajectory_inputs(names: Iterable[str]) -> list[Row]:
+    """Return the files of trajectories as `input_files` does.
+
+    Raises
+    ------
+    AgvbenchError
+        If one of them does not exist or cannot be read.
+    """
+    return _rows({f"{_TRAJECTORY}{name}": str(trajectory_file(name)) for name in names})
+
+
+def recorded_trajectories(inputs: Iterable[Row]) -> set[str]:
+    """Return the names of the trajectories among rows of the table ``inputs``."""
+    return {str(row["input"]).removeprefix(_TRAJECTORY) for row in inputs if row["input"].startswith(_TRAJECTORY)}
+
+
+def _rows(files: Mapping[str, str]) -> list[Row]:
     return [
         {"input": name, "file": file, "sha256": _hash(Path(file))}
         for name, file in files.items()
@@ -81,7 +104,7 @@ def _hash(file: Path) -> str:
 
 
 def require_same_inputs(recorded: Iterable[Row], now: Iterable[Row]) -> None:
-    """Refuse to resume with files whose content is not that which the session began with.
+    """Refuse files whose content is not that which the session began with.
 
     Raises
     ------
@@ -95,6 +118,29 @@ def require_same_inputs(recorded: Iterable[Row], now: Iterable[Row]) -> None:
                 f"has changed since the session began ({row['input']})", where=row["file"],
                 remedy="restore it from a copy, or start anew without --resume",
             )  # fmt: skip
+
+
+class RecordedInputs:
+    """The table ``inputs`` of the campaign that `writer` records."""
+
+    def __init__(self, writer: CampaignWriter) -> None:
+        self._writer = writer
+        self._rows = recorded_rows(writer.path, INPUTS_TABLE)
+
+    def add(self, rows: Iterable[Row]) -> None:
+        """Append the rows of files that are not in the table.
+
+        Raises
+        ------
+        FileError
+            If a file that is in it has other content now.
+        RecordingError
+            If the disk refuses.
+        """
+        require_same_inputs(self._rows, rows := list(rows))
+        if len(extended := with_new(self._rows, rows, "input")) > len(self._rows):
+            self._writer.write_table(INPUTS_TABLE, pd.DataFrame(extended))
+            self._rows = extended
 
 
 def recorded_rows(directory: Path, table: str) -> list[Row]:

@@ -23,6 +23,7 @@ from agvbench.running.bench import Bench
 from agvbench.running.constant import Shares
 from agvbench.running.driver import Driver, NotDrivenError, UndrivableError
 from agvbench.running.latch import Failure
+from agvbench.running.provenance import RecordedInputs, trajectory_inputs
 from agvbench.running.records import DriveOrder
 from agvbench.running.remainders import NO_REMAINDERS
 from agvbench.types import Pose, Run
@@ -33,7 +34,7 @@ class BenchSession:
 
     ``models`` are those known before anything is driven, by condition; a dry run needs one of each. ``remainders`` is
     what the corrected one still misses, by trajectory; ``steering`` the mode in which all are steered, "" for each its
-    own.
+    own. ``inputs`` records the files of the trajectories that are driven.
     """
 
     def __init__(
@@ -45,19 +46,21 @@ class BenchSession:
         bench: Bench | None,
         remainders: Mapping[str, Pose] = NO_REMAINDERS,
         steering: str = "",
+        inputs: RecordedInputs | None = None,
     ) -> None:
         self.directory, self.workspace = directory, workspace
         self.nominal = models["uncalibrated"]
         self.shares = Shares.of_model(self.nominal)
         self.planned: list[tuple[DriveOrder, Plan]] = []
         self._models, self._bench, self._remainders, self._steering = models, bench, remainders, steering
+        self._inputs = inputs
         self._plans: dict[tuple[Trajectory, str], Plan] = {}
         self._undrivable: dict[tuple[Trajectory, str], PlanError] = {}
         self._not_calibrated: FitError | None = None
         self._hourly: set[tuple[Trajectory, str]] = set()
         self.notices: list[str] = []
         self.not_applicable: set[str] = set()
-        """The ids of runs that this kind of vehicle cannot drive."""
+        """The ids of runs that this vehicle cannot drive here."""
 
     @property
     def is_dry(self) -> bool:
@@ -91,7 +94,17 @@ class BenchSession:
         return self._models[condition] if self._bench is None else self._bench.model(condition)
 
     def trajectory(self, name: str) -> Trajectory:
-        """Return the trajectory of this name or file, steered as the session is, or as the vehicle can."""
+        """Return the trajectory of this name or file, steered as the session is, or as the vehicle can.
+
+        Raises
+        ------
+        FileError
+            If there is no such trajectory, or its file has changed since the session began.
+        RecordingError
+            If the hash of its file cannot be recorded.
+        """
+        if self._inputs is not None:
+            self._inputs.add(trajectory_inputs([name]))
         return steered(load_trajectory(name), self._steering, self.nominal)
 
     def plan(self, trajectory: Trajectory, condition: str) -> Plan:

@@ -14,7 +14,7 @@ import pytest
 
 from agvbench.campaign import Campaign
 from agvbench.campaign.completeness import Completeness
-from agvbench.errors import CampaignError, FileError, FlagError, LinkError
+from agvbench.errors import CampaignError, FileError, FlagError, LinkError, PlanError
 from agvbench.model import VehicleModel, example_path, thesis_vehicle
 from agvbench.planning.reading import trajectory_file
 from agvbench.running.benchmark_files import benchmark_name, find_benchmark
@@ -193,6 +193,31 @@ def test_what_was_planned_and_the_calibration_belong_to_the_campaign(lab):
     assert set(campaign.table("inputs")["input"]) == {"--vehicle", "--calibration"}
 
 
+def test_a_trajectory_that_changes_in_a_session_is_not_driven(lab):
+    own = lab / "own.toml"
+    shutil.copy(trajectory_file("5"), own)
+    with open_session({}, out="c", resume=False, dry_run=False) as session:
+        session.trajectory("own.toml")
+        own.write_text(own.read_text() + "# another\n")
+        with pytest.raises(FileError, match=r"^own.toml: has changed since the session began \(trajectory own.toml\)"):
+            session.trajectory("own.toml")
+
+
+def test_a_run_that_has_no_plan_here_is_not_missing(lab):
+    names = ("left", "far", "far-again", "long")
+    plan = [{"run_id": n, "experiment": "t", "trajectory": "", "condition": "", "repeat": 1} for n in names]
+    with open_session({"workspace": "rectangle:2x2"}, out="c", resume=False, dry_run=False, plan=plan) as session:
+        session.driver("left", experiment="free", repeat=1).hold(drive=0.5, front=0.5, rear=0.0, for_s=0.3)
+        for name, error in (("far", PlanError), ("far-again", NotDrivenError)):
+            with pytest.raises(error):
+                session.driver(name, experiment="t", repeat=1).trajectory("1", condition="uncalibrated")
+        with pytest.raises(NotDrivenError):
+            session.driver("long", experiment="free", repeat=1).hold(drive=1.0, for_s=60.0)
+    done = Completeness.of(Campaign.open(lab / "c"))
+    assert done is not None
+    assert (done.planned, done.missing) == (("left",), ())
+
+
 def test_the_campaigns_copy_stands_in_for_a_calibration_that_is_gone_unless_it_was_changed(lab):
     thesis_vehicle().save(lab / "cal.toml")
     with open_session({"calibration": "cal.toml"}, out="c", resume=False, dry_run=False):
@@ -210,16 +235,19 @@ def test_the_campaigns_copy_stands_in_for_a_calibration_that_is_gone_unless_it_w
         pass
 
 
-@pytest.mark.parametrize("changed", ["cal.toml", "mine.py", "trajectories/own.toml", "bench_mine.py"])
+@pytest.mark.parametrize(
+    "changed", ["cal.toml", "mine.py", "trajectories/own.toml", "trajectories/body.toml", "bench_mine.py"]
+)
 def test_a_session_is_not_resumed_with_files_of_other_content(lab, changed):
     thesis_vehicle().save(lab / "cal.toml")
     (lab / "mine.py").write_text("from agvbench.simulator import make_plant as make\n")
     (lab / "trajectories").mkdir()
-    shutil.copy(trajectory_file("5"), lab / "trajectories" / "own.toml")
+    for name in ("own", "body"):
+        shutil.copy(trajectory_file("5"), lab / "trajectories" / f"{name}.toml")
     given = {"calibration": "cal.toml", "plant": "mine.py:make", "benchmarks": ("bench_mine.py",)}
     plan = [{"run_id": "x", "experiment": "t", "trajectory": "own", "condition": "calibrated", "repeat": 1}]
-    with open_session(given, out="c", resume=False, dry_run=False, plan=plan):
-        pass
+    with open_session(given, out="c", resume=False, dry_run=False, plan=plan) as session:
+        session.trajectory("body")  # in the body of a benchmark
     with open_session({}, out="c", resume=True, dry_run=False, plan=plan):
         pass
     (lab / changed).write_text((lab / changed).read_text() + "# another\n")
