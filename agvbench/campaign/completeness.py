@@ -13,6 +13,15 @@ _ATTEMPT = re.compile(r"(-attempt\d+)?(-aborted\d+)?$")
 _SHOWN = 3
 
 
+def planned_id(run_id: str) -> str:
+    """Return the id of the planned run that the recorded run `run_id` is an attempt at.
+
+    >>> planned_id("left-r01-attempt2-aborted1")
+    'left-r01'
+    """
+    return _ATTEMPT.sub("", run_id)
+
+
 @dataclass(frozen=True)
 class Completeness:
     """The ids of the runs that were `planned`, and of those that have no attempt of status ``ok``."""
@@ -34,10 +43,8 @@ class Completeness:
         if not campaign.has_table(PLANNED_TABLE):
             return None
         planned = tuple(campaign.table(PLANNED_TABLE)["run_id"].astype(str))
-        tried = {_ATTEMPT.sub("", run_id) for run_id in campaign.run_ids}
-        counted = {
-            _ATTEMPT.sub("", run_id) for run_id in campaign.runs.loc[campaign.runs["status"] == RUN_OK, "run_id"]
-        }
+        tried = set(map(planned_id, campaign.run_ids))
+        counted = set(map(planned_id, campaign.runs.loc[campaign.runs["status"] == RUN_OK, "run_id"]))
         missing = tuple(run_id for run_id in planned if run_id not in counted)
         return cls(planned, missing, len(tried.intersection(missing)))
 

@@ -22,7 +22,14 @@ from agvbench.running.placers.choosing import make_placer
 from agvbench.running.placers.placer import Rig
 from agvbench.running.placing import say
 from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess, not_as_planned
-from agvbench.running.records import DriveOrder, is_attempt, record_aborted, recorded_run, stopped_drive, times_stopped
+from agvbench.running.records import (
+    DriveOrder,
+    attempts_by_run,
+    record_aborted,
+    recorded_run,
+    stopped_drive,
+    times_stopped,
+)
 from agvbench.running.session_began import SessionBegan
 from agvbench.running.settings import BenchSettings
 from agvbench.running.supervision import DEFAULT_SAFETY, Supervisor
@@ -115,9 +122,11 @@ class Bench:
 
     def outlook(self, run_ids: Collection[str]) -> str:
         """Return in words what is left to drive of these runs, and which of them were rejected before."""
-        recorded = {run_id: [r for r in self._recorded.values() if is_attempt(r, run_id)] for run_id in run_ids}
+        attempts = attempts_by_run(self._recorded.values())
+        recorded = {run_id: attempts.get(run_id, []) for run_id in run_ids}
         done = sum(any(run.is_ok for run in runs) for runs in recorded.values())
-        again = [run_id for run_id, runs in recorded.items() if runs and not any(run.is_ok for run in runs)]
+        rejected = {run_id for run_id, runs in recorded.items() if any(r.status.startswith("rejected") for r in runs)}
+        again = [run_id for run_id in recorded if run_id in rejected and not any(r.is_ok for r in recorded[run_id])]
         words = f"resumed: {done} runs done, {len(recorded) - done} to drive"
         return f"{words}; rejected before and tried again: {', '.join(again)}" if again else words
 

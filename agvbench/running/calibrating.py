@@ -12,7 +12,7 @@ from agvbench.campaign.schema import PLANNED_TABLE
 from agvbench.errors import AgvbenchError, FitError, VehicleError
 from agvbench.model import VehicleModel
 from agvbench.running.provenance import recorded_rows
-from agvbench.running.records import is_attempt
+from agvbench.running.records import attempts_by_run
 from agvbench.types import Run
 
 VEHICLE_FILE = "vehicle.toml"
@@ -78,7 +78,8 @@ def unfinished_calibration(directory: Path, recorded: Mapping[str, Run], attempt
 
     rows = recorded_rows(directory, PLANNED_TABLE)
     planned = {str(row["run_id"]) for row in rows if row["experiment"] in CALIBRATION_EXPERIMENTS}
-    tried = {run_id: [run for run in recorded.values() if is_attempt(run, run_id)] for run_id in planned}
+    attempts_at = attempts_by_run(recorded.values())
+    tried = {run_id: attempts_at.get(run_id, []) for run_id in planned}
     return {
         run_id
         for run_id, runs in tried.items()

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from agvbench.campaign import CampaignWriter
+from agvbench.campaign.completeness import planned_id
 from agvbench.errors import CampaignError
 from agvbench.running.drive import Drive
 from agvbench.running.supervision import STOPPED
@@ -80,9 +81,12 @@ def times_stopped(run_id: str, recorded: Mapping[str, Run]) -> int:
     return sum(name.startswith(run_id + _ABORTED) and STOPPED in run.status for name, run in recorded.items())
 
 
-def is_attempt(run: Run, run_id: str) -> bool:
-    """Whether `run` is an attempt at the run `run_id`."""
-    return run.run_id == run_id or run.run_id.startswith(f"{run_id}-attempt")
+def attempts_by_run(recorded: Iterable[Run]) -> dict[str, list[Run]]:
+    """Return the recorded attempts by the id of the planned run."""
+    attempts: dict[str, list[Run]] = {}
+    for run in recorded:
+        attempts.setdefault(planned_id(run.run_id), []).append(run)
+    return attempts
 
 
 def free_name(stem: str, taken: Collection[str]) -> str:

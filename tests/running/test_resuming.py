@@ -11,6 +11,7 @@ import subprocess
 import sys
 
 import pytest
+from campaign_samples import make_run
 
 from agvbench.campaign import Campaign
 from agvbench.campaign.completeness import Completeness
@@ -24,6 +25,7 @@ from agvbench.running.driver import NotDrivenError
 from agvbench.running.opening import open_session
 from agvbench.running.placers.auto import Auto
 from agvbench.running.placers.choosing import PLACERS
+from agvbench.running.records import attempts_by_run
 from agvbench.workflows.bench import run_benchmarks
 
 MINE = """'''Two turns, for agvbench.'''
@@ -171,6 +173,13 @@ def test_two_sessions_cannot_record_to_one_directory(lab):
         pass
     with open_session({}, out="c", resume=True, dry_run=False):  # released, whatever ended the first
         pass
+
+
+def test_attempts_belong_to_the_planned_run_whose_id_they_carry():
+    names = ["left", "left-attempt2", "left-attempt3-aborted1", "left-attempts", "right-aborted1"]
+    attempts = attempts_by_run(make_run(name) for name in names)
+    found = {planned: [run.run_id for run in runs] for planned, runs in attempts.items()}
+    assert found == {"left": names[:3], "left-attempts": ["left-attempts"], "right": ["right-aborted1"]}
 
 
 def test_what_was_planned_and_the_calibration_belong_to_the_campaign(lab):
