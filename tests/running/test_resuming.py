@@ -9,9 +9,9 @@ import re
 import shutil
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
-from campaign_samples import make_run
 
 from agvbench.campaign import Campaign
 from agvbench.campaign.completeness import Completeness
@@ -177,7 +177,7 @@ def test_two_sessions_cannot_record_to_one_directory(lab):
 
 def test_attempts_belong_to_the_planned_run_whose_id_they_carry():
     names = ["left", "left-attempt2", "left-attempt3-aborted1", "left-attempts", "right-aborted1"]
-    attempts = attempts_by_run(make_run(name) for name in names)
+    attempts = attempts_by_run(SimpleNamespace(run_id=name) for name in names)
     found = {planned: [run.run_id for run in runs] for planned, runs in attempts.items()}
     assert found == {"left": names[:3], "left-attempts": ["left-attempts"], "right": ["right-aborted1"]}
 
