@@ -42,6 +42,8 @@ DEFINITIONS = (
     "End position error: distance of the end position from the target position, both in the start frame. "
     "Heading error: heading change minus that of the target; the thesis calls it Δδ. "
     "Δs, as in the thesis: distance from start to end minus distance from start to target; "
-    "it hardly changes when a run ends to the left or right of its target."
+    "it hardly changes when a run ends to the left or right of its target. "
+    "Rotation: measured change of heading, positive in the direction of the target's. "
+    "Medians are of magnitudes, biases of signed values."
 )
 COMPONENT_DEFINITIONS = "Along and across: end position minus target position along x and y of the start frame."
