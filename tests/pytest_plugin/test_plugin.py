@@ -73,7 +73,7 @@ def test_bench_files_of_other_tools_stay_theirs(pytester):
 @pytest.mark.parametrize(
     ("options", "line"),
     [
-        (["--agvbench-repeats=-1"], "--repeats: value cannot be used: -1 (limit: at least 1)"),
+        (["--agvbench-repeats=-1"], "--repeats: value cannot be used: -1 (limit: 1 to 1000)"),
         (["--agvbench-order=random"], "argument --agvbench-order: invalid choice: 'random'"),
         (["--agvbench-seed=-4"], "--seed: value cannot be used: -4"),
         (["--agvbench-attempts=0"], "--attempts: value cannot be used: 0"),

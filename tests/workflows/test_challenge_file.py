@@ -13,7 +13,6 @@ import pytest
 
 from agvbench.cli import main
 from agvbench.errors import FileError, FitError, FlagError, PlantError
-from agvbench.running.supervision import safety_stop
 from agvbench.workflows import challenge
 from agvbench.workflows.challenge import hold_trial, run_challenge
 from agvbench.workflows.challenge_file import known_trials, write_trials
@@ -116,13 +115,10 @@ def benches(monkeypatch, *ends):
     return began
 
 
-def test_a_session_that_was_stopped_goes_on_and_one_that_failed_does_not(tmp_path, monkeypatch):
-    lost = str(safety_stop(0.9, "tracking was lost", where="agvbench/v2/lab/agv1", value="not seen for 0.59 s"))
-    wrapped = lost.replace(" into ", "\ninto ")
-    began = benches(monkeypatch, (2, wrapped), (2, lost), (1, ""))
+def test_a_bench_that_fails_is_a_trial_that_cannot_be_driven_and_rejected_runs_are_none(tmp_path, monkeypatch):
+    began = benches(monkeypatch, (1, ""))
     challenge._drive("nothing", 3, 5, tmp_path)
-    assert len(began) == 3
-    assert all("--resume" in command for command in began)
+    assert "--resume" not in began[0]
     began = benches(monkeypatch, (2, "ERROR: the disk is full"), (0, ""))
     with pytest.raises(PlantError, match=r"could not drive.*disk is full"):
         challenge._drive("nothing", 3, 5, tmp_path)

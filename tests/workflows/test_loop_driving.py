@@ -27,8 +27,9 @@ def test_a_loop_does_not_go_on_after_a_fault_stopped_its_bench(tmp_path):
     process = start(tmp_path, "--agv=impaired:fails@3/1:sim")
     _, errors = process.communicate(timeout=300)
     assert process.returncode == 2
-    assert errors.startswith("agvbench loop: the bench was stopped in run ")
-    assert errors.count("\n") == 1
+    event, stopped = errors.splitlines()
+    assert event == "agv reports LinkError: the agv adapter failed: RuntimeError: impaired on purpose"
+    assert stopped.startswith("agvbench loop: the bench was stopped in run ")
     assert "--resume" in errors
     assert not (tmp_path / "x" / DIAGNOSIS).exists()
     runs = list(Campaign.open(tmp_path / "x" / BEFORE))
