@@ -50,13 +50,17 @@ class Comparison:
 
     @property
     def worst_first(self) -> list[Difference]:
-        """Return the differences for reading: worse, undecided, same, better, and in each the largest first."""
+        """Return the differences for reading: trajectories with the worst first, in each the end position first.
+
+        Worse comes before undecided, same and better, and in each the largest first, in multiples of the margin.
+        """
         order = (Verdict.WORSE, Verdict.UNKNOWN, Verdict.SAME, Verdict.BETTER)
-
-        def rank(d: Difference) -> tuple[int, float]:
-            return order.index(d.verdict), -d.interval.estimate / (d.margin or 1.0)
-
-        return sorted(self.differences, key=rank)
+        worst: dict[tuple[str, str], tuple[int, float]] = {}
+        for d in self.differences:
+            rank = order.index(d.verdict), -d.interval.estimate / (d.margin or 1.0)
+            cell = d.trajectory, d.condition
+            worst[cell] = min(rank, worst.get(cell, rank))
+        return sorted(self.differences, key=lambda d: worst[d.trajectory, d.condition])
 
     @property
     def is_regression(self) -> bool:

@@ -145,15 +145,15 @@ def test_the_other_side_of_the_target_is_no_regression_and_is_shown():
     assert made["along_mm"]["low"] < 0.0 < made["along_mm"]["high"]
 
 
-def test_rows_come_worst_first():
+def test_rows_come_by_trajectory_the_worst_first_with_the_end_position_before_other_errors():
     rng = np.random.default_rng(48)
     shift = {("2_backward", "calibrated"): (40.0, 0.0), ("5_forward_left", "calibrated"): (80.0, 0.0)}
     make = {"repeats": 10, "trajectories": ("1_forward", "2_backward", "5_forward_left"), "conditions": ("calibrated",)}
     comparison = compare(error_table(normal(rng), **make), error_table(normal(rng), shift=shift, **make))
     rows = [d for d in comparison.worst_first if d.trajectory != ALL]
-    worse = [d.trajectory for d in rows if d.verdict is Verdict.WORSE]
-    assert worse == ["5_forward_left"] * 2 + ["2_backward"] * 2
-    assert rows[: len(worse)] == [d for d in rows if d.verdict is Verdict.WORSE]
+    assert [d.trajectory for d in rows] == ["5_forward_left"] * 3 + ["2_backward"] * 3 + ["1_forward"] * 3
+    assert [d.quantity.column for d in rows] == ["position_mm", "delta_heading_deg", "delta_s_mm"] * 3
+    assert [d.trajectory for d in rows if d.verdict is Verdict.WORSE] == ["5_forward_left"] * 2 + ["2_backward"] * 2
 
 
 def test_where_repeats_are_few_the_distance_is_not_tested_before_the_end_pose():
