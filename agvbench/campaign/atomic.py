@@ -19,16 +19,21 @@ def write_atomically(path: Path, data: bytes | memoryview, *, durable: bool = Tr
     temporary = path.with_name(TEMPORARY_PREFIX + path.name)
     descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
     try:
-        view = memoryview(data)
-        while view:
-            view = view[os.write(descriptor, view) :]
-        if durable:
-            os.fsync(descriptor)
+        write_all(descriptor, data, durable=durable)
     finally:
         os.close(descriptor)
     temporary.replace(path)
     if durable:
         _force_to_disk(path.parent)
+
+
+def write_all(descriptor: int, data: bytes | memoryview, *, durable: bool) -> None:
+    """Write `data` to its end to an open file; with `durable` they are on the disk before this returns."""
+    view = memoryview(data)
+    while view:
+        view = view[os.write(descriptor, view) :]
+    if durable:
+        os.fsync(descriptor)
 
 
 def replace_whole(path: Path, write: Callable[[Path], object], *, durable: bool = True) -> None:

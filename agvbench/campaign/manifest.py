@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from agvbench.campaign.atomic import write_atomically
+from agvbench.campaign.atomic import write_all, write_atomically
 from agvbench.campaign.schema import PLANNED_TABLE
 from agvbench.errors import CampaignError
 from agvbench.text_files import require_regular
@@ -188,10 +188,6 @@ def _append(path: Path, lines: bytes, *, durable: bool) -> None:
     try:
         size = os.fstat(descriptor).st_size
         cut_off = size > 0 and os.pread(descriptor, 1, size - 1) != b"\n"
-        data = memoryview(b"\n" * cut_off + lines)
-        while data:
-            data = data[os.write(descriptor, data) :]
-        if durable:
-            os.fsync(descriptor)
+        write_all(descriptor, b"\n" * cut_off + lines, durable=durable)
     finally:
         os.close(descriptor)

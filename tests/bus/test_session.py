@@ -79,9 +79,7 @@ def free_port() -> int:
 @pytest.mark.slow
 @pytest.mark.real_time
 def test_a_process_leaves_the_bus_without_an_error_where_a_receiver_takes_nothing() -> None:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
     with ExitStack() as stack:
 
         def start(script: Path) -> subprocess.Popen[str]:
