@@ -92,6 +92,9 @@ def test_a_process_leaves_the_bus_without_an_error_where_a_receiver_takes_nothin
             return process
 
         sender = start(Path(__file__).with_name("send_too_much.py"))
-        start(Path(__file__).parents[1] / "faults" / "never_take.py").send_signal(signal.SIGSTOP)
+        receiver = start(Path(__file__).parents[1] / "faults" / "never_take.py")
+        assert sender.stdout is not None
+        assert sender.stdout.readline() == "matched\n"
+        receiver.send_signal(signal.SIGSTOP)
         assert sender.communicate("send\n", timeout=60.0) == ("left\n", "")
         assert sender.returncode == 0
