@@ -156,7 +156,7 @@ def _writer(
     if not (directory / SETTINGS_FILE).exists():
         settings.save(directory)
     if not (directory / f"{PROVENANCE_TABLE}.parquet").exists():
-        facts = provenance(Path(__file__).parent)
+        facts = provenance(Path(__file__).parent, simulated=simulated)
         writer.write_table(PROVENANCE_TABLE, pd.DataFrame({"name": list(facts), "value": list(facts.values())}))
     return writer
 

@@ -22,6 +22,7 @@ from agvbench.running.benchmark_files import find_benchmark
 from agvbench.running.settings import BenchSettings
 
 INPUTS_TABLE = "inputs"
+SIMULATED_TIME = "simulated"
 _TRAJECTORY = "trajectory "
 Row = Mapping[str, Any]
 
@@ -45,10 +46,14 @@ def git_revision(directory: Path) -> str:
     return done.stdout.strip() if done.returncode == 0 else ""
 
 
-def provenance(directory: Path) -> dict[str, str]:
-    """Return what is worth knowing about this session, for the report and for whoever asks in a year."""
+def provenance(directory: Path, *, simulated: bool) -> dict[str, str]:
+    """Return what is worth knowing about this session, for the report and for whoever asks in a year.
+
+    ``time`` says whose clock the campaign's times are of.
+    """
     facts = {
         "began": datetime.now(UTC).isoformat(timespec="seconds"),
+        "time": SIMULATED_TIME if simulated else "wall clock",
         "git_revision": git_revision(directory),
         "python": sys.version.split()[0],
         "machine": platform.platform(),

@@ -3,7 +3,9 @@
 import csv
 import math
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -13,6 +15,8 @@ from report_samples import HOSTILE
 from agvbench.reporting import write_report
 from agvbench.reporting.content import Column, plain
 from agvbench.reporting.csv_table import frame_to_csv
+from agvbench.reporting.sections.diagnosis import DiagnosisSection
+from agvbench.reporting.sections.provenance import Provenance
 from agvbench.statistics.rest import start_pose
 
 VOID = {"meta", "link", "br", "img", "hr", "input", "path", "use", "rect"}
@@ -200,3 +204,18 @@ def test_sections_with_nothing_to_show_are_listed_at_the_end(campaigns, tmp_path
     assert "Not in this report" in said
     assert "End poses: No run has a target and a measured end pose." in said
     assert text.count("<h2>") == 5
+
+
+def test_a_missing_diagnosis_is_one_command_away(report_data):
+    data = replace(report_data("one condition"), path=Path("to night"))
+    (said,) = DiagnosisSection().blocks(data)
+    assert "agvbench diagnose 'to night' --json 'to night/diagnosis.json'" in said.text
+
+
+@pytest.mark.parametrize(
+    ("clock", "words"), [("simulated", "1 minutes of simulated time"), ("wall clock", "1 minutes")]
+)
+def test_how_long_was_driven_says_whose_time_it_is(clock, words, report_data):
+    data = report_data("one condition")
+    (table,) = Provenance().blocks(replace(data, provenance={"time": clock}))
+    assert dict(table.rows)["runs"] == f"{len(data.runs)}, over {words}"

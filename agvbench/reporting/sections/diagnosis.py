@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -65,8 +67,14 @@ class DiagnosisSection(Section):
     def blocks(self, data: ReportData) -> Sequence[Block]:
         """Return verdict, tables and pictures, or how to get them."""
         if data.diagnosis is None:
-            return [Paragraph("No diagnosis lies here: agvbench diagnose DIR --json DIR/diagnosis.json makes one.")]
+            return [Paragraph(f"No diagnosis lies here: {_command(data.path)} makes one.")]
         return diagnosis_blocks(data.diagnosis)
+
+
+def _command(campaign: Path) -> str:
+    """Return the command that diagnoses this campaign, for a shell."""
+    directory, file = (quote(plain_sentences(str(path))) for path in (campaign, campaign / "diagnosis.json"))
+    return f"agvbench diagnose {directory} --json {file}"
 
 
 def diagnosis_blocks(shown: ShownDiagnosis) -> list[Block]:

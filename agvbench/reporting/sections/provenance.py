@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from agvbench import __version__
 from agvbench.reporting.content import Block, Column, Table
 from agvbench.reporting.sections.base import Section
+from agvbench.running.provenance import SIMULATED_TIME
 from agvbench.workflows.report import ReportData
 
 _COLUMNS = (Column("name", "what"), Column("value", "value"))
@@ -33,16 +34,19 @@ def _facts(data: ReportData) -> Iterator[tuple[str, str]]:
     yield "motion capture", f"{header.mocap_rate_hz:g} Hz"
     yield "firmware", _distinct(run.firmware for run in data.runs)
     yield "sessions", _distinct(run.session or "" for run in data.runs)
-    yield "runs", f"{len(data.runs)}, over {_how_long(max(run.started_s for run in data.runs))}"
+    yield "runs", f"{len(data.runs)}, over {_how_long(data)}"
     yield "vehicle model", " ".join(filter(None, [data.curves.model_name, data.curves.model_hash]))
     for name, value in data.provenance.items():
         yield name.replace("_", " "), value
     yield "report made by", f"agvbench {__version__}"
 
 
-def _how_long(seconds: float) -> str:
+def _how_long(data: ReportData) -> str:
+    """Return for how long was driven; a simulation drives an hour in some seconds, so it says whose time this is."""
+    seconds = max(run.started_s for run in data.runs)
     units = ((86400.0, "days", 3.0), (3600.0, "hours", 3.0), (60.0, "minutes", 0.0))
-    return next(f"{seconds / unit:.0f} {name}" for unit, name, least in units if seconds >= least * unit)
+    words = next(f"{seconds / unit:.0f} {name}" for unit, name, least in units if seconds >= least * unit)
+    return f"{words} of simulated time" if data.provenance.get("time") == SIMULATED_TIME else words
 
 
 def _distinct(names: Iterator[str]) -> str:
