@@ -114,6 +114,10 @@ class PlanError(AgvbenchError):
     """A trajectory that this vehicle cannot drive here."""
 
 
+class UnsuitedVehicleError(PlanError):
+    """A trajectory that this vehicle can drive nowhere: it lacks the steered axle or the unit of commands."""
+
+
 class FitError(AgvbenchError):
     """Data that do not determine what is fitted."""
 

@@ -9,8 +9,8 @@ examples:
   agvbench plan --repeats 10                 how many hours ten repeats of each take
 
 TRAJECTORY is a name ("5", "slalom") or a .toml file; names are looked for in ./trajectories first, then among those
-that ship with agvbench. A trajectory that cannot be driven is shown with the
-reason, and the exit code is 2.
+that ship with agvbench. A trajectory that cannot be driven is shown with the reason, and the exit code is 2. Where none
+is named, those that need what the vehicle does not have (a steered rear axle, commands of its unit) are skipped.
 """
 
 from __future__ import annotations
@@ -70,9 +70,13 @@ def run(args: argparse.Namespace) -> int:
         repeats=args.repeats,
     )
     _print(made, args)
-    for problem in made.problems:
-        print(f"agvbench plan: {problem}", file=sys.stderr)
-    return PlanError.exit_code if made.problems else 0
+    # Of all trajectories nobody asked for those that this kind of vehicle cannot drive anywhere.
+    skipped = [] if args.trajectories or not made.plans else made.unsuited
+    failed = [problem for problem in made.problems if problem not in skipped]
+    for word, problems in (("skipped: ", skipped), ("", failed)):
+        for problem in problems:
+            print(f"agvbench plan: {word}{problem}", file=sys.stderr)
+    return PlanError.exit_code if failed else 0
 
 
 def _print(made: DryRun, args: argparse.Namespace) -> None:

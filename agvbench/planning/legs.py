@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from agvbench.errors import PlanError
+from agvbench.errors import PlanError, UnsuitedVehicleError
 from agvbench.model import VehicleModel
 from agvbench.planning.segments import Arc, Pause, Segment, Steering, Straight
 from agvbench.planning.speeds import axle_speed
@@ -139,7 +139,7 @@ def _check_end_stop(what: str, axle: str, angle_rad: float, model: VehicleModel,
     if low - 1e-9 <= angle_rad <= high + 1e-9:
         return
     if low == high:
-        raise PlanError(
+        raise UnsuitedVehicleError(
             f"{what} needs {math.degrees(angle_rad):.1f}° at the {axle} axle, which does not steer",
             where=where,
             remedy=f'say steering = "{"front" if axle == "rear" else "rear"}"',

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from agvbench.errors import PlanError
+from agvbench.errors import PlanError, UnsuitedVehicleError
 from agvbench.model import VehicleModel
 from agvbench.planning.legs import Leg
 from agvbench.planning.shapes import CommandTable
@@ -54,7 +54,7 @@ def commands_and_legs(trajectory: Trajectory, model: VehicleModel) -> tuple[Comm
 
 def _check(table: CommandTable, name: str, model: VehicleModel) -> None:
     if table.unit != model.command_unit:
-        raise PlanError(
+        raise UnsuitedVehicleError(
             "commands are in another unit than the vehicle's",
             where=f"{name}: commands.unit",
             value=table.unit,

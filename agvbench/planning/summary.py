@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from agvbench.errors import PlanError
+from agvbench.errors import PlanError, UnsuitedVehicleError
 from agvbench.model import VehicleModel
 from agvbench.planning.corrected import corrected_plan
 from agvbench.planning.planner import Plan, plan
@@ -51,8 +51,13 @@ class DryRun:
 
     @property
     def problems(self) -> list[PlanError]:
-        """Why the others cannot."""
-        return [row.problem for row in self.rows if row.problem is not None]
+        """Why the others cannot: each reason once, though several conditions may have it."""
+        return _once(row.problem for row in self.rows if row.problem is not None)
+
+    @property
+    def unsuited(self) -> list[PlanError]:
+        """Those of the `problems` that no floor and no start would solve: the vehicle lacks what is needed."""
+        return [problem for problem in self.problems if isinstance(problem, UnsuitedVehicleError)]
 
     @property
     def runs(self) -> int:
@@ -74,6 +79,10 @@ class DryRun:
         """Width and height [m] of the floor on which each plan has room, in its start frame, with the margin."""
         widths, heights = zip(*map(self.floor_of, self.plans), strict=True) if self.plans else ([0.0], [0.0])
         return max(widths), max(heights)
+
+
+def _once(problems: Iterable[PlanError]) -> list[PlanError]:
+    return list({str(problem): problem for problem in problems}.values())
 
 
 def dry_run(

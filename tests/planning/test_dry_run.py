@@ -74,7 +74,7 @@ def test_plan_shows_the_rest_when_one_cannot_be_driven(capsys):
     assert main(["plan", "1", "5", "--workspace", "circle:2.5"]) == 2
     captured = capsys.readouterr()
     assert "1.00 1.00 90°" in captured.out
-    assert captured.err.count("does not fit") == 2
+    assert captured.err.count("does not fit") == 1
 
 
 def test_what_is_corrected_is_planned_as_a_bench_would(calibrated):
@@ -105,3 +105,25 @@ def test_a_vehicle_is_planned_with_its_own_nominal_speed_and_steering(
     front_steered.save("vehicle.toml")
     assert planned(capsys)["uncalibrated"][1] == pytest.approx(planned(capsys, "--steering=front")["uncalibrated"][1])
     assert planned(capsys)["uncalibrated"][1] > 1.05
+
+
+def test_plan_skips_what_the_vehicle_is_not_made_for(capsys, tmp_path, front_steered):
+    front_steered.save(tmp_path / "front.toml")
+    assert main(["plan", f"--vehicle={tmp_path / 'front.toml'}"]) == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.split(": ")[1:3] for line in lines] == [["skipped", "crab"], ["skipped", "pulses"]]
+
+
+def test_plan_of_a_named_trajectory_fails_where_the_vehicle_is_not_made_for_it(capsys, tmp_path, front_steered):
+    front_steered.save(tmp_path / "front.toml")
+    assert main(["plan", "crab", "5", f"--vehicle={tmp_path / 'front.toml'}"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert (
+        "crab: segments[0]: moving at 20.0° to the heading needs 20.0° at the rear axle, which does not steer" in line
+    )
+
+
+def test_plan_of_all_fails_where_the_floor_is_too_small(capsys, tmp_path, front_steered):
+    front_steered.save(tmp_path / "front.toml")
+    assert main(["plan", f"--vehicle={tmp_path / 'front.toml'}", "--workspace=circle:2.9"]) == 2
+    assert "does not fit" in capsys.readouterr().err
