@@ -11,55 +11,62 @@ from agvbench.running.drive import DEFAULT_TIMING
 from agvbench.running.records import DriveOrder
 
 _AT_REST_S = DEFAULT_TIMING.rest_before_s + DEFAULT_TIMING.settle_s
+_BETWEEN_S = _AT_REST_S + TURNAROUND_S
+_NAMES = ("experiment", "trajectory", "condition")
+_NUMBERS = ("runs", "longest\n[s]", "driving\n[min]", "between\n[min]", "total\n[min]", "floor\n[m]")
 
 
 def dry_run_table(planned: Sequence[tuple[DriveOrder, Plan]]) -> str:
-    """Return the table as text: a row for each experiment, trajectory and condition, and the sum.
+    """Return the table as text: a row for each experiment, trajectory and condition, and the sum of each column.
 
-    Times are those of the plans, with the rests around each run and the way back to the start.
+    Times are those of the plans; beside them stands what passes between two runs.
     """
+    from rich import box
     from rich.table import Table
     from rich.text import Text
 
     from agvbench.reporting.text import as_text
 
-    cells: dict[tuple[str, str, str], list[Plan]] = {}
-    for order, plan in planned:
-        cells.setdefault((order.experiment, order.trajectory, order.condition), []).append(plan)
-    table = Table(title="What would be driven", caption=_sum(planned), caption_justify="left")
-    for column in ("experiment", "trajectory", "condition"):
-        table.add_column(column)
-    for column in ("runs", "each [s]", "all [min]", "floor [m]"):
-        table.add_column(Text(column), justify="right")
-    for (experiment, trajectory, condition), plans in cells.items():
-        longest = max(plan.duration_s for plan in plans)
-        floor = " × ".join(
-            f"{max(sides) + 2.0 * DEFAULT_MARGIN_M:.2f}"
-            for sides in zip(*(plan.floor_m for plan in plans), strict=True)
-        )
-        minutes = _total_s(plans) / 60.0
-        table.add_row(
-            *map(Text, (experiment, trajectory or "–", condition, str(len(plans)))),
-            *map(Text, (f"{longest:.1f}", f"{minutes:.1f}", floor)),
-        )
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_footer=bool(planned), caption_justify="left")
+    table.title, table.caption = "What would be driven", _caption(planned)
+    for column, total in zip(_NAMES, ("total", "", ""), strict=True):
+        table.add_column(column, footer=total)
+    for column, total in zip(_NUMBERS, _times([plan for _, plan in planned]), strict=True):
+        table.add_column(Text(column), footer=Text(total), justify="right", no_wrap=True)
+    for names, plans in _by_kind(planned).items():
+        table.add_row(*map(Text, names), *map(Text, _times(plans)))
     return as_text(table)
 
 
-def _sum(planned: Sequence[tuple[DriveOrder, Plan]]) -> str:
+def _by_kind(planned: Sequence[tuple[DriveOrder, Plan]]) -> dict[tuple[str, str, str], list[Plan]]:
+    kinds: dict[tuple[str, str, str], list[Plan]] = {}
+    for order, plan in planned:
+        kinds.setdefault((order.experiment, order.trajectory or "–", order.condition), []).append(plan)
+    return kinds
+
+
+def _times(plans: Sequence[Plan]) -> tuple[str, ...]:
+    """Return the cells of these plans under the headings of numbers."""
+    durations = [plan.duration_s for plan in plans]
+    driving_s, between_s = sum(durations), _BETWEEN_S * len(plans)
+    minutes = (f"{seconds / 60.0:.1f}" for seconds in (driving_s, between_s, driving_s + between_s))
+    floor = " × ".join(
+        f"{max(sides) + 2.0 * DEFAULT_MARGIN_M:.2f}" for sides in zip(*(plan.floor_m for plan in plans), strict=True)
+    )
+    return str(len(plans)), f"{max(durations, default=0.0):.1f}", *minutes, floor
+
+
+def _caption(planned: Sequence[tuple[DriveOrder, Plan]]) -> str:
     if not planned:
         return "nothing"
-    plans = [plan for _, plan in planned]
     radius_m = max(_reach(order, plan) for order, plan in planned)
-    hours = _total_s(plans) / 3600.0
+    total_s = sum(plan.duration_s + _BETWEEN_S for _, plan in planned)
     return (
-        f"{len(plans)} runs, {hours:.1f} h with the way back to the start; "
+        f"{len(planned)} runs, {total_s / 3600.0:.1f} h: driving, and {_BETWEEN_S:g} s between two runs "
+        f"({_AT_REST_S:g} s at rest, about {TURNAROUND_S:g} s for the way back to the start); "
         f"the vehicle stays within {radius_m:.2f} m of the floor's origin, "
         f"with {DEFAULT_MARGIN_M:.2f} m around its axles"
     )
-
-
-def _total_s(plans: Sequence[Plan]) -> float:
-    return sum(plan.duration_s + _AT_REST_S + TURNAROUND_S for plan in plans)
 
 
 def _reach(order: DriveOrder, plan: Plan) -> float:
