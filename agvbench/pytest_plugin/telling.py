@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Generator
+from collections.abc import Collection, Generator
 from typing import TYPE_CHECKING
 
 import pytest
@@ -23,14 +23,21 @@ _NOT_DRIVEN = pytest.StashKey[int]()
 
 
 class Progress:
-    """Counts benchmarks; draws one line on a terminal, and one line in ten elsewhere."""
+    """Counts the runs `left` to drive; draws one line on a terminal, and one line in ten elsewhere.
 
-    def __init__(self, reporter: pytest.TerminalReporter, total: int) -> None:
-        self._reporter, self._total, self._done = reporter, total, 0
-        self._began, self._told = time.monotonic(), 0
+    ``what`` is done with them. Runs that an earlier session finished are not among them, or the time left would follow
+    from runs that take none.
+    """
 
-    def begin(self, name: str) -> None:
+    def __init__(self, reporter: pytest.TerminalReporter, left: Collection[str], what: str = "") -> None:
+        self._reporter, self._left, self._what = reporter, frozenset(left), what
+        self._total, self._done, self._told = len(self._left), 0, 0
+        self._began: float | None = None
+
+    def begin(self, run_id: str, name: str) -> None:
         """Tell what is driven now."""
+        if run_id not in self._left:
+            return
         line = self._line(name)
         if self._reporter.isatty:
             self._reporter.rewrite(line, erase=True)
@@ -39,17 +46,23 @@ class Progress:
             self._reporter.write_line(line)
         self._done += 1
 
+    def leave_out(self, run_id: str) -> None:
+        """Do not count the run that began last: this vehicle cannot drive it here."""
+        if run_id in self._left:
+            self._total, self._done = self._total - 1, self._done - 1
+
     def end(self) -> None:
         """Wipe the line."""
         if self._reporter.isatty:
             self._reporter.rewrite("", erase=True)
 
     def _line(self, name: str) -> str:
+        self._began = time.monotonic() if self._began is None else self._began
         share = self._done / self._total
         elapsed = time.monotonic() - self._began
         left = f"{_clock(elapsed / share - elapsed)} left" if self._done > 2 else "…"
         bar = "█" * round(share * _BAR) + "·" * (_BAR - round(share * _BAR))
-        return f"{bar} {self._done}/{self._total} runs  {_clock(elapsed)} elapsed  {left}  {name}"
+        return f"{bar} {self._done}/{self._total} runs{self._what}  {_clock(elapsed)} elapsed  {left}  {name}"
 
 
 def _clock(seconds: float) -> str:
@@ -65,10 +78,12 @@ def _progress(session: pytest.Session) -> Progress | None:
     config = session.config
     if _PROGRESS not in config.stash:
         reporter = config.pluginmanager.get_plugin("terminalreporter")
-        benches = sum(is_bench(item) for item in session.items)
-        if reporter is None or not benches:
+        runs = {run_name(item) for item in session.items if is_bench(item)}
+        if reporter is None or not runs:
             return None
-        config.stash[_PROGRESS] = Progress(reporter, benches)
+        opened = config.stash.get(SESSION, None)
+        done, is_dry = (opened.done, opened.is_dry) if opened is not None else (set[str](), False)
+        config.stash[_PROGRESS] = Progress(reporter, runs - done, " planned" if is_dry else "")
     return config.stash[_PROGRESS]
 
 
@@ -82,7 +97,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> bool | None:
         stash[_NOT_DRIVEN] = stash.get(_NOT_DRIVEN, 0) + 1
         return True
     if (progress := _progress(item.session)) is not None:
-        progress.begin(item.name.removeprefix("bench_"))
+        progress.begin(run_name(item), item.name.removeprefix("bench_"))
     return None
 
 
@@ -101,6 +116,15 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, object, o
         pyfuncitem.config.stash[ENDS_PROGRAM] = True
         remedy = "return, or raise an error that says what is wrong"
         raise InputError("a benchmark called sys.exit", value=error.code, remedy=remedy) from None
+    finally:
+        _leave_out_undrivable(pyfuncitem)
+
+
+def _leave_out_undrivable(item: pytest.Function) -> None:
+    """Lower the number of runs by one that turns out to need what this vehicle or floor does not have."""
+    stash = item.config.stash
+    if SESSION in stash and _PROGRESS in stash and run_name(item) in stash[SESSION].not_applicable:
+        stash[_PROGRESS].leave_out(run_name(item))
 
 
 @pytest.hookimpl(wrapper=True)

@@ -120,14 +120,17 @@ class Bench:
         earlier = unfinished_calibration(self.writer.path, self._recorded, self.settings.attempts)
         self.awaited = earlier.union(run_ids)
 
+    def done(self, run_ids: Collection[str]) -> set[str]:
+        """Return which of these runs an earlier session finished."""
+        attempts = attempts_by_run(self._recorded.values())
+        return {run_id for run_id in run_ids if any(run.is_ok for run in attempts.get(run_id, []))}
+
     def outlook(self, run_ids: Collection[str]) -> str:
         """Return in words what is left to drive of these runs, and which of them were rejected before."""
-        attempts = attempts_by_run(self._recorded.values())
-        recorded = {run_id: attempts.get(run_id, []) for run_id in run_ids}
-        done = sum(any(run.is_ok for run in runs) for runs in recorded.values())
-        rejected = {run_id for run_id, runs in recorded.items() if any(r.status.startswith("rejected") for r in runs)}
-        again = [run_id for run_id in recorded if run_id in rejected and not any(r.is_ok for r in recorded[run_id])]
-        words = f"resumed: {done} runs done, {len(recorded) - done} to drive"
+        attempts, done = attempts_by_run(self._recorded.values()), self.done(run_ids)
+        left = [run_id for run_id in run_ids if run_id not in done]
+        again = [run_id for run_id in left if any(r.status.startswith("rejected") for r in attempts.get(run_id, []))]
+        words = f"resumed: {len(done)} runs done, {len(left)} to drive"
         return f"{words}; rejected before and tried again: {', '.join(again)}" if again else words
 
     @property

@@ -61,6 +61,8 @@ class BenchSession:
         self.notices: list[str] = []
         self.not_applicable: set[str] = set()
         """The ids of runs that this vehicle cannot drive here."""
+        self.done: set[str] = set()
+        """The ids of runs that an earlier session finished."""
 
     @property
     def is_dry(self) -> bool:
@@ -75,6 +77,7 @@ class BenchSession:
     def expect(self, run_ids: Collection[str], calibration: Collection[str]) -> None:
         """Take note of the runs that were chosen, and of those among them that calibrate: all are awaited."""
         if self._bench is not None:
+            self.done = self._bench.done(run_ids)
             self._bench.expect_calibration(calibration)
             if self._bench.is_resumed:
                 self.notices.append(self._bench.outlook(run_ids))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from agvbench.model import example_path
+
 pytest_plugins = ["pytester"]
 
 BENCHMARK = """
@@ -147,6 +149,27 @@ def test_a_file_that_calls_sys_exit_is_one_line(pytester, named):
     assert before_summary.count("bench_it.py: calls sys.exit when it is imported: 3; ") == 1
     assert "Traceback" not in text
     assert "INTERNALERROR" not in text
+
+
+def test_runs_that_the_vehicle_cannot_drive_are_not_counted(pytester):
+    pytester.makepyfile(
+        bench_axles="""
+        '''For agvbench.'''
+        import pytest
+
+        @pytest.mark.repeats(5)
+        def bench_rear(drive):
+            drive.hold(drive=1.0, rear=0.5, for_s=0.3)
+
+        @pytest.mark.repeats(5)
+        def bench_straight(drive):
+            drive.hold(drive=1.0, for_s=0.3)
+        """
+    )
+    vehicle = f"--agvbench-vehicle={example_path('front_steered')}"
+    result = pytester.runpytest_subprocess("-q", "-p", "no:cacheprovider", "--agvbench-dry-run", vehicle)
+    assert [line for line in result.outlines if "/5 runs planned" in line], result.outlines
+    assert any(line.split()[:2] == ["total", "5"] for line in result.outlines), result.outlines
 
 
 def test_two_benchmarks_of_one_run_name_are_refused(pytester):

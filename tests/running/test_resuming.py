@@ -69,6 +69,14 @@ def test_what_was_chosen_is_chosen_again(lab, give_up):
     assert {run.run_id for run in Campaign.open(lab / "c")} == first
 
 
+def test_progress_of_a_resumed_session_counts_what_is_left(lab, give_up):
+    assert "1/4 runs" in bench(*BEGAN).stdout
+    for run_id in ("left-1-r02", "left-0.5-r01"):
+        give_up(lab / "c", run_id)
+    shown_ = [line for line in bench("--resume").stdout.splitlines() if " elapsed " in line]
+    assert [re.search(r"\d+/\d+ runs", line)[0] for line in shown_] == ["1/2 runs"]
+
+
 def test_a_run_that_lost_the_vehicle_is_rejected_and_driven_again(lab, give_up):
     lost = bench("bench_mine.py", "--repeats=2", "--seed=7", "-k=left", "--camera=untracked=0.003,burst_frames=60")
     assert lost.returncode == 0, lost.stdout + lost.stderr
