@@ -14,16 +14,19 @@ import inspect
 import os
 import threading
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 from numba import config
+from numba.core import event
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 _LOCK = threading.Lock()
+COMPILING = "compiling the simulation to machine code (once per machine; takes some seconds) …"
 
 
 def cached_njit(**options: Any) -> Callable[[F], F]:
@@ -45,6 +48,29 @@ def cached_njit(**options: Any) -> Callable[[F], F]:
         return decorated
 
     return decorate
+
+
+@contextmanager
+def telling_of_compilation(tell: Callable[[str], None]) -> Iterator[None]:
+    """Have `tell` say once that agvbench is compiled, where no machine code is kept yet: it takes some seconds."""
+    with event.install_listener("numba:compile", _FirstCompilation(tell)):
+        yield
+
+
+class _FirstCompilation(event.Listener):  # type: ignore[misc] # numba is not typed
+    """Tells of the first function of agvbench that is compiled; one that is loaded from disk is no event."""
+
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        self._tell, self._told = tell, False
+
+    def on_start(self, event: Any) -> None:
+        module = event.data["dispatcher"].py_func.__module__
+        if not self._told and module.startswith("agvbench."):
+            self._told = True
+            self._tell(COMPILING)
+
+    def on_end(self, event: Any) -> None:
+        """Nothing: the first run says that it goes on."""
 
 
 def cache_directory() -> Path:

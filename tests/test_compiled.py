@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from agvbench.compiled import COMPILING
+
 LAW = """
 from agvbench.compiled import cached_njit
 GAIN = {gain}
@@ -64,3 +66,23 @@ def test_an_edited_source_is_compiled_again_in_whatever_imports_from_it(tmp_path
         kernels = list((tmp_path / "cache").glob("kernel_*.py"))
         assert len(kernels) == count, "the file from which a hook is inherited is a source, too"
     assert list((tmp_path / "cache").rglob("*run*.nbc"))
+
+
+TELLING = """
+from agvbench.compiled import telling_of_compilation
+with telling_of_compilation(print):
+    from agvbench.calibration.circle import fit_circle
+    import numpy as np
+    angle = np.linspace(0.0, 1.0, 50)
+    fit_circle(np.stack([np.cos(angle), np.sin(angle)], axis=1))
+"""
+
+
+def test_compiling_is_said_once_and_only_where_nothing_is_kept(tmp_path):
+    environment = os.environ | {"AGVBENCH_CACHE": str(tmp_path)}
+    command = [sys.executable, "-c", TELLING]
+    first, second = (
+        subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout for _ in range(2)
+    )
+    assert first == f"{COMPILING}\n"
+    assert second == ""

@@ -39,9 +39,11 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
     parallel = hasattr(config, "workerinput") or getattr(config.option, "dist", "no") != "no"
     if config.option.collectonly or parallel or not any(is_bench(item) for item in session.items):
         return (yield)
+    from agvbench.compiled import telling_of_compilation
     from agvbench.running.opening import open_session
 
     with ExitStack() as stack:
+        stack.enter_context(telling_of_compilation(_teller(config)))
         try:
             opened = open_session(
                 given_options(config) | chosen(config, session.items),
