@@ -1,6 +1,6 @@
 """What the thesis leaves open about its drives of chapter 8, and the set that is assumed before looking.
 
-The default set follows one rule, written down before the predictor existed (docs/decisions/thesis-assumptions.md):
+The default set follows one rule, written down before the predictor existed (docs/decisions/0001-thesis-assumptions.md):
 
 1. what the thesis says it did, is done;
 2. what it argues away (acceleration in 8.1, the list of 3.2) stays away;
