@@ -23,8 +23,8 @@ def to_parquet(table: pa.Table) -> memoryview:
     """Return `table` as parquet: floats split by byte (neighbouring poses share their high bytes), then LZ4.
 
     A part has a thousand rows: setting up zstd for each of its columns would take three times as long as LZ4 does,
-    to save 4 % of space (docs/decisions/0008-campaign-files.md). The bytes depend on the table alone: no time stamps, no
-    statistics, no pandas metadata.
+    to save 4 % of space (docs/decisions/0008-campaign-files.md). The bytes depend on the table alone: no time stamps,
+    no statistics, no pandas metadata.
     """
     encodings: dict[str, str] = {}
     dictionaries: list[str] = []
