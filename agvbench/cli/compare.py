@@ -1,9 +1,10 @@
 """Compare two campaigns (firmware, nights, vehicles), or two conditions of one.
 
 Says per trajectory and condition whether end position error, heading error and |Δs| are better, the same within a
-margin, worse, or whether the repeats cannot say. Shows by how much the mean end position moved. Two campaigns that do
-not differ report a regression with a chance of at most 1 %. What is missing from a campaign, and differences between
-vehicles, cameras, trajectories and calibrations, are listed first.
+margin, worse, or whether the repeats cannot say. End position error and heading error decide what a regression is;
+|Δs|, as the thesis defines it, is a note unless --with-delta-s. Shows by how much the mean end position moved. Two
+campaigns that do not differ report a regression with a chance of at most 1 %. What is missing from a campaign, and
+differences between vehicles, cameras, trajectories and calibrations, are listed first.
 
 examples:
   agvbench compare campaigns/last-night campaigns/tonight
@@ -36,6 +37,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--fail-on", choices=("regression", "any", "never"), default="regression", help="when to exit with 1"
     )
     parser.add_argument(
+        "--with-delta-s", action="store_true", help="|Δs| worse alone is a regression, too, instead of a note"
+    )
+    parser.add_argument(
         "--margin-mm", metavar="MM", type=number, help="noise band of end position error and |Δs| (default: 5)"
     )
     parser.add_argument("--margin-deg", metavar="DEG", type=number, help="noise band of the heading error (default: 1)")
@@ -61,6 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
         conditions=tuple(arguments.conditions) if arguments.conditions else None,
         margin_mm=MARGIN_MM if arguments.margin_mm is None else arguments.margin_mm,
         margin_deg=MARGIN_DEG if arguments.margin_deg is None else arguments.margin_deg,
+        distance_decides=arguments.with_delta_s,
     )
     if arguments.json:
         write_json(comparison, arguments.json, known)

@@ -7,7 +7,7 @@ from agvbench.statistics import Comparison, Difference
 from agvbench.statistics.differences import ALL
 from agvbench.statistics.quantities import COMPONENT_DEFINITIONS
 from agvbench.statistics.verdict import ALPHA_SAME
-from agvbench.statistics.words import describe
+from agvbench.statistics.words import describe, notes_in_words
 
 
 def comparison_table(comparison: Comparison, slug: str) -> Table:
@@ -36,8 +36,8 @@ def comparison_table(comparison: Comparison, slug: str) -> Table:
     note = (
         f"Rank-sum tests, one-sided, exact for small samples, corrected after Holm for {comparison.tests} comparisons "
         f"that could reach significance; {comparison.alpha:.0%} for any false alarm, "
-        f"{ALPHA_SAME:.0%} for each “same within margin”. Intervals are each for itself."
-    )
+        f"{ALPHA_SAME:.0%} for each “same within margin”. Intervals are each for itself. {notes_in_words(comparison)}"
+    ).rstrip()
     return Table(slug, f"{b} against {a}: smaller errors are better.", columns, rows, grouped=True, note=note)
 
 
@@ -66,7 +66,7 @@ def _row(d: Difference, comparison: Comparison) -> list[Value]:
         d.quantity.labelled,
         *(d.a.repeats, d.a.median, d.b.repeats, d.b.median),
         *d.interval,
-        str(d.verdict),
+        d.shown_verdict,
         d.p_worse if d.interval.estimate > 0.0 else d.p_better,
         d.cliffs_delta,
         describe(d, comparison),

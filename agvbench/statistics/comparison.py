@@ -1,24 +1,25 @@
 """Compare two sets of runs: where b is worse than a, and how sure that is.
 
-Every comparison is a rank-sum test of end position error, heading error or |Δs|, exact for small samples. Holm's
-correction covers all of them, so that two campaigns that do not differ report a regression with a chance of at most
-1 %, whatever their noise.
+Every comparison is a rank-sum test of end position error, heading error or |Δs|, exact for small samples. The first two
+decide. Holm's correction covers all of them, so that two campaigns that do not differ report a regression with a chance
+of at most 1 %, whatever their noise. |Δs|, as the thesis defines it, is a note, corrected by itself.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from agvbench.errors import FlagError
 from agvbench.statistics.bootstrap import RESAMPLES
 from agvbench.statistics.cells import match_cells
-from agvbench.statistics.differences import Difference, judge, of_all, of_cell
+from agvbench.statistics.differences import Difference, judge_families, of_all, of_cell
 from agvbench.statistics.end_shifts import EndShift, end_shift
-from agvbench.statistics.quantities import QUANTITIES, Quantity
+from agvbench.statistics.quantities import END_POSE, QUANTITIES, Quantity
 from agvbench.statistics.sessions import session_note
-from agvbench.statistics.verdict import ALPHA, Verdict
+from agvbench.statistics.verdict import ALPHA, Verdict, overall
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,9 +45,32 @@ class Comparison:
     alpha: float
     tests: int
 
+    @property
+    def deciding(self) -> list[Difference]:
+        """Return the differences that decide whether something is worse; the others are notes."""
+        return [difference for difference in self.differences if difference.decides]
+
     def of(self, verdict: Verdict) -> list[Difference]:
-        """Return the differences with this verdict."""
-        return [difference for difference in self.differences if difference.verdict is verdict]
+        """Return the differences that decide and have this verdict."""
+        return [difference for difference in self.deciding if difference.verdict is verdict]
+
+    @property
+    def verdicts(self) -> dict[tuple[str, str], Verdict]:
+        """Return the verdict on each trajectory and condition, by the differences that decide."""
+        found: dict[tuple[str, str], list[Verdict]] = {}
+        for d in self.deciding:
+            found.setdefault((d.trajectory, d.condition), []).append(d.verdict)
+        return {cell: overall(verdicts) for cell, verdicts in found.items()}
+
+    @property
+    def noted_worse(self) -> list[Difference]:
+        """Return the notes that say worse of a trajectory and condition whose verdict does not."""
+        verdicts = self.verdicts
+        return [
+            d
+            for d in self.differences
+            if not d.decides and d.verdict is Verdict.WORSE and verdicts[d.trajectory, d.condition] is not Verdict.WORSE
+        ]
 
     @property
     def worst_first(self) -> list[Difference]:
@@ -56,7 +80,7 @@ class Comparison:
         """
         order = (Verdict.WORSE, Verdict.UNKNOWN, Verdict.SAME, Verdict.BETTER)
         worst: dict[tuple[str, str], tuple[int, float]] = {}
-        for d in self.differences:
+        for d in self.deciding:
             rank = order.index(d.verdict), -d.interval.estimate / (d.margin or 1.0)
             cell = d.trajectory, d.condition
             worst[cell] = min(rank, worst.get(cell, rank))
@@ -64,13 +88,13 @@ class Comparison:
 
     @property
     def is_regression(self) -> bool:
-        """Whether anything is worse beyond its margin."""
+        """Whether anything that decides is worse beyond its margin."""
         return bool(self.of(Verdict.WORSE))
 
     @property
     def could_compare(self) -> bool:
         """Whether some difference could have been found, or every one was ruled out."""
-        return any(d.able for d in self.differences) or not self.of(Verdict.UNKNOWN)
+        return any(d.able for d in self.deciding) or not self.of(Verdict.UNKNOWN)
 
 
 def compare(
@@ -81,6 +105,7 @@ def compare(
     margin_deg: float = MARGIN_DEG,
     conditions: tuple[str, str] | None = None,
     same_campaign: bool = False,
+    deciding: Collection[Quantity] = END_POSE,
     names: tuple[str, str] = ("A", "B"),
     alpha: float = ALPHA,
     resamples: int = RESAMPLES,
@@ -100,10 +125,14 @@ def compare(
     same_campaign
         `a` and `b` come from the same campaign, so that sessions of one name are the same session and runs are compared
         within it.
+    deciding
+        The quantities that decide whether something is worse, of end position error, heading error and |Δs|; the others
+        are notes.
     names
         What to call the two sides.
     alpha
-        The chance of reporting any regression where there is none, over all trajectories and quantities.
+        The chance of reporting any regression where there is none, over all trajectories and the quantities that
+        decide; notes have the same chance of their own.
     resamples, seed
         Of the bootstrap.
 
@@ -119,7 +148,7 @@ def compare(
     raw = [of_cell(cell, q, margins[q], resamples, seed) for cell in cells for q in QUANTITIES]
     if len(cells) > 1:
         raw += [of_all(cells, q, margins[q], resamples, seed) for q in QUANTITIES]
-    differences, tests = judge(raw, alpha)
+    differences, tests = judge_families(raw, deciding, alpha)
     shifts = sorted(map(end_shift, cells), key=lambda shift: -shift.length_mm)
     note = session_note(cells, same_campaign=same_campaign)
     return Comparison(*names, tuple(differences), tuple(shifts), tuple(left_out), (note,), alpha, tests)

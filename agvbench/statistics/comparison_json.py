@@ -26,6 +26,10 @@ def comparison_to_json(comparison: Comparison) -> dict[str, Any]:
         "headline": headline(comparison),
         "alpha": comparison.alpha,
         "tests": comparison.tests,
+        "trajectories": [
+            {"trajectory": trajectory, "condition": condition, "verdict": str(verdict)}
+            for (trajectory, condition), verdict in comparison.verdicts.items()
+        ],
         "differences": [_difference(d, comparison) for d in comparison.differences],
         "end_shifts": [_shift(shift) for shift in comparison.shifts],
         "left_out": list(comparison.left_out),
@@ -50,6 +54,7 @@ def _difference(d: Difference, comparison: Comparison) -> dict[str, Any]:
         "cliffs_delta": d.cliffs_delta,
         "smallest_visible_difference": _finite(d.visible),
         "verdict": str(d.verdict),
+        "decides": d.decides,
         "words": describe(d, comparison),
     }
 

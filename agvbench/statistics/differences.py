@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,7 +39,7 @@ class Difference:
     ``interval`` is the difference of medians with its 95 % bootstrap interval, for itself alone; ``p_worse`` and
     ``p_better`` are corrected for all comparisons, ``p_same`` is not; ``able`` says whether so many repeats could
     reach significance at all, ``visible`` about the smallest difference that they find nine times in ten
-    (infinite: none); ``cliffs_delta`` is positive where b is worse.
+    (infinite: none); ``cliffs_delta`` is positive where b is worse. Where it does not `decide`, its verdict is a note.
     """
 
     trajectory: str
@@ -56,6 +56,12 @@ class Difference:
     visible: float
     able: bool
     verdict: Verdict
+    decides: bool = True
+
+    @property
+    def shown_verdict(self) -> str:
+        """The verdict as tables print it: in brackets where it does not decide."""
+        return str(self.verdict) if self.decides else f"({self.verdict})"
 
 
 @dataclass(frozen=True)
@@ -112,6 +118,20 @@ def _tested(
         verdict=Verdict.UNKNOWN,
     )
     return Untold(difference, plain.least_p)
+
+
+def judge_families(raw: Sequence[Untold], deciding: Collection[Quantity], alpha: float) -> tuple[list[Difference], int]:
+    """Return what `judge` does, with the quantities that decide and those that are notes as two families.
+
+    Each family has its own chance `alpha` of a false alarm: notes cost the decision no power, and cannot change it.
+    """
+    judged: dict[int, Difference] = {}
+    counts = {True: 1, False: 1}
+    for decides in counts:
+        family = [k for k, r in enumerate(raw) if (r.difference.quantity in deciding) is decides]
+        found, counts[decides] = judge([raw[k] for k in family], alpha)
+        judged |= {k: replace(d, decides=decides) for k, d in zip(family, found, strict=True)}
+    return [judged[k] for k in range(len(raw))], counts[True]
 
 
 def judge(raw: Sequence[Untold], alpha: float) -> tuple[list[Difference], int]:

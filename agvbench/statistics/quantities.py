@@ -21,7 +21,8 @@ class Quantity:
     @property
     def labelled(self) -> str:
         """Return the name of the magnitude with its unit, short enough for a column headed "error"."""
-        return f"{self.name.removeprefix('end ').removesuffix(' error')} [{self.unit}]"
+        thesis = " (thesis)" if self.column == "delta_s_mm" else ""
+        return f"{self.name.removeprefix('end ').removesuffix(' error')}{thesis} [{self.unit}]"
 
 
 POSITION = Quantity("position_mm", "end position error", "mm", "end position error", 1)
@@ -33,6 +34,8 @@ ROTATION = Quantity("rotation_deg", "rotation", "deg", "rotation", 2)
 
 QUANTITIES = (POSITION, HEADING, DISTANCE)
 """What tables of end poses show and comparisons test."""
+END_POSE = (POSITION, HEADING)
+"""What a lab means by the error of a run: these decide what is better or worse."""
 COMPONENTS = (ALONG, ACROSS, HEADING)
 """The signed components of an end pose's error, whose biases are tested."""
 THESIS = (DISTANCE, HEADING)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from enum import StrEnum
 
 ALPHA = 0.01
@@ -15,6 +16,20 @@ class Verdict(StrEnum):
     SAME = "same within margin"
     WORSE = "worse"
     UNKNOWN = "cannot say"
+
+
+def overall(verdicts: Collection[Verdict]) -> Verdict:
+    """Return the verdict on something of which several quantities were judged.
+
+    It is worse where one of them is, better where one of them is and none can be worse, and the same where all are.
+
+    >>> overall([Verdict.BETTER, Verdict.WORSE]), overall([Verdict.BETTER, Verdict.SAME])
+    (<Verdict.WORSE: 'worse'>, <Verdict.BETTER: 'better'>)
+    """
+    for verdict in (Verdict.WORSE, Verdict.UNKNOWN, Verdict.BETTER):
+        if verdict in verdicts:
+            return verdict
+    return Verdict.SAME
 
 
 def decide(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from agvbench.statistics.comparison import Comparison
-from agvbench.statistics.differences import Difference
+from agvbench.statistics.differences import ALL, Difference
 from agvbench.statistics.power import fewest_repeats
 from agvbench.statistics.quantities import DISTANCE
 from agvbench.statistics.verdict import Verdict
@@ -23,14 +23,34 @@ def describe(difference: Difference, comparison: Comparison) -> str:
 
 
 def headline(comparison: Comparison) -> str:
-    """Return the comparison's answer in one sentence."""
+    """Return the comparison's answer: a sentence by what decides, and one about notes that say something else."""
     worse, better = len(comparison.of(Verdict.WORSE)), len(comparison.of(Verdict.BETTER))
     same, unknown = len(comparison.of(Verdict.SAME)), len(comparison.of(Verdict.UNKNOWN))
     if not comparison.could_compare:
         return f"Could not compare: {describe(comparison.of(Verdict.UNKNOWN)[0], comparison)}."
     counts = [f"{worse} worse", f"{better} better", f"{same} the same within the margin", f"{unknown} undecided"]
     answer = "Regression" if worse else "No regression shown"
-    return f"{answer}: of {len(comparison.differences)} comparisons {', '.join(counts)}."
+    decided = f"{answer}: of {len(comparison.deciding)} comparisons {', '.join(counts)}."
+    return f"{decided} {note}" if (note := note_of(comparison)) else decided
+
+
+def notes_in_words(comparison: Comparison) -> str:
+    """Return what verdicts in brackets are; "" where every verdict decides."""
+    names = dict.fromkeys(d.quantity.name for d in comparison.differences if not d.decides)
+    if not names:
+        return ""
+    return f"In brackets: {', '.join(names)} as the thesis defines it, corrected by itself, which decides nothing."
+
+
+def note_of(comparison: Comparison) -> str:
+    """Return the sentence about trajectories that only quantities which do not decide call worse; "" if none does."""
+    found = comparison.noted_worse
+    if not found:
+        return ""
+    several = len({d.condition for d in comparison.differences if d.trajectory != ALL}) > 1
+    where = dict.fromkeys(f"{d.trajectory} {d.condition}" if several else d.trajectory for d in found)
+    name = " and ".join(dict.fromkeys(d.quantity.name for d in found))
+    return f"Note: {name}, as the thesis defines it, is worse alone in {', '.join(where)}, which is no regression."
 
 
 def _amount(difference: Difference, value: float) -> str:
@@ -42,7 +62,8 @@ def _too_few(difference: Difference, comparison: Comparison) -> str:
     a, b = difference.a.repeats, difference.b.repeats
     repeats = f"{a} repeats" if a == b else f"{a} against {b} repeats"
     # Where repeats are few, |Δs| is left out so that end poses can be judged.
-    among = [d for d in comparison.differences if difference.quantity == DISTANCE or d.quantity != DISTANCE]
+    family = [d for d in comparison.differences if d.decides == difference.decides]
+    among = [d for d in family if difference.quantity == DISTANCE or d.quantity != DISTANCE]
     needed = fewest_repeats(comparison.alpha / len(among))
     return f"{repeats} cannot show any difference here, however large; {needed} of each could"
 

@@ -14,15 +14,21 @@ from agvbench.running.settings import BenchSettings
 
 _GEOMETRY = {"front_axle_m": "m", "rear_axle_m": "m"}
 _CAMERA = ("mocap", "camera")
+_DIGITS = 12
+"""Of a hash, as versions are known by theirs; the JSON has them whole."""
 
 
 @dataclass(frozen=True)
 class Comparability:
-    """``incomplete`` and ``incomparable`` forbid a conclusion, ``notes`` qualify it; sentences of one line each."""
+    """``incomplete`` and ``incomparable`` forbid a conclusion, ``notes`` qualify it; sentences of one line each.
+
+    ``calibrations`` are the hashes of both sides' vehicle files, "" where there is none.
+    """
 
     incomplete: tuple[str, ...] = ()
     incomparable: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    calibrations: tuple[str, ...] = ()
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -49,11 +55,10 @@ def comparability(a: str | Path, b: str | Path | None, *, across_vehicles: bool 
         return Comparability(incomplete)
     units, *notes = (tuple(find(*sides)) for find in (_units, _vehicles, _cameras, _trajectories, _calibrations))
     qualified = tuple(sentence for found in notes for sentence in found)
-    return (
-        Comparability(incomplete, (), (*units, *qualified))
-        if across_vehicles
-        else Comparability(incomplete, units, qualified)
-    )
+    hashes = tuple(_calibration_hash(side.path) for side in sides)
+    if across_vehicles:
+        return Comparability(incomplete, (), (*units, *qualified), hashes)
+    return Comparability(incomplete, units, qualified, hashes)
 
 
 def _incomplete(side: Campaign) -> str:
@@ -102,9 +107,9 @@ def _calibrations(a: Campaign, b: Campaign) -> Iterator[str]:
     calibrated = any(set(side.runs["condition"]) - {"uncalibrated", ""} for side in (a, b))
     if all(hashes) and hashes[0] != hashes[1] and calibrated:
         yield (
-            f"The calibrations differ ({hashes[0]} and {hashes[1]}): this is part of every difference but the "
-            "uncalibrated ones. To compare firmware or vehicles alone, drive both with one calibration (bench "
-            "--calibration FILE)."
+            f"The calibrations differ ({hashes[0][:_DIGITS]} and {hashes[1][:_DIGITS]}): this is part of every "
+            "difference but the uncalibrated ones. To compare firmware or vehicles alone, drive both with one "
+            "calibration (bench --calibration FILE)."
         )
 
 

@@ -11,6 +11,7 @@ from agvbench.errors import FlagError
 from agvbench.statistics import Comparison, Verdict, compare, pose_errors
 from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
 from agvbench.statistics.comparison_json import comparison_to_json
+from agvbench.statistics.quantities import END_POSE, QUANTITIES
 from agvbench.workflows.comparability import NOTHING_KNOWN, Comparability
 from agvbench.workflows.writing import write_file
 
@@ -24,8 +25,11 @@ def compare_campaigns(
     conditions: tuple[str, str] | None = None,
     margin_mm: float = MARGIN_MM,
     margin_deg: float = MARGIN_DEG,
+    distance_decides: bool = False,
 ) -> Comparison:
     """Compare campaign `b` with campaign `a`, or two conditions of `a` with each other.
+
+    With ``distance_decides`` |Δs| counts as end position error and heading error do, instead of being a note.
 
     Raises
     ------
@@ -47,6 +51,7 @@ def compare_campaigns(
         margin_deg=margin_deg,
         conditions=conditions,
         same_campaign=b is None,
+        deciding=QUANTITIES if distance_decides else END_POSE,
         names=_names(Path(a), None if b is None else Path(b), conditions),
     )
     if b is None or Path(a).resolve() != Path(b).resolve():
@@ -80,7 +85,11 @@ def write_json(comparison: Comparison, path: str | Path, known: Comparability = 
     FileError
         If the file cannot be written.
     """
-    content = comparison_to_json(comparison) | {"complete": not known.incomplete, "cautions": list(known.sentences)}
+    content = comparison_to_json(comparison) | {
+        "complete": not known.incomplete,
+        "cautions": list(known.sentences),
+        "calibrations": list(known.calibrations),
+    }
     text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
     write_file("--json", Path(path), lambda file: file.write_text(f"{text}\n", encoding="utf-8"))
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 import shutil
 
 import numpy as np
@@ -59,14 +60,14 @@ def test_hostile_names_do_not_reach_the_terminal(campaigns, tmp_path, capsys):
 def test_nights_alike_are_no_regression(nights, capsys):
     code, out, err = run(capsys, "compare", nights[0], nights[1])
     assert (code, err) == (0, "")
-    assert "No regression shown: of 9 comparisons 0 worse" in out
+    assert "No regression shown: of 6 comparisons 0 worse" in out
     assert "Each side is one session" in out
 
 
 def test_a_vehicle_that_drives_too_far_is_a_regression(nights, capsys, tmp_path):
     code, out, _ = run(capsys, "compare", nights[0], nights[2], "--json", tmp_path / "c.json")
     assert code == 1
-    assert "Regression: of 9 comparisons" in out
+    assert "Regression: of 6 comparisons" in out
     made = json.loads((tmp_path / "c.json").read_text(encoding="utf-8"))
     assert made["regression"] is True
     worse = {d["trajectory"] for d in made["differences"] if d["verdict"] == "worse"}
@@ -86,7 +87,7 @@ def test_when_to_fail(nights, capsys, order, fail_on, code):
 def test_a_margin_wider_than_the_difference_makes_no_regression(nights, capsys):
     code, out, _ = run(capsys, "compare", nights[0], nights[2], "--margin-mm", "200", "--margin-deg", "10")
     assert code == 0
-    assert "9 the same within the margin" in out
+    assert "6 the same within the margin" in out
 
 
 def test_conditions_inside_one_campaign(campaigns, capsys):
@@ -110,7 +111,22 @@ def test_separate_calibrations_are_said(tmp_path, capsys):
     assert warning not in run(capsys, "compare", a, b)[1]
     text = (b / "vehicle.toml").read_text(encoding="utf-8")
     (b / "vehicle.toml").write_text(text.replace("neutral = 1500.0", "neutral = 1510.0"), encoding="utf-8")
-    assert warning in run(capsys, "compare", a, b)[1]
+    said = run(capsys, "compare", a, b, "--json", tmp_path / "c.json")[1]
+    assert warning in said
+    hashes = json.loads((tmp_path / "c.json").read_text(encoding="utf-8"))["calibrations"]
+    assert len(set(hashes)) == 2
+    assert all(whole not in said and whole[:12] in said for whole in hashes)
+
+
+@pytest.mark.parametrize(("columns", "shown"), [(80, 3), (100, 5), (140, 5)])
+def test_a_comparison_is_as_wide_as_columns_says_and_folds_no_name(columns, shown, campaigns, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(columns))
+    main(["compare", str(campaigns("eight trajectories")), "--conditions", "uncalibrated", "calibrated"])
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= columns
+    assert any(line.split()[0] == "6_forward_right" for line in lines if line.strip())
+    numbers = next(line for line in lines if "position [mm]" in line)
+    assert len(re.findall(r"\d+\.\d\d", numbers)) == shown
 
 
 @pytest.fixture

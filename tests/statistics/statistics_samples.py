@@ -19,6 +19,7 @@ TARGETS = {
     "7_backward_left": (-1.0, 1.0, -math.pi / 2),
     "8_backward_right": (-1.0, -1.0, math.pi / 2),
 }
+OTHERS = {"parallel_park": (0.0, -0.5, 0.0)}
 AHEAD = Pose(2.0, 0.0, 0.0)
 
 
@@ -71,14 +72,20 @@ def error_table(draw, *, repeats, trajectories=tuple(TARGETS), conditions=("unca
                     "session": "",
                     "status": "ok",
                     "problem": "",
-                    **dict(zip(("target_x_m", "target_y_m", "target_heading_rad"), TARGETS[trajectory], strict=True)),
+                    **dict(
+                        zip(
+                            ("target_x_m", "target_y_m", "target_heading_rad"),
+                            (TARGETS | OTHERS)[trajectory],
+                            strict=True,
+                        )
+                    ),
                     "position_mm": math.hypot(along[repeat], across[repeat]),
                     "along_mm": along[repeat],
                     "across_mm": across[repeat],
                     "delta_s_mm": along[repeat],
                     "delta_heading_deg": heading[repeat],
                     "heading_deg": heading[repeat],
-                    "rotation_deg": abs(math.degrees(TARGETS[trajectory][2])) + heading[repeat],
+                    "rotation_deg": abs(math.degrees((TARGETS | OTHERS)[trajectory][2])) + heading[repeat],
                 }
                 for repeat in range(repeats)
             ]

@@ -11,6 +11,7 @@ from agvbench.errors import FlagError, InputError
 from agvbench.statistics import Verdict, compare
 from agvbench.statistics.comparison_json import comparison_to_json
 from agvbench.statistics.differences import ALL
+from agvbench.statistics.quantities import QUANTITIES
 from agvbench.statistics.words import describe, headline
 
 PAIRS = 200
@@ -130,6 +131,37 @@ def test_runs_that_end_further_left_are_a_regression_although_distance_and_headi
     assert shift.across.high - shift.across.low < 10.0
 
 
+def further_along_and_less_across():
+    """Return two sides of one trajectory: the second ends nearer to its target, at a distance that is more wrong."""
+    rng = np.random.default_rng(50)
+    make = {"repeats": 10, "trajectories": ("parallel_park", "1_forward"), "conditions": ("calibrated",)}
+    return (
+        error_table(normal(rng, 2.0), shift={("parallel_park", "calibrated"): (along, 0.0, across)}, **make)
+        for along, across in ((80.0, 110.0), (90.0, 80.0))
+    )
+
+
+def test_distance_worse_alone_is_a_note_and_no_regression():
+    comparison = compare(*further_along_and_less_across())
+    verdicts = {d.quantity.column: d.verdict for d in comparison.differences if d.trajectory == "parallel_park"}
+    assert (verdicts["position_mm"], verdicts["delta_s_mm"]) == (Verdict.BETTER, Verdict.WORSE)
+    assert not comparison.is_regression
+    assert comparison.verdicts["parallel_park", "calibrated"] is not Verdict.WORSE
+    assert headline(comparison).endswith("is worse alone in parallel_park, which is no regression.")
+    assert headline(comparison).startswith("No regression shown: of 6 comparisons 0 worse")
+    made = comparison_to_json(comparison)
+    assert [d["decides"] for d in made["differences"]] == [True, True, False] * 3
+    assert made["tests"] == 6
+
+
+def test_distance_counts_where_it_is_asked_to_and_shares_the_chance_of_a_false_alarm():
+    comparison = compare(*further_along_and_less_across(), deciding=QUANTITIES)
+    assert comparison.is_regression
+    assert comparison.verdicts["parallel_park", "calibrated"] is Verdict.WORSE
+    assert comparison.tests == 9
+    assert "Note" not in headline(comparison)
+
+
 def test_the_other_side_of_the_target_is_no_regression_and_is_shown():
     rng = np.random.default_rng(47)
     make = {"repeats": 10, "trajectories": ("1_forward",), "conditions": ("calibrated",)}
@@ -159,7 +191,9 @@ def test_rows_come_by_trajectory_the_worst_first_with_the_end_position_before_ot
 def test_where_repeats_are_few_the_distance_is_not_tested_before_the_end_pose():
     rng = np.random.default_rng(49)
     make = {"repeats": 5, "trajectories": ("1_forward",), "conditions": ("calibrated",)}
-    comparison = compare(error_table(normal(rng), **make), error_table(normal(rng), **make))
+    a, b = (error_table(normal(rng), **make) for _ in range(2))
+    assert all(d.able for d in compare(a, b).differences)  # |Δs| is a note, which costs the others nothing
+    comparison = compare(a, b, deciding=QUANTITIES)
     assert {d.quantity.column: d.able for d in comparison.differences} == {
         "position_mm": True, "delta_heading_deg": True, "delta_s_mm": False,
     }  # fmt: skip

@@ -12,7 +12,7 @@ from agvbench.reporting.sections.base import Section
 from agvbench.statistics import Comparison, Difference, Verdict, valid
 from agvbench.statistics.differences import ALL
 from agvbench.statistics.quantities import DEFINITIONS, QUANTITIES
-from agvbench.statistics.words import describe
+from agvbench.statistics.words import describe, note_of
 from agvbench.workflows.report import ReportData
 
 if TYPE_CHECKING:
@@ -55,13 +55,16 @@ def _lead(data: ReportData) -> list[str]:
 
 def _bought(comparison: Comparison) -> str:
     who = _BOUGHT.get((comparison.name_a, comparison.name_b), f"Going from {comparison.name_a} to {comparison.name_b}")
-    counted = [d for d in comparison.differences if d.trajectory != ALL]
+    counted = [d for d in comparison.deciding if d.trajectory != ALL]
     trajectories = len({d.trajectory for d in counted})
     where = f"on average over {trajectories} trajectories" if trajectories > 1 else f"on {counted[0].trajectory}"
     *first, last = map(_moved, _summary(comparison))
     moved = f"{', '.join(first)} and {last}"
     better, worse = (sum(d.verdict is v for d in counted) for v in (Verdict.BETTER, Verdict.WORSE))
-    score = f"Of {len(counted)} medians {better or 'none'} improved beyond doubt, {worse or 'none'} got worse"
+    score = (
+        f"Of {len(counted)} medians of end position and heading error {better or 'none'} improved beyond doubt, "
+        f"{worse or 'none'} got worse"
+    )
     return plain_sentences(f"{who} changed {moved}, {where}. {score}.")
 
 
@@ -92,4 +95,6 @@ def _details(comparison: Comparison) -> Iterator[str]:
             )
             more = f"; and {len(found) - _MOST_NAMED} more" if len(found) > _MOST_NAMED else ""
             yield f"{lead}, {pair}: {named}{more}."
+    if note := note_of(comparison):
+        yield plain_sentences(f"{pair}: {note}")
     yield from comparison.notes
