@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 from agvbench.reporting.content import Column, Paragraph, Table, Value, plain, plain_sentences
 from agvbench.statistics.differences import ALL
 from agvbench.statistics.quantities import COMPONENT_DEFINITIONS, DEFINITIONS
-from agvbench.statistics.words import headline
+from agvbench.statistics.words import headline, notes_in_words
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
-    from rich.console import Console, RenderableType
+    from rich.console import Console, ConsoleOptions, RenderableType
     from rich.text import Text
 
     from agvbench.reporting.write import WrittenReport
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 _VERDICT_STYLES = {"better": "green", "worse": "bold red", "same": "cyan", "cannot": "dim"}
 _LONGEST_HEADING, _NARROWEST = 14, 110
 _INTERVAL = "95 % interval"
+_UNLIMITED = 1000
+_SHORT = {"same within margin": "same", "(same within margin)": "(same)"}
 
 
 def console_table(table: Table) -> RenderableType:
@@ -32,6 +35,7 @@ def console_table(table: Table) -> RenderableType:
     from rich.text import Text
 
     shown = RichTable(title=Text(plain(table.caption)), box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
+    shown.collapse_padding = True
     for column in table.columns:
         heading = f"{column.group}\n{column.title}" if column.group else column.title
         number, whole = column.digits is not None, column.title == _INTERVAL
@@ -43,15 +47,37 @@ def console_table(table: Table) -> RenderableType:
 
 
 def wide_console() -> Console:
-    """Return standard output, at least 110 columns wide where nobody's terminal says otherwise."""
+    """Return standard output, at least 110 columns wide where neither a terminal nor ``COLUMNS`` says otherwise."""
+    import os
+
     from rich.console import Console
 
     console = Console()
-    return console if console.is_terminal else Console(width=max(_NARROWEST, console.width))
+    is_said = console.is_terminal or os.environ.get("COLUMNS", "").isdigit()
+    return console if is_said else Console(width=max(_NARROWEST, console.width))
+
+
+class _Fitting:
+    """The first of several layouts that is no wider than the console; the last where all are."""
+
+    def __init__(self, *layouts: RenderableType) -> None:
+        self._layouts = layouts
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[RenderableType]:
+        from rich.measure import Measurement
+
+        unlimited = options.update(max_width=_UNLIMITED)
+        widths = (Measurement.get(console, unlimited, layout).maximum for layout in self._layouts)
+        fitting = (layout for layout, width in zip(self._layouts, widths, strict=True) if width <= options.max_width)
+        yield next(fitting, self._layouts[-1])
 
 
 def comparison_summary(comparison: Comparison) -> RenderableType:
-    """Return a comparison as a table that fits a console: medians, difference with its interval, verdict."""
+    """Return a comparison as a table that fits a console: medians, difference with its interval, verdict.
+
+    Where the console is narrow, names of trajectories get lines of their own; where it is narrower still, intervals
+    are left out.
+    """
     heading_a, heading_b = _headings(comparison)
     columns = [
         Column("trajectory", "trajectory"),
@@ -59,14 +85,36 @@ def comparison_summary(comparison: Comparison) -> RenderableType:
         Column("repeats", "n"),
         Column("median_a", heading_a, 2),
         Column("median_b", heading_b, 2),
-        Column("difference", "difference", 2),
+        Column("difference", "change", 2),
         Column("interval", _INTERVAL),
         Column("verdict", "verdict"),
     ]
     several = _several_conditions(comparison)
     rows = [_console_row(d, columns[5], several=several) for d in comparison.worst_first]
     caption = f"{heading_b} against {heading_a} (medians; smaller is better; worst first)"
-    return console_table(Table("comparison", caption, columns, rows))
+    wide, grouped = (Table("comparison", caption, columns, made) for made in (_named_once(rows), rows))
+    return _Fitting(console_table(wide), _grouped(grouped), _grouped(_without(grouped, "interval")))
+
+
+def _named_once(rows: Sequence[Sequence[Value]]) -> list[list[Value]]:
+    """Return rows with their first cell left out where the row before has the same."""
+    before = [None, *(row[0] for row in rows)]
+    return [["" if row[0] == last else row[0], *row[1:]] for row, last in zip(rows, before, strict=False)]
+
+
+def _without(table: Table, name: str) -> Table:
+    kept = [k for k, column in enumerate(table.columns) if column.name != name]
+    return replace(table, columns=[table.columns[k] for k in kept], rows=[[row[k] for k in kept] for row in table.rows])
+
+
+def _grouped(table: Table) -> RenderableType:
+    """Return `table` with its first column's names on lines of their own, above the rows that they name."""
+    columns, rows = table.columns[1:], []
+    for (name, *row), named in zip(table.rows, _named_once(table.rows), strict=True):
+        if named[0]:
+            rows.append([name, *[None] * (len(columns) - 1)])
+        rows.append([f"· {row[0]}", *row[1:]])
+    return console_table(replace(table, columns=columns, rows=rows))
 
 
 def shift_summary(comparison: Comparison) -> RenderableType:
@@ -82,7 +130,8 @@ def shift_summary(comparison: Comparison) -> RenderableType:
             cells += [part.estimate, _interval(part, columns[1])]
         rows.append(cells)
     caption = f"Mean end position, {heading_b} minus {heading_a} (largest first; no verdict)"
-    return console_table(Table("end_shift", caption, columns, rows))
+    table = Table("end_shift", caption, columns, rows)
+    return _Fitting(console_table(table), console_table(_without(_without(table, "along_interval"), "across_interval")))
 
 
 def _several_conditions(comparison: Comparison) -> bool:
@@ -99,7 +148,8 @@ def _console_row(d: Difference, difference: Column, *, several: bool) -> list[Va
     medians = d.a.median, d.b.median, d.interval.estimate
     a, b = d.a.repeats, d.b.repeats
     repeats = str(a) if a == b else f"{a}, {b}"
-    return [name, d.quantity.labelled, repeats, *medians, _interval(d.interval, difference), str(d.verdict)]
+    verdict = _SHORT.get(d.shown_verdict, d.shown_verdict)
+    return [name, d.quantity.labelled, repeats, *medians, _interval(d.interval, difference), verdict]
 
 
 def _interval(interval: Interval, column: Column) -> str:
@@ -150,7 +200,7 @@ def print_cautions(console: Console, sentences: Sequence[str]) -> None:
     from rich.text import Text
 
     for sentence in sentences:
-        console.print(Text(plain_sentences(sentence), style="yellow"), soft_wrap=True)
+        console.print(Text(plain_sentences(sentence), style="yellow"), soft_wrap=not console.is_terminal)
 
 
 def print_comparison(console: Console, comparison: Comparison) -> None:
@@ -158,7 +208,7 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
     from rich.text import Text
 
     if _headings(comparison) == ("A", "B"):
-        console.print(Text(f"A: {plain(comparison.name_a)}\nB: {plain(comparison.name_b)}"))
+        console.print(Text(f"A: {plain(comparison.name_a)}\nB: {plain(comparison.name_b)}"), soft_wrap=True)
     console.print(comparison_summary(comparison))
     console.print(shift_summary(comparison))
     console.print(Text(f"{DEFINITIONS} {COMPONENT_DEFINITIONS}", style="dim"))
@@ -176,8 +226,8 @@ def _legend(comparison: Comparison) -> str:
     return (
         f"margins: ± {', ± '.join(sorted(margins))}. better or worse: beyond the margin, and beyond chance after"
         " correcting for all rows; same: within the margin; cannot say: neither could be shown, even where an interval"
-        " leaves out 0"
-    )
+        f" leaves out 0. {notes_in_words(comparison)}"
+    ).rstrip()
 
 
 def _styled(cell: str, column: Column) -> RenderableType:

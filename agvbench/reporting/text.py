@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import shutil
 
 from rich.console import Console, RenderableType
@@ -11,8 +12,9 @@ _NARROWEST = 100
 
 
 def as_text(renderable: RenderableType) -> str:
-    """Return `renderable` as lines without colours, as wide as the terminal and at least 100 columns."""
-    width = max(_NARROWEST, shutil.get_terminal_size((_NARROWEST, 24)).columns)
+    """Return `renderable` as lines without colours: as wide as ``COLUMNS`` says, else as the terminal, at least 100."""
+    columns = shutil.get_terminal_size((_NARROWEST, 24)).columns
+    width = columns if os.environ.get("COLUMNS", "").isdigit() else max(_NARROWEST, columns)
     console = Console(file=io.StringIO(), width=width, no_color=True)
     console.print(renderable)
     file = console.file
