@@ -29,6 +29,42 @@ _BYTES_KEPT = 16 << 20
 _BYTES_EACH = 48
 
 
+class Failure:
+    """What failed while a run was driven: noted by threads that receive, raised in the one that drives."""
+
+    def __init__(self) -> None:
+        self._error: AgvbenchError | None = None
+        # Without it, what ends the session could be noted, and forgotten, between a look at what ends the run and its
+        # removal.
+        self._lock = threading.Lock()
+
+    def note(self, error: AgvbenchError) -> None:
+        """Keep what failed first, and rather what ends the session than what ends one run."""
+        with self._lock:
+            if self._error is None or isinstance(self._error, RunStoppedError):
+                self._error = error
+
+    def check(self) -> None:
+        """Raise what failed, if anything did: what ends one run once, what ends the session again and again."""
+        with self._lock:
+            error = self._error
+            if isinstance(error, RunStoppedError):
+                self._error = None
+        if error is not None:
+            raise error
+
+    def forget_run(self) -> None:
+        """Forget what ended the last run."""
+        with self._lock:
+            if isinstance(self._error, RunStoppedError):
+                self._error = None
+
+    def forget(self) -> None:
+        """Forget whatever failed."""
+        with self._lock:
+            self._error = None
+
+
 class RealTime:
     """One command out at its time, kept alive while it holds, and the frames that arrived meanwhile.
 
@@ -54,18 +90,13 @@ class RealTime:
         # One is counted by the thread that receives, the other by the one that takes: no lock between them.
         self._came = self._gone = 0
         self.dropped = Tally()
-        self._failure: AgvbenchError | None = None
+        self._failure = Failure()
         self._start_s: float | None = None
         self._last_t_s = -np.inf
         self._offset_s = 0.0
         self._thread = threading.Thread(target=self._receive, name="agvbench-inbox", daemon=True)
         self._thread.start()
-        self._heartbeat = Heartbeat(session, keys.question(AGV, TIME), clock, self._fail)
-
-    def _fail(self, error: AgvbenchError) -> None:
-        """Keep what failed first, and rather what ends the session than what ends one run."""
-        if self._failure is None or isinstance(self._failure, RunStoppedError):
-            self._failure = error
+        self._heartbeat = Heartbeat(session, keys.question(AGV, TIME), clock, self._failure.note)
 
     def _receive(self) -> None:
         while True:
@@ -83,7 +114,7 @@ class RealTime:
 
     def _hear(self, event: Event) -> None:
         if event.level == Level.ERROR:
-            self._fail(event.as_error())
+            self._failure.note(event.as_error())
 
     def _keep(self, message: FramesMessage) -> None:
         """Keep frames until they are taken; where nobody takes them for long, what comes then is dropped."""
@@ -97,7 +128,8 @@ class RealTime:
 
     def start(self) -> None:
         """Forget the last run's clock and what went wrong in it."""
-        self._start_s, self._last_t_s, self._failure = None, -np.inf, None
+        self._start_s, self._last_t_s = None, -np.inf
+        self._failure.forget()
 
     def exchange(self, command: Command, t_s: float, hold_s: float) -> Frames:
         """Publish at `t_s`; return the frames that arrived until `t_s + hold_s`."""
@@ -117,8 +149,7 @@ class RealTime:
         return self._take()
 
     def _begin(self, t_s: float) -> None:
-        if isinstance(self._failure, RunStoppedError):
-            self._failure = None
+        self._failure.forget_run()
         self._offset_s = measure_offset(self._session, self._keys.question(MOCAP, TIME), self._clock)
         while self._arrived:
             self._next()
@@ -140,10 +171,7 @@ class RealTime:
 
     def _check(self) -> None:
         self._presence.check(AGV, MOCAP)
-        if (failure := self._failure) is not None:
-            if isinstance(failure, RunStoppedError):  # it is of one run only
-                self._failure = None
-            raise failure
+        self._failure.check()
 
     def _next(self) -> tuple[float, FramesMessage]:
         at_s, message = self._arrived.popleft()

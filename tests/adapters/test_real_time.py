@@ -14,6 +14,7 @@ from rig_driving import NEUTRAL, START, TINY
 from agvbench.adapters import AdapterOptions, open_rig
 from agvbench.adapters.agv_host import AgvHost
 from agvbench.adapters.contract import AgvAdapter
+from agvbench.bus import real_time
 from agvbench.bus.clock import SimulatedClock, WallClock
 from agvbench.bus.clock_offset import measure_offset
 from agvbench.bus.command_message import CommandFlags, CommandMessage, encode_command, pack_command
@@ -21,6 +22,7 @@ from agvbench.bus.event_message import Event, decode_event, encode_event
 from agvbench.bus.identity_message import AgvIdentity
 from agvbench.bus.keys import AGV, CLAIM, Keys
 from agvbench.bus.questions import ask
+from agvbench.bus.real_time import Failure
 from agvbench.bus.request_message import encode_claim, encode_time
 from agvbench.bus.session import open_session
 from agvbench.errors import AgvbenchError, LinkError, RunStoppedError
@@ -71,6 +73,28 @@ def test_what_ends_a_run_does_not_replace_what_ends_the_session(order: tuple[typ
             time.sleep(0.01)
         with pytest.raises(LinkError, match="made up LinkError"):
             link.exchange(NEUTRAL, t_s=0.0, hold_s=0.05)
+
+
+def test_what_ends_the_session_is_not_forgotten_with_what_ended_a_run_at_the_same_instant(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    failure = Failure()
+    failure.note(RunStoppedError("made up"))
+    other = threading.Thread(target=failure.note, args=(LinkError("made up LinkError"),))
+    starts = [other]
+
+    def looks(error: object, kind: type) -> bool:
+        if starts:
+            starts.pop().start()
+            other.join(0.2)  # for ever, if it has to wait for this thread
+        return isinstance(error, kind)
+
+    monkeypatch.setattr(real_time, "isinstance", looks, raising=False)
+    with pytest.raises(RunStoppedError):
+        failure.check()
+    other.join()
+    with pytest.raises(LinkError, match="made up LinkError"):
+        failure.check()
 
 
 class Silent(AgvAdapter):
