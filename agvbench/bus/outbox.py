@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from agvbench.bus.command_message import CommandFlags, pack_command
@@ -31,7 +33,7 @@ class CommandOutbox:
             priority=zenoh.Priority.REAL_TIME,
             express=True,
         )
-        self._put = self._publisher.put
+        self._put: Callable[[bytes], None] = self._publisher.put
 
     def send(self, command: Command, t_s: float, hold_s: float, flags: int = CommandFlags.NONE) -> int:
         """Publish a command; return its sequence number.
@@ -41,7 +43,7 @@ class CommandOutbox:
         MessageError
             If a number is not finite, or the hold is out of range.
         LinkError
-            If the session was closed.
+            If the session or this outbox was closed.
         """
         self.last = sequence = self._take()
         try:
@@ -51,5 +53,11 @@ class CommandOutbox:
         return sequence
 
     def close(self) -> None:
-        """Publish no more."""
-        self._publisher.undeclare()
+        """Publish no more; also while another thread is inside `send`, waiting for a receiver that takes nothing."""
+        self._put = self._refuse
+        # Zenoh locks a publisher ("Already borrowed") as long as a thread sends with it: it goes with the session then.
+        with suppress(RuntimeError):
+            self._publisher.undeclare()
+
+    def _refuse(self, _: bytes) -> None:
+        raise self._error

@@ -130,7 +130,10 @@ def bus_session(
 ) -> Iterator[zenoh.Session]:
     """Open a session (`open_session`) while the context lasts, and close it also where a receiver takes nothing.
 
-    Zenoh waits up to 10 s for a message that a receiver does not take, and then gives the session up with an error.
+    Zenoh waits up to 10 s for a message that a receiver does not take, and then gives the session up with an error. The
+    limit is a constant of Zenoh: neither its configuration nor its Python interface has a setting for it
+    (``wait_before_close`` ends the senders' wait only), and a shorter one of ours would lose what a slow receiver is
+    still taking.
 
     Raises
     ------

@@ -24,7 +24,7 @@ from agvbench.bus.questions import ask
 from agvbench.bus.real_time import RealTime
 from agvbench.bus.session import open_session
 from agvbench.bus.wire import MAX_MESSAGE_BYTES, MAX_ROWS
-from agvbench.errors import MessageError
+from agvbench.errors import LinkError, MessageError
 from agvbench.types import Frames
 
 pytestmark = pytest.mark.real_time
@@ -139,6 +139,30 @@ def test_what_a_runner_keeps_of_a_flood_is_bounded_and_its_stop_goes_out() -> No
             closed.close()
         runner.close()
         vehicle.undeclare()
+
+
+def test_an_outbox_closes_while_another_thread_is_inside_a_send() -> None:
+    sent: list[int] = []
+
+    def send() -> None:
+        sent.append(outbox.send(MOVING, 0.0, 1.0))
+        sent.append(outbox.send(MOVING, 0.1, 1.0))
+
+    with open_session() as session:
+        takes_nothing = session.declare_subscriber(KEYS.command, zenoh.handlers.FifoChannel(1))
+        outbox = CommandOutbox(session, KEYS)
+        sender = threading.Thread(target=send)
+        sender.start()
+        assert until(lambda: bool(sent))
+        time.sleep(0.3)  # it waits for the receiver now
+        assert sender.is_alive()
+        outbox.close()
+        with pytest.raises(LinkError, match="the bus was closed"):
+            outbox.send(MOVING, 0.0, 1.0)
+        while takes_nothing.try_recv() is not None or sender.is_alive():
+            time.sleep(0.01)
+        takes_nothing.undeclare()
+    assert len(sent) == 2
 
 
 def test_tokens_of_roles_that_do_not_exist_are_not_remembered() -> None:
