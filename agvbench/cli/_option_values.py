@@ -15,13 +15,16 @@ def check_values(options: Mapping[str, Any]) -> None:
     Raises
     ------
     AgvbenchError
-        If a value cannot be used, or a vehicle file is not there.
+        If a value cannot be used, or a vehicle file or a trajectory is not there.
     """
+    from agvbench.planning.reading import driven_trajectories, load_trajectory
     from agvbench.planning.workspace import Workspace
     from agvbench.running.settings import BenchSettings
 
     settings = BenchSettings.given({name: value for name, value in options.items() if value is not None})
     Workspace.parse(settings.workspace)
+    for name in driven_trajectories(settings.trajectories) if settings.trajectories else ():
+        load_trajectory(name)
     for name in _FILES:
         path = getattr(settings, name)
         if path and not Path(path).is_file():

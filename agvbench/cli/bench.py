@@ -10,6 +10,7 @@ examples:
   agvbench bench --resume --out tonight           go on where it stopped
   agvbench bench --place auto                     between runs the vehicle drives itself back to the start
   agvbench bench --plant my_plant.py:make_plant   your own simulated plant
+  agvbench bench --trajectories garage,figure_eight   these in place of the eight
   agvbench bench endurance                        another benchmark: bench_endurance.py
 """
 

@@ -2,13 +2,14 @@
 
 Five stages, each with its result in the loop's directory:
 
-  before/          a bench session that excites the vehicle: calibration, the eight trajectories, step responses, free
-                   driving
+  before/          a bench session that excites the vehicle: calibration, the trajectories, step responses, free driving
   diagnosis.json   what the calibrated model lacks (agvbench diagnose), and vehicle.toml, the model with the effects
-  trial/           corrected plans of the eight trajectories, for what they still miss (remainders.json)
+  trial/           corrected plans of the trajectories, for what they still miss (remainders.json)
   plans.json       what plans with that model make up for, and what they cannot
-  after/           the eight trajectories uncalibrated, calibrated and corrected, driven in turns
+  after/           the trajectories uncalibrated, calibrated and corrected, driven in turns
   report.html      before and after, trajectory by trajectory, with an equivalence test of the bias
+
+The trajectories are those of agvbench bench: the eight and your own, or --trajectories.
 
 The corrected model may still miss where a trajectory ends, where an effect is in no library or of another form. What
 stood out of the scatter in before/ and in trial/ is taken off the aim; --no-trial learns from before/ alone, and
@@ -21,6 +22,7 @@ has effects that its calibration does not know.
 examples:
   agvbench loop                                      the default vehicle, 10 repeats, in some minutes
   agvbench loop --repeats 30 --out loops/tonight     more repeats, into loops/tonight/
+  agvbench loop --trajectories garage,figure_eight   these in place of the eight
   agvbench loop --out loops/tonight --resume         go on where it stopped
   agvbench loop --plant agvbench.simulator.hidden:lateral_slip --seed 7   a vehicle with a hidden effect
 """

@@ -11,7 +11,14 @@
 
 from agvbench.planning.corrected import NOTHING_LEFT, CorrectedPlan, Correction, corrected_plan, depends_on_time
 from agvbench.planning.planner import Plan, place, plan
-from agvbench.planning.reading import list_trajectories, load_trajectory, own_trajectories, trajectory_from_table
+from agvbench.planning.reading import (
+    THE_EIGHT,
+    driven_trajectories,
+    list_trajectories,
+    load_trajectory,
+    own_trajectories,
+    trajectory_from_table,
+)
 from agvbench.planning.resting import Departure, Miss
 from agvbench.planning.summary import DryRun, DryRunRow, dry_run
 from agvbench.planning.trajectory import Trajectory, steered
@@ -19,6 +26,7 @@ from agvbench.planning.workspace import Workspace
 
 __all__ = [
     "NOTHING_LEFT",
+    "THE_EIGHT",
     "CorrectedPlan",
     "Correction",
     "Departure",
@@ -30,6 +38,7 @@ __all__ = [
     "Workspace",
     "corrected_plan",
     "depends_on_time",
+    "driven_trajectories",
     "dry_run",
     "list_trajectories",
     "load_trajectory",

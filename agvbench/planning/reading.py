@@ -16,6 +16,9 @@ from agvbench.planning.validation import convert, suggest
 from agvbench.resources import resource_directory
 from agvbench.text_files import read_toml
 
+THE_EIGHT = tuple(str(number) for number in range(1, 9))
+"""The test trajectories of the thesis (section 8.2)."""
+
 
 def load_trajectory(name_or_path: str | Path, *, directory: Path | None = None) -> Trajectory:
     """Return the trajectory in a TOML file, or the one of that name or file name.
@@ -101,6 +104,16 @@ def own_trajectories() -> list[str]:
     """
     shipped = {file.stem for file in _shipped_files()}
     return [file.stem for file in _local_files() if file.stem not in shipped]
+
+
+def driven_trajectories(named: str = "") -> list[str]:
+    """Return what a bench drives: the names or files in `named`, commas between; else the eight and the lab's own.
+
+    >>> driven_trajectories("figure_eight, garage")
+    ['figure_eight', 'garage']
+    """
+    names = dict.fromkeys(name.strip() for name in named.split(","))
+    return [name for name in names if name] or [*THE_EIGHT, *own_trajectories()]
 
 
 def _local_files() -> list[Path]:

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any, cast
 import pytest
 
 from agvbench.errors import AgvbenchError, InputError
-from agvbench.pytest_plugin.options import settings_from
+from agvbench.pytest_plugin.options import option, settings_from
 
 if TYPE_CHECKING:
     from agvbench.running.settings import BenchSettings
 
 REPEAT = "agvbench_repeat"
+TRAJECTORIES = "trajectories"
 CALIBRATION_EXPERIMENTS = frozenset({"steering_front", "steering_rear", "steering_opposite", "drive"})
 _DEFAULT_REPEATS = 10
 _SETTINGS = pytest.StashKey["BenchSettings"]()
@@ -51,11 +52,24 @@ def pytest_make_collect_report(
         return pytest.CollectReport(collector.nodeid, "failed", str(line), [])
 
 
-@pytest.hookimpl(trylast=True)
-def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Apply the marks ``grid`` and ``repeats`` of benchmarks; marks of these names elsewhere are their owners'."""
-    if metafunc.definition.getparent(BenchModule) is None:
-        return
+@pytest.hookimpl(wrapper=True)
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> Generator[None]:
+    """Apply the marks of benchmarks; marks of these names elsewhere are their owners'.
+
+    The trajectory comes first in a run's name, before what pytest's own marks add, and the repeat last.
+    """
+    is_benchmark = metafunc.definition.getparent(BenchModule) is not None
+    if is_benchmark and metafunc.definition.get_closest_marker(TRAJECTORIES):
+        from agvbench.planning.reading import driven_trajectories
+
+        metafunc.parametrize("trajectory", driven_trajectories(_settings(metafunc.config).trajectories))
+    yield
+    if is_benchmark:
+        _repeat(metafunc)
+
+
+def _repeat(metafunc: pytest.Metafunc) -> None:
+    """Apply the marks ``grid`` and ``repeats``."""
     grids = list(metafunc.definition.iter_markers("grid"))
     mark = metafunc.definition.get_closest_marker("repeats")
     if not grids and mark is None:
@@ -118,6 +132,8 @@ def _arrange(config: pytest.Config, items: list[pytest.Item], benches: list[pyte
     from agvbench.running.order import ordered
 
     _check_names(benches)
+    if option(config, "--trajectories") and not any(item.get_closest_marker(TRAJECTORIES) for item in benches):
+        raise pytest.UsageError("--trajectories: none of these benchmarks takes it; drive the benchmark trajectories")
     if len(unknown) == len(benches):
         raise pytest.UsageError("--corrected: no corrected model; give the vehicle file that a diagnosis wrote")
     left_out = {*undriven, *unknown}

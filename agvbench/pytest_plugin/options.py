@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 _MARKS = (
     "repeats(n, full=None): drive n times (full times with --agvbench-full); n=None follows --agvbench-repeats",
     "grid(name, reduced, full): parametrize by `reduced`, with --agvbench-full by `full`",
+    "trajectories: parametrize `trajectory` by --agvbench-trajectories (default: the eight and the folder's own)",
     "experiment(name): what the campaign calls the runs of this benchmark (default: the function's name)",
 )
 

@@ -65,6 +65,11 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
         "simulated plant, MODULE_OR_FILE:FACTORY (default: a vehicle like the thesis')",
     ),
     (
+        "--trajectories",
+        {"metavar": "NAME", "action": Joined},
+        "names or .toml files, with commas or one after another (default: the eight, and your own in trajectories/)",
+    ),
+    (
         "--steering",
         {"choices": ("abeam", "front", "rear", "opposite", "crab")},
         "steer every trajectory in this mode (default: as each says, or with the one axle that steers)",

@@ -8,11 +8,19 @@ from typing import Any
 
 from agvbench.errors import PlanError
 from agvbench.model import VehicleModel
-from agvbench.planning import NOTHING_LEFT, Correction, Miss, Workspace, corrected_plan, load_trajectory, steered
+from agvbench.planning import (
+    NOTHING_LEFT,
+    THE_EIGHT,
+    Correction,
+    Miss,
+    Workspace,
+    corrected_plan,
+    load_trajectory,
+    steered,
+)
 from agvbench.running.remainders import NO_REMAINDERS
 from agvbench.types import Pose
 
-THE_EIGHT = tuple(str(number) for number in range(1, 9))
 _NOTICEABLE_M, _NOTICEABLE_RAD = 5e-4, math.radians(0.05)
 
 
@@ -33,15 +41,17 @@ def plans_of(
     floor = Workspace.parse(workspace)
     out: dict[str, dict[str, Any]] = {}
     for name in names:
-        left = remainders.get(name, NOTHING_LEFT)
         trajectory = steered(load_trajectory(name), steering, model)
+        if "corrected" not in trajectory.conditions:
+            continue
+        left = remainders.get(trajectory.name, NOTHING_LEFT)
         try:
             made = corrected_plan(trajectory, model, workspace=floor, remainder=left)
         except PlanError as error:
-            out[name] = {"problem": str(error)}
+            out[trajectory.name] = {"problem": str(error)}
             continue
         if made.correction is not None:
-            out[name] = _entry(made.correction) | {"remainder": _pose(left)}
+            out[trajectory.name] = _entry(made.correction) | {"remainder": _pose(left)}
     return out
 
 

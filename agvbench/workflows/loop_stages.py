@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from agvbench.campaign.atomic import replace_whole
 from agvbench.errors import FileError, FitError
 from agvbench.model import VehicleModel
+from agvbench.planning import driven_trajectories
 from agvbench.running.remainders import read_remainders
 from agvbench.running.settings import BenchSettings
 from agvbench.text_files import read_json
@@ -124,7 +125,8 @@ def planned(directory: Path, settings: BenchSettings, learned: str, tell: Tell) 
     path = directory / PLANS
     if not path.exists():
         model, missed = VehicleModel.load(directory / VEHICLE), read_remainders(learned)
-        content = plans_of(model, settings.workspace, missed, steering=settings.steering)
+        names = driven_trajectories(settings.trajectories)
+        content = plans_of(model, settings.workspace, missed, names, settings.steering)
         write(path, json.dumps({"schema": 1, "plans": content}, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
     plans: dict[str, Any] = _read(path)["plans"]
     for name, entry in plans.items():

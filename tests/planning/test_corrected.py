@@ -100,7 +100,7 @@ def test_what_a_model_is_known_to_miss_is_taken_off_its_aim(name):
     assert made.correction.remaining.distance_m < 1e-4
 
 
-@pytest.mark.parametrize("name", ["u_turn", "parallel_park", "s_curve", "figure_eight", "crab"])
+@pytest.mark.parametrize("name", ["u_turn", "parallel_park", "s_curve", "figure_eight", "garage", "crab"])
 def test_paths_of_several_legs(name):
     truth = hidden("speed_lag_and_cornering_speed_loss", 5)
     made = corrected_plan(load_trajectory(name), true_model(truth), start=START)

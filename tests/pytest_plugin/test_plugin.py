@@ -55,6 +55,42 @@ def test_calibration_first_repeats_interleaved_and_no_uncalibrated_half_speed(py
     ]
 
 
+SHIPPED = """
+    '''Benchmarks of agvbench.'''
+    import pytest
+
+    @pytest.mark.repeats
+    @pytest.mark.trajectories
+    @pytest.mark.parametrize("condition", ["uncalibrated", "calibrated"])
+    def bench_trajectory(drive, trajectory, condition):
+        drive.trajectory(trajectory, condition=condition)
+"""
+PALLET = 'schema = 1\nname = "pallet"\n\n[[segments]]\nkind = "straight"\nlength_m = 1.0\n'
+
+
+def test_the_trajectories_driven_are_those_named_in_that_order(pytester):
+    pytester.makepyfile(bench_mine=SHIPPED)
+    assert collected(pytester, "--agvbench-repeats=1", "--agvbench-trajectories=garage,3") == [
+        "trajectory[garage-uncalibrated-r01]",
+        "trajectory[garage-calibrated-r01]",
+        "trajectory[3-calibrated-r01]",
+    ]
+
+
+def test_the_eight_and_the_folders_own_are_driven_by_default(pytester):
+    pytester.makepyfile(bench_mine=SHIPPED)
+    pytester.mkdir("trajectories").joinpath("pallet.toml").write_text(PALLET)
+    names = [name for name in collected(pytester, "--agvbench-repeats=1") if "-calibrated" in name]
+    assert names == [f"trajectory[{name}-calibrated-r01]" for name in (*"12345678", "pallet")]
+
+
+@pytest.mark.usefixtures("bench_file")
+def test_trajectories_that_no_benchmark_takes_are_refused(pytester):
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "--agvbench-trajectories=garage")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    assert "--trajectories: none of these benchmarks takes it" in result.stderr.str() + result.stdout.str()
+
+
 @pytest.mark.usefixtures("bench_file")
 def test_full_takes_the_whole_grid_and_every_repeat(pytester):
     names = collected(pytester, "--agvbench-full", "--agvbench-repeats=1", "--agvbench-order=blocked")

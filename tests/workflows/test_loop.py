@@ -47,6 +47,7 @@ def test_help_teaches(tmp_path):
         (["--repeats=0", "--out=x"], "agvbench loop: --repeats: value cannot be used: 0"),
         (["--resume", "--out=x"], "agvbench loop: x/loop.toml: no loop to resume"),
         (["--resume"], "agvbench loop: --resume: no loop to resume: none in campaigns/"),
+        (["--trajectories=garag", "--out=x"], "agvbench loop: there is no trajectory 'garag'; did you mean 'garage'?"),
         (["--vehicle=missing.toml", "--out=x"], "agvbench loop: missing.toml: cannot read the vehicle file"),
     ],
 )

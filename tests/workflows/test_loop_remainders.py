@@ -8,6 +8,7 @@ import pytest
 from agvbench.effects import SteeringLag
 from agvbench.model import thesis_vehicle
 from agvbench.planning import Departure, corrected_plan, load_trajectory
+from agvbench.planning.reading import trajectory_file
 from agvbench.planning.resting import coasting_path
 from agvbench.types import Frames, Pose, Run
 from agvbench.workflows.loop_plans import plans_of
@@ -70,6 +71,22 @@ def test_a_vehicle_that_does_what_the_model_says_leaves_nothing_to_learn():
     left = remainders(Driven(as_the_model_says(model, made.commands, made.target)), model, "corrected")["5"]
     assert [1e3 * left["x_m"], 1e3 * left["y_m"]] == pytest.approx([0.0, 0.0], abs=0.1)
     assert math.degrees(left["heading_rad"]) == pytest.approx(0.0, abs=0.02)
+
+
+def test_plans_are_told_by_the_name_that_their_runs_have(tmp_path):
+    mine = tmp_path / "mine.toml"
+    mine.write_text(trajectory_file("garage").read_text().replace('"garage"', '"my_garage"'))
+    left = {"my_garage": Pose(0.02, 0.0, 0.0)}
+    said = plans_of(thesis_vehicle(), "circle:20", left, (str(mine), "figure_eight", "3"))
+    assert list(said) == ["my_garage", "figure_eight", "3"]
+    assert said["my_garage"]["remainder"]["along_mm"] == 20.0
+    assert max(abs(said[name]["remaining"]["along_mm"]) for name in ("my_garage", "figure_eight")) < 0.5
+
+
+def test_no_plan_is_made_of_a_trajectory_that_is_not_driven_corrected(tmp_path):
+    calm = tmp_path / "calm.toml"
+    calm.write_text('conditions = ["calibrated"]\n' + trajectory_file("garage").read_text())
+    assert plans_of(thesis_vehicle(), "circle:20", names=(str(calm),)) == {}
 
 
 def test_what_is_said_of_a_plan_before_it_is_driven_is_of_the_plan_that_is_driven():

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from agvbench.planning import Workspace, own_trajectories
+from agvbench.planning import THE_EIGHT, Workspace, own_trajectories
 from agvbench.workflows.doctor.finding import Check, Finding, Lab, State
 from agvbench.workflows.plan import plan_trajectories
-
-_EIGHT = tuple(map(str, range(1, 9)))
 
 
 class Floor(Check):
@@ -19,7 +17,7 @@ class Floor(Check):
         settings, own = lab.settings, own_trajectories()
         workspace = Workspace.parse(settings.workspace)
         made = plan_trajectories(
-            [*_EIGHT, *own], vehicle=settings.vehicle, workspace=workspace, steering=settings.steering
+            [*THE_EIGHT, *own], vehicle=settings.vehicle, workspace=workspace, steering=settings.steering
         )
         vehicle = settings.vehicle or "the thesis' vehicle"
         where = f"{vehicle} on {workspace.name} with {workspace.margin_m:g} m to spare"
