@@ -28,9 +28,10 @@ def dry_run_table(planned: Sequence[tuple[DriveOrder, Plan]]) -> str:
     from agvbench.reporting.text import as_text
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_footer=bool(planned), caption_justify="left")
+    table.collapse_padding = True
     table.title, table.caption = "What would be driven", _caption(planned)
     for column, total in zip(_NAMES, ("total", "", ""), strict=True):
-        table.add_column(column, footer=total)
+        table.add_column(column, footer=total, overflow="fold")
     for column, total in zip(_NUMBERS, _times([plan for _, plan in planned]), strict=True):
         table.add_column(Text(column), footer=Text(total), justify="right", no_wrap=True)
     for names, plans in _by_kind(planned).items():
