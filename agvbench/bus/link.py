@@ -13,7 +13,7 @@ from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import AGV, CLAIM, IDENTITY, MOCAP, RELEASE, REPLAY, RESET, Keys
 from agvbench.bus.lock_step import LockStep
 from agvbench.bus.outbox import CommandOutbox
-from agvbench.bus.presence import Presence
+from agvbench.bus.presence import SETTLES_S, Presence
 from agvbench.bus.questions import ask
 from agvbench.bus.real_time import RealTime
 from agvbench.bus.request_message import (
@@ -104,7 +104,7 @@ class VehicleLink:
         return ask(self._session, self.keys.question(role, question), payload, limit_s, self._check_presence)
 
     def _check_presence(self) -> None:
-        self._presence.check(AGV, MOCAP)
+        self._presence.check(AGV, MOCAP, settles_s=SETTLES_S)
 
     def _compare_calibration(self, driven_with: str) -> None:
         built_for = self._identity.agv.extra.get("firmware_calibration", "none")

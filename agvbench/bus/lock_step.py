@@ -9,7 +9,7 @@ from agvbench.bus.frames_message import FramesFlags, FramesMessage
 from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import AGV, MOCAP, Keys
 from agvbench.bus.outbox import CommandOutbox
-from agvbench.bus.presence import Presence
+from agvbench.bus.presence import SETTLES_S, Presence
 from agvbench.bus.watchdog import Watchdog
 from agvbench.errors import AdapterGoneError, LinkError
 from agvbench.types import Command, Frames
@@ -61,7 +61,7 @@ class LockStep:
     def _exchange(self, command: Command, t_s: float, hold_s: float, flags: int) -> Frames:
         if self._hung is not None:
             raise self._hung
-        self._presence.check(AGV, MOCAP)
+        self._presence.check(AGV, MOCAP, settles_s=SETTLES_S)
         sequence = self._outbox.send(command, t_s, hold_s, flags)
         self._watchdog.arm()
         try:
@@ -91,7 +91,7 @@ class LockStep:
         return batches[0] if len(batches) == 1 else Frames.concatenate(batches)
 
     def _check_waiting(self) -> None:
-        self._presence.check(AGV, MOCAP)
+        self._presence.check(AGV, MOCAP, settles_s=SETTLES_S)
         if self._watchdog.expired:
             self._hung = AdapterGoneError(
                 "the simulator does not answer",

@@ -10,6 +10,9 @@ from agvbench.bus.clock import Clock
 from agvbench.bus.keys import AGV, MOCAP, Keys
 from agvbench.errors import AdapterGoneError
 
+SETTLES_S = 0.1
+"""How long [s] the tokens of adapters that vanish together take to do so."""
+
 
 class Presence:
     """Watches the liveliness tokens of a vehicle's adapters.
@@ -72,10 +75,15 @@ class Presence:
                     remedy=f"start 'agvbench {role}' or 'agvbench sim' for this lab and vehicle, or check the names",
                 )
 
-    def check(self, *roles: str) -> None:
-        """Raise `AdapterGoneError`, with its name and since when, if an adapter in one of these roles vanished."""
+    def check(self, *roles: str, settles_s: float = 0.0) -> None:
+        """Raise `AdapterGoneError`, with its name and since when, if an adapter in one of these roles vanished.
+
+        With a process, the tokens of those that are connected through it vanish, too, in any order: whoever can wait
+        for `settles_s` [s] is told of the first of `roles`.
+        """
         if not self._gone_since_s:
             return
+        self._clock.sleep(settles_s)
         for role in roles:
             if (since_s := self._gone_since_s.get(role)) is not None:
                 gone_s = self._clock.now() - since_s
@@ -83,7 +91,8 @@ class Presence:
                     f"the {role} adapter vanished",
                     where=self._keys.root,
                     value=f"{gone_s:.1f} s ago",
-                    remedy="start it again; the run that was being driven does not count",
+                    remedy="start it again, or continue its process if that was suspended; "
+                    "the run that was being driven does not count",
                 )
 
     def close(self) -> None:

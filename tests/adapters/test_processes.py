@@ -7,7 +7,9 @@ import socket
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import Any
 
 import pytest
@@ -87,6 +89,33 @@ def test_a_simulator_that_is_killed_ends_the_exchange(endpoint: str) -> None:
         killer.wait()
         with pytest.raises(AdapterGoneError, match="vanished"):
             link.exchange(NEUTRAL, t_s=0.2, hold_s=0.1)
+
+
+@contextmanager
+def suspended(child: subprocess.Popen[str]) -> Iterator[None]:
+    child.send_signal(signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        child.send_signal(signal.SIGCONT)
+
+
+@pytest.mark.parametrize("role", ["agv", "mocap"])
+def test_a_suspended_adapter_is_named_long_before_the_answer_limit(endpoint: str, role: str) -> None:
+    """The camera is connected through the vehicle's process: it is not blamed when that is suspended."""
+    with (
+        process("agv", "sim", *SEED, "--plant", TINY, "--listen", endpoint) as agv,
+        process("mocap", "sim", *SEED, "--connect", endpoint) as mocap,
+        open_rig(connect=endpoint, seed=11) as link,
+    ):
+        link.reset(START, run_key="a")
+        began_s = time.monotonic()
+        with suspended({"agv": agv, "mocap": mocap}[role]):
+            with pytest.raises(AdapterGoneError, match=f"the {role} adapter vanished: .*if that was suspended"):
+                link.reset(START, run_key="b")
+            with pytest.raises(AdapterGoneError, match=f"the {role} adapter vanished"):
+                link.exchange(NEUTRAL, t_s=0.0, hold_s=0.1)
+        assert time.monotonic() - began_s < 30.0  # it takes about 3 s, but for a busy machine; the limit is 60 s
 
 
 def test_a_simulator_with_another_seed_is_refused(endpoint: str) -> None:
