@@ -118,6 +118,8 @@ class NatNetMocap(MocapAdapter):
                 text += f", {malformed} packets could not be decoded: {counters.first_malformed}"
             if foreign:
                 text += f", {foreign} packets were not the server's"
+                if (port := counters.foreign_port) is not None:
+                    text += f" (frames from port {port}: if that is the server's, add --camera data_port={port})"
             self._reports.event(Level.WARNING, "frames_lost", text)
 
     def close(self) -> None:

@@ -22,6 +22,10 @@ _RELEARN_S = 2.0
 _FRAME = struct.pack("<H", Message.FRAMEOFDATA)
 
 
+def _is_frame(datagram: bytes) -> bool:
+    return datagram[: len(_FRAME)] == _FRAME
+
+
 @dataclass(frozen=True)
 class Connection:
     """Where a server is, and how to talk to it.
@@ -56,6 +60,8 @@ class Counters:
     first_malformed: str = ""
     foreign: int = 0
     """Datagrams of others than the server, of other sockets on its machine, too."""
+    foreign_port: int | None = None
+    """The port of the server's machine that such frames came from last."""
 
     def note(self, error: MessageError) -> None:
         """Count what could not be decoded."""
@@ -66,8 +72,9 @@ class Counters:
 class Channel:
     """Sockets that hear the server only; ``told`` counts the packets that were sent to it.
 
-    The server sends from its command port and from its data port. No document says which port frames come from, so
-    frames from one other port of its machine are taken, too, until some come from those two.
+    The server sends from its command port and from its data port; in unicast nothing else is taken. No document says
+    which port a multicast server's frames come from: once none have come from those two for a while, frames from one
+    other port of its machine are taken, until some come from those two.
 
     Attributes
     ----------
@@ -86,6 +93,7 @@ class Channel:
         self._selector = selectors.DefaultSelector()
         self.told = 0
         self.ports = {connection.port, connection.data_port or DATA_PORT}
+        self._joined = False
         self._frames_port: int | None = None
         self._frames_s = -math.inf
         try:
@@ -126,6 +134,7 @@ class Channel:
             data.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, member)
         except (OSError, UnicodeError) as error:
             raise self._unusable(error) from None
+        self._joined, self._frames_s = True, self._clock.now()
 
     def tell(self, message: Message, payload: bytes = b"") -> None:
         """Send a packet; while the network is away, what is missing shows in what does not arrive."""
@@ -168,7 +177,7 @@ class Channel:
                 except (BlockingIOError, ConnectionError):
                     break
                 if not self._is_of_server(datagram, *who):
-                    self._counters.foreign += 1
+                    self._note_foreign(datagram, *who)
                     continue
                 try:
                     packets.append(split(datagram))
@@ -176,9 +185,14 @@ class Channel:
                     self._counters.note(error)
         return packets
 
+    def _note_foreign(self, datagram: bytes, host: str, port: int) -> None:
+        self._counters.foreign += 1
+        if host == self._server[0] and _is_frame(datagram):
+            self._counters.foreign_port = port
+
     def _is_of_server(self, datagram: bytes, host: str, port: int) -> bool:
-        known, is_frame = port in self.ports, datagram[: len(_FRAME)] == _FRAME
-        if host != self._server[0] or not (known or is_frame):
+        known, is_frame = port in self.ports, _is_frame(datagram)
+        if host != self._server[0] or not (known or (is_frame and self._joined)):
             return False
         now_s = self._clock.now()
         if not known and port != self._frames_port and now_s - self._frames_s <= _RELEARN_S:

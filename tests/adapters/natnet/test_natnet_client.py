@@ -22,7 +22,7 @@ from agvbench.adapters.natnet.encode import encode_frame
 from agvbench.adapters.natnet.frame import MODELS_CHANGED
 from agvbench.adapters.natnet.packet import Message, join
 from agvbench.adapters.natnet.version import Version
-from agvbench.bus.clock import WallClock
+from agvbench.bus.clock import SimulatedClock, WallClock
 from agvbench.errors import AdapterGoneError, LinkError
 
 pytestmark = pytest.mark.real_time
@@ -174,25 +174,50 @@ def test_frames_of_other_sockets_on_the_servers_machine_are_no_poses(lab: Lab) -
     assert [one.frame.number for one in lab.seen] == [1, 3]
 
 
-def test_frames_from_one_port_that_was_not_announced_are_taken_until_some_come_from_a_known_one() -> None:
-    frame = join(Message.FRAMEOFDATA, bytes(40))
-    server, data, another = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(3))
-    server.bind(("127.0.0.1", 0))
-    counters = Counters()
-    channel = Channel(Connection("127.0.0.1", server.getsockname()[1], data_port=free_port()), counters)
-    channel.tell(Message.KEEPALIVE)
-    client = server.recvfrom(100)[1]
-    taken = []
-    for sender in (data, another, data, server, data):
-        before = counters.foreign
-        sender.sendto(frame, client)
-        arrived = channel.arrived(5.0)
-        assert len(arrived) + counters.foreign - before == 1
-        taken.append(len(arrived))
-    assert taken == [1, 0, 1, 1, 0]
-    channel.close()
-    for one in (server, data, another):
-        one.close()
+class Wire:
+    """A channel, its server, and two more sockets on the server's machine."""
+
+    def __init__(self, stack: ExitStack) -> None:
+        self.server, self.data, self.another = (
+            stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(3)
+        )
+        self.server.bind(("127.0.0.1", 0))
+        port = self.server.getsockname()[1]
+        self.counters = Counters()
+        self.channel = Channel(Connection("127.0.0.1", port, "127.0.0.1", data_port=free_port()), self.counters)
+        stack.callback(self.channel.close)
+        self.channel.tell(Message.KEEPALIVE)
+        self.client = self.server.recvfrom(100)[1]
+
+    def takes(self, sender: socket.socket) -> bool:
+        """Whether the channel takes a frame of this sender; it counts those that it does not."""
+        before = self.counters.foreign
+        sender.sendto(join(Message.FRAMEOFDATA, bytes(40)), self.client)
+        arrived = self.channel.arrived(5.0)
+        assert len(arrived) + self.counters.foreign - before == 1
+        return bool(arrived)
+
+
+def test_in_unicast_frames_are_taken_from_the_announced_ports_only() -> None:
+    with ExitStack() as stack:
+        wire = Wire(stack)
+        assert [wire.takes(one) for one in (wire.data, wire.another, wire.server)] == [False, False, True]
+        assert wire.counters.foreign_port == wire.another.getsockname()[1]
+        wire.channel.ports.add(wire.data.getsockname()[1])
+        assert wire.takes(wire.data)
+
+
+def test_in_multicast_frames_from_one_other_port_are_taken_where_none_come_from_the_announced_ones() -> None:
+    with ExitStack() as stack:
+        wire = Wire(stack)
+        wire.channel._clock = clock = SimulatedClock()  # type: ignore[assignment]
+        wire.channel.join(GROUP, free_port())
+        assert not wire.takes(wire.data)
+        clock.sleep(2.5)
+        senders = (wire.data, wire.another, wire.data, wire.server, wire.data)
+        assert [wire.takes(one) for one in senders] == [True, False, True, True, False]
+        clock.sleep(2.5)
+        assert not wire.takes(wire.data)
 
 
 def test_foreign_and_malformed_packets_are_counted_and_do_no_harm(lab: Lab) -> None:
