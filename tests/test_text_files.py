@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 
 from agvbench.adapters.natnet.capture import datagrams_of
-from agvbench.campaign.csv_text import read_csv_text
 from agvbench.campaign.header import CampaignHeader
 from agvbench.campaign.manifest import Manifest
-from agvbench.campaign.mapping import load_mapping
-from agvbench.campaign.parquet import read_parquet
+from agvbench.campaign.recordings.mapping import load_mapping
+from agvbench.campaign.tables.csv_text import read_csv_text
+from agvbench.campaign.tables.parquet import read_parquet
 from agvbench.errors import AgvbenchError, FileError
 from agvbench.model import VehicleModel
 from agvbench.planning.reading import load_trajectory

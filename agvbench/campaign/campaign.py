@@ -1,8 +1,9 @@
-"""Open a campaign directory and read its runs."""
+"""Open a campaign directory, read its runs, and know where its sessions begin."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+import math
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import fields
 from functools import cached_property
 from pathlib import Path
@@ -11,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from agvbench.campaign.checks import check_commands, check_poses, check_runs
 from agvbench.campaign.header import FILE_NAME, CampaignHeader
 from agvbench.campaign.manifest import Manifest
-from agvbench.campaign.plausibility import check_motion
-from agvbench.campaign.schema import COMMANDS, POSES, RUNS, TABLES
-from agvbench.campaign.source import SUFFIXES, Source
-from agvbench.campaign.timed import TimedTable, blank_untracked
+from agvbench.campaign.tables.consistency import check_commands, check_poses, check_runs
+from agvbench.campaign.tables.motion_checks import check_motion
+from agvbench.campaign.tables.schema import COMMANDS, POSES, RUNS, TABLES
+from agvbench.campaign.tables.source import SUFFIXES, Source
+from agvbench.campaign.tables.timed_table import TimedTable, blank_untracked
 from agvbench.errors import CampaignError
 from agvbench.types import Commands, Frames, Pose, Run
 
@@ -204,3 +205,15 @@ class Campaign:
             split=row.get("split") or None,
             extra={name: value for name, value in row.items() if name not in _KNOWN and value is not None},
         )
+
+
+def session_starts(runs: Iterable[Run]) -> dict[str | None, float]:
+    """Return when each session's first run started [s since the campaign began], by name.
+
+    >>> session_starts([])
+    {}
+    """
+    began: dict[str | None, float] = {}
+    for run in runs:
+        began[run.session] = min(run.started_s, began.get(run.session, math.inf))
+    return began

@@ -10,8 +10,8 @@ from typing import Annotated, Any
 
 import msgspec
 
-from agvbench.campaign.explain import explain
 from agvbench.campaign.manifest import record
+from agvbench.campaign.toml_errors import explain
 from agvbench.errors import CampaignError, FileError
 from agvbench.text_files import read_toml
 from agvbench.types import CommandUnit

@@ -14,8 +14,8 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from agvbench.campaign.atomic import write_all, write_atomically
-from agvbench.campaign.schema import PLANNED_TABLE
+from agvbench.campaign.atomic_files import write_all, write_atomically
+from agvbench.campaign.tables.schema import PLANNED_TABLE
 from agvbench.errors import CampaignError
 from agvbench.text_files import require_regular
 

@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
-from agvbench.campaign.atomic import TEMPORARY_PREFIX, is_temporary
-from agvbench.campaign.checks import check_commands, check_poses, check_runs
+from agvbench.campaign.atomic_files import TEMPORARY_PREFIX, is_temporary
 from agvbench.campaign.header import FILE_NAME, CampaignHeader
 from agvbench.campaign.lock import LOCK_FILE
 from agvbench.campaign.manifest import MANIFEST_FILE, Manifest, record
-from agvbench.campaign.parquet import to_parquet
-from agvbench.campaign.parts import part_name, parts_of, run_id_of
-from agvbench.campaign.schema import PLANNED_TABLE, TABLES
-from agvbench.campaign.source import parts
-from agvbench.campaign.timed import TimedTable, blank_untracked
+from agvbench.campaign.tables.consistency import check_commands, check_poses, check_runs
+from agvbench.campaign.tables.parquet import to_parquet
+from agvbench.campaign.tables.parts import part_name, parts_of, run_id_of
+from agvbench.campaign.tables.schema import PLANNED_TABLE, TABLES
+from agvbench.campaign.tables.source import parts
+from agvbench.campaign.tables.timed_table import TimedTable, blank_untracked
 from agvbench.errors import CampaignError, RecordingError
 from agvbench.types import CommandUnit, Run
 

@@ -40,8 +40,8 @@ def refuse_clocks(refused: Mapping[str, str], runs: int, *, where: str) -> None:
 def refuse_units(runs: Sequence[Run], header: HeaderLike) -> None:
     """Raise an error if times are not in seconds, or headings do not turn as the path does.
 
-    Metres and radians are checked when a campaign is opened (`agvbench.campaign.plausibility`). What is asked here
-    needs no model either: how often the camera looks, and that a vehicle on an arc turns by as much as its path.
+    Metres and radians are checked when a campaign is opened (`agvbench.campaign.tables.motion_checks`). What is asked
+    here needs no model either: how often the camera looks, and that a vehicle on an arc turns by as much as its path.
 
     Raises
     ------

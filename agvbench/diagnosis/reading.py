@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.calibration import inspect_frames
-from agvbench.campaign.sessions import session_starts
+from agvbench.campaign.campaign import session_starts
 from agvbench.diagnosis.grouping import at_common_levels, group_runs
 from agvbench.diagnosis.resting import between_rows, frame_noise, motion_of, start_of
 from agvbench.diagnosis.windows import Beginnings, Horizon, blocks, cut_windows, recording_of

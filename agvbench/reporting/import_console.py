@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from agvbench.campaign import Campaign
-from agvbench.campaign.importing import IMPORT_TABLE
+from agvbench.campaign.recordings.importer import IMPORT_TABLE
 
 _COLUMNS = {
     "file": "file",

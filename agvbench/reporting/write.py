@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from agvbench.campaign.atomic import made_folder, replace_whole
+from agvbench.campaign.atomic_files import made_folder, replace_whole
 from agvbench.errors import FileError
 from agvbench.reporting.content import Content, plain
 from agvbench.reporting.csv_table import frame_to_csv

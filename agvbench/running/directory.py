@@ -7,7 +7,7 @@ from datetime import datetime
 from pathlib import Path
 
 from agvbench.campaign.header import FILE_NAME
-from agvbench.campaign.source import parts
+from agvbench.campaign.tables.source import parts
 from agvbench.errors import FlagError
 from agvbench.running.settings import SETTINGS_FILE
 

@@ -15,7 +15,7 @@ import pandas as pd
 
 from agvbench.campaign import CampaignWriter
 from agvbench.campaign.manifest import Manifest, sha256
-from agvbench.campaign.parquet import read_parquet
+from agvbench.campaign.tables.parquet import read_parquet
 from agvbench.errors import FileError
 from agvbench.planning.reading import trajectory_file
 from agvbench.running.benchmark_files import find_benchmark

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 
-from agvbench.campaign.sessions import session_starts
+from agvbench.campaign.campaign import session_starts
 from agvbench.types import Run
 
 _LONG_AGO_S = 3600.0

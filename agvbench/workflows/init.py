@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from agvbench.campaign.atomic import made_folder
+from agvbench.campaign.atomic_files import made_folder
 from agvbench.errors import FileError
 from agvbench.resources import resource_directory
 from agvbench.running.vehicles import uncalibrated_vehicle

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from agvbench.campaign import Campaign
-from agvbench.campaign.sessions import session_starts
+from agvbench.campaign.campaign import session_starts
 from agvbench.errors import FitError
 from agvbench.model import VehicleModel
 from agvbench.planning import Departure

@@ -10,7 +10,7 @@ from typing import Any
 
 import tomli_w
 
-from agvbench.campaign.atomic import write_atomically
+from agvbench.campaign.atomic_files import write_atomically
 from agvbench.errors import FileError, FlagError
 from agvbench.running.directory import CAMPAIGNS, newest
 from agvbench.running.settings import BenchSettings, settings_for_resume

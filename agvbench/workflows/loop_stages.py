@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from agvbench.campaign.atomic import replace_whole
+from agvbench.campaign.atomic_files import replace_whole
 from agvbench.errors import FileError, FitError
 from agvbench.model import VehicleModel
 from agvbench.planning import driven_trajectories

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from agvbench.campaign.atomic import replace_whole
+from agvbench.campaign.atomic_files import replace_whole
 from agvbench.campaign.manifest import list_file
 from agvbench.errors import FileError
 

@@ -17,13 +17,13 @@ class MappingToml(FileTarget):
 
     def __init__(self) -> None:
         super().__init__()
-        from agvbench.campaign.mapping import load_mapping
+        from agvbench.campaign.recordings.mapping import load_mapping
 
         self._load = load_mapping
 
     def seeds(self) -> Iterable[bytes]:
         """Return the mapping that ships."""
-        from agvbench.campaign.mapping import find_mapping
+        from agvbench.campaign.recordings.mapping import find_mapping
 
         yield find_mapping("dart").read_bytes()
 

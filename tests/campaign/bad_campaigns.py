@@ -15,7 +15,7 @@ from campaign_samples import HEADER, head, make_run, tables, write_campaign, wri
 from motion_samples import Change, bench, reversed_in_time, write
 
 from agvbench.campaign import Campaign, CampaignWriter
-from agvbench.campaign.parquet import read_parquet
+from agvbench.campaign.tables.parquet import read_parquet
 
 HERE = Path("c")
 Cases = dict[str, tuple[str, Callable[[], object]]]

@@ -12,8 +12,8 @@ from campaign_samples import HEADER, make_run, write_campaign
 
 from agvbench.campaign import Campaign, CampaignWriter
 from agvbench.campaign.manifest import MANIFEST_FILE
-from agvbench.campaign.parquet import read_parquet
-from agvbench.campaign.schema import TABLES
+from agvbench.campaign.tables.parquet import read_parquet
+from agvbench.campaign.tables.schema import TABLES
 from agvbench.errors import CampaignError
 
 BESIDE = "vehicle.toml"

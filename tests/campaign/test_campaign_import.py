@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agvbench.campaign import Campaign, import_recordings
-from agvbench.campaign.orientation import heading_of
+from agvbench.campaign.recordings.recording import heading_of
 from agvbench.cli import main
 from agvbench.errors import RecordingError
 

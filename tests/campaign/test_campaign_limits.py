@@ -11,8 +11,8 @@ import pytest
 from campaign_samples import HEADER, make_run
 
 from agvbench.campaign import Campaign, CampaignWriter
-from agvbench.campaign.csv_text import MAX_BYTES, read_csv_text
-from agvbench.campaign.parquet import read_parquet, to_parquet
+from agvbench.campaign.tables.csv_text import MAX_BYTES, read_csv_text
+from agvbench.campaign.tables.parquet import read_parquet, to_parquet
 from agvbench.errors import CampaignError, FileError
 
 
@@ -61,7 +61,7 @@ def test_parts_share_one_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     writer = CampaignWriter.create(tmp_path / "c", HEADER, durable=False)
     for name in "abc":
         writer.append(make_run(name, frames=1000))
-    monkeypatch.setattr("agvbench.campaign.source.MAX_BYTES", 150_000)
+    monkeypatch.setattr("agvbench.campaign.tables.source.MAX_BYTES", 150_000)
     with pytest.raises(CampaignError, match=r"poses.parquet/c.parquet: is too large for memory"):
         Campaign.open(writer.path).check()
 

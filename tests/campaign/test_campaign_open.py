@@ -10,7 +10,7 @@ import pytest
 from campaign_samples import head, tables, write_campaign, write_csv, write_head
 
 from agvbench.campaign import Campaign
-from agvbench.campaign.schema import TABLES
+from agvbench.campaign.tables.schema import TABLES
 
 
 def test_csv_reads_as_parquet_does(tmp_path: Path) -> None:

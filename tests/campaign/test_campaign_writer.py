@@ -18,7 +18,7 @@ from hypothesis.extra.numpy import arrays
 
 from agvbench.campaign import Campaign, CampaignWriter
 from agvbench.campaign.manifest import MANIFEST_FILE
-from agvbench.campaign.parts import part_name, run_id_of
+from agvbench.campaign.tables.parts import part_name, run_id_of
 from agvbench.errors import CampaignError
 from agvbench.types import NO_TARGET, Commands, Frames
 

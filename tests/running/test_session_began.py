@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from agvbench.campaign import Campaign
-from agvbench.campaign.sessions import session_starts
+from agvbench.campaign.campaign import session_starts
 from agvbench.running import rig_checks, session_began
 from agvbench.running.driver import Driver
 from agvbench.running.opening import open_session

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from agvbench.campaign.atomic import is_temporary
-from agvbench.campaign.columns import fill_columns, type_columns
-from agvbench.campaign.csv_text import read_csv_text
+from agvbench.campaign.atomic_files import is_temporary
 from agvbench.campaign.manifest import Manifest
-from agvbench.campaign.parquet import MAX_BYTES, MAX_ROWS, read_parquet
-from agvbench.campaign.schema import Column
+from agvbench.campaign.tables.csv_text import read_csv_text
+from agvbench.campaign.tables.parquet import MAX_BYTES, MAX_ROWS, read_parquet
+from agvbench.campaign.tables.schema import Column, fill_columns, type_columns
 from agvbench.errors import CampaignError
 
 SUFFIXES = (".parquet", ".csv")

@@ -1,4 +1,4 @@
-"""Turn foreign recordings into a campaign, and account for every row that was left out."""
+"""Import foreign recordings into a campaign, and account for every row that was left out."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ import numpy as np
 import pyarrow as pa
 
 from agvbench import __version__
-from agvbench.campaign.accounts import Account, account_for, why_nothing
 from agvbench.campaign.campaign import Campaign
-from agvbench.campaign.cutting import cut
 from agvbench.campaign.header import FILE_NAME, CampaignHeader
 from agvbench.campaign.manifest import sha256
-from agvbench.campaign.mapping import find_mapping, load_mapping
-from agvbench.campaign.mapping_schema import FileRule, Mapping
-from agvbench.campaign.parts import parts_of
-from agvbench.campaign.plausibility import check_motion
-from agvbench.campaign.recording import Recording, read_recording
-from agvbench.campaign.timed import TimedTable
+from agvbench.campaign.recordings.mapping import find_mapping, load_mapping
+from agvbench.campaign.recordings.mapping_schema import FileRule, Mapping
+from agvbench.campaign.recordings.recording import Recording, read_recording
+from agvbench.campaign.recordings.segmentation import Account, account_for, cut, why_nothing
+from agvbench.campaign.tables.motion_checks import check_motion
+from agvbench.campaign.tables.parts import parts_of
+from agvbench.campaign.tables.timed_table import TimedTable
 from agvbench.campaign.writer import CampaignWriter, check_parts, refuse_occupied
 from agvbench.errors import FileError, RecordingError
 from agvbench.types import NO_TARGET, RUN_OK, Commands, Floats, Frames, Run

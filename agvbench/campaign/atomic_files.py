@@ -1,4 +1,4 @@
-"""Files that are either whole or absent: write beside the target, force to disk, rename into place."""
+"""Atomic writes: a file is whole or absent (written beside the target, synced to disk, renamed into place)."""
 
 from __future__ import annotations
 

@@ -1,18 +1,19 @@
-"""Find, load and check the mapping of ``agvbench import``."""
+"""Find, load and check the mapping of ``agvbench import``, and convert its units to SI."""
 
 from __future__ import annotations
 
+import difflib
+import math
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
 import msgspec
 
-from agvbench.campaign import units
-from agvbench.campaign.explain import explain
 from agvbench.campaign.header import SCHEMA
-from agvbench.campaign.mapping_schema import ISO_8601, TABLES, Mapping, Quantity
-from agvbench.errors import FileError
+from agvbench.campaign.recordings.mapping_schema import ISO_8601, TABLES, Mapping, Quantity
+from agvbench.campaign.toml_errors import explain
+from agvbench.errors import FileError, InputError
 from agvbench.text_files import read_toml
 
 _DELIMITERS = ",;\t|: /#&!~^*%$"
@@ -64,12 +65,12 @@ def load_mapping(name: str | Path) -> Mapping:
 def quantities(mapping: Mapping) -> Iterator[tuple[str, Quantity, dict[str, float]]]:
     """Yield each measured column that is mapped: its name, its declaration and the units it may have."""
     columns = mapping.columns
-    yield "x", columns.x, units.LENGTH
-    yield "y", columns.y, units.LENGTH
+    yield "x", columns.x, LENGTH
+    yield "y", columns.y, LENGTH
     if columns.heading:
-        yield "heading", columns.heading, units.ANGLE
+        yield "heading", columns.heading, ANGLE
     if columns.mean_error:
-        yield "mean_error", columns.mean_error, units.LENGTH
+        yield "mean_error", columns.mean_error, LENGTH
 
 
 def _check(mapping: Mapping, path: Path) -> None:
@@ -81,9 +82,9 @@ def _check(mapping: Mapping, path: Path) -> None:
         remedy = "give one of columns.heading and columns.quaternion"
         raise FileError("heading is given twice or not at all", where=path, remedy=remedy)
     for name, quantity, known in quantities(mapping):
-        units.factor(quantity.unit, known, f"{path}: columns.{name}.unit")
+        factor(quantity.unit, known, f"{path}: columns.{name}.unit")
     if columns.time.unit != ISO_8601:
-        units.factor(columns.time.unit, {**units.TIME, ISO_8601: 1.0}, f"{path}: columns.time.unit")
+        factor(columns.time.unit, {**TIME, ISO_8601: 1.0}, f"{path}: columns.time.unit")
     if mapping.csv.delimiter not in _DELIMITERS:
         raise FileError(
             "csv.delimiter cannot separate cells", where=path, value=repr(mapping.csv.delimiter),
@@ -93,3 +94,26 @@ def _check(mapping: Mapping, path: Path) -> None:
         where = f"{path}: columns.quaternion"
         raise FileError("floor_x and floor_y are one axis", where=where, remedy="give two of x, y, z")
     mapping.header(path)
+
+
+LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}
+ANGLE = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0, "turn": 2.0 * math.pi}
+TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9}
+
+
+def factor(unit: str, units: dict[str, float], where: object) -> float:
+    """Return the factor from `unit` to SI.
+
+    >>> factor("mm", LENGTH, "columns.x")
+    0.001
+
+    Raises
+    ------
+    InputError
+        If `unit` is not one of `units`.
+    """
+    if unit in units:
+        return units[unit]
+    close = difflib.get_close_matches(unit.lower(), units, 1)
+    remedy = f"give {close[0]}" if close else "give one of these"
+    raise InputError("unit is unknown", where=where, value=repr(unit), limit=", ".join(units), remedy=remedy)

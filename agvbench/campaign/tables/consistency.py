@@ -1,4 +1,4 @@
-"""What the tables of a campaign must not contradict: each check is one question with a one-line answer.
+"""Consistency checks of a campaign's tables: each check is one question with a one-line answer.
 
 Poses may be late, doubled, missing, untracked or wild, and headings may jump by 2π: real cameras do all of that.
 What is refused is what no camera and no vehicle does: values that are not numbers, another clock, another unit.
@@ -14,8 +14,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from agvbench.campaign.schema import SPLITS
-from agvbench.campaign.timed import TimedTable
+from agvbench.campaign.tables.schema import SPLITS
+from agvbench.campaign.tables.timed_table import TimedTable
 from agvbench.errors import CampaignError
 from agvbench.types import RUN_OK, CommandUnit, Floats
 

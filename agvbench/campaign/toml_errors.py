@@ -1,4 +1,4 @@
-"""Say what is wrong in a TOML file as a person would: msgspec's findings in the words of the file."""
+"""Validation errors of TOML files: msgspec's findings in the words of the file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Judge by motion whether poses are in metres and radians, and whether their time runs forward.
+"""Motion checks: whether poses are in metres and radians, and whether their time runs forward.
 
 No model is needed: vehicles have a largest speed, they drive towards their targets, their heading changes with their
 direction of travel, and they answer commands instead of preceding them. Slip, crabbing, tracker jumps and rest are
@@ -16,7 +16,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from agvbench.campaign.header import CampaignHeader
-from agvbench.campaign.timed import TimedTable
+from agvbench.campaign.tables.timed_table import TimedTable
 from agvbench.errors import CampaignError
 from agvbench.types import RUN_OK, Floats, wrap_angle
 

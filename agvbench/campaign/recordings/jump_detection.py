@@ -1,11 +1,11 @@
-"""Find the frames in which a tracker jumped: to a wrong marker, to another object, or by a flipped fit."""
+"""Detect frames in which a tracker jumped: to a wrong marker, to another object, or by a flipped fit."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.campaign.mapping_schema import Gate
+from agvbench.campaign.recordings.mapping_schema import Gate
 from agvbench.errors import InputError
 from agvbench.types import Floats, wrap_angle
 

@@ -1,4 +1,4 @@
-"""A table of timed rows (commands or poses), grouped by run."""
+"""Tables of timed rows (commands or poses), grouped by run."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from agvbench.campaign.columns import UNKNOWN_COUNT
+from agvbench.campaign.tables.schema import UNKNOWN_COUNT
 from agvbench.errors import CampaignError
 from agvbench.types import Floats
 

@@ -1,0 +1,1 @@
+"""Foreign recordings: their mapping, their rows, and the campaign made of them."""

@@ -1,0 +1,1 @@
+"""The tables of a campaign: their columns, formats and checks."""
