@@ -12,7 +12,7 @@ import numpy as np
 
 from agvbench.errors import FitError
 from agvbench.signals import MAD_TO_STD
-from agvbench.statistics.rest import SPEED_LIMIT_MPS, start_pose
+from agvbench.statistics.rest_poses import SPEED_LIMIT_MPS, start_pose
 from agvbench.types import Floats, Frames, Run
 
 _LAST_S = 0.2

@@ -17,7 +17,7 @@ from agvbench.calibration import inspect_frames
 from agvbench.calibration.source import HeaderLike
 from agvbench.diagnosis.resting import frame_noise, rests
 from agvbench.model.simulation_loop import LATELY_S
-from agvbench.statistics.rest import SPEED_LIMIT_MPS
+from agvbench.statistics.rest_poses import SPEED_LIMIT_MPS
 from agvbench.types import Commands, Floats, Frames, Run
 
 SUPPORT_S = 0.2

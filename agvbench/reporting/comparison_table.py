@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from agvbench.reporting.content import Column, Table, Value
 from agvbench.statistics import Comparison, Difference
-from agvbench.statistics.differences import ALL
+from agvbench.statistics.comparison_summary import describe, notes_in_words
+from agvbench.statistics.differences import ALL, ALPHA_SAME
 from agvbench.statistics.quantities import COMPONENT_DEFINITIONS
-from agvbench.statistics.verdict import ALPHA_SAME
-from agvbench.statistics.words import describe, notes_in_words
 
 
 def comparison_table(comparison: Comparison, slug: str) -> Table:

@@ -6,9 +6,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 from agvbench.reporting.content import Column, Paragraph, Table, Value, plain, plain_sentences
+from agvbench.statistics.comparison_summary import headline, notes_in_words
 from agvbench.statistics.differences import ALL
 from agvbench.statistics.quantities import COMPONENT_DEFINITIONS, DEFINITIONS
-from agvbench.statistics.words import headline, notes_in_words
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -8,7 +8,7 @@ from agvbench.types import Frames, Pose
 
 WINDOW_S = 0.4
 SPEED_LIMIT_MPS = 0.01
-"""Decides while driving whether a run may begin or end: stricter than reading, `agvbench.statistics.rest`."""
+"""Decides while driving whether a run may begin or end: stricter than reading, `agvbench.statistics.rest_poses`."""
 _FEWEST_FRAMES = 4
 LEAST_RATE_HZ = (_FEWEST_FRAMES + 1) / (WINDOW_S / 2)
 """A camera that looks less often than this cannot lose a frame and still say so."""

@@ -1,11 +1,10 @@
 """Errors of runs, their spread, and comparisons."""
 
 from agvbench.statistics.comparison import Comparison, compare
-from agvbench.statistics.differences import Difference
+from agvbench.statistics.differences import Difference, Verdict
 from agvbench.statistics.end_poses import end_pose_table
-from agvbench.statistics.runs import pose_errors, valid
-from agvbench.statistics.spread import bias_and_spread
-from agvbench.statistics.verdict import Verdict
+from agvbench.statistics.repeatability import bias_and_spread
+from agvbench.statistics.run_errors import pose_errors, valid
 
 __all__ = [
     "Comparison",

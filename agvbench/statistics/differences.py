@@ -1,23 +1,96 @@
-"""One difference between two sides: how large, how sure, and the verdict."""
+"""One difference between two sides: its size, its confidence interval, its verdict.
+
+`EndShift` stands beside the tests: an end position error may stay as it is while runs end on the other side of their
+target.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
 
 import numpy as np
 
-from agvbench.statistics.bootstrap import Interval, average_difference_interval, median_difference_interval
-from agvbench.statistics.cells import Cell, Strata
-from agvbench.statistics.effect_size import cliffs_delta
-from agvbench.statistics.multiplicity import can_speak, holm_of_those_that_can_speak
-from agvbench.statistics.outliers import classify_outliers
-from agvbench.statistics.power import smallest_visible_difference
+from agvbench.statistics.bootstrap import CONFIDENCE, Interval, average_difference_interval, median_difference_interval
+from agvbench.statistics.descriptive import classify_outliers
+from agvbench.statistics.hypothesis_tests import (
+    can_speak,
+    holm_of_those_that_can_speak,
+    rank_test,
+    smallest_visible_difference,
+)
+from agvbench.statistics.matching import Cell, Strata
 from agvbench.statistics.quantities import DISTANCE, Quantity
-from agvbench.statistics.rank_test import rank_test
-from agvbench.statistics.verdict import Verdict, decide
 from agvbench.types import Floats
+
+ALPHA = 0.01
+ALPHA_SAME = 0.05
+
+
+class Verdict(StrEnum):
+    """What the repeats say about b against a; smaller errors are better."""
+
+    BETTER = "better"
+    SAME = "same within margin"
+    WORSE = "worse"
+    UNKNOWN = "cannot say"
+
+
+def overall(verdicts: Collection[Verdict]) -> Verdict:
+    """Return the verdict on something of which several quantities were judged.
+
+    It is worse where one of them is, better where one of them is and none can be worse, and the same where all are.
+
+    >>> overall([Verdict.BETTER, Verdict.WORSE]), overall([Verdict.BETTER, Verdict.SAME])
+    (<Verdict.WORSE: 'worse'>, <Verdict.BETTER: 'better'>)
+    """
+    for verdict in (Verdict.WORSE, Verdict.UNKNOWN, Verdict.BETTER):
+        if verdict in verdicts:
+            return verdict
+    return Verdict.SAME
+
+
+def decide(
+    difference: float,
+    margin: float,
+    *,
+    p_worse: float,
+    p_better: float,
+    p_same: float,
+    alpha: float = ALPHA,
+    alpha_same: float = ALPHA_SAME,
+) -> Verdict:
+    """Return the verdict on a `difference` of medians (b − a) against a noise band of ±`margin`.
+
+    Worse (better) takes both: significance after correction for all comparisons, and an estimate beyond the margin. The
+    same takes two one-sided tests, each against one end of the band (TOST): absence of evidence is not the same.
+
+    Parameters
+    ----------
+    difference, margin
+        In the same unit; `margin` is not negative.
+    p_worse, p_better
+        One-sided p-values of no difference, corrected for multiplicity.
+    p_same
+        The larger p-value of the two one-sided tests of a difference of at least the margin, uncorrected.
+    alpha, alpha_same
+        The levels that the former and the latter are held against.
+
+    Examples
+    --------
+    >>> decide(9.0, 2.0, p_worse=0.001, p_better=1.0, p_same=1.0)
+    <Verdict.WORSE: 'worse'>
+    >>> decide(0.1, 2.0, p_worse=0.4, p_better=0.6, p_same=0.2)
+    <Verdict.UNKNOWN: 'cannot say'>
+    """
+    if p_worse <= alpha and difference > margin:
+        return Verdict.WORSE
+    if p_better <= alpha and difference < -margin:
+        return Verdict.BETTER
+    return Verdict.SAME if p_same <= alpha_same else Verdict.UNKNOWN
+
 
 ALL = "all trajectories"
 
@@ -178,3 +251,54 @@ def _pooled_sd(groups: Sequence[Floats]) -> float:
     squares = sum(float(np.sum((group - group.mean()) ** 2)) for group in groups)
     freedom = sum(len(group) - 1 for group in groups)
     return math.sqrt(squares / freedom) if freedom else math.nan
+
+
+def cliffs_delta(superiority: float) -> float:
+    """Return Cliff's delta, P(b > a) − P(b < a), from A₁₂ = P(b > a) + P(b = a) / 2.
+
+    >>> cliffs_delta(1.0), cliffs_delta(0.5)
+    (1.0, 0.0)
+    """
+    return 2.0 * superiority - 1.0
+
+
+@dataclass(frozen=True)
+class EndShift:
+    """Mean end position of side b minus that of side a in one cell, along and across [mm], with 95 % intervals."""
+
+    trajectory: str
+    condition: str
+    along: Interval
+    across: Interval
+
+    @property
+    def length_mm(self) -> float:
+        """Return how far the mean end position moved [mm]."""
+        return math.hypot(self.along.estimate, self.across.estimate)
+
+
+def end_shift(cell: Cell) -> EndShift:
+    """Return the shift of the mean end position in `cell`."""
+    along, across = (mean_difference_interval(cell.a.ends_mm[:, k], cell.b.ends_mm[:, k]) for k in (0, 1))
+    return EndShift(cell.trajectory, cell.condition, along, across)
+
+
+def mean_difference_interval(a: Floats, b: Floats, *, confidence: float = CONFIDENCE) -> Interval:
+    """Return mean(b) − mean(a) with Welch's interval (1947); NaN bounds where a side has fewer than two values.
+
+    >>> shift = mean_difference_interval(np.array([0.0, 1.0, 2.0]), np.array([10.0, 11.0, 12.0]))
+    >>> shift.estimate, round(shift.low, 2), round(shift.high, 2)
+    (10.0, 7.73, 12.27)
+    """
+    from scipy.special import stdtrit
+
+    estimate = float(np.mean(b) - np.mean(a))
+    if min(len(a), len(b)) < 2:
+        return Interval(estimate, math.nan, math.nan)
+    squares = [float(np.var(side, ddof=1)) / len(side) for side in (a, b)]
+    total = sum(squares)
+    if total == 0.0:
+        return Interval(estimate, estimate, estimate)
+    freedom = total**2 / sum(s**2 / (len(side) - 1) for s, side in zip(squares, (a, b), strict=True))
+    half = float(stdtrit(freedom, 0.5 + confidence / 2.0)) * math.sqrt(total)
+    return Interval(estimate, estimate - half, estimate + half)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from agvbench.statistics.quantities import COMPONENTS, Quantity
-from agvbench.statistics.runs import valid
+from agvbench.statistics.run_errors import valid
 from agvbench.types import Floats
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from agvbench.statistics.share import Share
+from agvbench.statistics.proportion import Share
 from agvbench.workflows.challenge_trial import Trial
 
 _Z = 1.959963984540054

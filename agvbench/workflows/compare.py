@@ -10,7 +10,7 @@ from agvbench.campaign import Campaign
 from agvbench.errors import FlagError
 from agvbench.statistics import Comparison, Verdict, compare, pose_errors
 from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
-from agvbench.statistics.comparison_json import comparison_to_json
+from agvbench.statistics.comparison_summary import comparison_to_json
 from agvbench.statistics.quantities import END_POSE, QUANTITIES
 from agvbench.workflows.comparability import NOTHING_KNOWN, Comparability
 from agvbench.workflows.writing import write_file

@@ -17,7 +17,7 @@ from agvbench.errors import FitError
 from agvbench.model import VehicleModel
 from agvbench.planning import Departure
 from agvbench.planning.resting import rest_poses
-from agvbench.statistics.rest import end_pose, start_pose
+from agvbench.statistics.rest_poses import end_pose, start_pose
 from agvbench.types import Floats, Pose, Run
 
 FEWEST = 3

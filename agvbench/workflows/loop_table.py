@@ -11,7 +11,7 @@ import numpy as np
 
 from agvbench.statistics.equivalence import Bias, Equivalence, equivalences
 from agvbench.statistics.quantities import COMPONENTS, DISTANCE, POSITION, Quantity
-from agvbench.statistics.runs import valid
+from agvbench.statistics.run_errors import valid
 from agvbench.types import CONDITIONS
 
 if TYPE_CHECKING:

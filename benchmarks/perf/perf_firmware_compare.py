@@ -26,7 +26,7 @@ from firmware_vehicle import believed
 from agvbench.campaign import Campaign
 from agvbench.planning import load_trajectory, plan
 from agvbench.statistics import pose_errors
-from agvbench.statistics.published import CASES, published_end_poses
+from agvbench.statistics.end_poses import CASES, published_end_poses
 from agvbench.types import Commands, Floats, Pose
 
 if TYPE_CHECKING:

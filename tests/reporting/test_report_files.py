@@ -17,7 +17,7 @@ from agvbench.reporting.content import Column, plain
 from agvbench.reporting.csv_table import frame_to_csv
 from agvbench.reporting.sections.diagnosis import DiagnosisSection
 from agvbench.reporting.sections.provenance import Provenance
-from agvbench.statistics.rest import start_pose
+from agvbench.statistics.rest_poses import start_pose
 
 VOID = {"meta", "link", "br", "img", "hr", "input", "path", "use", "rect"}
 

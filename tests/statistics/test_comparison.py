@@ -9,10 +9,9 @@ from statistics_samples import TARGETS, error_table
 
 from agvbench.errors import FlagError, InputError
 from agvbench.statistics import Verdict, compare
-from agvbench.statistics.comparison_json import comparison_to_json
+from agvbench.statistics.comparison_summary import comparison_to_json, describe, headline
 from agvbench.statistics.differences import ALL
 from agvbench.statistics.quantities import QUANTITIES
-from agvbench.statistics.words import describe, headline
 
 PAIRS = 200
 

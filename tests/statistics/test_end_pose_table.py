@@ -5,8 +5,8 @@ import pytest
 from statistics_samples import TARGETS, error_table
 
 from agvbench.statistics import end_pose_table
-from agvbench.statistics.outliers import classify_outliers
-from agvbench.statistics.published import CASES, published_end_poses, thesis_case
+from agvbench.statistics.descriptive import classify_outliers
+from agvbench.statistics.end_poses import CASES, published_end_poses, thesis_case
 from agvbench.types import Pose
 
 

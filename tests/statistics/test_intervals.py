@@ -11,10 +11,15 @@ from statistics_samples import error_table
 
 from agvbench.statistics import bias_and_spread
 from agvbench.statistics.bootstrap import average_difference_interval, median_difference_interval, median_interval
-from agvbench.statistics.multiplicity import can_speak, holm, holm_of_those_that_can_speak
-from agvbench.statistics.power import fewest_repeats, smallest_visible_difference
-from agvbench.statistics.rank_test import rank_test
-from agvbench.statistics.spread import spread
+from agvbench.statistics.hypothesis_tests import (
+    can_speak,
+    fewest_repeats,
+    holm,
+    holm_of_those_that_can_speak,
+    rank_test,
+    smallest_visible_difference,
+)
+from agvbench.statistics.repeatability import spread
 
 NOISES = {
     "normal": lambda rng, size: rng.normal(size=size),

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from agvbench.statistics.rank_test import rank_test
+from agvbench.statistics.hypothesis_tests import rank_test
 
 small = st.lists(st.integers(0, 6).map(float), min_size=1, max_size=5)
 

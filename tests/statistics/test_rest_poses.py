@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from statistics_samples import make_run
 
 from agvbench.errors import FitError
-from agvbench.statistics.rest import end_pose, start_pose
+from agvbench.statistics.rest_poses import end_pose, start_pose
 from agvbench.types import Frames, Pose, wrap_angle
 
 START, END = (0.3, -0.2, 3.1), (2.3, -0.1, 3.3)

@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import beta
 
 from agvbench.errors import FlagError
-from agvbench.statistics.share import Share
+from agvbench.statistics.proportion import Share
 from agvbench.workflows.challenge import run_challenge
 from agvbench.workflows.challenge_scores import QUESTIONS, coverings, score
 from agvbench.workflows.challenge_trial import Trial

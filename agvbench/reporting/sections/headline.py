@@ -10,9 +10,9 @@ import numpy as np
 from agvbench.reporting.content import Block, Bullets, Paragraph, plain, plain_sentences
 from agvbench.reporting.sections.base import Section
 from agvbench.statistics import Comparison, Difference, Verdict, valid
+from agvbench.statistics.comparison_summary import describe, note_of
 from agvbench.statistics.differences import ALL
 from agvbench.statistics.quantities import DEFINITIONS, QUANTITIES
-from agvbench.statistics.words import describe, note_of
 from agvbench.workflows.report import ReportData
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph
 from agvbench.reporting.figures.strips import Strip, draw_strips
 from agvbench.reporting.sections.base import Section
 from agvbench.statistics import valid
-from agvbench.statistics.published import CASES
+from agvbench.statistics.end_poses import CASES
 from agvbench.statistics.quantities import HEADING, QUANTITIES, ROTATION, Quantity
 from agvbench.workflows.report import ReportData
 

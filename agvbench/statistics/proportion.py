@@ -1,4 +1,4 @@
-"""A share of outcomes with its exact bounds."""
+"""A proportion of outcomes with its exact confidence bounds."""
 
 from __future__ import annotations
 

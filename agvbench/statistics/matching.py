@@ -1,4 +1,4 @@
-"""What two sets of runs have in common: cells of one trajectory (and condition), split by session where shared."""
+"""Match two sets of runs: cells of one trajectory (and condition), split by session where shared."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from agvbench.errors import InputError
 from agvbench.statistics.quantities import ACROSS, ALONG, QUANTITIES, Quantity
-from agvbench.statistics.runs import valid
+from agvbench.statistics.run_errors import valid
 from agvbench.types import Floats
 
 if TYPE_CHECKING:

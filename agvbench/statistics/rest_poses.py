@@ -1,4 +1,4 @@
-"""Where the vehicle rested: poses before the first command and after the stop, from noisy frames.
+"""Rest poses: poses before the first command and after the stop, estimated from noisy frames.
 
 Frames may be untracked, doubled, late or wildly wrong. Both poses are means over a window at rest after
 outlying frames have been left out, with the standard error of that mean. The standard errors assume that the

@@ -12,7 +12,7 @@ import numpy as np
 from agvbench.signals import robust_std
 from agvbench.statistics.bootstrap import Interval, median_interval
 from agvbench.statistics.end_poses import in_order
-from agvbench.statistics.runs import valid
+from agvbench.statistics.run_errors import valid
 from agvbench.types import Floats
 
 if TYPE_CHECKING:
