@@ -1,22 +1,22 @@
 """From measured runs to static maps."""
 
 from agvbench.calibration.arc_samples import CALIBRATION_EXPERIMENTS
-from agvbench.calibration.axles import axle_angles_from_arc, axle_angles_from_curvature
 from agvbench.calibration.calibrate import Calibration, calibrate
-from agvbench.calibration.circle import CircleFit, CircleFits, fit_circle, fit_circles
-from agvbench.calibration.frames import FrameQuality, clean_frames, inspect_frames
 from agvbench.calibration.identification import Identification, PoseNoise, identify
-from agvbench.calibration.map_fit import LeftOut, MapFit
-from agvbench.calibration.map_fits import (
+from agvbench.calibration.maps.map_fit import LeftOut, MapFit
+from agvbench.calibration.maps.selection import (
     compare_maps,
     drive_fitters,
     fit_drive_map,
     fit_steering_map,
     steering_fitters,
 )
-from agvbench.calibration.measure import RunMeasurement, measure_run
-from agvbench.calibration.points import CurvePoints
+from agvbench.calibration.measurement.axle_angles import axle_angles_from_arc, axle_angles_from_curvature
+from agvbench.calibration.measurement.circle import CircleFit, CircleFits, fit_circle, fit_circles
+from agvbench.calibration.measurement.frames import FrameQuality, clean_frames, inspect_frames
+from agvbench.calibration.measurement.run_measurement import RunMeasurement, measure_run
 from agvbench.calibration.quaternion import quaternion_to_heading
+from agvbench.calibration.samples import CurvePoints
 
 __all__ = [
     "CALIBRATION_EXPERIMENTS",

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
-from agvbench.calibration.measure import RunMeasurement, measure_run
+from agvbench.calibration.measurement.run_measurement import RunMeasurement, measure_run
 from agvbench.calibration.samples import Role, Sample
 from agvbench.errors import FitError
 from agvbench.types import Run

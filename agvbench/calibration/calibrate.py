@@ -9,10 +9,11 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 from agvbench.calibration.arc_samples import CALIBRATION_EXPERIMENTS, arc_samples, described, measure_runs
-from agvbench.calibration.end_stops_fit import saturated
+from agvbench.calibration.campaign_protocol import CampaignLike, HeaderLike
 from agvbench.calibration.free_driving import FreeDriving, read_free_driving
-from agvbench.calibration.map_fit import MapFit, judge, rounded
-from agvbench.calibration.map_fits import (
+from agvbench.calibration.maps.end_stops import saturated
+from agvbench.calibration.maps.map_fit import MapFit, judge, rounded
+from agvbench.calibration.maps.selection import (
     DRIVE_KINDS,
     STEERING_KINDS,
     compare_maps,
@@ -20,9 +21,7 @@ from agvbench.calibration.map_fits import (
     preferred,
     steering_fitters,
 )
-from agvbench.calibration.points import CurvePoints
-from agvbench.calibration.samples import ROLES, Role, Sample, points_of
-from agvbench.calibration.source import CampaignLike, HeaderLike
+from agvbench.calibration.samples import ROLES, CurvePoints, Role, Sample, points_of
 from agvbench.errors import FitError, InputError
 from agvbench.model import VehicleModel
 from agvbench.types import Run

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.calibration.map_fit import r_squared, rounded
+from agvbench.calibration.maps.map_fit import r_squared, rounded
 from agvbench.errors import FitError
 from agvbench.signals import robust_std
 from agvbench.types import Floats

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.calibration.campaign_protocol import HeaderLike
 from agvbench.calibration.drive_regression import DriveData, DriveRegression, regress_drive
+from agvbench.calibration.measurement.windows import WINDOW_S, Windows, command_spread, held_command, measured_windows
 from agvbench.calibration.samples import Role, Sample
-from agvbench.calibration.source import HeaderLike
-from agvbench.calibration.windows import WINDOW_S, Windows, command_spread, held_command, measured_windows
 from agvbench.errors import FitError
 from agvbench.types import Floats, Run
 from agvbench.vehicle.geometry import Geometry

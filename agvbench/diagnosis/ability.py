@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from agvbench.calibration.source import HeaderLike
+from agvbench.calibration.campaign_protocol import HeaderLike
 from agvbench.diagnosis.plausibility import refuse_clocks
 from agvbench.diagnosis.provenance import refuse_nothing
 from agvbench.diagnosis.reading import Readings

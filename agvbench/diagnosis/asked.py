@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agvbench.calibration.source import HeaderLike
+from agvbench.calibration.campaign_protocol import HeaderLike
 from agvbench.diagnosis.provenance import provenance
 from agvbench.diagnosis.reading import Readings
 from agvbench.diagnosis.result import Diagnosis, Verdict

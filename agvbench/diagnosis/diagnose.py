@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from agvbench.calibration import RunMeasurement, measure_run
-from agvbench.calibration.source import CampaignLike
+from agvbench.calibration.campaign_protocol import CampaignLike
 from agvbench.diagnosis.ability import cannot_tell
 from agvbench.diagnosis.asked import Asked
 from agvbench.diagnosis.batch import Batch

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from agvbench.calibration.source import HeaderLike
+from agvbench.calibration.campaign_protocol import HeaderLike
 from agvbench.diagnosis.candidates import candidates
 from agvbench.diagnosis.next_experiment import pin, separate
 from agvbench.diagnosis.next_experiment_pins import unpinned

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from agvbench.calibration.source import HeaderLike
+from agvbench.calibration.campaign_protocol import HeaderLike
 from agvbench.diagnosis.reading import Readings
 from agvbench.errors import CampaignError
 

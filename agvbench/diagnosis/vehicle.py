@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from agvbench.calibration.source import HeaderLike
+from agvbench.calibration.campaign_protocol import HeaderLike
 from agvbench.diagnosis.fitting import Fit
 from agvbench.diagnosis.levels import FreeMaps
 from agvbench.effects import Effect, effect_kinds

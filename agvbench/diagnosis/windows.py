@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.calibration import inspect_frames
-from agvbench.calibration.source import HeaderLike
+from agvbench.calibration.campaign_protocol import HeaderLike
 from agvbench.diagnosis.resting import frame_noise, rests
 from agvbench.model.simulation_loop import LATELY_S
 from agvbench.statistics.rest_poses import SPEED_LIMIT_MPS

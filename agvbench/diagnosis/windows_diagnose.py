@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.calibration.source import HeaderLike
+from agvbench.calibration.campaign_protocol import HeaderLike
 from agvbench.diagnosis.asked import Asked
 from agvbench.diagnosis.batch import Batch
 from agvbench.diagnosis.candidates import given_effects

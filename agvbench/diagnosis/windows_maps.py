@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from agvbench.calibration.windows import held_command
+from agvbench.calibration.measurement.windows import held_command
 from agvbench.diagnosis.levels import ROLES, FreeMaps, free_maps
 from agvbench.diagnosis.reading import Readings
 from agvbench.types import Floats, Run

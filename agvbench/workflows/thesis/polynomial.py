@@ -7,7 +7,7 @@ from dataclasses import astuple, dataclass
 import numpy as np
 
 from agvbench.calibration import CurvePoints
-from agvbench.calibration.polynomial_fits import fit_cubic, fit_line
+from agvbench.calibration.maps.polynomial import fit_cubic, fit_line
 from agvbench.types import Floats
 from agvbench.vehicle.maps import Cubic, Line
 

@@ -1,4 +1,4 @@
-"""What a fit of a static map says about itself."""
+"""The result of a fit of a static map: residuals, R², points left out."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.calibration.points import CurvePoints
+from agvbench.calibration.samples import CurvePoints
 from agvbench.errors import FitError
 from agvbench.types import Floats
 from agvbench.vehicle.maps import StaticMap

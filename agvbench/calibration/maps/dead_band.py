@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agvbench.calibration.map_fit import MapFit, judge, require_points, rounded
-from agvbench.calibration.points import CurvePoints
+from agvbench.calibration.maps.map_fit import MapFit, judge, require_points, rounded
+from agvbench.calibration.samples import CurvePoints
 from agvbench.errors import FitError
 from agvbench.types import Floats
 from agvbench.vehicle.maps import DeadBandWithSaturation

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.calibration.map_fit import LeftOut, MapFit, judge, require_points, rounded, without
-from agvbench.calibration.points import CurvePoints
-from agvbench.calibration.polynomial_fits import polynomial
+from agvbench.calibration.maps.map_fit import LeftOut, MapFit, judge, require_points, rounded, without
+from agvbench.calibration.maps.polynomial import polynomial
+from agvbench.calibration.samples import CurvePoints
 from agvbench.errors import FitError
 from agvbench.signals import robust_std
 from agvbench.types import Floats

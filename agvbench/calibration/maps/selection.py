@@ -1,4 +1,4 @@
-"""Fit the map of a steered axle or of the drive: one kind, the thesis' way, or whichever predicts best."""
+"""Select the map of a steered axle or of the drive: one kind, the thesis' way, or by cross-validation."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from agvbench.calibration.dead_band_fit import fit_dead_band
-from agvbench.calibration.end_stops_fit import fit_line_with_end_stops
-from agvbench.calibration.map_fit import MapFit
-from agvbench.calibration.points import CurvePoints
-from agvbench.calibration.polynomial_fits import fit_cubic, fit_line
-from agvbench.calibration.refined_fit import fit_refined
-from agvbench.calibration.table_fit import fit_monotone_table
+from agvbench.calibration.maps.dead_band import fit_dead_band
+from agvbench.calibration.maps.end_stops import fit_line_with_end_stops
+from agvbench.calibration.maps.map_fit import MapFit
+from agvbench.calibration.maps.polynomial import fit_cubic, fit_line
+from agvbench.calibration.maps.table import fit_monotone_table, fit_refined
+from agvbench.calibration.samples import CurvePoints
 from agvbench.errors import FitError, InputError
 
 Fitter = Callable[[CurvePoints], MapFit]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.calibration import _circle_kernel as kernel
+from agvbench.calibration.measurement import _circle_kernel as kernel
 from agvbench.errors import FitError
 from agvbench.signals import robust_std
 from agvbench.types import Floats

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from agvbench.calibration import _circle_kernel as kernel
+from agvbench.calibration.measurement import _circle_kernel as kernel
 from agvbench.errors import InputError, NotAnArcError
 from agvbench.types import Floats
 

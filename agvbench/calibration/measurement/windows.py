@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from agvbench.calibration.frames import clean_frames
+from agvbench.calibration.measurement.frames import clean_frames
 from agvbench.types import Commands, Floats, Run
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.kinematics import axle_angles

@@ -1,4 +1,4 @@
-"""What calibration asks of a campaign: its header and its runs, wherever they are kept."""
+"""The protocol of a campaign for calibration: its header and its runs, wherever they are kept."""
 
 from __future__ import annotations
 

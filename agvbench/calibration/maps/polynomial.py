@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from agvbench.calibration.map_fit import MapFit, judge, require_points, rounded, without
-from agvbench.calibration.points import CurvePoints
+from agvbench.calibration.maps.map_fit import MapFit, judge, require_points, rounded, without
+from agvbench.calibration.samples import CurvePoints
 from agvbench.errors import FitError, VehicleError
 from agvbench.types import Floats
 from agvbench.vehicle.maps import Cubic, Line

@@ -1,0 +1,1 @@
+"""Fits of static maps, one file for each family, and the selection among them."""
