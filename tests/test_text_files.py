@@ -18,7 +18,7 @@ from agvbench.campaign.tables.csv_text import read_csv_text
 from agvbench.campaign.tables.parquet import read_parquet
 from agvbench.errors import AgvbenchError, FileError
 from agvbench.model import VehicleModel
-from agvbench.planning.reading import load_trajectory
+from agvbench.planning.trajectories.loading import load_trajectory
 from agvbench.running.remainders import read_remainders
 from agvbench.running.settings import BenchSettings
 from agvbench.text_files import MAX_BYTES, MAX_DEPTH, read_json, read_text, read_toml

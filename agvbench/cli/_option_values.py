@@ -17,7 +17,7 @@ def check_values(options: Mapping[str, Any]) -> None:
     AgvbenchError
         If a value cannot be used, or a vehicle file or a trajectory is not there.
     """
-    from agvbench.planning.reading import driven_trajectories, load_trajectory
+    from agvbench.planning.trajectories.loading import driven_trajectories, load_trajectory
     from agvbench.planning.workspace import Workspace
     from agvbench.running.settings import BenchSettings
 

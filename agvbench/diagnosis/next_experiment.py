@@ -22,7 +22,7 @@ from agvbench.diagnosis.next_experiment_result import NextExperiment, Proposal
 from agvbench.diagnosis.next_experiment_rivals import Rival, rival_models
 from agvbench.diagnosis.next_experiment_search import LEAST_REPEATS, Search
 from agvbench.planning import Trajectory, Workspace
-from agvbench.planning.shapes import CommandTable
+from agvbench.planning.trajectories.shapes import CommandTable
 from agvbench.types import CommandUnit, Floats
 
 DECISIVE = 40.0

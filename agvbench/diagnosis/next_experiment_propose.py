@@ -17,7 +17,7 @@ from agvbench.diagnosis.result import Diagnosis, Verdict
 from agvbench.diagnosis.selection import Selection
 from agvbench.errors import AgvbenchError
 from agvbench.planning import Trajectory, Workspace
-from agvbench.planning.shapes import Slalom
+from agvbench.planning.trajectories.shapes import Slalom
 from agvbench.vehicle.geometry import Geometry
 
 

@@ -9,9 +9,11 @@
 `corrected_plan` changes steering and durations until the model comes to rest on the target.
 """
 
-from agvbench.planning.corrected import NOTHING_LEFT, CorrectedPlan, Correction, corrected_plan, depends_on_time
+from agvbench.planning.correction import NOTHING_LEFT, CorrectedPlan, Correction, corrected_plan, depends_on_time
+from agvbench.planning.dry_runs import DryRun, DryRunRow, dry_run
+from agvbench.planning.end_pose_prediction import Departure, Miss
 from agvbench.planning.planner import Plan, place, plan
-from agvbench.planning.reading import (
+from agvbench.planning.trajectories.loading import (
     THE_EIGHT,
     driven_trajectories,
     list_trajectories,
@@ -19,9 +21,7 @@ from agvbench.planning.reading import (
     own_trajectories,
     trajectory_from_table,
 )
-from agvbench.planning.resting import Departure, Miss
-from agvbench.planning.summary import DryRun, DryRunRow, dry_run
-from agvbench.planning.trajectory import Trajectory, steered
+from agvbench.planning.trajectories.trajectory import Trajectory, steered
 from agvbench.planning.workspace import Workspace
 
 __all__ = [

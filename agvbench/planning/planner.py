@@ -1,4 +1,4 @@
-"""From a trajectory and a vehicle model to timed commands, before anything moves."""
+"""From a trajectory (or raw commands) and a vehicle model to timed commands, before anything moves."""
 
 from __future__ import annotations
 
@@ -7,13 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from agvbench.errors import PlanError, VehicleError
+from agvbench.errors import PlanError, UnsuitedVehicleError, VehicleError
 from agvbench.model import VehicleModel
-from agvbench.planning import raw
-from agvbench.planning.legs import Leg, legs_of
-from agvbench.planning.motion import end_pose, sample, swept
-from agvbench.planning.placing import best_start, check_fits, does_not_fit
-from agvbench.planning.trajectory import Trajectory
+from agvbench.planning.legs import Leg, end_pose, legs_of, sample, swept
+from agvbench.planning.placement import best_start, check_fits, does_not_fit
+from agvbench.planning.trajectories.shapes import CommandTable
+from agvbench.planning.trajectories.trajectory import Trajectory
 from agvbench.planning.workspace import Workspace
 from agvbench.types import Command, Commands, Floats, Pose
 from agvbench.vehicle.geometry import Geometry
@@ -104,7 +103,7 @@ def plan(
 def _made(trajectory: Trajectory, model: VehicleModel) -> Plan:
     """Return the plan that starts at the floor's origin."""
     if trajectory.commands is not None:
-        commands, legs = raw.commands_and_legs(trajectory, model)
+        commands, legs = commands_and_legs(trajectory, model)
     else:
         legs = legs_of(trajectory, model)
         commands = commands_of(legs, model)
@@ -156,7 +155,7 @@ def commands_of(legs: Sequence[Leg], model: VehicleModel) -> Commands:
             rows.append((t, command))
         t += leg.duration_s
     rows.append((t, rows[-1][1]._replace(drive=model.neutral)))
-    return raw.from_rows([(at, *command) for at, command in rows])
+    return commands_from_rows([(at, *command) for at, command in rows])
 
 
 def _command(leg: Leg, model: VehicleModel) -> Command:
@@ -171,3 +170,62 @@ def _command(leg: Leg, model: VehicleModel) -> Command:
         ) from None
     # Neutral is what the drive's electronics take for a stop; a fitted map need not be zero there.
     return command._replace(drive=model.neutral) if leg.is_rest else command
+
+
+Row = tuple[float, float, float, float]
+_UNIT_RANGE = {"us": (500.0, 2500.0), "normalised": (-1.0, 1.0)}
+"""What may be commanded at all: beyond 500 to 2500 µs servos run against their stops."""
+
+
+def commands_from_rows(rows: Sequence[Row]) -> Commands:
+    """Return commands from rows of t_s, drive, front, rear."""
+    t, drive, front, rear = np.array(rows, dtype=np.float64).T.copy()
+    return Commands(t, drive, front, rear)
+
+
+def commands_and_legs(trajectory: Trajectory, model: VehicleModel) -> tuple[Commands, list[Leg]]:
+    """Return a trajectory's own commands with the stop behind them, and the legs that they drive.
+
+    Raises
+    ------
+    PlanError
+        If they are in another unit than the vehicle's, or beyond what may be commanded in it.
+    """
+    table = trajectory.commands
+    assert table is not None  # noqa: S101 - only called for raw commands
+    _check(table, trajectory.name, model)
+    *_, front, rear = table.rows[-1]
+    commands = commands_from_rows([*table.rows, (table.duration_s, model.neutral, front, rear)])
+    fronts, rears = model.axle_angles(commands.front, commands.rear)
+    speeds = model.speed(commands.drive)
+    legs = [
+        Leg(
+            f"{trajectory.name}: commands.rows[{i}]",
+            float(fronts[i]),
+            float(rears[i]),
+            0.0 if drive == model.neutral else float(speeds[i]),
+            float(commands.t_s[i + 1] - commands.t_s[i]),
+        )
+        for i, drive in enumerate(commands.drive[:-1])
+    ]
+    return commands, legs
+
+
+def _check(table: CommandTable, name: str, model: VehicleModel) -> None:
+    if table.unit != model.command_unit:
+        raise UnsuitedVehicleError(
+            "commands are in another unit than the vehicle's",
+            where=f"{name}: commands.unit",
+            value=table.unit,
+            limit=model.command_unit,
+        )
+    low, high = _UNIT_RANGE[table.unit]
+    for i, row in enumerate(table.rows):
+        for column, value in zip(("drive", "front", "rear"), row[1:], strict=True):
+            if not low <= value <= high:
+                raise PlanError(
+                    f"{column} command is out of range",
+                    where=f"{name}: commands.rows[{i}]",
+                    value=f"{value:g}",
+                    limit=f"{low:g} to {high:g}",
+                )

@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 
 from agvbench.errors import PlanError
-from agvbench.planning.segments import Steering
+from agvbench.planning.trajectories.segments import Steering
 from agvbench.vehicle.geometry import Geometry
 
 _SQUARE = math.radians(89.0)

@@ -60,7 +60,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> Generator[None]:
     """
     is_benchmark = metafunc.definition.getparent(BenchModule) is not None
     if is_benchmark and metafunc.definition.get_closest_marker(TRAJECTORIES):
-        from agvbench.planning.reading import driven_trajectories
+        from agvbench.planning.trajectories.loading import driven_trajectories
 
         metafunc.parametrize("trajectory", driven_trajectories(_settings(metafunc.config).trajectories))
     yield

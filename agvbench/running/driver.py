@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from agvbench.errors import FlagError, PlanError
 from agvbench.planning import Plan, Trajectory
-from agvbench.planning.shapes import CommandTable
+from agvbench.planning.trajectories.shapes import CommandTable
 from agvbench.running.constant import falling, held
 from agvbench.running.records import DriveOrder
 from agvbench.types import CONDITIONS, Commands, CommandUnit, Run

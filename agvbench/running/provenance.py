@@ -17,7 +17,7 @@ from agvbench.campaign import CampaignWriter
 from agvbench.campaign.manifest import Manifest, sha256
 from agvbench.campaign.tables.parquet import read_parquet
 from agvbench.errors import FileError
-from agvbench.planning.reading import trajectory_file
+from agvbench.planning.trajectories.loading import trajectory_file
 from agvbench.running.benchmark_files import find_benchmark
 from agvbench.running.settings import BenchSettings
 

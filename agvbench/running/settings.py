@@ -12,7 +12,7 @@ from typing import Any, get_args
 import tomli_w
 
 from agvbench.errors import FileError, FlagError
-from agvbench.planning.segments import Steering
+from agvbench.planning.trajectories.segments import Steering
 from agvbench.running.supervision.limits import DEFAULT_SAFETY
 from agvbench.text_files import read_toml
 

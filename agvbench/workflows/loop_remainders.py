@@ -16,7 +16,7 @@ from agvbench.campaign.campaign import session_starts
 from agvbench.errors import FitError
 from agvbench.model import VehicleModel
 from agvbench.planning import Departure
-from agvbench.planning.resting import rest_poses
+from agvbench.planning.end_pose_prediction import rest_poses
 from agvbench.statistics.rest_poses import end_pose, start_pose
 from agvbench.types import Floats, Pose, Run
 

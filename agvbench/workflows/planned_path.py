@@ -12,7 +12,7 @@ from agvbench.campaign import CampaignHeader
 from agvbench.errors import AgvbenchError, FitError
 from agvbench.model import VehicleModel, thesis_vehicle
 from agvbench.planning import Plan, load_trajectory, plan, steered
-from agvbench.planning.trajectory import TRAJECTORY_NAME
+from agvbench.planning.trajectories.trajectory import TRAJECTORY_NAME
 from agvbench.statistics.rest_poses import start_pose
 from agvbench.types import Floats, Pose, Run
 from agvbench.vehicle.geometry import Geometry

@@ -9,9 +9,9 @@ import msgspec
 import pytest
 
 from agvbench.planning import Workspace, plan, trajectory_from_table
-from agvbench.planning import segments as segment_module
-from agvbench.planning import shapes as shape_module
-from agvbench.planning.trajectory import SHAPES, Trajectory
+from agvbench.planning.trajectories import segments as segment_module
+from agvbench.planning.trajectories import shapes as shape_module
+from agvbench.planning.trajectories.trajectory import SHAPES, Trajectory
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = [DOCS / "reference" / "trajectories.md", DOCS / "how-to" / "write-a-trajectory.md"]

@@ -8,8 +8,8 @@ import tomli_w
 
 from agvbench.errors import FileError
 from agvbench.planning import list_trajectories, load_trajectory, trajectory_from_table
-from agvbench.planning.reading import trajectory_files
-from agvbench.planning.trajectory import SHAPES
+from agvbench.planning.trajectories.loading import trajectory_files
+from agvbench.planning.trajectories.trajectory import SHAPES
 from agvbench.types import NO_TARGET
 
 STRAIGHT = 'schema = 1\nname = "{name}"\n[[segments]]\nkind = "straight"\nlength_m = {length}\n'

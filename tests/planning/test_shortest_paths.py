@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from ompl import base as ompl_base
 
 from agvbench.errors import PlanError
-from agvbench.planning import dubins, reeds_shepp
-from agvbench.planning.paths import end_of, length_of
+from agvbench.planning.shortest_paths import dubins, reeds_shepp
+from agvbench.planning.shortest_paths.pieces import end_of, length_of
 from agvbench.types import Pose
 
 PLANNERS = {

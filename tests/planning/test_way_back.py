@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from agvbench.errors import PlanError
 from agvbench.planning import Workspace
-from agvbench.planning.paths import end_of, length_of
-from agvbench.planning.reeds_shepp import paths_by_length, shortest_path
-from agvbench.planning.way_back import GearLeg, Guided, way_back
+from agvbench.planning.shortest_paths.pieces import end_of, length_of
+from agvbench.planning.shortest_paths.reeds_shepp import paths_by_length, shortest_path
+from agvbench.planning.shortest_paths.return_path import GearLeg, Guided, way_back
 from agvbench.types import Pose, wrap_angle
 from agvbench.vehicle.geometry import Geometry
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from agvbench.errors import InputError, PlanError
 from agvbench.planning import Workspace, place, plan, trajectory_from_table
-from agvbench.planning.placing import best_start
+from agvbench.planning.placement import best_start
 from agvbench.types import Pose
 
 SQUARE = [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)]

@@ -17,7 +17,7 @@ from agvbench.campaign import Campaign
 from agvbench.campaign.completeness import Completeness
 from agvbench.errors import CampaignError, FileError, FlagError, LinkError, PlanError
 from agvbench.model import VehicleModel, example_path, thesis_vehicle
-from agvbench.planning.reading import trajectory_file
+from agvbench.planning.trajectories.loading import trajectory_file
 from agvbench.running.benchmark_files import benchmark_name, find_benchmark
 from agvbench.running.calibrating import VEHICLE_FILE
 from agvbench.running.directory import shown

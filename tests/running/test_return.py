@@ -15,7 +15,7 @@ from agvbench.adapters import open_rig
 from agvbench.errors import AgvbenchError, PlacingError, SafetyStopError
 from agvbench.model import VehicleModel, nominal_model, thesis_vehicle
 from agvbench.planning import Workspace
-from agvbench.planning.way_back import GearLeg
+from agvbench.planning.shortest_paths.return_path import GearLeg
 from agvbench.running.returning.follower import Follower
 from agvbench.running.returning.returner import Returner
 from agvbench.running.supervision import Supervisor

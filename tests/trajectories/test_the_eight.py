@@ -8,7 +8,7 @@ import pytest
 
 from agvbench.model import nominal_model, thesis_vehicle
 from agvbench.planning import list_trajectories, load_trajectory, plan
-from agvbench.planning.reading import trajectory_files
+from agvbench.planning.trajectories.loading import trajectory_files
 from agvbench.vehicle.geometry import Geometry
 
 TARGETS = {  # thesis section 8.2: m, m, degrees

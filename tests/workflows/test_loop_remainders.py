@@ -8,8 +8,8 @@ import pytest
 from agvbench.effects import SteeringLag
 from agvbench.model import thesis_vehicle
 from agvbench.planning import Departure, corrected_plan, load_trajectory
-from agvbench.planning.reading import trajectory_file
-from agvbench.planning.resting import coasting_path
+from agvbench.planning.end_pose_prediction import coasting_path
+from agvbench.planning.trajectories.loading import trajectory_file
 from agvbench.types import Frames, Pose, Run
 from agvbench.workflows.loop_plans import plans_of
 from agvbench.workflows.loop_remainders import remainders, shrunk

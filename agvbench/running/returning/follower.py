@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from agvbench.planning.way_back import STEP_M, GearLeg
+from agvbench.planning.shortest_paths.return_path import STEP_M, GearLeg
 from agvbench.types import Pose, wrap_angle
 
 _AHEAD_M = 0.3

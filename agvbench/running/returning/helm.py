@@ -8,8 +8,8 @@ import numpy as np
 
 from agvbench.errors import PlanError
 from agvbench.model import VehicleModel
-from agvbench.planning.segments import Steering
 from agvbench.planning.steering import centre_ahead
+from agvbench.planning.trajectories.segments import Steering
 from agvbench.running.constant import Shares
 from agvbench.types import Command
 from agvbench.vehicle.maps import StaticMap

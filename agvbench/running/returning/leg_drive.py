@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 
 from agvbench.errors import PlacingError
-from agvbench.planning.way_back import GearLeg, Guided
+from agvbench.planning.shortest_paths.return_path import GearLeg, Guided
 from agvbench.running.returning.follower import Follower, Guidance
 from agvbench.running.returning.habits import Habits
 from agvbench.running.returning.helm import Helm

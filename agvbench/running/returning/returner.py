@@ -7,7 +7,7 @@ import math
 from agvbench.errors import PlacingError, PlanError
 from agvbench.model import VehicleModel
 from agvbench.planning import Workspace
-from agvbench.planning.way_back import GearLeg, Guided, way_back
+from agvbench.planning.shortest_paths.return_path import GearLeg, Guided, way_back
 from agvbench.running.links import RunnerLink
 from agvbench.running.rest import is_at_rest, pose_before
 from agvbench.running.returning.aim import Aim

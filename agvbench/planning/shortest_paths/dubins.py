@@ -17,7 +17,7 @@ from typing import cast
 
 import numpy as np
 
-from agvbench.planning.paths import RESOLUTION, Piece, by_length, path_of, require_solvable
+from agvbench.planning.shortest_paths.pieces import RESOLUTION, Piece, by_length, path_of, require_solvable
 from agvbench.types import Floats, Pose
 
 WORDS = ("LSL", "RSR", "LSR", "RSL", "LRL", "RLR")

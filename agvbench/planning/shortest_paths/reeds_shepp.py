@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.planning.paths import RESOLUTION, Piece, by_length, path_of, require_solvable
+from agvbench.planning.shortest_paths.pieces import RESOLUTION, Piece, by_length, path_of, require_solvable
 from agvbench.types import Floats, Pose
 
 Complexes = NDArray[np.complex128]

@@ -8,9 +8,9 @@ from typing import Annotated, Literal, Protocol
 
 from msgspec import Meta, Struct
 
-from agvbench.planning import dubins, reeds_shepp
-from agvbench.planning.paths import Piece
-from agvbench.planning.segments import (
+from agvbench.planning.shortest_paths import dubins, reeds_shepp
+from agvbench.planning.shortest_paths.pieces import Piece
+from agvbench.planning.trajectories.segments import (
     Arc,
     AxleAngle,
     Direction,
@@ -18,14 +18,15 @@ from agvbench.planning.segments import (
     Length,
     Radius,
     Segment,
+    Speed,
     Straight,
     Turn,
     TurnAngle,
     alternating,
+    check_speed,
     exactly_one,
     from_pieces,
 )
-from agvbench.planning.speeds import Speed, check_speed
 from agvbench.types import CommandUnit, Pose
 
 Coordinate = Annotated[float, Meta(ge=-10_000.0, le=10_000.0)]

@@ -1,4 +1,4 @@
-"""Plans for a vehicle whose effects are known: commands that make up for them, and what they cannot make up for."""
+"""Plans for a vehicle with effects: commands that compensate them, and the error that remains."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ import numpy as np
 
 from agvbench.effects import Stage
 from agvbench.model import VehicleModel
-from agvbench.planning.legs import Leg, legs_of
-from agvbench.planning.motion import axles_swept
-from agvbench.planning.placing import check_fits
+from agvbench.planning.end_pose_prediction import Departure, Miss, coasting_path, rest_poses
+from agvbench.planning.legs import Leg, axles_swept, legs_of
+from agvbench.planning.placement import check_fits
 from agvbench.planning.planner import Plan, commands_of, plan
-from agvbench.planning.resting import Departure, Miss, coasting_path, rest_poses
 from agvbench.planning.shooting import shoot
-from agvbench.planning.trajectory import Trajectory
+from agvbench.planning.trajectories.trajectory import Trajectory
 from agvbench.planning.workspace import Workspace
 from agvbench.types import Commands, Floats, Pose
 

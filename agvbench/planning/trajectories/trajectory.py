@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Literal, cast
 import msgspec
 from msgspec import Meta, Struct
 
-from agvbench.planning.segments import Segment, Steering
-from agvbench.planning.shapes import (
+from agvbench.planning.trajectories.segments import Segment, Speed, Steering, check_speed
+from agvbench.planning.trajectories.shapes import (
     CommandTable,
     DubinsShape,
     Endurance,
@@ -20,7 +20,6 @@ from agvbench.planning.shapes import (
     SpeedSteps,
     StepSteer,
 )
-from agvbench.planning.speeds import Speed, check_speed
 from agvbench.types import NO_TARGET, Pose
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""From a failed msgspec validation to one line that says which key, what value, and what would be allowed."""
+"""Validation errors of trajectories: one line that says which key, what value, and what would be allowed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The way back to a start: a Reeds–Shepp path to a line that leads straight into it, inside the workspace.
+"""The path back to a start: Reeds–Shepp to a line that leads straight into it, inside the workspace.
 
 Small errors of a pose take manoeuvres of many pieces to remove exactly, and each piece makes errors of its own. So the
 last stretch is always a straight along which a controller has room to remove them: the path leads to its far end.
@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from agvbench.errors import PlanError
-from agvbench.planning.paths import Piece, length_of
-from agvbench.planning.reeds_shepp import paths_by_length
+from agvbench.planning.shortest_paths.pieces import Piece, length_of
+from agvbench.planning.shortest_paths.reeds_shepp import paths_by_length
 from agvbench.planning.workspace import Workspace
 from agvbench.types import Floats, Pose
 from agvbench.vehicle.geometry import Geometry

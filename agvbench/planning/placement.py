@@ -1,4 +1,4 @@
-"""Where on the floor to start, so that a path stays inside the workspace."""
+"""Placement of a path on the floor: a start pose from which it stays inside the workspace."""
 
 from __future__ import annotations
 

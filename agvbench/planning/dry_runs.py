@@ -1,4 +1,4 @@
-"""What a campaign would drive: how long, on how much floor, and what cannot be driven (a dry run)."""
+"""Dry runs: how long a campaign takes, how much floor it needs, and what cannot be driven."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from agvbench.errors import PlanError, UnsuitedVehicleError
 from agvbench.model import VehicleModel
-from agvbench.planning.corrected import corrected_plan
+from agvbench.planning.correction import corrected_plan
 from agvbench.planning.planner import Plan, plan
-from agvbench.planning.trajectory import Trajectory
+from agvbench.planning.trajectories.trajectory import Trajectory
 from agvbench.planning.workspace import DEFAULT_MARGIN_M, Workspace
 from agvbench.types import Pose
 

@@ -1,4 +1,4 @@
-"""Trajectories from TOML files: a lab's own, those that ship with agvbench, and tables from elsewhere.
+"""Load trajectories from TOML files: a lab's own, those that ship with agvbench, and tables from elsewhere.
 
 A name is looked for in the directory ``trajectories`` under the current one, which is where a lab keeps its own, and
 then among those that ship.
@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from agvbench.errors import FileError
-from agvbench.planning.trajectory import Trajectory
-from agvbench.planning.validation import convert, suggest
+from agvbench.planning.trajectories.toml_errors import convert, suggest
+from agvbench.planning.trajectories.trajectory import Trajectory
 from agvbench.resources import resource_directory
 from agvbench.text_files import read_toml
 

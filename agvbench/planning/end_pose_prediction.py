@@ -1,4 +1,4 @@
-"""Where a vehicle model comes to rest: the end of a run as the camera will see it, whatever effects the model has."""
+"""Predicted end poses: where a vehicle model comes to rest, as the camera sees it, whatever effects it has."""
 
 from __future__ import annotations
 

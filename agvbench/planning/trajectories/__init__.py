@@ -1,0 +1,1 @@
+"""Trajectories as users declare them: segments, shapes, and the TOML files that hold them."""
