@@ -9,8 +9,8 @@ from typing import TypeVar
 from agvbench.adapters.contract import AdapterOptions, AgvAdapter, MocapAdapter
 from agvbench.errors import AgvbenchError, LinkError
 from agvbench.registry import own_classes
-from agvbench.simulator.checked import explain
-from agvbench.simulator.loading import import_file
+from agvbench.simulator.checked_plant import explain
+from agvbench.simulator.plant_loading import import_file
 
 _Adapter = TypeVar("_Adapter", AgvAdapter, MocapAdapter)
 

@@ -1,9 +1,9 @@
 """Plants and sensor noise: an independent truth that shares no code with the vehicle model."""
 
 from agvbench.simulator.camera import Camera, Tracker
-from agvbench.simulator.checked import CheckedPlant
-from agvbench.simulator.contract import check_plant
-from agvbench.simulator.loading import CheckedFactory, load_plant
+from agvbench.simulator.checked_plant import CheckedPlant
+from agvbench.simulator.plant_contract import check_plant
+from agvbench.simulator.plant_loading import CheckedFactory, load_plant
 from agvbench.simulator.plants import make_plant, random_plant, small_plant
 
 CameraNoise = Camera  # the name by which adapters know it

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from agvbench.simulator.parameters import Battery, Body, Drive, DriveSide, Play, SimulatedVehicle, Steering
+from agvbench.simulator.vehicle_parameters import Battery, Body, Drive, DriveSide, Play, SimulatedVehicle, Steering
 from agvbench.types import PlantFactory
 
 if TYPE_CHECKING:
-    from agvbench.simulator.vehicle import VehiclePlant
+    from agvbench.simulator.vehicle_plant import VehiclePlant
 
 _DEG = math.pi / 180.0
 Draw = Callable[[float, float], float]
@@ -132,7 +132,7 @@ def random_plant(seed: int) -> VehiclePlant:
 
 
 def _plant(vehicle: SimulatedVehicle, seed: int) -> VehiclePlant:
-    from agvbench.simulator.vehicle import VehiclePlant  # loads numba
+    from agvbench.simulator.vehicle_plant import VehiclePlant  # loads numba
 
     return VehiclePlant(vehicle, seed)
 
@@ -192,4 +192,4 @@ def _random_side(full_mps: float, draw: Draw) -> DriveSide:
 PLANTS: Mapping[str, PlantFactory] = MappingProxyType(
     {"make_plant": make_plant, "random_plant": random_plant, "small_plant": small_plant}
 )
-"""Every plant that ships, by name: each inherits the whole contract (`agvbench.simulator.contract`)."""
+"""Every plant that ships, by name: each inherits the whole contract (`agvbench.simulator.plant_contract`)."""

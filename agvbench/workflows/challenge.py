@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 from agvbench.errors import AgvbenchError, FlagError, PlantError
 from agvbench.simulator.hidden import SealedTruth, sealed_truth, true_rivals
 from agvbench.simulator.hidden.catalogue import CATALOGUE, NOTHING, recipes
-from agvbench.simulator.hidden.drawing import vehicle_of
+from agvbench.simulator.hidden.sampling import vehicle_of
 from agvbench.workflows.challenge_file import known_trials, write_trials
 from agvbench.workflows.challenge_scores import Scores, score
 from agvbench.workflows.challenge_trial import Trial

@@ -18,9 +18,9 @@ from agvbench.model.simulated_run import SimulatedRun
 from agvbench.model.simulation import Simulation
 from agvbench.simulator.hidden import HiddenPlant
 from agvbench.simulator.hidden.constants import BASE
-from agvbench.simulator.hidden.drawing import make_hidden_plant, vehicle_of
-from agvbench.simulator.hidden.drives import path, reference_drives
 from agvbench.simulator.hidden.plant import TURNAROUND_S
+from agvbench.simulator.hidden.reference_drives import path, reference_drives
+from agvbench.simulator.hidden.sampling import make_hidden_plant, vehicle_of
 from agvbench.types import Commands
 from agvbench.vehicle.geometry import Geometry
 

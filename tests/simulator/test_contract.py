@@ -9,7 +9,7 @@ import pytest
 
 from agvbench.errors import PlantError
 from agvbench.simulator import check_plant
-from agvbench.simulator.contract import CLAUSES, subject_of
+from agvbench.simulator.plant_contract import CLAUSES, subject_of
 from agvbench.simulator.plants import PLANTS
 
 UNITS = {"small_plant": "normalised"}

@@ -7,7 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from agvbench.simulator import Camera, check_plant
-from agvbench.simulator.contract import CLAUSES
+from agvbench.simulator.plant_contract import CLAUSES
 from agvbench.simulator.plants import PLANTS
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -12,7 +12,7 @@ import pytest
 from thesis_check import EIGHT, FRONT_AXLE_M, NOMINAL, REAR_AXLE_M, ideal_maps, medians, steady_motion
 
 from agvbench.simulator.plants import THESIS_VEHICLE, make_plant, random_plant
-from agvbench.simulator.vehicle import VehiclePlant
+from agvbench.simulator.vehicle_plant import VehiclePlant
 
 # Medians of tables 7.1 and 7.2: the servo that is varied, over its pulse.
 PULSES = range(900, 2101, 100)

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 import agvbench.simulator
 from agvbench.errors import PlantError
 from agvbench.simulator import dynamics, make_plant, random_plant, small_plant
-from agvbench.simulator.parameters import flatten
 from agvbench.simulator.plants import SMALL_VEHICLE, THESIS_VEHICLE, random_vehicle
-from agvbench.simulator.vehicle import VehiclePlant
+from agvbench.simulator.vehicle_parameters import flatten
+from agvbench.simulator.vehicle_plant import VehiclePlant
 from agvbench.types import Plant, Pose
 
 pulses = st.floats(900.0, 2100.0)

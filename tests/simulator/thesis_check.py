@@ -108,9 +108,9 @@ def medians(plant: Plant, maps: Maps, full_mps: tuple[float, float], repeats: in
 def main() -> None:
     """Print simulated beside measured medians."""
     from agvbench.simulator import make_plant
-    from agvbench.simulator.parameters import Play
     from agvbench.simulator.plants import THESIS_VEHICLE
-    from agvbench.simulator.vehicle import VehiclePlant
+    from agvbench.simulator.vehicle_parameters import Play
+    from agvbench.simulator.vehicle_plant import VehiclePlant
 
     measured = {
         1: (83.03, 5.1, 5.9, 1.9), 2: (18.34, 3.4, 14.6, 2.3), 3: (math.nan, math.nan, 10.3, 2.2),

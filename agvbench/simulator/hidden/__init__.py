@@ -19,13 +19,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from agvbench.errors import PlantError
+from agvbench.simulator.hidden.base_vehicle import BaseVehicle, draw_vehicle
 from agvbench.simulator.hidden.catalogue import CATALOGUE, NOTHING, recipes
-from agvbench.simulator.hidden.drawing import drawn_spec, factory, make_hidden_plant
 from agvbench.simulator.hidden.plant import HiddenPlant
-from agvbench.simulator.hidden.rivals import true_rivals
-from agvbench.simulator.hidden.separation import Bench, Separation, separation
+from agvbench.simulator.hidden.sampling import drawn_spec, factory, make_hidden_plant
+from agvbench.simulator.hidden.separation import Bench, Separation, separation, true_rivals
 from agvbench.simulator.hidden.truth import HiddenEffect, SealedTruth
-from agvbench.simulator.hidden.vehicle import BaseVehicle, draw_vehicle
 
 __all__ = [
     "CATALOGUE",

@@ -1,5 +1,5 @@
 # mypy: warn-return-any=False
-"""The integrator of hidden plants, compiled: classical Runge-Kutta on a grid that begins anew with every command.
+"""The integrator of hidden plants, compiled: classical Runge-Kutta on a grid that restarts with every command.
 
 Steps end at grid points and whenever a command takes effect. A call that ends inside a step returns a partial step
 from its start and throws it away: how the time is split changes a result by rounding only.
@@ -14,14 +14,17 @@ import numpy as np
 from agvbench.compiled import cached_njit
 from agvbench.simulator.hidden import _actuators as actuators
 from agvbench.simulator.hidden import _body as body
-from agvbench.simulator.hidden import _sight as sight
 from agvbench.simulator.hidden.constants import (
     COMMAND_HIGH,
     COMMAND_LOW,
     DELAY_S,
     DRIVE_DELAY_SHARE,
     LATENCY_S,
+    LENS,
+    MARKER_FORWARD,
+    MARKER_LEFT,
     NEUTRAL,
+    SCALE,
     SEAM_DIRECTION,
     SEAM_KICK,
     SEAM_PLACE,
@@ -29,8 +32,37 @@ from agvbench.simulator.hidden.constants import (
     SMOOTHING_S,
     STICK_S,
     STICK_TWIST,
+    TURNED,
 )  # fmt: skip
 from agvbench.types import Floats
+
+_ROUNDS = 60
+
+
+@cached_njit()
+def seen(p: Floats, x: float, y: float, heading: float) -> tuple[float, float, float]:
+    """Return the pose that the camera reports for a true pose of where the markers should be."""
+    c, s = math.cos(heading), math.sin(heading)
+    mx = x + (c * p[MARKER_FORWARD] - s * p[MARKER_LEFT])
+    my = y + (s * p[MARKER_FORWARD] + c * p[MARKER_LEFT])
+    bent = (1.0 + p[SCALE]) * (1.0 + p[LENS] * (mx * mx + my * my))
+    return bent * mx, bent * my, heading + p[TURNED]
+
+
+@cached_njit()
+def unseen(p: Floats, x: float, y: float, heading: float) -> tuple[float, float, float]:
+    """Return the true pose at which the camera reports the given one: a vehicle is placed by what is seen of it."""
+    true_heading = heading - p[TURNED]
+    mx, my = x / (1.0 + p[SCALE]), y / (1.0 + p[SCALE])
+    px, py = mx, my
+    for _ in range(_ROUNDS):
+        bend = 1.0 + p[LENS] * (px * px + py * py)
+        px, py = mx / bend, my / bend
+    c, s = math.cos(true_heading), math.sin(true_heading)
+    left_x = c * p[MARKER_FORWARD] - s * p[MARKER_LEFT]
+    left_y = s * p[MARKER_FORWARD] + c * p[MARKER_LEFT]
+    return px - left_x, py - left_y, true_heading
+
 
 STEP_S = 1.0 / 600.0
 _ROUNDING_S = 1e-10
@@ -57,7 +89,7 @@ def begin(p: Floats, state: Floats, past: Floats, marks: np.ndarray, pose: tuple
     session, rolled = state[SESSION], state[ROLLED]
     state[:] = 0.0
     state[SESSION], state[ROLLED] = session, rolled
-    state[X], state[Y], state[HEADING] = sight.unseen(p, pose[0], pose[1], pose[2])
+    state[X], state[Y], state[HEADING] = unseen(p, pose[0], pose[1], pose[2])
     state[SMOOTH_X], state[SMOOTH_Y], state[SMOOTH_HEADING] = pose
     state[DRIVE] = state[FRONT] = state[REAR] = p[NEUTRAL]
     state[ASKED_DRIVE] = state[ASKED_FRONT] = state[ASKED_REAR] = p[NEUTRAL]
@@ -190,7 +222,7 @@ def _commit(p: Floats, state: Floats, work: Floats, past: Floats, marks: np.ndar
 
 @cached_njit()
 def _smooth(p: Floats, work: Floats, dt: float) -> None:
-    x, y, heading = sight.seen(p, work[X], work[Y], work[HEADING])
+    x, y, heading = seen(p, work[X], work[Y], work[HEADING])
     share = -math.expm1(-dt / p[SMOOTHING_S])
     work[SMOOTH_X] += share * (x - work[SMOOTH_X])
     work[SMOOTH_Y] += share * (y - work[SMOOTH_Y])
@@ -204,7 +236,7 @@ def _look(p: Floats, work: Floats, past: Floats, marks: np.ndarray, dt: float) -
         _smooth(p, work, dt)
         return work[SMOOTH_X], work[SMOOTH_Y], work[SMOOTH_HEADING]
     if p[LATENCY_S] == 0.0:
-        return sight.seen(p, work[X], work[Y], work[HEADING])
+        return seen(p, work[X], work[Y], work[HEADING])
     when = work[CLOCK] - p[LATENCY_S]
     t1, x1, y1, z1 = work[CLOCK], work[X], work[Y], work[HEADING]
     oldest = max(0, marks[2] - PAST)
@@ -212,9 +244,9 @@ def _look(p: Floats, work: Floats, past: Floats, marks: np.ndarray, dt: float) -
         t0, x0, y0, z0 = past[i % PAST, 0], past[i % PAST, 1], past[i % PAST, 2], past[i % PAST, 3]
         if t0 <= when:
             share = (when - t0) / (t1 - t0) if t1 > t0 else 0.0
-            return sight.seen(p, x0 + share * (x1 - x0), y0 + share * (y1 - y0), z0 + share * (z1 - z0))
+            return seen(p, x0 + share * (x1 - x0), y0 + share * (y1 - y0), z0 + share * (z1 - z0))
         t1, x1, y1, z1 = t0, x0, y0, z0
-    return sight.seen(p, x1, y1, z1)
+    return seen(p, x1, y1, z1)
 
 
 @cached_njit()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from agvbench.errors import PlantError
-from agvbench.simulator.asked import asked_advance, asked_pose
+from agvbench.simulator.checked_plant import asked_advance, asked_pose
 from agvbench.simulator.hidden import _kernel as kernel
 from agvbench.simulator.hidden.constants import LATENCY_S, pack
 from agvbench.simulator.hidden.truth import SealedTruth

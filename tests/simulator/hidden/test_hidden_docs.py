@@ -6,8 +6,8 @@ import re
 from pathlib import Path
 
 from agvbench.simulator.hidden.catalogue import CATALOGUE
-from agvbench.simulator.hidden.drawing import vehicle_of
-from agvbench.simulator.hidden.drives import reference_drives
+from agvbench.simulator.hidden.reference_drives import reference_drives
+from agvbench.simulator.hidden.sampling import vehicle_of
 
 TEXT = (Path(__file__).parents[3] / "docs" / "reference" / "challenge-plants.md").read_text(encoding="utf-8")
 

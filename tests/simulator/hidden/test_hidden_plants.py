@@ -10,7 +10,8 @@ from hidden_truth import START, poses, quiet
 
 from agvbench.errors import PlantError
 from agvbench.simulator import check_plant, load_plant
-from agvbench.simulator.hidden import constants, drawing, make_hidden_plant, make_plant
+from agvbench.simulator.hidden import constants, make_hidden_plant, make_plant
+from agvbench.simulator.hidden import sampling as drawing
 from agvbench.simulator.hidden.catalogue import CATALOGUE, NOTHING, recipes
 
 PAIRS = ["steering_lag_and_lateral_slip", "actuation_delay_and_slow_patch", "mocap_latency_and_marker_offset"]

@@ -7,8 +7,8 @@ import pytest
 
 from agvbench.simulator.hidden import Bench, make_hidden_plant, separation
 from agvbench.simulator.hidden.catalogue import CATALOGUE
-from agvbench.simulator.hidden.drawing import FLOORS, vehicle_of
-from agvbench.simulator.hidden.rivals import fit_recipe
+from agvbench.simulator.hidden.sampling import FLOORS, vehicle_of
+from agvbench.simulator.hidden.separation import fit_recipe
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""The base vehicle of a hidden plant: drawn at random, quiet, and with nothing but static maps."""
+"""The base vehicle of a hidden plant: randomly sampled, quiet, and with nothing but static maps."""
 
 from __future__ import annotations
 

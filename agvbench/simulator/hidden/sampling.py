@@ -1,4 +1,4 @@
-"""`make_hidden_plant`: a quiet vehicle drawn at random, hiding what a specification says, large enough to be found."""
+"""`make_hidden_plant`: a randomly sampled quiet vehicle, hiding effects large enough to be found."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from collections.abc import Callable
 
 import numpy as np
 
+from agvbench.simulator.hidden.base_vehicle import BaseVehicle, draw_vehicle
 from agvbench.simulator.hidden.catalogue import AND, CATALOGUE, NOTHING, recipes
 from agvbench.simulator.hidden.plant import HiddenPlant
 from agvbench.simulator.hidden.recipe import Recipe, Values
 from agvbench.simulator.hidden.separation import Bench, Separation, separation
 from agvbench.simulator.hidden.truth import HiddenEffect, Kind, SealedTruth
-from agvbench.simulator.hidden.vehicle import BaseVehicle, draw_vehicle
 
 FLOORS = 3.0
 """What a hidden effect leaves at least on the reference drives."""

@@ -6,8 +6,8 @@ import numpy as np
 
 from agvbench.errors import PlantError
 from agvbench.simulator import dynamics
-from agvbench.simulator.asked import asked_advance, asked_pose
-from agvbench.simulator.parameters import MAX_DELAY_FRAMES, SimulatedVehicle
+from agvbench.simulator.checked_plant import asked_advance, asked_pose
+from agvbench.simulator.vehicle_parameters import MAX_DELAY_FRAMES, SimulatedVehicle
 
 _SEEDS = 2**64
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 
 from agvbench.errors import PlantError
-from agvbench.simulator.checked import CheckedPlant, explain, raised
+from agvbench.simulator.checked_plant import CheckedPlant, explain, raised
 from agvbench.types import PlantFactory
 
 _FORM = "write MODULE:FACTORY or path/to/FILE.py:FACTORY"

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from agvbench.errors import PlantError
-from agvbench.simulator.checked import CheckedPlant
-from agvbench.simulator.loading import CheckedFactory, load_plant
+from agvbench.simulator.checked_plant import CheckedPlant
+from agvbench.simulator.plant_loading import CheckedFactory, load_plant
 from agvbench.types import CommandUnit, PlantFactory, wrap_angle
 
 REST_TOLERANCE_M = 1e-3
