@@ -12,12 +12,11 @@ VERSIONS = ((2, 5), (2, 6), (2, 7), (2, 9), (2, 11), (3, 0), (3, 1), (4, 0), (4,
 
 def packets(version: tuple[int, int]) -> Iterator[bytes]:
     """Give a server's packets: who it is, what bodies are called, a frame with markers, an echo, a text."""
-    from agvbench.adapters.natnet.encode import Model, encode_descriptions, encode_frame
-    from agvbench.adapters.natnet.frame import FrameOfData
-    from agvbench.adapters.natnet.layout import BODY, MARKER
-    from agvbench.adapters.natnet.packet import Message, join
-    from agvbench.adapters.natnet.server import ServerInfo, encode_server_info
-    from agvbench.adapters.natnet.version import Version
+    from agvbench.adapters.natnet.protocol.bitstream import BODY, MARKER, Version
+    from agvbench.adapters.natnet.protocol.encode import Model, encode_descriptions, encode_frame
+    from agvbench.adapters.natnet.protocol.frame import FrameOfData
+    from agvbench.adapters.natnet.protocol.packet import Message, join
+    from agvbench.adapters.natnet.protocol.server_info import ServerInfo, encode_server_info
 
     spoken = Version(*version)
     bodies, markers = np.zeros(2, BODY), np.zeros(3, MARKER)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from agvbench.adapters.contract import SILENCE_LIMIT_S, AgvAdapter
-from agvbench.adapters.hosting import Host
+from agvbench.adapters.host import Host
 from agvbench.bus.clock import Clock
 from agvbench.bus.command_message import CommandFlags, CommandMessage, decode_command
 from agvbench.bus.event_message import COMMANDS_LATE, COMMANDS_LOST, RUNNER_SILENT, Level

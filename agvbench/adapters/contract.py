@@ -1,15 +1,16 @@
-"""The adapter contract: what stands between the bus and a vehicle or a motion capture system.
+"""The adapter contract: what stands between the bus and a vehicle or a motion capture system, and its options.
 
-An adapter knows nothing of the bus: a host (`agvbench.adapters.hosting`) calls its few methods, one at a time, and
+An adapter knows nothing of the bus: a host (`agvbench.adapters.host`) calls its few methods, one at a time, and
 gives it an object to report to. A new adapter is one file in ``agvbench/adapters/agv/`` or ``agvbench/adapters/mocap/``
 with one subclass and its ``scheme``; it is found by name and inherits the tests.
 """
 
 from __future__ import annotations
 
+import hashlib
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Protocol, Self
 
@@ -22,7 +23,7 @@ from agvbench.bus.frames_message import FrameClock
 from agvbench.bus.identity_message import AgvIdentity, MocapIdentity
 from agvbench.bus.request_message import Replay, Reset, Sampling
 from agvbench.bus.truth_message import Truth, TruthFlags
-from agvbench.errors import LinkError
+from agvbench.errors import FlagError, LinkError
 from agvbench.types import CommandUnit, Floats, Frames
 
 DEFAULT_PLANT = "agvbench.simulator:make_plant"
@@ -198,3 +199,37 @@ class MocapAdapter(ABC):
 
 
 NO_POSES = np.empty((0, 3))
+
+
+def camera_options(pairs: Iterable[str]) -> dict[str, str]:
+    """Return the camera's parameters by name.
+
+    >>> camera_options(["lost=0.01,rate_hz=240", "up=z"])
+    {'lost': '0.01', 'rate_hz': '240', 'up': 'z'}
+
+    Raises
+    ------
+    FlagError
+        If a pair has no ``=``.
+    """
+    options: dict[str, str] = {}
+    for pair in filter(None, ",".join(pairs).split(",")):
+        name, equals, value = pair.partition("=")
+        if not (name and equals and value):
+            raise FlagError(
+                "not a parameter and its value", where="--camera", value=repr(pair), remedy="write NAME=VALUE"
+            )
+        options[name] = value
+    return options
+
+
+def run_seed(seed: int, run_key: str, purpose: str, bits: int = 32) -> int:
+    """Return a seed of `bits` bits for one purpose in one run.
+
+    >>> run_seed(0, "steering-0001", "plant") == run_seed(0, "steering-0001", "plant")
+    True
+    >>> run_seed(0, "steering-0001", "plant") == run_seed(0, "steering-0001", "camera")
+    False
+    """
+    text = f"agvbench\0{seed}\0{run_key}\0{purpose}"
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[: bits // 8], "little")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from agvbench.adapters.contract import MocapAdapter
-from agvbench.adapters.hosting import Host
+from agvbench.adapters.host import Host
 from agvbench.bus.clock import Clock
 from agvbench.bus.frames_message import FrameClock, FramesFlags, pack_batch, pack_single
 from agvbench.bus.identity_message import encode_mocap_identity

@@ -6,8 +6,7 @@ import math
 from dataclasses import replace
 from typing import ClassVar, Self
 
-from agvbench.adapters.contract import AdapterOptions, AgvAdapter, AgvReports
-from agvbench.adapters.seeding import run_seed
+from agvbench.adapters.contract import AdapterOptions, AgvAdapter, AgvReports, run_seed
 from agvbench.bus.identity_message import AgvIdentity
 from agvbench.bus.request_message import Reset, Sampling
 from agvbench.simulator import load_plant

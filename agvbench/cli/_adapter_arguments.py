@@ -81,7 +81,7 @@ def vehicle_options(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def camera_options(arguments: argparse.Namespace) -> dict[str, Any]:
     """Return what `add_camera_arguments` declares."""
-    from agvbench.adapters.camera_options import camera_options
+    from agvbench.adapters.contract import camera_options
 
     return {"camera": camera_options(arguments.camera)}
 

@@ -60,8 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
             "either an adapter runs, a file is decoded or a stream emulated", remedy="name one of the three"
         )
     if arguments.emulate:
-        from agvbench.adapters.camera_options import camera_options
-        from agvbench.adapters.contract import AdapterOptions
+        from agvbench.adapters.contract import AdapterOptions, camera_options
         from agvbench.workflows.natnet_emulation import emulate
 
         camera = camera_options(arguments.camera)
@@ -70,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
         return emulate(options, arguments.natnet_version or "4.1", arguments.multicast, arguments.port)
     if arguments.decode is not None:
-        from agvbench.adapters.natnet.decode_file import print_packets
+        from agvbench.adapters.natnet.transcript import print_packets
 
         print_packets(arguments.decode, arguments.natnet_version)
         return 0

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 from agvbench.adapters import AdapterOptions, open_rig
-from agvbench.adapters.camera_options import camera_options
+from agvbench.adapters.contract import camera_options
 from agvbench.bus.bus_config import BusConfig
 from agvbench.bus.identity_message import AgvIdentity, Identity
 from agvbench.bus.link import VehicleLink

@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 
-from agvbench.adapters.simavr.built import build_directory, firmware_sources, missing_packages
+from agvbench.adapters.simavr.firmware_files import build_directory, firmware_sources, missing_packages
 from agvbench.errors import FileError, LinkError
 
 _LIMIT_S = 300.0

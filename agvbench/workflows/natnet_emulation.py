@@ -8,12 +8,11 @@ from agvbench.adapters.contract import AdapterOptions
 from agvbench.adapters.natnet.axes import bodies_of
 from agvbench.adapters.natnet.channel import DATA_PORT
 from agvbench.adapters.natnet.emulator import Emulator, Settings
-from agvbench.adapters.natnet.encode import Model
-from agvbench.adapters.natnet.frame import FrameOfData
-from agvbench.adapters.natnet.layout import MARKER
-from agvbench.adapters.natnet.network import PacketFaults
+from agvbench.adapters.natnet.network_faults import PacketFaults
 from agvbench.adapters.natnet.options import multicast_group
-from agvbench.adapters.natnet.version import Version
+from agvbench.adapters.natnet.protocol.bitstream import MARKER, Version
+from agvbench.adapters.natnet.protocol.encode import Model
+from agvbench.adapters.natnet.protocol.frame import FrameOfData
 from agvbench.bus.clock import WallClock, wait_until
 from agvbench.simulator import Camera, load_plant
 from agvbench.types import Command, Frames

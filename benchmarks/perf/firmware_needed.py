@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 
-from agvbench.adapters.simavr.built import why_not_built
+from agvbench.adapters.simavr.firmware_files import why_not_built
 from agvbench.errors import AgvbenchError
 
 

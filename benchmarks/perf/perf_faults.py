@@ -19,7 +19,7 @@ sys.path.insert(0, str(ROOT / "tests" / "faults"))
 
 from fault_record import Fault, all_faults  # noqa: E402  (found by the line above)
 
-from agvbench.adapters.simavr.built import why_not_built  # noqa: E402
+from agvbench.adapters.simavr.firmware_files import why_not_built  # noqa: E402
 
 DOCUMENT = ROOT / "docs" / "reference" / "faults.md"
 BEGIN, END = "<!-- table: python benchmarks/perf/perf_faults.py --write -->", "<!-- end of table -->"

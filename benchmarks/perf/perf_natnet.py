@@ -27,11 +27,10 @@ import optirx
 from agvbench.adapters.natnet.channel import Connection
 from agvbench.adapters.natnet.client import Client, Seen
 from agvbench.adapters.natnet.emulator import Emulator, Settings
-from agvbench.adapters.natnet.encode import Model, encode_frame
-from agvbench.adapters.natnet.frame import FrameOfData, decode_frame
-from agvbench.adapters.natnet.layout import BODY, MARKER
-from agvbench.adapters.natnet.packet import Message, join
-from agvbench.adapters.natnet.version import Version
+from agvbench.adapters.natnet.protocol.bitstream import BODY, MARKER, Version
+from agvbench.adapters.natnet.protocol.encode import Model, encode_frame
+from agvbench.adapters.natnet.protocol.frame import FrameOfData, decode_frame
+from agvbench.adapters.natnet.protocol.packet import Message, join
 from agvbench.bus.clock import WallClock
 
 BODIES, MARKERS, RATE_HZ = 25, 5, 360.0

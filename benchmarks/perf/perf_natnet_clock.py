@@ -15,9 +15,9 @@ import numpy as np
 from agvbench.adapters.natnet.channel import Connection
 from agvbench.adapters.natnet.client import Client, Seen
 from agvbench.adapters.natnet.emulator import Emulator, Settings
-from agvbench.adapters.natnet.encode import Model
-from agvbench.adapters.natnet.frame import FrameOfData
-from agvbench.adapters.natnet.layout import BODY, MARKER
+from agvbench.adapters.natnet.protocol.bitstream import BODY, MARKER
+from agvbench.adapters.natnet.protocol.encode import Model
+from agvbench.adapters.natnet.protocol.frame import FrameOfData
 from agvbench.bus.clock import SimulatedClock
 from agvbench.types import Floats
 

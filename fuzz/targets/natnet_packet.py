@@ -16,10 +16,10 @@ class NatNetPacket(Target):
     instruments = ("agvbench.adapters.natnet",)
 
     def __init__(self) -> None:
-        from agvbench.adapters.natnet.frame import decode_frame
-        from agvbench.adapters.natnet.json_lines import Transcript
-        from agvbench.adapters.natnet.packet import Message, split
-        from agvbench.adapters.natnet.version import Version
+        from agvbench.adapters.natnet.protocol.bitstream import Version
+        from agvbench.adapters.natnet.protocol.frame import decode_frame
+        from agvbench.adapters.natnet.protocol.packet import Message, split
+        from agvbench.adapters.natnet.transcript import Transcript
 
         self._transcript, self._split, self._decode, self._frame = Transcript, split, decode_frame, Message.FRAMEOFDATA
         self._versions = [Version(*version) for version in VERSIONS]

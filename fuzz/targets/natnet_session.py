@@ -27,9 +27,9 @@ class NatNetSession(Target):
         from agvbench.adapters.natnet.channel import Connection
         from agvbench.adapters.natnet.client import Client, Seen
         from agvbench.adapters.natnet.emulator import Emulator, Settings
-        from agvbench.adapters.natnet.encode import Model
-        from agvbench.adapters.natnet.packet import split
-        from agvbench.adapters.natnet.version import Version
+        from agvbench.adapters.natnet.protocol.bitstream import Version
+        from agvbench.adapters.natnet.protocol.encode import Model
+        from agvbench.adapters.natnet.protocol.packet import split
         from agvbench.bus.clock import WallClock
 
         def seen(one: Seen) -> None:

@@ -17,7 +17,7 @@ from agvbench.adapters import AdapterOptions
 from agvbench.adapters.contract import AgvAdapter
 from agvbench.adapters.registry import agv_adapters, mocap_adapters, open_agv, open_mocap, parse_spec
 from agvbench.adapters.serial_line import conversation
-from agvbench.adapters.simavr.built import why_not_built
+from agvbench.adapters.simavr.firmware_files import why_not_built
 from agvbench.bus.command_message import CommandFlags, CommandMessage
 from agvbench.bus.event_message import Level
 from agvbench.bus.identity_message import (

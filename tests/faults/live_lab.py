@@ -11,9 +11,9 @@ import numpy as np
 from agvbench.adapters.contract import DEFAULT_PLANT
 from agvbench.adapters.natnet.axes import bodies_of
 from agvbench.adapters.natnet.emulator import Emulator, Settings
-from agvbench.adapters.natnet.encode import Model
-from agvbench.adapters.natnet.frame import FrameOfData
-from agvbench.adapters.natnet.layout import MARKER
+from agvbench.adapters.natnet.protocol.bitstream import MARKER
+from agvbench.adapters.natnet.protocol.encode import Model
+from agvbench.adapters.natnet.protocol.frame import FrameOfData
 from agvbench.adapters.simavr.host import Pulse, SimavrHost
 from agvbench.bus.clock import WallClock, wait_until
 from agvbench.errors import AgvbenchError

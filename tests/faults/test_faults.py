@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from fault_record import Fault, all_faults
 
-from agvbench.adapters.simavr.built import why_not_built
+from agvbench.adapters.simavr.firmware_files import why_not_built
 
 pytestmark = pytest.mark.real_time
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from agvbench.adapters.simavr.built import missing_packages
+from agvbench.adapters.simavr.firmware_files import missing_packages
 from agvbench.adapters.simavr.microcontroller import Microcontroller
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"

@@ -120,7 +120,7 @@ def test_a_pulse_out_of_range_is_one_line_and_the_rig_goes_on() -> None:
 
 
 def test_without_the_built_firmware_the_line_says_what_to_do(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    from agvbench.adapters.simavr import built
+    from agvbench.adapters.simavr import firmware_files as built
 
     monkeypatch.setattr(built, "build_directory", lambda: tmp_path)
     with pytest.raises(LinkError, match=r"not built: simavr_host; run agvbench firmware"):

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from agvbench.adapters.simavr.built import missing_packages
+from agvbench.adapters.simavr.firmware_files import missing_packages
 
 ROOT = Path(__file__).resolve().parents[2]
 

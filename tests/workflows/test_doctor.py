@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from agvbench.adapters.natnet.emulator import Emulator, Settings
-from agvbench.adapters.natnet.encode import Model
-from agvbench.adapters.natnet.frame import FrameOfData
-from agvbench.adapters.natnet.layout import BODY, MARKER
+from agvbench.adapters.natnet.protocol.bitstream import BODY, MARKER
+from agvbench.adapters.natnet.protocol.encode import Model
+from agvbench.adapters.natnet.protocol.frame import FrameOfData
 from agvbench.cli import main
 from agvbench.errors import AgvbenchError, VehicleError
 from agvbench.model import example_vehicle, thesis_vehicle

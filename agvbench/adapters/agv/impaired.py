@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from agvbench.adapters.contract import AdapterOptions, AgvAdapter, AgvReports
-from agvbench.adapters.impairment.fault import Line, vehicle_fault
-from agvbench.adapters.impairment.faults import Faults
+from agvbench.adapters.impairment.faults import Faults, Line, vehicle_fault
 from agvbench.adapters.impairment.spec import SCHEME, Impairment, parse_address
 from agvbench.adapters.registry import open_agv
 from agvbench.bus.command_message import CommandFlags, CommandMessage

@@ -13,8 +13,7 @@ from contextlib import suppress
 import numpy as np
 
 from agvbench.adapters.agv.sim import SimAgv
-from agvbench.adapters.contract import AdapterOptions
-from agvbench.adapters.seeding import run_seed
+from agvbench.adapters.contract import AdapterOptions, run_seed
 from agvbench.adapters.serial_line.dialect import check_unit
 from agvbench.adapters.simavr.address import FRAME_S, FirmwareAddress
 from agvbench.adapters.simavr.host import CYCLES_PER_S, Pulse

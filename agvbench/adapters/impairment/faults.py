@@ -1,15 +1,127 @@
-"""The faults of one adapter: which hold, in which run, and whose randomness it is."""
+"""Faults: of the frames that a camera publishes, or of a vehicle and its line; and those of one adapter."""
 
 from __future__ import annotations
 
+import difflib
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from typing import Generic, TypeVar
+from functools import cache
+from typing import ClassVar, Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
-from agvbench.adapters.impairment.fault import Fault
-from agvbench.adapters.impairment.spec import Impairment
-from agvbench.adapters.seeding import run_seed
+from agvbench.adapters.contract import run_seed
+from agvbench.adapters.impairment.spec import SCHEME, Impairment
+from agvbench.errors import LinkError
+from agvbench.registry import classes_by_file
+from agvbench.types import Command, Frames
+
+_FRAMES, _VEHICLE = "agvbench.adapters.impairment.frames", "agvbench.adapters.impairment.vehicle"
+
+
+class Fault(ABC):
+    """A fault that is as grave as `value` says; made once, begun anew for every run."""
+
+    name: ClassVar[str]
+    usual: ClassVar[float] = 1.0
+    """The value where none is given."""
+    lowest: ClassVar[float] = 0.0
+    highest: ClassVar[float] = 1.0
+
+    def __init__(self, value: float | None = None) -> None:
+        self.value = self.usual if value is None else value
+        if not self.lowest <= self.value <= self.highest:
+            limit = f"{self.lowest:g} to {self.highest:g}"
+            raise LinkError("fault cannot be so grave", where=f"{SCHEME}:{self.name}", value=self.value, limit=limit)
+        self.begin(np.random.default_rng(0))
+
+    def begin(self, rng: np.random.Generator) -> None:
+        """Begin a run, whose randomness is `rng`."""
+        self.rng = rng
+
+
+class FrameFault(Fault):
+    """Befalls what a camera publishes."""
+
+    @abstractmethod
+    def change(self, frames: Frames) -> Frames:
+        """Return what becomes of a batch of frames, all of them captured since the fault began."""
+
+
+@runtime_checkable
+class Line(Protocol):
+    """A serial line to a vehicle, as far as faults go."""
+
+    wire: Callable[[bytes], bytes]
+    """What becomes of bytes on their way to the vehicle."""
+
+    def press_reset(self) -> None:
+        """Reset the microcontroller."""
+
+    def pull(self) -> None:
+        """Take the line away, for ever."""
+
+
+class VehicleFault(Fault):
+    """Befalls a vehicle before it gets a command."""
+
+    needs_line: ClassVar[bool] = False
+
+    def strike(self, line: Line | None) -> None:
+        """Do it; called before every command from when the fault begins. `line` is None where there is none."""
+
+    def alter(self, command: Command, neutral: float) -> Command:
+        """Return what the vehicle is told in place of `command`; `neutral` is what moves nothing."""
+        return command
+
+    def cease(self) -> None:
+        """Let go of whoever is held; the adapter is closed."""
+
+
+class LineFault(VehicleFault):
+    """Befalls the bytes on their way to a vehicle with a serial line."""
+
+    needs_line = True
+
+    def strike(self, line: Line | None) -> None:
+        """Take over the wire."""
+        assert line is not None  # noqa: S101  (the adapter was asked)
+        line.wire = self.carry
+
+    @abstractmethod
+    def carry(self, data: bytes) -> bytes:
+        """Return what arrives of `data`."""
+
+
+def frame_fault(impairment: Impairment) -> FrameFault:
+    """Return the fault of frames that `impairment` names, or raise `LinkError`."""
+    fault = _make(impairment, _FRAMES)
+    assert isinstance(fault, FrameFault)  # noqa: S101  (for the type checker: its package has no others)
+    return fault
+
+
+def vehicle_fault(impairment: Impairment) -> VehicleFault:
+    """Return the fault of a vehicle that `impairment` names, or raise `LinkError`."""
+    fault = _make(impairment, _VEHICLE)
+    assert isinstance(fault, VehicleFault)  # noqa: S101  (for the type checker: its package has no others)
+    return fault
+
+
+@cache
+def _known(package: str) -> dict[str, type[Fault]]:
+    return {fault.name: fault for fault in classes_by_file(package, Fault)}
+
+
+def _make(impairment: Impairment, package: str) -> Fault:
+    known = _known(package)
+    if impairment.name in known:
+        return known[impairment.name](impairment.value)
+    close = difflib.get_close_matches(impairment.name, known, n=1)
+    raise LinkError(
+        "no such fault", where=SCHEME, value=repr(impairment.name), limit=" ".join(sorted(known)),
+        remedy=f"did you mean '{close[0]}'?" if close else None,
+    )  # fmt: skip
+
 
 Kind = TypeVar("Kind", bound=Fault)
 

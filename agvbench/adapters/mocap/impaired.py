@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from agvbench.adapters.contract import AdapterOptions, MocapAdapter, MocapReports
-from agvbench.adapters.impairment.fault import frame_fault
-from agvbench.adapters.impairment.faults import Faults
+from agvbench.adapters.impairment.faults import Faults, frame_fault
 from agvbench.adapters.impairment.spec import SCHEME, Impairment, parse_address
 from agvbench.adapters.registry import open_mocap
 from agvbench.bus.event_message import Level

@@ -7,9 +7,9 @@ import math
 from agvbench.adapters.contract import AdapterOptions, MocapAdapter, MocapReports
 from agvbench.adapters.natnet.axes import to_floor
 from agvbench.adapters.natnet.client import Client, Seen
-from agvbench.adapters.natnet.emulated import EMULATED, EmulatedNatNet
-from agvbench.adapters.natnet.layout import TRACKED
+from agvbench.adapters.natnet.emulated_camera import EMULATED, EmulatedNatNet
 from agvbench.adapters.natnet.options import NatNetOptions
+from agvbench.adapters.natnet.protocol.bitstream import TRACKED
 from agvbench.bus.event_message import Level
 from agvbench.bus.frames_message import FrameClock
 from agvbench.bus.identity_message import MocapIdentity

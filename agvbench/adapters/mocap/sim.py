@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from agvbench.adapters.contract import AdapterOptions, MocapAdapter, MocapReports
-from agvbench.adapters.seeding import run_seed
+from agvbench.adapters.contract import AdapterOptions, MocapAdapter, MocapReports, run_seed
 from agvbench.bus.frames_message import FrameClock
 from agvbench.bus.identity_message import MocapIdentity
 from agvbench.bus.request_message import Reset, Sampling

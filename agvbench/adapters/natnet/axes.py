@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.adapters.natnet.layout import BODY, TRACKED
+from agvbench.adapters.natnet.protocol.bitstream import BODY, TRACKED
 from agvbench.calibration.quaternion import Up, quaternion_to_heading
 from agvbench.types import Floats, Frames
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from agvbench.adapters.natnet.packet import MAX_DATAGRAM_BYTES
+from agvbench.adapters.natnet.protocol.packet import MAX_DATAGRAM_BYTES
 from agvbench.errors import FileError
 from agvbench.text_files import require_regular
 

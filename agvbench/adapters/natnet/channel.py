@@ -8,8 +8,8 @@ import socket
 import struct
 from dataclasses import dataclass
 
-from agvbench.adapters.natnet.packet import MAX_DATAGRAM_BYTES, Message, join, split
-from agvbench.adapters.natnet.version import Version
+from agvbench.adapters.natnet.protocol.bitstream import Version
+from agvbench.adapters.natnet.protocol.packet import MAX_DATAGRAM_BYTES, Message, join, split
 from agvbench.bus.clock import WallClock
 from agvbench.errors import AdapterGoneError, LinkError, MessageError
 

@@ -13,11 +13,11 @@ from typing import NamedTuple
 
 from agvbench.adapters.natnet.channel import DATA_PORT, POLL_S, Channel, Connection, Counters
 from agvbench.adapters.natnet.clock_sync import ClockSync, Stamp
-from agvbench.adapters.natnet.description import decode_descriptions
-from agvbench.adapters.natnet.frame import MODELS_CHANGED, FrameOfData, decode_frame
-from agvbench.adapters.natnet.packet import Message
-from agvbench.adapters.natnet.server import ServerInfo, decode_server_info
-from agvbench.adapters.natnet.version import Version
+from agvbench.adapters.natnet.protocol.bitstream import Version
+from agvbench.adapters.natnet.protocol.description import decode_descriptions
+from agvbench.adapters.natnet.protocol.frame import MODELS_CHANGED, FrameOfData, decode_frame
+from agvbench.adapters.natnet.protocol.packet import Message
+from agvbench.adapters.natnet.protocol.server_info import ServerInfo, decode_server_info
 from agvbench.bus.clock import Clock
 from agvbench.errors import AdapterGoneError, LinkError, MessageError
 

@@ -13,12 +13,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from agvbench.adapters.natnet.encode import Model, encode_descriptions, encode_frame
-from agvbench.adapters.natnet.frame import FrameOfData
-from agvbench.adapters.natnet.network import Network, PacketFaults
-from agvbench.adapters.natnet.packet import MAX_DATAGRAM_BYTES, Message, join, split
-from agvbench.adapters.natnet.server import ServerInfo, encode_server_info
-from agvbench.adapters.natnet.version import Version
+from agvbench.adapters.natnet.network_faults import Network, PacketFaults
+from agvbench.adapters.natnet.protocol.bitstream import Version
+from agvbench.adapters.natnet.protocol.encode import Model, encode_descriptions, encode_frame
+from agvbench.adapters.natnet.protocol.frame import FrameOfData
+from agvbench.adapters.natnet.protocol.packet import MAX_DATAGRAM_BYTES, Message, join, split
+from agvbench.adapters.natnet.protocol.server_info import ServerInfo, encode_server_info
 from agvbench.bus.clock import Clock, WallClock
 from agvbench.errors import LinkError, MessageError
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ipaddress import IPv4Address
 
 from agvbench.adapters.natnet.channel import COMMAND_PORT, Connection
-from agvbench.adapters.natnet.version import Version
+from agvbench.adapters.natnet.protocol.bitstream import Version
 from agvbench.calibration.quaternion import Up
 from agvbench.errors import FlagError
 

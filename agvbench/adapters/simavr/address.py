@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple, Self
 
-from agvbench.adapters.simavr.built import VERSIONS
+from agvbench.adapters.simavr.firmware_files import VERSIONS
 from agvbench.errors import LinkError
 
 FRAME_S = 0.02

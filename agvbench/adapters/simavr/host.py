@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from agvbench.adapters.simavr.built import HOST, VERSIONS, built
+from agvbench.adapters.simavr.firmware_files import HOST, VERSIONS, built
 from agvbench.errors import AdapterGoneError, LinkError
 
 CYCLES_PER_S = 16e6

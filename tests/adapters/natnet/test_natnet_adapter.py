@@ -19,8 +19,8 @@ from agvbench.adapters.mocap.natnet import NatNetMocap
 from agvbench.adapters.mocap_host import MocapHost
 from agvbench.adapters.natnet.axes import from_floor
 from agvbench.adapters.natnet.emulator import Emulator, Settings
-from agvbench.adapters.natnet.layout import BODY
 from agvbench.adapters.natnet.options import NatNetOptions
+from agvbench.adapters.natnet.protocol.bitstream import BODY
 from agvbench.adapters.registry import open_mocap
 from agvbench.bus.clock import WallClock
 from agvbench.bus.event_message import Event

@@ -13,10 +13,10 @@ import dpkt
 import pytest
 from streams import drawn
 
-from agvbench.adapters.natnet.encode import encode_descriptions, encode_frame
-from agvbench.adapters.natnet.packet import Message, join
-from agvbench.adapters.natnet.server import ServerInfo, encode_server_info
-from agvbench.adapters.natnet.version import Version
+from agvbench.adapters.natnet.protocol.bitstream import Version
+from agvbench.adapters.natnet.protocol.encode import encode_descriptions, encode_frame
+from agvbench.adapters.natnet.protocol.packet import Message, join
+from agvbench.adapters.natnet.protocol.server_info import ServerInfo, encode_server_info
 from agvbench.cli import main
 
 V41 = Version(4, 1)

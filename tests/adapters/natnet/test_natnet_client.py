@@ -18,10 +18,10 @@ from agvbench.adapters.natnet.channel import Channel, Connection, Counters
 from agvbench.adapters.natnet.client import Client, Seen
 from agvbench.adapters.natnet.clock_sync import MAX_DRIFT, ClockSync
 from agvbench.adapters.natnet.emulator import MAX_CLIENTS, Emulator, Settings
-from agvbench.adapters.natnet.encode import encode_frame
-from agvbench.adapters.natnet.frame import MODELS_CHANGED
-from agvbench.adapters.natnet.packet import Message, join
-from agvbench.adapters.natnet.version import Version
+from agvbench.adapters.natnet.protocol.bitstream import Version
+from agvbench.adapters.natnet.protocol.encode import encode_frame
+from agvbench.adapters.natnet.protocol.frame import MODELS_CHANGED
+from agvbench.adapters.natnet.protocol.packet import Message, join
 from agvbench.bus.clock import SimulatedClock, WallClock
 from agvbench.errors import AdapterGoneError, LinkError
 

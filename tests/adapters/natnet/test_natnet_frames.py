@@ -16,12 +16,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from streams import VERSIONS, drawn
 
-from agvbench.adapters.natnet.description import decode_descriptions
-from agvbench.adapters.natnet.encode import encode_descriptions, encode_frame
-from agvbench.adapters.natnet.frame import decode_frame
-from agvbench.adapters.natnet.packet import Message, join, split
-from agvbench.adapters.natnet.server import ServerInfo, decode_server_info, encode_server_info
-from agvbench.adapters.natnet.version import Version
+from agvbench.adapters.natnet.protocol.bitstream import Version
+from agvbench.adapters.natnet.protocol.description import decode_descriptions
+from agvbench.adapters.natnet.protocol.encode import encode_descriptions, encode_frame
+from agvbench.adapters.natnet.protocol.frame import decode_frame
+from agvbench.adapters.natnet.protocol.packet import Message, join, split
+from agvbench.adapters.natnet.protocol.server_info import ServerInfo, decode_server_info, encode_server_info
 from agvbench.errors import MessageError
 
 every_version = pytest.mark.parametrize("version", VERSIONS, ids=str)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from agvbench.adapters.impairment.fault import FrameFault
+from agvbench.adapters.impairment.faults import FrameFault
 from agvbench.types import Frames
 
 

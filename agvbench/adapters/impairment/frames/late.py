@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from agvbench.adapters.impairment.fault import FrameFault
+from agvbench.adapters.impairment.faults import FrameFault
 from agvbench.types import Frames
 
 

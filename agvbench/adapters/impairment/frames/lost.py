@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from agvbench.adapters.impairment.fault import FrameFault
+from agvbench.adapters.impairment.faults import FrameFault
 from agvbench.types import Frames
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from agvbench.adapters.impairment.fault import LineFault
+from agvbench.adapters.impairment.faults import LineFault
 
 
 class Cut(LineFault):

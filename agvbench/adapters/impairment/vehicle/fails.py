@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from agvbench.adapters.impairment.fault import Line, VehicleFault
+from agvbench.adapters.impairment.faults import Line, VehicleFault
 
 
 class Fails(VehicleFault):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from agvbench.adapters.impairment.fault import VehicleFault
+from agvbench.adapters.impairment.faults import VehicleFault
 from agvbench.types import Command
 
 

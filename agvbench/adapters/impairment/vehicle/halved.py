@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from agvbench.adapters.impairment.fault import LineFault
+from agvbench.adapters.impairment.faults import LineFault
 
 
 class Halved(LineFault):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from agvbench.adapters.impairment.fault import Line, VehicleFault
+from agvbench.adapters.impairment.faults import Line, VehicleFault
 
 
 class Reset(VehicleFault):

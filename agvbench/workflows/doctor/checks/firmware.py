@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from agvbench.adapters.registry import parse_spec
 from agvbench.adapters.simavr.address import FirmwareAddress
-from agvbench.adapters.simavr.built import missing_packages, why_not_built
+from agvbench.adapters.simavr.firmware_files import missing_packages, why_not_built
 from agvbench.workflows.doctor.finding import Check, Finding, Lab, State
 
 _SCHEMES = ("simavr", "simavr-live")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 
-from agvbench.adapters.camera_options import camera_options
+from agvbench.adapters.contract import camera_options
 from agvbench.adapters.natnet.client import Client, Seen
 from agvbench.adapters.natnet.options import NatNetOptions
 from agvbench.adapters.registry import parse_spec

@@ -13,9 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.adapters.natnet.cursor import Cursor
-from agvbench.adapters.natnet.layout import BODY, TRACKED, Layout, layout_of
-from agvbench.adapters.natnet.version import Version
+from agvbench.adapters.natnet.protocol.bitstream import BODY, TRACKED, Layout, Version, layout_of
+from agvbench.adapters.natnet.protocol.packet import Cursor
 from agvbench.errors import MessageError
 
 _NUMBER = struct.Struct("<i")
@@ -37,10 +36,10 @@ RECORDING, MODELS_CHANGED = 1, 2
 class FrameOfData(NamedTuple):
     """A frame.
 
-    ``bodies`` are records of `agvbench.adapters.natnet.layout.BODY`: position [m] in the server's axes, quaternion
-    (x, y, z, w), mean marker error [m]. ``markers`` are the labelled ones, where asked for. ``timestamp_s`` [s] counts
-    from when the server began (NaN where 2.5 does not say); ``exposed_ticks`` (mid-exposure), ``received_ticks`` and
-    ``transmitted_ticks`` are readings of the server's clock, -1 before version 3.0.
+    ``bodies`` are records of `agvbench.adapters.natnet.protocol.bitstream.BODY`: position [m] in the server's axes,
+    quaternion (x, y, z, w), mean marker error [m]. ``markers`` are the labelled ones, where asked for. ``timestamp_s``
+    [s] counts from when the server began (NaN where 2.5 does not say); ``exposed_ticks`` (mid-exposure),
+    ``received_ticks`` and ``transmitted_ticks`` are readings of the server's clock, -1 before version 3.0.
     """
 
     number: int
@@ -66,7 +65,7 @@ def decode_frame(payload: bytes, version: Version, *, markers: bool = False) -> 
     payload
         The packet without its first four bytes.
     version
-        Of the bit stream, see `agvbench.adapters.natnet.server.ServerInfo`.
+        Of the bit stream, see `agvbench.adapters.natnet.protocol.server_info.ServerInfo`.
     markers
         Whether the labelled markers are wanted.
 

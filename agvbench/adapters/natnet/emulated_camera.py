@@ -21,11 +21,10 @@ from agvbench.adapters.natnet.axes import bodies_of, to_floor
 from agvbench.adapters.natnet.channel import Connection
 from agvbench.adapters.natnet.client import Client, Seen
 from agvbench.adapters.natnet.emulator import Emulator, Settings
-from agvbench.adapters.natnet.encode import Model
-from agvbench.adapters.natnet.frame import FrameOfData
-from agvbench.adapters.natnet.layout import BODY, MARKER, TRACKED
-from agvbench.adapters.natnet.network import PacketFaults
-from agvbench.adapters.natnet.version import Version
+from agvbench.adapters.natnet.network_faults import PacketFaults
+from agvbench.adapters.natnet.protocol.bitstream import BODY, MARKER, TRACKED, Version
+from agvbench.adapters.natnet.protocol.encode import Model
+from agvbench.adapters.natnet.protocol.frame import FrameOfData
 from agvbench.bus.clock import SimulatedClock, WallClock
 from agvbench.bus.event_message import Level
 from agvbench.bus.frames_message import FrameClock

@@ -1,4 +1,4 @@
-"""A bad network, to rehearse with: packets of an emulated server are lost, doubled, overtaken, or cut short."""
+"""Network faults to rehearse with: packets of an emulated server are lost, duplicated, reordered or truncated."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from typing import NamedTuple
 
-from agvbench.adapters.natnet.version import Version
+from agvbench.adapters.natnet.protocol.bitstream import Version
 from agvbench.errors import MessageError
 
 _OLD = struct.Struct("<256s4B4B")

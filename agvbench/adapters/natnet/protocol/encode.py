@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.adapters.natnet.frame import FrameOfData
-from agvbench.adapters.natnet.layout import layout_of
-from agvbench.adapters.natnet.version import Version
+from agvbench.adapters.natnet.protocol.bitstream import Version, layout_of
+from agvbench.adapters.natnet.protocol.frame import FrameOfData
 
 _INT = struct.Struct("<i")
 _PARENT = -1

@@ -5,8 +5,8 @@ from __future__ import annotations
 import struct
 from typing import NamedTuple
 
-from agvbench.adapters.natnet.cursor import Cursor
-from agvbench.adapters.natnet.version import Version
+from agvbench.adapters.natnet.protocol.bitstream import Version
+from agvbench.adapters.natnet.protocol.packet import Cursor
 from agvbench.errors import MessageError
 
 _ID = struct.Struct("<i")

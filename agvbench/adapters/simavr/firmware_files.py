@@ -1,4 +1,4 @@
-"""Where the built firmware is, and what is missing if it is not."""
+"""The files of the built firmware, and what is missing if it is not built."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Hosts: they put an adapter on the bus. What both kinds share: questions, events, the token, and one lock.
+"""Hosts put an adapter on the bus. Shared by both kinds: queries, events, the token, and one lock.
 
 The lock is what lets adapters be written without any: whatever a host calls, it calls one at a time.
 """
