@@ -11,12 +11,11 @@ from agvbench.adapters.contract import SILENCE_LIMIT_S, AgvAdapter
 from agvbench.adapters.host import Host
 from agvbench.bus.clock import Clock
 from agvbench.bus.command_message import CommandFlags, CommandMessage, decode_command
+from agvbench.bus.counters import LossCounter, Sequence, Tally
 from agvbench.bus.event_message import COMMANDS_LATE, COMMANDS_LOST, RUNNER_SILENT, Level
 from agvbench.bus.identity_message import encode_agv_identity
 from agvbench.bus.keys import AGV, CLAIM, RELEASE, REPLAY, RESET, Keys
 from agvbench.bus.request_message import decode_claim, decode_replay, decode_reset
-from agvbench.bus.sequence import LossCounter, Sequence
-from agvbench.bus.tally import Tally
 from agvbench.bus.truth_message import Truth, TruthFlags
 from agvbench.bus.wire import Kind, prefix
 from agvbench.errors import AdapterGoneError, LinkError, MessageError, RunStoppedError

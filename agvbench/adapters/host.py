@@ -12,11 +12,11 @@ from dataclasses import replace
 from typing import Any
 
 from agvbench.bus.clock import Clock
+from agvbench.bus.counters import Sequence
 from agvbench.bus.event_message import Event, Level, encode_event
 from agvbench.bus.keys import IDENTITY, TIME, Keys
-from agvbench.bus.questions import refusal
+from agvbench.bus.queries import refusal
 from agvbench.bus.request_message import encode_time
-from agvbench.bus.sequence import Sequence
 from agvbench.errors import AgvbenchError, LinkError
 
 _QUESTIONS_WAITING = 64

@@ -11,8 +11,8 @@ from agvbench.adapters.contract import AdapterOptions
 from agvbench.adapters.mocap_host import MocapHost
 from agvbench.adapters.registry import open_agv, open_mocap
 from agvbench.bus.clock import Clock
+from agvbench.bus.counters import Sequence
 from agvbench.bus.keys import Keys
-from agvbench.bus.sequence import Sequence
 from agvbench.bus.truth_message import Truth, TruthFlags, encode_truth
 from agvbench.bus.wire import MAX_ROWS
 from agvbench.errors import AdapterGoneError

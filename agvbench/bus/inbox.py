@@ -9,11 +9,10 @@ import threading
 from collections import deque
 from typing import Any
 
+from agvbench.bus.counters import LossCounter, Tally
 from agvbench.bus.event_message import Event, Level, decode_event
 from agvbench.bus.frames_message import FramesMessage, decode_frames
 from agvbench.bus.keys import AGV, MOCAP, Keys
-from agvbench.bus.sequence import LossCounter
-from agvbench.bus.tally import Tally
 from agvbench.bus.wire import HEADER_BYTES, Kind
 from agvbench.errors import LinkError, MessageError
 

@@ -7,8 +7,8 @@ from contextlib import suppress
 from typing import Any
 
 from agvbench.bus.command_message import CommandFlags, pack_command
+from agvbench.bus.counters import Sequence
 from agvbench.bus.keys import Keys
-from agvbench.bus.sequence import Sequence
 from agvbench.errors import LinkError
 from agvbench.types import Command
 

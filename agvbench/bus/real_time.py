@@ -1,26 +1,27 @@
-"""Exchanges with what moves in real time: publish, then collect frames until the command has been held."""
+"""Exchanges in real time: publish, then collect frames; with heartbeat and clock offset of the adapter."""
 
 from __future__ import annotations
 
 import threading
 from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from agvbench.bus.clock import Clock, wait_until
-from agvbench.bus.clock_offset import measure_offset
 from agvbench.bus.command_message import CommandFlags
+from agvbench.bus.counters import Tally
 from agvbench.bus.event_message import Event, Level
 from agvbench.bus.frames_message import FramesMessage, unpack_columns
-from agvbench.bus.heartbeat import Heartbeat
 from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import AGV, MOCAP, TIME, Keys
+from agvbench.bus.liveliness import Presence
 from agvbench.bus.outbox import CommandOutbox
-from agvbench.bus.presence import Presence
-from agvbench.bus.tally import Tally
-from agvbench.errors import AgvbenchError, LinkError, MessageError, RunStoppedError
+from agvbench.bus.queries import ask
+from agvbench.bus.request_message import decode_time
+from agvbench.errors import AdapterGoneError, AgvbenchError, LinkError, MessageError, RunStoppedError
 from agvbench.types import Command, Frames
 
 KEEP_ALIVE_S = 0.1
@@ -191,3 +192,68 @@ class RealTime:
             t_s=frames.t_s + (self._offset_s - start_s),
             received_s=np.repeat(arrived_s, [message.frame_count for message in messages]) - start_s,
         )
+
+
+PERIOD_S = 0.5
+ANSWER_LIMIT_S = 1.0
+
+
+class Heartbeat:
+    """Asks the question `key` again and again, in a thread; calls `on_silent` when nobody answers.
+
+    A vehicle has stopped itself by then: this is for the runner, which would else drive on without one.
+    """
+
+    def __init__(self, session: Any, key: str, clock: Clock, on_silent: Callable[[AgvbenchError], None]) -> None:
+        self._session, self._key, self._clock, self._on_silent = session, key, clock, on_silent
+        self._closed = threading.Event()
+        self._thread = threading.Thread(target=self._beat, name="agvbench-heartbeat", daemon=True)
+        self._thread.start()
+
+    def _beat(self) -> None:
+        while not self._clock.wait(self._closed, PERIOD_S):
+            try:
+                ask(self._session, self._key, b"", ANSWER_LIMIT_S)
+            except AgvbenchError:
+                if not self._closed.is_set():
+                    self._on_silent(self._silence())
+
+    def _silence(self) -> AdapterGoneError:
+        return AdapterGoneError(
+            "adapter does not answer any more", where=self._key.rpartition("/")[0],
+            value=f"waited {ANSWER_LIMIT_S:g} s",
+            remedy="see whether its process hangs or was suspended, then go on with --resume",
+        )  # fmt: skip
+
+    def close(self) -> None:
+        """Ask no more."""
+        self._closed.set()
+        self._thread.join(timeout=2.0 * ANSWER_LIMIT_S)
+
+
+_ROUND_TRIPS = 8
+_LIMIT_S = 2.0
+
+
+def measure_offset(session: Any, key: str, clock: Clock, round_trips: int = _ROUND_TRIPS) -> float:
+    """Return what to add [s] to the clock behind `key` to get the time of `clock`.
+
+    The error is at most half of the shortest round trip; the shortest is used, since delays only ever add.
+
+    Raises
+    ------
+    AdapterGoneError
+        If the adapter behind `key` does not answer.
+
+    References
+    ----------
+    F. Cristian, Probabilistic clock synchronization, Distributed Computing 3, 1989.
+    """
+    best_s, offset_s = float("inf"), 0.0
+    for _ in range(round_trips):
+        sent_s = clock.now()
+        there_s = decode_time(ask(session, key, b"", _LIMIT_S))
+        trip_s = clock.now() - sent_s
+        if trip_s < best_s:
+            best_s, offset_s = trip_s, sent_s + trip_s / 2.0 - there_s
+    return offset_s

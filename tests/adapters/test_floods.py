@@ -18,9 +18,9 @@ from agvbench.bus.event_message import Event, Level, encode_event
 from agvbench.bus.frames_message import FrameClock, FramesFlags, pack_columns, pack_frames
 from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import AGV, TIME, Keys
+from agvbench.bus.liveliness import Presence
 from agvbench.bus.outbox import CommandOutbox
-from agvbench.bus.presence import Presence
-from agvbench.bus.questions import ask
+from agvbench.bus.queries import ask
 from agvbench.bus.real_time import RealTime
 from agvbench.bus.session import open_session
 from agvbench.bus.wire import MAX_MESSAGE_BYTES, MAX_ROWS

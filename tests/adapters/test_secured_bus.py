@@ -21,7 +21,7 @@ from agvbench.bus.command_message import CommandFlags, pack_command
 from agvbench.bus.event_message import Event, Level, encode_event
 from agvbench.bus.keys import AGV, IDENTITY, Keys
 from agvbench.bus.link import VehicleLink
-from agvbench.bus.questions import ask
+from agvbench.bus.queries import ask
 from agvbench.bus.session import open_session
 from agvbench.campaign import Campaign
 from agvbench.errors import AdapterGoneError, LinkError, PlantError

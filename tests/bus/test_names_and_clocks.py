@@ -8,10 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agvbench.bus.clock import Clock, SimulatedClock, WallClock, wait_until
+from agvbench.bus.clock import Clock, SimulatedClock, WallClock, Watchdog, wait_until
+from agvbench.bus.counters import LossCounter, Sequence
 from agvbench.bus.keys import Keys
-from agvbench.bus.sequence import LossCounter, Sequence
-from agvbench.bus.watchdog import Watchdog
 from agvbench.errors import LinkError
 
 

@@ -1,4 +1,4 @@
-"""Questions to adapters: one query, one answer, or an error that says what came instead."""
+"""Queries to adapters: one query, one answer, or an error that says what came instead."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who is there: liveliness tokens, so that an adapter that vanishes is noticed without waiting for it."""
+"""Liveliness of adapters: tokens on the bus, so that one that vanishes is noticed at once."""
 
 from __future__ import annotations
 
