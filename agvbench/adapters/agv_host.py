@@ -10,14 +10,14 @@ from typing import Any
 from agvbench.adapters.contract import SILENCE_LIMIT_S, AgvAdapter
 from agvbench.adapters.host import Host
 from agvbench.bus.clock import Clock
-from agvbench.bus.command_message import CommandFlags, CommandMessage, decode_command
 from agvbench.bus.counters import LossCounter, Sequence, Tally
-from agvbench.bus.event_message import COMMANDS_LATE, COMMANDS_LOST, RUNNER_SILENT, Level
-from agvbench.bus.identity_message import encode_agv_identity
 from agvbench.bus.keys import AGV, CLAIM, RELEASE, REPLAY, RESET, Keys
-from agvbench.bus.request_message import decode_claim, decode_replay, decode_reset
-from agvbench.bus.truth_message import Truth, TruthFlags
-from agvbench.bus.wire import Kind, prefix
+from agvbench.bus.messages.command import CommandFlags, CommandMessage, decode_command
+from agvbench.bus.messages.event import COMMANDS_LATE, COMMANDS_LOST, RUNNER_SILENT, Level
+from agvbench.bus.messages.identity import encode_agv_identity
+from agvbench.bus.messages.request import decode_claim, decode_replay, decode_reset
+from agvbench.bus.messages.truth import Truth, TruthFlags
+from agvbench.bus.messages.wire import Kind, prefix
 from agvbench.errors import AdapterGoneError, LinkError, MessageError, RunStoppedError
 from agvbench.types import Floats
 

@@ -17,12 +17,12 @@ from typing import ClassVar, Protocol, Self
 import numpy as np
 
 from agvbench.bus.clock import Clock, WallClock
-from agvbench.bus.command_message import CommandMessage
-from agvbench.bus.event_message import Level
-from agvbench.bus.frames_message import FrameClock
-from agvbench.bus.identity_message import AgvIdentity, MocapIdentity
-from agvbench.bus.request_message import Replay, Reset, Sampling
-from agvbench.bus.truth_message import Truth, TruthFlags
+from agvbench.bus.messages.command import CommandMessage
+from agvbench.bus.messages.event import Level
+from agvbench.bus.messages.frames import FrameClock
+from agvbench.bus.messages.identity import AgvIdentity, MocapIdentity
+from agvbench.bus.messages.request import Replay, Reset, Sampling
+from agvbench.bus.messages.truth import Truth, TruthFlags
 from agvbench.errors import FlagError, LinkError
 from agvbench.types import CommandUnit, Floats, Frames
 

@@ -13,10 +13,10 @@ from typing import Any
 
 from agvbench.bus.clock import Clock
 from agvbench.bus.counters import Sequence
-from agvbench.bus.event_message import Event, Level, encode_event
 from agvbench.bus.keys import IDENTITY, TIME, Keys
+from agvbench.bus.messages.event import Event, Level, encode_event
+from agvbench.bus.messages.request import encode_time
 from agvbench.bus.queries import refusal
-from agvbench.bus.request_message import encode_time
 from agvbench.errors import AgvbenchError, LinkError
 
 _QUESTIONS_WAITING = 64

@@ -11,12 +11,12 @@ from agvbench.adapters.contract import MocapAdapter
 from agvbench.adapters.host import Host
 from agvbench.bus.clock import Clock
 from agvbench.bus.counters import LossCounter, Sequence
-from agvbench.bus.frames_message import FrameClock, FramesFlags, pack_batch, pack_single
-from agvbench.bus.identity_message import encode_mocap_identity
 from agvbench.bus.keys import MOCAP, RESET, Keys
-from agvbench.bus.request_message import decode_reset, encode_sampling
-from agvbench.bus.truth_message import Truth, decode_truth
-from agvbench.bus.wire import MAX_ROWS
+from agvbench.bus.messages.frames import FrameClock, FramesFlags, pack_batch, pack_single
+from agvbench.bus.messages.identity import encode_mocap_identity
+from agvbench.bus.messages.request import decode_reset, encode_sampling
+from agvbench.bus.messages.truth import Truth, decode_truth
+from agvbench.bus.messages.wire import MAX_ROWS
 from agvbench.errors import LinkError, MessageError
 from agvbench.types import Frames
 

@@ -13,8 +13,8 @@ from agvbench.adapters.registry import open_agv, open_mocap
 from agvbench.bus.clock import Clock
 from agvbench.bus.counters import Sequence
 from agvbench.bus.keys import Keys
-from agvbench.bus.truth_message import Truth, TruthFlags, encode_truth
-from agvbench.bus.wire import MAX_ROWS
+from agvbench.bus.messages.truth import Truth, TruthFlags, encode_truth
+from agvbench.bus.messages.wire import MAX_ROWS
 from agvbench.errors import AdapterGoneError
 
 

@@ -10,8 +10,8 @@ from agvbench.adapters.contract import DEFAULT_PLANT, AdapterOptions
 from agvbench.adapters.node import host_adapters
 from agvbench.bus.bus_config import BusConfig
 from agvbench.bus.clock import Clock
-from agvbench.bus.identity_message import Identity
 from agvbench.bus.link import VehicleLink
+from agvbench.bus.messages.identity import Identity
 from agvbench.bus.session import bus_session
 from agvbench.errors import LinkError
 from agvbench.types import CommandUnit

@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import ClassVar, Self
 
 from agvbench.adapters.contract import AdapterOptions, AgvAdapter, AgvReports, run_seed
-from agvbench.bus.identity_message import AgvIdentity
-from agvbench.bus.request_message import Reset, Sampling
+from agvbench.bus.messages.identity import AgvIdentity
+from agvbench.bus.messages.request import Reset, Sampling
 from agvbench.simulator import load_plant
 from agvbench.types import Command, Plant
 

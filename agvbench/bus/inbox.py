@@ -10,10 +10,10 @@ from collections import deque
 from typing import Any
 
 from agvbench.bus.counters import LossCounter, Tally
-from agvbench.bus.event_message import Event, Level, decode_event
-from agvbench.bus.frames_message import FramesMessage, decode_frames
 from agvbench.bus.keys import AGV, MOCAP, Keys
-from agvbench.bus.wire import HEADER_BYTES, Kind
+from agvbench.bus.messages.event import Event, Level, decode_event
+from agvbench.bus.messages.frames import FramesMessage, decode_frames
+from agvbench.bus.messages.wire import HEADER_BYTES, Kind
 from agvbench.errors import LinkError, MessageError
 
 _CAPACITY = 1024

@@ -8,16 +8,13 @@ from typing import Any
 
 from agvbench.bus.clock import Clock, SimulatedClock, WallClock, Watchdog
 from agvbench.bus.counters import LossCounter
-from agvbench.bus.event_message import Event, Level
-from agvbench.bus.identity_message import Identity, decode_agv_identity, decode_mocap_identity
 from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import AGV, CLAIM, IDENTITY, MOCAP, RELEASE, REPLAY, RESET, Keys
 from agvbench.bus.liveliness import SETTLES_S, Presence
 from agvbench.bus.lock_step import LockStep
-from agvbench.bus.outbox import CommandOutbox
-from agvbench.bus.queries import ask
-from agvbench.bus.real_time import RealTime
-from agvbench.bus.request_message import (
+from agvbench.bus.messages.event import Event, Level
+from agvbench.bus.messages.identity import Identity, decode_agv_identity, decode_mocap_identity
+from agvbench.bus.messages.request import (
     Replay,
     Reset,
     Sampling,
@@ -26,6 +23,9 @@ from agvbench.bus.request_message import (
     encode_replay,
     encode_reset,
 )
+from agvbench.bus.outbox import CommandOutbox
+from agvbench.bus.queries import ask
+from agvbench.bus.real_time import RealTime
 from agvbench.errors import AgvbenchError, LinkError
 from agvbench.types import Command, Commands, Frames, Pose
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from agvbench.bus.clock import SimulatedClock, Watchdog
-from agvbench.bus.command_message import CommandFlags
-from agvbench.bus.event_message import Event, Level
-from agvbench.bus.frames_message import FramesFlags, FramesMessage
 from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import AGV, MOCAP, Keys
 from agvbench.bus.liveliness import SETTLES_S, Presence
+from agvbench.bus.messages.command import CommandFlags
+from agvbench.bus.messages.event import Event, Level
+from agvbench.bus.messages.frames import FramesFlags, FramesMessage
 from agvbench.bus.outbox import CommandOutbox
 from agvbench.errors import AdapterGoneError, LinkError
 from agvbench.types import Command, Frames

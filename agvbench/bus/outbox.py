@@ -6,9 +6,9 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-from agvbench.bus.command_message import CommandFlags, pack_command
 from agvbench.bus.counters import Sequence
 from agvbench.bus.keys import Keys
+from agvbench.bus.messages.command import CommandFlags, pack_command
 from agvbench.errors import LinkError
 from agvbench.types import Command
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from itertools import islice
 from typing import Any
 
-from agvbench.bus.event_message import Event, decode_event, encode_event
+from agvbench.bus.messages.event import Event, decode_event, encode_event
 from agvbench.errors import AdapterGoneError, AgvbenchError, LinkError
 
 _ANSWERS_READ = 16

@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 
 from agvbench.bus.clock import Clock, wait_until
-from agvbench.bus.command_message import CommandFlags
 from agvbench.bus.counters import Tally
-from agvbench.bus.event_message import Event, Level
-from agvbench.bus.frames_message import FramesMessage, unpack_columns
 from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import AGV, MOCAP, TIME, Keys
 from agvbench.bus.liveliness import Presence
+from agvbench.bus.messages.command import CommandFlags
+from agvbench.bus.messages.event import Event, Level
+from agvbench.bus.messages.frames import FramesMessage, unpack_columns
+from agvbench.bus.messages.request import decode_time
 from agvbench.bus.outbox import CommandOutbox
 from agvbench.bus.queries import ask
-from agvbench.bus.request_message import decode_time
 from agvbench.errors import AdapterGoneError, AgvbenchError, LinkError, MessageError, RunStoppedError
 from agvbench.types import Command, Frames
 

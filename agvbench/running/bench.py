@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import replace
 
-from agvbench.bus.event_message import Event
+from agvbench.bus.messages.event import Event
 from agvbench.campaign import CampaignWriter
 from agvbench.errors import CampaignError, FlagError, RunStoppedError, SafetyStopError
 from agvbench.model import VehicleModel

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pandas as pd
 
-from agvbench.bus.event_message import Event
+from agvbench.bus.messages.event import Event
 from agvbench.campaign import CampaignWriter
 from agvbench.running.links import RunnerLink
 from agvbench.running.provenance import recorded_rows

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from agvbench.bus.event_message import Event
-from agvbench.bus.identity_message import Identity
 from agvbench.bus.keys import Keys
+from agvbench.bus.messages.event import Event
+from agvbench.bus.messages.identity import Identity
 from agvbench.types import Command, Commands, Frames, Pose
 
 

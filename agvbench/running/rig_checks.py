@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from agvbench.adapters import AdapterOptions, open_rig
 from agvbench.adapters.contract import camera_options
 from agvbench.bus.bus_config import BusConfig
-from agvbench.bus.identity_message import AgvIdentity, Identity
 from agvbench.bus.link import VehicleLink
+from agvbench.bus.messages.identity import AgvIdentity, Identity
 from agvbench.errors import FlagError, VehicleError
 from agvbench.model import VehicleModel
 from agvbench.running.rest import LEAST_RATE_HZ

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from agvbench.bus.event_message import Event
-from agvbench.bus.identity_message import Identity
 from agvbench.bus.link import VehicleLink
+from agvbench.bus.messages.event import Event
+from agvbench.bus.messages.identity import Identity
 from agvbench.types import Command, Commands, Frames, Pose
 
 _SLACK_S = 1e-9

@@ -31,14 +31,14 @@ from agvbench.adapters.agv_host import AgvHost
 from agvbench.adapters.contract import AdapterOptions, AgvAdapter, MocapAdapter, MocapReports
 from agvbench.adapters.mocap_host import MocapHost
 from agvbench.bus.clock import WallClock
-from agvbench.bus.command_message import CommandMessage
-from agvbench.bus.frames_message import FrameClock, FramesMessage
-from agvbench.bus.identity_message import AgvIdentity, MocapIdentity
 from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import Keys
 from agvbench.bus.link import VehicleLink
+from agvbench.bus.messages.command import CommandMessage
+from agvbench.bus.messages.frames import FrameClock, FramesMessage
+from agvbench.bus.messages.identity import AgvIdentity, MocapIdentity
+from agvbench.bus.messages.request import Reset, Sampling
 from agvbench.bus.outbox import CommandOutbox
-from agvbench.bus.request_message import Reset, Sampling
 from agvbench.bus.session import open_session
 from agvbench.errors import LinkError
 from agvbench.types import Command, Frames, Pose

@@ -27,7 +27,7 @@ HOST = f"""
 import sys, time
 from agvbench.adapters import AdapterOptions
 from agvbench.adapters.agv.serial import SerialAgv
-from agvbench.bus.command_message import CommandMessage
+from agvbench.bus.messages.command import CommandMessage
 from agvbench.types import Command
 
 agv = SerialAgv.open(sys.argv[1], AdapterOptions())

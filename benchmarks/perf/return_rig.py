@@ -11,12 +11,12 @@ from agvbench.adapters import open_rig
 from agvbench.adapters.agv.sim import SimAgv
 from agvbench.adapters.contract import AdapterOptions
 from agvbench.adapters.mocap.sim import SimMocap
-from agvbench.bus.command_message import CommandFlags, CommandMessage
-from agvbench.bus.identity_message import Identity
 from agvbench.bus.keys import Keys
 from agvbench.bus.link import VehicleLink
-from agvbench.bus.request_message import Reset, Sampling
-from agvbench.bus.truth_message import Truth
+from agvbench.bus.messages.command import CommandFlags, CommandMessage
+from agvbench.bus.messages.identity import Identity
+from agvbench.bus.messages.request import Reset, Sampling
+from agvbench.bus.messages.truth import Truth
 from agvbench.model import VehicleModel
 from agvbench.running.links import RunnerLink
 from agvbench.running.unbroken import UnbrokenLink

@@ -20,15 +20,13 @@ class BusMessage(Target):
     instruments = ("agvbench.bus",)
 
     def __init__(self) -> None:
-        from agvbench.bus import (
-            command_message,
-            event_message,
-            frames_message,
-            identity_message,
-            request_message,
-            truth_message,
-        )
-        from agvbench.bus.wire import Kind
+        from agvbench.bus.messages import command as command_message
+        from agvbench.bus.messages import event as event_message
+        from agvbench.bus.messages import frames as frames_message
+        from agvbench.bus.messages import identity as identity_message
+        from agvbench.bus.messages import request as request_message
+        from agvbench.bus.messages import truth as truth_message
+        from agvbench.bus.messages.wire import Kind
 
         self._decoders: dict[int, Callable[[bytes], Any]] = {
             Kind.COMMAND: command_message.decode_command,
@@ -45,16 +43,16 @@ class BusMessage(Target):
 
     def seeds(self) -> Iterable[bytes]:
         """Return a message of each kind."""
-        from agvbench.bus.command_message import CommandMessage, encode_command
-        from agvbench.bus.event_message import Event, Level, encode_event
-        from agvbench.bus.frames_message import FramesMessage, encode_frames, pack_columns
-        from agvbench.bus.identity_message import (
+        from agvbench.bus.messages.command import CommandMessage, encode_command
+        from agvbench.bus.messages.event import Event, Level, encode_event
+        from agvbench.bus.messages.frames import FramesMessage, encode_frames, pack_columns
+        from agvbench.bus.messages.identity import (
             AgvIdentity,
             MocapIdentity,
             encode_agv_identity,
             encode_mocap_identity,
         )
-        from agvbench.bus.request_message import (
+        from agvbench.bus.messages.request import (
             Replay,
             Reset,
             Sampling,
@@ -63,7 +61,7 @@ class BusMessage(Target):
             encode_sampling,
             encode_time,
         )
-        from agvbench.bus.truth_message import Truth, encode_truth
+        from agvbench.bus.messages.truth import Truth, encode_truth
         from agvbench.types import Command, Commands, Frames, Pose
 
         numbers = np.arange(3.0)

@@ -16,10 +16,10 @@ from rig_driving import FAILING, NEUTRAL, START, TINY
 
 from agvbench.adapters import AdapterOptions, host_adapters, open_rig
 from agvbench.bus.bus_config import BusConfig
-from agvbench.bus.command_message import CommandMessage, decode_command, encode_command
-from agvbench.bus.frames_message import FramesMessage, decode_frames, encode_frames, pack_columns, unpack_columns
-from agvbench.bus.identity_message import AgvIdentity, Identity, MocapIdentity
 from agvbench.bus.link import VehicleLink
+from agvbench.bus.messages.command import CommandMessage, decode_command, encode_command
+from agvbench.bus.messages.frames import FramesMessage, decode_frames, encode_frames, pack_columns, unpack_columns
+from agvbench.bus.messages.identity import AgvIdentity, Identity, MocapIdentity
 from agvbench.bus.session import open_session
 from agvbench.cli import main
 from agvbench.errors import AgvbenchError

@@ -18,16 +18,16 @@ from agvbench.adapters.contract import AgvAdapter
 from agvbench.adapters.registry import agv_adapters, mocap_adapters, open_agv, open_mocap, parse_spec
 from agvbench.adapters.serial_line import conversation
 from agvbench.adapters.simavr.firmware_files import why_not_built
-from agvbench.bus.command_message import CommandFlags, CommandMessage
-from agvbench.bus.event_message import Level
-from agvbench.bus.identity_message import (
+from agvbench.bus.messages.command import CommandFlags, CommandMessage
+from agvbench.bus.messages.event import Level
+from agvbench.bus.messages.identity import (
     decode_agv_identity,
     decode_mocap_identity,
     encode_agv_identity,
     encode_mocap_identity,
 )
-from agvbench.bus.request_message import Replay, Reset, Sampling
-from agvbench.bus.truth_message import Truth, TruthFlags
+from agvbench.bus.messages.request import Replay, Reset, Sampling
+from agvbench.bus.messages.truth import Truth, TruthFlags
 from agvbench.errors import AgvbenchError, LinkError
 from agvbench.types import Command, Commands, Frames
 

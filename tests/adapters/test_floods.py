@@ -13,17 +13,17 @@ import zenoh
 from test_real_time import MOVING, NEUTRAL, Silent, claimed_host
 
 from agvbench.bus.clock import WallClock
-from agvbench.bus.command_message import CommandFlags, CommandMessage, pack_command
-from agvbench.bus.event_message import Event, Level, encode_event
-from agvbench.bus.frames_message import FrameClock, FramesFlags, pack_columns, pack_frames
 from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import AGV, TIME, Keys
 from agvbench.bus.liveliness import Presence
+from agvbench.bus.messages.command import CommandFlags, CommandMessage, pack_command
+from agvbench.bus.messages.event import Event, Level, encode_event
+from agvbench.bus.messages.frames import FrameClock, FramesFlags, pack_columns, pack_frames
+from agvbench.bus.messages.wire import MAX_MESSAGE_BYTES, MAX_ROWS
 from agvbench.bus.outbox import CommandOutbox
 from agvbench.bus.queries import ask
 from agvbench.bus.real_time import RealTime
 from agvbench.bus.session import open_session
-from agvbench.bus.wire import MAX_MESSAGE_BYTES, MAX_ROWS
 from agvbench.errors import LinkError, MessageError
 from agvbench.types import Frames
 
@@ -212,8 +212,8 @@ def test_messages_that_are_too_long_do_not_arrive_and_the_rest_does(free_endpoin
 
 
 def test_a_replay_of_endless_commands_is_refused() -> None:
-    from agvbench.bus.request_message import decode_replay
-    from agvbench.bus.wire import Kind, pack_header
+    from agvbench.bus.messages.request import decode_replay
+    from agvbench.bus.messages.wire import Kind, pack_header
 
     with pytest.raises(MessageError, match="too many rows"):
         decode_replay(pack_header(Kind.REPLAY, count=MAX_ROWS + 1) + bytes(100))

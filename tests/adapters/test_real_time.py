@@ -16,13 +16,13 @@ from agvbench.adapters.agv_host import AgvHost
 from agvbench.adapters.contract import AgvAdapter
 from agvbench.bus import real_time
 from agvbench.bus.clock import SimulatedClock, WallClock
-from agvbench.bus.command_message import CommandFlags, CommandMessage, encode_command, pack_command
-from agvbench.bus.event_message import Event, decode_event, encode_event
-from agvbench.bus.identity_message import AgvIdentity
 from agvbench.bus.keys import AGV, CLAIM, Keys
+from agvbench.bus.messages.command import CommandFlags, CommandMessage, encode_command, pack_command
+from agvbench.bus.messages.event import Event, decode_event, encode_event
+from agvbench.bus.messages.identity import AgvIdentity
+from agvbench.bus.messages.request import encode_claim, encode_time
 from agvbench.bus.queries import ask
 from agvbench.bus.real_time import Failure, measure_offset
-from agvbench.bus.request_message import encode_claim, encode_time
 from agvbench.bus.session import open_session
 from agvbench.errors import AgvbenchError, LinkError, RunStoppedError
 from agvbench.types import Command, Frames

@@ -17,10 +17,10 @@ from secured_lab import set_up
 
 from agvbench.adapters import open_rig
 from agvbench.bus.bus_config import BusConfig
-from agvbench.bus.command_message import CommandFlags, pack_command
-from agvbench.bus.event_message import Event, Level, encode_event
 from agvbench.bus.keys import AGV, IDENTITY, Keys
 from agvbench.bus.link import VehicleLink
+from agvbench.bus.messages.command import CommandFlags, pack_command
+from agvbench.bus.messages.event import Event, Level, encode_event
 from agvbench.bus.queries import ask
 from agvbench.bus.session import open_session
 from agvbench.campaign import Campaign

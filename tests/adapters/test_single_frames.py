@@ -9,11 +9,11 @@ import numpy as np
 from agvbench.adapters.contract import AdapterOptions, MocapAdapter
 from agvbench.adapters.mocap_host import MocapHost
 from agvbench.bus.clock import WallClock
-from agvbench.bus.frames_message import FrameClock, FramesMessage
-from agvbench.bus.identity_message import MocapIdentity
 from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import Keys
-from agvbench.bus.request_message import Reset, Sampling
+from agvbench.bus.messages.frames import FrameClock, FramesMessage
+from agvbench.bus.messages.identity import MocapIdentity
+from agvbench.bus.messages.request import Reset, Sampling
 from agvbench.bus.session import open_session
 from agvbench.types import Frames
 

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from agvbench import errors
-from agvbench.bus.command_message import CommandMessage, decode_command, encode_command
-from agvbench.bus.event_message import Event, Level, decode_event, encode_event
-from agvbench.bus.frames_message import (
+from agvbench.bus.messages.command import CommandMessage, decode_command, encode_command
+from agvbench.bus.messages.event import Event, Level, decode_event, encode_event
+from agvbench.bus.messages.frames import (
     FrameClock,
     FramesMessage,
     decode_frames,
@@ -25,7 +25,7 @@ from agvbench.bus.frames_message import (
     pack_columns,
     unpack_columns,
 )
-from agvbench.bus.identity_message import (
+from agvbench.bus.messages.identity import (
     AgvIdentity,
     MocapIdentity,
     decode_agv_identity,
@@ -33,7 +33,7 @@ from agvbench.bus.identity_message import (
     encode_agv_identity,
     encode_mocap_identity,
 )
-from agvbench.bus.request_message import (
+from agvbench.bus.messages.request import (
     Replay,
     Reset,
     Sampling,
@@ -48,8 +48,8 @@ from agvbench.bus.request_message import (
     encode_sampling,
     encode_time,
 )
-from agvbench.bus.truth_message import Truth, decode_truth, encode_truth
-from agvbench.bus.wire import MAX_MESSAGE_BYTES, MAX_ROWS, VERSION
+from agvbench.bus.messages.truth import Truth, decode_truth, encode_truth
+from agvbench.bus.messages.wire import MAX_MESSAGE_BYTES, MAX_ROWS, VERSION
 from agvbench.errors import LinkError, MessageError, PlanError
 from agvbench.registry import own_classes
 from agvbench.types import Command, Commands, Frames, Pose

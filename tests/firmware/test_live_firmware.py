@@ -20,7 +20,7 @@ from agvbench.adapters.agv import serial
 from agvbench.adapters.agv.serial import SerialAgv
 from agvbench.adapters.serial_line import conversation
 from agvbench.adapters.simavr.host import Pulse, SimavrHost
-from agvbench.bus.command_message import CommandMessage
+from agvbench.bus.messages.command import CommandMessage
 from agvbench.campaign import Campaign
 from agvbench.errors import AgvbenchError, LinkError
 from agvbench.running.opening import open_session
@@ -97,7 +97,7 @@ HOST_TO_KILL = """
 import sys, time
 from agvbench.adapters import AdapterOptions
 from agvbench.adapters.agv.serial import SerialAgv
-from agvbench.bus.command_message import CommandMessage
+from agvbench.bus.messages.command import CommandMessage
 from agvbench.types import Command
 
 agv = SerialAgv.open(sys.argv[1], AdapterOptions())

@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 
 from agvbench.adapters import AdapterOptions, host_adapters, open_rig
-from agvbench.bus.command_message import CommandFlags, pack_command
-from agvbench.bus.event_message import Event, Level, encode_event
 from agvbench.bus.keys import Keys
+from agvbench.bus.messages.command import CommandFlags, pack_command
+from agvbench.bus.messages.event import Event, Level, encode_event
 from agvbench.bus.session import open_session as open_bus
 from agvbench.campaign import Campaign
 from agvbench.errors import AgvbenchError

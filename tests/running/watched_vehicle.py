@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from agvbench.adapters.agv.live import LiveAgv
-from agvbench.bus.event_message import Level
+from agvbench.bus.messages.event import Level
 
 
 class WatchedVehicle(LiveAgv):

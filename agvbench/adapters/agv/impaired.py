@@ -8,9 +8,9 @@ from agvbench.adapters.contract import AdapterOptions, AgvAdapter, AgvReports
 from agvbench.adapters.impairment.faults import Faults, Line, vehicle_fault
 from agvbench.adapters.impairment.spec import SCHEME, Impairment, parse_address
 from agvbench.adapters.registry import open_agv
-from agvbench.bus.command_message import CommandFlags, CommandMessage
-from agvbench.bus.identity_message import AgvIdentity
-from agvbench.bus.request_message import Replay, Reset
+from agvbench.bus.messages.command import CommandFlags, CommandMessage
+from agvbench.bus.messages.identity import AgvIdentity
+from agvbench.bus.messages.request import Replay, Reset
 from agvbench.errors import LinkError
 
 

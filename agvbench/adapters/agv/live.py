@@ -10,9 +10,9 @@ import numpy as np
 from agvbench.adapters.contract import SILENCE_LIMIT_S, AdapterOptions, AgvReports
 from agvbench.adapters.simulated_agv import SimulatedAgv
 from agvbench.bus.clock import wait_until
-from agvbench.bus.command_message import CommandFlags, CommandMessage
-from agvbench.bus.request_message import Replay, Reset
-from agvbench.bus.truth_message import TruthFlags
+from agvbench.bus.messages.command import CommandFlags, CommandMessage
+from agvbench.bus.messages.request import Replay, Reset
+from agvbench.bus.messages.truth import TruthFlags
 from agvbench.errors import AgvbenchError
 from agvbench.types import Command, Plant
 

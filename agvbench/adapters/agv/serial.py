@@ -9,10 +9,10 @@ from agvbench.adapters.serial_line.conversation import Conversation
 from agvbench.adapters.serial_line.dialect import check_unit
 from agvbench.adapters.serial_line.port import SerialPort
 from agvbench.bus.clock import Clock
-from agvbench.bus.command_message import CommandFlags, CommandMessage
 from agvbench.bus.counters import Tally
-from agvbench.bus.event_message import VEHICLE_STOPPED_ITSELF, Level
-from agvbench.bus.identity_message import AgvIdentity
+from agvbench.bus.messages.command import CommandFlags, CommandMessage
+from agvbench.bus.messages.event import VEHICLE_STOPPED_ITSELF, Level
+from agvbench.bus.messages.identity import AgvIdentity
 from agvbench.errors import AgvbenchError, LinkError
 from agvbench.types import Command
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from agvbench.adapters.contract import NO_POSES, AdapterOptions
 from agvbench.adapters.simulated_agv import SimulatedAgv
-from agvbench.bus.command_message import CommandFlags, CommandMessage
-from agvbench.bus.request_message import Replay, Reset, Sampling
-from agvbench.bus.truth_message import TruthFlags
+from agvbench.bus.messages.command import CommandFlags, CommandMessage
+from agvbench.bus.messages.request import Replay, Reset, Sampling
+from agvbench.bus.messages.truth import TruthFlags
 from agvbench.errors import LinkError
 from agvbench.types import Command, Floats, Plant
 

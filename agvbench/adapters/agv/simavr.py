@@ -18,8 +18,8 @@ from agvbench.adapters.serial_line.dialect import check_unit
 from agvbench.adapters.simavr.address import FRAME_S, FirmwareAddress
 from agvbench.adapters.simavr.host import CYCLES_PER_S, Pulse
 from agvbench.adapters.simavr.microcontroller import Microcontroller
-from agvbench.bus.identity_message import AgvIdentity
-from agvbench.bus.request_message import Reset
+from agvbench.bus.messages.identity import AgvIdentity
+from agvbench.bus.messages.request import Reset
 from agvbench.errors import LinkError
 from agvbench.simulator import load_plant
 from agvbench.types import Command, Floats, Plant

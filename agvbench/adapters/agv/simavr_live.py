@@ -16,9 +16,9 @@ from agvbench.adapters.serial_line.dialect import check_unit
 from agvbench.adapters.serial_line.port import SerialPort
 from agvbench.adapters.simavr.address import FRAME_S, FirmwareAddress
 from agvbench.adapters.simavr.host import SimavrHost
-from agvbench.bus.command_message import CommandMessage
-from agvbench.bus.identity_message import AgvIdentity
-from agvbench.bus.request_message import Reset
+from agvbench.bus.messages.command import CommandMessage
+from agvbench.bus.messages.identity import AgvIdentity
+from agvbench.bus.messages.request import Reset
 from agvbench.errors import AgvbenchError, LinkError
 from agvbench.simulator import load_plant
 from agvbench.types import Command, Plant

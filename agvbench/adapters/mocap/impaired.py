@@ -11,11 +11,11 @@ from agvbench.adapters.contract import AdapterOptions, MocapAdapter, MocapReport
 from agvbench.adapters.impairment.faults import Faults, frame_fault
 from agvbench.adapters.impairment.spec import SCHEME, Impairment, parse_address
 from agvbench.adapters.registry import open_mocap
-from agvbench.bus.event_message import Level
-from agvbench.bus.frames_message import FrameClock
-from agvbench.bus.identity_message import MocapIdentity
-from agvbench.bus.request_message import Reset, Sampling
-from agvbench.bus.truth_message import Truth
+from agvbench.bus.messages.event import Level
+from agvbench.bus.messages.frames import FrameClock
+from agvbench.bus.messages.identity import MocapIdentity
+from agvbench.bus.messages.request import Reset, Sampling
+from agvbench.bus.messages.truth import Truth
 from agvbench.types import Frames
 
 

@@ -10,9 +10,9 @@ from agvbench.adapters.natnet.client import Client, Seen
 from agvbench.adapters.natnet.emulated_camera import EMULATED, EmulatedNatNet
 from agvbench.adapters.natnet.options import NatNetOptions
 from agvbench.adapters.natnet.protocol.bitstream import TRACKED
-from agvbench.bus.event_message import Level
-from agvbench.bus.frames_message import FrameClock
-from agvbench.bus.identity_message import MocapIdentity
+from agvbench.bus.messages.event import Level
+from agvbench.bus.messages.frames import FrameClock
+from agvbench.bus.messages.identity import MocapIdentity
 from agvbench.errors import LinkError
 
 _QUIET_S = 1.0

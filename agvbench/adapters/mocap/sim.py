@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from agvbench.adapters.contract import AdapterOptions, MocapAdapter, MocapReports, run_seed
-from agvbench.bus.frames_message import FrameClock
-from agvbench.bus.identity_message import MocapIdentity
-from agvbench.bus.request_message import Reset, Sampling
-from agvbench.bus.truth_message import Truth, TruthFlags
+from agvbench.bus.messages.frames import FrameClock
+from agvbench.bus.messages.identity import MocapIdentity
+from agvbench.bus.messages.request import Reset, Sampling
+from agvbench.bus.messages.truth import Truth, TruthFlags
 from agvbench.errors import LinkError
 from agvbench.simulator import Camera, Tracker
 from agvbench.types import Frames

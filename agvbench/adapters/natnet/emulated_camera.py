@@ -26,11 +26,11 @@ from agvbench.adapters.natnet.protocol.bitstream import BODY, MARKER, TRACKED, V
 from agvbench.adapters.natnet.protocol.encode import Model
 from agvbench.adapters.natnet.protocol.frame import FrameOfData
 from agvbench.bus.clock import SimulatedClock, WallClock
-from agvbench.bus.event_message import Level
-from agvbench.bus.frames_message import FrameClock
-from agvbench.bus.identity_message import MocapIdentity
-from agvbench.bus.request_message import Reset, Sampling
-from agvbench.bus.truth_message import Truth
+from agvbench.bus.messages.event import Level
+from agvbench.bus.messages.frames import FrameClock
+from agvbench.bus.messages.identity import MocapIdentity
+from agvbench.bus.messages.request import Reset, Sampling
+from agvbench.bus.messages.truth import Truth
 from agvbench.errors import LinkError
 from agvbench.types import Frames
 

@@ -23,10 +23,10 @@ from agvbench.adapters.natnet.options import NatNetOptions
 from agvbench.adapters.natnet.protocol.bitstream import BODY
 from agvbench.adapters.registry import open_mocap
 from agvbench.bus.clock import WallClock
-from agvbench.bus.event_message import Event
-from agvbench.bus.frames_message import FramesMessage
 from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import Keys
+from agvbench.bus.messages.event import Event
+from agvbench.bus.messages.frames import FramesMessage
 from agvbench.bus.session import open_session
 from agvbench.errors import FlagError
 from agvbench.types import Frames

@@ -22,9 +22,9 @@ from agvbench.adapters.registry import open_agv
 from agvbench.adapters.serial_line import conversation
 from agvbench.adapters.serial_line.port import SerialPort
 from agvbench.bus.clock import WallClock
-from agvbench.bus.command_message import CommandMessage
-from agvbench.bus.event_message import Level
-from agvbench.bus.identity_message import decode_agv_identity, encode_agv_identity
+from agvbench.bus.messages.command import CommandMessage
+from agvbench.bus.messages.event import Level
+from agvbench.bus.messages.identity import decode_agv_identity, encode_agv_identity
 from agvbench.errors import AgvbenchError, LinkError
 from agvbench.types import Command
 

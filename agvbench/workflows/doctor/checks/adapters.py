@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from contextlib import closing
 
 from agvbench.adapters.registry import open_agv, open_mocap
-from agvbench.bus.identity_message import AgvIdentity, Identity, MocapIdentity
+from agvbench.bus.messages.identity import AgvIdentity, Identity, MocapIdentity
 from agvbench.model import VehicleModel
 from agvbench.running.placers.choosing import choose_placer
 from agvbench.running.rig_checks import adapter_options, check_commands, open_session_rig

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import cast
 
-from agvbench.bus.wire import MAX_TEXT_BYTES, Kind, Reader, pack_header, pack_text, unpack_header
+from agvbench.bus.messages.wire import MAX_TEXT_BYTES, Kind, Reader, pack_header, pack_text, unpack_header
 from agvbench.errors import LinkError, MessageError
 from agvbench.types import CommandUnit
 

@@ -9,7 +9,7 @@ import math
 import struct
 from typing import Final, NamedTuple
 
-from agvbench.bus.wire import Kind, check_length, prefix, unpack_header
+from agvbench.bus.messages.wire import Kind, check_length, prefix, unpack_header
 from agvbench.errors import MessageError
 from agvbench.types import Command
 

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from agvbench.bus.wire import FLOAT, MAX_ROWS, Kind, Reader, pack_column, pack_header, unpack_header
+from agvbench.bus.messages.wire import FLOAT, MAX_ROWS, Kind, Reader, pack_column, pack_header, unpack_header
 from agvbench.errors import MessageError
 from agvbench.types import Floats
 

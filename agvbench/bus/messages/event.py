@@ -12,7 +12,7 @@ from enum import IntEnum
 from typing import Self
 
 from agvbench import errors
-from agvbench.bus.wire import MAX_TEXT_BYTES, Kind, Reader, pack_header, pack_text, unpack_header
+from agvbench.bus.messages.wire import MAX_TEXT_BYTES, Kind, Reader, pack_header, pack_text, unpack_header
 from agvbench.registry import own_classes
 
 _BODY = struct.Struct("<QdB")

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agvbench.bus.wire import (
+from agvbench.bus.messages.wire import (
     FLOAT,
     HEADER_BYTES,
     MAX_ROWS,

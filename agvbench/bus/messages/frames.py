@@ -17,7 +17,17 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.bus.wire import BOOLEAN, FLOAT, HEADER_BYTES, INTEGER, MAX_ROWS, Kind, check_length, prefix, unpack_header
+from agvbench.bus.messages.wire import (
+    BOOLEAN,
+    FLOAT,
+    HEADER_BYTES,
+    INTEGER,
+    MAX_ROWS,
+    Kind,
+    check_length,
+    prefix,
+    unpack_header,
+)
 from agvbench.errors import MessageError
 from agvbench.types import Floats, Frames
 

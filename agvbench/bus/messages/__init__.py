@@ -1,0 +1,1 @@
+"""The messages on the bus, and how each is packed into bytes."""
