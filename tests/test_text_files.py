@@ -19,8 +19,8 @@ from agvbench.campaign.tables.parquet import read_parquet
 from agvbench.errors import AgvbenchError, FileError
 from agvbench.model import VehicleModel
 from agvbench.planning.trajectories.loading import load_trajectory
-from agvbench.running.remainders import read_remainders
-from agvbench.running.settings import BenchSettings
+from agvbench.running.configuration.settings import BenchSettings
+from agvbench.running.session.end_pose_bias import read_remainders
 from agvbench.text_files import MAX_BYTES, MAX_DEPTH, read_json, read_text, read_toml
 
 READERS: dict[str, Callable[[Path], object]] = {

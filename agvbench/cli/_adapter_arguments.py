@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from agvbench.running.options import number, whole_number
+from agvbench.running.configuration.session_options import number, whole_number
 
 AGV_ENDPOINT = "tcp/127.0.0.1:7447"
 MOCAP_ENDPOINT = "tcp/127.0.0.1:7448"

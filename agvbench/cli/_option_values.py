@@ -19,7 +19,7 @@ def check_values(options: Mapping[str, Any]) -> None:
     """
     from agvbench.planning.trajectories.loading import driven_trajectories, load_trajectory
     from agvbench.planning.workspace import Workspace
-    from agvbench.running.settings import BenchSettings
+    from agvbench.running.configuration.settings import BenchSettings
 
     settings = BenchSettings.given({name: value for name, value in options.items() if value is not None})
     Workspace.parse(settings.workspace)

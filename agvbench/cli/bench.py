@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import argparse
 
-from agvbench.running.options import add_options
+from agvbench.running.configuration.session_options import add_options
 
 HELP = "calibrate, drive the eight trajectories, write campaign and report"
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import argparse
 
-from agvbench.running.options import whole_number
+from agvbench.running.configuration.session_options import whole_number
 
 HELP = "blind trials of the diagnosis on plants with a hidden effect"
 

@@ -21,7 +21,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from agvbench.running.options import number
+from agvbench.running.configuration.session_options import number
 
 HELP = "compare two campaigns, or two conditions: better, same, worse, or cannot say"
 

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import argparse
 
-from agvbench.running.options import OPTIONS, destination, whole_number
+from agvbench.running.configuration.session_options import OPTIONS, destination, whole_number
 
 _OF_THE_RIG = (
     "--agv", "--mocap", "--camera", "--plant", "--place", "--workspace", "--connect", "--bus-config", "--lab",

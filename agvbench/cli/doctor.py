@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import argparse
 
-from agvbench.running.options import OPTIONS, destination
+from agvbench.running.configuration.session_options import OPTIONS, destination
 
 HELP = "look whether vehicle, cameras and this machine are ready"
 _OF_THE_RIG = (
@@ -34,8 +34,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Print what every check finds; return the exit code."""
     from agvbench.adapters import check_specs
     from agvbench.reporting.doctor_table import tell
-    from agvbench.running.settings import BenchSettings
-    from agvbench.running.vehicles import lab_vehicle
+    from agvbench.running.configuration.settings import BenchSettings
+    from agvbench.running.configuration.vehicles import lab_vehicle
     from agvbench.workflows.doctor import Lab, State, examine
 
     given = {destination(flag): getattr(arguments, destination(flag)) for flag in _OF_THE_RIG}

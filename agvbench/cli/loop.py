@@ -31,7 +31,7 @@ from __future__ import annotations
 
 import argparse
 
-from agvbench.running.options import OPTIONS, destination
+from agvbench.running.configuration.session_options import OPTIONS, destination
 
 HELP = "bench, diagnose, correct the model, bench again: before and after"
 # The loop decides what is calibrated and corrected, and a calibration to the full is agvbench bench's.

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from agvbench.errors import FlagError, PlanError
-from agvbench.running.options import number, whole_number
+from agvbench.running.configuration.session_options import number, whole_number
 
 if TYPE_CHECKING:
     from agvbench.planning import DryRun
@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Plan, print, and say what cannot be driven."""
     from agvbench.planning.workspace import DEFAULT_MARGIN_M, Workspace
-    from agvbench.running.vehicles import lab_vehicle
+    from agvbench.running.configuration.vehicles import lab_vehicle
     from agvbench.workflows.plan import plan_trajectories
 
     if args.repeats < 1:

@@ -14,7 +14,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from agvbench.running.options import number
+from agvbench.running.configuration.session_options import number
 
 HELP = "write the report of a campaign: HTML, tables, figures, Rerun recording"
 

@@ -13,7 +13,7 @@ from agvbench.errors import AgvbenchError, InputError
 from agvbench.pytest_plugin.options import option, settings_from
 
 if TYPE_CHECKING:
-    from agvbench.running.settings import BenchSettings
+    from agvbench.running.configuration.settings import BenchSettings
 
 REPEAT = "agvbench_repeat"
 TRAJECTORIES = "trajectories"
@@ -88,7 +88,7 @@ def _repeat(metafunc: pytest.Metafunc) -> None:
 def _settings(config: pytest.Config) -> BenchSettings:
     """Return the session's settings, or the usual ones: what is wrong is told once everything is collected."""
     if _SETTINGS not in config.stash:
-        from agvbench.running.settings import BenchSettings
+        from agvbench.running.configuration.settings import BenchSettings
 
         try:
             config.stash[_SETTINGS] = settings_from(config)
@@ -146,7 +146,7 @@ def _arrange(config: pytest.Config, items: list[pytest.Item], benches: list[pyte
 
 def chosen(config: pytest.Config, items: Iterable[pytest.Item]) -> dict[str, Any]:
     """Return what chose the runs of this session, for the one that resumes it: benchmarks, and pytest's ``-k``."""
-    from agvbench.running.benchmark_files import benchmark_name
+    from agvbench.running.configuration.benchmark_files import benchmark_name
 
     given = [str(argument) for argument in config.args]
     if not all(Path(argument.partition("::")[0]).is_file() for argument in given):

@@ -14,8 +14,7 @@ from agvbench.pytest_plugin.collecting import chosen, experiment, is_bench, phas
 from agvbench.pytest_plugin.options import given_options, option
 
 if TYPE_CHECKING:
-    from agvbench.running.driver import Driver
-    from agvbench.running.session import BenchSession
+    from agvbench.running.session.session import BenchSession, Driver
 
 INTERRUPT = pytest.StashKey[KeyboardInterrupt]()
 """What ended the session before its time."""
@@ -40,7 +39,7 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
     if config.option.collectonly or parallel or not any(is_bench(item) for item in session.items):
         return (yield)
     from agvbench.compiled import telling_of_compilation
-    from agvbench.running.opening import open_session
+    from agvbench.running.session.opening import open_session
 
     with ExitStack() as stack:
         stack.enter_context(telling_of_compilation(_teller(config)))
@@ -80,7 +79,7 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
 
 def _teller(config: pytest.Config) -> Callable[[str], None]:
     """Return what tells the operator something while a benchmark is driven, whose output pytest captures."""
-    from agvbench.running.placing import say
+    from agvbench.running.positioning.start_pose import say
 
     capture = config.pluginmanager.get_plugin("capturemanager")
 
@@ -96,7 +95,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     """End with the exit code that shells know of the signal that ended the session, or that of a set-up that failed."""
     stash = session.config.stash
     if INTERRUPT in stash:
-        from agvbench.running.signals import exit_code
+        from agvbench.running.session.termination_signals import exit_code
 
         session.exitstatus = exit_code(stash[INTERRUPT])
     elif ENDS_PROGRAM in stash or (SESSION in stash and stash[SESSION].failure is not None):

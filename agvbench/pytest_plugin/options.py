@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from agvbench.running.options import OPTIONS, PYTEST_PREFIX, add_options, destination, prefixed
+from agvbench.running.configuration.session_options import OPTIONS, PYTEST_PREFIX, add_options, destination, prefixed
 
 if TYPE_CHECKING:
-    from agvbench.running.settings import BenchSettings
+    from agvbench.running.configuration.settings import BenchSettings
 
 _MARKS = (
     "repeats(n, full=None): drive n times (full times with --agvbench-full); n=None follows --agvbench-repeats",
@@ -49,7 +49,7 @@ def settings_from(config: pytest.Config) -> BenchSettings:
     AgvbenchError
         If a value cannot be used, or what the session began with not be read.
     """
-    from agvbench.running.session_settings import session_settings
+    from agvbench.running.session.opening import session_settings
 
     resume = bool(option(config, "--resume"))
     return session_settings(given_options(config), option(config, "--out"), resume=resume)[1]

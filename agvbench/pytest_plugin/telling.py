@@ -14,7 +14,7 @@ from agvbench.pytest_plugin.fixtures import ENDS_PROGRAM, INTERRUPT, SESSION, ST
 from agvbench.pytest_plugin.options import option
 
 if TYPE_CHECKING:
-    from agvbench.running.session import BenchSession
+    from agvbench.running.session.session import BenchSession
 
 _BAR = 24
 _STOPPED = "stopped"
@@ -106,7 +106,7 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, object, o
     """Count what was not driven, for a reason that is no failure, as skipped."""
     if not is_bench(pyfuncitem):
         return (yield)
-    from agvbench.running.driver import NotDrivenError
+    from agvbench.running.session.session import NotDrivenError
 
     try:
         return (yield)
@@ -185,7 +185,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
         if why:
             terminalreporter.write_line(f"ended by {why}, nothing was driven")
         return
-    from agvbench.running.directory import shown
+    from agvbench.running.configuration.campaign_directory import shown
 
     directory = shown(session.directory)
     if why:
@@ -204,7 +204,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
 def _conclude(terminalreporter: pytest.TerminalReporter, config: pytest.Config, session: BenchSession) -> None:
     from agvbench.reporting.after_bench import conclude
     from agvbench.reporting.dry_run import dry_run_table
-    from agvbench.running.directory import shown
+    from agvbench.running.configuration.campaign_directory import shown
 
     if session.is_dry:
         terminalreporter.write_line(dry_run_table(session.planned))

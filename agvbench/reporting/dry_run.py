@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from agvbench.planning import Plan
 from agvbench.planning.workspace import DEFAULT_MARGIN_M
-from agvbench.running.campaign_time import TURNAROUND_S
-from agvbench.running.drive import DEFAULT_TIMING
-from agvbench.running.records import DriveOrder
+from agvbench.running.execution.campaign_time import TURNAROUND_S
+from agvbench.running.execution.drive import DEFAULT_TIMING
+from agvbench.running.execution.run_records import DriveOrder
 
 _AT_REST_S = DEFAULT_TIMING.rest_before_s + DEFAULT_TIMING.settle_s
 _BETWEEN_S = _AT_REST_S + TURNAROUND_S

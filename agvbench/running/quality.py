@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from agvbench.bus.messages.event import NOT_AS_PLANNED, Event, Level
-from agvbench.running.rest import is_at_rest, pose_before
+from agvbench.running.rest_detection import is_at_rest, pose_before
 from agvbench.types import RUN_OK, Frames, Pose, wrap_angle
 
 

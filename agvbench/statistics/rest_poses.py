@@ -19,7 +19,7 @@ from agvbench.types import Floats, Frames, Pose, Run, wrap_angle
 
 WINDOW_S = 0.5
 SPEED_LIMIT_MPS = 0.02
-"""Of a recorded vehicle; twice the limit while driving (`agvbench.running.rest`), which admits runs to the record."""
+"""Of a recorded vehicle; twice the limit while driving (`agvbench.running.rest_detection`), which admits runs."""
 _FEWEST_FRAMES = 8
 _WILD_SCALES = 6.0
 # The least scatter that is believed: cameras quantise, and a scatter of zero would make every frame but one wild.

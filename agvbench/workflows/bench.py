@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 from agvbench.errors import INTERNAL_ERROR_EXIT_CODE, FlagError
-from agvbench.running.benchmark_files import find_benchmark
-from agvbench.running.directory import choose_directory
-from agvbench.running.options import OPTIONS, SESSION_OPTIONS, destination, prefixed
-from agvbench.running.settings import SETTINGS_FILE, BenchSettings
+from agvbench.running.configuration.benchmark_files import find_benchmark
+from agvbench.running.configuration.campaign_directory import choose_directory
+from agvbench.running.configuration.session_options import OPTIONS, SESSION_OPTIONS, destination, prefixed
+from agvbench.running.configuration.settings import SETTINGS_FILE, BenchSettings
 
 _SIGNALLED = 128
 """Exit codes above are those of sessions that a signal ended, and that have said so."""

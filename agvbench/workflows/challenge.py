@@ -16,13 +16,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from agvbench.errors import AgvbenchError, FlagError, PlantError
+from agvbench.running.configuration.benchmark_files import EXCITING
 from agvbench.simulator.hidden import SealedTruth, sealed_truth, true_rivals
 from agvbench.simulator.hidden.catalogue import CATALOGUE, NOTHING, recipes
 from agvbench.simulator.hidden.sampling import vehicle_of
 from agvbench.workflows.challenge_file import known_trials, write_trials
 from agvbench.workflows.challenge_scores import Scores, score
 from agvbench.workflows.challenge_trial import Trial
-from agvbench.workflows.exciting import EXCITING
 
 if TYPE_CHECKING:
     from agvbench.diagnosis import Diagnosis

@@ -9,8 +9,8 @@ from pathlib import Path
 from agvbench.campaign import Campaign
 from agvbench.campaign.completeness import Completeness
 from agvbench.errors import AgvbenchError
-from agvbench.running.provenance import INPUTS_TABLE
-from agvbench.running.settings import BenchSettings
+from agvbench.running.configuration.provenance import INPUTS_TABLE
+from agvbench.running.configuration.settings import BenchSettings
 
 _GEOMETRY = {"front_axle_m": "m", "rear_axle_m": "m"}
 _CAMERA = ("mocap", "camera")

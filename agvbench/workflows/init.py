@@ -8,7 +8,7 @@ from pathlib import Path
 from agvbench.campaign.atomic_files import made_folder
 from agvbench.errors import FileError
 from agvbench.resources import resource_directory
-from agvbench.running.vehicles import uncalibrated_vehicle
+from agvbench.running.configuration.vehicles import uncalibrated_vehicle
 
 _TEMPLATES = Path(__file__).parent / "lab"
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from agvbench.errors import AgvbenchError
-from agvbench.running.settings import BenchSettings
-from agvbench.workflows.exciting import EXCITING
+from agvbench.running.configuration.benchmark_files import EXCITING
+from agvbench.running.configuration.settings import BenchSettings
 from agvbench.workflows.loop_driving import Tell, drive
 from agvbench.workflows.loop_settings import (
     AFTER,

@@ -12,9 +12,9 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 from agvbench.errors import AgvbenchError
-from agvbench.running.directory import has_session
-from agvbench.running.settings import SETTINGS_FILE, BenchSettings
-from agvbench.running.signals import Terminated, interruptible
+from agvbench.running.configuration.campaign_directory import has_session
+from agvbench.running.configuration.settings import SETTINGS_FILE, BenchSettings
+from agvbench.running.session.termination_signals import Terminated, interruptible
 
 _PROGRAM = (
     "import json, sys; from agvbench.workflows.bench import run_benchmarks;"

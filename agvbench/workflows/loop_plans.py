@@ -18,7 +18,7 @@ from agvbench.planning import (
     load_trajectory,
     steered,
 )
-from agvbench.running.remainders import NO_REMAINDERS
+from agvbench.running.session.end_pose_bias import NO_REMAINDERS
 from agvbench.types import Pose
 
 _NOTICEABLE_M, _NOTICEABLE_RAD = 5e-4, math.radians(0.05)

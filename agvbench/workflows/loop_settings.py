@@ -12,8 +12,8 @@ import tomli_w
 
 from agvbench.campaign.atomic_files import write_atomically
 from agvbench.errors import FileError, FlagError
-from agvbench.running.directory import CAMPAIGNS, newest
-from agvbench.running.settings import BenchSettings, settings_for_resume
+from agvbench.running.configuration.campaign_directory import CAMPAIGNS, newest
+from agvbench.running.configuration.settings import BenchSettings, settings_for_resume
 
 SETTINGS = "loop.toml"
 BEFORE, DIAGNOSIS, VEHICLE, PLANS, AFTER = "before", "diagnosis.json", "vehicle.toml", "plans.json", "after"

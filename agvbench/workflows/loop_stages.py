@@ -11,8 +11,8 @@ from agvbench.campaign.atomic_files import replace_whole
 from agvbench.errors import FileError, FitError
 from agvbench.model import VehicleModel
 from agvbench.planning import driven_trajectories
-from agvbench.running.remainders import read_remainders
-from agvbench.running.settings import BenchSettings
+from agvbench.running.configuration.settings import BenchSettings
+from agvbench.running.session.end_pose_bias import read_remainders
 from agvbench.text_files import read_json
 from agvbench.workflows.diagnosis_files import keep_residuals
 from agvbench.workflows.loop_driving import Tell, drive, moved

@@ -16,7 +16,7 @@ from agvbench.planning import (
     load_trajectory,
     steered,
 )
-from agvbench.running.vehicles import expected_calibration, uncalibrated_vehicle
+from agvbench.running.configuration.vehicles import expected_calibration, uncalibrated_vehicle
 from agvbench.types import Pose
 
 

@@ -20,9 +20,9 @@ from agvbench.diagnosis.reading import read_runs
 from agvbench.errors import FileError, PlanError
 from agvbench.model import VehicleModel
 from agvbench.planning import plan
-from agvbench.running.opening import open_session
-from agvbench.running.records import DriveOrder
-from agvbench.running.settings import SETTINGS_FILE, BenchSettings
+from agvbench.running.configuration.settings import SETTINGS_FILE, BenchSettings
+from agvbench.running.execution.run_records import DriveOrder
+from agvbench.running.session.opening import open_session
 from agvbench.types import Run
 from agvbench.workflows.diagnosis_files import RESIDUALS
 

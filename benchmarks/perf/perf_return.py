@@ -21,13 +21,12 @@ from return_rig import Watched, rig
 from agvbench.errors import AgvbenchError
 from agvbench.model import VehicleModel, nominal_model
 from agvbench.planning import Workspace, load_trajectory, plan
-from agvbench.running.constant import Shares, held
-from agvbench.running.drive import drive
-from agvbench.running.placers.auto import Auto
-from agvbench.running.placers.placer import Rig
+from agvbench.running.command_shares import Shares, held
+from agvbench.running.configuration.vehicles import uncalibrated_vehicle
+from agvbench.running.execution.drive import drive
+from agvbench.running.positioning.placers import Auto, Rig
 from agvbench.running.quality import DEFAULT_LIMITS
 from agvbench.running.supervision import Supervisor
-from agvbench.running.vehicles import uncalibrated_vehicle
 from agvbench.simulator.hidden import drawn_spec
 from agvbench.types import Command, Commands, Pose, wrap_angle
 from agvbench.vehicle.geometry import Geometry

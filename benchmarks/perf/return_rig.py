@@ -18,8 +18,7 @@ from agvbench.bus.messages.identity import Identity
 from agvbench.bus.messages.request import Reset, Sampling
 from agvbench.bus.messages.truth import Truth
 from agvbench.model import VehicleModel
-from agvbench.running.links import RunnerLink
-from agvbench.running.unbroken import UnbrokenLink
+from agvbench.running.links import RunnerLink, UnbrokenLink
 from agvbench.simulator import load_plant
 from agvbench.types import Command, Floats, Frames, Plant, Pose
 

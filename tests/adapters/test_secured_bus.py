@@ -25,7 +25,7 @@ from agvbench.bus.queries import ask
 from agvbench.bus.session import open_session
 from agvbench.campaign import Campaign
 from agvbench.errors import AdapterGoneError, LinkError, PlantError
-from agvbench.running.settings import BenchSettings
+from agvbench.running.configuration.settings import BenchSettings
 from agvbench.workflows.doctor import Lab, State, examine
 
 KEYS = Keys("lab", "agv1")

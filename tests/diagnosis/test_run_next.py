@@ -12,7 +12,7 @@ from agvbench.cli import main
 from agvbench.diagnosis.grouping import split_runs
 from agvbench.diagnosis.reading import read_runs
 from agvbench.planning import load_trajectory
-from agvbench.running.settings import BenchSettings
+from agvbench.running.configuration.settings import BenchSettings
 from agvbench.workflows.run_next import _options
 
 

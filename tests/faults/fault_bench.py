@@ -15,9 +15,9 @@ from told_to_drive import Witness, witness
 
 from agvbench.campaign import Campaign as Recorded
 from agvbench.errors import AgvbenchError
-from agvbench.running.directory import has_session
-from agvbench.running.opening import open_session
-from agvbench.running.session import BenchSession
+from agvbench.running.configuration.campaign_directory import has_session
+from agvbench.running.session.opening import open_session
+from agvbench.running.session.session import BenchSession
 
 SEED = 5
 RUNS = ("before", "befallen", "after")

@@ -20,7 +20,7 @@ from agvbench.bus.clock import WallClock
 from agvbench.bus.link import VehicleLink
 from agvbench.errors import AgvbenchError
 from agvbench.planning import Workspace
-from agvbench.running.drive import Timing, drive
+from agvbench.running.execution.drive import Timing, drive
 from agvbench.running.supervision import DEFAULT_SAFETY, SafetyLimits, Supervisor
 from agvbench.types import Command, Commands, Pose
 

@@ -23,7 +23,7 @@ from agvbench.adapters.simavr.host import Pulse, SimavrHost
 from agvbench.bus.messages.command import CommandMessage
 from agvbench.campaign import Campaign
 from agvbench.errors import AgvbenchError, LinkError
-from agvbench.running.opening import open_session
+from agvbench.running.session.opening import open_session
 from agvbench.types import Command, Frames, Pose
 
 pytestmark = [pytest.mark.real_time, pytest.mark.usefixtures("firmware")]

@@ -13,7 +13,7 @@ from report_samples import make_campaign
 
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
 from agvbench.cli import main
-from agvbench.running.settings import BenchSettings
+from agvbench.running.configuration.settings import BenchSettings
 from agvbench.types import Commands
 
 

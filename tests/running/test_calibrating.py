@@ -10,10 +10,9 @@ import pytest
 
 from agvbench.errors import FitError, LinkError
 from agvbench.model import VehicleModel, thesis_vehicle
-from agvbench.running.calibrating import RUNS_DIGEST, VEHICLE_FILE
-from agvbench.running.driver import NotDrivenError
-from agvbench.running.opening import open_session
-from agvbench.running.session import BenchSession
+from agvbench.running.execution.calibration import RUNS_DIGEST, VEHICLE_FILE
+from agvbench.running.session.opening import open_session
+from agvbench.running.session.session import BenchSession, NotDrivenError
 
 SHARES = (-0.8, -0.4, 0.4, 0.8)
 RUNS = {f"{axle}{share}": (axle, share) for axle in ("front", "rear", "drive") for share in SHARES}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from agvbench.running.campaign_time import WallCampaignTime
+from agvbench.running.execution.campaign_time import WallCampaignTime
 
 
 class Machine:

@@ -11,7 +11,7 @@ from agvbench.effects.battery_droop import BatteryDroop
 from agvbench.effects.lateral_slip import LateralSlip
 from agvbench.model import thesis_vehicle
 from agvbench.planning import Departure, Workspace, corrected_plan, load_trajectory
-from agvbench.running.session import BenchSession
+from agvbench.running.session.session import BenchSession
 from agvbench.types import Pose
 
 FLOOR = Workspace.parse("circle:6.1")

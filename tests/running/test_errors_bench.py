@@ -10,11 +10,11 @@ import pytest
 from agvbench.campaign import CampaignHeader, CampaignWriter
 from agvbench.errors import AgvbenchError
 from agvbench.model import example_path
-from agvbench.running.benchmark_files import find_benchmark
-from agvbench.running.calibrating import calibrate_campaign
-from agvbench.running.driver import Driver
-from agvbench.running.opening import open_session
-from agvbench.running.settings import BenchSettings
+from agvbench.running.configuration.benchmark_files import find_benchmark
+from agvbench.running.configuration.settings import BenchSettings
+from agvbench.running.execution.calibration import calibrate_campaign
+from agvbench.running.session.opening import open_session
+from agvbench.running.session.session import Driver
 from agvbench.workflows.init import make_lab
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "errors-bench.md"
@@ -69,7 +69,7 @@ def resumed_with_another_name():
 
 def over_the_bus_in_another_unit(monkeypatch):
     """A vehicle that says of itself that it takes µs, as one in another process would."""
-    from agvbench.running import rig_checks
+    from agvbench.running.session import rig_checks
 
     real = rig_checks.open_rig
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from agvbench.campaign import Campaign
-from agvbench.running.directory import has_session
+from agvbench.running.configuration.campaign_directory import has_session
 
 pytestmark = pytest.mark.real_time
 

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 from agvbench.campaign import Campaign
-from agvbench.running.opening import open_session
-from agvbench.running.pausing import PAUSE_FILE, Pause
-from agvbench.running.session import BenchSession
+from agvbench.running.execution.pause import PAUSE_FILE, Pause
+from agvbench.running.session.opening import open_session
+from agvbench.running.session.session import BenchSession
 
 pytestmark = pytest.mark.real_time
 

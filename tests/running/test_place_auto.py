@@ -16,14 +16,12 @@ from agvbench.adapters import open_rig
 from agvbench.errors import FlagError
 from agvbench.model import nominal_model
 from agvbench.planning import Workspace
-from agvbench.running.opening import open_session
-from agvbench.running.placers.auto import Auto
-from agvbench.running.placers.choosing import PLACERS, choose_placer
-from agvbench.running.placers.placer import Rig
+from agvbench.running.configuration.settings import PLACES
+from agvbench.running.links import UnbrokenLink
+from agvbench.running.positioning.placers import PLACERS, Auto, Rig, choose_placer
 from agvbench.running.quality import DEFAULT_LIMITS
-from agvbench.running.settings import PLACES
+from agvbench.running.session.opening import open_session
 from agvbench.running.supervision import Supervisor
-from agvbench.running.unbroken import UnbrokenLink
 from agvbench.types import Pose
 from agvbench.vehicle.geometry import Geometry
 

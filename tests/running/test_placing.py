@@ -15,7 +15,7 @@ import pytest
 
 from agvbench.adapters import open_rig
 from agvbench.errors import LinkError
-from agvbench.running.placing import wait_for_start
+from agvbench.running.positioning.start_pose import wait_for_start
 from agvbench.types import Command, Pose
 
 pytestmark = pytest.mark.real_time

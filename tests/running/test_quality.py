@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from agvbench.running.quality import assess
-from agvbench.running.rest import is_at_rest, pose_before
+from agvbench.running.rest_detection import is_at_rest, pose_before
 from agvbench.types import Frames, Pose
 
 RATE_HZ = 120.0

@@ -1,7 +1,7 @@
 import pytest
 
 from agvbench.errors import FileError
-from agvbench.running.remainders import read_remainders
+from agvbench.running.session.end_pose_bias import read_remainders
 from agvbench.types import Pose
 
 

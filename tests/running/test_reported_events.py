@@ -19,8 +19,8 @@ from agvbench.bus.session import open_session as open_bus
 from agvbench.campaign import Campaign
 from agvbench.errors import AgvbenchError
 from agvbench.reporting.sections import all_sections
-from agvbench.running.opening import open_session
 from agvbench.running.quality import not_as_planned
+from agvbench.running.session.opening import open_session
 from agvbench.types import Command
 from agvbench.workflows.report import gather
 

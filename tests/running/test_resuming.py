@@ -18,14 +18,13 @@ from agvbench.campaign.completeness import Completeness
 from agvbench.errors import CampaignError, FileError, FlagError, LinkError, PlanError
 from agvbench.model import VehicleModel, example_path, thesis_vehicle
 from agvbench.planning.trajectories.loading import trajectory_file
-from agvbench.running.benchmark_files import benchmark_name, find_benchmark
-from agvbench.running.calibrating import VEHICLE_FILE
-from agvbench.running.directory import shown
-from agvbench.running.driver import NotDrivenError
-from agvbench.running.opening import open_session
-from agvbench.running.placers.auto import Auto
-from agvbench.running.placers.choosing import PLACERS
-from agvbench.running.records import attempts_by_run
+from agvbench.running.configuration.benchmark_files import benchmark_name, find_benchmark
+from agvbench.running.configuration.campaign_directory import shown
+from agvbench.running.execution.calibration import VEHICLE_FILE
+from agvbench.running.execution.run_records import attempts_by_run
+from agvbench.running.positioning.placers import PLACERS, Auto
+from agvbench.running.session.opening import open_session
+from agvbench.running.session.session import NotDrivenError
 from agvbench.workflows.bench import run_benchmarks
 
 MINE = """'''Two turns, for agvbench.'''
@@ -113,7 +112,7 @@ def test_one_that_drives_back_itself_begins_at_other_random_numbers_too(tmp_path
 
     asked: list[str] = []
     monkeypatch.setitem(PLACERS, "auto", Placed)
-    monkeypatch.setattr("agvbench.running.bench.times_stopped", lambda *_: 2)
+    monkeypatch.setattr("agvbench.running.execution.bench.times_stopped", lambda *_: 2)
     with open_session({"place": "auto"}, out=str(tmp_path / "c"), resume=False, dry_run=False) as session:
         session.driver("left", experiment="free", repeat=1).hold(drive=0.5, front=0.5, rear=0.0, for_s=0.3)
     assert asked == ["left-again2"]

@@ -16,10 +16,10 @@ from agvbench.errors import AgvbenchError, PlacingError, SafetyStopError
 from agvbench.model import VehicleModel, nominal_model, thesis_vehicle
 from agvbench.planning import Workspace
 from agvbench.planning.shortest_paths.return_path import GearLeg
-from agvbench.running.returning.follower import Follower
-from agvbench.running.returning.returner import Returner
+from agvbench.running.links import UnbrokenLink
+from agvbench.running.positioning.automatic_return.path_following import Follower
+from agvbench.running.positioning.automatic_return.returner import Returner
 from agvbench.running.supervision import Supervisor
-from agvbench.running.unbroken import UnbrokenLink
 from agvbench.types import Command, Pose, wrap_angle
 from agvbench.vehicle.geometry import Geometry
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from agvbench.running.returning.sight import Sight
+from agvbench.running.positioning.automatic_return.motion_interface import Sight
 from agvbench.types import Frames
 
 

@@ -10,11 +10,12 @@ import pytest
 
 from agvbench.campaign import Campaign
 from agvbench.campaign.campaign import session_starts
-from agvbench.running import rig_checks, session_began
-from agvbench.running.driver import Driver
-from agvbench.running.opening import open_session
-from agvbench.running.session_began import SessionBegan, idle_notice, last_end_s
-from agvbench.running.settings import BenchSettings, settings_for_resume
+from agvbench.running.configuration.settings import BenchSettings, settings_for_resume
+from agvbench.running.execution import campaign_time as session_began
+from agvbench.running.execution.campaign_time import SessionBegan, idle_notice, last_end_s
+from agvbench.running.session import rig_checks
+from agvbench.running.session.opening import open_session
+from agvbench.running.session.session import Driver
 from agvbench.types import NO_TARGET, Commands, Frames, Run
 
 HOUR_S = 3600.0

@@ -8,8 +8,8 @@ import pytest
 
 from agvbench.errors import AgvbenchError, FileError, FlagError
 from agvbench.model import thesis_vehicle
-from agvbench.running.opening import open_session
-from agvbench.running.settings import SETTINGS_FILE, BenchSettings, settings_for_resume
+from agvbench.running.configuration.settings import SETTINGS_FILE, BenchSettings, settings_for_resume
+from agvbench.running.session.opening import open_session
 from agvbench.vehicle.geometry import Geometry
 
 

@@ -13,7 +13,7 @@ from agvbench.adapters import open_rig
 from agvbench.bus.keys import Keys
 from agvbench.errors import SafetyStopError
 from agvbench.planning import Workspace
-from agvbench.running.drive import drive
+from agvbench.running.execution.drive import drive
 from agvbench.running.supervision import DEFAULT_SAFETY, SafetyLimits, Supervisor
 from agvbench.running.supervision.rule import Slice
 from agvbench.running.supervision.rules.frozen import Frozen

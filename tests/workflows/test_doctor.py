@@ -18,8 +18,8 @@ from agvbench.adapters.natnet.protocol.frame import FrameOfData
 from agvbench.cli import main
 from agvbench.errors import AgvbenchError, VehicleError
 from agvbench.model import example_vehicle, thesis_vehicle
-from agvbench.running.settings import BenchSettings
-from agvbench.running.vehicles import uncalibrated_vehicle
+from agvbench.running.configuration.settings import BenchSettings
+from agvbench.running.configuration.vehicles import uncalibrated_vehicle
 from agvbench.workflows.doctor import Lab, State, examine
 from agvbench.workflows.doctor.checks.adapters import Adapters
 from agvbench.workflows.doctor.checks.ports import Ports

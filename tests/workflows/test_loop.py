@@ -16,8 +16,8 @@ from agvbench.campaign import Campaign
 from agvbench.errors import FileError, FlagError
 from agvbench.model import VehicleModel
 from agvbench.reporting.loop import before_after_table, end_position_table
-from agvbench.running.remainders import read_remainders
-from agvbench.running.settings import BenchSettings
+from agvbench.running.configuration.settings import BenchSettings
+from agvbench.running.session.end_pose_bias import read_remainders
 from agvbench.statistics.equivalence import Bias
 from agvbench.statistics.quantities import THESIS
 from agvbench.workflows.loop_settings import MODEL_ONLY, NO_TRIAL, opened, write

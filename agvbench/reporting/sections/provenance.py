@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from agvbench import __version__
 from agvbench.reporting.content import Block, Column, Table
 from agvbench.reporting.sections.base import Section
-from agvbench.running.provenance import SIMULATED_TIME
+from agvbench.running.configuration.provenance import SIMULATED_TIME
 from agvbench.workflows.report import ReportData
 
 _COLUMNS = (Column("name", "what"), Column("value", "value"))

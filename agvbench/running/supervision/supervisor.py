@@ -1,4 +1,4 @@
-"""The supervisor: exchanges in short slices, and a stop as soon as a rule complains."""
+"""The supervisor: exchanges in short slices, and a stop, with its error, as soon as a rule complains."""
 
 from __future__ import annotations
 
@@ -8,14 +8,33 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from agvbench.errors import RunStoppedError, SafetyStopError
 from agvbench.planning import Workspace
 from agvbench.registry import classes_by_file
 from agvbench.running.links import RunnerLink
 from agvbench.running.supervision import rules
 from agvbench.running.supervision.limits import DEFAULT_SAFETY, SafetyLimits
 from agvbench.running.supervision.rule import Rule, Slice, Window
-from agvbench.running.supervision.stop import safety_stop
 from agvbench.types import Command, Frames
+
+STOPPED = " s into the run: "
+"""What every such error says, and so the status of every run that ended with one."""
+
+
+def safety_stop(
+    at_s: float, why: str, *, where: str, value: str, limit: str | None = None, ends_session: bool = True
+) -> SafetyStopError:
+    """Return the error of a vehicle that was stopped `at_s` [s] after its run began, or 0 before that.
+
+    Where the stop does not end the session it is a `RunStoppedError`.
+    """
+    if not ends_session:
+        return RunStoppedError(f"stopped {at_s:.1f}{STOPPED}{why}", where=where, value=value, limit=limit)
+    return SafetyStopError(
+        f"stopped {at_s:.1f}{STOPPED}{why}", where=where, value=value, limit=limit,
+        remedy="look at vehicle and camera, then go on with --resume",
+    )  # fmt: skip
+
 
 _SLACK_S = 1e-9
 

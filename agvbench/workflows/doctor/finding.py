@@ -8,7 +8,7 @@ from enum import Enum
 from pathlib import Path
 from typing import ClassVar
 
-from agvbench.running.settings import BenchSettings
+from agvbench.running.configuration.settings import BenchSettings
 
 
 class State(Enum):

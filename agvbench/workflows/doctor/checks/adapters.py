@@ -8,10 +8,10 @@ from contextlib import closing
 from agvbench.adapters.registry import open_agv, open_mocap
 from agvbench.bus.messages.identity import AgvIdentity, Identity, MocapIdentity
 from agvbench.model import VehicleModel
-from agvbench.running.placers.choosing import choose_placer
-from agvbench.running.rig_checks import adapter_options, check_commands, open_session_rig
-from agvbench.running.settings import BenchSettings
-from agvbench.running.vehicles import known_models
+from agvbench.running.configuration.settings import BenchSettings
+from agvbench.running.configuration.vehicles import known_models
+from agvbench.running.positioning.placers import choose_placer
+from agvbench.running.session.rig_checks import adapter_options, check_commands, open_session_rig
 from agvbench.workflows.doctor.finding import Check, Finding, Lab, State
 
 _SIM = BenchSettings().agv

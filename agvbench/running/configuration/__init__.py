@@ -1,0 +1,1 @@
+"""What a session is asked for: options, settings, vehicle, benchmarks and directory; and their provenance."""

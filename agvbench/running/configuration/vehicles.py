@@ -1,0 +1,69 @@
+"""The vehicle models of a session: the nominal one, and those of the other conditions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from agvbench.model import VehicleModel, nominal_model, thesis_vehicle
+from agvbench.running.configuration.settings import BenchSettings
+from agvbench.vehicle.geometry import Geometry
+from agvbench.vehicle.maps import FullSpeedOrStop, MonotoneTable
+
+LAB_VEHICLE = "vehicle.toml"
+"""The vehicle of a lab folder: every command takes it where no other is named."""
+
+
+def lab_vehicle() -> str:
+    """Return the vehicle file of the current folder, or "" where it has none."""
+    return LAB_VEHICLE if Path(LAB_VEHICLE).is_file() else ""
+
+
+def known_models(settings: BenchSettings) -> dict[str, VehicleModel]:
+    """Return the models that are known before anything is driven, by condition.
+
+    Raises
+    ------
+    VehicleError
+        If one of their files cannot be used.
+    """
+    models = {"uncalibrated": uncalibrated_vehicle(settings.vehicle)}
+    if settings.calibration:
+        models["calibrated"] = VehicleModel.load(settings.calibration)
+    if settings.corrected:
+        models["corrected"] = VehicleModel.load(settings.corrected)
+    return models
+
+
+def uncalibrated_vehicle(path: str = "") -> VehicleModel:
+    """Return the vehicle of the file `path`, or the thesis' vehicle (table 5.1) with nominal maps.
+
+    Raises
+    ------
+    VehicleError
+        If the file cannot be used.
+    """
+    if path:
+        return VehicleModel.load(path)
+    return nominal_model("model AGV", Geometry(front_axle_m=0.181, rear_axle_m=0.121), "us", 1500.0)
+
+
+def expected_calibration(path: str = "") -> VehicleModel:
+    """Return what stands in for the calibrated vehicle while nothing was measured: axles, unit and neutral are its own.
+
+    Where only full speed and stop are known of the drive, it is taken to be straight between them.
+
+    Raises
+    ------
+    VehicleError
+        If the file `path` cannot be used.
+    """
+    if not path:
+        return thesis_vehicle()
+    believed = uncalibrated_vehicle(path)
+    drive = believed.drive
+    if not isinstance(drive, FullSpeedOrStop):
+        return believed
+    commands = (drive.command_low, drive.command_stop, drive.command_high)
+    speeds = (drive.output_low, 0.0, drive.output_high)
+    return replace(believed, drive=MonotoneTable(commands, speeds, interpolation="linear"))

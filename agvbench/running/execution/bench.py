@@ -1,0 +1,328 @@
+"""The bench drives a session's runs: each is judged, recorded, and repeated where it was rejected."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+
+from agvbench.bus.messages.event import Event
+from agvbench.campaign import CampaignWriter
+from agvbench.errors import (
+    CampaignError,
+    FlagError,
+    LinkError,
+    PlantError,
+    RecordingError,
+    RunStoppedError,
+    SafetyStopError,
+)
+from agvbench.model import VehicleModel
+from agvbench.planning import Departure, Workspace
+from agvbench.running.configuration.settings import BenchSettings
+from agvbench.running.execution.calibration import unfinished_calibration
+from agvbench.running.execution.campaign_time import CampaignTime, SessionBegan
+from agvbench.running.execution.drive import DEFAULT_TIMING, Drive, Timing, drive, exchanged
+from agvbench.running.execution.event_log import EventLog
+from agvbench.running.execution.pause import Pause, standing
+from agvbench.running.execution.run_records import (
+    DriveOrder,
+    attempts_by_run,
+    record_aborted,
+    recorded_run,
+    stopped_drive,
+    times_stopped,
+)
+from agvbench.running.links import RunnerLink
+from agvbench.running.positioning.placers import Rig, make_placer
+from agvbench.running.positioning.start_pose import say
+from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess, not_as_planned
+from agvbench.running.supervision import DEFAULT_SAFETY, Supervisor
+from agvbench.types import Command, Frames, Run
+
+_UNNAMED = SessionBegan()
+_MOST_UNSEEN = 3
+"""Runs in which the vehicle is not seen at all, one after another: then somebody has to look at the camera."""
+
+
+class Bench:
+    """Drives orders over `link` and records them with `writer`.
+
+    ``calibrate`` is called once, with the calibration runs that are still `awaited`, when the first order asks for the
+    calibrated model; ``corrected`` is the model of the
+    condition of that name, if there is one.
+    ``tell`` tells the operator.
+    """
+
+    def __init__(
+        self,
+        settings: BenchSettings,
+        *,
+        nominal: VehicleModel,
+        link: RunnerLink,
+        writer: CampaignWriter,
+        campaign_time: CampaignTime,
+        calibrate: Callable[[Collection[str]], VehicleModel],
+        recorded: Mapping[str, Run],
+        corrected: VehicleModel | None = None,
+        session: SessionBegan = _UNNAMED,
+        timing: Timing = DEFAULT_TIMING,
+        limits: QualityLimits = DEFAULT_LIMITS,
+        tell: Callable[[str], None] = say,
+    ) -> None:
+        self.settings = settings
+        self.link, self.writer = link, writer
+        self.nominal, self._calibrate = nominal, calibrate
+        self._calibrated: VehicleModel | None = None
+        self._corrected = corrected
+        self._tell = tell
+        self._time, self._timing, self._limits = campaign_time, timing, limits
+        self._identity = link.identity()
+        self._latch, self.pause = Latch(), Pause(writer.path, tell)
+        self.log = EventLog(writer, tell)
+        self._recorded, self._session = recorded, session
+        self._unseen = 0
+        self.awaited: set[str] = set()
+        workspace = Workspace.parse(settings.workspace)
+        safety = replace(DEFAULT_SAFETY, flickers=not self._identity.simulated, exchange_s=settings.exchange)
+        self._supervisor = Supervisor(workspace, nominal.neutral, safety)
+        self._placer = make_placer(settings.place, Rig(link, nominal, workspace, self._supervisor, limits, tell))
+
+    def model(self, condition: str) -> VehicleModel:
+        """Return the vehicle model that commands are computed with under `condition`.
+
+        Raises
+        ------
+        FlagError
+            If it is ``"corrected"`` and there is no such model.
+        """
+        if condition == "uncalibrated":
+            return self.nominal
+        if condition == "corrected":
+            if self._corrected is None:
+                raise FlagError("no corrected model", where="--corrected", remedy="give what a diagnosis wrote")
+            return self._corrected
+        if self._calibrated is None:
+            self._calibrated = self._calibrate(self.awaited)
+        return self._calibrated
+
+    @property
+    def failure(self) -> Failure | None:
+        """What ended the driving: the first failure of hardware, bus or disk."""
+        return self._latch.failure
+
+    @property
+    def is_resumed(self) -> bool:
+        """Whether runs were recorded before this session."""
+        return bool(self._recorded)
+
+    def check(self) -> None:
+        """Raise `LinkError` if a failure ended the driving before."""
+        self._latch.check()
+
+    def expect_calibration(self, run_ids: Collection[str]) -> None:
+        """Await the calibration runs `run_ids`, and those that were planned earlier and are not finished."""
+        earlier = unfinished_calibration(self.writer.path, self._recorded, self.settings.attempts)
+        self.awaited = earlier.union(run_ids)
+
+    def done(self, run_ids: Collection[str]) -> set[str]:
+        """Return which of these runs an earlier session finished."""
+        attempts = attempts_by_run(self._recorded.values())
+        return {run_id for run_id in run_ids if any(run.is_ok for run in attempts.get(run_id, []))}
+
+    def outlook(self, run_ids: Collection[str]) -> str:
+        """Return in words what is left to drive of these runs, and which of them were rejected before."""
+        attempts, done = attempts_by_run(self._recorded.values()), self.done(run_ids)
+        left = [run_id for run_id in run_ids if run_id not in done]
+        again = [run_id for run_id in left if any(r.status.startswith("rejected") for r in attempts.get(run_id, []))]
+        words = f"resumed: {len(done)} runs done, {len(left)} to drive"
+        return f"{words}; rejected before and tried again: {', '.join(again)}" if again else words
+
+    @property
+    def departure(self) -> Departure:
+        """When the next run begins, since the first of its session did."""
+        return Departure(started_h=self._session.hours(self._time.now_s()))
+
+    def run(self, order: DriveOrder) -> Run:
+        """Drive `order` until an attempt counts; return the last attempt.
+
+        Attempts that an interrupted session recorded are not driven again; a simulated plant repeats them unseen,
+        so that what wears or drains is as it was.
+
+        Raises
+        ------
+        LinkError
+            If hardware failed, now or earlier in this session: a bench that failed once drives no more.
+        RecordingError
+            If the run was driven and cannot be recorded; the bench drives no more, either.
+        """
+        self.check()
+        order = replace(order, session=self._session.name)
+        with self._latch.remembering():
+            for attempt in range(1, self._attempts(order) + 1):
+                run = self._attempt(order, attempt)
+                if run.is_ok:
+                    break
+        return run
+
+    def close(self) -> None:
+        """Keep what was reported since the last run."""
+        self.log.take(self.link, "", self._time.now_s())
+        with suppress(CampaignError):  # what ended the session has to be told, not that this could not be recorded
+            self.log.save()
+
+    def _attempts(self, order: DriveOrder) -> int:
+        """Return how many attempts there are: as many again where all of an earlier session's were rejected."""
+        limit = self.settings.attempts
+        while _attempt_id(order, limit) in self._recorded and not self._recorded[_attempt_id(order, limit)].is_ok:
+            limit += self.settings.attempts
+        return limit
+
+    def _attempt(self, order: DriveOrder, attempt: int) -> Run:
+        run_id = _attempt_id(order, attempt)
+        if run_id in self._recorded:
+            return self._repeat_unseen(order, self._recorded[run_id])
+        self.pause.wait(run_id, standing(self.link, self._neutral()))
+        order = self._placed(order, run_id)
+        started_s = self._time.now_s()
+        self._session = self._session.with_run(started_s)
+        self.log.take(self.link, "", started_s)
+        seen: list[Frames] = []
+        before: list[Event] = []
+        stopped = False
+        try:
+            driven = self._drive(
+                order, run_id, seen, at_rest=lambda: before.extend(self.log.take(self.link, run_id, started_s))
+            )
+            status = self._status(order, driven)
+        except RunStoppedError as stop:
+            stopped = True
+            driven, status = self._stopped(order, seen, stop)
+            self._tell(f"{run_id} {status}")
+        except BaseException as error:
+            record_aborted(self.writer, order, run_id, started_s, seen, error, self._identity.firmware)
+            self.log.take(self.link, run_id, started_s)
+            raise
+        events = self.log.take(self.link, run_id, started_s + driven.duration_s)
+        if (count := len(before) + len(events)) and not self._identity.lock_step:
+            order = replace(order, extra={**order.extra, "events": count})
+        if not stopped and (event := not_as_planned(events)) is not None:
+            status = f"rejected: {event.line}"
+        run = recorded_run(order, run_id, started_s, status, driven, self._identity.firmware)
+        self.writer.append(run)
+        self.log.save()
+        self._time.has_run(started_s, driven.duration_s)
+        self._check_seen(run)
+        return run
+
+    def _stopped(self, order: DriveOrder, seen: list[Frames], stop: RunStoppedError) -> tuple[Drive, str]:
+        """Return what was driven of a run that the supervisor stopped, and its status: it does not count."""
+        self._placer.was_moved()
+        rest_s = self._timing.rest_before_s
+        driven = stopped_drive(order.commands, seen, max(self._supervisor.exchanged_s, -rest_s), rest_s)
+        return driven, f"rejected: {RunStoppedError(stop.what, value=stop.value, limit=stop.limit)}"
+
+    def _check_seen(self, run: Run) -> None:
+        """Drive no more where the vehicle is never seen.
+
+        Raises
+        ------
+        SafetyStopError
+            Then.
+        """
+        self._unseen = 0 if run.frames.tracked.any() else self._unseen + 1
+        if self._unseen >= _MOST_UNSEEN:
+            raise SafetyStopError(
+                "the vehicle is not seen", where=self.link.keys.root, value=f"in {self._unseen} runs in succession",
+                remedy="look at camera and markers, then continue with --resume",
+            )  # fmt: skip
+
+    def _repeat_unseen(self, order: DriveOrder, run: Run) -> Run:
+        if self._identity.simulated:
+            duration_s = float(str(run.extra["duration_s"]))
+            commands, until_s = exchanged(run.commands, self._neutral(), duration_s, self._timing)
+            self.link.replay(self._drawn_as(run.run_id), commands, pose=order.start, until_s=until_s)
+            self._placer.was_moved()
+            self._time.has_run(run.started_s, duration_s)
+        return run
+
+    def _placed(self, order: DriveOrder, run_id: str) -> DriveOrder:
+        """Bring the vehicle to the start; return the order with what the campaign is to say of that."""
+        placing = self._placer.place(order.start, self._drawn_as(run_id))
+        if placing is None:
+            return order
+        self._time.has_placed(placing.duration_s)
+        return replace(order, extra={**order.extra, **placing.columns()})
+
+    def _neutral(self) -> Command:
+        """Return the command before a run: everything neutral, since a run's first command is the first recorded."""
+        return Command(self.nominal.neutral, self.nominal.neutral, self.nominal.neutral)
+
+    def _drive(self, order: DriveOrder, run_id: str, seen: list[Frames], at_rest: Callable[[], object]) -> Drive:
+        return drive(
+            self.link,
+            order.commands,
+            neutral=self._neutral(),
+            start=order.start,
+            run_key=self._placer.run_key(self._drawn_as(run_id)),
+            supervisor=self._supervisor,
+            timing=self._timing,
+            seen=seen,
+            at_rest=at_rest,
+        )
+
+    def _drawn_as(self, run_id: str) -> str:
+        """Return what a simulated run's randomness follows from: its name, and how often it was stopped before.
+
+        By its name alone a camera would lose the vehicle in the same way whenever the session goes on.
+        """
+        stopped = times_stopped(run_id, self._recorded)
+        return f"{run_id}-again{stopped}" if stopped else run_id
+
+    def _status(self, order: DriveOrder, driven: Drive) -> str:
+        begin_s = -self._timing.rest_before_s
+        quality = assess(
+            driven.frames,
+            start=order.start,
+            begin_s=begin_s,
+            end_s=begin_s + driven.duration_s,
+            rate_hz=self._identity.mocap_rate_hz,
+        )
+        return quality.status(self._limits)
+
+
+def _attempt_id(order: DriveOrder, attempt: int) -> str:
+    return order.run_id if attempt == 1 else f"{order.run_id}-attempt{attempt}"
+
+
+Failure = LinkError | PlantError | RecordingError
+
+
+class Latch:
+    """Remembers what went wrong first.
+
+    A disk that is full now is full for the next run, too: driving on would wear the vehicle for nothing.
+    """
+
+    def __init__(self) -> None:
+        self._failure: Failure | None = None
+
+    @property
+    def failure(self) -> Failure | None:
+        """What went wrong first, if anything did."""
+        return self._failure
+
+    def check(self) -> None:
+        """Raise `LinkError` with the first failure as its cause, if there was one."""
+        if self._failure is not None:
+            remedy = None if self._failure.remedy else "mend it and go on with --resume"
+            raise LinkError("the bench drives no more after the first failure", value=self._failure, remedy=remedy)
+
+    @contextmanager
+    def remembering(self) -> Iterator[None]:
+        """Remember what fails while the context lasts."""
+        try:
+            yield
+        except (LinkError, PlantError, RecordingError) as error:
+            self._failure = self._failure or error
+            raise

@@ -1,0 +1,125 @@
+"""Run records: from an order and what was seen to a run of the campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from agvbench.campaign import CampaignWriter
+from agvbench.campaign.completeness import planned_id
+from agvbench.errors import CampaignError
+from agvbench.running.execution.drive import Drive
+from agvbench.running.supervision import STOPPED
+from agvbench.types import Commands, Frames, Pose, Run
+
+_ABORTED = "-aborted"
+
+
+@dataclass(frozen=True)
+class DriveOrder:
+    """What is to be driven: the plan of one run, before any attempt at it."""
+
+    run_id: str
+    experiment: str
+    trajectory: str
+    condition: str
+    repeat: int
+    commands: Commands
+    target: Pose
+    start: Pose
+    session: str | None = None
+    extra: Mapping[str, object] = field(default_factory=dict)
+
+
+def recorded_run(order: DriveOrder, run_id: str, started_s: float, status: str, driven: Drive, firmware: str) -> Run:
+    """Return the run that `order` became."""
+    extra = {**order.extra, "duration_s": driven.duration_s}
+    return _run(order, run_id, started_s, status, driven.commands, driven.frames, firmware, extra)
+
+
+def stopped_drive(commands: Commands, seen: list[Frames], until_s: float, rest_before_s: float) -> Drive:
+    """Return what became of a run whose exchanges ended at `until_s` [s]: the commands sent by then."""
+    sent = np.asarray(commands.t_s < until_s)
+    sent[0] = True
+    commands = Commands(*(column[sent] for column in vars(commands).values()))
+    return Drive(commands, Frames.concatenate(seen), rest_before_s + until_s)
+
+
+def aborted_run(order: DriveOrder, run_id: str, started_s: float, status: str, frames: Frames, firmware: str) -> Run:
+    """Return what is left of a run that was stopped: its frames, and the commands sent until the last of them."""
+    last_s = float(np.max(frames.t_s))
+    sent = np.asarray(order.commands.t_s <= max(last_s, 0.0))
+    commands = Commands(*(column[sent] for column in vars(order.commands).values()))
+    extra = {**order.extra, "duration_s": last_s - float(np.min(frames.t_s))}
+    return _run(order, run_id, started_s, status, commands, frames, firmware, extra)
+
+
+def record_aborted(
+    writer: CampaignWriter,
+    order: DriveOrder,
+    run_id: str,
+    started_s: float,
+    seen: list[Frames],
+    error: BaseException,
+    firmware: str,
+) -> None:
+    """Keep what was `seen` of a run that `error` ended; nothing where nothing was seen."""
+    why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error) or type(error).__name__
+    frames = Frames.concatenate(seen)
+    if not len(frames):
+        return
+    name = free_name(run_id + _ABORTED, writer.finished_ids)
+    with suppress(CampaignError):  # what ended the run has to be told, not that it could not be recorded
+        writer.append(aborted_run(order, name, started_s, f"aborted: {why}", frames, firmware))
+
+
+def times_stopped(run_id: str, recorded: Mapping[str, Run]) -> int:
+    """Return how often the supervisor has stopped the run `run_id`, going by what was `recorded`."""
+    return sum(name.startswith(run_id + _ABORTED) and STOPPED in run.status for name, run in recorded.items())
+
+
+def attempts_by_run(recorded: Iterable[Run]) -> dict[str, list[Run]]:
+    """Return the recorded attempts by the id of the planned run."""
+    attempts: dict[str, list[Run]] = {}
+    for run in recorded:
+        attempts.setdefault(planned_id(run.run_id), []).append(run)
+    return attempts
+
+
+def free_name(stem: str, taken: Collection[str]) -> str:
+    """Return the first of ``stem1``, ``stem2``, … that is not taken.
+
+    >>> free_name("left-r01-aborted", {"left-r01-aborted1"})
+    'left-r01-aborted2'
+    """
+    return next(name for k in range(1, len(taken) + 2) if (name := f"{stem}{k}") not in taken)
+
+
+def _run(
+    order: DriveOrder,
+    run_id: str,
+    started_s: float,
+    status: str,
+    commands: Commands,
+    frames: Frames,
+    firmware: str,
+    extra: Mapping[str, object],
+) -> Run:
+    return Run(
+        run_id=run_id,
+        experiment=order.experiment,
+        trajectory=order.trajectory,
+        condition=order.condition,
+        repeat=order.repeat,
+        target=order.target,
+        started_s=started_s,
+        status=status,
+        firmware=firmware,
+        commands=commands,
+        frames=frames,
+        session=order.session,
+        extra=extra,
+    )

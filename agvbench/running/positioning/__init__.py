@@ -1,0 +1,1 @@
+"""How a vehicle comes to the start of a run: put there by software or an operator, or driven there by itself."""

@@ -1,0 +1,193 @@
+"""Drive a vehicle back to a start pose: plan, follow, stop, look, and correct the goal until it is there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from agvbench.errors import PlacingError, PlanError
+from agvbench.model import VehicleModel
+from agvbench.planning import Workspace
+from agvbench.planning.shortest_paths.return_path import GearLeg, Guided, way_back
+from agvbench.running.links import RunnerLink
+from agvbench.running.positioning.automatic_return.command_mapping import Helm
+from agvbench.running.positioning.automatic_return.leg_drive import DEFAULT_RETURN, LegDrive, ReturnLimits
+from agvbench.running.positioning.automatic_return.motion_interface import Reins
+from agvbench.running.positioning.automatic_return.online_adaptation import Habits
+from agvbench.running.rest_detection import is_at_rest, pose_before
+from agvbench.running.supervision import Supervisor
+from agvbench.types import Pose, wrap_angle
+
+
+@dataclass(frozen=True)
+class Placing:
+    """How a vehicle came to its start: time taken [s], ways driven, and how far off it was seen at rest [m, rad]."""
+
+    duration_s: float
+    attempts: int
+    position_error_m: float
+    heading_error_rad: float
+
+    def columns(self) -> dict[str, object]:
+        """Return what a campaign's runs table says of it."""
+        return {f"placing_{name}": value for name, value in vars(self).items()}
+
+
+_SHARE = 0.5
+_FARTHEST_M, _FARTHEST_RAD = 0.03, 0.06
+"""What was missed by more says nothing of the next attempt."""
+_MOST_IN_A_GEAR = 4
+
+
+class Aim:
+    """The pose to aim at for a start, learned over the attempts of one return.
+
+    What a vehicle misses again and again in one place (a slope, a camera's distortion, a drive that pulls to one side)
+    is made up for, whatever its cause; so attempts come in one gear. Where that does not help (a seam in the floor just
+    before the start), they come in the other.
+    """
+
+    def __init__(self, start: Pose) -> None:
+        self._start, self.pose = start, start
+        self._backward: bool | None = None
+        self._attempts = 0
+
+    @property
+    def gears(self) -> tuple[bool, ...]:
+        """The gears to come in: backward or not."""
+        return (False, True) if self._backward is None else (self._backward,)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the aim is the start itself, in any gear."""
+        return self._backward is None and self.pose == self._start
+
+    def begin_anew(self) -> None:
+        """Aim at the start itself, in any gear."""
+        self.pose, self._backward, self._attempts = self._start, None, 0
+
+    def took(self, backward: bool) -> None:
+        """Note the gear of an attempt that was driven to its end."""
+        self._backward, self._attempts = backward, self._attempts + 1
+
+    def came_to(self, seen: Pose) -> None:
+        """Aim off by a share of what was missed; after some attempts, from the other side."""
+        if self._backward is None:
+            return
+        if self._attempts >= _MOST_IN_A_GEAR:
+            self.pose, self._backward, self._attempts = self._start, not self._backward, 0
+            return
+        missed = seen.relative_to(self._start)
+        if max(abs(missed.x_m), abs(missed.y_m)) > _FARTHEST_M or abs(missed.heading_rad) > _FARTHEST_RAD:
+            return
+        off = self.pose.relative_to(self._start)
+        x_m, y_m, heading_rad = (was - _SHARE * now for was, now in zip(off, missed, strict=True))
+        self.pose = self._start.compose(Pose(x_m, y_m, wrap_angle(heading_rad)))
+
+
+_RADII = (1.5, 1.0, 0.75)
+"""Of the radius to plan with, widest first: turns as gentle as the floor allows."""
+_LEADS = (2.7, 2.0, 1.4)
+"""Of the wheelbase: the straight into the start, on which errors die off."""
+
+
+class Returner:
+    """Brings one vehicle to start poses, and learns its habits as it does.
+
+    Parameters
+    ----------
+    link, supervisor
+        What to drive with; the supervisor's rules hold here as they do in runs.
+    model
+        What is believed of the vehicle; it may be wrong in every number, but not in the sense of its commands.
+    workspace
+        Where to stay.
+    """
+
+    def __init__(
+        self,
+        link: RunnerLink,
+        model: VehicleModel,
+        workspace: Workspace,
+        supervisor: Supervisor,
+        limits: ReturnLimits = DEFAULT_RETURN,
+    ) -> None:
+        self._link, self._supervisor, self._helm = link, supervisor, Helm(model)
+        self._workspace, self._limits = workspace, limits
+        self._habits = Habits()
+
+    def bring_to(self, start: Pose) -> Placing:
+        """Drive to `start` (floor frame) and return how it went; the vehicle stands still, its commands neutral.
+
+        Raises
+        ------
+        SafetyStopError
+            If the supervisor stopped the vehicle.
+        PlacingError
+            If there is no way inside the workspace, or the vehicle is not there after all attempts, or does not do what
+            it is told.
+        LinkError
+            If the bus or an adapter fails.
+        """
+        reins = Reins(self._link, self._supervisor)
+        try:
+            return self._bring_to(start, reins)
+        except BaseException:
+            # As in a run: before anything else the vehicle stands still.
+            self._link.stop()
+            raise
+
+    def _bring_to(self, start: Pose, reins: Reins) -> Placing:
+        limits, aim = self._limits, Aim(start)
+        for attempt in range(limits.most_attempts + 1):
+            seen = self._look(reins)
+            off_m, off_rad = math.dist(seen[:2], start[:2]), abs(wrap_angle(seen.heading_rad - start.heading_rad))
+            if max(off_m / limits.position_m, off_rad / limits.heading_rad) <= limits.reserve:
+                return Placing(reins.now_s, attempt, off_m, off_rad)
+            aim.came_to(seen)
+            if attempt < limits.most_attempts:
+                self._drive_way(seen, aim, reins)
+        raise PlacingError(
+            "the vehicle did not come to its start", where=self._link.keys.root,
+            value=f"{off_m * 1e3:.1f} mm and {math.degrees(off_rad):.2f}° off after {limits.most_attempts} attempts",
+            limit=f"{limits.position_m * 1e3:g} mm and {math.degrees(limits.heading_rad):g}°",
+            remedy="put it there by hand, and go on with --resume",
+        )  # fmt: skip
+
+    def _look(self, reins: Reins) -> Pose:
+        """Return where the vehicle stands, once it does."""
+        reins.begin()
+        until_s = reins.now_s + self._limits.settle_limit_s
+        while True:
+            frames = reins.hold(self._helm.neutral, self._limits.look_s)
+            seen = pose_before(frames, reins.now_s)
+            if seen is not None and is_at_rest(frames, until_s=reins.now_s):
+                return seen
+            if reins.now_s >= until_s:
+                raise PlacingError("the vehicle does not come to rest", where=self._link.keys.root,
+                                limit=f"{self._limits.settle_limit_s:g} s")  # fmt: skip
+
+    def _drive_way(self, seen: Pose, aim: Aim, reins: Reins) -> None:
+        """Drive a way until its end, or until the vehicle is astray."""
+        crab_rad = self._habits.crab_rad
+        try:
+            legs = self._way(seen, aim, crab_rad)
+        except PlanError as error:
+            if aim.is_plain:
+                raise PlacingError(
+                    error.what, where=error.where, value=error.value, limit=error.limit, remedy=error.remedy
+                ) from None
+            return aim.begin_anew()
+        for leg in legs:
+            goal_crab_rad = crab_rad if leg is legs[-1] else None
+            drive = LegDrive(leg, reins, self._helm, self._habits, self._limits, goal_crab_rad=goal_crab_rad)
+            if not drive.run():
+                return aim.begin_anew()
+        return aim.took(legs[-1].backward)
+
+    def _way(self, seen: Pose, aim: Aim, crab_rad: float) -> list[GearLeg]:
+        geometry, radius_m = self._helm.model.geometry, self._helm.radius_m
+        guided = Guided(geometry, self._helm.ahead_m, crab_rad)
+        radii_m = [share * radius_m for share in _RADII]
+        leads_m = [share * geometry.wheelbase_m for share in _LEADS]
+        return way_back(seen, aim.pose, guided, self._workspace, radii_m=radii_m, leads_m=leads_m, gears=aim.gears)

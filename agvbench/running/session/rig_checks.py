@@ -1,0 +1,124 @@
+"""The rig that a session asks for, and whether it can drive what it asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+from agvbench.adapters import AdapterOptions, open_rig
+from agvbench.adapters.contract import camera_options
+from agvbench.bus.bus_config import BusConfig
+from agvbench.bus.link import VehicleLink
+from agvbench.bus.messages.identity import AgvIdentity, Identity
+from agvbench.errors import FlagError, VehicleError
+from agvbench.model import VehicleModel
+from agvbench.running.configuration.settings import BenchSettings
+from agvbench.running.rest_detection import LEAST_RATE_HZ
+from agvbench.running.supervision.limits import DEFAULT_SAFETY
+
+_OPTIONS = {"uncalibrated": "--vehicle", "calibrated": "--calibration", "corrected": "--corrected"}
+
+
+def adapter_options(settings: BenchSettings, models: Mapping[str, VehicleModel]) -> AdapterOptions:
+    """Return what the adapters of a session are told."""
+    nominal = models["uncalibrated"]
+    return AdapterOptions(
+        vehicle=settings.vehicle_name,
+        plant=settings.plant,
+        seed=settings.seed,
+        command_unit=nominal.command_unit,
+        neutral=nominal.neutral,
+        calibration_hash=models["calibrated"].calibration_hash if "calibrated" in models else "",
+        camera=camera_options([settings.camera]),
+    )
+
+
+@contextmanager
+def open_session_rig(settings: BenchSettings, models: Mapping[str, VehicleModel]) -> Iterator[VehicleLink]:
+    """Open the rig of a session while the context lasts, checked.
+
+    Raises
+    ------
+    AgvbenchError
+        If an adapter cannot be opened, or `check_rig` refuses the rig.
+    """
+    options = adapter_options(settings, models)
+    with open_rig(
+        agv=settings.agv,
+        mocap=settings.mocap,
+        plant=options.plant,
+        camera=options.camera,
+        seed=options.seed,
+        connect=settings.connect or None,
+        bus_config=BusConfig.load(settings.bus_config) if settings.bus_config else None,
+        lab=settings.lab,
+        vehicle=options.vehicle,
+        command_unit=options.command_unit,
+        neutral=options.neutral,
+        calibration_hash=options.calibration_hash,
+    ) as link:
+        check_rig(models, settings, link)
+        yield link
+
+
+def check_rig(models: Mapping[str, VehicleModel], settings: BenchSettings, link: VehicleLink) -> None:
+    """Refuse what would go wrong later.
+
+    Raises
+    ------
+    VehicleError
+        If a model, by condition, would stop at another command than the vehicle does, or speaks in another unit.
+    FlagError
+        If an option is not for this rig.
+    """
+    check_commands(models, link.identity())
+    _check_exchange(settings, link)
+    _check_session(settings, link)
+    _check_rate(link)
+
+
+def check_commands(models: Mapping[str, VehicleModel], identity: AgvIdentity | Identity) -> None:
+    """Raise `VehicleError` unless the models, by condition, command the vehicle in its unit, about its neutral."""
+    for condition, model in models.items():
+        for what, said, true in (
+            ("takes commands in another unit", model.command_unit, identity.command_unit),
+            ("stands still at another command", model.neutral, identity.neutral),
+        ):
+            if said != true:
+                remedy = f"give the right file with {_OPTIONS[condition]}"
+                raise VehicleError(
+                    f"the vehicle {what} than its file says", where=model.name, value=said, limit=true, remedy=remedy
+                )
+
+
+def _check_exchange(settings: BenchSettings, link: VehicleLink) -> None:
+    if settings.exchange > DEFAULT_SAFETY.exchange_s and not link.identity().lock_step:
+        raise FlagError(
+            "a vehicle in real time must be watched while it drives",
+            where="--exchange",
+            value=f"{settings.exchange:g} s",
+            limit=f"{DEFAULT_SAFETY.exchange_s:g} s",
+            remedy="leave it out",
+        )
+
+
+def _check_session(settings: BenchSettings, link: VehicleLink) -> None:
+    if settings.session and link.identity().simulated:
+        raise FlagError(
+            "a simulated vehicle is never charged or re-mounted: its campaign is one session",
+            where="--session",
+            value=settings.session,
+            remedy="leave it out",
+        )
+
+
+def _check_rate(link: VehicleLink) -> None:
+    rate_hz = link.identity().mocap_rate_hz
+    if rate_hz < LEAST_RATE_HZ:
+        raise FlagError(
+            "the camera looks too seldom to tell whether a vehicle is at rest",
+            where="--mocap",
+            value=f"{rate_hz:g} Hz",
+            limit=f"at least {LEAST_RATE_HZ:g} Hz",
+            remedy="ask it for more frames, or wish for more with --camera rate_hz=",
+        )

@@ -1,0 +1,314 @@
+"""A bench session as benchmarks see it: models, workspace, and a driver for each benchmark's runs."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from agvbench.errors import FitError, FlagError, PlanError
+from agvbench.model import VehicleModel
+from agvbench.planning import (
+    NOTHING_LEFT,
+    Departure,
+    Plan,
+    Trajectory,
+    Workspace,
+    corrected_plan,
+    depends_on_time,
+    load_trajectory,
+    plan,
+    steered,
+)
+from agvbench.planning.trajectories.shapes import CommandTable
+from agvbench.running.command_shares import Shares, falling, held
+from agvbench.running.configuration.provenance import RecordedInputs, trajectory_inputs
+from agvbench.running.execution.bench import Bench, Failure
+from agvbench.running.execution.run_records import DriveOrder
+from agvbench.running.session.end_pose_bias import NO_REMAINDERS
+from agvbench.types import CONDITIONS, Commands, CommandUnit, Pose, Run
+
+
+class BenchSession:
+    """A session that drives with `bench` or, where that is None, a dry run that plans everything and drives nothing.
+
+    ``models`` are those known before anything is driven, by condition; a dry run needs one of each. ``remainders`` is
+    what the corrected one still misses, by trajectory; ``steering`` the mode in which all are steered, "" for each its
+    own. ``inputs`` records the files of the trajectories that are driven.
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        *,
+        models: Mapping[str, VehicleModel],
+        workspace: Workspace,
+        bench: Bench | None,
+        remainders: Mapping[str, Pose] = NO_REMAINDERS,
+        steering: str = "",
+        inputs: RecordedInputs | None = None,
+    ) -> None:
+        self.directory, self.workspace = directory, workspace
+        self.nominal = models["uncalibrated"]
+        self.shares = Shares.of_model(self.nominal)
+        self.planned: list[tuple[DriveOrder, Plan]] = []
+        self._models, self._bench, self._remainders, self._steering = models, bench, remainders, steering
+        self._inputs = inputs
+        self._plans: dict[tuple[Trajectory, str], Plan] = {}
+        self._undrivable: dict[tuple[Trajectory, str], PlanError] = {}
+        self._not_calibrated: FitError | None = None
+        self._hourly: set[tuple[Trajectory, str]] = set()
+        self.notices: list[str] = []
+        self.not_applicable: set[str] = set()
+        """The ids of runs that this vehicle cannot drive here."""
+        self.done: set[str] = set()
+        """The ids of runs that an earlier session finished."""
+
+    @property
+    def is_dry(self) -> bool:
+        """Whether nothing is driven."""
+        return self._bench is None
+
+    @property
+    def failure(self) -> Failure | None:
+        """What ended the driving before its time, if anything did."""
+        return None if self._bench is None else self._bench.failure
+
+    def expect(self, run_ids: Collection[str], calibration: Collection[str]) -> None:
+        """Take note of the runs that were chosen, and of those among them that calibrate: all are awaited."""
+        if self._bench is not None:
+            self.done = self._bench.done(run_ids)
+            self._bench.expect_calibration(calibration)
+            if self._bench.is_resumed:
+                self.notices.append(self._bench.outlook(run_ids))
+
+    def concluded(self, run_id: str) -> None:
+        """Take note of a run that was driven, rejected for good, or cannot be driven: it is awaited no more."""
+        if self._bench is not None:
+            self._bench.awaited.discard(run_id)
+
+    @property
+    def events(self) -> list[str]:
+        """What adapters and link reported in this session: a line for each kind, with how often it came."""
+        return [] if self._bench is None else self._bench.log.summary()
+
+    def model(self, condition: str) -> VehicleModel:
+        """Return the vehicle model that commands are computed with under `condition`."""
+        return self._models[condition] if self._bench is None else self._bench.model(condition)
+
+    def trajectory(self, name: str) -> Trajectory:
+        """Return the trajectory of this name or file, steered as the session is, or as the vehicle can.
+
+        Raises
+        ------
+        FileError
+            If there is no such trajectory, or its file has changed since the session began.
+        RecordingError
+            If the hash of its file cannot be recorded.
+        """
+        if self._inputs is not None:
+            self._inputs.add(trajectory_inputs([name]))
+        return steered(load_trajectory(name), self._steering, self.nominal)
+
+    def plan(self, trajectory: Trajectory, condition: str) -> Plan:
+        """Return the plan of `trajectory` under `condition`: made once, driven in every repeat.
+
+        Under ``"corrected"`` it makes up for the model's effects, and is made anew for every run if one of them
+        depends on how long the session lasts.
+
+        Raises
+        ------
+        PlanError
+            If the vehicle cannot drive it, or not inside the workspace.
+        NotDrivenError
+            If that was said before.
+        LinkError
+            If the bench drives no more.
+        """
+        if self._bench is not None:
+            self._bench.check()
+        key = (trajectory, condition)
+        if key in self._undrivable:
+            raise UndrivableError(f"cannot be driven, as its first repeat says: {self._undrivable[key]}")
+        if key not in self._plans:
+            try:
+                self._plans[key] = self._planned(trajectory, condition)
+            except PlanError as error:
+                self._undrivable[key] = error
+                raise
+        if key in self._hourly:
+            return self._planned(trajectory, condition)
+        return self._plans[key]
+
+    def _planned(self, trajectory: Trajectory, condition: str) -> Plan:
+        model = self._model_to_drive(condition)
+        if condition != "corrected":
+            return plan(trajectory, model, workspace=self.workspace)
+        departure = Departure() if self._bench is None else self._bench.departure
+        missed = self._remainders.get(trajectory.name, NOTHING_LEFT)
+        made = corrected_plan(trajectory, model, workspace=self.workspace, departure=departure, remainder=missed)
+        if depends_on_time(made, model, departure):
+            self._hourly.add((trajectory, condition))
+        return made
+
+    def _model_to_drive(self, condition: str) -> VehicleModel:
+        if condition == "calibrated" and self._not_calibrated is not None:
+            raise NotDrivenError(f"not calibrated, as the first such run says: {self._not_calibrated}")
+        try:
+            return self.model(condition)
+        except FitError as error:
+            self._not_calibrated = error
+            raise
+
+    def driver(self, run_id: str, *, experiment: str, repeat: int) -> Driver:
+        """Return what drives the run `run_id`."""
+        return Driver(self, run_id, experiment=experiment, repeat=repeat)
+
+    def run(self, order: DriveOrder, planned: Plan) -> Run:
+        """Drive `order`; in a dry run only note it.
+
+        Raises
+        ------
+        NotDrivenError
+            In a dry run.
+        """
+        if self._bench is None:
+            self.planned.append((order, planned))
+            raise NotDrivenError("dry run")
+        return self._bench.run(order)
+
+
+_LEAST_SHARE = 0.2
+
+
+class NotDrivenError(Exception):
+    """Nothing was driven, and that is no failure: a dry run, or an axle that this vehicle does not steer."""
+
+
+class UndrivableError(NotDrivenError):
+    """A trajectory of which an earlier run said that it cannot be driven here."""
+
+
+class RunRejectedError(PlanError):
+    """Every attempt at a run was rejected; all are recorded."""
+
+
+class Driver:
+    """Drives the runs of one benchmark; each returns the recorded run that counts.
+
+    Parameters
+    ----------
+    session
+        Where to drive.
+    run_id
+        What the campaign calls the run; in simulation all its randomness follows from this name.
+    experiment, repeat
+        Columns of the runs table.
+    """
+
+    def __init__(self, session: BenchSession, run_id: str, *, experiment: str, repeat: int) -> None:
+        self._session, self._run_id = session, run_id
+        self._experiment, self._repeat = experiment, repeat
+
+    def trajectory(self, name: str, *, condition: str) -> Run:
+        """Drive the trajectory `name` (shipped, or a TOML file) with the commands that `condition` gives.
+
+        Raises
+        ------
+        FlagError
+            If the condition is unknown.
+        PlanError
+            If this vehicle cannot drive the trajectory here; nothing moved.
+        RunRejectedError
+            If no attempt counted.
+        LinkError
+            If the bus or hardware failed.
+        """
+        if condition not in CONDITIONS:
+            raise FlagError("unknown condition", value=condition, limit=", ".join(CONDITIONS), where=self._run_id)
+        trajectory = self._session.trajectory(name)
+        with self._planning():
+            planned = self._session.plan(trajectory, condition)
+        return self._drive(planned, condition)
+
+    def hold(
+        self,
+        *,
+        for_s: float,
+        drive: float = 0.0,
+        front: float = 0.0,
+        rear: float = 0.0,
+        least_s: float | None = None,
+        slower: bool = False,
+    ) -> Run:
+        """Hold shares of full command for `for_s` seconds: drive 1 is full speed forward, steering 1 full left.
+
+        With `least_s` the time is shortened, down to that, until the path fits the workspace; with `slower` the drive
+        is then lowered, without it the run is left out.
+        """
+        times = [for_s] if least_s is None else falling(for_s, least_s)
+        shares = falling(1.0, _LEAST_SHARE)[1:] if slower else []
+        tries = [(s, drive) for s in times] + [(times[-1], drive * share) for share in shares]
+        steps = [[(s, {"drive": share, "front": front, "rear": rear})] for s, share in tries]
+        fitting = next((one for one in steps if self._fits(one)), None)
+        if fitting is None and least_s is not None and not slower:
+            self._session.not_applicable.add(self._run_id)
+            raise NotDrivenError(
+                f"too fast for this floor: {least_s:g} s of it do not fit {self._session.workspace.name}"
+            )
+        return self.steps(fitting or steps[-1])
+
+    def steps(self, steps: Sequence[tuple[float, Mapping[str, float]]]) -> Run:
+        """Hold several commands one after another: (duration [s], shares of full command) each."""
+        with self._planning():
+            planned = self._held(steps)
+        return self._drive(planned, "uncalibrated", trajectory="")
+
+    @contextmanager
+    def _planning(self) -> Iterator[None]:
+        """Take note of a run that has no plan: it is not among those that a campaign lacks."""
+        try:
+            yield
+        except (PlanError, UndrivableError):
+            self._session.not_applicable.add(self._run_id)
+            raise
+
+    def _fits(self, steps: Sequence[tuple[float, Mapping[str, float]]]) -> bool:
+        try:
+            self._held(steps)
+        except (PlanError, UndrivableError):
+            return False
+        return True
+
+    def _held(self, steps: Sequence[tuple[float, Mapping[str, float]]]) -> Plan:
+        shares = self._session.shares
+        if shares.rear == 0.0 and any(step.get("rear") for _, step in steps):
+            self._session.not_applicable.add(self._run_id)
+            raise NotDrivenError("this vehicle does not steer its rear axle")
+        commands = held(shares.neutral, [(duration_s, shares.command(**step)) for duration_s, step in steps])
+        trajectory = _as_trajectory(self._experiment, commands, self._session.nominal.command_unit)
+        return self._session.plan(trajectory, "uncalibrated")
+
+    def _drive(self, planned: Plan, condition: str, *, trajectory: str | None = None) -> Run:
+        order = DriveOrder(
+            run_id=self._run_id,
+            experiment=self._experiment,
+            trajectory=planned.trajectory.name if trajectory is None else trajectory,
+            condition=condition,
+            repeat=self._repeat,
+            commands=planned.commands,
+            target=planned.target,
+            start=planned.start,
+        )
+        run = self._session.run(order, planned)
+        if not run.is_ok:
+            raise RunRejectedError(
+                "no attempt counted", where=self._run_id, value=run.status, remedy="see the campaign's rejected runs"
+            )
+        return run
+
+
+def _as_trajectory(name: str, commands: Commands, unit: CommandUnit) -> Trajectory:
+    *rows, stop = zip(*(column.tolist() for column in vars(commands).values()), strict=True)
+    table = CommandTable(unit=unit, rows=tuple(rows), duration_s=stop[0])
+    return Trajectory(schema=1, name=name, target="none", commands=table)
