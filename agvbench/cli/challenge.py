@@ -42,9 +42,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Hold the trials; return the exit code: 1 if a trial ended with an error."""
     from rich.console import Console
 
+    from agvbench.challenge.challenge import run_challenge
     from agvbench.reporting.challenge_console import print_scores
     from agvbench.reporting.challenge_markdown import scores_markdown
-    from agvbench.workflows.challenge import run_challenge
 
     scores = run_challenge(
         arguments.seeds,

@@ -6,8 +6,8 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from agvbench.challenge.scores import Scores
 from agvbench.reporting.challenge_lines import ANSWERS, SHARES, answer_rows, other_lines, share_rows
-from agvbench.workflows.challenge_scores import Scores
 
 
 def print_scores(scores: Scores, console: Console) -> None:

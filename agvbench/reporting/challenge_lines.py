@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from agvbench.challenge.scores import Scores
 from agvbench.simulator.hidden.catalogue import AND
-from agvbench.workflows.challenge_scores import Scores
 
 SHARES = ("", "count", "share", "95 % bounds")
 ANSWERS = ("hidden", "answers")

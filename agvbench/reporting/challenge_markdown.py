@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
+from agvbench.challenge.scores import Scores
 from agvbench.reporting.challenge_lines import ANSWERS, SHARES, answer_rows, other_lines, share_rows
 from agvbench.reporting.markdown import escape
-from agvbench.workflows.challenge_scores import Scores
 
 
 def scores_markdown(scores: Scores) -> str:

@@ -37,8 +37,8 @@ DIAGNOSES = "diagnoses"
 
 def simulated() -> Iterator[tuple[str, list[str]]]:
     """Yield the name of each simulated campaign, and the options that drive it."""
+    from agvbench.challenge.challenge import PAIRS
     from agvbench.simulator.hidden.catalogue import CATALOGUE, NOTHING
-    from agvbench.workflows.challenge import PAIRS
 
     for seed in HIDDEN_SEEDS:
         for spec in (NOTHING, *CATALOGUE, *PAIRS):

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
+from agvbench.challenge import challenge
+from agvbench.challenge.challenge import hold_trial, run_challenge
+from agvbench.challenge.result_file import known_trials, write_trials
+from agvbench.challenge.trial import Trial
 from agvbench.cli import main
 from agvbench.errors import FileError, FitError, FlagError, PlantError
-from agvbench.workflows import challenge
-from agvbench.workflows.challenge import hold_trial, run_challenge
-from agvbench.workflows.challenge_file import known_trials, write_trials
-from agvbench.workflows.challenge_trial import Trial
 
 LAG = Trial(
     "steering_lag", 3, "library", ("steering_lag",), ("steering_lag",), (), False, False,

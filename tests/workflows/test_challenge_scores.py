@@ -8,11 +8,11 @@ import math
 import pytest
 from scipy.stats import beta
 
+from agvbench.challenge.challenge import run_challenge
+from agvbench.challenge.scores import QUESTIONS, coverings, score
+from agvbench.challenge.trial import Trial
 from agvbench.errors import FlagError
 from agvbench.statistics.proportion import Share
-from agvbench.workflows.challenge import run_challenge
-from agvbench.workflows.challenge_scores import QUESTIONS, coverings, score
-from agvbench.workflows.challenge_trial import Trial
 
 
 def trial(hidden=(), library=None, verdict="ADEQUATE", named=(), **more):

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
+from agvbench.challenge import challenge
+from agvbench.challenge.challenge import hold_trial, unsealed
 from agvbench.diagnosis import Dependence, Diagnosis, Estimate, HeldOut, NamedEffect, Verdict
 from agvbench.simulator.hidden import make_hidden_plant
-from agvbench.workflows import challenge
-from agvbench.workflows.challenge import hold_trial, unsealed
 
 
 def truth(spec):

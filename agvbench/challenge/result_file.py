@@ -1,4 +1,4 @@
-"""The file of a challenge: scores and every trial, written after each trial and read again to go on."""
+"""The result file of a challenge: scores and every trial, written after each trial and read again to go on."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from agvbench.challenge.scores import plain, score
+from agvbench.challenge.trial import Trial
 from agvbench.errors import FileError
 from agvbench.text_files import read_json
-from agvbench.workflows.challenge_scores import plain, score
-from agvbench.workflows.challenge_trial import Trial
 from agvbench.workflows.writing import write_file
 
 SCHEMA = 1

@@ -1,4 +1,4 @@
-"""What ``agvbench challenge`` does: drive plants with a sealed truth, diagnose, unseal, score."""
+"""``agvbench challenge``: drive plants with a sealed truth, diagnose, unseal, score."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from agvbench.challenge.result_file import known_trials, write_trials
+from agvbench.challenge.scores import Scores, score
+from agvbench.challenge.trial import Trial
 from agvbench.errors import AgvbenchError, FlagError, PlantError
 from agvbench.running.configuration.benchmark_files import EXCITING
 from agvbench.simulator.hidden import SealedTruth, sealed_truth, true_rivals
 from agvbench.simulator.hidden.catalogue import CATALOGUE, NOTHING, recipes
 from agvbench.simulator.hidden.sampling import vehicle_of
-from agvbench.workflows.challenge_file import known_trials, write_trials
-from agvbench.workflows.challenge_scores import Scores, score
-from agvbench.workflows.challenge_trial import Trial
 
 if TYPE_CHECKING:
     from agvbench.diagnosis import Diagnosis

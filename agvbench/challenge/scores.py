@@ -1,4 +1,4 @@
-"""How blind trials are scored: what was hidden against what was answered, every share with its exact bounds."""
+"""Scores of blind trials: hidden effects against answers, every share with its exact bounds."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from agvbench.challenge.trial import Trial
 from agvbench.statistics.proportion import Share
-from agvbench.workflows.challenge_trial import Trial
 
 _Z = 1.959963984540054
 _THREE_FLOORS = 9.0

@@ -1,4 +1,4 @@
-"""One blind trial: what was hidden, and what was answered."""
+"""One blind trial: the hidden effects, and the answer of the diagnosis."""
 
 from __future__ import annotations
 
