@@ -61,10 +61,10 @@ def run(arguments: argparse.Namespace) -> int:
     from agvbench.cli._option_values import check_values
 
     check_values(vars(arguments))
+    from agvbench.loop.loop import run_loop
+    from agvbench.loop.settings import MODEL_ONLY, NO_TRIAL
     from agvbench.reporting.console import wide_console
     from agvbench.reporting.content import plain_sentences
-    from agvbench.workflows.loop import run_loop
-    from agvbench.workflows.loop_settings import MODEL_ONLY, NO_TRIAL
 
     console = wide_console()
     given = {

@@ -10,6 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from agvbench.errors import FileError
+from agvbench.loop.before_after import (
+    BeforeAfter,
+    EndPosition,
+    before_after,
+    counts,
+    end_positions,
+    root_mean_square_bias,
+)
+from agvbench.loop.loop import Loop
 from agvbench.reporting.console import console_table
 from agvbench.reporting.content import (
     Block,
@@ -31,15 +40,6 @@ from agvbench.statistics.quantities import COMPONENT_DEFINITIONS, COMPONENTS, DE
 from agvbench.types import CONDITIONS
 from agvbench.workflows.diagnosis_files import ShownDiagnosis, read_diagnosis
 from agvbench.workflows.diagnosis_words import items, mapping
-from agvbench.workflows.loop import Loop
-from agvbench.workflows.loop_table import (
-    BeforeAfter,
-    EndPosition,
-    before_after,
-    counts,
-    end_positions,
-    root_mean_square_bias,
-)
 from agvbench.workflows.report import gather
 
 if TYPE_CHECKING:

@@ -26,11 +26,7 @@ from statistics import mean
 from scipy.stats import binomtest
 
 from agvbench.campaign import Campaign
-from agvbench.simulator.hidden import drawn_spec
-from agvbench.statistics import pose_errors
-from agvbench.statistics.equivalence import Bias
-from agvbench.statistics.quantities import COMPONENTS, DISTANCE, THESIS
-from agvbench.workflows.loop_table import (
+from agvbench.loop.before_after import (
     BeforeAfter,
     EndPosition,
     before_after,
@@ -38,6 +34,10 @@ from agvbench.workflows.loop_table import (
     end_positions,
     root_mean_square_bias,
 )
+from agvbench.simulator.hidden import drawn_spec
+from agvbench.statistics import pose_errors
+from agvbench.statistics.equivalence import Bias
+from agvbench.statistics.quantities import COMPONENTS, DISTANCE, THESIS
 
 FIRST_SEED = 1000
 ASKED = 0.90

@@ -14,15 +14,15 @@ import pytest
 
 from agvbench.campaign import Campaign
 from agvbench.errors import FileError, FlagError
+from agvbench.loop.before_after import before_after, end_positions
+from agvbench.loop.settings import MODEL_ONLY, NO_TRIAL, opened, write
+from agvbench.loop.stages import learned
 from agvbench.model import VehicleModel
 from agvbench.reporting.loop import before_after_table, end_position_table
 from agvbench.running.configuration.settings import BenchSettings
 from agvbench.running.session.end_pose_bias import read_remainders
 from agvbench.statistics.equivalence import Bias
 from agvbench.statistics.quantities import THESIS
-from agvbench.workflows.loop_settings import MODEL_ONLY, NO_TRIAL, opened, write
-from agvbench.workflows.loop_stages import learned
-from agvbench.workflows.loop_table import before_after, end_positions
 
 PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
 

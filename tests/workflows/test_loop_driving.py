@@ -10,8 +10,8 @@ import time
 import pytest
 
 from agvbench.campaign import Campaign
-from agvbench.workflows.loop_driving import _run
-from agvbench.workflows.loop_settings import BEFORE, DIAGNOSIS
+from agvbench.loop.sessions import _run
+from agvbench.loop.settings import BEFORE, DIAGNOSIS
 
 pytestmark = pytest.mark.real_time
 

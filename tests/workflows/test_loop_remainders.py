@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from agvbench.effects import SteeringLag
+from agvbench.loop.corrections import plans_of, remainders, shrunk
 from agvbench.model import thesis_vehicle
 from agvbench.planning import Departure, corrected_plan, load_trajectory
 from agvbench.planning.end_pose_prediction import coasting_path
 from agvbench.planning.trajectories.loading import trajectory_file
 from agvbench.types import Frames, Pose, Run
-from agvbench.workflows.loop_plans import plans_of
-from agvbench.workflows.loop_remainders import remainders, shrunk
 
 START = Pose(0.4, -0.3, 0.7)
 REST_S = 0.5

@@ -1,4 +1,4 @@
-"""Where a loop keeps what it was asked for and what it has done, so that it can go on after an interruption."""
+"""The settings of a loop and the names of its files, so that it can go on after an interruption."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Before and after, trajectory by trajectory."""
+"""End position errors before and after the correction, trajectory by trajectory."""
 
 from __future__ import annotations
 

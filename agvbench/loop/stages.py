@@ -9,15 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from agvbench.campaign.atomic_files import replace_whole
 from agvbench.errors import FileError, FitError
-from agvbench.model import VehicleModel
-from agvbench.planning import driven_trajectories
-from agvbench.running.configuration.settings import BenchSettings
-from agvbench.running.session.end_pose_bias import read_remainders
-from agvbench.text_files import read_json
-from agvbench.workflows.diagnosis_files import keep_residuals
-from agvbench.workflows.loop_driving import Tell, drive, moved
-from agvbench.workflows.loop_plans import plans_of
-from agvbench.workflows.loop_settings import (
+from agvbench.loop.corrections import plans_of
+from agvbench.loop.sessions import Tell, drive, moved
+from agvbench.loop.settings import (
     BEFORE,
     DIAGNOSIS,
     FIRST_REMAINDERS,
@@ -29,6 +23,12 @@ from agvbench.workflows.loop_settings import (
     VEHICLE,
     write,
 )
+from agvbench.model import VehicleModel
+from agvbench.planning import driven_trajectories
+from agvbench.running.configuration.settings import BenchSettings
+from agvbench.running.session.end_pose_bias import read_remainders
+from agvbench.text_files import read_json
+from agvbench.workflows.diagnosis_files import keep_residuals
 
 if TYPE_CHECKING:
     from agvbench.diagnosis import Diagnosis
@@ -94,7 +94,7 @@ def learned(directory: Path, settings: BenchSettings, tell: Tell) -> str:
     lacks does something else on another way.
     """
     from agvbench.campaign import Campaign
-    from agvbench.workflows.loop_remainders import remainders
+    from agvbench.loop.corrections import remainders
 
     path = directory / REMAINDERS
     if settings.remainders == MODEL_ONLY:

@@ -1,4 +1,4 @@
-"""The bench sessions of a loop, each in a process of its own: one drives, the next finds a plant as it was built."""
+"""The bench sessions of a loop, each in its own process; the second finds a plant as it was built."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ``agvbench loop`` does: bench, diagnose, correct the model, plan with it, try the plans, bench again.
+"""``agvbench loop``: bench, diagnose, correct the model, plan with it, try the plans, bench again.
 
 Each stage leaves its result in the loop's directory, and a stage whose result is there is not done again.
 """
@@ -11,19 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from agvbench.errors import AgvbenchError
+from agvbench.loop.sessions import Tell, drive
+from agvbench.loop.settings import AFTER, BEFORE, DIAGNOSIS, PLANS, SETTINGS, VEHICLE, opened
+from agvbench.loop.stages import diagnosed, drive_corrected, learned, planned
 from agvbench.running.configuration.benchmark_files import EXCITING
 from agvbench.running.configuration.settings import BenchSettings
-from agvbench.workflows.loop_driving import Tell, drive
-from agvbench.workflows.loop_settings import (
-    AFTER,
-    BEFORE,
-    DIAGNOSIS,
-    PLANS,
-    SETTINGS,
-    VEHICLE,
-    opened,
-)
-from agvbench.workflows.loop_stages import diagnosed, drive_corrected, learned, planned
 
 SHOWING = ("trajectories",)
 """What the second session drives."""

@@ -1,0 +1,1 @@
+"""The loop of bench, diagnosis, correction and bench: its stages, and what it gained."""
