@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Compute, show and write."""
     from agvbench.reporting.thesis_console import print_section, thesis_console, with_progress
-    from agvbench.workflows.thesis import thesis_sections, write_json, write_tables
+    from agvbench.thesis import thesis_sections, write_json, write_tables
 
     console = thesis_console()
     sections = with_progress(thesis_sections(arguments.section))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from agvbench.workflows.thesis.layout import Cell, Section, Table, show
+from agvbench.thesis.section import Cell, Section, Table, show
 
 if TYPE_CHECKING:
     import rich.table

@@ -8,7 +8,7 @@ import numpy as np
 
 from agvbench.errors import FileError
 from agvbench.reporting.figures.style import CONDITION_COLOURS, MARKERS, new_figure
-from agvbench.workflows.thesis.residual_cases import Traced, traced
+from agvbench.thesis.residuals import Traced, traced
 
 _INK, _GRID, _PAPER = "#222222", "#dddddd", "#ffffff"
 

@@ -11,10 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from agvbench import thesis
 from agvbench.campaign.manifest import Manifest, record
 from agvbench.errors import FileError
 from agvbench.statistics import Comparison
-from agvbench.workflows import compare, thesis
+from agvbench.workflows import compare
 from agvbench.workflows.init import make_lab
 from agvbench.workflows.writing import write_file
 

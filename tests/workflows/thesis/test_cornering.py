@@ -6,23 +6,21 @@ import numpy as np
 import pytest
 
 from agvbench.errors import FileError
-from agvbench.workflows.thesis.cornering import (
+from agvbench.thesis.refits.cornering import (
     FORMS,
     cornering_share,
+    count_mirrored,
+    expected_differing,
     fit_loss,
     fitted_loss,
     held_out_rms_mm,
+    identical_blocks,
     samples,
     steering_measure,
-)
-from agvbench.workflows.thesis.lever_arm import common_lever_arm, slope_and_error
-from agvbench.workflows.thesis.mirror import (
-    count_mirrored,
-    expected_differing,
-    identical_blocks,
     straight_speeds_repeated,
 )
-from agvbench.workflows.thesis.tables import CorneringTable, cornering_table, load_table
+from agvbench.thesis.refits.idle_axle import common_lever_arm, slope_and_error
+from agvbench.thesis.tables import CorneringTable, cornering_table, load_table
 
 
 def test_143_of_144_mirrored_pairs_are_identical():

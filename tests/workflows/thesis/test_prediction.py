@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agvbench.model import thesis_vehicle
-from agvbench.types import Commands
-from agvbench.workflows.thesis.assumptions import (
+from agvbench.thesis.prediction.assumptions import (
     MEANING,
     Assumptions,
     choices,
@@ -17,11 +16,11 @@ from agvbench.workflows.thesis.assumptions import (
     every_combination,
     one_at_a_time,
 )
-from agvbench.workflows.thesis.commands import cut_to_degrees, told
-from agvbench.workflows.thesis.eight import EIGHT, wanted_angles
-from agvbench.workflows.thesis.prediction import arc_end, driven, predict
-from agvbench.workflows.thesis.ramps import driven_distance
-from agvbench.workflows.thesis.tables import GEOMETRY
+from agvbench.thesis.prediction.commands import cut_to_degrees, told
+from agvbench.thesis.prediction.end_pose import arc_end, driven, driven_distance, predict
+from agvbench.thesis.prediction.trajectories import EIGHT, wanted_angles
+from agvbench.thesis.tables import GEOMETRY
+from agvbench.types import Commands
 
 LF, LR = 0.181, 0.121
 NO_LOSS = Assumptions(cornering_loss="none")

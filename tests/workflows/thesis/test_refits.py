@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from agvbench.resources import resource_directory
-from agvbench.workflows.thesis.battery import battery_section, fit_droop, held_out_errors
-from agvbench.workflows.thesis.drive import cubic_map, drive_section, printed_cubic, refit_drive
-from agvbench.workflows.thesis.polynomial import fit_polynomial
-from agvbench.workflows.thesis.steering import neutral_error_deg, published_lines, refit_line, steering_section
-from agvbench.workflows.thesis.tables import GEOMETRY, end_pose_rows, endurance_table
+from agvbench.thesis.refits.battery import battery_section, fit_droop, held_out_errors
+from agvbench.thesis.refits.drive import cubic_map, drive_section, printed_cubic, refit_drive
+from agvbench.thesis.refits.polynomial import fit_polynomial
+from agvbench.thesis.refits.steering import neutral_error_deg, published_lines, refit_line, steering_section
+from agvbench.thesis.tables import GEOMETRY, end_pose_rows, endurance_table
 
 
 def column(table, name):

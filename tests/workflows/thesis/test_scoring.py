@@ -4,20 +4,20 @@ import statistics
 
 import pytest
 
-from agvbench.workflows.thesis.assumptions import Assumptions
-from agvbench.workflows.thesis.prediction import predict
-from agvbench.workflows.thesis.prediction_section import prediction_section
-from agvbench.workflows.thesis.scoring import (
+from agvbench.thesis.prediction.assumptions import Assumptions
+from agvbench.thesis.prediction.end_pose import predict
+from agvbench.thesis.prediction.scoring import (
     ScoredRow,
     groups,
     median_errors,
+    prediction_section,
     score,
     score_against_null,
     score_all,
 )
-from agvbench.workflows.thesis.sensitivity import best, combinations, sensitivity_section, shared_only
-from agvbench.workflows.thesis.tables import MeasuredRow
-from agvbench.workflows.thesis.turns import MeasuredTurn, backward_factors, measured_turns
+from agvbench.thesis.prediction.sensitivity import best, combinations, sensitivity_section, shared_only
+from agvbench.thesis.prediction.turns import MeasuredTurn, backward_factors, measured_turns
+from agvbench.thesis.tables import MeasuredRow
 
 
 def row(measured, predicted, null=0.0, has_sign=False, quantity="delta_s_mm"):
@@ -50,7 +50,7 @@ def test_null_errors_are_the_printed_medians():
 def test_nothing_of_chapter_8_enters_a_prediction(monkeypatch):
     """Predictions stay the same with other measurements; only their errors change."""
     before = [r.predicted for r in score_all(Assumptions())]
-    from agvbench.workflows.thesis import scoring
+    from agvbench.thesis.prediction import scoring
 
     invented = tuple(
         MeasuredRow(r.measured.trajectory, r.measured.condition, r.measured.quantity, 500.0, 1.0, 999.0)
@@ -103,7 +103,7 @@ def test_prediction_section_counts_what_its_rows_say():
 
 
 def test_half_speed_is_what_the_cubic_gets_wrong():
-    from agvbench.workflows.thesis.eight import EIGHT
+    from agvbench.thesis.prediction.trajectories import EIGHT
 
     cubic = predict(EIGHT[2], "calibrated", Assumptions())
     table = predict(EIGHT[2], "calibrated", Assumptions(calibrated_drive="table_7_4"))

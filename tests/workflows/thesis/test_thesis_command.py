@@ -10,10 +10,10 @@ import sys
 import pytest
 
 from agvbench.cli import main, thesis
-from agvbench.workflows.thesis import section_names, thesis_sections
-from agvbench.workflows.thesis.better_maps import maps_section
-from agvbench.workflows.thesis.errata import errata_section, printed_speed, printed_yaw_rate
-from agvbench.workflows.thesis.layout import Table, key_of, show
+from agvbench.thesis import section_names, thesis_sections
+from agvbench.thesis.errata import errata_section, printed_speed, printed_yaw_rate
+from agvbench.thesis.refits.alternative_maps import maps_section
+from agvbench.thesis.section import Table, key_of, show
 
 
 def test_files(tmp_path, capsys):

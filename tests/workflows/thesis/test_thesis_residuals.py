@@ -6,21 +6,13 @@ import numpy as np
 import pytest
 
 from agvbench.cli import main
-from agvbench.workflows.thesis.assumptions import Assumptions
-from agvbench.workflows.thesis.chapter_8_carried import asymmetry_with
-from agvbench.workflows.thesis.chapter_8_effects import (
-    CAUSES,
-    checks,
-    fitted,
-    mean_error,
-    predicted,
-    rows_with,
-)
-from agvbench.workflows.thesis.idle_axle import arm_across_tables
-from agvbench.workflows.thesis.prediction import predict_all
-from agvbench.workflows.thesis.residual_cases import kinematics_alone, traced
-from agvbench.workflows.thesis.scoring import CONDITIONS
-from agvbench.workflows.thesis.tables import drive_table, endurance_table, steering_table
+from agvbench.thesis.added_effects import CAUSES, asymmetry_with, checks, fitted, mean_error, predicted, rows_with
+from agvbench.thesis.prediction.assumptions import Assumptions
+from agvbench.thesis.prediction.end_pose import predict_all
+from agvbench.thesis.prediction.scoring import CONDITIONS
+from agvbench.thesis.refits.idle_axle import arm_across_tables
+from agvbench.thesis.residuals import kinematics_alone, traced
+from agvbench.thesis.tables import drive_table, endurance_table, steering_table
 
 
 def _of(name):

@@ -8,23 +8,23 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from agvbench.errors import FlagError
-from agvbench.workflows.thesis.layout import Section
+from agvbench.thesis.section import Section
 from agvbench.workflows.writing import write_file
 
 SCHEMA = 1
 
 #: Name of a section and the module that makes it, in reading order.
 _MODULES = {
-    "steering": "steering",
-    "drive": "drive",
-    "maps": "better_maps",
-    "cornering": "cornering",
-    "battery": "battery",
-    "lever_arm": "lever_arm",
+    "steering": "refits.steering",
+    "drive": "refits.drive",
+    "maps": "refits.alternative_maps",
+    "cornering": "refits.cornering",
+    "battery": "refits.battery",
+    "lever_arm": "refits.idle_axle",
     "errata": "errata",
-    "prediction": "prediction_section",
-    "sensitivity": "sensitivity",
-    "turns": "turns",
+    "prediction": "prediction.scoring",
+    "sensitivity": "prediction.sensitivity",
+    "turns": "prediction.turns",
     "residuals": "residuals",
 }
 

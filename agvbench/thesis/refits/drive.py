@@ -7,11 +7,10 @@ from functools import cache
 import numpy as np
 
 from agvbench.calibration import fit_drive_map
+from agvbench.thesis.refits.polynomial import Polynomial, fit_polynomial
+from agvbench.thesis.section import Figure, Section, Table, figures_table
+from agvbench.thesis.tables import drive_table
 from agvbench.vehicle.maps import Cubic, StaticMap
-from agvbench.workflows.thesis.layout import Section, Table
-from agvbench.workflows.thesis.polynomial import Polynomial, fit_polynomial
-from agvbench.workflows.thesis.published import Figure, figures_table
-from agvbench.workflows.thesis.tables import drive_table
 
 PARTIAL_US = (1200.0, 1850.0)
 FULL_US = (900.0, 2100.0)

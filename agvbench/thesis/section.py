@@ -1,4 +1,4 @@
-"""Sections and tables as data: computed once, shown on a console, in Markdown, CSV or JSON."""
+"""Sections and tables as data, for console, Markdown, CSV or JSON; printed figures beside recomputed ones."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import io
 import math
 import re
 from dataclasses import dataclass, field
+from decimal import Decimal
 
 Cell = str | float | int | bool | None
 
@@ -112,3 +113,44 @@ def _json_cell(cell: Cell) -> Cell:
 
 def _escape(text: str) -> str:
     return text.replace("|", "\\|")
+
+
+COLUMNS = ("figure", "where", "thesis", "ours", "agree", "remark")
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure as the thesis prints it (`printed`, a decimal with a point) beside ours.
+
+    It agrees when ours, rounded to the printed decimals, is the printed one; `tolerance_units` allows for
+    inputs that were themselves printed rounded, in units of the last printed decimal.
+    """
+
+    what: str
+    where: str
+    printed: str
+    ours: float
+    remark: str = ""
+    tolerance_units: float = 0.5
+
+    @property
+    def agrees(self) -> bool:
+        """Whether ours rounds to the printed figure.
+
+        >>> Figure("R²", "table 7.5", "0.9991", 0.99909596).agrees
+        True
+        >>> Figure("slope", "eq. 7.1", "-0.0840", -0.0861).agrees
+        False
+        """
+        printed = Decimal(self.printed)
+        unit = Decimal(1).scaleb(int(printed.as_tuple().exponent))
+        return abs(Decimal(repr(float(self.ours))) - printed) <= Decimal(str(self.tolerance_units)) * unit
+
+    def row(self) -> tuple[Cell, ...]:
+        """Return the cells under `COLUMNS`."""
+        return (self.what, self.where, self.printed, float(self.ours), self.agrees, self.remark)
+
+
+def figures_table(name: str, title: str, figures: list[Figure], note: str = "") -> Table:
+    """Return a table of figures."""
+    return Table(name, title, COLUMNS, tuple(figure.row() for figure in figures), note, digits=6)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from functools import cache
 from statistics import median
 
-from agvbench.workflows.thesis.assumptions import (
+from agvbench.thesis.prediction.assumptions import (
     MEANING,
     ONLY,
     Assumptions,
@@ -15,18 +15,19 @@ from agvbench.workflows.thesis.assumptions import (
     every_combination,
     one_at_a_time,
 )
-from agvbench.workflows.thesis.layout import Cell, Section, Table
-from agvbench.workflows.thesis.prediction_section import QUANTITY, describe
-from agvbench.workflows.thesis.scoring import (
+from agvbench.thesis.prediction.scoring import (
     CONDITIONS,
+    QUANTITY,
     Group,
     ScoredRow,
+    describe,
     groups,
     median_errors,
     score,
     score_against_null,
     score_all,
 )
+from agvbench.thesis.section import Cell, Section, Table
 
 Progress = Callable[[int, int], None]
 

@@ -6,12 +6,12 @@ from functools import cache
 from typing import NamedTuple
 
 from agvbench.model import thesis_vehicle
+from agvbench.thesis.prediction.assumptions import Assumptions, TrueDrive
+from agvbench.thesis.refits.cornering import NEUTRAL_US, cornering_share, fitted_loss
+from agvbench.thesis.refits.drive import dead_band_map
+from agvbench.thesis.refits.steering import true_maps, verification_maps
+from agvbench.thesis.tables import GEOMETRY
 from agvbench.vehicle.kinematics import body_motion
-from agvbench.workflows.thesis.assumptions import Assumptions, TrueDrive
-from agvbench.workflows.thesis.cornering import NEUTRAL_US, cornering_share, fitted_loss
-from agvbench.workflows.thesis.drive import dead_band_map
-from agvbench.workflows.thesis.steering import true_maps, verification_maps
-from agvbench.workflows.thesis.tables import GEOMETRY
 
 
 class SteadyMotion(NamedTuple):

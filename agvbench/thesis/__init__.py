@@ -5,6 +5,6 @@ Each section is a pure function of the shipped tables; `SECTIONS` maps its name 
 
 from __future__ import annotations
 
-from agvbench.workflows.thesis.run import section_names, thesis_sections, write_json, write_tables
+from agvbench.thesis.run import section_names, thesis_sections, write_json, write_tables
 
 __all__ = ["section_names", "thesis_sections", "write_json", "write_tables"]

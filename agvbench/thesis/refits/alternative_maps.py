@@ -1,4 +1,4 @@
-"""Maps that say what the tables show, beside the thesis' own forms, judged on pulses they have not seen.
+"""Alternative maps, beside the thesis' own forms, judged on pulses they have not seen.
 
 Each map is fitted without one pulse and asked for it, for every pulse but the outermost two, which only
 extrapolation could give (`agvbench.calibration.compare_maps`).
@@ -14,10 +14,10 @@ import numpy as np
 
 from agvbench.calibration import CurvePoints, MapFit, compare_maps, drive_fitters, steering_fitters
 from agvbench.errors import FitError
-from agvbench.workflows.thesis.layout import Cell, Section, Table
-from agvbench.workflows.thesis.polynomial import fit_polynomial
-from agvbench.workflows.thesis.steering import AXLES
-from agvbench.workflows.thesis.tables import drive_table, rms, steering_table
+from agvbench.thesis.refits.polynomial import fit_polynomial
+from agvbench.thesis.refits.steering import AXLES
+from agvbench.thesis.section import Cell, Section, Table
+from agvbench.thesis.tables import drive_table, rms, steering_table
 
 NEUTRAL_US = 1500.0
 #: What a fit is called in the tables; fits of other names are the calibration's own variants.

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from agvbench.thesis.prediction.assumptions import Steering, TurnTarget
 from agvbench.vehicle.geometry import Geometry
-from agvbench.workflows.thesis.assumptions import Steering, TurnTarget
 
 RADIUS_M = 1.0
 STRAIGHT_M = 2.0

@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 from statistics import mean, median
 
-from agvbench.workflows.thesis.assumptions import Assumptions
-from agvbench.workflows.thesis.layout import Cell, Section, Table
-from agvbench.workflows.thesis.prediction import Prediction, predict_all
-from agvbench.workflows.thesis.scoring import CONDITIONS
-from agvbench.workflows.thesis.tables import end_pose_rows
+from agvbench.thesis.prediction.assumptions import Assumptions
+from agvbench.thesis.prediction.end_pose import Prediction, predict_all
+from agvbench.thesis.prediction.scoring import CONDITIONS
+from agvbench.thesis.section import Cell, Section, Table
+from agvbench.thesis.tables import end_pose_rows
 
 TARGET_MM = 1000.0 * math.sqrt(2.0)
 

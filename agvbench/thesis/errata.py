@@ -6,18 +6,16 @@ import math
 
 import numpy as np
 
-from agvbench.vehicle.kinematics import body_motion
-from agvbench.workflows.thesis.battery import ENDURANCE_S
-from agvbench.workflows.thesis.drive import half_speed_errors, printed_cubic
-from agvbench.workflows.thesis.layout import Cell, Section, Table
-from agvbench.workflows.thesis.lever_arm import common_lever_arm
-from agvbench.workflows.thesis.mirror import count_mirrored
-from agvbench.workflows.thesis.polynomial import fit_polynomial
-from agvbench.workflows.thesis.published import Figure, figures_table
-from agvbench.workflows.thesis.ramps import ACCELERATION_MPS2, BRAKING_MPS2, driven_distance
-from agvbench.workflows.thesis.scoring import CONDITIONS
-from agvbench.workflows.thesis.steering import refit_line
-from agvbench.workflows.thesis.tables import (
+from agvbench.thesis.prediction.end_pose import ACCELERATION_MPS2, BRAKING_MPS2, driven_distance
+from agvbench.thesis.prediction.scoring import CONDITIONS
+from agvbench.thesis.refits.battery import ENDURANCE_S
+from agvbench.thesis.refits.cornering import count_mirrored
+from agvbench.thesis.refits.drive import half_speed_errors, printed_cubic
+from agvbench.thesis.refits.idle_axle import common_lever_arm
+from agvbench.thesis.refits.polynomial import fit_polynomial
+from agvbench.thesis.refits.steering import refit_line
+from agvbench.thesis.section import Cell, Figure, Section, Table, figures_table
+from agvbench.thesis.tables import (
     GEOMETRY,
     MeasuredRow,
     cornering_table,
@@ -27,6 +25,7 @@ from agvbench.workflows.thesis.tables import (
     steering_table,
     verification_table,
 )
+from agvbench.vehicle.kinematics import body_motion
 
 _FULL_SPEED_MPS = 0.32
 

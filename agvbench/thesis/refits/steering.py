@@ -8,12 +8,11 @@ from functools import cache
 import numpy as np
 
 from agvbench.model import thesis_vehicle
+from agvbench.thesis.refits.polynomial import Polynomial, fit_polynomial
+from agvbench.thesis.section import Figure, Section, Table, figures_table
+from agvbench.thesis.tables import STATISTICS, steering_table, verification_table
 from agvbench.types import Floats
 from agvbench.vehicle.maps import Line, MonotoneTable, StaticMap
-from agvbench.workflows.thesis.layout import Section, Table
-from agvbench.workflows.thesis.polynomial import Polynomial, fit_polynomial
-from agvbench.workflows.thesis.published import Figure, figures_table
-from agvbench.workflows.thesis.tables import STATISTICS, steering_table, verification_table
 
 AXLES = ("front", "rear")
 #: eq. 7.1 and 7.2 as printed: slope [deg/µs], intercept [deg], R² of table 7.5.

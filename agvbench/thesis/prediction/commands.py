@@ -1,4 +1,4 @@
-"""What the vehicle was told in chapter 8: pulses and driving time, assumed where the thesis does not say."""
+"""The commands of chapter 8: pulses and driving time, assumed where the thesis does not say."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from functools import cache
 from typing import NamedTuple
 
 from agvbench.model import thesis_vehicle
-from agvbench.vehicle.kinematics import body_motion
-from agvbench.workflows.thesis.assumptions import (
+from agvbench.thesis.prediction.assumptions import (
     Assumptions,
     CalibratedDrive,
     CalibratedSteering,
     TrueDrive,
     WholeDegrees,
 )
-from agvbench.workflows.thesis.drive import PARTIAL_US, cubic_map
-from agvbench.workflows.thesis.eight import Trajectory, wanted_angles
-from agvbench.workflows.thesis.steering import published_lines, unrounded_lines
-from agvbench.workflows.thesis.tables import GEOMETRY
-from agvbench.workflows.thesis.vehicle import true_speed
+from agvbench.thesis.prediction.calibrated_vehicle import true_speed
+from agvbench.thesis.prediction.trajectories import Trajectory, wanted_angles
+from agvbench.thesis.refits.drive import PARTIAL_US, cubic_map
+from agvbench.thesis.refits.steering import published_lines, unrounded_lines
+from agvbench.thesis.tables import GEOMETRY
+from agvbench.vehicle.kinematics import body_motion
 
 NEUTRAL_US = 1500.0
 FULL_SPEED_MPS = 0.32

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from agvbench.thesis.section import Figure, Section, Table, figures_table
+from agvbench.thesis.tables import endurance_percentiles, endurance_table, rms
 from agvbench.types import Floats
-from agvbench.workflows.thesis.layout import Section, Table
-from agvbench.workflows.thesis.published import Figure, figures_table
-from agvbench.workflows.thesis.tables import endurance_percentiles, endurance_table, rms
 
 ENDURANCE_S = 29877.0
 TRAJECTORY_RUN_S = 7.0
