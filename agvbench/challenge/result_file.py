@@ -13,7 +13,7 @@ from agvbench.challenge.scores import plain, score
 from agvbench.challenge.trial import Trial
 from agvbench.errors import FileError
 from agvbench.text_files import read_json
-from agvbench.workflows.writing import write_file
+from agvbench.workflows.output_files import write_file
 
 SCHEMA = 1
 

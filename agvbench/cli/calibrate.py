@@ -41,8 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     from rich.console import Console
 
     from agvbench.reporting.calibration_console import print_calibration
-    from agvbench.workflows.calibrate import calibrated, save
-    from agvbench.workflows.firmware_header import write_firmware_header
+    from agvbench.workflows.calibrate import calibrated, save, write_firmware_header
 
     console, out, firmware = Console(), arguments.out, arguments.firmware
     calibration = calibrated(arguments.directory, maps=arguments.maps, session=arguments.session)

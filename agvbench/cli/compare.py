@@ -53,8 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Compare, print the comparison, and return its exit code."""
     from agvbench.reporting.console import print_cautions, print_comparison, wide_console
     from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
-    from agvbench.workflows.comparability import comparability
-    from agvbench.workflows.compare import compare_campaigns, exit_code, write_json
+    from agvbench.workflows.compare import comparability, compare_campaigns, exit_code, write_json
 
     console = wide_console()
     known = comparability(arguments.a, arguments.b, across_vehicles=arguments.across_vehicles)

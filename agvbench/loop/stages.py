@@ -74,7 +74,7 @@ def diagnosed(directory: Path, seed: int, tell: Tell) -> dict[str, Any]:
 
 
 def _in_words(found: Diagnosis) -> list[str]:
-    from agvbench.workflows.diagnosis_words import effect_in_words
+    from agvbench.workflows.diagnosis_files import effect_in_words
 
     lines = [f"{found.verdict}: {found.why}", *(effect_in_words(effect) for effect in found.effects)]
     if found.model is None:

@@ -13,7 +13,7 @@ from rich.text import Text
 from agvbench.diagnosis import Diagnosis
 from agvbench.diagnosis.result import HeldOut
 from agvbench.reporting.windows_table import windows_table
-from agvbench.workflows.diagnosis_words import (
+from agvbench.workflows.diagnosis_files import (
     COLUMNS,
     DEFINITIONS,
     QUANTITIES,

@@ -9,7 +9,7 @@ from agvbench.reporting.content import Content, plain
 from agvbench.reporting.html import to_html
 from agvbench.reporting.sections.diagnosis import DiagnosisSection, diagnosis_blocks
 from agvbench.workflows.diagnosis_files import shown
-from agvbench.workflows.writing import write_file
+from agvbench.workflows.output_files import write_file
 
 
 def write_diagnosis_report(found: Diagnosis, path: str | Path) -> Path:

@@ -38,8 +38,7 @@ from agvbench.reporting.sections.diagnosis import diagnosis_blocks
 from agvbench.statistics.equivalence import Bias
 from agvbench.statistics.quantities import COMPONENT_DEFINITIONS, COMPONENTS, DEFINITIONS
 from agvbench.types import CONDITIONS
-from agvbench.workflows.diagnosis_files import ShownDiagnosis, read_diagnosis
-from agvbench.workflows.diagnosis_words import items, mapping
+from agvbench.workflows.diagnosis_files import ShownDiagnosis, items, mapping, read_diagnosis
 from agvbench.workflows.report import gather
 
 if TYPE_CHECKING:

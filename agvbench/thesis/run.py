@@ -9,7 +9,7 @@ from pathlib import Path
 
 from agvbench.errors import FlagError
 from agvbench.thesis.section import Section
-from agvbench.workflows.writing import write_file
+from agvbench.workflows.output_files import write_file
 
 SCHEMA = 1
 

@@ -16,7 +16,7 @@ from agvbench.diagnosis.next_experiment_propose import with_first_experiment
 from agvbench.errors import FlagError
 from agvbench.model import VehicleModel
 from agvbench.workflows.diagnosis_files import keep
-from agvbench.workflows.writing import write_file
+from agvbench.workflows.output_files import write_file
 
 _RUNS_COUNTED = 5
 Progress = Callable[[int, int], AbstractContextManager[Callable[[str], None]]]

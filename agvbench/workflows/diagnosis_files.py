@@ -1,20 +1,23 @@
-"""A diagnosis as it lies in a campaign directory: its JSON, and the residuals to be drawn."""
+"""A diagnosis as it lies in a campaign directory: its JSON, the residuals to be drawn, and its words."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from agvbench.errors import FileError
 from agvbench.text_files import read_json
-from agvbench.workflows.writing import write_file
+from agvbench.workflows.output_files import write_file
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from agvbench.diagnosis import Diagnosis
+if TYPE_CHECKING:
+    from agvbench.diagnosis import NamedEffect
 
 JSON, RESIDUALS = "diagnosis.json", "residuals.parquet"
 _NUMBERS = (
@@ -86,3 +89,71 @@ def _residuals(path: Path) -> tuple[pd.DataFrame | None, tuple[str, ...]]:
     except (OSError, ValueError, KeyError) as error:
         return None, (f"{RESIDUALS} cannot be read: {error}.",)
     return numbers.loc[np.isfinite(numbers.to_numpy()).all(axis=1)], ()
+
+
+QUANTITIES = {
+    "end_position_mm": "end position error [mm]",
+    "end_position_median_mm": "end position error, median [mm]",
+    "along_mm": "along at the end [mm]",
+    "across_mm": "across at the end [mm]",
+    "delta_heading_deg": "heading error at the end [°]",
+    "delta_s_mm": "Δs at the end [mm]",
+    "position_rms_mm": "position along the way [mm]",
+    "heading_rms_deg": "heading along the way [°]",
+}
+"""What errors before and after are of, by their name in the JSON."""
+COLUMNS = {"before": "before", "after": "after", "floor": "repeatability"}
+"""Headings of the errors of a quantity, by their name in the JSON."""
+DEFINITIONS = (
+    "Errors are measured minus predicted. End position error: distance between the two end positions; along and "
+    "across: its components along x and y of the start frame. The heading error is the thesis' Δδ. Δs compares "
+    "distances from start to end, and hardly sees an error across."
+)
+
+
+def effect_in_words(effect: NamedEffect) -> str:
+    """Return one line on an effect: its parameters, and what cannot be told from it."""
+    parts = []
+    for name, e in effect.parameters.items():
+        unit = "" if e.unit == "–" else f" {e.unit}"
+        parts.append(f"{name} = {e.value:.4g} ± {e.stderr:.2g}{unit}" + (f" ({e.note})" if e.note else ""))
+    line = f"{effect.name}: {', '.join(parts)}"
+    return line + (f"; or instead {', '.join(effect.confounded_with)}" if effect.confounded_with else "")
+
+
+def left_in_words(content: Mapping[str, Any]) -> Iterator[str]:
+    """Yield on what the rest depends."""
+    for d in map(mapping, items(mapping(content.get("unexplained")).get("depends_on"))):
+        share, p_value = number(d.get("share")), number(d.get("p_value"))
+        known = [f"{100.0 * share:.0f} % of it"] * (not math.isnan(share))
+        known += [f"p = {p_value:.1g}"] * (not math.isnan(p_value))
+        of_it = f" ({', '.join(known)})" if known else ""
+        if "covariate" in d:
+            yield f"What is left depends on {d['covariate']} through {d.get('through', 'the motion')}{of_it}."
+
+
+def next_in_words(content: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what to drive next, what no run can tell apart, and which parameters these runs do not pin."""
+    if following := mapping(content.get("next_experiment")):
+        yield f"Next run, {mapping(following.get('trajectory')).get('name')}: {following.get('why')}."
+    provenance = mapping(content.get("provenance"))
+    for item in map(mapping, items(provenance.get("inseparable"))):
+        between = " from ".join(map(str, items(item.get("between"))))
+        yield f"No run from rest to rest tells {between}; it takes {item.get('needs')}."
+    for name, why in mapping(provenance.get("not_identifiable")).items():
+        yield f"{name} is not identifiable from these runs ({why})."
+
+
+def mapping(value: object) -> Mapping[str, Any]:
+    """Return a mapping as it is, anything else as an empty one."""
+    return value if isinstance(value, Mapping) else {}
+
+
+def items(value: object) -> list[Any]:
+    """Return a list as it is, anything else as an empty one."""
+    return value if isinstance(value, list) else []
+
+
+def number(value: object) -> float:
+    """Return a number, NaN for anything else."""
+    return float(value) if isinstance(value, int | float) else math.nan

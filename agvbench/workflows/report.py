@@ -3,24 +3,55 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from agvbench.campaign import Campaign, CampaignHeader
 from agvbench.errors import InputError
 from agvbench.statistics import Comparison, bias_and_spread, compare, end_pose_table, pose_errors, valid
 from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM, checked_margins
 from agvbench.statistics.end_poses import in_order
-from agvbench.types import Run
+from agvbench.types import Frames, Run
 from agvbench.workflows.calibration_curves import CalibrationCurves, read_calibration_curves
 from agvbench.workflows.diagnosis_files import ShownDiagnosis, read_diagnosis
-from agvbench.workflows.run_quality import run_quality
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+def run_quality(runs: Sequence[Run], *, rate_hz: float) -> pd.DataFrame:
+    """Return one row per run: what it is, its status, and how many frames were tracked, doubled and lost.
+
+    Columns ``run_id``, ``experiment``, ``trajectory``, ``condition``, ``status``, ``frames`` (that arrived),
+    ``expected`` (between the first and the last capture time at `rate_hz`), ``tracked`` (distinct capture times
+    with a pose), ``doubled``, ``lost_share`` (the share of expected frames that brought no pose) and ``longest_gap_s``
+    (NaN below two tracked frames).
+    """
+    import pandas as pd
+
+    columns = ("run_id", "experiment", "trajectory", "condition", "status")
+    rows = [{c: getattr(run, c) for c in columns} | _seen(run.frames, rate_hz) for run in runs]
+    return pd.DataFrame(rows)
+
+
+def _seen(frames: Frames, rate_hz: float) -> dict[str, float]:
+    times = np.unique(frames.t_s[np.isfinite(frames.t_s)])
+    tracked = np.unique(frames.t_s[frames.tracked.astype(np.bool_)])
+    expected = round(float(times[-1] - times[0]) * rate_hz) + 1 if len(times) else 0
+    return {
+        "frames": len(frames),
+        "expected": expected,
+        "tracked": len(tracked),
+        "doubled": len(frames) - len(times),
+        "lost_share": max(0.0, 1.0 - len(tracked) / expected) if expected else float("nan"),
+        "longest_gap_s": float(np.max(np.diff(tracked))) if len(tracked) > 1 else float("nan"),
+    }
+
 
 Tracker = Callable[[Iterable[Run], int], Iterator[Run]]
 

@@ -17,7 +17,7 @@ from agvbench.errors import FileError
 from agvbench.statistics import Comparison
 from agvbench.workflows import compare
 from agvbench.workflows.init import make_lab
-from agvbench.workflows.writing import write_file
+from agvbench.workflows.output_files import write_file
 
 NOTHING_COMPARED = Comparison("A", "B", (), (), (), (), alpha=0.01, tests=0)
 

@@ -23,11 +23,11 @@ from agvbench.reporting.content import (
 )
 from agvbench.reporting.figures.residuals import AFTER, BEFORE, draw_dependence, draw_floor
 from agvbench.reporting.sections.base import Section
-from agvbench.workflows.diagnosis_files import ShownDiagnosis
-from agvbench.workflows.diagnosis_words import (
+from agvbench.workflows.diagnosis_files import (
     COLUMNS,
     DEFINITIONS,
     QUANTITIES,
+    ShownDiagnosis,
     items,
     left_in_words,
     mapping,

@@ -1,4 +1,4 @@
-"""Files that a user asked for by an option: written, or one line that says which option to give another place."""
+"""Output files that an option asked for: written, or one line that says which option gives another place."""
 
 from __future__ import annotations
 
