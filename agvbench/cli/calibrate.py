@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from rich.console import Console
 
-    from agvbench.reporting.calibration_console import print_calibration
+    from agvbench.reporting.console.calibration import print_calibration
     from agvbench.workflows.calibrate import calibrated, save, write_firmware_header
 
     console, out, firmware = Console(), arguments.out, arguments.firmware

@@ -43,8 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     from rich.console import Console
 
     from agvbench.challenge.challenge import run_challenge
-    from agvbench.reporting.challenge_console import print_scores
-    from agvbench.reporting.challenge_markdown import scores_markdown
+    from agvbench.reporting.console.challenge import print_scores, scores_markdown
 
     scores = run_challenge(
         arguments.seeds,

@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Compare, print the comparison, and return its exit code."""
-    from agvbench.reporting.console import print_cautions, print_comparison, wide_console
+    from agvbench.reporting.console.tables import print_cautions, print_comparison, wide_console
     from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
     from agvbench.workflows.compare import comparability, compare_campaigns, exit_code, write_json
 

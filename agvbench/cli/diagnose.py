@@ -62,8 +62,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Diagnose; return the exit code."""
     from rich.console import Console
 
-    from agvbench.reporting.diagnosis_console import print_diagnosis
-    from agvbench.reporting.progress import searching
+    from agvbench.reporting.console.diagnosis import print_diagnosis
+    from agvbench.reporting.console.progress import searching
     from agvbench.workflows.diagnose import run_diagnose
 
     console = Console()

@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print what every check finds; return the exit code."""
     from agvbench.adapters import check_specs
-    from agvbench.reporting.doctor_table import tell
+    from agvbench.reporting.console.doctor import tell
     from agvbench.running.configuration.settings import BenchSettings
     from agvbench.running.configuration.vehicles import lab_vehicle
     from agvbench.workflows.doctor import Lab, State, examine

@@ -31,8 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """List effects or write a template; return the exit code."""
-    from agvbench.reporting.console import wide_console
-    from agvbench.reporting.effects_list import effects_table, reference_page
+    from agvbench.reporting.console.effects import effects_table, reference_page
+    from agvbench.reporting.console.tables import wide_console
     from agvbench.workflows.effects import write_template
 
     if arguments.action == "new":

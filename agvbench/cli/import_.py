@@ -31,7 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Import; return the exit code."""
     from rich.console import Console
 
-    from agvbench.reporting.import_console import print_import
+    from agvbench.reporting.console.recordings import print_import
     from agvbench.workflows.import_recordings import run_import
 
     print_import(run_import(arguments.mapping, arguments.files, arguments.out), Console())

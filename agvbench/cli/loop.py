@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_values(vars(arguments))
     from agvbench.loop.loop import run_loop
     from agvbench.loop.settings import MODEL_ONLY, NO_TRIAL
-    from agvbench.reporting.console import wide_console
+    from agvbench.reporting.console.tables import wide_console
     from agvbench.reporting.content import plain_sentences
 
     console = wide_console()
@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
         resume=arguments.resume,
         tell=lambda line: console.print(plain_sentences(line), highlight=False, markup=False, soft_wrap=True),
     )
-    from agvbench.reporting.loop import print_loop, write_loop_report
+    from agvbench.reporting.loop_report import print_loop, write_loop_report
 
     print_loop(console, write_loop_report(loop))
     return 0

@@ -82,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
 def _print(made: DryRun, args: argparse.Namespace) -> None:
     from rich.console import Console
 
-    from agvbench.reporting.plan_console import commands_csv, print_dry_run, to_json
+    from agvbench.reporting.console.plan import commands_csv, print_dry_run, to_json
 
     if args.json:
         print(to_json(made))

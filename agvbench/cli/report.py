@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the report and print its summary."""
     from agvbench.reporting import write_report
-    from agvbench.reporting.console import print_report, wide_console
+    from agvbench.reporting.console.tables import print_report, wide_console
     from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
 
     report = write_report(

@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Compute, show and write."""
-    from agvbench.reporting.thesis_console import print_section, thesis_console, with_progress
+    from agvbench.reporting.console.thesis import print_section, thesis_console, with_progress
     from agvbench.thesis import thesis_sections, write_json, write_tables
 
     console = thesis_console()
@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
             write_tables(computed, arguments.out)
         sections = iter(computed)
     if arguments.figures is not None:
-        from agvbench.reporting.thesis_figures import write_thesis_figures
+        from agvbench.reporting.figures.thesis import write_thesis_figures
 
         write_thesis_figures(arguments.figures)
     for section in sections:

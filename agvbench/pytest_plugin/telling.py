@@ -202,8 +202,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
 
 
 def _conclude(terminalreporter: pytest.TerminalReporter, config: pytest.Config, session: BenchSession) -> None:
-    from agvbench.reporting.after_bench import conclude
-    from agvbench.reporting.dry_run import dry_run_table
+    from agvbench.reporting.console.bench import conclude, dry_run_table
     from agvbench.running.configuration.campaign_directory import shown
 
     if session.is_dry:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from agvbench.diagnosis import Diagnosis
 from agvbench.reporting.content import Content, plain
-from agvbench.reporting.html import to_html
+from agvbench.reporting.pages import to_html
 from agvbench.reporting.sections.diagnosis import DiagnosisSection, diagnosis_blocks
 from agvbench.workflows.diagnosis_files import shown
 from agvbench.workflows.output_files import write_file

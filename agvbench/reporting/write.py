@@ -9,14 +9,26 @@ from pathlib import Path
 
 from agvbench.campaign.atomic_files import made_folder, replace_whole
 from agvbench.errors import FileError
+from agvbench.reporting.console.progress import track
 from agvbench.reporting.content import Content, plain
-from agvbench.reporting.csv_table import frame_to_csv
-from agvbench.reporting.page_texts import TABLES, page_texts
-from agvbench.reporting.progress import track
+from agvbench.reporting.pages import to_html, to_markdown
 from agvbench.reporting.recording import write_recording
 from agvbench.reporting.sections import all_sections
+from agvbench.reporting.table_files import frame_to_csv, to_csv, to_latex
 from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
 from agvbench.workflows.report import ReportData, gather
+
+HTML, MARKDOWN, TABLES = "report.html", "report.md", "tables"
+
+
+def page_texts(title: str, subtitle: str, sections: Sequence[Content]) -> Iterator[tuple[str, str]]:
+    """Yield the name of each file, in a directory of its own, and its text."""
+    yield HTML, to_html(title, subtitle, sections)
+    yield MARKDOWN, to_markdown(title, sections)
+    for table in (table for section in sections for table in section.tables):
+        yield f"{TABLES}/{table.slug}.csv", to_csv(table)
+        yield f"{TABLES}/{table.slug}.tex", to_latex(table)
+
 
 RECORDING = "campaign.rrd"
 

@@ -20,7 +20,7 @@ from agvbench.errors import VehicleError
 from agvbench.model import VehicleModel, example_vehicle
 from agvbench.model.simulated_run import SimulatedRun
 from agvbench.model.simulation import Simulation
-from agvbench.reporting.effects_list import reference_page
+from agvbench.reporting.console.effects import reference_page
 from agvbench.types import Commands
 from agvbench.vehicle.geometry import Geometry
 from agvbench.workflows.effects import template_text

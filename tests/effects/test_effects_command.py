@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from agvbench.cli import main
 from agvbench.effects import effect_kinds
-from agvbench.reporting.effects_list import reference_page
+from agvbench.reporting.console.effects import reference_page
 
 
 def test_lists_every_effect_with_its_parameters(capsys):

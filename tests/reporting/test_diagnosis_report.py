@@ -11,7 +11,7 @@ from report_samples import HOSTILE, make_campaign
 
 from agvbench.cli import main
 from agvbench.reporting.content import Bullets, Content, FigureBlock, Paragraph, Table
-from agvbench.reporting.html import to_html
+from agvbench.reporting.pages import to_html
 from agvbench.reporting.sections.diagnosis import diagnosis_blocks
 from agvbench.workflows.diagnosis_files import JSON, RESIDUALS, ShownDiagnosis, read_diagnosis
 

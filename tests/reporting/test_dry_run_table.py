@@ -6,7 +6,7 @@ import pytest
 
 from agvbench.model import example_vehicle
 from agvbench.planning import load_trajectory, plan
-from agvbench.reporting.dry_run import dry_run_table
+from agvbench.reporting.console.bench import dry_run_table
 from agvbench.running.execution.run_records import DriveOrder
 from agvbench.types import Pose
 

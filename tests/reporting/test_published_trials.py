@@ -9,7 +9,7 @@ import pytest
 
 from agvbench.challenge.result_file import known_trials, write_trials
 from agvbench.challenge.scores import score
-from agvbench.reporting.challenge_markdown import scores_markdown
+from agvbench.reporting.console.challenge import scores_markdown
 
 REFERENCE = Path(__file__).resolve().parents[2] / "docs" / "reference"
 PAGE = (REFERENCE / "blind-trials.md").read_text(encoding="utf-8")

@@ -9,11 +9,9 @@ from conftest import MAKERS
 
 from agvbench.reporting import sections
 from agvbench.reporting.content import Bullets, FigureBlock, Paragraph, Table
-from agvbench.reporting.csv_table import to_csv
-from agvbench.reporting.html import to_html
-from agvbench.reporting.latex import to_latex
-from agvbench.reporting.markdown import to_markdown
+from agvbench.reporting.pages import to_html, to_markdown
 from agvbench.reporting.sections import Section, all_sections
+from agvbench.reporting.table_files import to_csv, to_latex
 
 SECTIONS = all_sections()
 

@@ -18,7 +18,7 @@ from agvbench.loop.before_after import before_after, end_positions
 from agvbench.loop.settings import MODEL_ONLY, NO_TRIAL, opened, write
 from agvbench.loop.stages import learned
 from agvbench.model import VehicleModel
-from agvbench.reporting.loop import before_after_table, end_position_table
+from agvbench.reporting.loop_report import before_after_table, end_position_table
 from agvbench.running.configuration.settings import BenchSettings
 from agvbench.running.session.end_pose_bias import read_remainders
 from agvbench.statistics.equivalence import Bias

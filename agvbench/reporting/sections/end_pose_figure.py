@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from agvbench.reporting.conditions import condition_numbers, legend
 from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph
 from agvbench.reporting.figures.end_pose import draw_end_poses
+from agvbench.reporting.figures.labels import condition_numbers, legend, panel_title
 from agvbench.reporting.sections.base import Section
-from agvbench.reporting.titles import panel_title
 from agvbench.statistics import valid
 from agvbench.types import Floats, Pose
 from agvbench.workflows.report import ReportData

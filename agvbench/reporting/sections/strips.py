@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from agvbench.reporting.conditions import condition_numbers, legend
 from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph
+from agvbench.reporting.figures.labels import condition_numbers, legend
 from agvbench.reporting.figures.strips import Strip, draw_strips
 from agvbench.reporting.sections.base import Section
 from agvbench.statistics import valid

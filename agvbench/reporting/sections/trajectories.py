@@ -6,12 +6,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from agvbench.reporting.conditions import condition_numbers, legend
 from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph
 from agvbench.reporting.figures.floor import draw_paths
+from agvbench.reporting.figures.labels import condition_numbers, legend, panel_title
 from agvbench.reporting.figures.paths import drawn_path
 from agvbench.reporting.sections.base import Section
-from agvbench.reporting.titles import panel_title
 from agvbench.statistics.end_poses import in_order
 from agvbench.types import Floats, Run
 from agvbench.workflows.report import ReportData

@@ -1,11 +1,16 @@
-"""What the scores of blind trials say, in rows and lines, wherever they are shown."""
+"""The scores of blind trials, on the console and as Markdown."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
 
 from agvbench.challenge.scores import Scores
+from agvbench.reporting.pages import escape
 from agvbench.simulator.hidden.catalogue import AND
 
 SHARES = ("", "count", "share", "95 % bounds")
@@ -39,3 +44,35 @@ def other_lines(scores: Scores) -> Iterator[str]:
     if scores.errors:
         yield f"trials that ended with an error, which counts as a wrong answer: {len(scores.errors)}"
         yield from scores.errors
+
+
+def print_scores(scores: Scores, console: Console) -> None:
+    """Print the shares with their bounds, the confusion matrix and the rest."""
+    table = Table(title=f"{scores.trials} blind trials", box=box.SIMPLE_HEAD, title_justify="left")
+    for heading in SHARES:
+        table.add_column(heading, justify="left" if not heading else "right")
+    for row in share_rows(scores):
+        table.add_row(*row)
+    console.print(table)
+    answers = Table(title="hidden, and answered", box=box.SIMPLE_HEAD, title_justify="left")
+    for heading in ANSWERS:
+        answers.add_column(heading)
+    for answer in answer_rows(scores):
+        answers.add_row(*answer)
+    console.print(answers)
+    for line in other_lines(scores):
+        console.print(line, highlight=False, soft_wrap=True)
+
+
+def scores_markdown(scores: Scores) -> str:
+    """Return the shares with their bounds, the rest, and the confusion matrix."""
+    lines = [f"{scores.trials} blind trials:", "", *_table(SHARES, share_rows(scores)), ""]
+    lines += [f"- {escape(line)}" for line in other_lines(scores)]
+    lines += ["", *_table(ANSWERS, answer_rows(scores)), ""]
+    return "\n".join(lines)
+
+
+def _table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
+    yield f"| {' | '.join(headings)} |"
+    yield f"|{'---|' * len(headings)}"
+    yield from (f"| {' | '.join(map(escape, row))} |" for row in rows)

@@ -1,4 +1,4 @@
-"""The summary that a report prints on the console."""
+"""Tables on the console: reports and comparisons in short, as wide as the terminal allows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""All effects: the table of ``agvbench effects``, and their page in the reference."""
+"""The effects: the table of ``agvbench effects``, and their page in the reference."""
 
 from __future__ import annotations
 

@@ -1,14 +1,40 @@
-"""The table of a dry run: what would be driven, for how long, on how much floor."""
+"""A bench session on the console: the table of a dry run, and the summary when it is done."""
 
 from __future__ import annotations
 
+import io
+import os
+import shutil
 from collections.abc import Sequence
+from pathlib import Path
 
+from rich.console import Console, Group, RenderableType
+from rich.text import Text
+
+from agvbench.errors import AgvbenchError
 from agvbench.planning import Plan
 from agvbench.planning.workspace import DEFAULT_MARGIN_M
+from agvbench.reporting.console.tables import end_pose_summary, said_first
+from agvbench.reporting.write import write_report
 from agvbench.running.execution.campaign_time import TURNAROUND_S
 from agvbench.running.execution.drive import DEFAULT_TIMING
 from agvbench.running.execution.run_records import DriveOrder
+from agvbench.statistics.quantities import DEFINITIONS
+from agvbench.workflows.report import ReportData, gather
+
+_NARROWEST = 100
+
+
+def as_text(renderable: RenderableType) -> str:
+    """Return `renderable` as lines without colours: as wide as ``COLUMNS`` says, else as the terminal, at least 100."""
+    columns = shutil.get_terminal_size((_NARROWEST, 24)).columns
+    width = columns if os.environ.get("COLUMNS", "").isdigit() else max(_NARROWEST, columns)
+    console = Console(file=io.StringIO(), width=width, no_color=True)
+    console.print(renderable)
+    file = console.file
+    assert isinstance(file, io.StringIO)  # noqa: S101 - it is the one made above
+    return file.getvalue().rstrip("\n")
+
 
 _AT_REST_S = DEFAULT_TIMING.rest_before_s + DEFAULT_TIMING.settle_s
 _BETWEEN_S = _AT_REST_S + TURNAROUND_S
@@ -24,8 +50,6 @@ def dry_run_table(planned: Sequence[tuple[DriveOrder, Plan]]) -> str:
     from rich import box
     from rich.table import Table
     from rich.text import Text
-
-    from agvbench.reporting.text import as_text
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_footer=bool(planned), caption_justify="left")
     table.collapse_padding = True
@@ -79,3 +103,24 @@ def _reach(order: DriveOrder, plan: Plan) -> float:
     floor = complex(start.x_m, start.y_m) + turn * (path[:, 1] + 1j * path[:, 2])
     longest_axle = max(plan.geometry.front_axle_m, plan.geometry.rear_axle_m)
     return float(np.abs(floor).max() + longest_axle + DEFAULT_MARGIN_M)
+
+
+def conclude(directory: Path, *, report: bool) -> str:
+    """Return the summary of the campaign in `directory`, after writing its report where that is wanted.
+
+    What cannot be reported is said, not raised: the campaign is recorded all the same.
+    """
+    try:
+        if not report:
+            defined = Text(f"{DEFINITIONS}\n")
+            return as_text(Group(*_end_poses(gather(directory), defined), Text(f"campaign: {directory}")))
+        written = write_report(directory)
+    except AgvbenchError as error:
+        return f"no report: {error}\ncampaign: {directory}"
+    where = [Text(f"campaign: {directory}"), Text(f"report:   {written.files[0]}")]
+    return as_text(Group(*_end_poses(written.data), *said_first(written), Text(""), *where))
+
+
+def _end_poses(data: ReportData, *below: RenderableType) -> list[RenderableType]:
+    """Return the table of end poses and what stands below it, or nothing where no run had a target."""
+    return [end_pose_summary(data), *below] if len(data.end_poses) else []

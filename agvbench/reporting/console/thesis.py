@@ -1,4 +1,4 @@
-"""Sections on a terminal."""
+"""The sections of ``agvbench thesis`` on the console."""
 
 from __future__ import annotations
 

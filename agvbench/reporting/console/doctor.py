@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rich.markup import escape
 
-from agvbench.reporting.console import wide_console
+from agvbench.reporting.console.tables import wide_console
 from agvbench.reporting.content import plain_sentences
 from agvbench.workflows.doctor import Finding, State
 

@@ -1,4 +1,4 @@
-"""The thesis' residuals as pictures: held-out errors before and after, one SVG file per table."""
+"""The thesis' residuals as figures: held-out errors before and after, one SVG file per table."""
 
 from __future__ import annotations
 

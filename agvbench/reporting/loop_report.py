@@ -19,7 +19,8 @@ from agvbench.loop.before_after import (
     root_mean_square_bias,
 )
 from agvbench.loop.loop import Loop
-from agvbench.reporting.console import console_table
+from agvbench.reporting.console.progress import track
+from agvbench.reporting.console.tables import console_table
 from agvbench.reporting.content import (
     Block,
     Bullets,
@@ -31,10 +32,9 @@ from agvbench.reporting.content import (
     plain,
     plain_sentences,
 )
-from agvbench.reporting.page_texts import TABLES, page_texts
-from agvbench.reporting.progress import track
 from agvbench.reporting.sections import all_sections
 from agvbench.reporting.sections.diagnosis import diagnosis_blocks
+from agvbench.reporting.write import TABLES, page_texts
 from agvbench.statistics.equivalence import Bias
 from agvbench.statistics.quantities import COMPONENT_DEFINITIONS, COMPONENTS, DEFINITIONS
 from agvbench.types import CONDITIONS

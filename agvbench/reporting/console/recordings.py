@@ -1,4 +1,4 @@
-"""What became of the rows of imported recordings, on the console."""
+"""Imported recordings on the console: what became of their rows."""
 
 from __future__ import annotations
 
