@@ -28,12 +28,12 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
     """Collect ``bench_*.py`` files that speak of agvbench; other tools' files of that name stay theirs."""
     if file_path.suffix != ".py" or not file_path.name.startswith("bench_"):
         return None
-    from agvbench.pytest_plugin.collecting import BenchModule, is_bench_file
+    from agvbench.pytest_plugin.collection import BenchModule, is_bench_file
 
     if not is_bench_file(file_path):
         return None
-    from agvbench.pytest_plugin import active
+    from agvbench.pytest_plugin import session_hooks
 
-    if not parent.config.pluginmanager.is_registered(active):
-        parent.config.pluginmanager.register(active, "agvbench-session")
+    if not parent.config.pluginmanager.is_registered(session_hooks):
+        parent.config.pluginmanager.register(session_hooks, "agvbench-session")
     return cast(pytest.Collector, BenchModule.from_parent(parent, path=file_path))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from agvbench.errors import AgvbenchError
-from agvbench.pytest_plugin.collecting import chosen, experiment, is_bench, phase, plan_of, repeat, run_name
+from agvbench.pytest_plugin.collection import chosen, experiment, is_bench, phase, plan_of, repeat, run_name
 from agvbench.pytest_plugin.options import given_options, option
 
 if TYPE_CHECKING:

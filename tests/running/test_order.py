@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from agvbench.pytest_plugin.collection import ordered
 from agvbench.running.configuration.settings import ORDERS
-from agvbench.running.order import ordered
 
 CELLS = [(t, c, r) for t in "1234" for c in ("uncalibrated", "calibrated") for r in range(1, 4)]
 

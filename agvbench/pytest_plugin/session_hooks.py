@@ -1,8 +1,8 @@
-"""What takes part in a session that has benchmarks: marks, fixtures and hooks, registered when the first is found."""
+"""Marks, fixtures and hooks of a session that has benchmarks, registered when the first is found."""
 
 from __future__ import annotations
 
-from agvbench.pytest_plugin.collecting import (
+from agvbench.pytest_plugin.collection import (
     pytest_collection_modifyitems,
     pytest_generate_tests,
     pytest_make_collect_report,
@@ -16,7 +16,7 @@ from agvbench.pytest_plugin.fixtures import (
     pytest_unconfigure,
 )
 from agvbench.pytest_plugin.options import pytest_configure
-from agvbench.pytest_plugin.telling import (
+from agvbench.pytest_plugin.session_output import (
     pytest_pyfunc_call,
     pytest_report_teststatus,
     pytest_runtest_makereport,

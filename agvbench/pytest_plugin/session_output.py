@@ -1,4 +1,4 @@
-"""What a bench session tells while it drives and when it is done."""
+"""Output of a bench session: progress while it drives, and a summary when it is done."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from agvbench.errors import AgvbenchError, FlagError, InputError, PlanError
-from agvbench.pytest_plugin.collecting import is_bench, run_name
+from agvbench.pytest_plugin.collection import is_bench, run_name
 from agvbench.pytest_plugin.fixtures import ENDS_PROGRAM, INTERRUPT, SESSION, STOPPED_IN, stop_line
 from agvbench.pytest_plugin.options import option
 

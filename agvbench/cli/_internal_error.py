@@ -1,4 +1,4 @@
-"""A mistake of agvbench itself is told in one line, too; who mends it needs the traceback, and finds it in a file."""
+"""An internal error of agvbench is one line, too; its traceback, for those who fix it, is in a file."""
 
 from __future__ import annotations
 

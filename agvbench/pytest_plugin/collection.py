@@ -1,11 +1,16 @@
-"""Find benchmarks, repeat them, and put them in order."""
+"""Collection of benchmarks: find them, repeat them, and put them in order.
+
+Blocked order, as in the thesis' fig. 2.1, confounds the condition with battery and warm-up; interleaved order
+drives every cell once before any cell twice, so that what drifts falls on all conditions alike.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import re
-from collections.abc import Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import pytest
 
@@ -129,7 +134,6 @@ def _arrange(config: pytest.Config, items: list[pytest.Item], benches: list[pyte
         unknown = [] if settings.corrected else [item for item in benches if _is_corrected(item)]
     except AgvbenchError as error:
         raise pytest.UsageError(str(error)) from None
-    from agvbench.running.order import ordered
 
     _check_names(benches)
     if option(config, "--trajectories") and not any(item.get_closest_marker(TRAJECTORIES) for item in benches):
@@ -227,3 +231,39 @@ def _condition_applies(item: pytest.Item) -> bool:
 
     conditions = load_trajectory(str(given["trajectory"])).conditions
     return not conditions or given["condition"] in conditions
+
+
+T = TypeVar("T")
+
+
+def ordered(
+    items: Sequence[T],
+    order: str,
+    *,
+    seed: int,
+    phase: Callable[[T], int],
+    repeat: Callable[[T], int],
+    name: Callable[[T], str],
+) -> list[T]:
+    """Return `items` in the order ``"interleaved"``, ``"blocked"`` or ``"shuffled"``, phase by phase.
+
+    Examples
+    --------
+    >>> cells = [("a", 1), ("a", 2), ("b", 1), ("b", 2)]
+    >>> def drive_in(order):
+    ...     return ordered(cells, order, seed=1, phase=lambda c: 0, repeat=lambda c: c[1], name=str)
+    >>> drive_in("interleaved")
+    [('a', 1), ('b', 1), ('a', 2), ('b', 2)]
+    >>> drive_in("blocked") == cells
+    True
+    """
+    if order == "interleaved":
+        return sorted(items, key=lambda item: (phase(item), repeat(item)))
+    if order == "shuffled":
+        return sorted(items, key=lambda item: (phase(item), _digest(seed, name(item))))
+    return sorted(items, key=phase)
+
+
+def _digest(seed: int, name: str) -> bytes:
+    """Return a place in the shuffle that hangs on the item's own name, not on what else is driven."""
+    return hashlib.sha256(f"{seed}:{name}".encode()).digest()
