@@ -1,7 +1,7 @@
 """What the vehicle model lacks: residual, candidate effects, verdict."""
 
-from agvbench.diagnosis.dependences import Dependence
 from agvbench.diagnosis.diagnose import diagnose
+from agvbench.diagnosis.residuals.covariate_test import Dependence
 from agvbench.diagnosis.result import Diagnosis, Estimate, HeldOut, NamedEffect, Verdict
 
 __all__ = ["Dependence", "Diagnosis", "Estimate", "HeldOut", "NamedEffect", "Verdict", "diagnose"]

@@ -4,26 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 
-from agvbench.diagnosis.asked import Asked
-from agvbench.diagnosis.batch import Batch
-from agvbench.diagnosis.candidates import bounds_of
-from agvbench.diagnosis.dependences import ALPHA, LIKELY, RANDOM_PHASE, Dependence, dependences
-from agvbench.diagnosis.estimates import named_effects
-from agvbench.diagnosis.explained import Explained, described, with_term_first
-from agvbench.diagnosis.grouping import Split
-from agvbench.diagnosis.map_effects import map_effects
-from agvbench.diagnosis.next_experiment_propose import with_next_experiment
-from agvbench.diagnosis.prediction import Predictor
-from agvbench.diagnosis.reading import Readings
-from agvbench.diagnosis.residual_rates import residual_rates
-from agvbench.diagnosis.residual_spread import end_spread
-from agvbench.diagnosis.residual_table import with_residuals
-from agvbench.diagnosis.residuals import MEDIAN
+from agvbench.diagnosis.context import Asked
+from agvbench.diagnosis.data.readings import Readings
+from agvbench.diagnosis.data.splits import Split
+from agvbench.diagnosis.design.propose import with_next_experiment
+from agvbench.diagnosis.findings.corrected_vehicle import corrected_vehicle
+from agvbench.diagnosis.findings.estimates import named_effects
+from agvbench.diagnosis.findings.map_structure import map_effects
+from agvbench.diagnosis.findings.residual_table import with_residuals
+from agvbench.diagnosis.model.batch import Batch
+from agvbench.diagnosis.model.predictor import Predictor
+from agvbench.diagnosis.residuals.body_rates import residual_rates
+from agvbench.diagnosis.residuals.covariate_test import ALPHA, LIKELY, RANDOM_PHASE, Dependence, dependences
+from agvbench.diagnosis.residuals.periodic import swing
+from agvbench.diagnosis.residuals.residuals import MEDIAN, end_spread
 from agvbench.diagnosis.result import Diagnosis, HeldOut, NamedEffect, Verdict
-from agvbench.diagnosis.selection import Selection
-from agvbench.diagnosis.set_aside import Judged, judge, predicts
-from agvbench.diagnosis.swing import swing
-from agvbench.diagnosis.vehicle import corrected_vehicle
+from agvbench.diagnosis.selection.candidates import bounds_of
+from agvbench.diagnosis.selection.stepwise import Selection
+from agvbench.diagnosis.selection.validation import Judged, judge, predicts
+from agvbench.diagnosis.selection.with_term import Explained, described, with_term_first
 from agvbench.effects.forms import effect_forms
 from agvbench.model import VehicleModel
 from agvbench.types import Floats

@@ -8,28 +8,26 @@ import numpy as np
 
 from agvbench.calibration import RunMeasurement, measure_run
 from agvbench.calibration.campaign_protocol import CampaignLike
-from agvbench.diagnosis.ability import cannot_tell
-from agvbench.diagnosis.asked import Asked
-from agvbench.diagnosis.batch import Batch
-from agvbench.diagnosis.candidates import given_effects
+from agvbench.diagnosis.checks.consistency import refuse_contradictions, refuse_units
+from agvbench.diagnosis.checks.sufficiency import cannot_tell
 from agvbench.diagnosis.conclusion import conclude
-from agvbench.diagnosis.contradictions import refuse_contradictions
-from agvbench.diagnosis.empirical import explain_and_resettle, instead
-from agvbench.diagnosis.explained import Explained
-from agvbench.diagnosis.fitted_models import Tell
-from agvbench.diagnosis.forms import reform_and_resettle, tried_beside
-from agvbench.diagnosis.grouping import split_runs
-from agvbench.diagnosis.levels import ROLES, FreeMaps, free_maps, start_values
-from agvbench.diagnosis.plausibility import refuse_units
-from agvbench.diagnosis.reading import Readings, read_runs
+from agvbench.diagnosis.context import Asked
+from agvbench.diagnosis.data.readings import Readings, read_runs
+from agvbench.diagnosis.data.splits import split_runs
+from agvbench.diagnosis.data.windows import horizon_of
+from agvbench.diagnosis.discrepancy.stepwise import explain_and_resettle, instead
+from agvbench.diagnosis.free_driving.diagnose import diagnose_windows
+from agvbench.diagnosis.model.batch import Batch
+from agvbench.diagnosis.model.nodal_maps import ROLES, FreeMaps, free_maps, start_values
 from agvbench.diagnosis.result import Diagnosis
-from agvbench.diagnosis.selection import Selection, Selector
-from agvbench.diagnosis.set_aside import contradicts
-from agvbench.diagnosis.standing import resettle, settle
-from agvbench.diagnosis.thinning import MOST_RUNS, measured_in_all, some_repeats
-from agvbench.diagnosis.veto import withdrawn
-from agvbench.diagnosis.windows import horizon_of
-from agvbench.diagnosis.windows_diagnose import diagnose_windows
+from agvbench.diagnosis.selection.candidates import given_effects
+from agvbench.diagnosis.selection.fitted_models import Tell
+from agvbench.diagnosis.selection.initial_steering import resettle, settle
+from agvbench.diagnosis.selection.stepwise import Selection, Selector
+from agvbench.diagnosis.selection.subsampling import MOST_RUNS, measured_in_all, some_repeats
+from agvbench.diagnosis.selection.validation import contradicts, withdrawn
+from agvbench.diagnosis.selection.variants import reform_and_resettle, tried_beside
+from agvbench.diagnosis.selection.with_term import Explained
 from agvbench.errors import FitError
 from agvbench.model import VehicleModel, nominal_model
 from agvbench.types import Floats, Run

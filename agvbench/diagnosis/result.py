@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
-from agvbench.diagnosis.dependences import Dependence
-from agvbench.diagnosis.next_experiment_result import NextExperiment
+from agvbench.diagnosis.proposal import NextExperiment
+from agvbench.diagnosis.residuals.covariate_test import Dependence
 from agvbench.model import VehicleModel
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ class Diagnosis:
     matters; ``held_out`` (None if nothing could be predicted); ``model`` with refitted maps and the effects found;
     ``rejected`` the gain of each effect that did not earn its place; ``provenance``; ``next_experiment``: the run that
     would tell rivals apart or pin what the data leave open, None where there is none; ``residuals`` as
-    `agvbench.diagnosis.residual_table` returns them, for pictures.
+    `agvbench.diagnosis.findings.residual_table` returns them, for pictures.
     """
 
     verdict: Verdict

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from agvbench.campaign import Campaign
 from agvbench.diagnosis import Diagnosis, diagnose
-from agvbench.diagnosis.next_experiment_propose import with_first_experiment
+from agvbench.diagnosis.design.propose import with_first_experiment
 from agvbench.errors import FlagError
 from agvbench.model import VehicleModel
 from agvbench.workflows.diagnosis_files import keep

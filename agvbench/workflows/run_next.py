@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from agvbench.campaign import Campaign, CampaignWriter
-from agvbench.diagnosis.grouping import split_runs
-from agvbench.diagnosis.next_experiment_result import NextExperiment
-from agvbench.diagnosis.reading import read_runs
+from agvbench.diagnosis.data.readings import read_runs
+from agvbench.diagnosis.data.splits import split_runs
+from agvbench.diagnosis.proposal import NextExperiment
 from agvbench.errors import FileError, PlanError
 from agvbench.model import VehicleModel
 from agvbench.planning import plan

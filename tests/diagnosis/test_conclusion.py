@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from agvbench.diagnosis.conclusion import _held_out, _verdict
-from agvbench.diagnosis.dependences import RANDOM_PHASE, Dependence
-from agvbench.diagnosis.residuals import MEDIAN, QUANTITIES, Misses
+from agvbench.diagnosis.free_driving.conclusion import AT_THE_FLOOR, FAR_ABOVE, _above
+from agvbench.diagnosis.free_driving.conclusion import _verdict as verdict_of_windows
+from agvbench.diagnosis.residuals.covariate_test import RANDOM_PHASE, Dependence
+from agvbench.diagnosis.residuals.residuals import MEDIAN, QUANTITIES, Misses
 from agvbench.diagnosis.result import HeldOut, NamedEffect, Verdict
-from agvbench.diagnosis.set_aside import Judged
-from agvbench.diagnosis.windows_conclusion import AT_THE_FLOOR, FAR_ABOVE, _above
-from agvbench.diagnosis.windows_conclusion import _verdict as verdict_of_windows
+from agvbench.diagnosis.selection.validation import Judged
 
 FLOOR = dict.fromkeys((*QUANTITIES, MEDIAN), 2.0)  # mm, degrees
 PATCH = Dependence("x_m", "speed", 1e-6, 0.3)

@@ -66,7 +66,7 @@ def test_no_campaign_is_one_line(tmp_path, capsys):
 
 
 def test_runs_that_were_hardly_seen_are_left_out_and_counted(tiny_campaign):
-    from agvbench.diagnosis.reading import read_runs
+    from agvbench.diagnosis.data.readings import read_runs
 
     runs = tiny_campaign(Tiny()).runs[:3]
     blind = dataclasses.replace(runs[0], frames=runs[0].frames.select(np.arange(5)))

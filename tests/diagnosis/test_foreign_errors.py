@@ -122,7 +122,7 @@ def test_what_was_never_told_cannot_be_told(tiny_campaign, change, why):
 
 
 def test_a_table_in_any_order_is_read_alike(tiny_campaign):
-    from agvbench.diagnosis.reading import read_runs
+    from agvbench.diagnosis.data.readings import read_runs
 
     runs = tiny_campaign(Tiny()).runs[:4]
     rng = np.random.default_rng(0)

@@ -7,7 +7,7 @@ import pytest
 from tiny_vehicle import FRONT_M, NEUTRAL, REAR_M, Tiny
 
 from agvbench.diagnosis import Verdict, diagnose
-from agvbench.diagnosis.map_shapes import RefittedMap, dead_band, end_stops
+from agvbench.diagnosis.findings.map_shapes import RefittedMap, dead_band, end_stops
 from agvbench.model import VehicleModel
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import DeadBandWithSaturation, Line, LineWithEndStops

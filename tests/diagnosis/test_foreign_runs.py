@@ -8,10 +8,10 @@ from tiny_vehicle import HEADER, InMemory, Tiny, campaign_runs
 
 from agvbench.campaign import Campaign
 from agvbench.diagnosis import diagnose
-from agvbench.diagnosis.grouping import at_common_levels
-from agvbench.diagnosis.reading import read_runs
-from agvbench.diagnosis.resting import between_rows, rests
-from agvbench.diagnosis.windows import horizon_of
+from agvbench.diagnosis.data.initial_pose import between_rows, rests
+from agvbench.diagnosis.data.readings import read_runs
+from agvbench.diagnosis.data.splits import at_common_levels
+from agvbench.diagnosis.data.windows import horizon_of
 
 
 def late(run, seconds):

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tiny_vehicle import NEUTRAL, experiments
 
-from agvbench.diagnosis.grouping import HELD_OUT_SHARE, folds, group_runs, split_runs
+from agvbench.diagnosis.data.splits import HELD_OUT_SHARE, folds, group_runs, split_runs
 from agvbench.errors import FitError
 from agvbench.types import NO_TARGET, Commands, Frames, Run
 

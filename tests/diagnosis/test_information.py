@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agvbench.diagnosis.information import Information
+from agvbench.diagnosis.estimation.likelihood import Information
 
 
 @st.composite

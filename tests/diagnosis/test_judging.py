@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from whole_information import every_parameter
 
-from agvbench.diagnosis.judging import cross_validated
+from agvbench.diagnosis.estimation.cross_validation import cross_validated
 
 NO_BOUNDS = np.empty((0, 2))
 

@@ -8,11 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tiny_vehicle import FRONT_M, NEUTRAL, REAR_M, Tiny, campaign_runs
 
-from agvbench.diagnosis.batch import Batch
-from agvbench.diagnosis.lanes import Gathering
-from agvbench.diagnosis.levels import free_maps
-from agvbench.diagnosis.prediction import Predictor
-from agvbench.diagnosis.reading import read_runs
+from agvbench.diagnosis.data.readings import read_runs
+from agvbench.diagnosis.model.batch import Batch, Gathering
+from agvbench.diagnosis.model.nodal_maps import free_maps
+from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.vehicle.geometry import Geometry
 
 

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from agvbench.diagnosis.likelihood import objective, residual_of
-from agvbench.diagnosis.scatter import first_scatter
+from agvbench.diagnosis.estimation.likelihood import objective, residual_of
+from agvbench.diagnosis.estimation.variance import first_scatter
 
 RUNS, SAMPLES = 3, 5
 

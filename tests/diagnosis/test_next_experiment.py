@@ -9,13 +9,12 @@ import pytest
 from tiny_vehicle import HEADER, Tiny, drive
 
 from agvbench.diagnosis import conclusion, diagnose
-from agvbench.diagnosis.candidates import candidates
-from agvbench.diagnosis.next_experiment import pin, separate
-from agvbench.diagnosis.next_experiment_designs import Design, designs, levels_of, mutated
-from agvbench.diagnosis.next_experiment_needs import what_it_takes
-from agvbench.diagnosis.next_experiment_pins import unpinned
-from agvbench.diagnosis.next_experiment_rivals import swapped
-from agvbench.diagnosis.next_experiment_score import imagined, like
+from agvbench.diagnosis.design.alternatives import swapped
+from agvbench.diagnosis.design.criteria import imagined, like
+from agvbench.diagnosis.design.designs import Design, designs, levels_of, mutated
+from agvbench.diagnosis.design.identifiability import unpinned
+from agvbench.diagnosis.design.next_experiment import pin, separate, what_it_takes
+from agvbench.diagnosis.selection.candidates import candidates
 from agvbench.model import nominal_model
 from agvbench.planning import Workspace, plan, trajectory_from_table
 from agvbench.types import Pose

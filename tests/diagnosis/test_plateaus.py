@@ -10,12 +10,12 @@ from tiny_vehicle import FRONT_M, NEUTRAL, REAR_M, InMemory, Tiny, campaign_runs
 
 from agvbench.calibration import measure_run
 from agvbench.diagnosis import Verdict, diagnose
-from agvbench.diagnosis.batch import Batch
-from agvbench.diagnosis.candidates import bounds_of, candidates
-from agvbench.diagnosis.fitting import fit
-from agvbench.diagnosis.levels import ROLES, FreeMaps, free_maps, start_values
-from agvbench.diagnosis.reading import read_runs
-from agvbench.diagnosis.selection import Selector
+from agvbench.diagnosis.data.readings import read_runs
+from agvbench.diagnosis.estimation.fit import fit
+from agvbench.diagnosis.model.batch import Batch
+from agvbench.diagnosis.model.nodal_maps import ROLES, FreeMaps, free_maps, start_values
+from agvbench.diagnosis.selection.candidates import bounds_of, candidates
+from agvbench.diagnosis.selection.stepwise import Selector
 from agvbench.effects import SteeringLag
 from agvbench.effects.steering_backlash import SteeringBacklash
 from agvbench.types import Pose

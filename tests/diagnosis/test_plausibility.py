@@ -10,7 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from tiny_vehicle import HEADER, NEUTRAL, Tiny, drive, held
 
-from agvbench.diagnosis.plausibility import _tracks, refuse_units
+from agvbench.diagnosis.checks.consistency import _tracks, refuse_units
 from agvbench.errors import CampaignError
 from agvbench.types import NO_TARGET, Frames, Pose, Run
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from tiny_vehicle import Tiny, campaign_runs
 
-from agvbench.diagnosis.reading import read_runs
-from agvbench.diagnosis.residual_table import residual_table
+from agvbench.diagnosis.data.readings import read_runs
+from agvbench.diagnosis.findings.residual_table import residual_table
 
 
 def test_a_prediction_that_is_short_by_five_per_cent_misses_five_per_cent():

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from agvbench.diagnosis.residual_spread import EndSpread
-from agvbench.diagnosis.residuals import Misses, floor, lack_of_fit
+from agvbench.diagnosis.residuals.residuals import EndSpread, Misses, floor, lack_of_fit
 
 GROUP = np.repeat(np.arange(40), 4)
 

@@ -9,18 +9,19 @@ import pytest
 from tiny_vehicle import FRONT_M, HEADER, NEUTRAL, REAR_M, Tiny
 
 from agvbench.calibration import measure_run
-from agvbench.diagnosis import empirical, forms
-from agvbench.diagnosis.batch import Batch
-from agvbench.diagnosis.candidates import bounds_of, candidates, usual
-from agvbench.diagnosis.explained import Explained
-from agvbench.diagnosis.fitted_models import Scored
-from agvbench.diagnosis.fitting import fit
-from agvbench.diagnosis.forms import stood_elsewhere, wider
-from agvbench.diagnosis.levels import ROLES, free_maps, start_values
-from agvbench.diagnosis.prediction import Predictor
-from agvbench.diagnosis.reading import read_runs
-from agvbench.diagnosis.selection import Selection, Selector
-from agvbench.diagnosis.standing import otherwise
+from agvbench.diagnosis.data.readings import read_runs
+from agvbench.diagnosis.discrepancy import stepwise as empirical
+from agvbench.diagnosis.estimation.fit import fit
+from agvbench.diagnosis.model.batch import Batch
+from agvbench.diagnosis.model.nodal_maps import ROLES, free_maps, start_values
+from agvbench.diagnosis.model.predictor import Predictor
+from agvbench.diagnosis.selection import variants as forms
+from agvbench.diagnosis.selection.candidates import bounds_of, candidates, usual
+from agvbench.diagnosis.selection.fitted_models import Scored
+from agvbench.diagnosis.selection.initial_steering import otherwise
+from agvbench.diagnosis.selection.stepwise import Selection, Selector
+from agvbench.diagnosis.selection.variants import stood_elsewhere, wider
+from agvbench.diagnosis.selection.with_term import Explained
 from agvbench.diagnosis.terms import SpeedInDisc
 from agvbench.vehicle.geometry import Geometry
 
@@ -67,7 +68,7 @@ def test_what_is_left_of_a_model_is_not_what_once_ended_elsewhere(selector):
 
 
 def test_a_rival_is_judged_by_a_fit_that_went_as_far(selector, monkeypatch):
-    monkeypatch.setattr("agvbench.diagnosis.selection._NEARLY_RIVAL", np.inf)
+    monkeypatch.setattr("agvbench.diagnosis.selection.stepwise._NEARLY_RIVAL", np.inf)
     lag = selector.grown(selector.base(), "steering_lag")
     begun = fit(Predictor(selector.batch, lag.names), np.r_[selector.start, 0.1], NO_LIMIT, iterations=1)
     early = Scored(lag.names, begun, begun.loss)

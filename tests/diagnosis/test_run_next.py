@@ -9,8 +9,8 @@ from tiny_vehicle import HEADER, Tiny, campaign_runs
 
 from agvbench.campaign import Campaign, CampaignWriter
 from agvbench.cli import main
-from agvbench.diagnosis.grouping import split_runs
-from agvbench.diagnosis.reading import read_runs
+from agvbench.diagnosis.data.readings import read_runs
+from agvbench.diagnosis.data.splits import split_runs
 from agvbench.planning import load_trajectory
 from agvbench.running.configuration.settings import BenchSettings
 from agvbench.workflows.run_next import _options

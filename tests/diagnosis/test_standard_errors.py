@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from whole_information import every_parameter
 
-from agvbench.diagnosis.standard_errors import standard_errors
+from agvbench.diagnosis.estimation.standard_errors import standard_errors
 
 GROUPS, REPEATS = 30, 5
 GROUP = np.repeat(np.arange(GROUPS), REPEATS)

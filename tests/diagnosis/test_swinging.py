@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from tiny_vehicle import NEUTRAL, InMemory, Tiny, campaign_runs, drive
 
 from agvbench.diagnosis import Verdict, diagnose
-from agvbench.diagnosis.fitted_models import Scored
-from agvbench.diagnosis.levels import chosen_levels, free_maps
+from agvbench.diagnosis.model.nodal_maps import chosen_levels, free_maps
+from agvbench.diagnosis.selection.fitted_models import Scored
 from agvbench.types import NO_TARGET, Commands, Pose, Run
 
 MOST = 40

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from tiny_vehicle import Tiny
 
 from agvbench.diagnosis import Verdict, diagnose
-from agvbench.diagnosis.thinning import some_repeats
+from agvbench.diagnosis.selection.subsampling import some_repeats
 
 GROUPS = st.lists(st.integers(0, 12), min_size=1, max_size=200).map(np.array)
 

@@ -10,14 +10,14 @@ import pytest
 from tiny_vehicle import FRONT_M, REAR_M, Tiny, campaign_runs
 
 from agvbench.diagnosis import Verdict, diagnose, terms
-from agvbench.diagnosis.contradictions import refuse_contradictions
-from agvbench.diagnosis.dependences import ALPHA, LIKELY, RANDOM_PHASE, dependences
-from agvbench.diagnosis.empirical_regression import Steering
-from agvbench.diagnosis.empirical_screen import Start, screen
-from agvbench.diagnosis.explained import gain_p_value
-from agvbench.diagnosis.reading import read_runs
-from agvbench.diagnosis.residual_rates import Rates
-from agvbench.diagnosis.swing import swing
+from agvbench.diagnosis.checks.consistency import refuse_contradictions
+from agvbench.diagnosis.data.readings import read_runs
+from agvbench.diagnosis.discrepancy.regression import Steering
+from agvbench.diagnosis.discrepancy.screening import Start, screen
+from agvbench.diagnosis.residuals.body_rates import Rates
+from agvbench.diagnosis.residuals.covariate_test import ALPHA, LIKELY, RANDOM_PHASE, dependences
+from agvbench.diagnosis.residuals.periodic import swing
+from agvbench.diagnosis.selection.with_term import gain_p_value
 from agvbench.errors import CampaignError
 from agvbench.vehicle.geometry import Geometry
 

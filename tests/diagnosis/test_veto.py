@@ -10,17 +10,16 @@ from tiny_vehicle import FRONT_M, HEADER, NEUTRAL, REAR_M, InMemory, Tiny
 
 from agvbench.calibration import measure_run
 from agvbench.diagnosis import diagnose
-from agvbench.diagnosis.batch import Batch
-from agvbench.diagnosis.candidates import candidates
-from agvbench.diagnosis.empirical import instead
-from agvbench.diagnosis.explained import Explained
-from agvbench.diagnosis.grouping import split_runs
-from agvbench.diagnosis.levels import ROLES, free_maps, start_values
-from agvbench.diagnosis.reading import read_runs
-from agvbench.diagnosis.selection import Selection, Selector
-from agvbench.diagnosis.set_aside import contradicts
+from agvbench.diagnosis.data.readings import read_runs
+from agvbench.diagnosis.data.splits import split_runs
+from agvbench.diagnosis.discrepancy.stepwise import instead
+from agvbench.diagnosis.model.batch import Batch
+from agvbench.diagnosis.model.nodal_maps import ROLES, free_maps, start_values
+from agvbench.diagnosis.selection.candidates import candidates
+from agvbench.diagnosis.selection.stepwise import Selection, Selector
+from agvbench.diagnosis.selection.validation import contradicts, withdrawn
+from agvbench.diagnosis.selection.with_term import Explained
 from agvbench.diagnosis.terms.speed import SpeedInDisc
-from agvbench.diagnosis.veto import withdrawn
 from agvbench.vehicle.geometry import Geometry
 
 

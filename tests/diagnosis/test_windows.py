@@ -12,14 +12,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tiny_vehicle import HEADER, NEUTRAL, Tiny, campaign_runs
 
-from agvbench.diagnosis.batch import Batch
-from agvbench.diagnosis.prediction import Predictor
-from agvbench.diagnosis.reading import Readings, read_windows
-from agvbench.diagnosis.windows import Horizon, Window, cut_windows, horizon_of
-from agvbench.diagnosis.windows_errors import by_recording, floor_squares, interval, squares
-from agvbench.diagnosis.windows_maps import smooth_maps, start_values_of_windows
-from agvbench.diagnosis.windows_predictors import naive
-from agvbench.diagnosis.windows_split import held_out_windows, thinned
+from agvbench.diagnosis.data.readings import Readings, read_windows
+from agvbench.diagnosis.data.window_splits import held_out_windows, thinned
+from agvbench.diagnosis.data.windows import Horizon, Window, cut_windows, horizon_of
+from agvbench.diagnosis.free_driving.errors import by_recording, floor_squares, interval, squares
+from agvbench.diagnosis.free_driving.maps import smooth_maps, start_values_of_windows
+from agvbench.diagnosis.free_driving.predictors import naive
+from agvbench.diagnosis.model.batch import Batch
+from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.types import NO_TARGET, Commands, Frames, Run
 from agvbench.vehicle.geometry import Geometry
 

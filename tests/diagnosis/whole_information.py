@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from agvbench.diagnosis.information import Information
+from agvbench.diagnosis.estimation.likelihood import Information
 
 
 def every_parameter(forms):

@@ -1,0 +1,1 @@
+"""Whether a campaign suffices for a diagnosis, and whether its tables are consistent."""

@@ -1,0 +1,198 @@
+"""Consistency of a campaign: units, clocks and mirrored floors, and repeats that contradict one another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.calibration.campaign_protocol import HeaderLike
+from agvbench.diagnosis.data.readings import BACK_IN_TIME, Readings
+from agvbench.diagnosis.residuals.residuals import misses
+from agvbench.errors import CampaignError
+from agvbench.types import Floats, Run
+
+_RATE_FACTOR = 30.0
+_MOST_BACK = 0.25
+_EVERY_S = 0.3
+_LEAST_TURN_RAD, _FEWEST_STEPS, _FEWEST_TURNING = 0.15, 5, 5
+_SAME_TURN = (0.5, 2.0)
+
+
+def refuse_clocks(refused: Mapping[str, str], runs: int, *, where: str) -> None:
+    """Raise an error if in many of so many `runs` time goes back; `refused` tells by run why it cannot be used.
+
+    Raises
+    ------
+    CampaignError
+        If in more than a quarter.
+    """
+    back = [run_id for run_id, why in refused.items() if why.startswith(BACK_IN_TIME)]
+    if len(back) > _MOST_BACK * runs:
+        raise CampaignError(
+            BACK_IN_TIME,
+            where=f"{where}: poses",
+            value=f"in {len(back)} of {runs} runs, as in {back[0]}",
+            limit="a quarter of the runs",
+            remedy="give the poses of a run one clock",
+        )
+
+
+def refuse_units(runs: Sequence[Run], header: HeaderLike) -> None:
+    """Raise an error if times are not in seconds, or headings do not turn as the path does.
+
+    Metres and radians are checked when a campaign is opened (`agvbench.campaign.tables.motion_checks`). What is asked
+    here needs no model either: how often the camera looks, and that a vehicle on an arc turns by as much as its path.
+
+    Raises
+    ------
+    CampaignError
+        If so, naming the column.
+    """
+    where = f"campaign {header.name}: poses"
+    times = [np.unique(run.frames.t_s) for run in runs if run.is_ok]  # doubled frames come at once
+    steps_s = [np.median(np.diff(each)) for each in times if len(each) > 1]
+    if not steps_s:
+        return
+    step_s = max(float(np.median(steps_s)), 1e-9)
+    rate_hz = header.mocap_rate_hz
+    if not 1.0 / _RATE_FACTOR < step_s * rate_hz < _RATE_FACTOR:
+        raise CampaignError(
+            "t_s is not in seconds",
+            where=where,
+            value=f"a frame every {step_s:.3g}",
+            limit=f"about 1/{rate_hz:g} s, as mocap.rate_hz says",
+            remedy="convert t_s to seconds, or correct mocap.rate_hz",
+        )
+    ratio = _turn_ratio(list(_tracks(runs)))
+    if ratio is None or _SAME_TURN[0] < ratio < _SAME_TURN[1]:
+        return
+    value = f"the heading turns {ratio:.3g} times as far as the path"
+    if -_SAME_TURN[1] < ratio < -_SAME_TURN[0]:
+        what, remedy = "heading_rad and the floor are mirrored", "count headings counter-clockwise from x towards y"
+    else:
+        what, remedy = "heading_rad does not belong to x_m and y_m", "see that all three are of one body"
+    raise CampaignError(what, where=where, value=value, limit="once", remedy=remedy)
+
+
+def _tracks(runs: Sequence[Run]) -> Iterator[tuple[Floats, Floats]]:
+    """Yield times (n,) and poses (n, 3), with a continuous heading, of each run, a frame every 0.3 s."""
+    for run in runs:
+        f = run.frames
+        seen = f.tracked.astype(np.bool_) & np.isfinite(f.t_s + f.x_m + f.y_m + f.heading_rad)
+        order = np.flatnonzero(seen)[np.unique(f.t_s[seen], return_index=True)[1]]
+        if not run.is_ok or len(order) < 2:
+            continue
+        t_s = f.t_s[order]
+        poses = np.column_stack([f.x_m[order], f.y_m[order], np.unwrap(f.heading_rad[order])])
+        # Rounding may put the last moment past the last frame.
+        chosen = np.unique(np.searchsorted(t_s[:-1], np.arange(t_s[0], t_s[-1], _EVERY_S)))
+        yield t_s[chosen], poses[chosen]
+
+
+def _turn_ratio(tracks: list[tuple[Floats, Floats]]) -> float | None:
+    """Return how far headings turn while the direction of motion turns once, in the median of runs that turn."""
+    ratios = []
+    for _, poses in tracks:
+        step = np.diff(poses[:, :2], axis=0)
+        length = np.hypot(step[:, 0], step[:, 1])
+        moves = length > 0.3 * np.max(length, initial=0.0)
+        # Modulo half a turn: a vehicle that reverses goes the other way along the same line.
+        course = np.unwrap(np.arctan2(step[moves, 1], step[moves, 0]), period=np.pi)
+        heading = (0.5 * (poses[1:, 2] + poses[:-1, 2]))[moves]
+        if len(course) >= _FEWEST_STEPS and np.std(course) > _LEAST_TURN_RAD:
+            ratios.append(float(np.polyfit(course, heading, 1)[0]))
+    return float(np.median(ratios)) if len(ratios) >= _FEWEST_TURNING else None
+
+
+_FAR_SHARE, _FAR_M = 0.3, 0.15
+_AS_LONG = 0.05
+_MOST_GROUPS = 0.25
+_LEAST_WAY_M, _LEAST_SHARE, _FEWEST_PAIRS = 0.3, 0.15, 6
+_GAP, _FAR_APART, _TIMES_AS_FAR = 1.5, 0.02, 6.0
+
+
+def refuse_contradictions(readings: Readings, *, where: str) -> None:
+    """Raise an error if repeats of many commands went to different places, as seen from where they began.
+
+    One run that went wrong is an outlier. When in a quarter of all repeated commands the typical run is off by a third
+    of the way, frames and commands do not belong together, or there was more than one vehicle: no model describes that.
+
+    Raises
+    ------
+    CampaignError
+        If that is so.
+    """
+    stood = np.broadcast_to(readings.start[:, None], readings.poses.shape)
+    path = misses(readings, np.asarray(stood)).path[..., :2]
+    far, repeated, example = 0, 0, ""
+    for g in np.unique(readings.group):
+        own = np.flatnonzero(readings.group == g)
+        own = own[_as_long(readings, own, int(own[0]))]
+        both = readings.seen[own].all(axis=0)
+        if len(own) < 2 or not both.any():
+            continue
+        repeated += 1
+        ends = path[own][:, np.flatnonzero(both)[-1]]
+        off = float(np.mean(np.hypot(*(ends - ends.mean(axis=0)).T)))
+        way = float(np.median(np.hypot(*ends.T)))
+        if off > max(_FAR_SHARE * way, _FAR_M):
+            far += 1
+            example = example or f"{readings.runs[own[0]].run_id} and its repeats end {off:.2f} m from their mean"
+    if far <= _MOST_GROUPS * repeated:
+        _refuse_two_kinds(readings, path, where)
+    else:
+        raise CampaignError(
+            "runs with the same commands contradict each other",
+            where=where,
+            value=f"{far} of {repeated} repeated commands; {example}",
+            limit="a quarter of them",
+            remedy="see that frames belong to their runs, and that one vehicle drove them all under one calibration",
+        )
+
+
+def _as_long(readings: Readings, runs: NDArray[np.int64], others: NDArray[np.int64] | int) -> NDArray[np.bool_]:
+    """Whether runs were seen for as long as others: else their samples are of other times, and cannot be compared."""
+    return np.asarray(np.isclose(readings.t_s[runs, -1], readings.t_s[others, -1], rtol=_AS_LONG))
+
+
+def _refuse_two_kinds(readings: Readings, path: Floats, where: str) -> None:
+    """Raise an error if repeats agree closely or are off by one and the same amount, with nothing between.
+
+    Scatter, wear and places on the floor fill the gap between; two vehicles under one name, or two calibrations, do
+    not.
+    """
+    pairs = np.array(
+        [
+            (i, j)
+            for g in np.unique(readings.group)
+            for i, j in combinations(np.flatnonzero(readings.group == g).tolist(), 2)
+        ]
+    ).reshape(-1, 2)
+    seen = readings.seen[pairs[:, 0]] & readings.seen[pairs[:, 1]]
+    usable = seen.any(axis=1) & _as_long(readings, pairs[:, 0], pairs[:, 1])
+    pairs, last = pairs[usable], seen.shape[1] - 1 - np.argmax(seen[usable][:, ::-1], axis=1)
+    ends = path[pairs, last[:, None]]
+    way = np.hypot(*np.moveaxis(ends, -1, 0)).mean(axis=1)
+    apart = np.hypot(*(ends[:, 0] - ends[:, 1]).T) / np.maximum(way, 1e-9)
+    drove = way > _LEAST_WAY_M
+    apart, pairs = np.sort(apart[drove]), pairs[drove][np.argsort(apart[drove])]
+    count = len(apart)
+    few = max(_FEWEST_PAIRS, int(_LEAST_SHARE * count))
+    if count < 2 * few:
+        return
+    gaps = apart[few : count - few + 1] / np.maximum(apart[few - 1 : count - few], 1e-9)
+    at = few + int(np.argmax(gaps))
+    near, far = apart[:at], apart[at:]
+    if gaps.max() < _GAP or far[0] < _FAR_APART or np.median(far) < _TIMES_AS_FAR * np.median(near):
+        return
+    i, j = pairs[at]
+    raise CampaignError(
+        "runs with the same commands are of two kinds",
+        where=where,
+        value=f"{len(far)} of {count} pairs of repeats end {far[0]:.0%} of the way apart or more, the others at most "
+        f"{near[-1]:.0%}; {readings.runs[i].run_id} and {readings.runs[j].run_id} differ",
+        remedy="see that one vehicle drove them all under one calibration, or diagnose its runs apart",
+    )

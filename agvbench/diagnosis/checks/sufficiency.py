@@ -1,0 +1,50 @@
+"""Whether a campaign of runs from rest can tell anything at all: enough runs, repeats, motion and steering."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from agvbench.calibration.campaign_protocol import HeaderLike
+from agvbench.diagnosis.checks.consistency import refuse_clocks
+from agvbench.diagnosis.context import refuse_nothing
+from agvbench.diagnosis.data.readings import Readings
+from agvbench.errors import CampaignError
+
+FEWEST_RUNS = 20
+FEWEST_REPEATED = 3
+_LEAST_TURN_RAD = 0.05
+
+
+def cannot_tell(readings: Readings, header: HeaderLike) -> str:
+    """Return why this campaign cannot be diagnosed, or nothing.
+
+    Raises
+    ------
+    CampaignError
+        If it has too few runs, or clocks that contradict each other.
+    """
+    refuse_clocks(readings.refused, len(readings) + len(readings.refused), where=f"campaign {header.name}")
+    refuse_nothing(readings, header)
+    if len(readings) < FEWEST_RUNS:
+        raise CampaignError(
+            "too few runs to diagnose",
+            where=f"campaign {header.name}",
+            value=len(readings),
+            limit=f"at least {FEWEST_RUNS} that begin at rest",
+            remedy="drive bench_calibration.py and bench_trajectories.py first",
+        )
+    commands = [run.commands for run in readings.runs]
+    if all(np.all(c.drive == header.neutral) for c in commands):
+        return "the drive was never told anything but neutral"
+    if len({(f, r) for c in commands for f, r in zip(c.front.tolist(), c.rear.tolist(), strict=True)}) == 1:
+        return "steering was never excited: its commands are the same in all runs"
+    _, sizes = np.unique(readings.group, return_counts=True)
+    if np.count_nonzero(sizes >= 2) < FEWEST_REPEATED:
+        return f"without repeats there is no floor: at least {FEWEST_REPEATED} commands must be driven twice or more"
+    moved = np.nanmax(np.hypot(*np.moveaxis(readings.poses[..., :2] - readings.start[:, None, :2], -1, 0)), axis=1)
+    if np.count_nonzero(moved > 0.1) < FEWEST_RUNS // 2:
+        return f"the vehicle hardly moved: {np.count_nonzero(moved > 0.1)} runs went farther than 0.1 m"
+    turned = np.nanmax(np.abs(readings.poses[..., 2] - readings.start[:, None, 2]), axis=1)
+    if np.count_nonzero(turned > _LEAST_TURN_RAD) < FEWEST_REPEATED:
+        return "steering was never excited: hardly a run turns"
+    return ""

@@ -1,0 +1,54 @@
+"""What a diagnosis is asked of, and where its answer comes from."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+from agvbench.calibration.campaign_protocol import HeaderLike
+from agvbench.diagnosis.data.readings import Readings
+from agvbench.diagnosis.result import Diagnosis, Verdict
+from agvbench.errors import CampaignError
+from agvbench.model import VehicleModel
+from agvbench.vehicle.geometry import Geometry
+
+
+def provenance(header: HeaderLike, readings: Readings, seed: int, *, runs_used: int) -> dict[str, object]:
+    """Return version, campaign, seed, how many runs were used, and how many were refused for which reason."""
+    from agvbench import __version__
+
+    return {
+        "agvbench": __version__,
+        "campaign": header.name,
+        "seed": seed,
+        "runs_used": runs_used,
+        "runs_refused": dict(Counter(readings.refused.values())),
+    }
+
+
+def refuse_nothing(readings: Readings, header: HeaderLike) -> None:
+    """Raise `CampaignError` if no run can be used, with what is wrong with the first."""
+    if not len(readings):
+        first = next(iter(readings.refused.items()), ("", "there are none"))
+        raise CampaignError("no run can be used", where=f"campaign {header.name}", value=f"{first[0]}: {first[1]}")
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a diagnosis was asked of: the campaign's header, the model before if one was given, the seed."""
+
+    header: HeaderLike
+    geometry: Geometry
+    vehicle: VehicleModel | None
+    seed: int
+
+    def cannot_tell(self, readings: Readings, why: str) -> Diagnosis:
+        """Return the answer that the campaign cannot tell, and why."""
+        return Diagnosis(Verdict.NOT_IDENTIFIABLE, why, provenance=self.provenance(readings))
+
+    def provenance(self, readings: Readings) -> dict[str, object]:
+        """Return where the answer comes from."""
+        if readings.begins is None:
+            return provenance(self.header, readings, self.seed, runs_used=len(readings))
+        driven = {run.run_id.rpartition("@")[0] for run in readings.runs}
+        return provenance(self.header, readings, self.seed, runs_used=len(driven)) | {"windows_used": len(readings)}

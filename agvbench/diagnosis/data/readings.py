@@ -1,0 +1,196 @@
+"""A campaign as the diagnosis sees it: runs from rest or windows of free driving, sampled alike, in groups."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.calibration import inspect_frames
+from agvbench.campaign.campaign import session_starts
+from agvbench.diagnosis.data.initial_pose import between_rows, frame_noise, motion_of, start_of
+from agvbench.diagnosis.data.splits import at_common_levels, group_runs
+from agvbench.diagnosis.data.windows import Beginnings, Horizon, blocks, cut_windows, recording_of
+from agvbench.errors import FitError
+from agvbench.model.simulated_run import SimulatedRun
+from agvbench.types import Commands, Floats, Frames, Run
+
+SAMPLES = 24
+"""Poses per run: as many for a short run as for a long one, since a run is one piece of evidence."""
+
+BACK_IN_TIME = "frames go back in time"
+"""Why a run is refused in which frames are out of order and make no path when put in order."""
+
+_NEAR_S = 0.04
+_FEW, _MANY, _ROUGHER = 0.05, 0.25, 3.0
+_FEWEST_FRAMES = 20
+_FEWEST_SAMPLES = SAMPLES // 2
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Runs that begin at rest, or windows of free driving; R of them, K samples each.
+
+    ``t_s`` (R, K) and ``poses`` (R, K, 3) [m, m, rad], of single frames, with the heading continuous from the
+    start pose; NaN where none was kept. ``start`` (R, 3) with ``start_stderr`` (R, 3), from the frames at
+    rest; ``started_h`` (R,) [h] since the run's session began; ``group`` (R,): runs told the same
+    have the same number, and so have windows of one stretch. ``refused`` tells for each run that cannot be used why,
+    by its id. ``begins`` says when and how fast windows begin; None for runs from rest. ``stood``: whether the
+    axles had settled at each run's first steering command before it was given; else they stood at neutral.
+    """
+
+    runs: tuple[Run, ...]
+    t_s: Floats
+    poses: Floats
+    start: Floats
+    start_stderr: Floats
+    started_h: Floats
+    group: NDArray[np.int64]
+    refused: dict[str, str]
+    begins: Beginnings | None = None
+    stood: bool = False
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Which samples there are, (R, K)."""
+        return np.isfinite(self.poses[:, :, 0])
+
+    def select(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> Readings:
+        """Return the runs that a mask or an index array chooses."""
+        chosen = np.arange(len(self))[index]
+        return Readings(
+            tuple(self.runs[i] for i in chosen),
+            self.t_s[chosen],
+            self.poses[chosen],
+            self.start[chosen],
+            self.start_stderr[chosen],
+            self.started_h[chosen],
+            self.group[chosen],
+            self.refused,
+            None if self.begins is None else self.begins.select(chosen),
+            self.stood,
+        )
+
+    def simulated(self) -> list[SimulatedRun]:
+        """Return the runs as they are simulated, at the samples' times."""
+        begins = [None] * len(self) if self.begins is None else self.begins.t_s.tolist()
+        return [
+            SimulatedRun(run.commands, t, float(h), b, self._stood(run.commands))
+            for run, t, h, b in zip(self.runs, self.t_s, self.started_h, begins, strict=True)
+        ]
+
+    def _stood(self, commands: Commands) -> tuple[float, float] | None:
+        return (float(commands.front[0]), float(commands.rear[0])) if self.stood else None
+
+    @property
+    def begins_s(self) -> Floats:
+        """When prediction begins, on each run's clock (R,)."""
+        return np.zeros(len(self)) if self.begins is None else self.begins.t_s
+
+
+def read_runs(runs: Iterable[Run], neutral: float | None = None) -> Readings:
+    """Clean, sample and group the runs that count; a run that cannot be used is named in ``refused``.
+
+    Where `neutral` is given, a vehicle is taken to rest while its drive is there, for runs not seen before they began.
+    """
+    every = [between_rows(run) for run in at_common_levels(list(runs))]
+    began = session_starts(every)
+    kept: list[Run] = []
+    rows: list[tuple[Floats, Floats, Floats, Floats]] = []
+    refused: dict[str, str] = {}
+    for run in every:
+        try:
+            rows.append(_read(run, neutral))
+        except FitError as error:
+            refused[run.run_id] = str(error).removeprefix(f"{run.run_id}: ")
+        else:
+            kept.append(run)
+    started_h = np.array([(run.started_s - began[run.session]) / 3600.0 for run in kept])
+    t_s, poses, start, stderr = (np.array([row[i] for row in rows]) for i in range(4))
+    return Readings(tuple(kept), t_s, poses, start, stderr, started_h, group_runs(kept), refused)
+
+
+def read_windows(runs: Iterable[Run], horizon: Horizon, neutral: float) -> Readings:
+    """Cut runs into windows; a run that has none is named in ``refused``."""
+    every = list(at_common_levels(list(runs)))
+    began = session_starts(every)
+    refused: dict[str, str] = {}
+    windows = []
+    for run in every:
+        own = list(cut_windows(run, horizon, neutral)) if run.is_ok else []
+        if not own:
+            refused[run.run_id] = "no window in motion" if run.is_ok else run.status
+        windows += own
+    begins = Beginnings(
+        np.array([w.t0_s for w in windows]),
+        np.array([w.speed_mps for w in windows]),
+        np.array([w.speed_stderr for w in windows]),
+        np.array([w.lately_mps for w in windows]),
+        np.array([w.naive for w in windows]).reshape(-1, 3),
+        np.array([w.noise for w in windows]).reshape(-1, 2),
+        np.array([recording_of(w.run) for w in windows], dtype=np.str_),
+        np.array([w.run.session or "" for w in windows], dtype=np.str_),
+    )
+    started_h = np.array([(w.run.started_s - began[w.run.session]) / 3600.0 for w in windows])
+    t_s, poses, start, stderr = (
+        np.array([getattr(w, name) for w in windows]) for name in ("t_s", "poses", "start", "start_stderr")
+    )
+    group = blocks(windows, horizon)
+    return Readings(tuple(w.run for w in windows), t_s, poses, start, stderr, started_h, group, refused, begins)
+
+
+def _read(run: Run, neutral: float | None) -> tuple[Floats, Floats, Floats, Floats]:
+    if not run.is_ok:
+        raise FitError(run.status)
+    frames = _in_order(run)
+    if len(frames) < _FEWEST_FRAMES or not len(run.commands):
+        raise FitError("too few frames", value=len(frames), limit=f"at least {_FEWEST_FRAMES}")
+    start, stderr = start_of(run, frames, neutral)
+    t_s, poses = _sampled(frames, np.linspace(0.0, float(frames.t_s[-1]), SAMPLES + 1)[1:])
+    if np.count_nonzero(np.isfinite(poses[:, 0])) < _FEWEST_SAMPLES:
+        raise FitError("too much of the run was not seen")
+    turn = np.round((_heading_near_start(frames) - start[2]) / (2.0 * np.pi)) * 2.0 * np.pi
+    poses[:, 2] -= turn
+    return t_s, poses, start, stderr
+
+
+def _in_order(run: Run) -> Frames:
+    """Return the frames that show the vehicle, also where a table lists them in another order than that of time."""
+    frames, quality = inspect_frames(run.frames)
+    out_of_order = quality.bad_time + quality.late
+    if quality.bad_time <= _FEW * quality.frames and out_of_order <= _MANY * quality.frames:
+        return frames
+    ordered, put = inspect_frames(run.frames.select(np.argsort(run.frames.t_s, kind="stable")))
+    if put.jumps + put.doubled <= _FEW * put.frames and _as_smooth(ordered, frames):
+        return ordered
+    if out_of_order + quality.jumps > _MANY * quality.frames:
+        raise FitError(BACK_IN_TIME)
+    return frames
+
+
+def _as_smooth(ordered: Frames, arrived: Frames) -> bool:
+    """Whether frames in order of time make a path like those in order of arrival, and not two paths in turn."""
+    roughness = [float(frame_noise(motion_of(frames))[0]) for frames in (ordered, arrived)]
+    return roughness[0] <= _ROUGHER * roughness[1]
+
+
+def _heading_near_start(frames: Frames) -> float:
+    return float(np.unwrap(frames.heading_rad)[max(int(np.searchsorted(frames.t_s, 0.0, side="right")) - 1, 0)])
+
+
+def _sampled(frames: Frames, t_s: Floats) -> tuple[Floats, Floats]:
+    """Return the times and poses of the frames nearest to `t_s`; a pose is NaN where none is near.
+
+    Single frames and no means: a mean rounds the corners at which a vehicle starts, stops and turns, which would
+    look like a lag.
+    """
+    nearest = np.clip(np.searchsorted(0.5 * (frames.t_s[1:] + frames.t_s[:-1]), t_s), 0, len(frames) - 1)
+    poses = np.column_stack([frames.x_m, frames.y_m, np.unwrap(frames.heading_rad)])[nearest]
+    near = np.abs(frames.t_s[nearest] - t_s) <= _NEAR_S
+    poses[~near] = np.nan
+    return np.where(near, frames.t_s[nearest], t_s), poses

@@ -1,0 +1,247 @@
+"""Windows of free driving: from where, and how fast, each prediction begins.
+
+A run that does not begin at rest, or that a campaign asks to be predicted by windows, is cut into windows of a
+`Horizon`. Pose and speed at the beginning of a window are estimated from frames up to then and never from later ones;
+commands before it set the actuators in motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.calibration import inspect_frames
+from agvbench.calibration.campaign_protocol import HeaderLike
+from agvbench.diagnosis.data.initial_pose import frame_noise, rests
+from agvbench.model.simulation_loop import LATELY_S
+from agvbench.statistics.rest_poses import SPEED_LIMIT_MPS
+from agvbench.types import Commands, Floats, Frames, Run
+
+SUPPORT_S = 0.2
+"""Pose and speed at the beginning come from parabolas through the frames of so long before it."""
+
+SAMPLES = 8
+"""Poses per window, evenly spaced; the last one at the horizon."""
+
+HISTORY_S = 2.0
+"""Commands of so long before a window set its actuators in motion."""
+
+NAIVE_S = 0.1
+"""The naive predictor keeps the speed and yaw rate of so long before the beginning."""
+
+_DEFAULT_HORIZON_S, _DEFAULT_STRIDE_S = 2.0, 1.0
+_NEAR_S = 0.04
+_LATELY_SPANS = 4.0
+_FEWEST_FRAMES = 6
+_HELD_S = 1e3
+_BLOCK_S = 10.0
+_BLOCK_HORIZONS = 4.0
+
+
+@dataclass(frozen=True)
+class Horizon:
+    """How far ahead to predict, and how far apart predictions begin [s]."""
+
+    horizon_s: float = _DEFAULT_HORIZON_S
+    stride_s: float = _DEFAULT_STRIDE_S
+
+    @property
+    def block_s(self) -> float:
+        """How long a stretch of a recording counts as one piece of evidence [s]."""
+        return max(_BLOCK_S, _BLOCK_HORIZONS * self.horizon_s)
+
+
+@dataclass(frozen=True)
+class Beginnings:
+    """The state at the beginning of W windows; arrays of shape (W,) unless said otherwise.
+
+    ``t_s`` on the run's clock; ``speed_mps`` of the markers' centroid ahead, ``speed_stderr``, and
+    lately (``lately_mps``); ``naive`` (W, 3): its
+    velocity ahead and to the left [m/s] and yaw rate [rad/s] over the last `NAIVE_S`; ``noise`` (W, 2): standard
+    deviation of one frame in position [m] and heading [rad]; ``recording`` and ``session`` by name.
+    """
+
+    t_s: Floats
+    speed_mps: Floats
+    speed_stderr: Floats
+    lately_mps: Floats
+    naive: Floats
+    noise: Floats
+    recording: NDArray[np.str_]
+    session: NDArray[np.str_]
+
+    def select(self, chosen: NDArray[np.int64]) -> Beginnings:
+        """Return the windows with these indices."""
+        return Beginnings(*(getattr(self, f.name)[chosen] for f in fields(self)))
+
+
+@dataclass(frozen=True)
+class Window:
+    """One window: a piece of a ``run`` with its state at the beginning ``t0_s``.
+
+    ``start`` (3,) with ``start_stderr`` (3,); ``t_s`` (K,) and ``poses`` (K, 3) of single frames, NaN where none was
+    near; the rest as in `Beginnings`.
+    """
+
+    run: Run
+    t0_s: float
+    start: Floats
+    start_stderr: Floats
+    t_s: Floats
+    poses: Floats
+    speed_mps: float
+    speed_stderr: float
+    lately_mps: float
+    naive: Floats
+    noise: Floats
+
+
+def horizon_of(header: HeaderLike, runs: Iterable[Run]) -> Horizon | None:
+    """Return how to cut the campaign into windows; None if it says nothing and its runs begin at rest."""
+    if header.prediction_horizon_s is not None:
+        return Horizon(header.prediction_horizon_s, header.prediction_stride_s or header.prediction_horizon_s)
+    usable = [run for run in runs if run.is_ok and len(run.frames)]
+    resting = sum(rests(run, header.neutral) for run in usable)
+    return Horizon() if usable and resting < 0.5 * len(usable) else None
+
+
+def cut_windows(run: Run, horizon: Horizon, neutral: float) -> Iterator[Window]:
+    """Yield the windows of `run` in which the vehicle drives and is seen."""
+    frames, _ = inspect_frames(run.frames)
+    if len(frames) < _FEWEST_FRAMES or not len(run.commands):
+        return
+    t = frames.t_s
+    motion = np.column_stack([frames.x_m, frames.y_m, np.unwrap(frames.heading_rad)])
+    noise = frame_noise(motion)
+    first = max(float(t[0]) + SUPPORT_S, 0.0 if run.frames.t_s[0] < 0.0 else SUPPORT_S)
+    for wanted in np.arange(first, float(t[-1]) - horizon.horizon_s + _NEAR_S, horizon.stride_s):
+        last = int(np.searchsorted(t, wanted + 1e-9, side="right"))
+        state = _state(t[:last], motion[:last], noise)
+        if state is None or wanted - t[last - 1] > _NEAR_S:
+            continue
+        window = _window(run, horizon, neutral, t, motion, last, state, noise)
+        if window is not None:
+            yield window
+
+
+@dataclass(frozen=True)
+class _State:
+    pose: Floats
+    pose_stderr: Floats
+    speed_mps: float
+    speed_stderr: float
+    lately_mps: float
+    naive: Floats
+
+
+def _state(t: Floats, motion: Floats, noise: Floats) -> _State | None:
+    """Return the state at the last of the frames; None where they have a hole or are too few."""
+    own = t > t[-1] - SUPPORT_S if len(t) else np.empty(0, dtype=np.bool_)
+    u, m = t[own] - t[-1] if len(t) else t, motion[own]
+    if len(u) < _FEWEST_FRAMES or -u[0] < 0.7 * SUPPORT_S or np.max(np.diff(u)) > SUPPORT_S / 3.0:
+        return None
+    design = np.column_stack([np.ones_like(u), u, u * u])
+    unscaled = np.linalg.inv(design.T @ design)
+    value, slope, _ = unscaled @ design.T @ m
+    at, rising = np.sqrt(unscaled[0, 0]), np.sqrt(unscaled[1, 1])
+    c, s = np.cos(value[2]), np.sin(value[2])
+    recent = u > -NAIVE_S
+    recent[-3:] = True
+    line = np.column_stack([np.ones(int(recent.sum())), u[recent]])
+    vx, vy, yaw = np.linalg.lstsq(line, m[recent], rcond=None)[0][1]
+    # Over the last 0.1 s the vehicle turned: its velocity belongs to the heading half way back.
+    middle = value[2] + yaw * float(u[recent].mean())
+    cm, sm = np.cos(middle), np.sin(middle)
+    return _State(
+        value,
+        at * noise[[0, 0, 1]],
+        float(c * slope[0] + s * slope[1]),
+        float(rising * noise[0]),
+        _lately(t, motion),
+        np.array([cm * vx + sm * vy, cm * vy - sm * vx, yaw]),
+    )
+
+
+def _lately(t: Floats, motion: Floats) -> float:
+    """Return the speed ahead, averaged with weights that fall by e every `LATELY_S` before the last frame."""
+    own = t > t[-1] - _LATELY_SPANS * LATELY_S
+    dt, step = np.diff(t[own]), np.diff(motion[own], axis=0)
+    heading = motion[own][1:, 2] - 0.5 * step[:, 2]
+    weight = np.exp((t[own][1:] - t[-1]) / LATELY_S)
+    ahead = np.cos(heading) * step[:, 0] + np.sin(heading) * step[:, 1]
+    return float(np.sum(weight * ahead) / np.sum(weight * dt))
+
+
+def _window(
+    run: Run,
+    horizon: Horizon,
+    neutral: float,
+    t: Floats,
+    motion: Floats,
+    last: int,
+    state: _State,
+    noise: Floats,
+) -> Window | None:
+    t0 = float(t[last - 1])
+    wanted = t0 + horizon.horizon_s * np.arange(1, SAMPLES + 1) / SAMPLES
+    nearest = np.clip(np.searchsorted(0.5 * (t[1:] + t[:-1]), wanted), 0, len(t) - 1)
+    poses, near = motion[nearest].copy(), np.abs(t[nearest] - wanted) <= _NEAR_S
+    if not near[-1] or np.count_nonzero(near) < SAMPLES // 2:
+        return None
+    poses[~near] = np.nan
+    commands = _told(run, t0, t0 + horizon.horizon_s)
+    if abs(state.speed_mps) < SPEED_LIMIT_MPS and np.all(commands.drive[commands.t_s > t0 - SUPPORT_S] == neutral):
+        return None  # it stands, and is told to
+    piece = replace(run, run_id=f"{run.run_id}@{t0:.2f}", commands=commands, frames=Frames.empty())
+    return Window(
+        piece,
+        t0,
+        state.pose,
+        state.pose_stderr,
+        np.where(near, t[nearest], wanted),
+        poses,
+        state.speed_mps,
+        state.speed_stderr,
+        state.lately_mps,
+        state.naive,
+        noise,
+    )
+
+
+def _told(run: Run, t0: float, end_s: float) -> Commands:
+    """Return the commands of a window and of its history.
+
+    What was in force before counts as given long ago, unless the run began at rest within the history.
+    """
+    c = run.commands
+    first = max(int(np.searchsorted(c.t_s, t0 - HISTORY_S, side="right")) - 1, 0)
+    stop = max(int(np.searchsorted(c.t_s, end_s, side="left")), first + 1)
+    t_s = c.t_s[first:stop].copy()
+    if first or not np.any(run.frames.t_s < -_NEAR_S):
+        t_s[0] = min(t_s[0], t0) - _HELD_S
+    return Commands(t_s, c.drive[first:stop], c.front[first:stop], c.rear[first:stop])
+
+
+def recording_of(run: Run) -> str:
+    """Return the name of the recording that a run is a piece of; a run by itself else."""
+    source = run.extra.get("source")
+    return str(source) if source else run.run_id.rpartition("@")[0] or run.run_id
+
+
+def blocks(windows: list[Window], horizon: Horizon) -> NDArray[np.int64]:
+    """Return a number for each window, (W,): neighbours in one stretch of one run share it."""
+    names: dict[tuple[str, int], int] = {}
+    ends: dict[str, float] = {}
+    for w in windows:
+        ends[w.run.run_id.rpartition("@")[0]] = w.t0_s
+    out = []
+    for w in windows:
+        run_id = w.run.run_id.rpartition("@")[0]
+        # Blocks of equal length, so that no run ends in a block of one window.
+        count = max(1, round(ends[run_id] / horizon.block_s))
+        block = min(int(w.t0_s / (ends[run_id] + 1e-9) * count), count - 1)
+        out.append(names.setdefault((run_id, block), len(names)))
+    return np.array(out, dtype=np.int64)

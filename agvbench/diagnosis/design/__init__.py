@@ -1,0 +1,1 @@
+"""The experiment to drive next: designs, criteria, search."""

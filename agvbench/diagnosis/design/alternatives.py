@@ -1,0 +1,65 @@
+"""Rival models, each fitted again so that it agrees with the data at hand as well as it can."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from agvbench.diagnosis.estimation.fit import Fit, fit
+from agvbench.diagnosis.model.predictor import Predictor
+from agvbench.diagnosis.selection.candidates import Candidate, bounds_of
+from agvbench.types import Floats
+
+_SHORT, _LONG = 2, 8
+_MOST_PAIRS = 3
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A fitted model, and the effect by which it differs from the others (``name``) in the place of ``instead_of``."""
+
+    name: str
+    instead_of: str
+    fit: Fit
+
+
+def rival_models(
+    chosen: Fit, rivals: Mapping[str, Mapping[str, float]], candidates: Mapping[str, Candidate]
+) -> list[tuple[Rival, Rival]]:
+    """Return the pairs of models to be told apart: each named effect against its rivals, and rivals against each other.
+
+    Parameters
+    ----------
+    chosen
+        The model with every named effect.
+    rivals
+        By named effect, the effects that would do in its place.
+    candidates
+        Bounds and starts of effects, by name.
+    """
+    pairs = []
+    for name, others in rivals.items():
+        group = [Rival(name, name, chosen)]
+        group += [Rival(other, name, swapped(chosen, name, other, candidates)) for other in others]
+        # Of many rivals, those against the named one come first: what remains is for the run after the next.
+        pairs += list(combinations(group, 2))[: max(_MOST_PAIRS, len(others))]
+    return pairs
+
+
+def swapped(chosen: Fit, name: str, other: str, candidates: Mapping[str, Candidate]) -> Fit:
+    """Return the model with the effect `other` in the place of `name`, fitted from the best of its starts."""
+    names = (*(n for n in chosen.predictor.effects if n != name), other)
+    predictor = Predictor(chosen.predictor.batch, names)
+    bounds = bounds_of(names)
+    kept = [value for key, value in chosen.effect_values().items() if key.partition(".")[0] != name]
+    maps = chosen.parameters[: chosen.predictor.maps.size]
+
+    def fitted(start: Floats) -> Fit:
+        begin = np.r_[maps, kept, start]
+        return fit(predictor, begin, bounds, offsets=chosen.offsets, scatter=chosen.scatter, iterations=_SHORT)
+
+    best = min((fitted(start) for start in candidates[other].starts), key=lambda f: float(f.loss.sum()))
+    return fit(predictor, best.parameters, bounds, offsets=best.offsets, scatter=best.scatter, iterations=_LONG)

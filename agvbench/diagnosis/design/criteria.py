@@ -1,0 +1,167 @@
+"""How well runs not driven yet would tell models apart, or pin a parameter, beside what the data say already."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.diagnosis.data.readings import SAMPLES, Readings
+from agvbench.diagnosis.design.designs import Design
+from agvbench.diagnosis.estimation.fit import Fit
+from agvbench.diagnosis.estimation.variance import EVIDENCE_POSES
+from agvbench.diagnosis.model.batch import Batch
+from agvbench.diagnosis.model.predictor import OFFSETS, Predictor
+from agvbench.planning.workspace import Workspace
+from agvbench.types import NO_TARGET, Floats, Frames, Pose, Run
+from agvbench.vehicle.geometry import Geometry
+
+HEADINGS_RAD = (0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi)
+"""Repeats set off in turn in these directions, so that what depends on the floor differs between them."""
+
+_AFTER_S = 0.8
+_START_M, _START_RAD = 3e-4, 5e-4
+_WEAK = 1e-6
+
+
+@dataclass(frozen=True)
+class Information:
+    """What runs of one design say about parameters, offsets integrated out: ``matrix`` (D, P, P), D designs.
+
+    ``pull`` (D, P) and ``square`` (D,) are of a difference in prediction, if one was given.
+    """
+
+    matrix: Floats
+    pull: Floats
+    square: Floats
+
+
+def imagined(designs: Sequence[Design], starts: Sequence[Sequence[Pose]], noise: Floats) -> Readings:
+    """Return runs of `designs` as if driven, one from each of its `starts`; `noise` (3,) is that of their start poses.
+
+    Each design has as many starts; its runs lie one after another.
+    """
+    runs, t_s = [], []
+    for design in designs:
+        commands = design.commands()
+        runs += [_run(commands, k) for k in range(len(starts[0]))]
+        t_s += [np.linspace(0.1, design.duration_s + _AFTER_S, SAMPLES)] * len(starts[0])
+    start = np.array([pose for own in starts for pose in own], dtype=np.float64)
+    return Readings(
+        runs=tuple(runs),
+        t_s=np.array(t_s),
+        poses=np.zeros((len(runs), SAMPLES, 3)),
+        start=start,
+        start_stderr=np.broadcast_to(noise, start.shape).copy(),
+        started_h=np.zeros(len(runs)),
+        group=np.repeat(np.arange(len(designs)), len(starts[0])),
+        refused={},
+    )
+
+
+def _run(commands: object, repeat: int) -> Run:
+    return Run("", "free", "", "calibrated", repeat, NO_TARGET, 0.0, "ok", "", commands, Frames.empty())  # type: ignore[arg-type]
+
+
+def like(fitted: Fit, readings: Readings, geometry: Geometry) -> Predictor:
+    """Return the model that `fitted` is, for other runs."""
+    return Predictor(Batch(readings, fitted.predictor.maps, geometry), fitted.predictor.effects)
+
+
+def starts_within(path: Floats, workspace: Workspace, geometry: Geometry) -> list[Pose] | None:
+    """Return a start pose per heading of `HEADINGS_RAD` that keeps `path` (n, 3) about the floor's middle.
+
+    None if it is too wide for the floor, or is not finite. The path begins at the origin, along x.
+    """
+    if not np.isfinite(path).all():
+        return None
+    middle = 0.5 * (path[:, :2].min(axis=0) + path[:, :2].max(axis=0))
+    reach = float(np.hypot(*(path[:, :2] - middle).T).max()) + max(geometry.front_axle_m, geometry.rear_axle_m)
+    centre = np.asarray(workspace.centre)
+    if reach > float(workspace.clearances(centre[None, :]).min()) - workspace.margin_m:
+        return None
+    out = []
+    for heading in HEADINGS_RAD:
+        cos, sin = np.cos(heading), np.sin(heading)
+        out.append(
+            Pose(
+                float(centre[0] - cos * middle[0] + sin * middle[1]),
+                float(centre[1] - sin * middle[0] - cos * middle[1]),
+                float(np.mod(heading + np.pi, 2.0 * np.pi) - np.pi),
+            )
+        )
+    return out
+
+
+def information(fitted: Fit, predictor: Predictor, parameters: Floats, difference: Floats | None = None) -> Information:
+    """Return what the runs of `predictor` would say about `parameters`, with the noise and scatter of `fitted`.
+
+    ``difference`` (R, K, 3), if given, is what another model predicts otherwise.
+    """
+    readings = predictor.readings
+    linear = predictor.linearise(parameters, np.zeros((len(readings), len(OFFSETS))))
+    seen = np.ones(readings.t_s.shape, dtype=np.bool_)
+    weighted = Weighted(readings, seen, linear.by_offsets, fitted)
+    e = weighted.column(np.zeros_like(linear.poses) if difference is None else difference)
+    j = weighted.columns(linear.by_parameters)
+    fixed, off = weighted.without_offsets(j), weighted.without_offsets(e[..., None])
+    jt = j.transpose(0, 2, 1)
+    parts = (jt @ fixed, (jt @ off)[..., 0], np.sum(e * off[..., 0], axis=1))
+    sizes = np.bincount(readings.group)
+    first = np.concatenate([[0], np.cumsum(sizes)[:-1]])
+    return Information(*(np.add.reduceat(part, first, axis=0) / sizes[0] for part in parts))
+
+
+class Weighted:
+    """Runs' samples over noise, with what differs from run to run integrated out.
+
+    The noise and scatter are those of `fitted`, the offsets' priors too.
+    """
+
+    def __init__(self, readings: Readings, seen: NDArray[np.bool_], by_offsets: Floats, fitted: Fit) -> None:
+        scatter = fitted.scatter
+        count = np.maximum(seen.sum(axis=1), 1)
+        temper = np.sqrt(np.minimum(1.0, EVIDENCE_POSES / count))
+        sd = np.array([scatter.position_m, scatter.position_m, scatter.heading_rad])
+        self._weight = temper[:, None, None] * seen[..., None] / sd
+        prior = np.empty((len(readings), len(OFFSETS)))
+        prior[:, :2] = np.hypot(readings.start_stderr[:, :2], _START_M)
+        prior[:, 2] = np.hypot(readings.start_stderr[:, 2], np.hypot(scatter.offsets[0], _START_RAD))
+        prior[:, 3:] = scatter.offsets[1:]
+        self._a = self.columns(by_offsets)
+        inner = self._a.transpose(0, 2, 1) @ self._a
+        inner[:, range(len(OFFSETS)), range(len(OFFSETS))] += prior**-2.0
+        self._inverse = np.linalg.inv(inner)
+
+    def column(self, values: Floats) -> Floats:
+        """Return values (R, K, 3) over noise, (R, 3 K)."""
+        return np.asarray((values * self._weight).reshape(len(values), -1))
+
+    def columns(self, values: Floats) -> Floats:
+        """Return values (R, K, 3, q) over noise, (R, 3 K, q)."""
+        return np.asarray((values * self._weight[..., None]).reshape(len(values), -1, values.shape[-1]))
+
+    def without_offsets(self, columns: Floats) -> Floats:
+        """Return columns (R, 3 K, q) multiplied by the inverse covariance of noise and offsets."""
+        return np.asarray(columns - self._a @ (self._inverse @ (self._a.transpose(0, 2, 1) @ columns)))
+
+
+def evidence(known: Floats, new: Information, repeats: float) -> Floats:
+    """Return by how much minus two log likelihood of the wrong model would rise (D,), after it was fitted again.
+
+    ``known`` (P, P) is what the data say about its parameters already. It is the quadratic minimum over what
+    the parameters may still move.
+    """
+    matrix = known + repeats * new.matrix
+    matrix = matrix + _WEAK * np.eye(matrix.shape[-1])
+    move = np.linalg.solve(matrix, repeats * new.pull[..., None])[..., 0]
+    return np.asarray(repeats * new.square - np.sum(repeats * new.pull * move, axis=1))
+
+
+def expected_stderr(known: Floats, new: Floats, repeats: float, at: Floats) -> Floats:
+    """Return the standard errors (D, len(at)) of the parameters numbered `at` with the new runs (D, P, P) added."""
+    matrix = known + repeats * new
+    matrix = matrix + _WEAK * np.eye(matrix.shape[-1])
+    return np.asarray(np.sqrt(np.diagonal(np.linalg.inv(matrix), axis1=1, axis2=2)[:, at]))

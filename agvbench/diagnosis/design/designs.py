@@ -1,0 +1,155 @@
+"""Runs that may be driven next: commands at levels that the vehicle has known, in many orders and rhythms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from agvbench.diagnosis.model.nodal_maps import FreeMaps
+from agvbench.types import Commands, Floats
+
+SET_FIRST_S = 0.4
+LONGEST_S = 9.0
+_SHORTEST_S = 0.3
+_MOST_STEPS = 14
+_RHYTHMS_S = (2.4, 1.2, 0.6, 0.3)
+_FARTHEST_RAD = 0.6
+Step = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Levels:
+    """Commands to choose from: ``drive`` (forward and backward, strong and weak), ``front`` and ``rear``."""
+
+    drive: tuple[float, ...]
+    front: tuple[float, ...]
+    rear: tuple[float, ...]
+    neutral: float
+
+
+@dataclass(frozen=True)
+class Design:
+    """``steps`` of duration [s], drive, front, rear; the vehicle stands before and after, its wheels set."""
+
+    steps: tuple[Step, ...]
+    neutral: float
+
+    @property
+    def duration_s(self) -> float:
+        """When it stops [s]."""
+        return SET_FIRST_S + sum(step[0] for step in self.steps)
+
+    def rows(self) -> tuple[tuple[float, float, float, float], ...]:
+        """Return rows of t_s, drive, front, rear, without the stop."""
+        _, _, front, rear = self.steps[0]
+        rows = [(0.0, self.neutral, front, rear)]
+        at = SET_FIRST_S
+        for duration, *command in self.steps:
+            if tuple(command) != rows[-1][1:]:
+                rows.append((round(at, 3), command[0], command[1], command[2]))
+            at += duration
+        return tuple(rows)
+
+    def commands(self) -> Commands:
+        """Return the commands with the stop behind them."""
+        rows = self.rows()
+        _, _, front, rear = rows[-1]
+        table = np.array([*rows, (round(self.duration_s, 3), self.neutral, front, rear)])
+        t_s, drive, fronts, rears = (np.ascontiguousarray(column) for column in table.T)
+        return Commands(t_s, drive, fronts, rears)
+
+
+def levels_of(maps: FreeMaps, values: Floats) -> Levels:
+    """Return levels among those that the data know: `values` are the maps' fitted ones."""
+    where = maps.slices()
+    speed = values[where["drive"]]
+    drives = []
+    for sign in (1.0, -1.0):
+        own = np.flatnonzero(sign * speed > 0.02)
+        if len(own):
+            fastest = own[np.argmax(sign * speed[own])]
+            half = own[np.argmin(np.abs(sign * speed[own] - 0.5 * sign * speed[fastest]))]
+            drives += [float(maps.nodes["drive"][k]) for k in dict.fromkeys((fastest, half))]
+    front, rear = (_steering(maps.nodes[role], values[where[role]], maps.neutral) for role in ("front", "rear"))
+    return Levels(tuple(drives), front, rear, maps.neutral)
+
+
+def _steering(nodes: Floats, angle: Floats, neutral: float) -> tuple[float, ...]:
+    """Return straight first, then far and half way to either side."""
+    straight = int(np.argmin(np.abs(nodes - neutral)))
+    bent = angle - angle[straight]
+    chosen = [straight]
+    for sign in (1.0, -1.0):
+        own = np.flatnonzero((sign * bent > 0.03) & (np.abs(angle) < _FARTHEST_RAD))
+        if len(own):
+            far = own[np.argmax(sign * bent[own])]
+            half = own[np.argmin(np.abs(bent[own] - 0.5 * bent[far]))]
+            chosen += [int(far), int(half)]
+    return tuple(float(nodes[k]) for k in dict.fromkeys(chosen))
+
+
+def designs(levels: Levels) -> list[Design]:
+    """Return the designs to begin with: holds, steering in steps, stops and starts, there and back."""
+    return [Design(tuple(steps), levels.neutral) for steps in _sequences(levels) if steps]
+
+
+def _sequences(levels: Levels) -> Iterator[list[Step]]:
+    poses = list(_steerings(levels))
+    straight = (levels.front[0], levels.rear[0])
+    for drive in levels.drive:
+        for steering in poses:
+            for seconds in (4.0, 8.0):
+                yield [(seconds, drive, *steering)]
+            for rhythm in _RHYTHMS_S[:-1]:
+                yield _repeated([(rhythm, drive, *steering), (rhythm, levels.neutral, *steering)])
+        for one, other in [*((straight, s) for s in poses[1:]), *pairwise(poses[1:])]:
+            for rhythm in _RHYTHMS_S:
+                yield _repeated([(rhythm, drive, *one), (rhythm, drive, *other)])
+    for first, second in pairwise(levels.drive):
+        for steering in poses:
+            for rhythm in _RHYTHMS_S[:-1]:
+                yield _repeated([(rhythm, first, *steering), (rhythm, second, *steering)])
+
+
+def _steerings(levels: Levels) -> Iterator[tuple[float, float]]:
+    fronts, rears = levels.front, levels.rear
+    yield fronts[0], rears[0]
+    for front in fronts[1:]:
+        yield front, rears[0]
+    for rear in rears[1:3]:
+        yield fronts[0], rear
+    for k in range(1, min(len(fronts), len(rears))):
+        yield fronts[k], rears[k]  # crab
+    if len(fronts) > 3 and len(rears) > 3:
+        yield fronts[1], rears[3]  # opposite, each way
+        yield fronts[3], rears[1]
+
+
+def _repeated(steps: list[Step]) -> list[Step]:
+    seconds = sum(step[0] for step in steps)
+    return steps * max(1, min(int(LONGEST_S / seconds), _MOST_STEPS // len(steps)))
+
+
+def mutated(design: Design, levels: Levels, rng: np.random.Generator) -> Design:
+    """Return a design that differs in one step: another level or duration, one more or one less."""
+    steps = list(design.steps)
+    k = int(rng.integers(len(steps)))
+    duration, drive, front, rear = steps[k]
+    kind = int(rng.integers(6))
+    if kind == 0:
+        steps[k] = (round(max(_SHORTEST_S, duration * float(rng.choice([0.6, 0.8, 1.25, 1.6]))), 2), drive, front, rear)
+    elif kind == 1:
+        steps[k] = (duration, float(rng.choice([*levels.drive, levels.neutral])), front, rear)
+    elif kind == 2:
+        steps[k] = (duration, drive, float(rng.choice(levels.front)), rear)
+    elif kind == 3:
+        steps[k] = (duration, drive, front, float(rng.choice(levels.rear)))
+    elif kind == 4 and len(steps) < _MOST_STEPS:
+        steps.insert(k, (0.6, *steps[int(rng.integers(len(steps)))][1:]))
+    elif len(steps) > 1:
+        del steps[k]
+    made = Design(tuple(steps), design.neutral)
+    return made if made.duration_s <= LONGEST_S + SET_FIRST_S + 0.5 else design

@@ -1,0 +1,210 @@
+"""The run to drive next: where alternatives differ most, or where a parameter becomes identifiable.
+
+Rivals agree on the data at hand. How far a run not driven yet would part them is the quadratic form of the difference
+of their predictions in noise and scatter, after the wrong one was fitted again (the criterion of Box and Hill, 1967,
+with the parameters' uncertainty); the unit is that of the losses which rivals are judged by. The design that
+maximises it for the pair that is hardest to part is searched for among some hundred patterns and then by small changes
+of the best. A parameter is pinned by the design with the least expected standard error, relative to its scale.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from agvbench.diagnosis.design.alternatives import Rival, rival_models
+from agvbench.diagnosis.design.designs import SET_FIRST_S, Design
+from agvbench.diagnosis.design.identifiability import Unpinned
+from agvbench.diagnosis.design.search import LEAST_REPEATS, Search
+from agvbench.diagnosis.estimation.fit import Fit
+from agvbench.diagnosis.proposal import NextExperiment, Proposal
+from agvbench.diagnosis.selection.candidates import Candidate
+from agvbench.planning import Trajectory, Workspace
+from agvbench.planning.trajectories.shapes import CommandTable
+from agvbench.types import CommandUnit, Floats
+
+_NEEDS: dict[frozenset[str], str] = {
+    frozenset({"actuation_delay", "mocap_latency"}): (
+        "a time that vehicle and cameras share: a light on the vehicle that its firmware switches with the drive, "
+        "an encoder on board that is logged with the commands, or the vehicle pushed by hand with a clap in view"
+    ),
+    frozenset({"wheel_diameter_mismatch", "marker_offset"}): (
+        "the vehicle turned on a jig about a known point, or tight circles both ways, which need a floor that is "
+        "large enough"
+    ),
+    frozenset({"mocap_scale", "axle_speed_mismatch"}): "two markers at a known distance, or a tape along a straight",
+}
+_CLOCK = "a reference beside cameras and commands, such as an encoder on board"
+_LENGTH = "two markers at a known distance, measured at several places"
+_AXES = "the vehicle's own axis measured on the floor, with a straight edge or by pushing it along a rail"
+_BY_STAGE = {
+    "mocap_latency": _CLOCK,
+    "actuation_delay": _CLOCK,
+    "mocap_scale": _LENGTH,
+    "heading_misalignment": _AXES,
+    "marker_offset": "the markers' centroid measured against the axles, or the vehicle turned on a jig",
+}
+
+
+def what_it_takes(names: tuple[str, ...]) -> str:
+    """Return what would tell the effects called `names` apart, in words.
+
+    >>> what_it_takes(("mocap_latency", "actuation_delay")).partition(":")[0]
+    'a time that vehicle and cameras share'
+    """
+    for pair in combinations(names, 2):
+        if frozenset(pair) in _NEEDS:
+            return _NEEDS[frozenset(pair)]
+    for name in names:
+        if name in _BY_STAGE:
+            return _BY_STAGE[name]
+    return (
+        "a direct measurement of one of them: an angle, a speed or a distance that does not come from the same drives"
+    )
+
+
+DECISIVE = 40.0
+"""Expected difference in minus two log likelihood that decides: it exceeds a rival's margin in 99 of 100 draws."""
+
+HOPELESS = 10.0
+"""What even `MOST_REPEATS` would not bring beyond this is not worth driving."""
+
+MOST_REPEATS = 12
+PINNED = 0.5
+"""A parameter is pinned when its standard error is below this part of its usual size."""
+
+_WELL_PINNED = 0.05
+_MOST_PINNED = 3
+_UNKNOWN = 100.0
+
+
+def separate(
+    chosen: Fit,
+    rivals: Mapping[str, Mapping[str, float]],
+    candidates: Mapping[str, Candidate],
+    *,
+    unit: CommandUnit,
+    workspace: Workspace | None = None,
+    seed: int = 0,
+) -> Proposal:
+    """Return the run that tells rivals apart, and which of them no run does.
+
+    Parameters
+    ----------
+    chosen
+        The model with every named effect.
+    rivals
+        By named effect, the effects that predict as well in its place, with how much worse they are.
+    candidates
+        Effects that were tried, by name.
+    unit
+        Of commands.
+    workspace
+        The floor; the circle of 6.1 m by default.
+    seed
+        Draws the changes that are tried.
+    """
+    pairs = rival_models(chosen, rivals, candidates)
+    if not pairs:
+        return Proposal()
+    search = Search(chosen, workspace or Workspace.circle(), seed)
+    if not search.first:
+        return Proposal(None, {_names(pair): "a floor on which the vehicle can move" for pair in pairs})
+    # Each pair on its own first: a pair that nothing parts must not decide between designs for the others.
+    table = search.pair_scores(pairs, search.first)
+    most = MOST_REPEATS * table.max(axis=1)
+    hopeless = {_names(p): what_it_takes(_names(p)) for p, m in zip(pairs, most, strict=True) if m < HOPELESS}
+    parted = [p for p, m in zip(pairs, most, strict=True) if m >= HOPELESS]
+    if not parted:
+        return Proposal(None, hopeless)
+    best = search.best(lambda tried: search.pair_scores(parted, tried).min(axis=0))
+    each = search.pair_scores(parted, [best])[:, 0]
+    repeats = int(np.clip(np.ceil(DECISIVE / max(float(each.min()), 1e-9)), LEAST_REPEATS, MOST_REPEATS))
+    separations = search.separations(parted, best, each * repeats)
+    hardest = min(separations, key=lambda s: s.evidence)
+    why = (
+        f"tells {' from '.join(hardest.between)}, whose predictions differ by up to {hardest.apart_mm:.1f} mm and "
+        f"{hardest.apart_deg:.2f}° along it; {repeats} repeats should decide (expected {hardest.evidence:.0f}, "
+        f"{DECISIVE:.0f} is decisive)"
+    )
+    names = "_or_".join(dict.fromkeys(name for s in separations for name in s.between))
+    trajectory = as_trajectory(best, unit, f"next_{names}"[:60].rstrip("_"), "tells rivals apart")
+    starts = search.starts(best)
+    return Proposal(NextExperiment(why, trajectory, repeats, tuple(starts), separations), hopeless)
+
+
+def pin(
+    chosen: Fit,
+    flat: Sequence[Unpinned],
+    *,
+    unit: CommandUnit,
+    workspace: Workspace | None = None,
+    seed: int = 0,
+) -> NextExperiment | None:
+    """Return the run that pins most of the parameters that the data leave open, or None where none does.
+
+    Those that one of the effects found does the same as are left out: `separate` is for them.
+
+    Parameters
+    ----------
+    chosen
+        The model found.
+    flat
+        What `unpinned` returned.
+    unit, workspace, seed
+        As for `separate`.
+    """
+    wanted = [item for item in flat if not item.partner][:_MOST_PINNED]
+    if not wanted:
+        return None
+    search = Search(chosen, workspace or Workspace.circle(), seed)
+    if not search.first:
+        return None
+    least = search.pin_scores(wanted, search.first, LEAST_REPEATS).min(axis=1)
+    wanted = [item for item, value in zip(wanted, least, strict=True) if value < PINNED]
+    if not wanted:
+        return None
+
+    def score(tried: Sequence[Design]) -> Floats:
+        # Patterns come from calm to quick: of those that pin well enough, the calmest is driven.
+        reached = search.pin_scores(wanted, tried, LEAST_REPEATS)
+        return np.asarray(-np.log(np.maximum(reached, _WELL_PINNED)).sum(axis=0))
+
+    best = search.best(score)
+    reached = search.pin_scores(wanted, [best], LEAST_REPEATS)[:, 0]
+    pins = tuple(item.name for item, value in zip(wanted, reached, strict=True) if value < PINNED)
+    told = ", ".join(
+        f"{item.name} to ± {value * item.scale:.2g} ({_now(item)} now)"
+        for item, value in zip(wanted, reached, strict=True)
+        if value < PINNED
+    )
+    if not pins:
+        return None
+    trajectory = as_trajectory(best, unit, "next_excitation", "excites what nothing driven so far excites")
+    return NextExperiment(
+        f"{LEAST_REPEATS} repeats would pin {told}", trajectory, LEAST_REPEATS, tuple(search.starts(best)), (), pins
+    )
+
+
+def _now(item: Unpinned) -> str:
+    return "unknown" if item.stderr > _UNKNOWN * item.scale else f"± {item.stderr:.2g}"
+
+
+def as_trajectory(design: Design, unit: CommandUnit, name: str, description: str) -> Trajectory:
+    """Return a design in the trajectory schema."""
+    table = CommandTable(unit=unit, rows=design.rows(), duration_s=round(design.duration_s, 3))
+    return Trajectory(
+        schema=1,
+        name=name,
+        description=description,
+        conditions=("calibrated",),
+        target="none",
+        commands=table,
+        steer_first_s=SET_FIRST_S,
+    )
+
+
+def _names(pair: tuple[Rival, Rival]) -> tuple[str, str]:
+    return pair[0].name, pair[1].name

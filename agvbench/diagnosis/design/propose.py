@@ -1,0 +1,84 @@
+"""A diagnosis with the run to drive next."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from agvbench.calibration.campaign_protocol import HeaderLike
+from agvbench.diagnosis.data.readings import Readings
+from agvbench.diagnosis.design.identifiability import unpinned
+from agvbench.diagnosis.design.next_experiment import pin, separate
+from agvbench.diagnosis.design.search import LEAST_REPEATS
+from agvbench.diagnosis.proposal import NextExperiment
+from agvbench.diagnosis.result import Diagnosis, Verdict
+from agvbench.diagnosis.selection.candidates import candidates
+from agvbench.diagnosis.selection.stepwise import Selection
+from agvbench.errors import AgvbenchError
+from agvbench.planning import Trajectory, Workspace
+from agvbench.planning.trajectories.shapes import Slalom
+from agvbench.vehicle.geometry import Geometry
+
+
+def with_next_experiment(
+    found: Diagnosis, selection: Selection, readings: Readings, header: HeaderLike, seed: int
+) -> Diagnosis:
+    """Return `found` with the run that parts its rivals or, where there are none, pins what the data leave open.
+
+    What no run can tell apart, and what it would take, is said in ``provenance["inseparable"]``; parameters that these
+    data do not pin in ``provenance["not_identifiable"]``.
+    """
+    tried = candidates()
+    chosen = selection.chosen.fit
+    floor = floor_covered(readings, chosen.predictor.batch.geometry)
+    unit = header.command_unit
+    rivals = {e.name: {name: 0.0 for name in e.confounded_with if name in tried} for e in found.effects}
+    rivals = {name: others for name, others in rivals.items() if others}
+    flat = unpinned(chosen, tried)
+    extra: dict[str, object] = {}
+    experiment = None
+    if floor is not None and rivals:
+        proposal = separate(chosen, rivals, tried, unit=unit, workspace=floor, seed=seed)
+        experiment = proposal.experiment
+        extra["inseparable"] = [{"between": list(pair), "needs": n} for pair, n in proposal.inseparable.items()]
+    if flat:
+        extra["not_identifiable"] = {item.name: item.why for item in flat}
+    # An answer that is whole needs no further run for effects that were never excited and never asked for.
+    if experiment is None and floor is not None and flat:
+        experiment = pin(chosen, flat, unit=unit, workspace=floor, seed=seed)
+    return dataclasses.replace(found, next_experiment=experiment, provenance={**found.provenance, **extra})
+
+
+def with_first_experiment(found: Diagnosis) -> Diagnosis:
+    """Return a diagnosis that could tell nothing with the drive that it lacks: repeated, turning, at speed."""
+    if found.verdict is not Verdict.NOT_IDENTIFIABLE or found.next_experiment is not None:
+        return found
+    slalom = Trajectory(
+        schema=1,
+        name="next_slalom",
+        description="moves, turns both ways while driving, and is repeated",
+        target="none",
+        steering="front",
+        slalom=Slalom(turn="left", radius_m=1.0, angle_deg=60.0, arcs=4),
+    )
+    why = f"this campaign cannot tell ({found.why}); {LEAST_REPEATS} repeats of a slalom move, turn and repeat"
+    return dataclasses.replace(found, next_experiment=NextExperiment(why, slalom, LEAST_REPEATS))
+
+
+def floor_covered(readings: Readings, geometry: Geometry) -> Workspace | None:
+    """Return the floor that the axles have covered so far, or None if that is no area.
+
+    Nobody told the diagnosis how large the floor is: where the vehicle has been, it may be again.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    poses = readings.poses.reshape(-1, 3)
+    poses = poses[np.isfinite(poses).all(axis=1)]
+    ahead = np.column_stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])])
+    points = np.concatenate([poses[:, :2] + geometry.front_axle_m * ahead, poses[:, :2] - geometry.rear_axle_m * ahead])
+    try:
+        corners = points[ConvexHull(points).vertices]
+        return Workspace.polygon([(float(x), float(y)) for x, y in corners], 0.0)
+    except (QhullError, ValueError, AgvbenchError):
+        return None

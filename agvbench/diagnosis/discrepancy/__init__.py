@@ -1,0 +1,1 @@
+"""A discrepancy term for what no effect of the library explains."""

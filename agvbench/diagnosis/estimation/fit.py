@@ -1,0 +1,112 @@
+"""Free maps and effects fitted together, with what differs from run to run integrated out.
+
+Each run has its own start pose, an offset of each axle and a factor on its speed, drawn about zero with a scatter that
+is estimated, too. Without them a run's frames would pass for as many pieces of evidence, and the smallest play in a
+servo for an effect.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from agvbench.diagnosis.estimation.levenberg_marquardt import Descent, Pace, State
+from agvbench.diagnosis.estimation.likelihood import Information, residual_of, ridge, terms_of
+from agvbench.diagnosis.estimation.score_test import Ground
+from agvbench.diagnosis.estimation.variance import Scatter, first_scatter, scatter_of_windows
+from agvbench.diagnosis.model.predictor import Linearised, Predictor
+from agvbench.types import Floats
+
+_ITERATIONS = 8
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model.
+
+    ``parameters`` (P,), the maps' values first; ``offsets`` (R, 6) of each run; ``scatter``; ``loss`` (R,): minus two
+    log likelihood of each run; ``information`` and ``gradient`` (R, P): its quadratic form about them;
+    ``residual`` (R, K, 3): measured minus predicted with the offsets.
+    """
+
+    predictor: Predictor
+    parameters: Floats
+    offsets: Floats
+    scatter: Scatter
+    loss: Floats
+    information: Information
+    gradient: Floats
+    residual: Floats
+    linear: Linearised
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of the parameters (P, P)."""
+        return np.asarray(np.linalg.pinv(self.information.total + ridge(self.predictor), hermitian=True))
+
+    @cached_property
+    def ground(self) -> Ground:
+        """What every promise of a larger model starts from."""
+        return Ground.of(self)
+
+    def effect_values(self) -> dict[str, float]:
+        """Return the effects' parameters by name."""
+        own = self.parameters[self.predictor.maps.size :]
+        return dict(zip(self.predictor.parameter_names, own.tolist(), strict=True))
+
+
+def fit(
+    predictor: Predictor,
+    parameters: Floats,
+    bounds: Floats,
+    *,
+    offsets: Floats | None = None,
+    scatter: Scatter | None = None,
+    iterations: int = _ITERATIONS,
+    patient: bool = False,
+    near: Linearised | None = None,
+) -> Fit:
+    """Fit by Gauss–Newton with safe steps, the scatter by expectation maximisation between steps.
+
+    Parameters
+    ----------
+    predictor
+        Runs, maps and effects.
+    parameters
+        (P,) where to start.
+    bounds
+        (effects' parameters, 2): lowest and highest value of each.
+    offsets, scatter
+        Where to start; by default none and generous.
+    iterations
+        At most this many steps.
+    patient
+        Whether to go on for some rounds of as many steps while they are worth it.
+    near
+        Derivatives of the same maps at parameters close by. By far the most time goes into those by the maps' values,
+        and they change little: the first steps are taken with these, the last ones and the result with one's own.
+    """
+    readings = predictor.readings
+    offsets = np.zeros((len(readings), 6)) if offsets is None else offsets.copy()
+    scatter = scatter or (first_scatter() if predictor.readings.begins is None else scatter_of_windows(readings))
+    descent = Descent(predictor, bounds)
+    state, pace = descent.go(State(parameters.copy(), offsets, scatter), iterations, near)
+    # Only a fit that is to be believed is worth the way to its end.
+    believed = iterations > _ITERATIONS
+    state, view = descent.arrive(state, pace if believed else Pace.STANDS, iterations, patient=patient)
+    if believed:
+        state, view = descent.off_plateaus(state, view, iterations, patient=patient)
+    terms = view.terms
+    return Fit(
+        predictor, state.parameters, state.offsets, state.scatter,
+        terms.loss, terms.information, terms.gradient, view.residual, view.linear,
+    )  # fmt: skip
+
+
+def loss_at(fitted: Fit, parameters: Floats) -> Floats:
+    """Return each run's loss (R,) at other parameters, by simulation, with the scatter of `fitted`."""
+    predictor = fitted.predictor
+    residual = residual_of(predictor, predictor.predict(parameters, fitted.offsets))
+    return terms_of(predictor, residual, fitted.linear.by_first(0), fitted.offsets, fitted.scatter).loss

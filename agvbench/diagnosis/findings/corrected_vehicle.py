@@ -1,0 +1,61 @@
+"""The vehicle with refitted maps and the effects found."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from agvbench.calibration.campaign_protocol import HeaderLike
+from agvbench.diagnosis.estimation.fit import Fit
+from agvbench.diagnosis.model.nodal_maps import FreeMaps
+from agvbench.effects import Effect, effect_kinds
+from agvbench.effects.forms import effect_forms
+from agvbench.model import VehicleModel
+from agvbench.types import Floats
+from agvbench.vehicle.geometry import Geometry
+from agvbench.vehicle.maps import Fixed, MonotoneTable, StaticMap
+
+_DIGITS = 9
+
+
+def corrected_vehicle(header: HeaderLike, geometry: Geometry, fitted: Fit, maps: FreeMaps, seed: int) -> VehicleModel:
+    """Return the vehicle that `fitted` describes; its maps are tables, made monotone where scatter made them turn."""
+    where = maps.slices()
+    weight = np.maximum(np.diagonal(fitted.information.total), 1e-6)
+    values = {role: fitted.parameters[own] for role, own in where.items()}
+    front, rear = (_table(maps.nodes[r], values[r], weight[where[r]]) for r in ("front", "rear"))
+    place = int(np.searchsorted(maps.nodes["drive"], maps.neutral))
+    drive = _table(
+        np.insert(maps.nodes["drive"], place, maps.neutral),
+        np.insert(values["drive"], place, 0.0),
+        np.insert(weight[where["drive"]], place, 1e12),
+    )
+    return VehicleModel(
+        name=header.vehicle_name,
+        geometry=geometry,
+        command_unit=header.command_unit,
+        neutral=header.neutral,
+        front=front,
+        rear=rear,
+        drive=drive,
+        effects=_effects(fitted),
+        provenance={"campaign": header.name, "method": "diagnose", "seed": seed},
+    )
+
+
+def _effects(fitted: Fit) -> tuple[Effect, ...]:
+    kinds, values = {**effect_kinds(), **effect_forms()}, fitted.effect_values()
+    return tuple(
+        kinds[name](**{key.partition(".")[2]: v for key, v in values.items() if key.partition(".")[0] == name})
+        for name in fitted.predictor.effects
+        if name in kinds  # an empirical term is not a cause, and no part of a vehicle
+    )
+
+
+def _table(commands: Floats, values: Floats, weight: Floats) -> StaticMap:
+    if len(commands) < 2 or np.ptp(values) == 0.0:
+        return Fixed(output=round(float(values[0]), _DIGITS), command=float(commands[0]))
+    from scipy.optimize import isotonic_regression
+
+    rising = bool(np.polyfit(commands, values, 1)[0] > 0.0)
+    smooth = np.asarray(isotonic_regression(values, weights=weight, increasing=rising).x)
+    return MonotoneTable(tuple(commands.tolist()), tuple(smooth.round(_DIGITS).tolist()), "linear")

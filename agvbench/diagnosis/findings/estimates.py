@@ -1,0 +1,58 @@
+"""Parameters of the effects found, with standard errors and what the data do not pin."""
+
+from __future__ import annotations
+
+from agvbench.diagnosis.estimation.standard_errors import standard_errors
+from agvbench.diagnosis.result import Estimate, NamedEffect
+from agvbench.diagnosis.selection.stepwise import RIVAL_MARGIN, Selection
+from agvbench.diagnosis.terms import TERMS, EmpiricalTerm
+from agvbench.effects import Effect, effect_kinds
+from agvbench.effects.forms import cause_of, effect_forms
+from agvbench.types import Floats
+
+_FLAT = 3.0
+
+
+def named_effects(selection: Selection, bounds: Floats) -> tuple[NamedEffect, ...]:
+    """Return the effects of the chosen model.
+
+    Standard errors are those of `standard_errors`.
+    """
+    fit = selection.chosen.fit
+    maps = fit.predictor.maps.size
+    stderr = standard_errors(fit, fit.predictor.readings.group)
+    kinds: dict[str, type[Effect]] = {**effect_kinds(), **effect_forms(), **{term.name: term for term in TERMS}}
+    at = 0
+    found = []
+    for name in selection.chosen.names:
+        estimates = {}
+        for p in kinds[name].parameters():
+            value, error = float(fit.parameters[maps + at]), float(stderr[maps + at])
+            note = _note(value, error, bounds[at], p.scale)
+            estimates[p.name] = Estimate(value, error, p.unit, note)
+            at += 1
+        if name in selection.base.names or issubclass(kinds[name], EmpiricalTerm):
+            continue  # the vehicle was known to have it; or it is no effect but a description
+        rivals = sorted(selection.rivals[name].items(), key=lambda pair: pair[1])
+        found.append(
+            NamedEffect(
+                cause_of(name),
+                estimates,
+                tuple(rival for rival, _ in rivals),
+                {
+                    "loss_without_it": selection.gains[name],
+                    "rival_margin": RIVAL_MARGIN,
+                    **({"form": name} if name in effect_forms() else {}),
+                    **{f"{rival}_instead": worse for rival, worse in rivals},
+                },
+            )
+        )
+    return tuple(found)
+
+
+def _note(value: float, stderr: float, bounds: Floats, scale: float) -> str:
+    if value <= bounds[0] or value >= bounds[1]:
+        return "at its bound"
+    if stderr > _FLAT * scale:
+        return "the data hardly pin it"
+    return ""

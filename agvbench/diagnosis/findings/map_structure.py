@@ -1,0 +1,126 @@
+"""End stops and dead bands that the believed map lacks: read off the refitted one.
+
+Free maps take up an end stop or a dead band without a word, so no effect has to be fitted for them; but the vehicle
+file that was believed lacks them, and a planner that believes it asks for angles and speeds that there are not. Both
+are looked for in the refitted values: shapes with and without them are fitted to the values under their covariance.
+A map that is merely of another slope, offset or smooth shape has neither.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from agvbench.diagnosis.estimation.cross_validation import clustered_covariance
+from agvbench.diagnosis.estimation.fit import Fit
+from agvbench.diagnosis.findings.map_shapes import EndStops, RefittedMap, dead_band, end_stops
+from agvbench.diagnosis.result import Estimate, NamedEffect
+from agvbench.model import VehicleModel
+from agvbench.types import Floats
+from agvbench.vehicle.maps import DeadBandWithSaturation, Fixed, FullSpeedOrStop, LineWithEndStops, StaticMap
+
+_SOURCE = "read off the refitted map against the believed one"
+_FLAT = 0.05
+_GRID = 400
+_STILL, _LEAST_BAND = 0.01, 0.02
+
+
+@dataclass(frozen=True)
+class _Known:
+    """What the vehicle file and the refitted maps say of one role."""
+
+    believed: StaticMap
+    refitted: RefittedMap
+
+
+def map_effects(fitted: Fit, vehicle: VehicleModel | None) -> tuple[NamedEffect, ...]:
+    """Return ``steering_saturation`` and ``drive_dead_band`` where runs went beyond what `vehicle` knows of them.
+
+    Without a vehicle nothing was believed that they could contradict.
+    """
+    if vehicle is None:
+        return ()
+    known = _known(fitted, vehicle)
+    given = {effect.name for effect in vehicle.effects}
+    found = []
+    if "steering_saturation" not in given:
+        found += list(_saturation({role: known[role] for role in ("front", "rear")}))
+    if "drive_dead_band" not in given:
+        found += list(_dead_band(known["drive"], fitted.predictor.maps.neutral))
+    return tuple(found)
+
+
+def _known(fitted: Fit, vehicle: VehicleModel) -> dict[str, _Known]:
+    maps = fitted.predictor.maps
+    covariance = clustered_covariance(fitted, fitted.predictor.readings.group)
+    out = {}
+    for role, own in maps.slices().items():
+        believed: StaticMap = getattr(vehicle, role)
+        refitted = RefittedMap(maps.nodes[role], fitted.parameters[own], covariance[own, own])
+        out[role] = _Known(believed, refitted)
+    return out
+
+
+def _saturation(axles: dict[str, _Known]) -> Iterator[NamedEffect]:
+    estimates, gain = {}, 0.0
+    for role, known in axles.items():
+        if isinstance(known.believed, Fixed) or known.refitted.agrees_with(known.believed):
+            continue
+        stops = end_stops(known.refitted, known.believed)
+        if stops is None:
+            continue
+        low, high = _believes_stops(known.believed, known.refitted.commands, rising=stops.rising)
+        if limits := [*_side(stops, "low", low), *_side(stops, "high", high)]:
+            value, stderr = np.mean(limits, axis=0)
+            spread = 0.5 * float(np.ptp([limit for limit, _ in limits]))
+            estimates[f"{role}_rad"] = Estimate(float(value), math.hypot(float(stderr), spread), "rad")
+            gain += stops.gain
+    if estimates:
+        yield NamedEffect("steering_saturation", estimates, (), {"loss_without_it": gain, "source": _SOURCE})
+
+
+def _side(stops: EndStops, side: str, is_believed: bool) -> Iterator[tuple[float, float]]:
+    value, stderr = getattr(stops, side)
+    if not is_believed and math.isfinite(value):
+        yield abs(value), stderr
+
+
+def _believes_stops(believed: StaticMap, commands: Floats, *, rising: bool) -> tuple[bool, bool]:
+    """Return whether a map has a stop at low and at high outputs, by its kind or by being flat where runs were."""
+    if isinstance(believed, LineWithEndStops):
+        return math.isfinite(believed.output_low), math.isfinite(believed.output_high)
+    if isinstance(believed, DeadBandWithSaturation):
+        return True, True
+    at = np.linspace(commands[0], commands[-1], _GRID)
+    slope = np.abs(np.diff(believed(at)))
+    usual = float(np.median(slope))
+    ends = bool(slope[0] <= _FLAT * usual), bool(slope[-1] <= _FLAT * usual)
+    return ends if rising else (ends[1], ends[0])
+
+
+def _dead_band(drive: _Known, neutral: float) -> Iterator[NamedEffect]:
+    if drive.refitted.agrees_with(drive.believed) or _believes_dead_band(
+        drive.believed, drive.refitted.commands, neutral
+    ):
+        return
+    band = dead_band(drive.refitted, drive.believed, neutral)
+    if band is not None:
+        width = Estimate(band.width, band.stderr, "command")
+        yield NamedEffect("drive_dead_band", {"width": width}, (), {"loss_without_it": band.gain, "source": _SOURCE})
+
+
+def _believes_dead_band(believed: StaticMap, commands: Floats, neutral: float) -> bool:
+    """Return whether a map has a dead band, or says nothing of small commands that could be contradicted."""
+    if isinstance(believed, FullSpeedOrStop | Fixed):
+        return True
+    if isinstance(believed, DeadBandWithSaturation):
+        return believed.low_edge < believed.high_edge
+    farthest = float(np.max(np.abs(commands - neutral)))
+    at = neutral + farthest * np.linspace(-1.0, 1.0, 2 * _GRID + 1)
+    speed = np.abs(believed(at))
+    still = np.abs(at[speed <= _STILL * float(speed.max())] - neutral)
+    # A line stands still for as much of its range as is called still; a dead band for more.
+    return bool(len(still) and float(still.max()) > (_STILL + _LEAST_BAND) * farthest)

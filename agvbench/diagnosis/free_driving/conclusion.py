@@ -1,0 +1,182 @@
+"""What is concluded from windows of free driving: judged on the windows set aside, and put into a verdict."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.diagnosis.context import Asked
+from agvbench.diagnosis.data.readings import Readings
+from agvbench.diagnosis.data.windows import SUPPORT_S, Horizon
+from agvbench.diagnosis.estimation.fit import Fit
+from agvbench.diagnosis.findings.corrected_vehicle import corrected_vehicle
+from agvbench.diagnosis.findings.estimates import named_effects
+from agvbench.diagnosis.free_driving.errors import QUANTITIES, by_recording, floor_squares, rms, squares
+from agvbench.diagnosis.free_driving.predictors import believed, by_speed_error, naive, speed_held
+from agvbench.diagnosis.free_driving.selection import WindowSelector
+from agvbench.diagnosis.model.batch import Batch
+from agvbench.diagnosis.model.predictor import Predictor
+from agvbench.diagnosis.residuals.body_rates import residual_rates
+from agvbench.diagnosis.residuals.covariate_test import Dependence, dependences
+from agvbench.diagnosis.result import Diagnosis, HeldOut, NamedEffect, Verdict
+from agvbench.diagnosis.selection.candidates import bounds_of
+from agvbench.diagnosis.selection.fitted_models import Scored
+from agvbench.diagnosis.selection.stepwise import Selection
+from agvbench.types import Floats
+
+AT_THE_FLOOR = 1.25
+FAR_ABOVE = 5.0
+"""The floor of windows is a lower bound, for the vehicle's own scatter cannot be seen without repeats: so many times it
+is more than scatter."""
+
+
+@dataclasses.dataclass
+class WindowConclusion:
+    """Judges what was chosen on the windows set aside.
+
+    ``readings`` are all windows and ``judged`` those that are predicted here, of which ``held`` were set aside;
+    ``static`` are the maps without effects, fitted to the others.
+    """
+
+    asked: Asked
+    readings: Readings
+    judged: Readings
+    held: NDArray[np.bool_]
+    static: Fit
+    selector: WindowSelector
+    selection: Selection
+
+    def diagnosis(self, horizon: Horizon) -> Diagnosis:
+        """Return the diagnosis that what was chosen amounts to."""
+        asked, chosen = self.asked, self.selection.chosen
+        poses = self._poses(chosen)
+        static = Predictor(Batch(self.judged, self.static.predictor.maps, asked.geometry))
+        predicted = {
+            "static": static.predict(self.static.parameters),
+            "speed_held": speed_held(static.batch, self.static.parameters),
+            "naive": naive(self.judged),
+            "after": poses,
+        }
+        before = predicted["static"]
+        if asked.vehicle is not None:
+            before = predicted["believed"] = believed(asked.vehicle, self.judged, self.selector.batch.kinds)
+        shaken = by_speed_error(Predictor(self._every, chosen.fit.predictor.effects), chosen.fit.parameters)
+        effects = named_effects(self.selection, bounds_of(chosen.names))
+        held_out = self._held_out(before, poses, shaken)
+        # Small structure shows in many windows; what lies at the floor needs no further cause.
+        rest = self._dependences(poses) if _above(held_out, AT_THE_FLOOR) else []
+        far = _above(held_out, FAR_ABOVE)
+        verdict, why = _verdict(effects, rest, far)
+        return Diagnosis(
+            verdict,
+            why,
+            effects,
+            far or bool(rest),
+            tuple(rest),
+            held_out,
+            corrected_vehicle(asked.header, asked.geometry, chosen.fit, chosen.fit.predictor.maps, asked.seed),
+            self.selection.rejected,
+            asked.provenance(self.readings) | self._how(horizon, predicted, shaken),
+        )
+
+    def _how(self, horizon: Horizon, predicted: dict[str, Floats], shaken: Floats) -> dict[str, object]:
+        """Return how it was fitted, and what each predictor and each effect is worth."""
+        batch = self.selector.batch
+        return {
+            "fit_windows": len(batch.readings),
+            "models_fitted": self.selection.tried,
+            "windows": {
+                "horizon_s": horizon.horizon_s,
+                "stride_s": horizon.stride_s,
+                "initial_state_from_s": [-SUPPORT_S, 0.0],
+                "level_scatter": float(batch.level_scatter),
+                "redundancy": batch.redundancy,
+                "recordings": by_recording(self.judged, predicted, shaken, self.held, self.asked.seed),
+                "effects": self._each(predicted["after"]),
+            },
+        }
+
+    def _poses(self, model: Scored) -> Floats:
+        """Return what `model` predicts for every window that is judged."""
+        return Predictor(self._every, model.fit.predictor.effects).predict(model.fit.parameters)
+
+    @cached_property
+    def _every(self) -> Batch:
+        batch = self.selector.batch
+        return Batch(self.judged, batch.maps, self.asked.geometry, batch.level_scatter, kinds=batch.kinds)
+
+    def _held_out(self, before: Floats, after: Floats, shaken: Floats) -> HeldOut:
+        kept = self.judged.select(self.held)
+        least = floor_squares(kept, shaken[self.held])
+        was, now = squares(kept, before[self.held]), squares(kept, after[self.held])
+        errors = {
+            name: {"before": rms(was[name], name), "after": rms(now[name], name), "floor": rms(least[name], name)}
+            for name in QUANTITIES
+        }
+        recording = kept.begins.recording if kept.begins is not None else np.empty(0, dtype=np.str_)
+        worse = []
+        for name in dict.fromkeys(recording.tolist()):
+            own = recording == name
+            change = np.nanmean(now["position_rms_mm"][own]) - np.nanmean(was["position_rms_mm"][own])
+            if change > np.nanmean(least["position_rms_mm"][own]):
+                worse.append(name)
+        return HeldOut(len(kept), errors, tuple(worse))
+
+    def _each(self, poses: Floats) -> dict[str, dict[str, object]]:
+        """Return for each effect whether it was kept, and the held-out position error with and without it.
+
+        An effect that promised nothing was not fitted: its gain is zero, and there is no error with it.
+        """
+        chosen = self.selection.chosen
+        out: dict[str, dict[str, object]] = {}
+        now = self._error(poses)
+        for name in self.selector.candidates:
+            if name in self.selector.given:
+                continue
+            kept = name in chosen.names
+            if kept:
+                other: Scored | None = self.selector.shrunk(self.selection.base, chosen, name)
+            else:
+                other = self.selector.known((*chosen.names, name))
+            error = None if other is None else self._error(self._poses(other))
+            out[name] = {
+                "kept": kept,
+                "gain": self.selection.gains[name] if kept else chosen.total - other.total if other else 0.0,
+                "extrapolates": name in self.selector.extrapolating,
+                "held_out_position_mm": {"with": now if kept else error, "without": error if kept else now},
+            }
+        return out
+
+    def _error(self, poses: Floats) -> float:
+        name = "position_rms_mm"
+        return rms(squares(self.judged.select(self.held), poses[self.held])[name], name)
+
+    def _dependences(self, poses: Floats) -> list[Dependence]:
+        """Return what the rest depends on, a stretch of driving being one piece of evidence."""
+        rates = residual_rates(self.judged, poses)
+        _, stretch = np.unique(self.judged.group, return_inverse=True)
+        rates.covariates.pop("distance_m")  # counted from the window's beginning, where a wheel may stand anyhow
+        clustered = dataclasses.replace(rates, run=stretch[rates.run].astype(np.int64))
+        return dependences(clustered, np.arange(int(stretch.max()) + 1), self.asked.seed)
+
+
+def _above(held_out: HeldOut, times: float) -> bool:
+    return any(e["after"] > times * e["floor"] for e in held_out.errors.values())
+
+
+def _verdict(effects: tuple[NamedEffect, ...], rest: list[Dependence], far: bool) -> tuple[Verdict, str]:
+    if rest:
+        return Verdict.UNKNOWN, f"structure remains that no effect explains: it depends on {rest[0].covariate}"
+    if far:
+        return Verdict.UNKNOWN, (
+            f"what is missed is more than {FAR_ABOVE:g} times what noise explains, "
+            "but depends on none of the covariates looked at"
+        )
+    if not effects:
+        return Verdict.ADEQUATE, "nothing that was looked at predicts better than static maps, fitted again"
+    if any(effect.confounded_with for effect in effects):
+        return Verdict.AMBIGUOUS, "several effects explain the residual equally well"
+    return Verdict.NAMED, "nothing that was looked at explains what the effects named leave"

@@ -1,0 +1,1 @@
+"""What a fitted model leaves: residuals, body rates, covariate tests, periodic disturbances."""

@@ -1,0 +1,1 @@
+"""Which effects the model needs: candidates, stepwise selection, variants of laws, validation."""

@@ -1,0 +1,264 @@
+"""Models with more effects or fewer: fitted once, cross-validated, and remembered."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.diagnosis.data.splits import folds
+from agvbench.diagnosis.data.window_splits import fold_groups
+from agvbench.diagnosis.estimation.cross_validation import FOLDS, cross_validated
+from agvbench.diagnosis.estimation.fit import Fit, fit
+from agvbench.diagnosis.estimation.score_test import begun, promised_gain
+from agvbench.diagnosis.model.batch import Batch
+from agvbench.diagnosis.model.predictor import Predictor
+from agvbench.diagnosis.selection.candidates import Candidate, bounds_of, usual
+from agvbench.types import Floats
+
+Tell = Callable[[str], None]
+
+_SHORT, _LONG = 3, 10
+_HOPELESS = 3.0  # what promises less, to first order, is not fitted
+_LIKELY = 40.0  # what promises more is fitted to the end
+_MOST_STARTS = 2
+_WORSE = 20.0  # a fit that has not ended yet may still be so much worse than without the effect
+_KEPT = 0.5  # of what is promised: a fit that gains less has lost its way
+
+
+Starts = frozenset[tuple[str, bytes]]
+"""Which effects were fitted from other values than the usual, and from which."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """A model that is asked for: its effects, and which of them start elsewhere than usual.
+
+    Equal requests have the same answer, whatever was asked for in between.
+    """
+
+    names: frozenset[str]
+    starts: Starts = frozenset()
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A fitted model, the effects in it, each run's cross-validated loss (R,), and its unusual starts."""
+
+    names: tuple[str, ...]
+    fit: Fit
+    loss: Floats
+    starts: Starts = frozenset()
+
+    @property
+    def request(self) -> Request:
+        """What was asked for."""
+        return Request(frozenset(self.names), self.starts)
+
+    @property
+    def is_fitted(self) -> bool:
+        """Whether the effects were fitted; False for a model that is not worth it and predicts as without the last."""
+        return self.fit.predictor.effects == self.names
+
+    @property
+    def total(self) -> float:
+        """The cross-validated loss of all runs."""
+        return float(self.loss.sum())
+
+    def gain_over(self, other: Scored) -> float:
+        """Return by how much this model predicts better, and fits better: the lesser of the two.
+
+        Where few runs tell a value of the maps, predicting without them is a gamble, and wins or loses a hundred.
+        What the runs themselves do not speak for is no gain.
+        """
+        return min(other.total - self.total, float(other.fit.loss.sum() - self.fit.loss.sum()))
+
+
+@dataclass
+class FittedModels:
+    """Fits models to the runs to be fitted.
+
+    ``given`` are effects that the vehicle is known to have: they stay in every model, with parameters fitted again from
+    ``given_values``. ``tried`` counts the models that were fitted.
+    """
+
+    batch: Batch
+    candidates: dict[str, Candidate]
+    start: Floats
+    seed: int
+    tell: Tell
+    given: tuple[str, ...] = ()
+    given_values: Floats = field(default_factory=lambda: np.empty(0))
+    tried: int = 0
+    _fold: NDArray[np.int64] = field(init=False)
+    _known: dict[Request, Scored] = field(init=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._fold = folds(fold_groups(self.batch.readings), FOLDS, self.seed)
+
+    def base(self) -> Scored:
+        """Return the model without any effect that the vehicle is not known to have."""
+        return self.score(self.given, np.r_[self.start, self.given_values], None)
+
+    def adopt(self, scored: Scored) -> Scored:
+        """Take over what was fitted elsewhere to runs that this model predicts alike, and return it as one's own."""
+        fitted = replace(scored.fit, predictor=self._predictor(scored.names))
+        own = self._known[scored.request] = replace(scored, fit=fitted)
+        return own
+
+    def known(self, names: tuple[str, ...]) -> Scored | None:
+        """Return the model with the effects `names`, all from their usual starts, if it was fitted."""
+        return self._known.get(Request(frozenset(names)))
+
+    def shrunk(self, base: Scored, current: Scored, name: str) -> Scored:
+        """Return the model without the effect called `name`."""
+        names = tuple(n for n in current.names if n != name)
+        if names == self.given:
+            return base
+        own = current.fit.effect_values()
+        kept = [value for key, value in own.items() if key.partition(".")[0] != name]
+        maps = current.fit.parameters[: self.batch.maps.size]
+        starts = frozenset(start for start in current.starts if start[0] != name)
+        return self.score(names, np.r_[maps, kept], current.fit, starts=starts)
+
+    def grown(self, current: Scored, name: str, unusual: Candidate | None = None) -> Scored:
+        """Return `current` with the effect called `name`, fitted from the best of its starts.
+
+        These are the usual ones, or those of the candidate `unusual`.
+        """
+        names = (*current.names, name)
+        starts = current.starts if unusual is None else current.starts | unusual.key
+        if found := self._known.get(Request(frozenset(names), starts)):
+            return found
+        try:
+            return self._grown(current, self._predictor(names), unusual or usual(name), starts)
+        except np.linalg.LinAlgError:
+            # What runs away to where nothing can be predicted describes nothing.
+            return replace(current, names=names)
+
+    def promise(self, current: Scored, name: str) -> float:
+        """Return what the effect called `name` promises beside `current`, to first order, from its best start."""
+        return max(self._promises(current, self._predictor((*current.names, name)), usual(name)))
+
+    @staticmethod
+    def _promises(current: Scored, predictor: Predictor, candidate: Candidate) -> list[float]:
+        return [promised_gain(current.fit, predictor, start, candidate.bounds) for start in candidate.starts]
+
+    def _grown(self, current: Scored, predictor: Predictor, candidate: Candidate, starts: Starts) -> Scored:
+        names, now = predictor.effects, current.fit
+        bounds = bounds_of(names)
+        promises = self._promises(current, predictor, candidate)
+        promise = max(promises)
+        if promise < _HOPELESS:
+            return replace(current, names=names)  # as good as without it, and never chosen
+        ordered = [candidate.starts[k] for k in np.argsort(promises)[::-1]]
+        believed = candidate.screened and promise > _LIKELY
+        short = self._begun(current, predictor, ordered, bounds, _KEPT * promise if believed else None)
+        # What promises much may have to climb first: maps that took up a cause must give it back before it shows.
+        if promise < _LIKELY and float(now.loss.sum() - short.loss.sum()) < _HOPELESS:
+            self.tried += 1
+            tried = Scored(names, short, cross_validated(short, self._fold, bounds), starts)
+            return self._known.setdefault(tried.request, tried)
+        return self.score(names, short.parameters, short, starts=starts, patient=believed and candidate.foremost)
+
+    def _begun(
+        self, current: Scored, predictor: Predictor, starts: list[Floats], bounds: Floats, least: float | None
+    ) -> Fit:
+        """Return a fit of some steps from the first of `starts`, or the best of them where it gains less than `least`.
+
+        A start is far from the valley, for the maps have taken up what it adds, and the way down may end anywhere: then
+        the maps are first fitted beside it, held where it starts. Where nothing can be expected (`least` is None), that
+        is done if the fit ends worse than without, and for a few steps only.
+        """
+        found = [self._first_steps(current, predictor, starts[0], bounds)]
+        iterations = _SHORT if least is None else _LONG
+        if current.fit.loss.sum() - found[0].loss.sum() <= (-_WORSE if least is None else least):
+            for start in starts[:_MOST_STARTS]:
+                held = bounds.copy()
+                held[-len(start) :] = start[:, None]
+                beside = self._first_steps(current, predictor, start, held, iterations=iterations)
+                found.append(self._first_steps(current, predictor, start, bounds, beside, iterations=iterations))
+        return min(found, key=lambda one: float(one.loss.sum()))
+
+    @staticmethod
+    def _first_steps(
+        current: Scored,
+        predictor: Predictor,
+        start: Floats,
+        bounds: Floats,
+        beside: Fit | None = None,
+        *,
+        iterations: int = _SHORT,
+    ) -> Fit:
+        now = current.fit
+        return fit(
+            predictor,
+            begun(now, predictor, start) if beside is None else beside.parameters,
+            bounds,
+            offsets=(beside or now).offsets,
+            scatter=(beside or now).scatter,
+            iterations=iterations,
+            near=now.linear,
+        )
+
+    def score(
+        self,
+        names: tuple[str, ...],
+        parameters: Floats,
+        near: Fit | None,
+        *,
+        starts: Starts = frozenset(),
+        patient: bool = False,
+    ) -> Scored:
+        """Fit the model with the effects `names` and cross-validate it; what was fitted before is remembered.
+
+        Of these, `starts` begin elsewhere than usual. A `patient` fit is given more steps while they are worth it.
+        """
+        request = Request(frozenset(names), starts)
+        if request not in self._known:
+            bounds = bounds_of(names)
+            fitted = fit(
+                self._predictor(names) if near is None or near.predictor.effects != names else near.predictor,
+                parameters,
+                bounds,
+                offsets=None if near is None else near.offsets,
+                scatter=None if near is None else near.scatter,
+                iterations=_LONG,
+                patient=patient,
+                near=None if near is None else near.linear,
+            )
+            self.tried += 1
+            self._known[request] = Scored(names, fitted, cross_validated(fitted, self._fold, bounds), starts)
+        return self._known[request]
+
+    def left(self, smaller: Scored, larger: Scored) -> Scored:
+        """Return what is left of `larger` when an effect is dropped that it does not need.
+
+        The smaller model may have been fitted before, from elsewhere, and have ended somewhere else.
+        """
+        if smaller.names == self.given:
+            return smaller
+        again = self._known[smaller.request] = self.retried(smaller, larger)
+        return again
+
+    def retried(self, model: Scored, beyond: Scored) -> Scored:
+        """Return `model` fitted again, patiently, from where the model `beyond` stands, if it predicts better.
+
+        What another model gains may be nothing but the way that its fit went on. Effects that it lacks begin where they
+        are in `model`.
+        """
+        own = model.fit.effect_values() | beyond.fit.effect_values()
+        kept = [value for name in model.names for key, value in own.items() if key.partition(".")[0] == name]
+        bounds = bounds_of(model.names)
+        again = fit(
+            self._predictor(model.names), np.r_[beyond.fit.parameters[: self.batch.maps.size], kept], bounds,
+            offsets=beyond.fit.offsets, scatter=beyond.fit.scatter, iterations=_LONG, patient=True,
+        )  # fmt: skip
+        self.tried += 1
+        scored = Scored(model.names, again, cross_validated(again, self._fold, bounds), model.starts)
+        return min(model, scored, key=lambda one: one.total)
+
+    def _predictor(self, names: tuple[str, ...]) -> Predictor:
+        return Predictor(self.batch, names)

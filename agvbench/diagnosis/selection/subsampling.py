@@ -1,0 +1,75 @@
+"""Causes are looked for in some hundred runs and measured in all of them.
+
+Repeats beyond a few say more of how large a cause is, and hardly more of which: trying hundreds of models on all of
+them costs minutes and gigabytes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.diagnosis.data.readings import Readings
+from agvbench.diagnosis.data.window_splits import thinned
+from agvbench.diagnosis.model.batch import Batch
+from agvbench.diagnosis.selection.fitted_models import Scored
+from agvbench.diagnosis.selection.stepwise import Selection, Selector
+from agvbench.diagnosis.selection.variants import BEYOND
+from agvbench.diagnosis.selection.with_term import Explained
+
+MOST_RUNS = 240
+"""In so many runs causes are looked for, as far as commands with a repeat each leave it at that."""
+
+_FEWEST_REPEATS = 2
+
+
+def some_repeats(group: NDArray[np.int64], most: int) -> NDArray[np.bool_]:
+    """Return which runs to look for causes in, (R,): as many repeats of each group, spread over the session.
+
+    Parameters
+    ----------
+    group
+        (R,): a number for each run, in the order in which they were driven; repeats share it.
+    most
+        So many runs are enough.
+    """
+    sizes = np.bincount(group)
+    repeats = np.arange(_FEWEST_REPEATS, max(int(sizes.max()), _FEWEST_REPEATS) + 1)
+    total = np.minimum(sizes[:, None], repeats).sum(axis=0)
+    fair = int(repeats[max(int(np.searchsorted(total, most, side="right")) - 1, 0)])
+    chosen = np.zeros(len(group), dtype=np.bool_)
+    for g in np.unique(group):
+        chosen[thinned(np.flatnonzero(group == g), fair)] = True
+    return chosen
+
+
+def measured_in_all(
+    selection: Selection, explained: Explained | None, selector: Selector, readings: Readings
+) -> tuple[Selection, Explained | None]:
+    """Return what was found with its models fitted to all runs to be fitted; gains and rivals stay as they were found.
+
+    Parameters
+    ----------
+    selection, explained
+        What was found in some of the runs.
+    selector
+        Who found it.
+    readings
+        All runs to be fitted.
+    """
+    batch = selector.batch
+    stood = replace(readings, stood=batch.readings.stood)
+    whole = selector.over(Batch(stood, batch.maps, batch.geometry, kinds=BEYOND))
+
+    def again(model: Scored) -> Scored:
+        return whole.score(model.names, model.fit.parameters, None)
+
+    def both(found: Selection) -> Selection:
+        return replace(found, base=again(found.base), chosen=again(found.chosen))
+
+    if explained is None:
+        return both(selection), None
+    term = replace(explained, selection=both(explained.selection), without=again(explained.without))
+    return both(selection), term

@@ -1,0 +1,80 @@
+"""A selection with an empirical term, and what is said of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.diagnosis.estimation.cross_validation import by_group
+from agvbench.diagnosis.estimation.likelihood import residual_of
+from agvbench.diagnosis.residuals.covariate_test import Dependence
+from agvbench.diagnosis.selection.fitted_models import Scored
+from agvbench.diagnosis.selection.stepwise import Selection
+from agvbench.diagnosis.terms import EmpiricalTerm
+from agvbench.types import Floats
+
+_FLIPS = 9999
+
+
+@dataclass(frozen=True)
+class Explained:
+    """A selection with an empirical term.
+
+    ``selection.chosen`` holds the term beside the effects that predict better with it; ``without`` is the model of
+    these effects alone. ``gain`` is the term's, in cross-validated minus two log likelihood; ``p_value`` that of
+    as great a gain if it helped each group of runs as often as not.
+    """
+
+    selection: Selection
+    term: type[EmpiricalTerm]
+    without: Scored
+    gain: float
+    p_value: float
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The term's parameters by name."""
+        own = self.selection.chosen.fit.effect_values()
+        return {p.name: own[f"{self.term.name}.{p.name}"] for p in self.term.parameters()}
+
+
+def described(explained: Explained) -> dict[str, object]:
+    """Return what is said of an empirical term in the diagnosis."""
+    return {
+        "name": explained.term.name,
+        "covariate": explained.term.covariates[0],
+        "through": explained.term.through,
+        "parameters": explained.values,
+        "gain": explained.gain,
+        "p_value": explained.p_value,
+    }
+
+
+def with_term_first(rest: list[Dependence], explained: Explained) -> list[Dependence]:
+    """Return the dependences with what the term depends on first.
+
+    Of covariates that the term leaves open (along x or along y) it is the one that smooth curves find stronger.
+    """
+    own = [d for d in rest if d.covariate in explained.term.covariates]
+    if own:
+        first = replace(own[0], p_value=min(own[0].p_value, explained.p_value))
+        return [first, *(d for d in rest if d is not own[0])]
+    with_term, without = (_missed(model) for model in (explained.selection.chosen, explained.without))
+    share = 1.0 - with_term / max(without, 1e-300)
+    return [Dependence(explained.term.covariates[0], explained.term.through, explained.p_value, share), *rest]
+
+
+def _missed(model: Scored) -> float:
+    """Return the sum of squares that a model misses, no run's own offsets helping."""
+    predictor = model.fit.predictor
+    return float(np.nansum(residual_of(predictor, predictor.predict(model.fit.parameters)) ** 2))
+
+
+def gain_p_value(gain: Floats, group: NDArray[np.int64], seed: int) -> float:
+    """Return how often the total gain would be as great if each group's gain (R,) had its sign by chance."""
+    gains = by_group(gain, group)
+    rng = np.random.default_rng([0xF119, seed])
+    signs = rng.integers(0, 2, (_FLIPS, len(gains))) * 2.0 - 1.0
+    return float((1.0 + np.count_nonzero(signs @ gains >= gains.sum())) / (_FLIPS + 1.0))
