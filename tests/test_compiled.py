@@ -44,7 +44,7 @@ class Own(Shared, Effect):
 PROGRAM = """
 from plant.effect import Own
 from plant.kernel import run
-from agvbench.model.simulation_compose import kernel
+from agvbench.model.simulation.compose import kernel
 kernel((Own,))
 print(run(1.0))
 """

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from agvbench.errors import FitError, InputError
-from agvbench.model.simulation import Simulation
+from agvbench.model.simulation.simulation import Simulation
 from agvbench.types import Floats
 
 _MOST_STEPS = 30

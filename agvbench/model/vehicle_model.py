@@ -162,11 +162,11 @@ class VehicleModel:
     ) -> list[Floats]:
         """Simulate a batch of runs; see `agvbench.model.rollout.rollout`.
 
-        Effects that the fast kernel does not know are simulated by `agvbench.model.simulation_rollout.general_rollout`,
+        Effects that the fast kernel does not know are simulated by `agvbench.model.simulation.rollout.general_rollout`,
         for which `started_h` says when each run began, in hours since the session began.
         """
         from agvbench.model.rollout import has_fast_kernel, rollout
-        from agvbench.model.simulation_rollout import general_rollout
+        from agvbench.model.simulation.rollout import general_rollout
 
         if has_fast_kernel(self):
             return rollout(self, commands, initial, [np.asarray(t, dtype=np.float64) for t in t_s])

@@ -23,8 +23,8 @@ from scipy.optimize import least_squares
 from agvbench.calibration.identification import PoseNoise, identify
 from agvbench.effects import effect_kinds
 from agvbench.model import thesis_vehicle
-from agvbench.model.simulated_run import SimulatedRun
-from agvbench.model.simulation import Simulation
+from agvbench.model.simulation.simulated_run import SimulatedRun
+from agvbench.model.simulation.simulation import Simulation
 from agvbench.types import Commands, Floats
 
 RUNS, SECONDS, RATE_HZ, DRAWS, ROUNDS = 100, 10.0, 120.0, 200, 3

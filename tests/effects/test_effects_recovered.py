@@ -14,8 +14,8 @@ import pytest
 from scipy.optimize import least_squares
 
 from agvbench.effects import effect_kinds
-from agvbench.model.simulated_run import SimulatedRun
-from agvbench.model.simulation import Simulation
+from agvbench.model.simulation.simulated_run import SimulatedRun
+from agvbench.model.simulation.simulation import Simulation
 from agvbench.simulator.hidden import HiddenPlant
 from agvbench.simulator.hidden.constants import BASE
 from agvbench.simulator.hidden.plant import TURNAROUND_S

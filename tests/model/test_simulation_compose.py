@@ -10,9 +10,9 @@ import pytest
 
 from agvbench.effects import effect_kinds
 from agvbench.errors import FileError
-from agvbench.model import simulation_compose
-from agvbench.model.simulated_run import SimulatedRun
-from agvbench.model.simulation import Simulation
+from agvbench.model.simulation import compose as simulation_compose
+from agvbench.model.simulation.simulated_run import SimulatedRun
+from agvbench.model.simulation.simulation import Simulation
 from agvbench.types import Commands
 from agvbench.vehicle.geometry import Geometry
 
@@ -39,8 +39,8 @@ class SlowPatch(Effect):
 PROGRAM = """
 import numpy as np
 from slow_patch import SlowPatch
-from agvbench.model.simulated_run import SimulatedRun
-from agvbench.model.simulation import Simulation
+from agvbench.model.simulation.simulated_run import SimulatedRun
+from agvbench.model.simulation.simulation import Simulation
 from agvbench.types import Commands
 from agvbench.vehicle.geometry import Geometry
 run = SimulatedRun(Commands(*np.array([[0.0], [1600.0], [1500.0], [1500.0]])), np.array([0.0, 10.0]))

@@ -11,9 +11,9 @@ from simulation_truth import COMMANDS, FRAMES, LF, LR, REST, RUN_TIMES, SETTLED
 
 from agvbench.effects import effect_kinds
 from agvbench.effects.forms import effect_forms
-from agvbench.model.simulated_run import SimulatedRun
-from agvbench.model.simulation import Simulation
-from agvbench.model.simulation_compose import kernel_text
+from agvbench.model.simulation.compose import kernel_text
+from agvbench.model.simulation.simulated_run import SimulatedRun
+from agvbench.model.simulation.simulation import Simulation
 from agvbench.types import Commands
 from agvbench.vehicle.geometry import Geometry
 

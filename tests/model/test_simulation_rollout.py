@@ -8,9 +8,9 @@ import pytest
 from agvbench.effects import ActuationDelay, SpeedLag, SteeringLag, effect_kinds
 from agvbench.errors import InputError
 from agvbench.model import thesis_vehicle
-from agvbench.model.simulated_run import SimulatedRun
-from agvbench.model.simulation import Simulation
-from agvbench.model.simulation_rollout import general_rollout
+from agvbench.model.simulation.rollout import general_rollout
+from agvbench.model.simulation.simulated_run import SimulatedRun
+from agvbench.model.simulation.simulation import Simulation
 from agvbench.types import Commands
 from agvbench.vehicle.geometry import Geometry
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from agvbench.calibration import inspect_frames
 from agvbench.calibration.campaign_protocol import HeaderLike
 from agvbench.diagnosis.data.initial_pose import frame_noise, rests
-from agvbench.model.simulation_loop import LATELY_S
+from agvbench.model.simulation.loop import LATELY_S
 from agvbench.statistics.rest_poses import SPEED_LIMIT_MPS
 from agvbench.types import Commands, Floats, Frames, Run
 

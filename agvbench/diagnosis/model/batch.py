@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.model.nodal_maps import ROLES, FreeMaps
 from agvbench.effects import Effect
-from agvbench.model.simulation import Simulation
+from agvbench.model.simulation.simulation import Simulation
 from agvbench.types import Floats
 from agvbench.vehicle.geometry import Geometry
 

@@ -23,8 +23,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from agvbench.effects import Effect, effect_kinds
 from agvbench.errors import InputError, VehicleError
-from agvbench.model.simulated_run import SimulatedRun, check_runs
-from agvbench.model.simulation_compose import kernel
+from agvbench.model.simulation.compose import kernel
+from agvbench.model.simulation.simulated_run import SimulatedRun, check_runs
 from agvbench.types import Floats
 from agvbench.vehicle.geometry import Geometry
 
@@ -261,7 +261,7 @@ class Simulation:
         initial_state
             Whether x, y, heading and speed at the start are varied.
         """
-        from agvbench.model.simulation_slopes import slopes
+        from agvbench.model.simulation.slopes import slopes
 
         return slopes(self, settled, parameters, initial, directions, self.indices(*effects), initial_state)
 

@@ -3,7 +3,7 @@
 
 A servo obeys δ̇ = (aim − δ) / lag within ± rate: it ramps as long as the lag asks for more than the rate, and then its
 gap decays. Its way is monotone, so the axle behind it, with play, is known from where it stood. Servos of second order
-are in `agvbench.model.simulation_servos`. The drive obeys v̇ = (aim − v) / lag within limits of v̇, as a servo does;
+are in `agvbench.model.simulation.servos`. The drive obeys v̇ = (aim − v) / lag within limits of v̇, as a servo does;
 where it has to reverse it brakes to rest first. All of this is kept as a *plan*, an array.
 """
 
@@ -29,7 +29,7 @@ from agvbench.effects.state import (
     STEERING_RATE,
 )
 from agvbench.model.compiled import compiled
-from agvbench.model.simulation_servos import (
+from agvbench.model.simulation.servos import (
     CRUISED_S,
     FIRST_ORDER,
     INERT,

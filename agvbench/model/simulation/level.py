@@ -1,6 +1,6 @@
 """Where a simulation begins in mid-drive: the speed that was measured there, and the level of the drive that it tells.
 
-A part of the kernel; see `agvbench.model.simulation_compose`.
+A part of the kernel; see `agvbench.model.simulation.compose`.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ import math
 
 from agvbench.effects.state import FORWARD, FRONT, HOURS, LEFT, REAR, SEEN_LAG, SPEED, TIME, YAW_RATE
 from agvbench.model.compiled import compiled
-from agvbench.model.simulation_layout import FRONT_AXLE, LEVEL_SCATTER, REAR_AXLE, SECONDS_PER_HOUR, STARTED
-from agvbench.model.simulation_step import set_motion
+from agvbench.model.simulation.layout import FRONT_AXLE, LEVEL_SCATTER, REAR_AXLE, SECONDS_PER_HOUR, STARTED
+from agvbench.model.simulation.step import set_motion
 from agvbench.types import Floats
 
 # Less of the drive's speed than this is left ahead only if numbers are nonsense.

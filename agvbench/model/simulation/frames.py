@@ -1,15 +1,15 @@
 """What the camera reports of the motion: at the start of a run, while the vehicle stands, and within each step.
 
-Frames are read off the polynomial of a step. A part of the kernel; see `agvbench.model.simulation_compose`.
+Frames are read off the polynomial of a step. A part of the kernel; see `agvbench.model.simulation.compose`.
 """
 
 from __future__ import annotations
 
 from agvbench.effects.state import HEADING, SEEN_HEADING, SEEN_LAG, SEEN_X, SEEN_Y, X, Y
 from agvbench.model.compiled import compiled
-from agvbench.model.simulation_layout import ALONG_X, ALONG_Y, BASIS, COUNT, SMOOTH, TO_NODES, TURNED
-from agvbench.model.simulation_smoothing import bend, smoothed
-from agvbench.model.simulation_stages import capture, see
+from agvbench.model.simulation.layout import ALONG_X, ALONG_Y, BASIS, COUNT, SMOOTH, TO_NODES, TURNED
+from agvbench.model.simulation.smoothing import bend, smoothed
+from agvbench.model.simulation.stages import capture, see
 from agvbench.types import Floats
 
 

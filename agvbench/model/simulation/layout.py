@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from agvbench.model.simulation_smoothing import SMOOTH_SIZE
+from agvbench.model.simulation.smoothing import SMOOTH_SIZE
 
 # Gauss–Legendre nodes on [0, 1]; ∫₀^c of the polynomial through values at the nodes is the values times
 # c (BASIS[j, 0] + c BASIS[j, 1] + …).

@@ -3,7 +3,7 @@
 Steps end where a command takes effect and where the actuators' way has a kink, so that nothing in a step jumps.
 
 The stages imported here do nothing. The simulation runs this file's text, and that of the files that it calls, with
-the effects' hooks in their place; see `agvbench.model.simulation_compose`.
+the effects' hooks in their place; see `agvbench.model.simulation.compose`.
 """
 
 from __future__ import annotations
@@ -43,12 +43,12 @@ from agvbench.effects.state import (
     Y,
 )
 from agvbench.model.compiled import compiled
-from agvbench.model.simulation_actuators import PLAN_SIZE, SERVOS_SIZE, leave_command, plan_command, step_length
-from agvbench.model.simulation_frames import follow_seen, report_step, see_step, start_run, wait
-from agvbench.model.simulation_layout import COUNT, LONGEST_STEP, START_SIZE, STARTED, TURN, WORK_SIZE
-from agvbench.model.simulation_level import drive_speed, level_lift, see_late
-from agvbench.model.simulation_stages import aim, arrive, capture
-from agvbench.model.simulation_step import end_step, take_step
+from agvbench.model.simulation.actuators import PLAN_SIZE, SERVOS_SIZE, leave_command, plan_command, step_length
+from agvbench.model.simulation.frames import follow_seen, report_step, see_step, start_run, wait
+from agvbench.model.simulation.layout import COUNT, LONGEST_STEP, START_SIZE, STARTED, TURN, WORK_SIZE
+from agvbench.model.simulation.level import drive_speed, level_lift, see_late
+from agvbench.model.simulation.stages import aim, arrive, capture
+from agvbench.model.simulation.step import end_step, take_step
 from agvbench.types import Floats
 
 Integers = NDArray[np.int64]

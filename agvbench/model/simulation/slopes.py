@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from agvbench.types import Floats
 
 if TYPE_CHECKING:
-    from agvbench.model.simulation import Simulation, Slopes
+    from agvbench.model.simulation.simulation import Simulation, Slopes
 
 Integers = NDArray[np.int64]
 
@@ -29,7 +29,7 @@ def slopes(
     initial_state: bool,
 ) -> Slopes:
     """Return the derivatives that `Simulation.jacobian` describes."""
-    from agvbench.model.simulation import Slopes
+    from agvbench.model.simulation.simulation import Slopes
 
     asked = np.empty((0, *settled.shape)) if directions is None else directions
     return Slopes(

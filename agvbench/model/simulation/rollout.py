@@ -12,8 +12,8 @@ from agvbench.effects import Effect, effect_kinds
 from agvbench.effects.forms import effect_forms
 from agvbench.model.batch import Batch
 from agvbench.model.rollout import settled_targets
-from agvbench.model.simulated_run import SimulatedRun
-from agvbench.model.simulation import Simulation
+from agvbench.model.simulation.simulated_run import SimulatedRun
+from agvbench.model.simulation.simulation import Simulation
 from agvbench.types import Commands, Floats
 
 if TYPE_CHECKING:

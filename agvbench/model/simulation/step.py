@@ -1,7 +1,7 @@
 """One step of the general simulation: nothing in it jumps.
 
 The motion is taken at the four Gauss–Legendre nodes; heading and position follow by collocation (Hairer, Nørsett and
-Wanner 1993, section II.7). A part of the kernel; see `agvbench.model.simulation_compose`.
+Wanner 1993, section II.7). A part of the kernel; see `agvbench.model.simulation.compose`.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ from agvbench.effects.state import (
     Y,
 )
 from agvbench.model.compiled import compiled
-from agvbench.model.simulation_actuators import actuate
-from agvbench.model.simulation_layout import (
+from agvbench.model.simulation.actuators import actuate
+from agvbench.model.simulation.layout import (
     AHEAD,
     ALONG_X,
     ALONG_Y,
@@ -50,7 +50,7 @@ from agvbench.model.simulation_layout import (
     TURNED,
     WEIGHTS,
 )
-from agvbench.model.simulation_stages import drift, drive, move, steer
+from agvbench.model.simulation.stages import drift, drive, move, steer
 from agvbench.types import Floats
 
 

@@ -1,6 +1,6 @@
 """The stages of a vehicle without effects: none does anything.
 
-`agvbench.model.simulation_compose` puts the hooks of all effects in the place of these functions.
+`agvbench.model.simulation.compose` puts the hooks of all effects in the place of these functions.
 """
 
 from __future__ import annotations

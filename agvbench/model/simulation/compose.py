@@ -21,7 +21,11 @@ from types import ModuleType
 from agvbench.compiled import cache_directory, source_digest
 from agvbench.effects import HOOKS, TIME_HOOKS, Effect
 from agvbench.errors import FileError
-from agvbench.model import simulation_frames, simulation_level, simulation_loop, simulation_stages, simulation_step
+from agvbench.model.simulation import frames as simulation_frames
+from agvbench.model.simulation import level as simulation_level
+from agvbench.model.simulation import loop as simulation_loop
+from agvbench.model.simulation import stages as simulation_stages
+from agvbench.model.simulation import step as simulation_step
 
 # The files of the kernel that call stages, or what calls them, each after those that it imports.
 _PARTS = (simulation_frames, simulation_step, simulation_level, simulation_loop)
@@ -32,7 +36,7 @@ _SECOND_ORDER = {"STEERING_INERTIA", "STEERING_ACCELERATION"}
 
 @cache
 def kernel(kinds: tuple[type[Effect], ...]) -> Callable[..., None]:
-    """Return the compiled ``simulate`` of `agvbench.model.simulation_loop` with the hooks of `kinds`.
+    """Return the compiled ``simulate`` of `agvbench.model.simulation.loop` with the hooks of `kinds`.
 
     Parameters are laid out in the order of `kinds`. Compiling takes some seconds, once per set of effects and version.
 

@@ -1,0 +1,1 @@
+"""The generated simulation: effects composed into one compiled loop."""
