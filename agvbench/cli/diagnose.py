@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     found = run_diagnose(
         arguments.directory,
-        tell=lambda answer: print_diagnosis(answer, console),
+        show=lambda answer: print_diagnosis(answer, console),
         json_file=arguments.json_file,
         out=arguments.out,
         vehicle=arguments.vehicle,

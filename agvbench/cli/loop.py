@@ -75,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
         given,
         out=arguments.out,
         resume=arguments.resume,
-        tell=lambda line: console.print(plain_sentences(line), highlight=False, markup=False, soft_wrap=True),
+        on_progress=lambda line: console.print(plain_sentences(line), highlight=False, markup=False, soft_wrap=True),
     )
     from agvbench.reporting.loop_report import print_loop, write_loop_report
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from agvbench.diagnosis.context import Asked
+from agvbench.diagnosis.context import DiagnosisContext
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.data.splits import Split
 from agvbench.diagnosis.design.propose import with_next_experiment
@@ -16,13 +16,13 @@ from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.residuals.body_rates import residual_rates
 from agvbench.diagnosis.residuals.covariate_test import ALPHA, LIKELY, RANDOM_PHASE, Dependence, dependences
-from agvbench.diagnosis.residuals.periodic import swing
+from agvbench.diagnosis.residuals.periodic import periodic_disturbance
 from agvbench.diagnosis.residuals.residuals import MEDIAN, end_spread
 from agvbench.diagnosis.result import Diagnosis, HeldOut, NamedEffect, Verdict
 from agvbench.diagnosis.selection.candidates import bounds_of
 from agvbench.diagnosis.selection.stepwise import Selection
-from agvbench.diagnosis.selection.validation import Judged, judge, predicts
-from agvbench.diagnosis.selection.with_term import Explained, described, with_term_first
+from agvbench.diagnosis.selection.validation import Assessment, assess, predicts
+from agvbench.diagnosis.selection.with_term import TermSelection, described, with_term_first
 from agvbench.effects.forms import effect_forms
 from agvbench.model import VehicleModel
 from agvbench.types import Floats
@@ -31,11 +31,11 @@ _REMAINS = "structure remains that no effect explains: "
 
 
 def conclude(
-    asked: Asked,
+    context: DiagnosisContext,
     readings: Readings,
     split: Split,
     library: Selection,
-    explained: Explained | None,
+    term_selection: TermSelection | None,
     searched: int,
 ) -> Diagnosis:
     """Return the diagnosis that what was found amounts to; the test runs are opened here, and nothing is chosen after.
@@ -51,20 +51,20 @@ def conclude(
     searched
         In how many runs causes were looked for.
     """
-    selection = explained.selection if explained else library
+    selection = term_selection.selection if term_selection else library
     fit = selection.chosen.fit
-    every = predicts(library, explained, readings)
+    every = predicts(library, term_selection, readings)
     batch, reformed = every.batch, bool(effect_forms().keys() & set(selection.chosen.names))
-    poses, before = every.predict(fit.parameters), _poses_before(asked.vehicle, batch, selection)
+    poses, before = every.predict(fit.parameters), _poses_before(context.vehicle, batch, selection)
     spread = end_spread(every, fit)
     # A test of fit needs all the groups that it can get; what is published is of the test runs alone.
-    judged, tested = (judge(readings, own, before, poses, spread) for own in (~split.training, split.test))
-    if judged is None or tested is None:
-        return asked.cannot_tell(readings, "there are no repeats among the runs, and so no floor")
-    rest, likely = _what_is_left(batch, poses, explained, asked.seed)
-    effects = named_effects(selection, bounds_of(selection.chosen.names)) + map_effects(fit, asked.vehicle)
-    significant = explained is not None or judged.lacks or bool(rest)
-    verdict, why = _verdict(effects, significant, rest, explained)
+    assessment, tested = (assess(readings, own, before, poses, spread) for own in (~split.training, split.test))
+    if assessment is None or tested is None:
+        return context.cannot_tell(readings, "there are no repeats among the runs, and so no floor")
+    rest, likely = _what_is_left(batch, poses, term_selection, context.seed)
+    effects = named_effects(selection, bounds_of(selection.chosen.names)) + map_effects(fit, context.vehicle)
+    significant = term_selection is not None or assessment.lacks or bool(rest)
+    verdict, why = _verdict(effects, significant, rest, term_selection)
     if significant and not rest and likely:
         rest, why = likely, f"{_REMAINS}it is likely to depend on {likely[0].covariate}"
     found = Diagnosis(
@@ -74,19 +74,19 @@ def conclude(
         significant,
         tuple(rest),
         _held_out(readings.select(split.test), tested),
-        corrected_vehicle(asked.header, asked.geometry, fit, fit.predictor.maps, asked.seed),
+        corrected_vehicle(context.header, context.geometry, fit, fit.predictor.maps, context.seed),
         selection.rejected,
-        asked.provenance(readings)
+        context.provenance(readings)
         | _how_it_was_fitted(selection, readings)
         | {"fit_runs": int(split.training.sum()), "searched_runs": searched}
         | {"validation_runs": int(split.validation.sum())}
-        | {"lack_of_fit_p_value": judged.lack_of_fit}
-        | ({"empirical_term": described(explained)} if explained else {}),
+        | {"lack_of_fit_p_value": assessment.lack_of_fit}
+        | ({"empirical_term": described(term_selection)} if term_selection else {}),
     )
     found = with_residuals(found, readings, split.test, before, poses)
-    if explained or reformed:
+    if term_selection or reformed:
         return found
-    return with_next_experiment(found, selection, readings, asked.header, asked.seed)
+    return with_next_experiment(found, selection, readings, context.header, context.seed)
 
 
 def _poses_before(vehicle: VehicleModel | None, batch: Batch, selection: Selection) -> Floats:
@@ -98,45 +98,45 @@ def _poses_before(vehicle: VehicleModel | None, batch: Batch, selection: Selecti
 
 
 def _what_is_left(
-    batch: Batch, poses: Floats, explained: Explained | None, seed: int
+    batch: Batch, poses: Floats, term_selection: TermSelection | None, seed: int
 ) -> tuple[list[Dependence], list[Dependence]]:
     """Return what the rest depends on, and what it is likely to.
 
     It is the rest of the model without an empirical term, whose own covariate comes first.
     """
     readings, unexplained = batch.readings, poses
-    if explained is not None:
-        without = explained.without
+    if term_selection is not None:
+        without = term_selection.without
         unexplained = Predictor(batch, without.names).predict(without.fit.parameters)
     rates = residual_rates(readings, unexplained)
     likely = dependences(rates, readings.group, seed, readings.start, alpha=LIKELY)
     rest = [d for d in likely if d.p_value < ALPHA]
     # A place passed through in every run can look like a swing: it is looked for in what the term leaves.
-    if (swings := swing(residual_rates(readings, poses), readings.group, seed)) is not None:
-        rest = [swings, *(d for d in rest if d.covariate != RANDOM_PHASE)]
-    return (rest if explained is None else with_term_first(rest, explained)), likely
+    if (periodic := periodic_disturbance(residual_rates(readings, poses), readings.group, seed)) is not None:
+        rest = [periodic, *(d for d in rest if d.covariate != RANDOM_PHASE)]
+    return (rest if term_selection is None else with_term_first(rest, term_selection)), likely
 
 
 def _how_it_was_fitted(selection: Selection, readings: Readings) -> dict[str, object]:
-    offsets = selection.chosen.fit.scatter.offsets
+    random_effects = selection.chosen.fit.variance_components.random_effects
     return {
         "models_fitted": selection.tried,
-        "steering_stood_at": "the first command" if readings.stood else "neutral",
+        "steering_stood_at": "the first command" if readings.preset else "neutral",
         "scatter": {
-            "front_deg": float(np.degrees(offsets[1])),
-            "rear_deg": float(np.degrees(offsets[2])),
-            "speed_percent": 100.0 * float(offsets[3]),
+            "front_deg": float(np.degrees(random_effects[1])),
+            "rear_deg": float(np.degrees(random_effects[2])),
+            "speed_percent": 100.0 * float(random_effects[3]),
         },
     }
 
 
 def _verdict(
-    effects: tuple[NamedEffect, ...], significant: bool, rest: list[Dependence], explained: Explained | None
+    effects: tuple[NamedEffect, ...], significant: bool, rest: list[Dependence], term_selection: TermSelection | None
 ) -> tuple[Verdict, str]:
     if significant:
         on = f"it depends on {rest[0].covariate if rest else 'none of the covariates looked at'}"
-        if explained is not None:
-            on += f", and {explained.term.name} describes it"
+        if term_selection is not None:
+            on += f", and {term_selection.term.name} describes it"
         elif rest and rest[0].covariate == RANDOM_PHASE:
             on += ", with another phase in every run, which nothing that is planned beforehand can remove"
         return Verdict.UNKNOWN, _REMAINS + on
@@ -147,11 +147,13 @@ def _verdict(
     return Verdict.NAMED, "the effects named bring the prediction to the floor"
 
 
-def _held_out(kept: Readings, judged: Judged) -> HeldOut:
-    before, after = ({MEDIAN: missed.median_mm()} | missed.rms() for missed in (judged.before, judged.after))
-    errors = {name: {"before": before[name], "after": after[name], "floor": judged.floor[name]} for name in before}
-    was, now = judged.before.squares()["position_rms_mm"], judged.after.squares()["position_rms_mm"]
-    slack = (judged.floor["position_rms_mm"] / 1e3) ** 2
+def _held_out(kept: Readings, assessment: Assessment) -> HeldOut:
+    before, after = ({MEDIAN: missed.median_mm()} | missed.rms() for missed in (assessment.before, assessment.after))
+    errors = {
+        name: {"before": before[name], "after": after[name], "floor": assessment.repeatability[name]} for name in before
+    }
+    was, now = assessment.before.squares()["position_rms_mm"], assessment.after.squares()["position_rms_mm"]
+    slack = (assessment.repeatability["position_rms_mm"] / 1e3) ** 2
     worse = []
     for g in np.unique(kept.group):
         own = kept.group == g

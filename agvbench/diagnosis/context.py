@@ -26,7 +26,7 @@ def provenance(header: HeaderLike, readings: Readings, seed: int, *, runs_used: 
     }
 
 
-def refuse_nothing(readings: Readings, header: HeaderLike) -> None:
+def require_runs(readings: Readings, header: HeaderLike) -> None:
     """Raise `CampaignError` if no run can be used, with what is wrong with the first."""
     if not len(readings):
         first = next(iter(readings.refused.items()), ("", "there are none"))
@@ -34,7 +34,7 @@ def refuse_nothing(readings: Readings, header: HeaderLike) -> None:
 
 
 @dataclass(frozen=True)
-class Asked:
+class DiagnosisContext:
     """What a diagnosis was asked of: the campaign's header, the model before if one was given, the seed."""
 
     header: HeaderLike
@@ -48,7 +48,7 @@ class Asked:
 
     def provenance(self, readings: Readings) -> dict[str, object]:
         """Return where the answer comes from."""
-        if readings.begins is None:
+        if readings.initial_states is None:
             return provenance(self.header, readings, self.seed, runs_used=len(readings))
         driven = {run.run_id.rpartition("@")[0] for run in readings.runs}
         return provenance(self.header, readings, self.seed, runs_used=len(driven)) | {"windows_used": len(readings)}

@@ -57,9 +57,9 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Errors on the runs set aside: by quantity (``end_position_mm`` …) ``before``, ``after`` and ``floor``.
+    """Errors on the runs set aside: by quantity (``end_position_mm`` …) ``before``, ``after`` and ``repeatability``.
 
-    ``floor`` is the repeatability.
+    ``repeatability`` is the repeatability.
     """
 
     runs: int

@@ -53,7 +53,7 @@ class Loop:
         return self.directory / AFTER
 
 
-def run_loop(given: Mapping[str, Any], *, out: str | None, resume: bool, tell: Tell = lambda _: None) -> Loop:
+def run_loop(given: Mapping[str, Any], *, out: str | None, resume: bool, on_progress: Tell = lambda _: None) -> Loop:
     """Go round the loop, or on from where it was interrupted.
 
     Parameters
@@ -64,7 +64,7 @@ def run_loop(given: Mapping[str, Any], *, out: str | None, resume: bool, tell: T
         The directory; a new one under ``campaigns/`` by default.
     resume
         Whether to go on in it.
-    tell
+    on_progress
         Called with a line whenever there is progress.
 
     Raises
@@ -73,22 +73,22 @@ def run_loop(given: Mapping[str, Any], *, out: str | None, resume: bool, tell: T
         If an option, the plant, a campaign or a file cannot be used.
     """
     directory, settings = opened(given, out, resume=resume)
-    tell(f"1/5 driving to diagnose: {', '.join(EXCITING)} → {directory / BEFORE}")
+    on_progress(f"1/5 driving to diagnose: {', '.join(EXCITING)} → {directory / BEFORE}")
     if not (directory / DIAGNOSIS).exists():
-        _first_bench(directory, settings, tell)
-    tell(f"2/5 diagnosing → {directory / DIAGNOSIS}, {VEHICLE}")
-    diagnosis = diagnosed(directory, settings.seed, tell)
-    known = learned(directory, settings, tell)
-    tell(f"4/5 planning with what was found → {directory / PLANS}")
-    plans = planned(directory, settings, known, tell)
-    tell(f"5/5 driving uncalibrated, calibrated and corrected in turns → {directory / AFTER}")
-    drive_corrected(directory, AFTER, SHOWING, settings, known, tell)
+        _first_bench(directory, settings, on_progress)
+    on_progress(f"2/5 diagnosing → {directory / DIAGNOSIS}, {VEHICLE}")
+    diagnosis = diagnosed(directory, settings.seed, on_progress)
+    known = learned(directory, settings, on_progress)
+    on_progress(f"4/5 planning with what was found → {directory / PLANS}")
+    plans = planned(directory, settings, known, on_progress)
+    on_progress(f"5/5 driving uncalibrated, calibrated and corrected in turns → {directory / AFTER}")
+    drive_corrected(directory, AFTER, SHOWING, settings, known, on_progress)
     return Loop(directory, settings, diagnosis, plans)
 
 
-def _first_bench(directory: Path, settings: BenchSettings, tell: Tell) -> None:
+def _first_bench(directory: Path, settings: BenchSettings, on_progress: Tell) -> None:
     try:
-        drive(directory / BEFORE, EXCITING, settings, {"remainders": ""}, tell)
+        drive(directory / BEFORE, EXCITING, settings, {"remainders": ""}, on_progress)
     except AgvbenchError:
         # What could not begin leaves nothing behind that would have to be resumed.
         if not (directory / BEFORE / "campaign.toml").exists():

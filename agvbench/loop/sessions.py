@@ -26,7 +26,9 @@ _ERROR = "ERROR: "
 Tell = Callable[[str], None]
 
 
-def drive(directory: Path, names: Sequence[str], settings: BenchSettings, more: Mapping[str, str], tell: Tell) -> None:
+def drive(
+    directory: Path, names: Sequence[str], settings: BenchSettings, more: Mapping[str, str], on_progress: Tell
+) -> None:
     """Drive the benchmarks `names` in a process of its own, on from where it was interrupted.
 
     Parameters
@@ -37,7 +39,7 @@ def drive(directory: Path, names: Sequence[str], settings: BenchSettings, more: 
         Benchmarks.
     settings, more
         What the loop was asked for, and options that it sets itself.
-    tell
+    on_progress
         Called if some runs could not be driven.
 
     Raises
@@ -53,7 +55,7 @@ def drive(directory: Path, names: Sequence[str], settings: BenchSettings, more: 
     for error in errors:
         sys.stderr.write(f"{error}\n")
     if code:
-        tell(f"    some runs could not be driven: agvbench report {directory} says which")
+        on_progress(f"    some runs could not be driven: agvbench report {directory} says which")
 
 
 def _run(command: Sequence[str]) -> tuple[int, list[str]]:

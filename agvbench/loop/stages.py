@@ -38,7 +38,7 @@ TRYING = ("trial",)
 
 
 def drive_corrected(
-    directory: Path, session: str, names: Sequence[str], settings: BenchSettings, learned: str, tell: Tell
+    directory: Path, session: str, names: Sequence[str], settings: BenchSettings, learned: str, on_progress: Tell
 ) -> None:
     """Drive a session with what was found and learned."""
     models = {
@@ -47,10 +47,10 @@ def drive_corrected(
         "remainders": str(Path(learned).resolve()) if learned else "",
     }
     moved(directory / session, models)
-    drive(directory / session, names, settings, models, tell)
+    drive(directory / session, names, settings, models, on_progress)
 
 
-def diagnosed(directory: Path, seed: int, tell: Tell) -> dict[str, Any]:
+def diagnosed(directory: Path, seed: int, on_progress: Tell) -> dict[str, Any]:
     """Return the diagnosis, after writing it and the corrected vehicle, unless they are there already."""
     from agvbench.campaign import Campaign
     from agvbench.diagnosis import diagnose
@@ -58,15 +58,17 @@ def diagnosed(directory: Path, seed: int, tell: Tell) -> dict[str, Any]:
     path, vehicle = directory / DIAGNOSIS, directory / VEHICLE
     if path.exists() and vehicle.exists():
         content = _read(path)
-        tell(f"    {content['verdict']}, as found before")
+        on_progress(f"    {content['verdict']}, as found before")
         return content
     calibrated = VehicleModel.load(directory / BEFORE / VEHICLE) if (directory / BEFORE / VEHICLE).exists() else None
-    found = diagnose(Campaign.open(directory / BEFORE).check(), vehicle=calibrated, seed=seed, tell=lambda line: None)
+    found = diagnose(
+        Campaign.open(directory / BEFORE).check(), vehicle=calibrated, seed=seed, on_progress=lambda line: None
+    )
     model = found.model or calibrated
     if model is None:
         raise FitError("nothing to correct with", where=directory / BEFORE, value=found.why)
     for line in _in_words(found):
-        tell(f"    {line}")
+        on_progress(f"    {line}")
     replace_whole(vehicle, model.save)
     keep_residuals(found, directory)
     write(path, found.to_text())
@@ -87,7 +89,7 @@ def _in_words(found: Diagnosis) -> list[str]:
     return lines
 
 
-def learned(directory: Path, settings: BenchSettings, tell: Tell) -> str:
+def learned(directory: Path, settings: BenchSettings, on_progress: Tell) -> str:
     """Return the file of what the corrected model missed so far, after learning it unless it is there; "" for nothing.
 
     First from the calibrated runs of the first session; then corrected plans are tried, for an effect that the model
@@ -98,19 +100,19 @@ def learned(directory: Path, settings: BenchSettings, tell: Tell) -> str:
 
     path = directory / REMAINDERS
     if settings.remainders == MODEL_ONLY:
-        tell("3/5 corrected plans are not tried: --model-only")
+        on_progress("3/5 corrected plans are not tried: --model-only")
         return ""
     if path.exists():
-        tell(f"3/5 what corrected plans miss was learned before: {path}")
+        on_progress(f"3/5 what corrected plans miss was learned before: {path}")
         return str(path)
     model = VehicleModel.load(directory / VEHICLE)
     known = remainders(Campaign.open(directory / BEFORE), model, "calibrated")
     if settings.remainders == NO_TRIAL:
-        tell("3/5 corrected plans are not tried: --no-trial")
+        on_progress("3/5 corrected plans are not tried: --no-trial")
     else:
-        tell(f"3/5 trying corrected plans, for what they still miss → {directory / TRIAL}")
+        on_progress(f"3/5 trying corrected plans, for what they still miss → {directory / TRIAL}")
         _write_remainders(directory / FIRST_REMAINDERS, known)
-        drive_corrected(directory, TRIAL, TRYING, settings, str(directory / FIRST_REMAINDERS), tell)
+        drive_corrected(directory, TRIAL, TRYING, settings, str(directory / FIRST_REMAINDERS), on_progress)
         known |= remainders(Campaign.open(directory / TRIAL), model, "corrected")
     _write_remainders(path, known)
     return str(path)
@@ -120,7 +122,7 @@ def _write_remainders(path: Path, known: Mapping[str, Mapping[str, float]]) -> N
     write(path, json.dumps({"schema": 1, "remainders": known}, indent=2, allow_nan=False) + "\n")
 
 
-def planned(directory: Path, settings: BenchSettings, learned: str, tell: Tell) -> dict[str, Any]:
+def planned(directory: Path, settings: BenchSettings, learned: str, on_progress: Tell) -> dict[str, Any]:
     """Return what corrected plans make up for, after writing it, unless it is there already."""
     path = directory / PLANS
     if not path.exists():
@@ -131,9 +133,9 @@ def planned(directory: Path, settings: BenchSettings, learned: str, tell: Tell) 
     plans: dict[str, Any] = _read(path)["plans"]
     for name, entry in plans.items():
         if entry.get("problem"):
-            tell(f"    {name}: {entry['problem']}")
+            on_progress(f"    {name}: {entry['problem']}")
         for sentence in entry.get("said", ()):
-            tell(f"    {name}: {sentence}")
+            on_progress(f"    {name}: {sentence}")
     return plans
 
 

@@ -30,7 +30,7 @@ def _silent(runs: int, frames: int) -> AbstractContextManager[Callable[[str], No
 def run_diagnose(
     directory: str,
     *,
-    tell: Callable[[Diagnosis], None],
+    show: Callable[[Diagnosis], None],
     json_file: str | None = None,
     out: str | None = None,
     vehicle: str | None = None,
@@ -42,7 +42,7 @@ def run_diagnose(
     progress: Progress = _silent,
     wrote: Callable[[str], None] = lambda path: None,
 ) -> Diagnosis:
-    """Diagnose the campaign in `directory`, `tell` the answer, and write JSON and the corrected vehicle if asked for.
+    """Diagnose the campaign in `directory`, `show` the answer, and write JSON and the corrected vehicle if asked for.
 
     With `drive_next` the run that the diagnosis proposes is driven with the `rig`, added to a copy of the campaign, and
     that is diagnosed and told: what is written and returned is the second answer. ``next_file`` takes the trajectory
@@ -63,14 +63,14 @@ def run_diagnose(
     believed = Path(vehicle) if vehicle is not None else campaign.path / "vehicle.toml"
     model = VehicleModel.load(believed) if vehicle is not None or believed.exists() else None
     found = _diagnosed(campaign, model, seed, progress)
-    tell(found)
+    show(found)
     if next_file is not None and found.next_experiment is not None:
         trajectory = found.next_experiment.trajectory
         text = tomli_w.dumps(trajectory.to_table())
         write_file("--next", Path(next_file), lambda path: path.write_text(text, encoding="utf-8"))
         wrote(next_file)
     if drive_next:
-        found = _decided(campaign, found, tell, model, seed, next_out, rig or {}, progress)
+        found = _decided(campaign, found, show, model, seed, next_out, rig or {}, progress)
     if json_file is not None:
         text = found.to_text()
         write_file("--json", Path(json_file), lambda path: path.write_text(text, encoding="utf-8"))
@@ -84,7 +84,7 @@ def run_diagnose(
 
 def _diagnosed(campaign: Campaign, model: VehicleModel | None, seed: int, progress: Progress) -> Diagnosis:
     with progress(len(campaign), _frames(campaign)) as told:
-        return with_first_experiment(diagnose(campaign, vehicle=model, seed=seed, tell=told))
+        return with_first_experiment(diagnose(campaign, vehicle=model, seed=seed, on_progress=told))
 
 
 def _frames(campaign: Campaign) -> int:
@@ -97,7 +97,7 @@ def _frames(campaign: Campaign) -> int:
 def _decided(
     campaign: Campaign,
     found: Diagnosis,
-    tell: Callable[[Diagnosis], None],
+    show: Callable[[Diagnosis], None],
     model: VehicleModel | None,
     seed: int,
     out: str | None,
@@ -115,5 +115,5 @@ def _decided(
     name = found.next_experiment.trajectory.name
     console.print(f"drove {name}; the campaign with it: {extended.path}", highlight=False, soft_wrap=True)
     again = _diagnosed(extended.check(), model, seed, progress)
-    tell(again)
+    show(again)
     return again

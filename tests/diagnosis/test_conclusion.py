@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from agvbench.diagnosis.conclusion import _held_out, _verdict
-from agvbench.diagnosis.free_driving.conclusion import AT_THE_FLOOR, FAR_ABOVE, _above
+from agvbench.diagnosis.free_driving.conclusion import FAR_ABOVE, WITHIN_REPEATABILITY, _above
 from agvbench.diagnosis.free_driving.conclusion import _verdict as verdict_of_windows
 from agvbench.diagnosis.residuals.covariate_test import RANDOM_PHASE, Dependence
-from agvbench.diagnosis.residuals.residuals import MEDIAN, QUANTITIES, Misses
+from agvbench.diagnosis.residuals.residuals import MEDIAN, QUANTITIES, PoseResiduals
 from agvbench.diagnosis.result import HeldOut, NamedEffect, Verdict
-from agvbench.diagnosis.selection.validation import Judged
+from agvbench.diagnosis.selection.validation import Assessment
 
 FLOOR = dict.fromkeys((*QUANTITIES, MEDIAN), 2.0)  # mm, degrees
 PATCH = Dependence("x_m", "speed", 1e-6, 0.3)
@@ -31,17 +31,17 @@ class Kept:
         return len(self.runs)
 
 
-def off_by(*position_m: float) -> Misses:
+def off_by(*position_m: float) -> PoseResiduals:
     """Return what runs miss that are off ahead by as much, in each of three frames."""
     path = np.zeros((len(position_m), 3, 3))
     path[..., 0] = np.array(position_m)[:, None]
     nothing = np.zeros(len(position_m))
-    return Misses(path, np.ones(path.shape[:2], dtype=bool), nothing, nothing)
+    return PoseResiduals(path, np.ones(path.shape[:2], dtype=bool), nothing, nothing)
 
 
-def judged(after_floors: float, lack_of_fit: float | None) -> Judged:
+def assessment(after_floors: float, lack_of_fit: float | None) -> Assessment:
     after = off_by(*[2e-3 * after_floors] * 4)
-    return Judged(after, after, FLOOR, lack_of_fit)
+    return Assessment(after, after, FLOOR, lack_of_fit)
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ def judged(after_floors: float, lack_of_fit: float | None) -> Judged:
     [(2.0, 1e-4, True), (2.0, 0.5, False), (2.0, None, False), (1.1, 1e-6, False)],
 )
 def test_what_lacks_is_above_the_floor_and_beyond_scatter(after_floors, lack_of_fit, lacks):
-    assert judged(after_floors, lack_of_fit).lacks is lacks
+    assert assessment(after_floors, lack_of_fit).lacks is lacks
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_a_verdict_says_what_is_known_and_what_is_not(effects, significant, rest
 def test_free_driving_is_unknown_far_above_its_floor_or_where_something_is_depended_on(effects, rest, floors, verdict):
     held = HeldOut(9, {"heading_rms_deg": {"before": 9.0, "after": floors, "floor": 1.0}}, ())
     assert verdict_of_windows(effects, rest, _above(held, FAR_ABOVE))[0] is verdict
-    assert _above(held, AT_THE_FLOOR) is (floors > 1.25)
+    assert _above(held, WITHIN_REPEATABILITY) is (floors > 1.25)
 
 
 def test_what_got_worse_by_more_than_the_floor_is_told():
@@ -91,9 +91,9 @@ def test_what_got_worse_by_more_than_the_floor_is_told():
     # Squares: 9 before; 9 + 4 × 0.25, 9 + 4 × 4 and less, the floor's square being 4 mm².
     after = off_by(*[np.sqrt(10.0) * 1e-3] * 2, *[5e-3] * 2, *[1e-3] * 2)
     kept = Kept(np.repeat([0, 1, 2], 2), runs)
-    found = _held_out(kept, Judged(before, after, FLOOR, None))
+    found = _held_out(kept, Assessment(before, after, FLOOR, None))
     assert found.worse_on == ("2",)
     assert found.runs == 6
     assert found.errors["position_rms_mm"]["before"] == pytest.approx(3.0)
-    turned = _held_out(kept, Judged(after, before, FLOOR, None))
+    turned = _held_out(kept, Assessment(after, before, FLOOR, None))
     assert turned.worse_on == ("free-1",)

@@ -20,7 +20,7 @@ def linear_fit(design, measured):
     miss = measured - design @ best
     return SimpleNamespace(
         predictor=SimpleNamespace(
-            readings=SimpleNamespace(begins=None), maps=SimpleNamespace(size=design.shape[-1])
+            readings=SimpleNamespace(initial_states=None), maps=SimpleNamespace(size=design.shape[-1])
         ),
         parameters=best,
         loss=np.sum(miss**2, axis=1),

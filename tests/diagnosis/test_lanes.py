@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from tiny_vehicle import FRONT_M, NEUTRAL, REAR_M, Tiny, campaign_runs
 
 from agvbench.diagnosis.data.readings import read_runs
-from agvbench.diagnosis.model.batch import Batch, Gathering
-from agvbench.diagnosis.model.nodal_maps import free_maps
+from agvbench.diagnosis.model.batch import Batch, GroupedSums
+from agvbench.diagnosis.model.nodal_maps import nodal_maps
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.vehicle.geometry import Geometry
 
@@ -21,7 +21,7 @@ def test_terms_that_belong_together_are_summed(places):
     terms = np.random.default_rng(len(places)).normal(size=(len(places), 2, 3))
     expected = np.zeros((5, 4, 2, 3))
     np.add.at(expected, (one, other), terms)
-    gathering = Gathering.of(one, other)
+    gathering = GroupedSums.of(one, other)
     found = np.zeros_like(expected)
     found[tuple(gathering.place.T)] = gathering.sums(terms)
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12)
@@ -31,7 +31,7 @@ def test_terms_that_belong_together_are_summed(places):
 @pytest.fixture(scope="module")
 def predictor():
     readings = read_runs(campaign_runs(Tiny())).select(np.arange(0, 40, 4))
-    maps = free_maps(readings.runs, NEUTRAL)
+    maps = nodal_maps(readings.runs, NEUTRAL)
     batch = Batch(readings, maps, Geometry(FRONT_M, REAR_M))
     assert not batch.by_node
     return Predictor(batch, ("steering_lag",))
@@ -46,14 +46,14 @@ def values(predictor):
 
 def test_slopes_by_levels_are_those_of_whole_maps_and_of_each_runs_offsets(predictor, values):
     rng = np.random.default_rng(3)
-    offsets = rng.normal(size=(len(predictor.readings), 6)) * [0.01, 0.01, 0.1, 0.05, 0.05, 0.2]
-    slopes = predictor.linearise(values, offsets)
+    random_effects = rng.normal(size=(len(predictor.readings), 6)) * [0.01, 0.01, 0.1, 0.05, 0.05, 0.2]
+    slopes = predictor.linearise(values, random_effects)
     way = rng.normal(size=len(values)) * 1e-4
-    there, back = predictor.predict(values + way, offsets), predictor.predict(values - way, offsets)
+    there, back = predictor.predict(values + way, random_effects), predictor.predict(values - way, random_effects)
     np.testing.assert_allclose((there - back) / 2.0, slopes.by_parameters @ way, atol=1e-6)
-    way = rng.normal(size=offsets.shape) * 1e-4
-    there, back = predictor.predict(values, offsets + way), predictor.predict(values, offsets - way)
-    expected = np.einsum("rkcj,rj->rkc", slopes.by_offsets, way)
+    way = rng.normal(size=random_effects.shape) * 1e-4
+    there, back = predictor.predict(values, random_effects + way), predictor.predict(values, random_effects - way)
+    expected = np.einsum("rkcj,rj->rkc", slopes.by_random_effects, way)
     np.testing.assert_allclose((there - back) / 2.0, expected, atol=1e-6)
 
 
@@ -62,9 +62,9 @@ def test_what_was_predicted_last_is_kept_for_the_same_question_only(predictor, v
     none = np.zeros((len(predictor.readings), 6))
     first = predictor.predict(values, none).copy()
     assert predictor.predict(values, none) is predictor.predict(values.copy(), none.copy())
-    others, offsets = values.copy(), none.copy()
-    {"map": others[:1], "effect": others[-1:], "start": offsets[:, :1]}[moved][...] += 0.01
+    others, random_effects = values.copy(), none.copy()
+    {"map": others[:1], "effect": others[-1:], "start": random_effects[:, :1]}[moved][...] += 0.01
     fresh = Predictor(predictor.batch, predictor.effects)
-    np.testing.assert_array_equal(predictor.predict(others, offsets), fresh.predict(others, offsets))
-    assert np.nanmax(np.abs(predictor.predict(others, offsets) - first)) > 1e-5
+    np.testing.assert_array_equal(predictor.predict(others, random_effects), fresh.predict(others, random_effects))
+    assert np.nanmax(np.abs(predictor.predict(others, random_effects) - first)) > 1e-5
     np.testing.assert_array_equal(predictor.predict(values, none), first)

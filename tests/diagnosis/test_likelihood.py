@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from agvbench.diagnosis.estimation.likelihood import objective, residual_of
-from agvbench.diagnosis.estimation.variance import first_scatter
+from agvbench.diagnosis.estimation.variance import initial_variance_components
 
 RUNS, SAMPLES = 3, 5
 
@@ -17,7 +17,7 @@ class Readings(SimpleNamespace):
     """Runs that stood at the origin."""
 
     seen = np.ones((RUNS, SAMPLES), dtype=bool)
-    begins = None
+    initial_states = None
     poses = np.zeros((RUNS, SAMPLES, 3))
     start_stderr = np.full((RUNS, 3), 1e-3)
 
@@ -26,8 +26,8 @@ class Readings(SimpleNamespace):
 
 
 def squares(poses):
-    asked = SimpleNamespace(readings=Readings())
-    return objective(asked, residual_of(asked, poses), np.zeros((RUNS, 6)), first_scatter())
+    context = SimpleNamespace(readings=Readings())
+    return objective(context, residual_of(context, poses), np.zeros((RUNS, 6)), initial_variance_components())
 
 
 def test_the_farther_off_the_larger():

@@ -10,10 +10,10 @@ from tiny_vehicle import HEADER, Tiny, drive
 
 from agvbench.diagnosis import conclusion, diagnose
 from agvbench.diagnosis.design.alternatives import swapped
-from agvbench.diagnosis.design.criteria import imagined, like
+from agvbench.diagnosis.design.criteria import like, simulated_readings
 from agvbench.diagnosis.design.designs import Design, designs, levels_of, mutated
-from agvbench.diagnosis.design.identifiability import unpinned
-from agvbench.diagnosis.design.next_experiment import pin, separate, what_it_takes
+from agvbench.diagnosis.design.identifiability import unidentified
+from agvbench.diagnosis.design.next_experiment import discriminate, pin, what_it_takes
 from agvbench.diagnosis.selection.candidates import candidates
 from agvbench.model import nominal_model
 from agvbench.planning import Workspace, plan, trajectory_from_table
@@ -66,7 +66,7 @@ def test_the_run_that_separates_rivals_does_so_when_it_is_driven(diagnosed):
     truth = Tiny(steering_lag_s=0.15)
     _, selection = diagnosed(truth, steps=False)
     chosen = selection.chosen.fit
-    proposal = separate(chosen, {"steering_lag": {"axle_coupling": 1.0}}, candidates(), unit="us")
+    proposal = discriminate(chosen, {"steering_lag": {"axle_coupling": 1.0}}, candidates(), unit="us")
     experiment = proposal.experiment
     assert experiment is not None
     assert not proposal.inseparable
@@ -74,14 +74,14 @@ def test_the_run_that_separates_rivals_does_so_when_it_is_driven(diagnosed):
     nominal = nominal_model("tiny", GEOMETRY, "us", HEADER.neutral)
     commands = plan(trajectory, nominal).commands
     rng = np.random.default_rng(5)
-    rival = swapped(chosen, "steering_lag", "axle_coupling", candidates())
+    alternative = swapped(chosen, "steering_lag", "axle_coupling", candidates())
     missed = {}
-    for name, model in (("truth", chosen), ("rival", rival)):
+    for name, model in (("truth", chosen), ("rival", alternative)):
         squares = []
         for start in experiment.starts:
             frames = drive(truth, commands, start, 0.0, np.random.default_rng(rng.integers(2**31)))
             design = Design(tuple(_steps(commands)), HEADER.neutral)
-            predicted = like(model, imagined([design], [[start]], np.zeros(3)), GEOMETRY)
+            predicted = like(model, simulated_readings([design], [[start]], np.zeros(3)), GEOMETRY)
             poses = predicted.predict(model.parameters)[0]
             at = predicted.readings.t_s[0]
             x, y = np.interp(at, frames.t_s, frames.x_m), np.interp(at, frames.t_s, frames.y_m)
@@ -97,7 +97,7 @@ def _steps(commands):
 
 def test_steering_that_never_changes_while_driving_leaves_its_lag_open_and_a_run_pins_it(diagnosed):
     found, selection = diagnosed(Tiny(), steps=False)
-    flat = unpinned(selection.chosen.fit, candidates())
+    flat = unidentified(selection.chosen.fit, candidates())
     assert [item.name for item in flat] == ["steering_lag.time_constant_s"]
     assert found.to_json()["provenance"]["not_identifiable"][flat[0].name].startswith("never excited")
     experiment = found.next_experiment
@@ -135,9 +135,11 @@ def test_designs_stay_within_known_levels_and_time(diagnosed):
 def test_starts_keep_the_run_on_a_small_floor(diagnosed):
     truth = Tiny(steering_lag_s=0.15)
     _, selection = diagnosed(truth, steps=False)
-    floor = Workspace.circle(2.4, 0.1)
-    rivals = {"steering_lag": {"axle_coupling": 1.0}}
-    experiment = separate(selection.chosen.fit, rivals, candidates(), unit="us", workspace=floor).experiment
+    repeatability = Workspace.circle(2.4, 0.1)
+    alternatives = {"steering_lag": {"axle_coupling": 1.0}}
+    experiment = discriminate(
+        selection.chosen.fit, alternatives, candidates(), unit="us", workspace=repeatability
+    ).experiment
     commands = plan(experiment.trajectory, nominal_model("tiny", GEOMETRY, "us", HEADER.neutral)).commands
     for start in experiment.starts:
         frames = drive(truth, commands, Pose(*start), 0.0, np.random.default_rng(0))

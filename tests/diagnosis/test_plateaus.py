@@ -13,7 +13,7 @@ from agvbench.diagnosis import Verdict, diagnose
 from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.estimation.fit import fit
 from agvbench.diagnosis.model.batch import Batch
-from agvbench.diagnosis.model.nodal_maps import ROLES, FreeMaps, free_maps, start_values
+from agvbench.diagnosis.model.nodal_maps import ROLES, NodalMaps, nodal_maps, start_values
 from agvbench.diagnosis.selection.candidates import bounds_of, candidates
 from agvbench.diagnosis.selection.stepwise import Selector
 from agvbench.effects import SteeringLag
@@ -21,7 +21,7 @@ from agvbench.effects.steering_backlash import SteeringBacklash
 from agvbench.types import Pose
 from agvbench.vehicle.geometry import Geometry
 
-MAPS = FreeMaps(
+MAPS = NodalMaps(
     {"front": np.array([1000.0, 1400.0]), "rear": np.array([1000.0, 1500.0, 2000.0]), "drive": np.array([1600.0])},
     NEUTRAL,
 )
@@ -30,15 +30,15 @@ NEARLY_STRAIGHT = 1487.0
 
 
 def test_values_that_no_run_tells_are_laid_between_the_others_of_their_role():
-    silent = np.array([False, True, False, True, False, True])
-    laid = MAPS.bridged(np.array([0.5, 9.0, 0.6, 9.0, -0.4, 9.0]), silent)
+    unobserved = np.array([False, True, False, True, False, True])
+    laid = MAPS.interpolated(np.array([0.5, 9.0, 0.6, 9.0, -0.4, 9.0]), unobserved)
     # An outer value is that of its neighbour; the drive stands still at neutral.
     assert laid == pytest.approx([0.5, 0.5, 0.6, 0.1, -0.4, 0.0])
 
 
 def test_values_that_all_are_silent_stay():
     values = np.array([0.5, 9.0, 0.6, 9.0, -0.4, 0.3])
-    assert MAPS.bridged(values, np.array([True, True, False, False, False, False])) == pytest.approx(values)
+    assert MAPS.interpolated(values, np.array([True, True, False, False, False, False])) == pytest.approx(values)
 
 
 def driven(play_rad):
@@ -68,20 +68,27 @@ def play():
 def selector(play):
     """Return a selector of these runs."""
     readings, geometry = read_runs(play.runs, NEUTRAL), Geometry(FRONT_M, REAR_M)
-    maps = free_maps(readings.runs, NEUTRAL)
-    believed = {role: np.zeros(len(maps.nodes[role])) for role in ROLES}
-    start = start_values(maps, [measure_run(run, geometry, neutral=NEUTRAL) for run in play.runs], believed)
+    maps = nodal_maps(readings.runs, NEUTRAL)
+    prior_model = {role: np.zeros(len(maps.nodes[role])) for role in ROLES}
+    start = start_values(maps, [measure_run(run, geometry, neutral=NEUTRAL) for run in play.runs], prior_model)
     return Selector(Batch(readings, maps, geometry), candidates(), start, 0, lambda _: None)
 
 
 def test_a_fit_that_begins_on_a_plateau_ends_where_others_do(selector):
-    good = selector.grown(selector.base(), "steering_backlash").fit
+    good = selector.with_effect(selector.base(), "steering_backlash").fit
     maps, rear = selector.batch.maps, selector.batch.maps.slices()["rear"]
     node = rear.start + int(np.searchsorted(maps.nodes["rear"], NEARLY_STRAIGHT))
     begun = good.parameters.copy()
     begun[node] = rear_of(NEUTRAL) + 0.2 * PLAY_RAD
     bounds = bounds_of(("steering_backlash",))
-    again = fit(good.predictor, begun, bounds, offsets=good.offsets, scatter=good.scatter, iterations=10)
+    again = fit(
+        good.predictor,
+        begun,
+        bounds,
+        random_effects=good.random_effects,
+        variance_components=good.variance_components,
+        iterations=10,
+    )
     assert again.loss.sum() == pytest.approx(good.loss.sum(), abs=1.0)
     assert again.parameters[node] == pytest.approx(rear_of(NEARLY_STRAIGHT), abs=3e-3)
 

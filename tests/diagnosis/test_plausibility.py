@@ -10,7 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from tiny_vehicle import HEADER, NEUTRAL, Tiny, drive, held
 
-from agvbench.diagnosis.checks.consistency import _tracks, refuse_units
+from agvbench.diagnosis.checks.consistency import _tracks, require_plausible_units
 from agvbench.errors import CampaignError
 from agvbench.types import NO_TARGET, Frames, Pose, Run
 
@@ -29,7 +29,7 @@ def test_a_run_of_any_length(first, count):
     tracked, number = np.ones(count + 1, dtype=np.bool_), np.full(count + 1, -1)
     frames = Frames(t_s, 0.3 * t_s, still, still, tracked, number, nan, nan)
     run = replace(RUN, frames=frames)
-    refuse_units([run], HEADER)
+    require_plausible_units([run], HEADER)
     for when, poses in _tracks([run]):
         assert when[0] == t_s[0]
         assert when[-1] <= t_s[-1]
@@ -39,7 +39,7 @@ def test_a_run_of_any_length(first, count):
 
 def test_every_frame_doubled_is_no_other_unit():
     frames = RUN.frames.select(np.repeat(np.arange(len(RUN.frames)), 3))
-    refuse_units([replace(RUN, frames=frames)], HEADER)
+    require_plausible_units([replace(RUN, frames=frames)], HEADER)
     in_milliseconds = replace(frames, t_s=1000.0 * frames.t_s)
     with pytest.raises(CampaignError, match="t_s is not in seconds"):
-        refuse_units([replace(RUN, frames=in_milliseconds)], HEADER)
+        require_plausible_units([replace(RUN, frames=in_milliseconds)], HEADER)

@@ -5,24 +5,24 @@ import math
 import numpy as np
 import pytest
 
-from agvbench.diagnosis.residuals.residuals import EndSpread, Misses, floor, lack_of_fit
+from agvbench.diagnosis.residuals.residuals import EndSpread, PoseResiduals, lack_of_fit, repeatability
 
 GROUP = np.repeat(np.arange(40), 4)
 
 
-def scattered(seed: int, *, scatter_m: float, common_m: float) -> Misses:
+def scattered(seed: int, *, scatter_m: float, common_m: float) -> PoseResiduals:
     """Return misses along x of runs in groups of four: `common_m` for a group, `scatter_m` for each run."""
     rng = np.random.default_rng(seed)
     off = rng.normal(0.0, common_m, 40)[GROUP] + rng.normal(0.0, scatter_m, 160)
     path = np.zeros((160, 24, 3))
     path[..., 0] = off[:, None]
     path[..., 1:] = rng.normal(0.0, 1e-5, (160, 1, 2))
-    return Misses(path, np.ones((160, 24), dtype=bool), off, path[:, -1, 2])
+    return PoseResiduals(path, np.ones((160, 24), dtype=bool), off, path[:, -1, 2])
 
 
 def test_the_floor_is_the_scatter_of_repeats_whatever_they_have_in_common():
     for common in (0.0, 0.05):
-        found = floor(scattered(1, scatter_m=0.004, common_m=common), GROUP)
+        found = repeatability(scattered(1, scatter_m=0.004, common_m=common), GROUP)
         assert found["position_rms_mm"] == pytest.approx(4.0, rel=0.15)
         assert found["delta_s_mm"] == pytest.approx(4.0, rel=0.15)
         assert found["along_mm"] == pytest.approx(4.0, rel=0.15)
@@ -45,12 +45,12 @@ def test_what_is_missed_across_shows_in_the_end_position_and_not_in_the_distance
 def test_one_spoilt_run_hardly_lifts_the_floor():
     missed = scattered(2, scatter_m=0.004, common_m=0.0)
     missed.path[5, :, 0] += 1.0
-    assert floor(missed, GROUP)["position_rms_mm"] < 8.0
+    assert repeatability(missed, GROUP)["position_rms_mm"] < 8.0
 
 
 def test_without_repeats_there_is_no_floor():
     missed = scattered(3, scatter_m=0.004, common_m=0.0)
-    assert floor(missed, np.arange(160)) is None
+    assert repeatability(missed, np.arange(160)) is None
     assert lack_of_fit(missed, np.arange(160)) is None
 
 
@@ -73,7 +73,7 @@ def test_commands_that_share_a_value_of_the_maps_share_its_error():
     for seed in range(200):
         rng = np.random.default_rng(seed)
         ends = rng.multivariate_normal(np.zeros(3), spread.own[0], 60) + slopes @ rng.normal(0.0, math.sqrt(2e-4), 3)
-        missed = Misses(ends[:, None, :], np.ones((60, 1), dtype=bool), ends[:, 0], ends[:, 2])
+        missed = PoseResiduals(ends[:, None, :], np.ones((60, 1), dtype=bool), ends[:, 0], ends[:, 2])
         p_values.append(lack_of_fit(missed, group, spread))
     assert np.mean(np.array(p_values) < 0.05) < 0.11
     assert np.mean(np.array(p_values) < 0.5) > 0.35

@@ -13,15 +13,15 @@ from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.discrepancy import stepwise as empirical
 from agvbench.diagnosis.estimation.fit import fit
 from agvbench.diagnosis.model.batch import Batch
-from agvbench.diagnosis.model.nodal_maps import ROLES, free_maps, start_values
+from agvbench.diagnosis.model.nodal_maps import ROLES, nodal_maps, start_values
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection import variants as forms
 from agvbench.diagnosis.selection.candidates import bounds_of, candidates, usual
-from agvbench.diagnosis.selection.fitted_models import Scored
-from agvbench.diagnosis.selection.initial_steering import otherwise
+from agvbench.diagnosis.selection.fitted_models import ScoredModel
+from agvbench.diagnosis.selection.initial_steering import under_other_initial_steering
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
-from agvbench.diagnosis.selection.variants import stood_elsewhere, wider
-from agvbench.diagnosis.selection.with_term import Explained
+from agvbench.diagnosis.selection.variants import under_other_start, wider
+from agvbench.diagnosis.selection.with_term import TermSelection
 from agvbench.diagnosis.terms import SpeedInDisc
 from agvbench.vehicle.geometry import Geometry
 
@@ -32,46 +32,46 @@ NO_LIMIT = np.array([[0.0, 5.0]])
 def selector(tiny_campaign):
     runs = list(tiny_campaign(Tiny(steering_lag_s=0.15)))
     readings, geometry = read_runs(runs, HEADER.neutral), Geometry(FRONT_M, REAR_M)
-    maps = free_maps(readings.runs, NEUTRAL)
-    believed = {role: np.zeros(len(maps.nodes[role])) for role in ROLES}
-    start = start_values(maps, [measure_run(run, geometry, neutral=NEUTRAL) for run in runs], believed)
+    maps = nodal_maps(readings.runs, NEUTRAL)
+    prior_model = {role: np.zeros(len(maps.nodes[role])) for role in ROLES}
+    start = start_values(maps, [measure_run(run, geometry, neutral=NEUTRAL) for run in runs], prior_model)
     return Selector(Batch(readings, maps, geometry), candidates(), start, 0, lambda _: None)
 
 
 def test_a_model_left_half_way_is_fitted_again_from_where_the_larger_one_stands(selector):
-    lag = selector.grown(selector.base(), "steering_lag")
+    lag = selector.with_effect(selector.base(), "steering_lag")
     bounds = bounds_of(lag.names)
     begun = fit(Predictor(selector.batch, lag.names), np.r_[selector.start, 0.02], bounds, iterations=1)
-    early = Scored(lag.names, begun, begun.loss)
-    larger = selector.grown(lag, "lateral_slip")
-    again = selector.retried(early, larger)
+    early = ScoredModel(lag.names, begun, begun.loss)
+    larger = selector.with_effect(lag, "lateral_slip")
+    again = selector.refitted_from(early, larger)
     assert again.names == lag.names
     assert again.total < early.total - 100.0
     assert again.fit.effect_values()["steering_lag.time_constant_s"] == pytest.approx(0.15, rel=0.03)
 
 
 def test_a_model_that_is_at_its_best_stays(selector):
-    lag = selector.grown(selector.base(), "steering_lag")
-    again = selector.retried(lag, selector.grown(lag, "lateral_slip"))
+    lag = selector.with_effect(selector.base(), "steering_lag")
+    again = selector.refitted_from(lag, selector.with_effect(lag, "lateral_slip"))
     assert lag.total - 1.0 < again.total <= lag.total
 
 
 def test_what_is_left_of_a_model_is_not_what_once_ended_elsewhere(selector):
-    lag = selector.grown(selector.base(), "steering_lag")
+    lag = selector.with_effect(selector.base(), "steering_lag")
     larger = selector.score(("steering_lag", "lateral_slip"), np.r_[lag.fit.parameters, 0.01], lag.fit)
     poor = fit(Predictor(selector.batch, lag.names), np.r_[selector.start, 0.4], np.array([[0.4, 0.4]]), iterations=8)
-    selector.adopt(Scored(lag.names, poor, poor.loss))
-    left, gains = selector.pruned(selector.base(), larger)
+    selector.adopt(ScoredModel(lag.names, poor, poor.loss))
+    left, gains = selector.backward_elimination(selector.base(), larger)
     assert left.names == lag.names
     assert list(gains) == ["steering_lag"]
     assert left.total == pytest.approx(lag.total, abs=2.0)
 
 
 def test_a_rival_is_judged_by_a_fit_that_went_as_far(selector, monkeypatch):
-    monkeypatch.setattr("agvbench.diagnosis.selection.stepwise._NEARLY_RIVAL", np.inf)
-    lag = selector.grown(selector.base(), "steering_lag")
+    monkeypatch.setattr("agvbench.diagnosis.selection.stepwise._NEARLY_ALTERNATIVE", np.inf)
+    lag = selector.with_effect(selector.base(), "steering_lag")
     begun = fit(Predictor(selector.batch, lag.names), np.r_[selector.start, 0.1], NO_LIMIT, iterations=1)
-    early = Scored(lag.names, begun, begun.loss)
+    early = ScoredModel(lag.names, begun, begun.loss)
     assert early.total > lag.total + 100.0
     assert abs(selector._worse(early, lag)) < 2.0
 
@@ -81,11 +81,11 @@ def test_a_rival_is_judged_by_a_fit_that_went_as_far(selector, monkeypatch):
 )
 def test_what_another_causes_law_replaced_may_be_tried_again(selector, monkeypatch, law, again):
     base = selector.base()
-    lag = selector.grown(base, "steering_lag")
+    lag = selector.with_effect(base, "steering_lag")
     monkeypatch.setattr(forms, "_laws", lambda *_: iter(()))
     monkeypatch.setattr(forms, "_best", lambda _wide, current, _offers: replace(current, names=(law,)))
     monkeypatch.setattr(Selector, "pruned", lambda _self, _base, current: (current, {law: 100.0}))
-    reformed = forms.reform(Selection(base, lag, {}, {"steering_lag": 500.0}, {}, 2), selector)
+    reformed = forms.select_variants(Selection(base, lag, {}, {"steering_lag": 500.0}, {}, 2), selector)
     assert reformed.chosen.names == (law,)
     assert reformed.rejected == again
 
@@ -97,18 +97,18 @@ def test_what_runs_away_is_as_good_as_nothing(selector, monkeypatch):
     fresh = selector.over(selector.batch)
     base = fresh.base()
     monkeypatch.setattr(Selector, "_begun", away)
-    lag = fresh.grown(base, "steering_lag")
+    lag = fresh.with_effect(base, "steering_lag")
     assert (lag.names, lag.total) == (("steering_lag",), base.total)
-    assert not fresh.earns(base, lag)
+    assert not fresh.meets_criterion(base, lag)
 
 
 def test_where_a_slow_servo_stood_can_be_decided_again(selector):
-    right = selector.grown(selector.base(), "steering_lag")
-    wrong_belief = otherwise(selector)
-    wrong = wrong_belief.grown(wrong_belief.base(), "steering_lag")
-    assert stood_elsewhere(wrong, wrong_belief)
-    assert not stood_elsewhere(right, selector)
-    assert not stood_elsewhere(wrong_belief.base(), wrong_belief)
+    right = selector.with_effect(selector.base(), "steering_lag")
+    wrong_belief = under_other_initial_steering(selector)
+    wrong = wrong_belief.with_effect(wrong_belief.base(), "steering_lag")
+    assert under_other_start(wrong, wrong_belief)
+    assert not under_other_start(right, selector)
+    assert not under_other_start(wrong_belief.base(), wrong_belief)
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
@@ -116,11 +116,11 @@ def test_a_fit_does_not_depend_on_what_was_asked_for_before(selector, order):
     base, tried = selector.base(), usual("steering_lag")
     starts = [replace(tried, starts=np.array([[start]])) for start in (0.05, 0.3)]
     fresh = selector.over(selector.batch)
-    found = {k: fresh.grown(fresh.base(), "steering_lag", starts[k]) for k in order}
-    alone = [selector.over(selector.batch).grown(base, "steering_lag", start) for start in starts]
+    found = {k: fresh.with_effect(fresh.base(), "steering_lag", starts[k]) for k in order}
+    alone = [selector.over(selector.batch).with_effect(base, "steering_lag", start) for start in starts]
     assert [found[k].total for k in (0, 1)] == [model.total for model in alone]
     assert alone[0].total != alone[1].total
-    assert fresh.grown(fresh.base(), "steering_lag", starts[1]) is found[1]
+    assert fresh.with_effect(fresh.base(), "steering_lag", starts[1]) is found[1]
 
 
 def test_a_term_that_is_worth_nothing_alone_leaves_the_explanation_as_it_is(selector, monkeypatch):
@@ -128,7 +128,7 @@ def test_a_term_that_is_worth_nothing_alone_leaves_the_explanation_as_it_is(sele
     elsewhere = np.array([0.1, 40.0, 40.0, 0.2])
     with_term = wide.score((SpeedInDisc.name,), np.r_[base.fit.parameters, elsewhere], None)
     chosen = Selection(base, with_term, {}, {}, {}, 1)
-    explained = Explained(chosen, SpeedInDisc, base, 0.0, 1.0)
-    monkeypatch.setattr(empirical, "explain", lambda *_: explained)
-    named = Selection(base, selector.grown(base, "lateral_slip"), {}, {"lateral_slip": 20.0}, {}, 1)
-    assert empirical.explain_and_resettle(named, selector) == (named, explained, selector)
+    term_selection = TermSelection(chosen, SpeedInDisc, base, 0.0, 1.0)
+    monkeypatch.setattr(empirical, "explain", lambda *_: term_selection)
+    named = Selection(base, selector.with_effect(base, "lateral_slip"), {}, {"lateral_slip": 20.0}, {}, 1)
+    assert empirical.add_term_and_reconsider(named, selector) == (named, term_selection, selector)

@@ -19,7 +19,7 @@ def fitted(slopes, missed):
     value = float(slopes @ missed / (slopes @ slopes))
     return SimpleNamespace(
         predictor=SimpleNamespace(
-            maps=SimpleNamespace(size=0), parameter_names=["slope"], readings=SimpleNamespace(begins=None)
+            maps=SimpleNamespace(size=0), parameter_names=["slope"], readings=SimpleNamespace(initial_states=None)
         ),
         gradient=(slopes * (missed - slopes * value))[:, None],
         information=every_parameter((slopes**2)[:, None, None]),
@@ -38,8 +38,8 @@ def test_as_large_as_estimates_scatter_whatever_the_likelihood_believes(shared, 
     rng = np.random.default_rng(7)
     draws = [drawn(rng, shared, own) for _ in range(600)]
     told = [float(standard_errors(fit, GROUP)[0]) for fit, _ in draws]
-    scatter = float(np.std([value for _, value in draws]))
-    assert 0.95 < float(np.sqrt(np.mean(np.square(told)))) / scatter < 1.3
+    variance_components = float(np.std([value for _, value in draws]))
+    assert 0.95 < float(np.sqrt(np.mean(np.square(told)))) / variance_components < 1.3
     covered = np.mean([abs(value) < 1.96 * error for error, (_, value) in zip(told, draws, strict=True)])
     assert 0.92 < covered < 0.975
 

@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 from tiny_vehicle import NEUTRAL, InMemory, Tiny, campaign_runs, drive
 
 from agvbench.diagnosis import Verdict, diagnose
-from agvbench.diagnosis.model.nodal_maps import chosen_levels, free_maps
-from agvbench.diagnosis.selection.fitted_models import Scored
+from agvbench.diagnosis.model.nodal_maps import chosen_levels, nodal_maps
+from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.types import NO_TARGET, Commands, Pose, Run
 
 MOST = 40
 
 
-def swing(drive_us, size_us, period_s):
+def periodic_disturbance(drive_us, size_us, period_s):
     t = np.arange(0.4, 6.0, 0.05)
     wave = np.round(size_us * np.sin(math.tau * (t - 0.4) / period_s))
     front, rear = NEUTRAL - wave, NEUTRAL + 0.5 * np.round(wave)
@@ -40,7 +40,11 @@ def stepped(rng):
 def swinging(tiny):
     """The usual campaign, and three repeats each of two slaloms and six ways from level to level."""
     rng = np.random.default_rng(5)
-    ways = [swing(900.0, 260.0, 1.6), swing(2100.0, 330.0, 2.3), *(stepped(rng) for _ in range(6))]
+    ways = [
+        periodic_disturbance(900.0, 260.0, 1.6),
+        periodic_disturbance(2100.0, 330.0, 2.3),
+        *(stepped(rng) for _ in range(6)),
+    ]
     runs = campaign_runs(tiny)
     for i, commands in enumerate(ways * 3):
         start = Pose(*rng.uniform(-0.7, 0.7, 2), rng.uniform(-math.pi, math.pi))
@@ -72,7 +76,7 @@ def test_a_lag_is_found_beside_it():
 
 
 def test_a_value_lies_at_every_level_that_was_held():
-    maps = free_maps(swinging(Tiny()), NEUTRAL)
+    maps = nodal_maps(swinging(Tiny()), NEUTRAL)
     assert {1000.0, 1150.0, 1300.0, 1400.0, 1600.0, 1700.0, 1850.0, 2000.0} <= set(maps.nodes["front"])
     assert all(len(nodes) <= MOST for nodes in maps.nodes.values())
 
@@ -96,7 +100,7 @@ def test_some_of_many_levels_reach_from_end_to_end_without_wide_gaps(levels, see
 
 def test_a_gain_is_one_of_fit_and_of_prediction():
     def model(fit, predicted):
-        return Scored((), SimpleNamespace(loss=np.array([fit])), np.array([predicted]))
+        return ScoredModel((), SimpleNamespace(loss=np.array([fit])), np.array([predicted]))
 
     assert model(-10.0, -50.0).gain_over(model(-8.0, -20.0)) == 2.0
     assert model(-90.0, -50.0).gain_over(model(-8.0, -20.0)) == 30.0

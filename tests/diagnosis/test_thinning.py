@@ -39,7 +39,7 @@ def test_causes_found_in_some_runs_are_measured_in_all(tiny_campaign, monkeypatc
     whole = diagnose(campaign)
     monkeypatch.setattr(importlib.import_module("agvbench.diagnosis.diagnose"), "MOST_RUNS", 70)
     said: list[str] = []
-    found = diagnose(campaign, tell=said.append)
+    found = diagnose(campaign, on_progress=said.append)
     assert found.verdict is Verdict.NAMED
     assert [effect.name for effect in found.effects] == ["steering_lag"]
     assert found.provenance["searched_runs"] < found.provenance["fit_runs"] == whole.provenance["fit_runs"]

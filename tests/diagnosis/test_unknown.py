@@ -10,13 +10,13 @@ import pytest
 from tiny_vehicle import FRONT_M, REAR_M, Tiny, campaign_runs
 
 from agvbench.diagnosis import Verdict, diagnose, terms
-from agvbench.diagnosis.checks.consistency import refuse_contradictions
+from agvbench.diagnosis.checks.consistency import require_consistent_repeats
 from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.discrepancy.regression import Steering
 from agvbench.diagnosis.discrepancy.screening import Start, screen
 from agvbench.diagnosis.residuals.body_rates import Rates
 from agvbench.diagnosis.residuals.covariate_test import ALPHA, LIKELY, RANDOM_PHASE, dependences
-from agvbench.diagnosis.residuals.periodic import swing
+from agvbench.diagnosis.residuals.periodic import periodic_disturbance
 from agvbench.diagnosis.selection.with_term import gain_p_value
 from agvbench.errors import CampaignError
 from agvbench.vehicle.geometry import Geometry
@@ -26,7 +26,7 @@ GEOMETRY = Geometry(FRONT_M, REAR_M)
 GROUP = np.repeat(np.arange(RUNS // REPEATS), REPEATS)
 
 
-def drives(seed: int, *, scatter: float = 0.01) -> Rates:
+def drives(seed: int, *, variance_components: float = 0.01) -> Rates:
     """Return rates of straight drives over the floor that miss by chance: runs by themselves, and each step."""
     rng = np.random.default_rng(seed)
     size, per_run = 0.1, (RUNS, STEPS)
@@ -36,7 +36,7 @@ def drives(seed: int, *, scatter: float = 0.01) -> Rates:
     begin = np.dstack([places[:, :-1], np.broadcast_to(heading[:, None], per_run)]).reshape(-1, 3)
     end = np.dstack([places[:, 1:], np.broadcast_to(heading[:, None], per_run)]).reshape(-1, 3)
     run = np.repeat(np.arange(RUNS), STEPS)
-    value = rng.normal(0.0, scatter, (RUNS, 1, 3)) + rng.normal(0.0, scatter, (*per_run, 3))
+    value = rng.normal(0.0, variance_components, (RUNS, 1, 3)) + rng.normal(0.0, variance_components, (*per_run, 3))
     distance = np.tile(0.5 * (way[1:] + way[:-1]), RUNS)
     one = np.ones(RUNS * STEPS)
     covariates = {
@@ -102,19 +102,19 @@ def test_where_structure_is_known_to_remain_what_is_likely_is_found_too():
 @pytest.mark.parametrize("period", [0.3, 0.45])
 def test_a_swing_with_another_phase_in_each_run_is_a_matter_of_distance(period):
     rates = drives(2)
-    assert swing(rates, GROUP, 0) is None
+    assert periodic_disturbance(rates, GROUP, 0) is None
     # What repeats have in common has no phase of its own.
     same = dataclasses.replace(rates, value=rates.value.copy())
     same.value[:, 2] += 0.05 * np.sin(math.tau * rates.covariates["distance_m"] / period)
-    assert swing(same, GROUP, 0) is None
+    assert periodic_disturbance(same, GROUP, 0) is None
     phase = np.random.default_rng(3).uniform(0.0, math.tau, RUNS)[rates.run]
     wave = np.sin(math.tau * rates.covariates["distance_m"] / period + phase)
     # Nor do a few runs that miss by far make a swing of all.
     loud = dataclasses.replace(rates, value=rates.value.copy())
     loud.value[:, 2] += 3.0 * wave * (rates.run < 4)
-    assert swing(loud, GROUP, 0) is None
+    assert periodic_disturbance(loud, GROUP, 0) is None
     rates.value[:, 2] += 0.05 * wave
-    found = swing(rates, GROUP, 0)
+    found = periodic_disturbance(rates, GROUP, 0)
     assert found is not None
     assert (found.covariate, found.feature) == (RANDOM_PHASE, "turning")
     assert found.share > 0.5
@@ -169,11 +169,11 @@ def test_the_p_value_of_a_gain_counts_groups_and_not_runs():
 
 def test_frames_that_do_not_belong_to_their_commands_are_one_line():
     runs = campaign_runs(Tiny())
-    refuse_contradictions(read_runs(runs), where="campaign tiny")
+    require_consistent_repeats(read_runs(runs), where="campaign tiny")
     order = np.random.default_rng(0).permutation(len(runs))
     mixed = [dataclasses.replace(run, frames=runs[k].frames) for run, k in zip(runs, order, strict=True)]
     with pytest.raises(CampaignError, match="same commands contradict each other") as error:
-        refuse_contradictions(read_runs(mixed), where="campaign tiny")
+        require_consistent_repeats(read_runs(mixed), where="campaign tiny")
     assert "\n" not in str(error.value)
 
 
@@ -187,7 +187,7 @@ def test_repeats_that_were_lost_half_way_do_not_contradict_the_others():
     readings = read_runs(cut)
     lasted_s = readings.t_s[:, -1]
     assert np.count_nonzero(lasted_s < 0.6 * np.max(lasted_s)) > len(cut) // 4
-    refuse_contradictions(readings, where="campaign tiny")
+    require_consistent_repeats(readings, where="campaign tiny")
     assert len(readings) == len(runs)
 
 

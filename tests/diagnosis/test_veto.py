@@ -12,13 +12,13 @@ from agvbench.calibration import measure_run
 from agvbench.diagnosis import diagnose
 from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.data.splits import split_runs
-from agvbench.diagnosis.discrepancy.stepwise import instead
+from agvbench.diagnosis.discrepancy.stepwise import term_in_place
 from agvbench.diagnosis.model.batch import Batch
-from agvbench.diagnosis.model.nodal_maps import ROLES, free_maps, start_values
+from agvbench.diagnosis.model.nodal_maps import ROLES, nodal_maps, start_values
 from agvbench.diagnosis.selection.candidates import candidates
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
-from agvbench.diagnosis.selection.validation import contradicts, withdrawn
-from agvbench.diagnosis.selection.with_term import Explained
+from agvbench.diagnosis.selection.validation import fails_validation, validated
+from agvbench.diagnosis.selection.with_term import TermSelection
 from agvbench.diagnosis.terms.speed import SpeedInDisc
 from agvbench.vehicle.geometry import Geometry
 
@@ -28,9 +28,9 @@ def chooser(campaign):
     runs = list(campaign)
     readings, geometry = read_runs(runs, HEADER.neutral), Geometry(FRONT_M, REAR_M)
     held = ~split_runs(readings.runs, readings.group, 0).training
-    maps = free_maps(readings.runs, NEUTRAL)
-    believed = {role: np.zeros(len(maps.nodes[role])) for role in ROLES}
-    start = start_values(maps, [measure_run(run, geometry, neutral=NEUTRAL) for run in runs], believed)
+    maps = nodal_maps(readings.runs, NEUTRAL)
+    prior_model = {role: np.zeros(len(maps.nodes[role])) for role in ROLES}
+    start = start_values(maps, [measure_run(run, geometry, neutral=NEUTRAL) for run in runs], prior_model)
     batch = Batch(readings.select(~held), maps, geometry)
     return Selector(batch, candidates(), start, 0, lambda _: None), readings, held
 
@@ -45,7 +45,7 @@ def found(tried):
     """Return a selection of the steering lag, and the runs set aside."""
     selector, readings, held = tried
     base = selector.base()
-    lag = selector.grown(base, "steering_lag")
+    lag = selector.with_effect(base, "steering_lag")
     return Selection(base, lag, {}, {"steering_lag": 500.0}, {}, 2), readings.select(held)
 
 
@@ -60,28 +60,28 @@ def spoilt(found):
 
 def test_of_a_term_it_is_the_model_with_the_term_that_is_asked(found, spoilt):
     good, kept = found
-    wrong = Explained(spoilt, SpeedInDisc, good.base, 100.0, 1e-4)
-    left, term = withdrawn(good, wrong, kept, lambda _: None)
+    wrong = TermSelection(spoilt, SpeedInDisc, good.base, 100.0, 1e-4)
+    left, term = validated(good, wrong, kept, lambda _: None)
     assert term is None
     assert left.chosen is good.base
-    right = Explained(good, SpeedInDisc, good.base, 100.0, 1e-4)
-    assert withdrawn(spoilt, right, kept, lambda _: None) == (spoilt, right)
+    right = TermSelection(good, SpeedInDisc, good.base, 100.0, 1e-4)
+    assert validated(spoilt, right, kept, lambda _: None) == (spoilt, right)
 
 
 def test_a_cause_that_helps_stays(found):
     selection, kept = found
     said: list[str] = []
-    assert withdrawn(selection, None, kept, said.append) == (selection, None)
+    assert validated(selection, None, kept, said.append) == (selection, None)
     assert not said
 
 
 def test_a_cause_that_makes_it_worse_is_withdrawn(found, spoilt):
     _, kept = found
     said: list[str] = []
-    left, term = withdrawn(spoilt, None, kept, said.append)
+    left, term = validated(spoilt, None, kept, said.append)
     assert term is None
     assert left.chosen is spoilt.base
-    assert left.gains == left.rivals == {}
+    assert left.gains == left.alternatives == {}
     assert left.rejected == {"steering_lag": 500.0}
     assert said == ["steering_lag: withdrawn, for the validation runs are predicted better without"]
 
@@ -89,8 +89,8 @@ def test_a_cause_that_makes_it_worse_is_withdrawn(found, spoilt):
 def test_runs_set_aside_contradict_maps_that_lack_the_cause_and_not_the_cause(tried, found):
     _, readings, held = tried
     selection, _ = found
-    assert not contradicts(selection, readings, held)
-    assert contradicts(replace(selection, chosen=selection.base), readings, held)
+    assert not fails_validation(selection, readings, held)
+    assert fails_validation(replace(selection, chosen=selection.base), readings, held)
 
 
 def test_test_runs_change_no_name_and_no_parameter(tiny_campaign):
@@ -109,14 +109,14 @@ def test_test_runs_change_no_name_and_no_parameter(tiny_campaign):
 
 
 def test_no_term_takes_the_place_of_the_cause(tried, found):
-    assert instead(found[0], tried[0]) is None
+    assert term_in_place(found[0], tried[0]) is None
 
 
 def test_a_term_takes_the_place_of_what_only_looks_like_the_cause(tiny_campaign):
     selector, _, _ = chooser(tiny_campaign(Tiny(warm_gain=0.2)))
     base = selector.base()
-    mimic = selector.grown(base, "reverse_steering_gain")
-    explained = instead(Selection(base, mimic, {}, {"reverse_steering_gain": 1.0}, {}, 2), selector)
-    assert explained is not None
-    assert explained.selection.chosen.names == ("steering_by_campaign_time",)
-    assert explained.values["gain"] == pytest.approx(0.2, rel=0.1)
+    mimic = selector.with_effect(base, "reverse_steering_gain")
+    term_selection = term_in_place(Selection(base, mimic, {}, {"reverse_steering_gain": 1.0}, {}, 2), selector)
+    assert term_selection is not None
+    assert term_selection.selection.chosen.names == ("steering_by_campaign_time",)
+    assert term_selection.values["gain"] == pytest.approx(0.2, rel=0.1)

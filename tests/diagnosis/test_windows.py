@@ -15,9 +15,9 @@ from tiny_vehicle import HEADER, NEUTRAL, Tiny, campaign_runs
 from agvbench.diagnosis.data.readings import Readings, read_windows
 from agvbench.diagnosis.data.window_splits import held_out_windows, thinned
 from agvbench.diagnosis.data.windows import Horizon, Window, cut_windows, horizon_of
-from agvbench.diagnosis.free_driving.errors import by_recording, floor_squares, interval, squares
+from agvbench.diagnosis.free_driving.errors import by_recording, interval, repeatability_squares, squares
 from agvbench.diagnosis.free_driving.maps import smooth_maps, start_values_of_windows
-from agvbench.diagnosis.free_driving.predictors import naive
+from agvbench.diagnosis.free_driving.predictors import constant_velocity
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.types import NO_TARGET, Commands, Frames, Run
@@ -53,22 +53,22 @@ def test_the_state_on_a_circle_is_that_of_the_circle(speed, yaw):
     truth = [speed * math.sin(yaw * t) / yaw, speed * (1.0 - math.cos(yaw * t)) / yaw, yaw * t]
     np.testing.assert_allclose(window.start, truth, atol=2e-4 * (1.0 + speed * yaw * yaw))
     assert window.speed_mps == pytest.approx(speed, rel=0.02)
-    assert window.lately_mps == pytest.approx(speed, rel=0.01)
+    assert window.recent_speed_mps == pytest.approx(speed, rel=0.01)
 
 
 def test_the_naive_predictor_goes_on_along_the_circle():
     windows = list(cut_windows(arc(0.8, 0.9), HORIZON, NEUTRAL))
     read = read_windows([arc(0.8, 0.9)], HORIZON, NEUTRAL)
     assert len(read) == len(windows) > 3
-    np.testing.assert_allclose(naive(read), read.poses, atol=0.003)
+    np.testing.assert_allclose(constant_velocity(read), read.poses, atol=0.003)
 
 
 def test_nothing_after_the_beginning_is_used():
     run = arc(0.5, 0.3, noise_m=1e-3)
     cut = next(cut_windows(run, HORIZON, NEUTRAL))
     later = run.frames.t_s > cut.t0_s
-    shaken = dataclasses.replace(run.frames, x_m=run.frames.x_m + 0.01 * later * np.sin(40.0 * run.frames.t_s))
-    again = next(cut_windows(dataclasses.replace(run, frames=shaken), HORIZON, NEUTRAL))
+    perturbed = dataclasses.replace(run.frames, x_m=run.frames.x_m + 0.01 * later * np.sin(40.0 * run.frames.t_s))
+    again = next(cut_windows(dataclasses.replace(run, frames=perturbed), HORIZON, NEUTRAL))
     for name in ("start", "speed_mps", "lately_mps", "naive"):
         np.testing.assert_allclose(getattr(again, name), getattr(cut, name), atol=1e-12)
     assert not np.allclose(again.poses, cut.poses, atol=1e-3)
@@ -92,9 +92,9 @@ def test_a_tracker_that_jumps_metres_moves_no_window():
     wild = run.frames.x_m.copy()
     wild[[210, 211, 400]] += 9.0
     jumped = dataclasses.replace(run, frames=dataclasses.replace(run.frames, x_m=wild))
-    calm, shaken = list(cut_windows(run, HORIZON, NEUTRAL)), list(cut_windows(jumped, HORIZON, NEUTRAL))
-    assert len(shaken) == len(calm) > 3
-    for a, b in zip(calm, shaken, strict=True):
+    calm, perturbed = list(cut_windows(run, HORIZON, NEUTRAL)), list(cut_windows(jumped, HORIZON, NEUTRAL))
+    assert len(perturbed) == len(calm) > 3
+    for a, b in zip(calm, perturbed, strict=True):
         assert b.speed_mps == pytest.approx(a.speed_mps, abs=0.01)
         np.testing.assert_allclose(b.start, a.start, atol=1e-3)
         seen = np.isfinite(b.poses)
@@ -124,7 +124,7 @@ def test_slopes_by_nodes_are_those_of_whole_maps(readings):
     np.testing.assert_allclose((there - back) / 2.0, slopes.by_parameters @ way, atol=2e-6)
     way = rng.normal(size=none.shape) * 1e-4
     there, back = predictor.predict(values, way), predictor.predict(values, -way)
-    expected = np.einsum("wkcj,wj->wkc", slopes.by_offsets, way)
+    expected = np.einsum("wkcj,wj->wkc", slopes.by_random_effects, way)
     np.testing.assert_allclose((there - back) / 2.0, expected, atol=2e-6)
 
 
@@ -142,7 +142,7 @@ def test_start_values_are_near_the_maps_that_drove(readings):
 
 def test_whole_sessions_are_set_aside(readings):
     held = held_out_windows(readings, 0)
-    sessions = readings.begins.session
+    sessions = readings.initial_states.session
     assert 0 < np.count_nonzero(held) < 0.5 * len(held)
     assert not set(sessions[held]) & set(sessions[~held])
     assert len(set(sessions[~held])) >= 2
@@ -151,7 +151,7 @@ def test_whole_sessions_are_set_aside(readings):
 def test_the_split_of_the_campaign_decides(readings):
     runs = [dataclasses.replace(r, split="held_out" if r.session == "day 1" else "fit") for r in readings.runs]
     held = held_out_windows(dataclasses.replace(readings, runs=tuple(runs)), 0)
-    assert set(readings.begins.session[held]) == {"day 1"}
+    assert set(readings.initial_states.session[held]) == {"day 1"}
 
 
 @given(count=st.integers(1, 500), most=st.integers(2, 300))
@@ -165,11 +165,15 @@ def test_thinning_keeps_order_and_ends(count, most):
 
 def test_errors_are_told_by_recording_with_intervals_over_stretches(readings):
     table = by_recording(
-        readings, {"naive": naive(readings)}, np.zeros_like(readings.poses), np.zeros(len(readings), dtype=bool), 0
+        readings,
+        {"naive": constant_velocity(readings)},
+        np.zeros_like(readings.poses),
+        np.zeros(len(readings), dtype=bool),
+        0,
     )
-    counts = [np.count_nonzero(readings.begins.recording == f"{k}-0") for k in range(3)]
+    counts = [np.count_nonzero(readings.initial_states.recording == f"{k}-0") for k in range(3)]
     assert [row["windows"] for row in table] == counts
-    error = np.sqrt(np.nanmean(squares(readings, naive(readings))["position_rms_mm"][: counts[0]])) * 1e3
+    error = np.sqrt(np.nanmean(squares(readings, constant_velocity(readings))["position_rms_mm"][: counts[0]])) * 1e3
     assert table[0]["ahead_2_s"]["naive_mm"]["rms"] == pytest.approx(error)
     assert table[0]["ahead_1_s"]["naive_mm"]["rms"] < error
 
@@ -191,4 +195,4 @@ def test_an_interval_covers_its_error_and_is_unknown_without_stretches():
 def test_there_is_a_floor_where_a_perfect_predictor_misses_nothing(readings):
     exact = readings.poses.copy()
     assert np.nanmax(squares(readings, exact)["position_rms_mm"]) == 0.0
-    assert (floor_squares(readings, np.zeros_like(exact))["position_rms_mm"] > 0.0).all()
+    assert (repeatability_squares(readings, np.zeros_like(exact))["position_rms_mm"] > 0.0).all()

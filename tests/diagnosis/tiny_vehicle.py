@@ -131,12 +131,14 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
             v *= 1.0 - tiny.slow_patch
         forward = v * (math.cos(df) + (1.0 + tiny.axle_ratio) * math.cos(dr)) / 2.0
         beta = math.atan((FRONT_M * math.tan(dr) + REAR_M * math.tan(df)) / (FRONT_M + REAR_M))
-        pace = forward / math.cos(beta)
-        yaw = forward * (math.tan(df) - math.tan(dr)) / (FRONT_M + REAR_M) / (1.0 + tiny.slip * pace * pace)
+        convergence = forward / math.cos(beta)
+        yaw = (
+            forward * (math.tan(df) - math.tan(dr)) / (FRONT_M + REAR_M) / (1.0 + tiny.slip * convergence * convergence)
+        )
         middle = heading + yaw * _STEP_S / 2.0
         moving = 1.0 if abs(v) > 1e-3 else 0.0
-        x += (pace * math.cos(middle + beta) + moving * tiny.tilt_mps * math.cos(tiny.tilt_rad)) * _STEP_S
-        y += (pace * math.sin(middle + beta) + moving * tiny.tilt_mps * math.sin(tiny.tilt_rad)) * _STEP_S
+        x += (convergence * math.cos(middle + beta) + moving * tiny.tilt_mps * math.cos(tiny.tilt_rad)) * _STEP_S
+        y += (convergence * math.sin(middle + beta) + moving * tiny.tilt_mps * math.sin(tiny.tilt_rad)) * _STEP_S
         heading += yaw * _STEP_S
     return seen(tiny, np.array(times), np.array(poses), rng)
 

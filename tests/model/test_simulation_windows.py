@@ -40,12 +40,12 @@ def test_the_speed_at_the_beginning_is_the_bodys_whatever_cornering_takes():
 def test_another_level_is_believed_only_beyond_scatter(seen, scatter, expected):
     simulation, settled = window()
     start = np.array([[0.0, 0.0, 0.0, seen]])
-    poses = simulation.predict(settled, simulation.nulls.copy(), start, level_scatter=scatter)
+    poses = simulation.predict(settled, simulation.nulls.copy(), start, nodal_deviation=scatter)
     np.testing.assert_allclose(poses[:, 0], expected * (T - BEGINS_S), atol=1e-6)
 
 
 def test_a_speed_that_has_not_lasted_tells_no_level():
     simulation, settled = window()
     start = np.array([[0.0, 0.0, 0.0, 0.8, 0.4]])
-    poses = simulation.predict(settled, simulation.nulls.copy(), start, level_scatter=0.1)
+    poses = simulation.predict(settled, simulation.nulls.copy(), start, nodal_deviation=0.1)
     np.testing.assert_allclose(poses[:, 0], 0.4 * (T - BEGINS_S), atol=1e-6)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from agvbench.calibration.campaign_protocol import HeaderLike
 from agvbench.diagnosis.data.readings import BACK_IN_TIME, Readings
-from agvbench.diagnosis.residuals.residuals import misses
+from agvbench.diagnosis.residuals.residuals import pose_residuals
 from agvbench.errors import CampaignError
 from agvbench.types import Floats, Run
 
@@ -21,7 +21,7 @@ _LEAST_TURN_RAD, _FEWEST_STEPS, _FEWEST_TURNING = 0.15, 5, 5
 _SAME_TURN = (0.5, 2.0)
 
 
-def refuse_clocks(refused: Mapping[str, str], runs: int, *, where: str) -> None:
+def require_ordered_clocks(refused: Mapping[str, str], runs: int, *, where: str) -> None:
     """Raise an error if in many of so many `runs` time goes back; `refused` tells by run why it cannot be used.
 
     Raises
@@ -40,7 +40,7 @@ def refuse_clocks(refused: Mapping[str, str], runs: int, *, where: str) -> None:
         )
 
 
-def refuse_units(runs: Sequence[Run], header: HeaderLike) -> None:
+def require_plausible_units(runs: Sequence[Run], header: HeaderLike) -> None:
     """Raise an error if times are not in seconds, or headings do not turn as the path does.
 
     Metres and radians are checked when a campaign is opened (`agvbench.campaign.tables.motion_checks`). What is asked
@@ -114,7 +114,7 @@ _LEAST_WAY_M, _LEAST_SHARE, _FEWEST_PAIRS = 0.3, 0.15, 6
 _GAP, _FAR_APART, _TIMES_AS_FAR = 1.5, 0.02, 6.0
 
 
-def refuse_contradictions(readings: Readings, *, where: str) -> None:
+def require_consistent_repeats(readings: Readings, *, where: str) -> None:
     """Raise an error if repeats of many commands went to different places, as seen from where they began.
 
     One run that went wrong is an outlier. When in a quarter of all repeated commands the typical run is off by a third
@@ -125,8 +125,8 @@ def refuse_contradictions(readings: Readings, *, where: str) -> None:
     CampaignError
         If that is so.
     """
-    stood = np.broadcast_to(readings.start[:, None], readings.poses.shape)
-    path = misses(readings, np.asarray(stood)).path[..., :2]
+    preset = np.broadcast_to(readings.start[:, None], readings.poses.shape)
+    path = pose_residuals(readings, np.asarray(preset)).path[..., :2]
     far, repeated, example = 0, 0, ""
     for g in np.unique(readings.group):
         own = np.flatnonzero(readings.group == g)
@@ -142,7 +142,7 @@ def refuse_contradictions(readings: Readings, *, where: str) -> None:
             far += 1
             example = example or f"{readings.runs[own[0]].run_id} and its repeats end {off:.2f} m from their mean"
     if far <= _MOST_GROUPS * repeated:
-        _refuse_two_kinds(readings, path, where)
+        _require_one_kind(readings, path, where)
     else:
         raise CampaignError(
             "runs with the same commands contradict each other",
@@ -158,7 +158,7 @@ def _as_long(readings: Readings, runs: NDArray[np.int64], others: NDArray[np.int
     return np.asarray(np.isclose(readings.t_s[runs, -1], readings.t_s[others, -1], rtol=_AS_LONG))
 
 
-def _refuse_two_kinds(readings: Readings, path: Floats, where: str) -> None:
+def _require_one_kind(readings: Readings, path: Floats, where: str) -> None:
     """Raise an error if repeats agree closely or are off by one and the same amount, with nothing between.
 
     Scatter, wear and places on the floor fill the gap between; two vehicles under one name, or two calibrations, do

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from agvbench.calibration.campaign_protocol import HeaderLike
-from agvbench.diagnosis.checks.consistency import refuse_clocks
-from agvbench.diagnosis.context import refuse_nothing
+from agvbench.diagnosis.checks.consistency import require_ordered_clocks
+from agvbench.diagnosis.context import require_runs
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.errors import CampaignError
 
@@ -23,8 +23,8 @@ def cannot_tell(readings: Readings, header: HeaderLike) -> str:
     CampaignError
         If it has too few runs, or clocks that contradict each other.
     """
-    refuse_clocks(readings.refused, len(readings) + len(readings.refused), where=f"campaign {header.name}")
-    refuse_nothing(readings, header)
+    require_ordered_clocks(readings.refused, len(readings) + len(readings.refused), where=f"campaign {header.name}")
+    require_runs(readings, header)
     if len(readings) < FEWEST_RUNS:
         raise CampaignError(
             "too few runs to diagnose",

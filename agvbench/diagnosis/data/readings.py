@@ -12,7 +12,7 @@ from agvbench.calibration import inspect_frames
 from agvbench.campaign.campaign import session_starts
 from agvbench.diagnosis.data.initial_pose import between_rows, frame_noise, motion_of, start_of
 from agvbench.diagnosis.data.splits import at_common_levels, group_runs
-from agvbench.diagnosis.data.windows import Beginnings, Horizon, blocks, cut_windows, recording_of
+from agvbench.diagnosis.data.windows import Horizon, InitialStates, blocks, cut_windows, recording_of
 from agvbench.errors import FitError
 from agvbench.model.simulation.simulated_run import SimulatedRun
 from agvbench.types import Commands, Floats, Frames, Run
@@ -37,7 +37,7 @@ class Readings:
     start pose; NaN where none was kept. ``start`` (R, 3) with ``start_stderr`` (R, 3), from the frames at
     rest; ``started_h`` (R,) [h] since the run's session began; ``group`` (R,): runs told the same
     have the same number, and so have windows of one stretch. ``refused`` tells for each run that cannot be used why,
-    by its id. ``begins`` says when and how fast windows begin; None for runs from rest. ``stood``: whether the
+    by its id. ``initial_states`` says when and how fast windows begin; None for runs from rest. ``preset``: whether the
     axles had settled at each run's first steering command before it was given; else they stood at neutral.
     """
 
@@ -49,8 +49,8 @@ class Readings:
     started_h: Floats
     group: NDArray[np.int64]
     refused: dict[str, str]
-    begins: Beginnings | None = None
-    stood: bool = False
+    initial_states: InitialStates | None = None
+    preset: bool = False
 
     def __len__(self) -> int:
         return len(self.runs)
@@ -72,25 +72,25 @@ class Readings:
             self.started_h[chosen],
             self.group[chosen],
             self.refused,
-            None if self.begins is None else self.begins.select(chosen),
-            self.stood,
+            None if self.initial_states is None else self.initial_states.select(chosen),
+            self.preset,
         )
 
     def simulated(self) -> list[SimulatedRun]:
         """Return the runs as they are simulated, at the samples' times."""
-        begins = [None] * len(self) if self.begins is None else self.begins.t_s.tolist()
+        initial_states = [None] * len(self) if self.initial_states is None else self.initial_states.t_s.tolist()
         return [
-            SimulatedRun(run.commands, t, float(h), b, self._stood(run.commands))
-            for run, t, h, b in zip(self.runs, self.t_s, self.started_h, begins, strict=True)
+            SimulatedRun(run.commands, t, float(h), b, self._preset(run.commands))
+            for run, t, h, b in zip(self.runs, self.t_s, self.started_h, initial_states, strict=True)
         ]
 
-    def _stood(self, commands: Commands) -> tuple[float, float] | None:
-        return (float(commands.front[0]), float(commands.rear[0])) if self.stood else None
+    def _preset(self, commands: Commands) -> tuple[float, float] | None:
+        return (float(commands.front[0]), float(commands.rear[0])) if self.preset else None
 
     @property
     def begins_s(self) -> Floats:
         """When prediction begins, on each run's clock (R,)."""
-        return np.zeros(len(self)) if self.begins is None else self.begins.t_s
+        return np.zeros(len(self)) if self.initial_states is None else self.initial_states.t_s
 
 
 def read_runs(runs: Iterable[Run], neutral: float | None = None) -> Readings:
@@ -126,12 +126,12 @@ def read_windows(runs: Iterable[Run], horizon: Horizon, neutral: float) -> Readi
         if not own:
             refused[run.run_id] = "no window in motion" if run.is_ok else run.status
         windows += own
-    begins = Beginnings(
+    initial_states = InitialStates(
         np.array([w.t0_s for w in windows]),
         np.array([w.speed_mps for w in windows]),
         np.array([w.speed_stderr for w in windows]),
-        np.array([w.lately_mps for w in windows]),
-        np.array([w.naive for w in windows]).reshape(-1, 3),
+        np.array([w.recent_speed_mps for w in windows]),
+        np.array([w.constant_velocity for w in windows]).reshape(-1, 3),
         np.array([w.noise for w in windows]).reshape(-1, 2),
         np.array([recording_of(w.run) for w in windows], dtype=np.str_),
         np.array([w.run.session or "" for w in windows], dtype=np.str_),
@@ -141,7 +141,7 @@ def read_windows(runs: Iterable[Run], horizon: Horizon, neutral: float) -> Readi
         np.array([getattr(w, name) for w in windows]) for name in ("t_s", "poses", "start", "start_stderr")
     )
     group = blocks(windows, horizon)
-    return Readings(tuple(w.run for w in windows), t_s, poses, start, stderr, started_h, group, refused, begins)
+    return Readings(tuple(w.run for w in windows), t_s, poses, start, stderr, started_h, group, refused, initial_states)
 
 
 def _read(run: Run, neutral: float | None) -> tuple[Floats, Floats, Floats, Floats]:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.data.splits import HELD_OUT_SHARE
-from agvbench.diagnosis.data.windows import Beginnings
+from agvbench.diagnosis.data.windows import InitialStates
 from agvbench.errors import FitError
 
 MOST_FITTED = 300
@@ -38,8 +38,12 @@ def held_out_windows(readings: Readings, seed: int) -> NDArray[np.bool_]:
             raise FitError("the column split must name runs to fit and runs held out", where="runs", value=set(split))
         return held
     rng = np.random.default_rng([0xD1A7, seed])
-    begins = _begins(readings)
-    for names, kept in ((begins.session, _KEPT_SESSIONS), (begins.recording, 1), (readings.group.astype(np.str_), 1)):
+    initial_states = _initial_states(readings)
+    for names, kept in (
+        (initial_states.session, _KEPT_SESSIONS),
+        (initial_states.recording, 1),
+        (readings.group.astype(np.str_), 1),
+    ):
         held = _drawn(names, kept, rng)
         if held.any():
             return held
@@ -52,18 +56,18 @@ def fold_groups(readings: Readings) -> NDArray[np.int64]:
     Whole sessions where there are enough of them, else recordings, else stretches: what is learnt has to hold
     elsewhere.
     """
-    if readings.begins is None:
+    if readings.initial_states is None:
         return readings.group
-    for names in (readings.begins.session, readings.begins.recording):
+    for names in (readings.initial_states.session, readings.initial_states.recording):
         known, number = np.unique(names, return_inverse=True)
         if len(known) >= _FEWEST_FOLDS:
             return number.astype(np.int64)
     return readings.group
 
 
-def _begins(readings: Readings) -> Beginnings:
-    assert readings.begins is not None, "windows have beginnings"  # noqa: S101 - a contract between two files
-    return readings.begins
+def _initial_states(readings: Readings) -> InitialStates:
+    assert readings.initial_states is not None, "windows have beginnings"  # noqa: S101 - a contract between two files
+    return readings.initial_states
 
 
 def _drawn(names: NDArray[np.str_], kept: int, rng: np.random.Generator) -> NDArray[np.bool_]:

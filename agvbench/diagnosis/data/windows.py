@@ -29,12 +29,12 @@ SAMPLES = 8
 HISTORY_S = 2.0
 """Commands of so long before a window set its actuators in motion."""
 
-NAIVE_S = 0.1
+CONSTANT_VELOCITY_S = 0.1
 """The naive predictor keeps the speed and yaw rate of so long before the beginning."""
 
 _DEFAULT_HORIZON_S, _DEFAULT_STRIDE_S = 2.0, 1.0
 _NEAR_S = 0.04
-_LATELY_SPANS = 4.0
+_RECENT_SPANS = 4.0
 _FEWEST_FRAMES = 6
 _HELD_S = 1e3
 _BLOCK_S = 10.0
@@ -55,27 +55,27 @@ class Horizon:
 
 
 @dataclass(frozen=True)
-class Beginnings:
+class InitialStates:
     """The state at the beginning of W windows; arrays of shape (W,) unless said otherwise.
 
     ``t_s`` on the run's clock; ``speed_mps`` of the markers' centroid ahead, ``speed_stderr``, and
-    lately (``lately_mps``); ``naive`` (W, 3): its
-    velocity ahead and to the left [m/s] and yaw rate [rad/s] over the last `NAIVE_S`; ``noise`` (W, 2): standard
-    deviation of one frame in position [m] and heading [rad]; ``recording`` and ``session`` by name.
+    lately (``recent_speed_mps``); ``constant_velocity`` (W, 3): its
+    velocity ahead and to the left [m/s] and yaw rate [rad/s] over the last `CONSTANT_VELOCITY_S`; ``noise`` (W, 2):
+    standard deviation of one frame in position [m] and heading [rad]; ``recording`` and ``session`` by name.
     """
 
     t_s: Floats
     speed_mps: Floats
     speed_stderr: Floats
-    lately_mps: Floats
-    naive: Floats
+    recent_speed_mps: Floats
+    constant_velocity: Floats
     noise: Floats
     recording: NDArray[np.str_]
     session: NDArray[np.str_]
 
-    def select(self, chosen: NDArray[np.int64]) -> Beginnings:
+    def select(self, chosen: NDArray[np.int64]) -> InitialStates:
         """Return the windows with these indices."""
-        return Beginnings(*(getattr(self, f.name)[chosen] for f in fields(self)))
+        return InitialStates(*(getattr(self, f.name)[chosen] for f in fields(self)))
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Window:
     """One window: a piece of a ``run`` with its state at the beginning ``t0_s``.
 
     ``start`` (3,) with ``start_stderr`` (3,); ``t_s`` (K,) and ``poses`` (K, 3) of single frames, NaN where none was
-    near; the rest as in `Beginnings`.
+    near; the rest as in `InitialStates`.
     """
 
     run: Run
@@ -94,8 +94,8 @@ class Window:
     poses: Floats
     speed_mps: float
     speed_stderr: float
-    lately_mps: float
-    naive: Floats
+    recent_speed_mps: float
+    constant_velocity: Floats
     noise: Floats
 
 
@@ -133,8 +133,8 @@ class _State:
     pose_stderr: Floats
     speed_mps: float
     speed_stderr: float
-    lately_mps: float
-    naive: Floats
+    recent_speed_mps: float
+    constant_velocity: Floats
 
 
 def _state(t: Floats, motion: Floats, noise: Floats) -> _State | None:
@@ -148,7 +148,7 @@ def _state(t: Floats, motion: Floats, noise: Floats) -> _State | None:
     value, slope, _ = unscaled @ design.T @ m
     at, rising = np.sqrt(unscaled[0, 0]), np.sqrt(unscaled[1, 1])
     c, s = np.cos(value[2]), np.sin(value[2])
-    recent = u > -NAIVE_S
+    recent = u > -CONSTANT_VELOCITY_S
     recent[-3:] = True
     line = np.column_stack([np.ones(int(recent.sum())), u[recent]])
     vx, vy, yaw = np.linalg.lstsq(line, m[recent], rcond=None)[0][1]
@@ -160,14 +160,14 @@ def _state(t: Floats, motion: Floats, noise: Floats) -> _State | None:
         at * noise[[0, 0, 1]],
         float(c * slope[0] + s * slope[1]),
         float(rising * noise[0]),
-        _lately(t, motion),
+        _recent_speed(t, motion),
         np.array([cm * vx + sm * vy, cm * vy - sm * vx, yaw]),
     )
 
 
-def _lately(t: Floats, motion: Floats) -> float:
+def _recent_speed(t: Floats, motion: Floats) -> float:
     """Return the speed ahead, averaged with weights that fall by e every `LATELY_S` before the last frame."""
-    own = t > t[-1] - _LATELY_SPANS * LATELY_S
+    own = t > t[-1] - _RECENT_SPANS * LATELY_S
     dt, step = np.diff(t[own]), np.diff(motion[own], axis=0)
     heading = motion[own][1:, 2] - 0.5 * step[:, 2]
     weight = np.exp((t[own][1:] - t[-1]) / LATELY_S)
@@ -205,8 +205,8 @@ def _window(
         poses,
         state.speed_mps,
         state.speed_stderr,
-        state.lately_mps,
-        state.naive,
+        state.recent_speed_mps,
+        state.constant_velocity,
         noise,
     )
 

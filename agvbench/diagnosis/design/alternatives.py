@@ -18,7 +18,7 @@ _MOST_PAIRS = 3
 
 
 @dataclass(frozen=True)
-class Rival:
+class Alternative:
     """A fitted model, and the effect by which it differs from the others (``name``) in the place of ``instead_of``."""
 
     name: str
@@ -26,9 +26,9 @@ class Rival:
     fit: Fit
 
 
-def rival_models(
-    chosen: Fit, rivals: Mapping[str, Mapping[str, float]], candidates: Mapping[str, Candidate]
-) -> list[tuple[Rival, Rival]]:
+def alternative_models(
+    chosen: Fit, alternatives: Mapping[str, Mapping[str, float]], candidates: Mapping[str, Candidate]
+) -> list[tuple[Alternative, Alternative]]:
     """Return the pairs of models to be told apart: each named effect against its rivals, and rivals against each other.
 
     Parameters
@@ -41,9 +41,9 @@ def rival_models(
         Bounds and starts of effects, by name.
     """
     pairs = []
-    for name, others in rivals.items():
-        group = [Rival(name, name, chosen)]
-        group += [Rival(other, name, swapped(chosen, name, other, candidates)) for other in others]
+    for name, others in alternatives.items():
+        group = [Alternative(name, name, chosen)]
+        group += [Alternative(other, name, swapped(chosen, name, other, candidates)) for other in others]
         # Of many rivals, those against the named one come first: what remains is for the run after the next.
         pairs += list(combinations(group, 2))[: max(_MOST_PAIRS, len(others))]
     return pairs
@@ -59,7 +59,21 @@ def swapped(chosen: Fit, name: str, other: str, candidates: Mapping[str, Candida
 
     def fitted(start: Floats) -> Fit:
         begin = np.r_[maps, kept, start]
-        return fit(predictor, begin, bounds, offsets=chosen.offsets, scatter=chosen.scatter, iterations=_SHORT)
+        return fit(
+            predictor,
+            begin,
+            bounds,
+            random_effects=chosen.random_effects,
+            variance_components=chosen.variance_components,
+            iterations=_SHORT,
+        )
 
     best = min((fitted(start) for start in candidates[other].starts), key=lambda f: float(f.loss.sum()))
-    return fit(predictor, best.parameters, bounds, offsets=best.offsets, scatter=best.scatter, iterations=_LONG)
+    return fit(
+        predictor,
+        best.parameters,
+        bounds,
+        random_effects=best.random_effects,
+        variance_components=best.variance_components,
+        iterations=_LONG,
+    )

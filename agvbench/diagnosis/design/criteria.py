@@ -13,7 +13,7 @@ from agvbench.diagnosis.design.designs import Design
 from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.estimation.variance import EVIDENCE_POSES
 from agvbench.diagnosis.model.batch import Batch
-from agvbench.diagnosis.model.predictor import OFFSETS, Predictor
+from agvbench.diagnosis.model.predictor import RANDOM_EFFECTS, Predictor
 from agvbench.planning.workspace import Workspace
 from agvbench.types import NO_TARGET, Floats, Frames, Pose, Run
 from agvbench.vehicle.geometry import Geometry
@@ -38,7 +38,7 @@ class Information:
     square: Floats
 
 
-def imagined(designs: Sequence[Design], starts: Sequence[Sequence[Pose]], noise: Floats) -> Readings:
+def simulated_readings(designs: Sequence[Design], starts: Sequence[Sequence[Pose]], noise: Floats) -> Readings:
     """Return runs of `designs` as if driven, one from each of its `starts`; `noise` (3,) is that of their start poses.
 
     Each design has as many starts; its runs lie one after another.
@@ -101,12 +101,12 @@ def information(fitted: Fit, predictor: Predictor, parameters: Floats, differenc
     ``difference`` (R, K, 3), if given, is what another model predicts otherwise.
     """
     readings = predictor.readings
-    linear = predictor.linearise(parameters, np.zeros((len(readings), len(OFFSETS))))
+    linear = predictor.linearise(parameters, np.zeros((len(readings), len(RANDOM_EFFECTS))))
     seen = np.ones(readings.t_s.shape, dtype=np.bool_)
-    weighted = Weighted(readings, seen, linear.by_offsets, fitted)
+    weighted = Weighted(readings, seen, linear.by_random_effects, fitted)
     e = weighted.column(np.zeros_like(linear.poses) if difference is None else difference)
     j = weighted.columns(linear.by_parameters)
-    fixed, off = weighted.without_offsets(j), weighted.without_offsets(e[..., None])
+    fixed, off = weighted.without_random_effects(j), weighted.without_random_effects(e[..., None])
     jt = j.transpose(0, 2, 1)
     parts = (jt @ fixed, (jt @ off)[..., 0], np.sum(e * off[..., 0], axis=1))
     sizes = np.bincount(readings.group)
@@ -120,19 +120,19 @@ class Weighted:
     The noise and scatter are those of `fitted`, the offsets' priors too.
     """
 
-    def __init__(self, readings: Readings, seen: NDArray[np.bool_], by_offsets: Floats, fitted: Fit) -> None:
-        scatter = fitted.scatter
+    def __init__(self, readings: Readings, seen: NDArray[np.bool_], by_random_effects: Floats, fitted: Fit) -> None:
+        variance_components = fitted.variance_components
         count = np.maximum(seen.sum(axis=1), 1)
         temper = np.sqrt(np.minimum(1.0, EVIDENCE_POSES / count))
-        sd = np.array([scatter.position_m, scatter.position_m, scatter.heading_rad])
+        sd = np.array([variance_components.position_m, variance_components.position_m, variance_components.heading_rad])
         self._weight = temper[:, None, None] * seen[..., None] / sd
-        prior = np.empty((len(readings), len(OFFSETS)))
+        prior = np.empty((len(readings), len(RANDOM_EFFECTS)))
         prior[:, :2] = np.hypot(readings.start_stderr[:, :2], _START_M)
-        prior[:, 2] = np.hypot(readings.start_stderr[:, 2], np.hypot(scatter.offsets[0], _START_RAD))
-        prior[:, 3:] = scatter.offsets[1:]
-        self._a = self.columns(by_offsets)
+        prior[:, 2] = np.hypot(readings.start_stderr[:, 2], np.hypot(variance_components.random_effects[0], _START_RAD))
+        prior[:, 3:] = variance_components.random_effects[1:]
+        self._a = self.columns(by_random_effects)
         inner = self._a.transpose(0, 2, 1) @ self._a
-        inner[:, range(len(OFFSETS)), range(len(OFFSETS))] += prior**-2.0
+        inner[:, range(len(RANDOM_EFFECTS)), range(len(RANDOM_EFFECTS))] += prior**-2.0
         self._inverse = np.linalg.inv(inner)
 
     def column(self, values: Floats) -> Floats:
@@ -143,7 +143,7 @@ class Weighted:
         """Return values (R, K, 3, q) over noise, (R, 3 K, q)."""
         return np.asarray((values * self._weight[..., None]).reshape(len(values), -1, values.shape[-1]))
 
-    def without_offsets(self, columns: Floats) -> Floats:
+    def without_random_effects(self, columns: Floats) -> Floats:
         """Return columns (R, 3 K, q) multiplied by the inverse covariance of noise and offsets."""
         return np.asarray(columns - self._a @ (self._inverse @ (self._a.transpose(0, 2, 1) @ columns)))
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from agvbench.diagnosis.model.nodal_maps import FreeMaps
+from agvbench.diagnosis.model.nodal_maps import NodalMaps
 from agvbench.types import Commands, Floats
 
 SET_FIRST_S = 0.4
@@ -62,7 +62,7 @@ class Design:
         return Commands(t_s, drive, fronts, rears)
 
 
-def levels_of(maps: FreeMaps, values: Floats) -> Levels:
+def levels_of(maps: NodalMaps, values: Floats) -> Levels:
     """Return levels among those that the data know: `values` are the maps' fitted ones."""
     where = maps.slices()
     speed = values[where["drive"]]

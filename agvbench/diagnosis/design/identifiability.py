@@ -19,7 +19,7 @@ _SAME = 0.99
 
 
 @dataclass(frozen=True)
-class Unpinned:
+class Unidentified:
     """A parameter that the data do not pin.
 
     ``effect`` and ``parameter``; ``stderr`` expected from the data, and ``scale`` the size that such an effect
@@ -42,14 +42,14 @@ class Unpinned:
         return f"{self.effect}.{self.parameter}"
 
 
-def unpinned(chosen: Fit, candidates: Mapping[str, Candidate]) -> list[Unpinned]:
+def unidentified(chosen: Fit, candidates: Mapping[str, Candidate]) -> list[Unidentified]:
     """Return the parameters of effects that `chosen` lacks which would not show at their usual size.
 
     To first order about the chosen model: each effect's slopes, freed of what maps, effects found and the runs' own
     offsets can absorb. Limits, whose null is infinite, are left out: they show where they act or nowhere.
     """
     readings = chosen.predictor.readings
-    weighted = Weighted(readings, readings.seen, chosen.linear.by_offsets, chosen)
+    weighted = Weighted(readings, readings.seen, chosen.linear.by_random_effects, chosen)
     own = weighted.columns(chosen.linear.by_parameters)
     known = chosen.information.total
     inverse = np.linalg.inv(known + _WEAK * np.eye(len(known)))
@@ -61,9 +61,9 @@ def unpinned(chosen: Fit, candidates: Mapping[str, Candidate]) -> list[Unpinned]
             continue
         start = candidate.starts[0]
         predictor = Predictor(chosen.predictor.batch, (*chosen.predictor.effects, name))
-        _, slopes = predictor.by_last(np.r_[chosen.parameters, start], chosen.offsets, len(start))
+        _, slopes = predictor.by_last(np.r_[chosen.parameters, start], chosen.random_effects, len(start))
         slope = weighted.columns(slopes)
-        fixed = weighted.without_offsets(slope)
+        fixed = weighted.without_random_effects(slope)
         plain = np.einsum("ria,rib->ab", slope, fixed)
         cross = np.einsum("rip,ria->pa", own, fixed)
         left = np.linalg.pinv(plain - cross.T @ inverse @ cross + _WEAK * np.diag(candidate.scale**-2.0))
@@ -73,7 +73,7 @@ def unpinned(chosen: Fit, candidates: Mapping[str, Candidate]) -> list[Unpinned]
                 share = np.sqrt(plain[k, k]) * p.scale
                 partner = _partner(cross[:, k], plain[k, k], known, chosen)
                 why = _why(share, partner)
-                found.append(Unpinned(name, p.name, stderr, p.scale, why, start, k, partner))
+                found.append(Unidentified(name, p.name, stderr, p.scale, why, start, k, partner))
     return found
 
 
@@ -94,7 +94,7 @@ def _why(share: float, partner: str) -> str:
     return "flat: the maps, the other effects and the scatter between runs can do the same"
 
 
-def pin_scores(chosen: Fit, flat: Sequence[Unpinned], predictors: Sequence[Predictor], repeats: float) -> Floats:
+def pin_scores(chosen: Fit, flat: Sequence[Unidentified], predictors: Sequence[Predictor], repeats: float) -> Floats:
     """Return the expected standard errors over scales (len(flat), designs) with so many repeats of each design.
 
     ``predictors`` are the chosen model with each of the parameters' effects added, for the designs' runs.

@@ -14,9 +14,9 @@ from itertools import combinations
 
 import numpy as np
 
-from agvbench.diagnosis.design.alternatives import Rival, rival_models
+from agvbench.diagnosis.design.alternatives import Alternative, alternative_models
 from agvbench.diagnosis.design.designs import SET_FIRST_S, Design
-from agvbench.diagnosis.design.identifiability import Unpinned
+from agvbench.diagnosis.design.identifiability import Unidentified
 from agvbench.diagnosis.design.search import LEAST_REPEATS, Search
 from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.proposal import NextExperiment, Proposal
@@ -80,9 +80,9 @@ _MOST_PINNED = 3
 _UNKNOWN = 100.0
 
 
-def separate(
+def discriminate(
     chosen: Fit,
-    rivals: Mapping[str, Mapping[str, float]],
+    alternatives: Mapping[str, Mapping[str, float]],
     candidates: Mapping[str, Candidate],
     *,
     unit: CommandUnit,
@@ -106,7 +106,7 @@ def separate(
     seed
         Draws the changes that are tried.
     """
-    pairs = rival_models(chosen, rivals, candidates)
+    pairs = alternative_models(chosen, alternatives, candidates)
     if not pairs:
         return Proposal()
     search = Search(chosen, workspace or Workspace.circle(), seed)
@@ -137,7 +137,7 @@ def separate(
 
 def pin(
     chosen: Fit,
-    flat: Sequence[Unpinned],
+    flat: Sequence[Unidentified],
     *,
     unit: CommandUnit,
     workspace: Workspace | None = None,
@@ -145,16 +145,16 @@ def pin(
 ) -> NextExperiment | None:
     """Return the run that pins most of the parameters that the data leave open, or None where none does.
 
-    Those that one of the effects found does the same as are left out: `separate` is for them.
+    Those that one of the effects found does the same as are left out: `discriminate` is for them.
 
     Parameters
     ----------
     chosen
         The model found.
     flat
-        What `unpinned` returned.
+        What `unidentified` returned.
     unit, workspace, seed
-        As for `separate`.
+        As for `discriminate`.
     """
     wanted = [item for item in flat if not item.partner][:_MOST_PINNED]
     if not wanted:
@@ -188,7 +188,7 @@ def pin(
     )
 
 
-def _now(item: Unpinned) -> str:
+def _now(item: Unidentified) -> str:
     return "unknown" if item.stderr > _UNKNOWN * item.scale else f"± {item.stderr:.2g}"
 
 
@@ -206,5 +206,5 @@ def as_trajectory(design: Design, unit: CommandUnit, name: str, description: str
     )
 
 
-def _names(pair: tuple[Rival, Rival]) -> tuple[str, str]:
+def _names(pair: tuple[Alternative, Alternative]) -> tuple[str, str]:
     return pair[0].name, pair[1].name

@@ -8,8 +8,8 @@ import numpy as np
 
 from agvbench.calibration.campaign_protocol import HeaderLike
 from agvbench.diagnosis.data.readings import Readings
-from agvbench.diagnosis.design.identifiability import unpinned
-from agvbench.diagnosis.design.next_experiment import pin, separate
+from agvbench.diagnosis.design.identifiability import unidentified
+from agvbench.diagnosis.design.next_experiment import discriminate, pin
 from agvbench.diagnosis.design.search import LEAST_REPEATS
 from agvbench.diagnosis.proposal import NextExperiment
 from agvbench.diagnosis.result import Diagnosis, Verdict
@@ -31,22 +31,22 @@ def with_next_experiment(
     """
     tried = candidates()
     chosen = selection.chosen.fit
-    floor = floor_covered(readings, chosen.predictor.batch.geometry)
+    repeatability = floor_covered(readings, chosen.predictor.batch.geometry)
     unit = header.command_unit
-    rivals = {e.name: {name: 0.0 for name in e.confounded_with if name in tried} for e in found.effects}
-    rivals = {name: others for name, others in rivals.items() if others}
-    flat = unpinned(chosen, tried)
+    alternatives = {e.name: {name: 0.0 for name in e.confounded_with if name in tried} for e in found.effects}
+    alternatives = {name: others for name, others in alternatives.items() if others}
+    flat = unidentified(chosen, tried)
     extra: dict[str, object] = {}
     experiment = None
-    if floor is not None and rivals:
-        proposal = separate(chosen, rivals, tried, unit=unit, workspace=floor, seed=seed)
+    if repeatability is not None and alternatives:
+        proposal = discriminate(chosen, alternatives, tried, unit=unit, workspace=repeatability, seed=seed)
         experiment = proposal.experiment
         extra["inseparable"] = [{"between": list(pair), "needs": n} for pair, n in proposal.inseparable.items()]
     if flat:
         extra["not_identifiable"] = {item.name: item.why for item in flat}
     # An answer that is whole needs no further run for effects that were never excited and never asked for.
-    if experiment is None and floor is not None and flat:
-        experiment = pin(chosen, flat, unit=unit, workspace=floor, seed=seed)
+    if experiment is None and repeatability is not None and flat:
+        experiment = pin(chosen, flat, unit=unit, workspace=repeatability, seed=seed)
     return dataclasses.replace(found, next_experiment=experiment, provenance={**found.provenance, **extra})
 
 

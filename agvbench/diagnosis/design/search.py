@@ -7,20 +7,20 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from agvbench.diagnosis.data.readings import Readings
-from agvbench.diagnosis.design.alternatives import Rival
+from agvbench.diagnosis.design.alternatives import Alternative
 from agvbench.diagnosis.design.criteria import (
     HEADINGS_RAD,
     evidence,
-    imagined,
     information,
     like,
+    simulated_readings,
     starts_within,
 )
 from agvbench.diagnosis.design.designs import Design, Levels, designs, levels_of, mutated
-from agvbench.diagnosis.design.identifiability import Unpinned, pin_scores
+from agvbench.diagnosis.design.identifiability import Unidentified, pin_scores
 from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.model.batch import Batch
-from agvbench.diagnosis.model.predictor import OFFSETS, Predictor
+from agvbench.diagnosis.model.predictor import RANDOM_EFFECTS, Predictor
 from agvbench.diagnosis.proposal import Separation
 from agvbench.planning import Workspace
 from agvbench.types import Floats, Pose
@@ -50,7 +50,7 @@ class Search:
         """Return the designs that stay on the floor, whichever way they set off."""
         new = [d for d in dict.fromkeys(tried) if d not in self._starts]
         if new:
-            readings = imagined(new, [[Pose(0.0, 0.0, 0.0)]] * len(new), self.noise)
+            readings = simulated_readings(new, [[Pose(0.0, 0.0, 0.0)]] * len(new), self.noise)
             paths = like(self.chosen, readings, self.geometry).predict(self.chosen.parameters)
             origin = np.zeros((1, 3))
             for design, path in zip(new, paths, strict=True):
@@ -63,9 +63,9 @@ class Search:
 
     def readings(self, tried: Sequence[Design]) -> Readings:
         """Return the runs of designs from all of their starts."""
-        return imagined(tried, [self.starts(d) for d in tried], self.noise)
+        return simulated_readings(tried, [self.starts(d) for d in tried], self.noise)
 
-    def pair_scores(self, pairs: Sequence[tuple[Rival, Rival]], tried: Sequence[Design]) -> Floats:
+    def pair_scores(self, pairs: Sequence[tuple[Alternative, Alternative]], tried: Sequence[Design]) -> Floats:
         """Return the evidence per repeat (pairs, designs); that of designs which hardly differ is a lower bound.
 
         Models are linearised only on the designs where their predictions differ most, fitted again or not.
@@ -88,13 +88,13 @@ class Search:
             out[k, chosen] = np.minimum(*gains) * _gentle(apart, len(tried))[chosen] ** 2
         return out
 
-    def pin_scores(self, flat: Sequence[Unpinned], tried: Sequence[Design], repeats: int) -> Floats:
+    def pin_scores(self, flat: Sequence[Unidentified], tried: Sequence[Design], repeats: int) -> Floats:
         """Return the expected standard errors over scales (len(flat), designs); large where not looked at."""
         chosen = self.chosen
         every = self.readings(tried)
         batch = Batch(every, chosen.predictor.maps, self.geometry)
         out = np.full((len(flat), len(tried)), np.inf)
-        still = np.zeros((len(every), len(OFFSETS)))
+        still = np.zeros((len(every), len(RANDOM_EFFECTS)))
         for k, item in enumerate(flat):
             names = (*chosen.predictor.effects, item.effect)
             _, slopes = Predictor(batch, names).by_last(np.r_[chosen.parameters, item.start], still, len(item.start))
@@ -109,7 +109,7 @@ class Search:
         return np.where(np.isfinite(out), out, _NOT_LOOKED_AT)
 
     def _rough(self, apart: Floats, count: int) -> Floats:
-        s = self.chosen.scatter
+        s = self.chosen.variance_components
         e = apart / np.array([s.position_m, s.position_m, s.heading_rad])
         return np.asarray(np.sum(e**2, axis=(1, 2)).reshape(count, len(HEADINGS_RAD)).mean(axis=1))
 
@@ -128,7 +128,7 @@ class Search:
         return best
 
     def separations(
-        self, pairs: Sequence[tuple[Rival, Rival]], design: Design, gains: Floats
+        self, pairs: Sequence[tuple[Alternative, Alternative]], design: Design, gains: Floats
     ) -> tuple[Separation, ...]:
         """Return how well a design parts each pair."""
         readings = self.readings([design])

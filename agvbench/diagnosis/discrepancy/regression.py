@@ -18,7 +18,7 @@ from agvbench.types import Floats
 FOLDS = 5
 
 _LEAST = 1e-9
-_STRAY, _NEARLY_ALL = 3.0, 0.99
+_OUTLIER, _NEARLY_ALL = 3.0, 0.99
 
 Columns = dict[int, Floats]
 """Regressors (n, q) by feature: 0 along, 1 sideways, 2 turning."""
@@ -59,14 +59,14 @@ def steering(batch: Batch, parameters: Floats, rates: Rates) -> Steering:
     return Steering(tangent[rows], before[rows], levels)
 
 
-class Judge:
+class GroupedRegression:
     """Residual rates ready for regression: what maps take up removed, each feature in units of its misfit."""
 
     def __init__(self, rates: Rates, stands: Steering, fold: NDArray[np.int64]) -> None:
         self.folds, self.root = [np.flatnonzero(fold == f) for f in range(FOLDS)], np.sqrt(rates.weight)
         drive, axles = _dummies(stands.levels[:, 0]), [_dummies(stands.levels[:, k]) for k in (1, 2)]
         self.known = [self._orthogonal([drive]), *[self._orthogonal(axles)] * 2]
-        self.values = [self._clean(k, _without_strays(rates.value[:, k])) for k in range(3)]
+        self.values = [self._clean(k, _without_outliers(rates.value[:, k])) for k in range(3)]
         self.size = [max(float(np.sqrt(np.mean(v * v))), _LEAST) for v in self.values]
         self.values = [v / s for v, s in zip(self.values, self.size, strict=True)]
         self.count = len(np.unique(rates.run))
@@ -101,9 +101,9 @@ class Judge:
         return np.array([c.T @ c for c, _ in parts]), np.array([c.T @ v for c, v in parts])
 
 
-def _without_strays(value: Floats) -> Floats:
+def _without_outliers(value: Floats) -> Floats:
     """Return the values (n,), those far beyond nearly all others cut: one run gone astray must not drown the rest."""
-    limit = _STRAY * float(np.quantile(np.abs(value - np.median(value)), _NEARLY_ALL))
+    limit = _OUTLIER * float(np.quantile(np.abs(value - np.median(value)), _NEARLY_ALL))
     return np.clip(value, np.median(value) - limit, np.median(value) + limit)
 
 

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis import terms
 from agvbench.diagnosis.data.splits import folds
-from agvbench.diagnosis.discrepancy.regression import FOLDS, Columns, Judge, Steering
+from agvbench.diagnosis.discrepancy.regression import FOLDS, Columns, GroupedRegression, Steering
 from agvbench.diagnosis.residuals.body_rates import Rates
-from agvbench.diagnosis.terms import EmpiricalTerm
+from agvbench.diagnosis.terms import DiscrepancyTerm
 from agvbench.types import Floats
 from agvbench.vehicle.geometry import Geometry
 
@@ -61,14 +61,14 @@ class _Wave(Values):
 
 
 def options(
-    rates: Rates, stands: Steering, geometry: Geometry, judge: Judge
-) -> Iterator[tuple[type[terms.EmpiricalTerm], Iterator[Option]]]:
+    rates: Rates, stands: Steering, geometry: Geometry, assess: GroupedRegression
+) -> Iterator[tuple[type[terms.DiscrepancyTerm], Iterator[Option]]]:
     """Yield each term with its regressors and what makes values of their sizes."""
     c = rates.covariates
     sine = np.column_stack([np.cos(c["heading_rad"]), np.sin(c["heading_rad"])])
     yield terms.SpeedInDisc, _discs(rates)
     yield terms.SpeedInStrip, _strips(rates)
-    yield terms.TurnAtLine, _lines(rates, judge)
+    yield terms.TurnAtLine, _lines(rates, assess)
     yield terms.BentPicture, _pictures(rates)
     yield terms.SpeedByHeading, iter([({0: sine}, Values())])
     yield terms.TurnByHeading, iter([({2: sine}, Values())])
@@ -148,7 +148,7 @@ def _strips(rates: Rates) -> Iterator[Option]:
                     yield {0: -inside[:, None]}, Values(float(place), float(direction), width)
 
 
-def _lines(rates: Rates, judge: Judge) -> Iterator[Option]:
+def _lines(rates: Rates, assess: GroupedRegression) -> Iterator[Option]:
     """Yield lines that turn what crosses them: blurred ones over the whole floor, then sharp ones near the best.
 
     A sharp line that is off by a hand's breadth is crossed at other samples, and explains nothing.
@@ -159,7 +159,7 @@ def _lines(rates: Rates, judge: Judge) -> Iterator[Option]:
         for place in np.linspace(low, high, _LINE_STEP)[1:-1]:
             crossed = _crossed(rates, direction, place, _BLUR_M)
             if crossed is not None:
-                coarse.append((judge.gain({2: crossed})[0], direction, place))
+                coarse.append((assess.gain({2: crossed})[0], direction, place))
     best = sorted(coarse, reverse=True)[:_BEST_LINES]
     for _, direction, place in best:
         for turned in direction + np.linspace(-1.0, 1.0, _FINE) * 0.5 * math.pi / _LINE_DIRECTIONS:
@@ -217,19 +217,19 @@ class Start:
     give it back bit by bit.
     """
 
-    term: type[EmpiricalTerm]
+    term: type[DiscrepancyTerm]
     values: Floats
     gain: float
 
 
 def screen(rates: Rates, stands: Steering, geometry: Geometry, group: NDArray[np.int64], seed: int) -> list[Start]:
     """Return for each term its best start, the most promising term first; terms without promise are left out."""
-    judge = Judge(rates, stands, folds(group, FOLDS, seed)[rates.run])
+    assess = GroupedRegression(rates, stands, folds(group, FOLDS, seed)[rates.run])
     found = []
-    for term, shapes in options(rates, stands, geometry, judge):
+    for term, shapes in options(rates, stands, geometry, assess):
         best: Start | None = None
         for columns, values in shapes:
-            gain, sizes = judge.gain(columns)
+            gain, sizes = assess.gain(columns)
             if gain > (best.gain if best else 0.0):
                 best = Start(term, np.array([values(sizes), values(_SMALL * sizes)], dtype=np.float64), gain)
         if best is not None:

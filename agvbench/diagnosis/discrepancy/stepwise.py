@@ -10,15 +10,21 @@ from agvbench.diagnosis.discrepancy.regression import steering
 from agvbench.diagnosis.discrepancy.screening import Start, screen
 from agvbench.diagnosis.estimation.cross_validation import without_best
 from agvbench.diagnosis.residuals.body_rates import residual_rates
-from agvbench.diagnosis.residuals.residuals import AT_THE_FLOOR, LACK_OF_FIT, floor, lack_of_fit, misses
+from agvbench.diagnosis.residuals.residuals import (
+    LACK_OF_FIT,
+    WITHIN_REPEATABILITY,
+    lack_of_fit,
+    pose_residuals,
+    repeatability,
+)
 from agvbench.diagnosis.selection.candidates import candidate
-from agvbench.diagnosis.selection.fitted_models import Scored
+from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
-from agvbench.diagnosis.selection.variants import selected_otherwise, stood_elsewhere, wider
-from agvbench.diagnosis.selection.with_term import Explained, gain_p_value
-from agvbench.diagnosis.terms import TERMS, EmpiricalTerm
+from agvbench.diagnosis.selection.variants import selected_under_other_start, under_other_start, wider
+from agvbench.diagnosis.selection.with_term import TermSelection, gain_p_value
+from agvbench.diagnosis.terms import TERMS, DiscrepancyTerm
 
-Settled = tuple[Scored, type[EmpiricalTerm], dict[str, float], dict[str, dict[str, float]]]
+Settled = tuple[ScoredModel, type[DiscrepancyTerm], dict[str, float], dict[str, dict[str, float]]]
 """A model with a term, the term, the gains of the effects beside it, and their rivals."""
 
 _MOST_RETRIED = 3
@@ -26,32 +32,32 @@ _MOST_NAMES = 5
 _TERM_NAMES = frozenset(term.name for term in TERMS)
 
 
-def settled(wide: Selector, selection: Selection, current: Scored, term: type[EmpiricalTerm]) -> Settled:
+def settled(wide: Selector, selection: Selection, current: ScoredModel, term: type[DiscrepancyTerm]) -> Settled:
     """Return the model with the library's effects that earn their place beside the term, their gains and rivals.
 
     What was chosen without the term may only have been a rival of what is right beside it.
     """
     base = selection.base
-    rivals: dict[str, dict[str, float]] = {}
+    alternatives: dict[str, dict[str, float]] = {}
     current = _unmasked(wide, current)
     again = [n for n in selection.chosen.names if n not in current.names]
     again += sorted(selection.rejected, key=lambda n: -selection.rejected[n])[:_MOST_RETRIED]
     for name in again:
-        offer = wide.grown(current, name)
-        if name not in current.names and wide.earns(current, offer):
+        offer = wide.with_effect(current, name)
+        if name not in current.names and wide.meets_criterion(current, offer):
             current = offer
-    current, rivals = wide.exchanged(base, current, selection.rivals)
+    current, alternatives = wide.with_swaps(base, current, selection.alternatives)
     while True:
         found = [n for n in current.names if n not in {*base.names, term.name}]
-        smaller = {name: wide.shrunk(base, current, name) for name in found}
+        smaller = {name: wide.without_effect(base, current, name) for name in found}
         gains = {name: model.total - current.total for name, model in smaller.items()}
-        useless = [name for name, model in smaller.items() if not wide.earns(model, current)]
+        useless = [name for name, model in smaller.items() if not wide.meets_criterion(model, current)]
         if not useless:
-            return current, term, gains, {name: rivals.get(name, {}) for name in gains}
+            return current, term, gains, {name: alternatives.get(name, {}) for name in gains}
         current = wide.left(smaller[min(useless, key=lambda name: gains[name])], current)
 
 
-def _unmasked(wide: Selector, current: Scored) -> Scored:
+def _unmasked(wide: Selector, current: ScoredModel) -> ScoredModel:
     """Return the model with the effects that the unknown cause had hidden, as long as it misses more than scatter.
 
     An effect that gained nothing beside what was chosen first may stand out as soon as the term is there. All are asked
@@ -59,34 +65,36 @@ def _unmasked(wide: Selector, current: Scored) -> Scored:
     """
     while len(current.names) < _MOST_NAMES and lacks(current):
         names = [name for name in wide.candidates if name not in current.names and name not in _TERM_NAMES]
-        promises = {name: wide.promise(current, name) for name in names}
-        best = sorted(promises, key=lambda name: -promises[name])[:_MOST_RETRIED]
-        offers = [wide.grown(current, name) for name in best if promises[name] > wide.least_gain]
-        worthy = [offer for offer in offers if wide.earns(current, offer)]
+        predicted_gains = {name: wide.predicted_gain(current, name) for name in names}
+        best = sorted(predicted_gains, key=lambda name: -predicted_gains[name])[:_MOST_RETRIED]
+        offers = [wide.with_effect(current, name) for name in best if predicted_gains[name] > wide.least_gain]
+        worthy = [offer for offer in offers if wide.meets_criterion(current, offer)]
         if not worthy:
             break
         current = min(worthy, key=lambda offer: offer.total)
     return current
 
 
-def lacks(model: Scored) -> bool:
+def lacks(model: ScoredModel) -> bool:
     """Whether what the model misses is above the scatter of repeats, and differs between groups beyond it."""
     predictor = model.fit.predictor
-    missed = misses(predictor.readings, predictor.predict(model.fit.parameters))
-    least, group = floor(missed, predictor.readings.group), predictor.readings.group
+    missed = pose_residuals(predictor.readings, predictor.predict(model.fit.parameters))
+    least, group = repeatability(missed, predictor.readings.group), predictor.readings.group
     p_value = lack_of_fit(missed, group)
     if least is None or p_value is None or p_value >= LACK_OF_FIT:
         return False
-    return any(missed.rms()[name] > AT_THE_FLOOR * least[name] for name in ("position_rms_mm", "heading_rms_deg"))
+    return any(
+        missed.rms()[name] > WITHIN_REPEATABILITY * least[name] for name in ("position_rms_mm", "heading_rms_deg")
+    )
 
 
 _MOST_STARTS = 3
-_LEAST_PROMISE = 4.0
+_LEAST_PREDICTED_GAIN = 4.0
 _LEAST_OF_BEST = 0.3
 _FEW = 0.1
 
 
-def explain(selection: Selection, selector: Selector) -> Explained | None:
+def add_term(selection: Selection, selector: Selector) -> TermSelection | None:
     """Return the best empirical term, with the effects that earn their place beside it; None if no term earns its own.
 
     Terms are tried beside the effects chosen, and where none helps there beside none: an effect that only mimics the
@@ -102,7 +110,7 @@ def explain(selection: Selection, selector: Selector) -> Explained | None:
     """
     wide = wider(selector)
     starts = promising(wide, selection.chosen)
-    found: list[tuple[Scored, type[EmpiricalTerm]] | None] = []
+    found: list[tuple[ScoredModel, type[DiscrepancyTerm]] | None] = []
     if starts or lacks(selection.chosen):
         alone = promising(wide, selection.base) if selection.gains else []
         promises_more = bool(alone) and alone[0].gain > max((start.gain for start in starts), default=0.0)
@@ -119,7 +127,7 @@ def explain(selection: Selection, selector: Selector) -> Explained | None:
     return _explained(wide, selection, selector, models)
 
 
-def instead(selection: Selection, selector: Selector) -> Explained | None:
+def term_in_place(selection: Selection, selector: Selector) -> TermSelection | None:
     """Return the term that predicts better in the place of an effect that was chosen; None if none does.
 
     Asked where the runs set aside contradict what was chosen although nothing was missed of those it was chosen from: a
@@ -130,21 +138,21 @@ def instead(selection: Selection, selector: Selector) -> Explained | None:
     return _explained(wide, selection, selector, [] if found is None else [settled(wide, selection, *found)])
 
 
-def _explained(wide: Selector, selection: Selection, selector: Selector, models: list[Settled]) -> Explained | None:
+def _explained(wide: Selector, selection: Selection, selector: Selector, models: list[Settled]) -> TermSelection | None:
     """Return the best of the models with a term, if that earns its place."""
     models = [model for model in models if model[0].total < selection.chosen.total - selector.least_gain]
     if not models:
         return None
-    chosen, term, gains, rivals = min(models, key=lambda model: model[0].total)
-    without = wide.retried(wide.shrunk(selection.base, chosen, term.name), chosen)
-    if not wide.earns(without, chosen):
+    chosen, term, gains, alternatives = min(models, key=lambda model: model[0].total)
+    without = wide.refitted_from(wide.without_effect(selection.base, chosen, term.name), chosen)
+    if not wide.meets_criterion(without, chosen):
         return None
     gain = without.loss - chosen.loss
     tried = selection.tried + wide.tried
     rejected = {n: g for n, g in selection.rejected.items() if n not in chosen.names}
-    selector.tell(f"{' + '.join(chosen.names)}: an empirical term gains {gain.sum():.0f}")
-    return Explained(
-        Selection(selection.base, chosen, rivals, gains, rejected, tried),
+    selector.on_progress(f"{' + '.join(chosen.names)}: an empirical term gains {gain.sum():.0f}")
+    return TermSelection(
+        Selection(selection.base, chosen, alternatives, gains, rejected, tried),
         term,
         without,
         float(gain.sum()),
@@ -152,59 +160,67 @@ def _explained(wide: Selector, selection: Selection, selector: Selector, models:
     )
 
 
-def explain_and_resettle(selection: Selection, selector: Selector) -> tuple[Selection, Explained | None, Selector]:
-    """Do as `explain` does, and all again under the other belief of where the steering stood if that is better now.
+def add_term_and_reconsider(
+    selection: Selection, selector: Selector
+) -> tuple[Selection, TermSelection | None, Selector]:
+    """Do as `add_term` does, and all again under the other belief of where the steering stood if that is better now.
 
     While an unknown cause is missed nobody can tell where a slow servo stood before a run.
     """
-    explained = explain(selection, selector)
-    if explained is None:
+    term_selection = add_term(selection, selector)
+    if term_selection is None:
         return selection, None, selector
-    if stood_elsewhere(explained.selection.chosen, selector):
-        selected, other = selected_otherwise(selector)
-        again = explain(selected, other)
-        if again is not None and again.selection.chosen.total < explained.selection.chosen.total:
-            selection, explained, selector = selected, again, other
-    return selection, _afresh(selection, explained, selector), selector
+    if under_other_start(term_selection.selection.chosen, selector):
+        selected, other = selected_under_other_start(selector)
+        again = add_term(selected, other)
+        if again is not None and again.selection.chosen.total < term_selection.selection.chosen.total:
+            selection, term_selection, selector = selected, again, other
+    return selection, _afresh(selection, term_selection, selector), selector
 
 
-def _afresh(selection: Selection, explained: Explained, selector: Selector) -> Explained:
+def _afresh(selection: Selection, term_selection: TermSelection, selector: Selector) -> TermSelection:
     """Return what comes of the term beside none of the effects that were chosen before it, where that is better.
 
     What was chosen while the unknown cause was missed may only look like what is right beside its term; where nothing
     more than scatter is missed it is not asked.
     """
-    if not selection.gains or not lacks(explained.selection.chosen):
-        return explained
-    wide, term = wider(selector), explained.term
-    kind, values = candidate(term), np.array([list(explained.values.values())])
-    alone = wide.grown(selection.base, term.name, replace(kind, starts=values, screened=True, foremost=True))
+    if not selection.gains or not lacks(term_selection.selection.chosen):
+        return term_selection
+    wide, term = wider(selector), term_selection.term
+    kind, values = candidate(term), np.array([list(term_selection.values.values())])
+    alone = wide.with_effect(selection.base, term.name, replace(kind, starts=values, screened=True, foremost=True))
     if not alone.is_fitted:
-        return explained
-    bare = replace(selection, chosen=selection.base, gains={}, rivals={})
+        return term_selection
+    bare = replace(selection, chosen=selection.base, gains={}, alternatives={})
     again = _explained(wide, selection, selector, [settled(wide, bare, alone, term)])
-    return again if again is not None and again.selection.chosen.total < explained.selection.chosen.total else explained
+    return (
+        again
+        if again is not None and again.selection.chosen.total < term_selection.selection.chosen.total
+        else term_selection
+    )
 
 
-def promising(wide: Selector, root: Scored) -> list[Start]:
+def promising(wide: Selector, root: ScoredModel) -> list[Start]:
     """Return the terms that promise to describe what `root` misses, the best first."""
     batch = wide.batch
     poses = root.fit.predictor.predict(root.fit.parameters)
     rates = residual_rates(batch.readings, poses)
     stands = steering(batch, root.fit.parameters, rates)
     starts = screen(rates, stands, batch.geometry, batch.readings.group, wide.seed)
-    least = max(_LEAST_PROMISE, _LEAST_OF_BEST * starts[0].gain) if starts else 0.0
+    least = max(_LEAST_PREDICTED_GAIN, _LEAST_OF_BEST * starts[0].gain) if starts else 0.0
     return [start for start in starts if start.gain > least][:_MOST_STARTS]
 
 
-def _best_term(wide: Selector, root: Scored, starts: list[Start]) -> tuple[Scored, type[EmpiricalTerm]] | None:
-    best: tuple[Scored, type[EmpiricalTerm]] | None = None
+def _best_term(
+    wide: Selector, root: ScoredModel, starts: list[Start]
+) -> tuple[ScoredModel, type[DiscrepancyTerm]] | None:
+    best: tuple[ScoredModel, type[DiscrepancyTerm]] | None = None
     for start in starts:
         kind = candidate(start.term)
         values = np.clip(start.values, kind.bounds[:, 0], kind.bounds[:, 1])
         screened = replace(kind, starts=values, screened=True, foremost=start is starts[0])
-        offer = wide.grown(root, start.term.name, screened)
-        if wide.earns(root, offer) and (best is None or offer.total < best[0].total):
+        offer = wide.with_effect(root, start.term.name, screened)
+        if wide.meets_criterion(root, offer) and (best is None or offer.total < best[0].total):
             best = offer, start.term
     return best
 
@@ -220,17 +236,17 @@ def _rests_on_few(selector: Selector, selection: Selection, name: str) -> bool:
     return without_best(gain, selector.batch.readings.group, _FEW) < 0.5 * float(gain.sum())
 
 
-def _in_place(wide: Selector, selection: Selection) -> tuple[Scored, type[EmpiricalTerm]] | None:
+def _in_place(wide: Selector, selection: Selection) -> tuple[ScoredModel, type[DiscrepancyTerm]] | None:
     """Return the term that predicts better in the place of an effect that was chosen, if one does.
 
     An effect that few runs show is fitted to them and leaves nothing for a regression to find. Only terms that depend
     on no place are tried, for they are simulated as fast as effects.
     """
-    best: tuple[Scored, type[EmpiricalTerm]] | None = None
+    best: tuple[ScoredModel, type[DiscrepancyTerm]] | None = None
     for name in selection.gains:
-        rest = wide.shrunk(selection.base, selection.chosen, name)
+        rest = wide.without_effect(selection.base, selection.chosen, name)
         for term in (term for term in TERMS if not term.local):
-            offer = wide.grown(rest, term.name)
-            if offer.total < (best[0] if best else selection.chosen).total and wide.earns(rest, offer):
+            offer = wide.with_effect(rest, term.name)
+            if offer.total < (best[0] if best else selection.chosen).total and wide.meets_criterion(rest, offer):
                 best = offer, term
     return best

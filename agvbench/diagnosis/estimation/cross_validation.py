@@ -24,7 +24,7 @@ def cross_validated(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Flo
     any levels make up for, cannot be foretold from there either. That is a matter of directions and not of single
     parameters: those of which the other folds hold less than a hundredth of the information.
     """
-    if fitted.predictor.readings.begins is not None:
+    if fitted.predictor.readings.initial_states is not None:
         return _cross_validated_windows(fitted, fold, bounds)
     maps = fitted.predictor.maps.size
     effects = fitted.parameters[maps:]

@@ -12,10 +12,14 @@ from functools import cached_property
 
 import numpy as np
 
-from agvbench.diagnosis.estimation.levenberg_marquardt import Descent, Pace, State
+from agvbench.diagnosis.estimation.levenberg_marquardt import Convergence, FitState, LevenbergMarquardt
 from agvbench.diagnosis.estimation.likelihood import Information, residual_of, ridge, terms_of
-from agvbench.diagnosis.estimation.score_test import Ground
-from agvbench.diagnosis.estimation.variance import Scatter, first_scatter, scatter_of_windows
+from agvbench.diagnosis.estimation.score_test import LinearisationPoint
+from agvbench.diagnosis.estimation.variance import (
+    VarianceComponents,
+    initial_variance_components,
+    window_variance_components,
+)
 from agvbench.diagnosis.model.predictor import Linearised, Predictor
 from agvbench.types import Floats
 
@@ -26,15 +30,15 @@ _ITERATIONS = 8
 class Fit:
     """A fitted model.
 
-    ``parameters`` (P,), the maps' values first; ``offsets`` (R, 6) of each run; ``scatter``; ``loss`` (R,): minus two
-    log likelihood of each run; ``information`` and ``gradient`` (R, P): its quadratic form about them;
-    ``residual`` (R, K, 3): measured minus predicted with the offsets.
+    ``parameters`` (P,), the maps' values first; ``random_effects`` (R, 6) of each run; ``variance_components``;
+    ``loss`` (R,): minus two log likelihood of each run; ``information`` and ``gradient`` (R, P): its quadratic form
+    about them; ``residual`` (R, K, 3): measured minus predicted with the random effects.
     """
 
     predictor: Predictor
     parameters: Floats
-    offsets: Floats
-    scatter: Scatter
+    random_effects: Floats
+    variance_components: VarianceComponents
     loss: Floats
     information: Information
     gradient: Floats
@@ -47,9 +51,9 @@ class Fit:
         return np.asarray(np.linalg.pinv(self.information.total + ridge(self.predictor), hermitian=True))
 
     @cached_property
-    def ground(self) -> Ground:
+    def linearisation_point(self) -> LinearisationPoint:
         """What every promise of a larger model starts from."""
-        return Ground.of(self)
+        return LinearisationPoint.of(self)
 
     def effect_values(self) -> dict[str, float]:
         """Return the effects' parameters by name."""
@@ -62,8 +66,8 @@ def fit(
     parameters: Floats,
     bounds: Floats,
     *,
-    offsets: Floats | None = None,
-    scatter: Scatter | None = None,
+    random_effects: Floats | None = None,
+    variance_components: VarianceComponents | None = None,
     iterations: int = _ITERATIONS,
     patient: bool = False,
     near: Linearised | None = None,
@@ -89,24 +93,32 @@ def fit(
         and they change little: the first steps are taken with these, the last ones and the result with one's own.
     """
     readings = predictor.readings
-    offsets = np.zeros((len(readings), 6)) if offsets is None else offsets.copy()
-    scatter = scatter or (first_scatter() if predictor.readings.begins is None else scatter_of_windows(readings))
-    descent = Descent(predictor, bounds)
-    state, pace = descent.go(State(parameters.copy(), offsets, scatter), iterations, near)
+    random_effects = np.zeros((len(readings), 6)) if random_effects is None else random_effects.copy()
+    variance_components = variance_components or (
+        initial_variance_components()
+        if predictor.readings.initial_states is None
+        else window_variance_components(readings)
+    )
+    solver = LevenbergMarquardt(predictor, bounds)
+    state, convergence = solver.go(FitState(parameters.copy(), random_effects, variance_components), iterations, near)
     # Only a fit that is to be believed is worth the way to its end.
-    believed = iterations > _ITERATIONS
-    state, view = descent.arrive(state, pace if believed else Pace.STANDS, iterations, patient=patient)
-    if believed:
-        state, view = descent.off_plateaus(state, view, iterations, patient=patient)
-    terms = view.terms
+    prior_model = iterations > _ITERATIONS
+    state, evaluation = solver.converge(
+        state, convergence if prior_model else Convergence.CONVERGED, iterations, patient=patient
+    )
+    if prior_model:
+        state, evaluation = solver.leave_plateaus(state, evaluation, iterations, patient=patient)
+    terms = evaluation.terms
     return Fit(
-        predictor, state.parameters, state.offsets, state.scatter,
-        terms.loss, terms.information, terms.gradient, view.residual, view.linear,
+        predictor, state.parameters, state.random_effects, state.variance_components,
+        terms.loss, terms.information, terms.gradient, evaluation.residual, evaluation.linear,
     )  # fmt: skip
 
 
 def loss_at(fitted: Fit, parameters: Floats) -> Floats:
     """Return each run's loss (R,) at other parameters, by simulation, with the scatter of `fitted`."""
     predictor = fitted.predictor
-    residual = residual_of(predictor, predictor.predict(parameters, fitted.offsets))
-    return terms_of(predictor, residual, fitted.linear.by_first(0), fitted.offsets, fitted.scatter).loss
+    residual = residual_of(predictor, predictor.predict(parameters, fitted.random_effects))
+    return terms_of(
+        predictor, residual, fitted.linear.by_first(0), fitted.random_effects, fitted.variance_components
+    ).loss

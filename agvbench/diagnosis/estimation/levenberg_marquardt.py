@@ -8,7 +8,7 @@ from enum import Enum, auto
 import numpy as np
 
 from agvbench.diagnosis.estimation.likelihood import Terms, objective, residual_of, ridge, terms_of
-from agvbench.diagnosis.estimation.variance import Scatter, rescatter
+from agvbench.diagnosis.estimation.variance import VarianceComponents, update_variance_components
 from agvbench.diagnosis.model.predictor import Linearised, Predictor
 from agvbench.types import Floats
 
@@ -18,20 +18,20 @@ _DAMPINGS = (0.0, 0.1, 3.0)
 
 @dataclass(frozen=True)
 class Point:
-    """Where a fit stands: ``parameters`` (P,), each run's ``offsets`` (R, 6) and ``residual`` (R, K, 3)."""
+    """Where a fit stands: ``parameters`` (P,), each run's ``random_effects`` (R, 6) and ``residual`` (R, K, 3)."""
 
     parameters: Floats
-    offsets: Floats
+    random_effects: Floats
     residual: Floats
 
 
 @dataclass(frozen=True)
-class Stepper:
+class StepSolver:
     """What stays the same during a step: derivatives, scatter, and the ``bounds`` of the effects' parameters."""
 
     predictor: Predictor
     linear: Linearised
-    scatter: Scatter
+    variance_components: VarianceComponents
     bounds: Floats
 
     def step(self, point: Point, terms: Terms) -> tuple[Point, bool]:
@@ -43,9 +43,9 @@ class Stepper:
         now, (matrix, gradient) = self._objective(point), self._normal_equations(terms)
         for damping in _DAMPINGS:
             damped = matrix + damping * np.diag(np.diagonal(matrix))
-            move, move_offsets = self._move(point, terms, damped, gradient)
+            move, move_random_effects = self._move(point, terms, damped, gradient)
             for share in _SHARES:
-                tried = self._at(point, share * move, share * move_offsets)
+                tried = self._at(point, share * move, share * move_random_effects)
                 if self._objective(tried) <= now:
                     return tried, not damping and share == 1.0
         return point, False
@@ -54,14 +54,16 @@ class Stepper:
         """Return the point after a whole step, be it worse."""
         return self._at(point, *self._move(point, terms, *self._normal_equations(terms)))
 
-    def _at(self, point: Point, move: Floats, move_offsets: Floats) -> Point:
+    def _at(self, point: Point, move: Floats, move_random_effects: Floats) -> Point:
         maps = self.predictor.maps.size
-        parameters, offsets = point.parameters + move, point.offsets + move_offsets
+        parameters, random_effects = point.parameters + move, point.random_effects + move_random_effects
         parameters[maps:] = np.clip(parameters[maps:], self.bounds[:, 0], self.bounds[:, 1])
-        return Point(parameters, offsets, residual_of(self.predictor, self.predictor.predict(parameters, offsets)))
+        return Point(
+            parameters, random_effects, residual_of(self.predictor, self.predictor.predict(parameters, random_effects))
+        )
 
     def _objective(self, point: Point) -> float:
-        return objective(self.predictor, point.residual, point.offsets, self.scatter)
+        return objective(self.predictor, point.residual, point.random_effects, self.variance_components)
 
     def _normal_equations(self, terms: Terms) -> tuple[Floats, Floats]:
         return terms.information.total + ridge(self.predictor), terms.gradient.sum(axis=0)
@@ -88,23 +90,23 @@ class Stepper:
         return move
 
 
-_EXCURSION, _ROUNDS = 6, 4
+_NON_MONOTONE_STEPS, _ROUNDS = 6, 4
 _WORTH = 10.0
 _ENOUGH = 0.05
 _CLOSE = 1.0
 
 
 @dataclass(frozen=True)
-class State:
-    """What a fit has found so far: ``parameters`` (P,), ``offsets`` (R, 6) of each run, and their scatter."""
+class FitState:
+    """What a fit has found so far: ``parameters`` (P,), ``random_effects`` (R, 6) of each run, and their scatter."""
 
     parameters: Floats
-    offsets: Floats
-    scatter: Scatter
+    random_effects: Floats
+    variance_components: VarianceComponents
 
 
 @dataclass(frozen=True)
-class View:
+class Evaluation:
     """What is seen from a state: derivatives, ``residual`` (R, K, 3), and the likelihood about it."""
 
     linear: Linearised
@@ -117,107 +119,117 @@ class View:
         return float(self.terms.loss.sum())
 
 
-class Pace(Enum):
+class Convergence(Enum):
     """How a way goes when its steps are used up: it has come to a stand, or goes on by parts of steps or whole ones."""
 
-    STANDS = auto()
-    CREEPS = auto()
-    STRIDES = auto()
+    CONVERGED = auto()
+    SLOW = auto()
+    FAST = auto()
 
 
 @dataclass(frozen=True)
-class Descent:
+class LevenbergMarquardt:
     """Goes down for one model; ``bounds`` (effects' parameters, 2)."""
 
     predictor: Predictor
     bounds: Floats
 
-    def look(self, state: State, near: Linearised | None = None) -> View:
+    def evaluate(self, state: FitState, near: Linearised | None = None) -> Evaluation:
         """Return what is seen from `state`, with the maps' derivatives from `near` where given."""
-        linear = self.predictor.linearise(state.parameters, state.offsets, near)
+        linear = self.predictor.linearise(state.parameters, state.random_effects, near)
         residual = residual_of(self.predictor, linear.poses)
-        terms = terms_of(self.predictor, residual, linear, state.offsets, state.scatter)
-        return View(linear, residual, terms)
+        terms = terms_of(self.predictor, residual, linear, state.random_effects, state.variance_components)
+        return Evaluation(linear, residual, terms)
 
-    def go(self, state: State, iterations: int, near: Linearised | None = None) -> tuple[State, Pace]:
+    def go(self, state: FitState, iterations: int, near: Linearised | None = None) -> tuple[FitState, Convergence]:
         """Return the state after at most so many steps, and how it went at the end.
 
         With `near` the first steps are taken with the maps' derivatives from there.
         """
         before, whole = np.inf, True
         for step in range(iterations):
-            view = self.look(state, near)
-            state, whole = self._follow(state, view)
-            if near is not None and (before - view.loss < _CLOSE or step >= iterations // 2):
+            evaluation = self.evaluate(state, near)
+            state, whole = self._follow(state, evaluation)
+            if near is not None and (before - evaluation.loss < _CLOSE or step >= iterations // 2):
                 near = None
-            elif abs(before - view.loss) < _ENOUGH:
-                return state, Pace.STANDS
-            before = view.loss
-        return state, Pace.STRIDES if whole else Pace.CREEPS
+            elif abs(before - evaluation.loss) < _ENOUGH:
+                return state, Convergence.CONVERGED
+            before = evaluation.loss
+        return state, Convergence.FAST if whole else Convergence.SLOW
 
-    def arrive(self, state: State, pace: Pace, iterations: int, *, patient: bool) -> tuple[State, View]:
+    def converge(
+        self, state: FitState, convergence: Convergence, iterations: int, *, patient: bool
+    ) -> tuple[FitState, Evaluation]:
         """Return the end of the way, and what is seen from there.
 
         A creeping fit tries an excursion. One that is `patient` goes on also where that leads nowhere, and round after
         round as long as they are worth their steps.
         """
-        view = self.look(state)
+        evaluation = self.evaluate(state)
         for _ in range(_ROUNDS if patient else 1):
-            beyond = self.excursion(state, view) if pace is Pace.CREEPS else None
-            if pace is Pace.STANDS or (beyond is None and not patient):
+            beyond = self.non_monotone_steps(state, evaluation) if convergence is Convergence.SLOW else None
+            if convergence is Convergence.CONVERGED or (beyond is None and not patient):
                 break
-            state, pace = self.go(state if beyond is None else beyond, iterations)
-            before, view = view.loss, self.look(state)
-            if before - view.loss < _WORTH:
+            state, convergence = self.go(state if beyond is None else beyond, iterations)
+            before, evaluation = evaluation.loss, self.evaluate(state)
+            if before - evaluation.loss < _WORTH:
                 break
-        return state, view
+        return state, evaluation
 
-    def off_plateaus(self, state: State, view: View, iterations: int, *, patient: bool) -> tuple[State, View]:
+    def leave_plateaus(
+        self, state: FitState, evaluation: Evaluation, iterations: int, *, patient: bool
+    ) -> tuple[FitState, Evaluation]:
         """Return a better end of the way where values of the maps have come to lie where no run tells them; else this.
 
         Play has plateaus: a command that ends within it moves nothing, and has no slope that led out again, be it that
         the axle did move. So such values are laid between their neighbours, and the way goes on from there.
         """
         maps = self.predictor.maps
-        told, doubt = view.terms.information.total, ridge(self.predictor)
-        silent = np.diagonal(told)[: maps.size] < np.diagonal(doubt)[: maps.size]
-        if not silent.any():
-            return state, view
-        parameters = np.r_[maps.bridged(state.parameters[: maps.size], silent), state.parameters[maps.size :]]
-        begun, pace = self.go(replace(state, parameters=parameters), iterations)
-        end, seen = self.arrive(begun, pace, iterations, patient=patient)
-        return (end, seen) if seen.loss < view.loss else (state, view)
+        told, doubt = evaluation.terms.information.total, ridge(self.predictor)
+        unobserved = np.diagonal(told)[: maps.size] < np.diagonal(doubt)[: maps.size]
+        if not unobserved.any():
+            return state, evaluation
+        parameters = np.r_[maps.interpolated(state.parameters[: maps.size], unobserved), state.parameters[maps.size :]]
+        begun, convergence = self.go(replace(state, parameters=parameters), iterations)
+        end, seen = self.converge(begun, convergence, iterations, patient=patient)
+        return (end, seen) if seen.loss < evaluation.loss else (state, evaluation)
 
-    def excursion(self, state: State, view: View) -> State | None:
-        """Return a better state that lies across a bend, or None; `view` is what is seen from `state`.
+    def non_monotone_steps(self, state: FitState, evaluation: Evaluation) -> FitState | None:
+        """Return a better state that lies across a bend, or None; `evaluation` is what is seen from `state`.
 
         Maps that took up a cause give it back along a curved and narrow valley: every whole step leaves it, and short
         ones creep. So whole steps are taken for a while, however much worse they are at first; the scatter grows with
         the residual, which widens the valley (the watchdog technique of Chamberlain and others, Mathematical
         Programming Study 16, 1982).
         """
-        start, near = view.loss, view.linear
-        point = self._stepper(state, view).whole(self._point(state, view), view.terms)
-        now = self._reach(point, state, view)
-        for _ in range(_EXCURSION):
-            view = self.look(now, near)
-            if view.loss < start - _WORTH:
+        start, near = evaluation.loss, evaluation.linear
+        point = self._step_solver(state, evaluation).whole(self._point(state, evaluation), evaluation.terms)
+        now = self._reach(point, state, evaluation)
+        for _ in range(_NON_MONOTONE_STEPS):
+            evaluation = self.evaluate(now, near)
+            if evaluation.loss < start - _WORTH:
                 return now
-            now, _ = self._follow(now, view)
+            now, _ = self._follow(now, evaluation)
         return None
 
-    def _follow(self, state: State, view: View) -> tuple[State, bool]:
+    def _follow(self, state: FitState, evaluation: Evaluation) -> tuple[FitState, bool]:
         """Return a state that is no worse for the scatter at hand, and whether a whole step led there."""
-        point, whole = self._stepper(state, view).step(self._point(state, view), view.terms)
-        return self._reach(point, state, view), whole
+        point, whole = self._step_solver(state, evaluation).step(self._point(state, evaluation), evaluation.terms)
+        return self._reach(point, state, evaluation), whole
 
-    def _stepper(self, state: State, view: View) -> Stepper:
-        return Stepper(self.predictor, view.linear, state.scatter, self.bounds)
+    def _step_solver(self, state: FitState, evaluation: Evaluation) -> StepSolver:
+        return StepSolver(self.predictor, evaluation.linear, state.variance_components, self.bounds)
 
     @staticmethod
-    def _point(state: State, view: View) -> Point:
-        return Point(state.parameters, state.offsets, view.residual)
+    def _point(state: FitState, evaluation: Evaluation) -> Point:
+        return Point(state.parameters, state.random_effects, evaluation.residual)
 
-    def _reach(self, point: Point, state: State, view: View) -> State:
-        scatter = rescatter(self.predictor, point.residual, point.offsets, view.terms.inner_inverse, state.scatter)
-        return State(point.parameters, point.offsets, scatter)
+    def _reach(self, point: Point, state: FitState, evaluation: Evaluation) -> FitState:
+        variance_components = update_variance_components(
+            self.predictor,
+            point.residual,
+            point.random_effects,
+            evaluation.terms.inner_inverse,
+            state.variance_components,
+        )
+        return FitState(point.parameters, point.random_effects, variance_components)

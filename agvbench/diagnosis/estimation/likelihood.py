@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.diagnosis.estimation.variance import Scatter, priors, scale_of, student, tempering, weights
+from agvbench.diagnosis.estimation.variance import VarianceComponents, priors, scale_of, student, tempering, weights
 from agvbench.diagnosis.model.predictor import Linearised, Predictor
 from agvbench.types import Floats
 
@@ -79,19 +79,25 @@ class Terms:
     pull: Floats
 
 
-def terms_of(predictor: Predictor, residual: Floats, linear: Linearised, offsets: Floats, scatter: Scatter) -> Terms:
+def terms_of(
+    predictor: Predictor,
+    residual: Floats,
+    linear: Linearised,
+    random_effects: Floats,
+    variance_components: VarianceComponents,
+) -> Terms:
     """Return the likelihood of residuals (R, K, 3) of predictions with these derivatives."""
     runs = len(residual)
     temper, count = tempering(predictor)
-    weight = weights(predictor, scatter)
+    weight = weights(predictor, variance_components)
     e = (residual * weight).reshape(runs, -1)
     own = linear.own
     j = (linear.by_own * weight[..., None]).reshape(runs, e.shape[1], own.shape[1])
-    a = (linear.by_offsets * weight[..., None]).reshape(runs, e.shape[1], 6)
-    prior = priors(predictor, scatter)
+    a = (linear.by_random_effects * weight[..., None]).reshape(runs, e.shape[1], 6)
+    prior = priors(predictor, variance_components)
     at, jt = a.transpose(0, 2, 1), j.transpose(0, 2, 1)
     inner, inverse = inner_inverse(a, prior)
-    pull = (at @ e[..., None])[..., 0] - offsets / prior**2
+    pull = (at @ e[..., None])[..., 0] - random_effects / prior**2
     short = at @ j
     rows = np.arange(runs)[:, None]
     mixed = np.zeros((runs, 6, linear.count))
@@ -100,13 +106,15 @@ def terms_of(predictor: Predictor, residual: Floats, linear: Linearised, offsets
     gradient = np.zeros((runs, mixed.shape[2]))
     steep = (jt @ e[..., None])[..., 0] - (short.transpose(0, 2, 1) @ (inverse @ pull[..., None]))[..., 0]
     gradient[rows, own] = steep
-    squares = np.sum(e * e, axis=1) + np.sum((offsets / prior) ** 2, axis=1)
+    squares = np.sum(e * e, axis=1) + np.sum((random_effects / prior) ** 2, axis=1)
     # The offsets are a step away from their best values: what that step gains belongs to the loss.
     squares -= np.einsum("ri,rij,rj->r", pull, inverse, pull)
     logs = np.linalg.slogdet(inner)[1] + 2.0 * np.sum(np.log(prior), axis=1)
-    logs += temper * count * (4.0 * np.log(scatter.position_m) + 2.0 * np.log(scatter.heading_rad))
-    if predictor.readings.begins is not None:
-        logs += 6.0 * temper * (predictor.readings.seen * np.log(scatter.growth)).sum(axis=1)
+    logs += (
+        temper * count * (4.0 * np.log(variance_components.position_m) + 2.0 * np.log(variance_components.heading_rad))
+    )
+    if predictor.readings.initial_states is not None:
+        logs += 6.0 * temper * (predictor.readings.seen * np.log(variance_components.growth)).sum(axis=1)
         squares, trust = student(predictor, squares)
         blocks *= trust[:, None, None]
         gradient = np.asarray(gradient * trust[:, None])
@@ -122,13 +130,17 @@ def inner_inverse(a: Floats, prior: Floats) -> tuple[Floats, Floats]:
 
 
 @np.errstate(over="ignore")  # what a step too far predicts may be beyond all numbers: infinitely bad, and not taken
-def objective(predictor: Predictor, residual: Floats, offsets: Floats, scatter: Scatter) -> float:
+def objective(
+    predictor: Predictor, residual: Floats, random_effects: Floats, variance_components: VarianceComponents
+) -> float:
     """Return the weighted squares of residuals and offsets: what a step must not make larger."""
     temper, _ = tempering(predictor)
     seen = predictor.readings.seen[:, :, None]
-    e = residual * seen / scale_of(scatter)
-    squares = temper * np.sum(e * e, axis=(1, 2)) + np.sum((offsets / priors(predictor, scatter)) ** 2, axis=1)
-    if predictor.readings.begins is not None:
+    e = residual * seen / scale_of(variance_components)
+    squares = temper * np.sum(e * e, axis=(1, 2)) + np.sum(
+        (random_effects / priors(predictor, variance_components)) ** 2, axis=1
+    )
+    if predictor.readings.initial_states is not None:
         squares, _ = student(predictor, squares)
     return float(squares.sum())
 

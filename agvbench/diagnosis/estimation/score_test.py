@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Ground:
+class LinearisationPoint:
     """A fitted model of runs as larger ones are linearised about it, with the runs' offsets projected out.
 
     ``weight`` (R, K, 3) of residuals; ``a`` (R, 3K, 6) derivatives by the offsets, ``inverse`` (R, 6, 6) of their
@@ -40,17 +40,17 @@ class Ground:
     residual: Floats
 
     @classmethod
-    def of(cls, fitted: Fit) -> Ground:
+    def of(cls, fitted: Fit) -> LinearisationPoint:
         """Return the ground of a fit."""
-        predictor, scatter, linear = fitted.predictor, fitted.scatter, fitted.linear
-        weight = weights(predictor, scatter)
+        predictor, variance_components, linear = fitted.predictor, fitted.variance_components, fitted.linear
+        weight = weights(predictor, variance_components)
         residual = (fitted.residual * weight).reshape(len(weight), -1)
-        a = (linear.by_offsets * weight[..., None]).reshape(*residual.shape, -1)
+        a = (linear.by_random_effects * weight[..., None]).reshape(*residual.shape, -1)
         j = (linear.by_own * weight[..., None]).reshape(*residual.shape, -1)
-        prior = priors(predictor, scatter)
+        prior = priors(predictor, variance_components)
         inverse = inner_inverse(a, prior)[1]
         mixed = inverse @ (a.transpose(0, 2, 1) @ j)
-        drawn = fitted.offsets / prior**2
+        drawn = fitted.random_effects / prior**2
         matrix = fitted.information.total + ridge(predictor)
         pull = np.zeros(len(matrix))
         np.add.at(pull, linear.own, np.einsum("rij,ri->rj", mixed, drawn))
@@ -67,7 +67,7 @@ class Ground:
         pull = (self.a.transpose(0, 2, 1) @ e[..., None])[..., 0] - self.drawn
         return float(np.sum(e * e) - np.sum(pull * (self.inverse @ pull[..., None])[..., 0]))
 
-    def promise(self, residual: Floats, slopes: Floats, start: Floats, bounds: Floats) -> float:
+    def predicted_gain(self, residual: Floats, slopes: Floats, start: Floats, bounds: Floats) -> float:
         """Return by how much the loss falls, to first order, by `residual` (R, K, 3) and its `slopes`."""
         e = (residual * self.weight).reshape(len(residual), -1)
         new = (slopes * self.weight[..., None]).reshape(*e.shape, -1)
@@ -102,25 +102,27 @@ def begun(fitted: Fit, larger: Predictor, start: Floats) -> Floats:
     They do where runs begin at neutral; elsewhere they stay.
     """
     values, maps = fitted.parameters, larger.maps.size
-    if larger.readings.begins is None and not larger.readings.stood:
+    if larger.readings.initial_states is None and not larger.readings.preset:
         name = larger.effects[-1]
         kind = next((kind for kind in larger.batch.kinds if kind.name == name), None) or effect_kinds()[name]
         values = np.r_[larger.maps.beside(values[:maps], kind, start), values[maps:]]
     return np.asarray(np.r_[values, start])
 
 
-def promised_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floats) -> float:
+def first_order_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floats) -> float:
     """Return by how much the loss would fall with one effect more, its parameters near `start`, to first order.
 
     `larger` has the effects of `fitted` and then the other. It is linearised at `start`, with the derivatives by what
     was fitted before left as they are: some simulations in place of a fit.
     """
     parameters = begun(fitted, larger, start)
-    poses, slopes = larger.by_last(parameters, fitted.offsets, len(start))
+    poses, slopes = larger.by_last(parameters, fitted.random_effects, len(start))
     residual = residual_of(larger, poses)
-    if larger.readings.begins is None:
-        return fitted.ground.promise(residual, slopes, start, bounds)
-    terms = terms_of(larger, residual, fitted.linear.with_last(slopes), fitted.offsets, fitted.scatter)
+    if larger.readings.initial_states is None:
+        return fitted.linearisation_point.predicted_gain(residual, slopes, start, bounds)
+    terms = terms_of(
+        larger, residual, fitted.linear.with_last(slopes), fitted.random_effects, fitted.variance_components
+    )
     gradient, matrix = terms.gradient.sum(axis=0), terms.information.total + ridge(larger)
     move = np.linalg.lstsq(matrix, gradient, rcond=1e-12)[0]
     # What would go beyond its bound stops there, and the rest is solved for again.

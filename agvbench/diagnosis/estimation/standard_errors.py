@@ -33,7 +33,7 @@ def standard_errors(fitted: Fit, group: NDArray[np.int64]) -> Floats:
     group
         (R,): which runs belong together.
     """
-    if fitted.predictor.readings.begins is not None:
+    if fitted.predictor.readings.initial_states is not None:
         return np.asarray(np.sqrt(np.diagonal(clustered_covariance(fitted, group))))
     of_groups, counts = _jackknife(fitted, group)
     of_runs, _ = _jackknife(fitted, np.arange(len(group)))

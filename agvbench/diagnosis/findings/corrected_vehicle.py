@@ -6,7 +6,7 @@ import numpy as np
 
 from agvbench.calibration.campaign_protocol import HeaderLike
 from agvbench.diagnosis.estimation.fit import Fit
-from agvbench.diagnosis.model.nodal_maps import FreeMaps
+from agvbench.diagnosis.model.nodal_maps import NodalMaps
 from agvbench.effects import Effect, effect_kinds
 from agvbench.effects.forms import effect_forms
 from agvbench.model import VehicleModel
@@ -17,7 +17,7 @@ from agvbench.vehicle.maps import Fixed, MonotoneTable, StaticMap
 _DIGITS = 9
 
 
-def corrected_vehicle(header: HeaderLike, geometry: Geometry, fitted: Fit, maps: FreeMaps, seed: int) -> VehicleModel:
+def corrected_vehicle(header: HeaderLike, geometry: Geometry, fitted: Fit, maps: NodalMaps, seed: int) -> VehicleModel:
     """Return the vehicle that `fitted` describes; its maps are tables, made monotone where scatter made them turn."""
     where = maps.slices()
     weight = np.maximum(np.diagonal(fitted.information.total), 1e-6)

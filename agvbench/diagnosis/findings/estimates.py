@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from agvbench.diagnosis.estimation.standard_errors import standard_errors
 from agvbench.diagnosis.result import Estimate, NamedEffect
-from agvbench.diagnosis.selection.stepwise import RIVAL_MARGIN, Selection
-from agvbench.diagnosis.terms import TERMS, EmpiricalTerm
+from agvbench.diagnosis.selection.stepwise import ALTERNATIVE_MARGIN, Selection
+from agvbench.diagnosis.terms import TERMS, DiscrepancyTerm
 from agvbench.effects import Effect, effect_kinds
 from agvbench.effects.forms import cause_of, effect_forms
 from agvbench.types import Floats
@@ -31,19 +31,19 @@ def named_effects(selection: Selection, bounds: Floats) -> tuple[NamedEffect, ..
             note = _note(value, error, bounds[at], p.scale)
             estimates[p.name] = Estimate(value, error, p.unit, note)
             at += 1
-        if name in selection.base.names or issubclass(kinds[name], EmpiricalTerm):
+        if name in selection.base.names or issubclass(kinds[name], DiscrepancyTerm):
             continue  # the vehicle was known to have it; or it is no effect but a description
-        rivals = sorted(selection.rivals[name].items(), key=lambda pair: pair[1])
+        alternatives = sorted(selection.alternatives[name].items(), key=lambda pair: pair[1])
         found.append(
             NamedEffect(
                 cause_of(name),
                 estimates,
-                tuple(rival for rival, _ in rivals),
+                tuple(alternative for alternative, _ in alternatives),
                 {
                     "loss_without_it": selection.gains[name],
-                    "rival_margin": RIVAL_MARGIN,
+                    "rival_margin": ALTERNATIVE_MARGIN,
                     **({"form": name} if name in effect_forms() else {}),
-                    **{f"{rival}_instead": worse for rival, worse in rivals},
+                    **{f"{alternative}_instead": worse for alternative, worse in alternatives},
                 },
             )
         )

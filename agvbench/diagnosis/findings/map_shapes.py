@@ -51,9 +51,9 @@ class RefittedMap:
         whole = self.covariance + np.eye(len(self.values)) * (_MODEL_ERROR * self.size) ** 2
         return np.asarray(np.linalg.cholesky(np.linalg.inv(whole)).T)
 
-    def agrees_with(self, believed: StaticMap) -> bool:
+    def agrees_with(self, prior_model: StaticMap) -> bool:
         """Return whether a map goes through the values, as far as their errors say: then it lacks nothing there."""
-        off = self.root @ (self.values - np.asarray(believed(self.commands)))
+        off = self.root @ (self.values - np.asarray(prior_model(self.commands)))
         count = len(self.values)
         return float(off @ off) <= count + _CLEAR * math.sqrt(2.0 * count)
 
@@ -79,14 +79,14 @@ class EndStops:
     rising: bool
 
 
-def end_stops(refitted: RefittedMap, believed: StaticMap) -> EndStops | None:
+def end_stops(refitted: RefittedMap, prior_model: StaticMap) -> EndStops | None:
     """Return where a steering map stops turning; None where a line, or a smooth curve, describes it as well.
 
     Between its stops the map is the believed one, stretched and shifted.
     """
     known = np.flatnonzero(np.sqrt(np.diagonal(refitted.covariance)) < _UNKNOWN_RAD)
     own = refitted.select(known)
-    inner = np.asarray(believed(own.commands))
+    inner = np.asarray(prior_model(own.commands))
     if len(known) < _FEWEST_INSIDE + 1 or np.ptp(inner) == 0.0:
         return None
     rising = bool(np.polyfit(own.commands, own.values, 1)[0] > 0.0)
@@ -149,7 +149,7 @@ class DeadBand:
     gain: float
 
 
-def dead_band(refitted: RefittedMap, believed: StaticMap, neutral: float) -> DeadBand | None:
+def dead_band(refitted: RefittedMap, prior_model: StaticMap, neutral: float) -> DeadBand | None:
     """Return how far from neutral the drive starts to move, where it does not do so at once; else None.
 
     Each side has its own edge, so that a neutral that is merely another one is no dead band; what counts is their mean.
@@ -158,7 +158,7 @@ def dead_band(refitted: RefittedMap, believed: StaticMap, neutral: float) -> Dea
     if not len(known):
         return None
     own = refitted.select(known)
-    sides = [_edge(own, believed, neutral, sign) for sign in (1.0, -1.0)]
+    sides = [_edge(own, prior_model, neutral, sign) for sign in (1.0, -1.0)]
     found = [side for side in sides if side is not None]
     stopped = any(side.stopped for side in found)
     if not found or (len(found) < 2 and not stopped):
@@ -181,7 +181,7 @@ class _Edge:
     stopped: bool
 
 
-def _edge(own: RefittedMap, believed: StaticMap, neutral: float, sign: float) -> _Edge | None:
+def _edge(own: RefittedMap, prior_model: StaticMap, neutral: float, sign: float) -> _Edge | None:
     """Return where one side starts to move; None where it has too few levels, or none that speaks for an edge."""
     chosen = np.flatnonzero(sign * (own.commands - neutral) > 0.0)
     if len(chosen) < 2:
@@ -189,7 +189,7 @@ def _edge(own: RefittedMap, believed: StaticMap, neutral: float, sign: float) ->
     side = own.select(chosen)
     away = np.abs(side.commands - neutral)
     error = np.sqrt(np.diagonal(side.covariance)) + _MODEL_ERROR * own.size
-    told = np.abs(np.asarray(believed(side.commands)))
+    told = np.abs(np.asarray(prior_model(side.commands)))
     still = (np.abs(side.values) < _CLEAR * error) & (told > 2.0 * _CLEAR * error)
     moving = ~still
     if still.any():
@@ -222,8 +222,8 @@ def _extrapolated(side: RefittedMap, neutral: float) -> _Edge | None:
     if found is None:
         return None
     chi, edge, stderr = found
-    rivals = [_misfit(side, basis, parameters) for basis, parameters in _curves(side, neutral, 0.0, most=3)]
-    gain = min((rival for rival in rivals if rival is not None), default=chi) - chi
+    alternatives = [_misfit(side, basis, parameters) for basis, parameters in _curves(side, neutral, 0.0, most=3)]
+    gain = min((alternative for alternative in alternatives if alternative is not None), default=chi) - chi
     return _Edge(edge, stderr, gain, stopped=False) if gain > 0.0 else _Edge(0.0, stderr, 0.0, stopped=False)
 
 

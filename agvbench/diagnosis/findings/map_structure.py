@@ -32,7 +32,7 @@ _STILL, _LEAST_BAND = 0.01, 0.02
 class _Known:
     """What the vehicle file and the refitted maps say of one role."""
 
-    believed: StaticMap
+    prior_model: StaticMap
     refitted: RefittedMap
 
 
@@ -58,21 +58,21 @@ def _known(fitted: Fit, vehicle: VehicleModel) -> dict[str, _Known]:
     covariance = clustered_covariance(fitted, fitted.predictor.readings.group)
     out = {}
     for role, own in maps.slices().items():
-        believed: StaticMap = getattr(vehicle, role)
+        prior_model: StaticMap = getattr(vehicle, role)
         refitted = RefittedMap(maps.nodes[role], fitted.parameters[own], covariance[own, own])
-        out[role] = _Known(believed, refitted)
+        out[role] = _Known(prior_model, refitted)
     return out
 
 
 def _saturation(axles: dict[str, _Known]) -> Iterator[NamedEffect]:
     estimates, gain = {}, 0.0
     for role, known in axles.items():
-        if isinstance(known.believed, Fixed) or known.refitted.agrees_with(known.believed):
+        if isinstance(known.prior_model, Fixed) or known.refitted.agrees_with(known.prior_model):
             continue
-        stops = end_stops(known.refitted, known.believed)
+        stops = end_stops(known.refitted, known.prior_model)
         if stops is None:
             continue
-        low, high = _believes_stops(known.believed, known.refitted.commands, rising=stops.rising)
+        low, high = _prior_has_stops(known.prior_model, known.refitted.commands, rising=stops.rising)
         if limits := [*_side(stops, "low", low), *_side(stops, "high", high)]:
             value, stderr = np.mean(limits, axis=0)
             spread = 0.5 * float(np.ptp([limit for limit, _ in limits]))
@@ -88,39 +88,39 @@ def _side(stops: EndStops, side: str, is_believed: bool) -> Iterator[tuple[float
         yield abs(value), stderr
 
 
-def _believes_stops(believed: StaticMap, commands: Floats, *, rising: bool) -> tuple[bool, bool]:
+def _prior_has_stops(prior_model: StaticMap, commands: Floats, *, rising: bool) -> tuple[bool, bool]:
     """Return whether a map has a stop at low and at high outputs, by its kind or by being flat where runs were."""
-    if isinstance(believed, LineWithEndStops):
-        return math.isfinite(believed.output_low), math.isfinite(believed.output_high)
-    if isinstance(believed, DeadBandWithSaturation):
+    if isinstance(prior_model, LineWithEndStops):
+        return math.isfinite(prior_model.output_low), math.isfinite(prior_model.output_high)
+    if isinstance(prior_model, DeadBandWithSaturation):
         return True, True
     at = np.linspace(commands[0], commands[-1], _GRID)
-    slope = np.abs(np.diff(believed(at)))
+    slope = np.abs(np.diff(prior_model(at)))
     usual = float(np.median(slope))
     ends = bool(slope[0] <= _FLAT * usual), bool(slope[-1] <= _FLAT * usual)
     return ends if rising else (ends[1], ends[0])
 
 
 def _dead_band(drive: _Known, neutral: float) -> Iterator[NamedEffect]:
-    if drive.refitted.agrees_with(drive.believed) or _believes_dead_band(
-        drive.believed, drive.refitted.commands, neutral
+    if drive.refitted.agrees_with(drive.prior_model) or _prior_has_dead_band(
+        drive.prior_model, drive.refitted.commands, neutral
     ):
         return
-    band = dead_band(drive.refitted, drive.believed, neutral)
+    band = dead_band(drive.refitted, drive.prior_model, neutral)
     if band is not None:
         width = Estimate(band.width, band.stderr, "command")
         yield NamedEffect("drive_dead_band", {"width": width}, (), {"loss_without_it": band.gain, "source": _SOURCE})
 
 
-def _believes_dead_band(believed: StaticMap, commands: Floats, neutral: float) -> bool:
+def _prior_has_dead_band(prior_model: StaticMap, commands: Floats, neutral: float) -> bool:
     """Return whether a map has a dead band, or says nothing of small commands that could be contradicted."""
-    if isinstance(believed, FullSpeedOrStop | Fixed):
+    if isinstance(prior_model, FullSpeedOrStop | Fixed):
         return True
-    if isinstance(believed, DeadBandWithSaturation):
-        return believed.low_edge < believed.high_edge
+    if isinstance(prior_model, DeadBandWithSaturation):
+        return prior_model.low_edge < prior_model.high_edge
     farthest = float(np.max(np.abs(commands - neutral)))
     at = neutral + farthest * np.linspace(-1.0, 1.0, 2 * _GRID + 1)
-    speed = np.abs(believed(at))
+    speed = np.abs(prior_model(at))
     still = np.abs(at[speed <= _STILL * float(speed.max())] - neutral)
     # A line stands still for as much of its range as is called still; a dead band for more.
     return bool(len(still) and float(still.max()) > (_STILL + _LEAST_BAND) * farthest)

@@ -8,14 +8,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.diagnosis.context import Asked
+from agvbench.diagnosis.context import DiagnosisContext
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.data.windows import SUPPORT_S, Horizon
 from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.findings.corrected_vehicle import corrected_vehicle
 from agvbench.diagnosis.findings.estimates import named_effects
-from agvbench.diagnosis.free_driving.errors import QUANTITIES, by_recording, floor_squares, rms, squares
-from agvbench.diagnosis.free_driving.predictors import believed, by_speed_error, naive, speed_held
+from agvbench.diagnosis.free_driving.errors import QUANTITIES, by_recording, repeatability_squares, rms, squares
+from agvbench.diagnosis.free_driving.predictors import by_speed_error, constant_velocity, prior_model, speed_held
 from agvbench.diagnosis.free_driving.selection import WindowSelector
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
@@ -23,11 +23,11 @@ from agvbench.diagnosis.residuals.body_rates import residual_rates
 from agvbench.diagnosis.residuals.covariate_test import Dependence, dependences
 from agvbench.diagnosis.result import Diagnosis, HeldOut, NamedEffect, Verdict
 from agvbench.diagnosis.selection.candidates import bounds_of
-from agvbench.diagnosis.selection.fitted_models import Scored
+from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection
 from agvbench.types import Floats
 
-AT_THE_FLOOR = 1.25
+WITHIN_REPEATABILITY = 1.25
 FAR_ABOVE = 5.0
 """The floor of windows is a lower bound, for the vehicle's own scatter cannot be seen without repeats: so many times it
 is more than scatter."""
@@ -37,13 +37,13 @@ is more than scatter."""
 class WindowConclusion:
     """Judges what was chosen on the windows set aside.
 
-    ``readings`` are all windows and ``judged`` those that are predicted here, of which ``held`` were set aside;
+    ``readings`` are all windows and ``assessment`` those that are predicted here, of which ``held`` were set aside;
     ``static`` are the maps without effects, fitted to the others.
     """
 
-    asked: Asked
+    context: DiagnosisContext
     readings: Readings
-    judged: Readings
+    assessment: Readings
     held: NDArray[np.bool_]
     static: Fit
     selector: WindowSelector
@@ -51,23 +51,23 @@ class WindowConclusion:
 
     def diagnosis(self, horizon: Horizon) -> Diagnosis:
         """Return the diagnosis that what was chosen amounts to."""
-        asked, chosen = self.asked, self.selection.chosen
+        context, chosen = self.context, self.selection.chosen
         poses = self._poses(chosen)
-        static = Predictor(Batch(self.judged, self.static.predictor.maps, asked.geometry))
+        static = Predictor(Batch(self.assessment, self.static.predictor.maps, context.geometry))
         predicted = {
             "static": static.predict(self.static.parameters),
             "speed_held": speed_held(static.batch, self.static.parameters),
-            "naive": naive(self.judged),
+            "naive": constant_velocity(self.assessment),
             "after": poses,
         }
         before = predicted["static"]
-        if asked.vehicle is not None:
-            before = predicted["believed"] = believed(asked.vehicle, self.judged, self.selector.batch.kinds)
-        shaken = by_speed_error(Predictor(self._every, chosen.fit.predictor.effects), chosen.fit.parameters)
+        if context.vehicle is not None:
+            before = predicted["believed"] = prior_model(context.vehicle, self.assessment, self.selector.batch.kinds)
+        perturbed = by_speed_error(Predictor(self._every, chosen.fit.predictor.effects), chosen.fit.parameters)
         effects = named_effects(self.selection, bounds_of(chosen.names))
-        held_out = self._held_out(before, poses, shaken)
+        held_out = self._held_out(before, poses, perturbed)
         # Small structure shows in many windows; what lies at the floor needs no further cause.
-        rest = self._dependences(poses) if _above(held_out, AT_THE_FLOOR) else []
+        rest = self._dependences(poses) if _above(held_out, WITHIN_REPEATABILITY) else []
         far = _above(held_out, FAR_ABOVE)
         verdict, why = _verdict(effects, rest, far)
         return Diagnosis(
@@ -77,12 +77,12 @@ class WindowConclusion:
             far or bool(rest),
             tuple(rest),
             held_out,
-            corrected_vehicle(asked.header, asked.geometry, chosen.fit, chosen.fit.predictor.maps, asked.seed),
+            corrected_vehicle(context.header, context.geometry, chosen.fit, chosen.fit.predictor.maps, context.seed),
             self.selection.rejected,
-            asked.provenance(self.readings) | self._how(horizon, predicted, shaken),
+            context.provenance(self.readings) | self._how(horizon, predicted, perturbed),
         )
 
-    def _how(self, horizon: Horizon, predicted: dict[str, Floats], shaken: Floats) -> dict[str, object]:
+    def _how(self, horizon: Horizon, predicted: dict[str, Floats], perturbed: Floats) -> dict[str, object]:
         """Return how it was fitted, and what each predictor and each effect is worth."""
         batch = self.selector.batch
         return {
@@ -92,31 +92,31 @@ class WindowConclusion:
                 "horizon_s": horizon.horizon_s,
                 "stride_s": horizon.stride_s,
                 "initial_state_from_s": [-SUPPORT_S, 0.0],
-                "level_scatter": float(batch.level_scatter),
-                "redundancy": batch.redundancy,
-                "recordings": by_recording(self.judged, predicted, shaken, self.held, self.asked.seed),
+                "level_scatter": float(batch.nodal_deviation),
+                "redundancy": batch.autocorrelation_time,
+                "recordings": by_recording(self.assessment, predicted, perturbed, self.held, self.context.seed),
                 "effects": self._each(predicted["after"]),
             },
         }
 
-    def _poses(self, model: Scored) -> Floats:
+    def _poses(self, model: ScoredModel) -> Floats:
         """Return what `model` predicts for every window that is judged."""
         return Predictor(self._every, model.fit.predictor.effects).predict(model.fit.parameters)
 
     @cached_property
     def _every(self) -> Batch:
         batch = self.selector.batch
-        return Batch(self.judged, batch.maps, self.asked.geometry, batch.level_scatter, kinds=batch.kinds)
+        return Batch(self.assessment, batch.maps, self.context.geometry, batch.nodal_deviation, kinds=batch.kinds)
 
-    def _held_out(self, before: Floats, after: Floats, shaken: Floats) -> HeldOut:
-        kept = self.judged.select(self.held)
-        least = floor_squares(kept, shaken[self.held])
+    def _held_out(self, before: Floats, after: Floats, perturbed: Floats) -> HeldOut:
+        kept = self.assessment.select(self.held)
+        least = repeatability_squares(kept, perturbed[self.held])
         was, now = squares(kept, before[self.held]), squares(kept, after[self.held])
         errors = {
             name: {"before": rms(was[name], name), "after": rms(now[name], name), "floor": rms(least[name], name)}
             for name in QUANTITIES
         }
-        recording = kept.begins.recording if kept.begins is not None else np.empty(0, dtype=np.str_)
+        recording = kept.initial_states.recording if kept.initial_states is not None else np.empty(0, dtype=np.str_)
         worse = []
         for name in dict.fromkeys(recording.tolist()):
             own = recording == name
@@ -138,7 +138,7 @@ class WindowConclusion:
                 continue
             kept = name in chosen.names
             if kept:
-                other: Scored | None = self.selector.shrunk(self.selection.base, chosen, name)
+                other: ScoredModel | None = self.selector.without_effect(self.selection.base, chosen, name)
             else:
                 other = self.selector.known((*chosen.names, name))
             error = None if other is None else self._error(self._poses(other))
@@ -152,15 +152,15 @@ class WindowConclusion:
 
     def _error(self, poses: Floats) -> float:
         name = "position_rms_mm"
-        return rms(squares(self.judged.select(self.held), poses[self.held])[name], name)
+        return rms(squares(self.assessment.select(self.held), poses[self.held])[name], name)
 
     def _dependences(self, poses: Floats) -> list[Dependence]:
         """Return what the rest depends on, a stretch of driving being one piece of evidence."""
-        rates = residual_rates(self.judged, poses)
-        _, stretch = np.unique(self.judged.group, return_inverse=True)
+        rates = residual_rates(self.assessment, poses)
+        _, stretch = np.unique(self.assessment.group, return_inverse=True)
         rates.covariates.pop("distance_m")  # counted from the window's beginning, where a wheel may stand anyhow
         clustered = dataclasses.replace(rates, run=stretch[rates.run].astype(np.int64))
-        return dependences(clustered, np.arange(int(stretch.max()) + 1), self.asked.seed)
+        return dependences(clustered, np.arange(int(stretch.max()) + 1), self.context.seed)
 
 
 def _above(held_out: HeldOut, times: float) -> bool:

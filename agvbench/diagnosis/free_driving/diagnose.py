@@ -8,20 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.calibration.campaign_protocol import HeaderLike
-from agvbench.diagnosis.context import Asked, refuse_nothing
+from agvbench.diagnosis.context import DiagnosisContext, require_runs
 from agvbench.diagnosis.data.readings import Readings, read_windows
 from agvbench.diagnosis.data.window_splits import MOST_FITTED, MOST_JUDGED, held_out_windows, thinned
 from agvbench.diagnosis.data.windows import Horizon
 from agvbench.diagnosis.estimation.fit import Fit, fit
 from agvbench.diagnosis.free_driving.conclusion import WindowConclusion
 from agvbench.diagnosis.free_driving.maps import NODES, smooth_maps, start_values_of_windows
-from agvbench.diagnosis.free_driving.predictors import level_scatter, redundancy
+from agvbench.diagnosis.free_driving.predictors import autocorrelation_time, nodal_deviation
 from agvbench.diagnosis.free_driving.selection import WindowSelector
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.result import Diagnosis
 from agvbench.diagnosis.selection.candidates import given_effects
-from agvbench.diagnosis.selection.fitted_models import Tell
+from agvbench.diagnosis.selection.fitted_models import OnProgress
 from agvbench.diagnosis.selection.variants import tried_beside
 from agvbench.errors import CampaignError
 from agvbench.types import Run
@@ -32,45 +32,51 @@ FEWEST_STRETCHES = 5
 _LEAST_TURN_RAD = 0.05
 
 
-def diagnose_windows(asked: Asked, runs: Sequence[Run], horizon: Horizon, tell: Tell) -> Diagnosis:
+def diagnose_windows(
+    context: DiagnosisContext, runs: Sequence[Run], horizon: Horizon, on_progress: OnProgress
+) -> Diagnosis:
     """Diagnose free driving; see `agvbench.diagnosis.diagnose`.
 
     Errors are those at the horizon. What differs from session to session in the drive's level is read off the speed at
     the beginning of a window, where there are several sessions.
     """
-    readings = read_windows(runs, horizon, asked.header.neutral)
-    if reason := _cannot_tell(readings, asked.header, horizon):
-        return asked.cannot_tell(readings, reason)
-    held = held_out_windows(readings, asked.seed)
+    readings = read_windows(runs, horizon, context.header.neutral)
+    if reason := _cannot_tell(readings, context.header, horizon):
+        return context.cannot_tell(readings, reason)
+    held = held_out_windows(readings, context.seed)
     if not held.any():
-        return asked.cannot_tell(readings, "no stretch of driving can be set aside to judge on: drive for longer")
+        return context.cannot_tell(readings, "no stretch of driving can be set aside to judge on: drive for longer")
     fitted = readings.select(thinned(np.flatnonzero(~held), MOST_FITTED))
-    tell(f"{len(fitted)} windows to fit, {np.count_nonzero(held)} held out")
-    static = _static(fitted, asked.geometry, asked.header.neutral)
-    selector = _selector(asked, readings, held, static, tell)
+    on_progress(f"{len(fitted)} windows to fit, {np.count_nonzero(held)} held out")
+    static = _static(fitted, context.geometry, context.header.neutral)
+    selector = _selector(context, readings, held, static, on_progress)
     selection = selector.select()
-    tell("judging on what was held out")
-    judged = readings.select(np.sort(np.r_[np.flatnonzero(held), thinned(np.flatnonzero(~held), MOST_JUDGED)]))
-    held = np.isin([r.run_id for r in judged.runs], [r.run_id for r in readings.select(held).runs])
-    return WindowConclusion(asked, readings, judged, held, static, selector, selection).diagnosis(horizon)
+    on_progress("judging on what was held out")
+    assessment = readings.select(np.sort(np.r_[np.flatnonzero(held), thinned(np.flatnonzero(~held), MOST_JUDGED)]))
+    held = np.isin([r.run_id for r in assessment.runs], [r.run_id for r in readings.select(held).runs])
+    return WindowConclusion(context, readings, assessment, held, static, selector, selection).diagnosis(horizon)
 
 
-def _selector(asked: Asked, readings: Readings, held: NDArray[np.bool_], static: Fit, tell: Tell) -> WindowSelector:
+def _selector(
+    context: DiagnosisContext, readings: Readings, held: NDArray[np.bool_], static: Fit, on_progress: OnProgress
+) -> WindowSelector:
     """Return what tries effects on the windows that `static` was fitted to, none of those `held` out."""
     fitted, maps = static.predictor.readings, static.predictor.maps
     aside = readings.select(thinned(np.flatnonzero(held), MOST_FITTED))
-    tried, kinds = tried_beside(asked.vehicle)
-    names, values = given_effects(asked.vehicle, tried)
-    several = len(np.unique(readings.begins.session)) > 1 if readings.begins else False
-    scatter = level_scatter(static.predictor, static.parameters) if several else np.inf
-    level = fit(Predictor(Batch(fitted, maps, asked.geometry, scatter)), static.parameters, np.empty((0, 2)))
-    batch = Batch(fitted, maps, asked.geometry, scatter, redundancy(level), kinds)
-    elsewhere = Batch(aside, maps, asked.geometry, scatter, kinds=kinds)
-    return WindowSelector(batch, tried, level.parameters, asked.seed, tell, names, values, elsewhere=elsewhere)
+    tried, kinds = tried_beside(context.vehicle)
+    names, values = given_effects(context.vehicle, tried)
+    several = len(np.unique(readings.initial_states.session)) > 1 if readings.initial_states else False
+    variance_components = nodal_deviation(static.predictor, static.parameters) if several else np.inf
+    level = fit(
+        Predictor(Batch(fitted, maps, context.geometry, variance_components)), static.parameters, np.empty((0, 2))
+    )
+    batch = Batch(fitted, maps, context.geometry, variance_components, autocorrelation_time(level), kinds)
+    elsewhere = Batch(aside, maps, context.geometry, variance_components, kinds=kinds)
+    return WindowSelector(batch, tried, level.parameters, context.seed, on_progress, names, values, elsewhere=elsewhere)
 
 
 def _cannot_tell(readings: Readings, header: HeaderLike, horizon: Horizon) -> str:
-    refuse_nothing(readings, header)
+    require_runs(readings, header)
     if len(readings) < FEWEST_WINDOWS:
         raise CampaignError(
             "too little free driving to diagnose",

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.diagnosis.data.readings import Readings
-from agvbench.diagnosis.data.window_splits import _begins
+from agvbench.diagnosis.data.window_splits import _initial_states
 from agvbench.diagnosis.data.windows import SAMPLES
 from agvbench.types import Floats
 
@@ -43,22 +43,22 @@ def squares(readings: Readings, poses: Floats, sample: int = -1) -> dict[str, Fl
     }
 
 
-def floor_squares(readings: Readings, shaken: Floats, sample: int = -1) -> dict[str, Floats]:
+def repeatability_squares(readings: Readings, perturbed: Floats, sample: int = -1) -> dict[str, Floats]:
     """Return the squares (W,) that no predictor can avoid, from the noise of frames.
 
-    The pose to start from is uncertain, so is the pose that is judged, and so is the speed to start from: `shaken`
+    The pose to start from is uncertain, so is the pose that is judged, and so is the speed to start from: `perturbed`
     (W, K, 3) is by how much the prediction changes with a standard error of it. What the vehicle does differently
     without a cause in its commands comes on top: without repeats it cannot be told from what a model lacks, so this
     is the least that the floor can be.
     """
-    begins = _begins(readings)
+    initial_states = _initial_states(readings)
     went = np.hypot(*(readings.poses[:, sample, :2] - readings.start[:, :2]).T)
     sd = readings.start_stderr
-    by_speed = shaken[:, sample, 0] ** 2 + shaken[:, sample, 1] ** 2
-    along = by_speed + begins.noise[:, 0] ** 2 + sd[:, 0] ** 2
-    heading = sd[:, 2] ** 2 + begins.noise[:, 1] ** 2 + shaken[:, sample, 2] ** 2
+    by_speed = perturbed[:, sample, 0] ** 2 + perturbed[:, sample, 1] ** 2
+    along = by_speed + initial_states.noise[:, 0] ** 2 + sd[:, 0] ** 2
+    heading = sd[:, 2] ** 2 + initial_states.noise[:, 1] ** 2 + perturbed[:, sample, 2] ** 2
     return {
-        "position_rms_mm": along + sd[:, 1] ** 2 + (sd[:, 2] * went) ** 2 + begins.noise[:, 0] ** 2,
+        "position_rms_mm": along + sd[:, 1] ** 2 + (sd[:, 2] * went) ** 2 + initial_states.noise[:, 0] ** 2,
         "heading_rms_deg": heading,
         "delta_s_mm": along,
         "delta_heading_deg": heading,
@@ -71,29 +71,29 @@ def rms(values: Floats, name: str) -> float:
 
 
 def by_recording(
-    readings: Readings, predicted: Mapping[str, Floats], shaken: Floats, held: NDArray[np.bool_], seed: int
+    readings: Readings, predicted: Mapping[str, Floats], perturbed: Floats, held: NDArray[np.bool_], seed: int
 ) -> list[dict[str, object]]:
     """Return a table: for each recording and each time ahead the position error [mm] of every predictor.
 
     Each error is a root mean square with its 95 % interval, by resampling stretches of the recording: windows of one
     stretch miss alike.
     """
-    begins = _begins(readings)
+    initial_states = _initial_states(readings)
     table: list[dict[str, object]] = []
-    for recording in dict.fromkeys(begins.recording.tolist()):
-        own = begins.recording == recording
+    for recording in dict.fromkeys(initial_states.recording.tolist()):
+        own = initial_states.recording == recording
         rows = np.flatnonzero(own)
         row: dict[str, object] = {
             "recording": recording,
-            "session": str(begins.session[rows[0]]),
+            "session": str(initial_states.session[rows[0]]),
             "held_out": bool(held[rows].all()),
             "windows": len(rows),
-            "median_speed_mps": float(np.median(np.abs(begins.speed_mps[rows]))),
+            "median_speed_mps": float(np.median(np.abs(initial_states.speed_mps[rows]))),
         }
         for sample in AHEAD:
-            ahead = float(np.median(readings.t_s[rows, sample] - begins.t_s[rows]))
-            floor = floor_squares(readings, shaken, sample)["position_rms_mm"][rows]
-            entry: dict[str, object] = {"floor_mm": rms(floor, "position_rms_mm")}
+            ahead = float(np.median(readings.t_s[rows, sample] - initial_states.t_s[rows]))
+            repeatability = repeatability_squares(readings, perturbed, sample)["position_rms_mm"][rows]
+            entry: dict[str, object] = {"floor_mm": rms(repeatability, "position_rms_mm")}
             for name, poses in predicted.items():
                 missed = squares(readings, poses, sample)["position_rms_mm"][rows]
                 entry[f"{name}_mm"] = interval(missed, readings.group[rows], seed)

@@ -8,7 +8,7 @@ import numpy as np
 
 from agvbench.calibration.measurement.windows import held_command
 from agvbench.diagnosis.data.readings import Readings
-from agvbench.diagnosis.model.nodal_maps import ROLES, FreeMaps, free_maps
+from agvbench.diagnosis.model.nodal_maps import ROLES, NodalMaps, nodal_maps
 from agvbench.types import Floats, Run
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.kinematics import axle_angles
@@ -22,19 +22,19 @@ _STIFFNESS = 0.3
 _SLOWEST_MPS = 0.05
 
 
-def smooth_maps(runs: Sequence[Run], neutral: float, steering: int, drive: int) -> FreeMaps:
+def smooth_maps(runs: Sequence[Run], neutral: float, steering: int, drive: int) -> NodalMaps:
     """Return free maps with a node for every level, or so many evenly spaced nodes where there are many levels.
 
     Even spacing, not quantiles: another day's driving may dwell where this one only passed.
     """
-    nodes = dict(free_maps(runs, neutral).nodes)
+    nodes = dict(nodal_maps(runs, neutral).nodes)
     for role in ROLES:
         told = np.concatenate([getattr(run.commands, role) for run in runs])
         if role == "drive":
             told = told[told != neutral]
         if len(np.unique(told)) > _MANY_LEVELS:
             nodes[role] = _even(told, drive if role == "drive" else steering, neutral, role)
-    return FreeMaps(nodes, neutral)
+    return NodalMaps(nodes, neutral)
 
 
 def _even(told: Floats, count: int, neutral: float, role: str) -> Floats:
@@ -52,7 +52,7 @@ def _side(told: Floats, count: int, neutral: float) -> Floats:
     return np.sort(neutral + np.sign(told[0] - neutral) * np.linspace(low, high, count))
 
 
-def start_values_of_windows(maps: FreeMaps, readings: Readings, geometry: Geometry) -> Floats:
+def start_values_of_windows(maps: NodalMaps, readings: Readings, geometry: Geometry) -> Floats:
     """Return values to start a fit from: the motion between samples, inverted to axle angles and speed.
 
     Each is set against the command of a little earlier, since vehicles follow late; a stiff curve is laid through them.

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from agvbench.diagnosis.data.readings import Readings
-from agvbench.diagnosis.data.window_splits import _begins
+from agvbench.diagnosis.data.window_splits import _initial_states
 from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
@@ -20,9 +20,9 @@ from agvbench.signals import robust_std
 from agvbench.types import Floats
 
 
-def naive(readings: Readings) -> Floats:
+def constant_velocity(readings: Readings) -> Floats:
     """Return poses (W, K, 3) of arcs: the velocity and yaw rate of the last 0.1 s go on."""
-    ahead, left, yaw = (column[:, None] for column in _begins(readings).naive.T)
+    ahead, left, yaw = (column[:, None] for column in _initial_states(readings).constant_velocity.T)
     time = readings.t_s - readings.begins_s[:, None]
     half = 0.5 * yaw * time
     chord = time * np.sinc(half / np.pi)
@@ -39,7 +39,7 @@ def speed_held(batch: Batch, parameters: Floats) -> Floats:
     static = parameters[: predictor.maps.size]
     settled, initial = predictor.settled(static)
     front, rear = settled[:, 0], settled[:, 1]
-    ahead = _begins(batch.readings).speed_mps[batch.base.row_runs]
+    ahead = _initial_states(batch.readings).speed_mps[batch.base.row_runs]
     settled[:, 2] = 2.0 * ahead / (np.cos(front) + np.cos(rear))
     poses = batch.base.predict(settled, batch.base.nulls, initial)
     return poses.reshape(len(batch.readings), -1, 3)
@@ -48,51 +48,55 @@ def speed_held(batch: Batch, parameters: Floats) -> Floats:
 def by_speed_error(predictor: Predictor, parameters: Floats) -> Floats:
     """Return by how much predicted poses (W, K, 3) change with a standard error of the speed at the beginning."""
     before = predictor.predict(parameters)
-    begins = _begins(predictor.readings)
-    faster = replace(begins, speed_mps=begins.speed_mps + begins.speed_stderr)
-    shaken = Predictor(predictor.batch, predictor.effects)
-    shaken.readings = replace(predictor.readings, begins=faster)
-    return shaken.predict(parameters) - before
+    initial_states = _initial_states(predictor.readings)
+    faster = replace(initial_states, speed_mps=initial_states.speed_mps + initial_states.speed_stderr)
+    perturbed = Predictor(predictor.batch, predictor.effects)
+    perturbed.readings = replace(predictor.readings, initial_states=faster)
+    return perturbed.predict(parameters) - before
 
 
-def believed(vehicle: VehicleModel, readings: Readings, kinds: Sequence[type[Effect]]) -> Floats:
+def prior_model(vehicle: VehicleModel, readings: Readings, kinds: Sequence[type[Effect]]) -> Floats:
     """Return poses (W, K, 3) that a vehicle model predicts; `kinds` are its effects beyond the library's."""
-    begins = _begins(readings)
+    initial_states = _initial_states(readings)
     runs = [
         SimulatedRun(run.commands, t, float(h), begins_s=float(b))
-        for run, t, h, b in zip(readings.runs, readings.t_s, readings.started_h, begins.t_s, strict=True)
+        for run, t, h, b in zip(readings.runs, readings.t_s, readings.started_h, initial_states.t_s, strict=True)
     ]
     simulation = Simulation(vehicle.geometry, vehicle.neutral, runs, kinds=kinds)
     settled = simulation.settled(vehicle.front, vehicle.rear, vehicle.drive)
-    initial = np.column_stack([readings.start, begins.speed_mps])
+    initial = np.column_stack([readings.start, initial_states.speed_mps])
     poses = simulation.predict(settled, simulation.parameters([e for e in vehicle.effects if not e.is_null]), initial)
     return poses.reshape(len(readings), -1, 3)
 
 
-def level_scatter(predictor: Predictor, parameters: Floats) -> float:
+def nodal_deviation(predictor: Predictor, parameters: Floats) -> float:
     """Return how far the logarithm of speed scatters within a session from what commands have made it.
 
     Beyond twice that, the speed at the beginning of a window says that the drive runs at another level.
     """
-    begins, batch = _begins(predictor.readings), predictor.batch
+    initial_states, batch = _initial_states(predictor.readings), predictor.batch
     shortly = [
         SimulatedRun(run.commands, np.array([b + _SHORTLY_S]), float(h), begins_s=float(b))
-        for run, h, b in zip(predictor.readings.runs, predictor.readings.started_h, begins.t_s, strict=True)
+        for run, h, b in zip(predictor.readings.runs, predictor.readings.started_h, initial_states.t_s, strict=True)
     ]
     settled, initial = predictor.settled(parameters)
     initial[:, 3] = np.nan
     simulation = Simulation(batch.geometry, batch.maps.neutral, shortly, kinds=batch.kinds)
     moved = simulation.predict(settled, predictor.all_parameters(parameters), initial) - initial[:, :3]
     told = (np.cos(initial[:, 2]) * moved[:, 0] + np.sin(initial[:, 2]) * moved[:, 1]) / _SHORTLY_S
-    use = (np.abs(told) > _SLOW_MPS) & (told * begins.speed_mps > 0.0) & (np.abs(begins.speed_mps) > _SLOW_MPS)
-    off = np.log(np.abs(begins.speed_mps[use]) / np.abs(told[use]))
-    session = begins.session[use]
+    use = (
+        (np.abs(told) > _SLOW_MPS)
+        & (told * initial_states.speed_mps > 0.0)
+        & (np.abs(initial_states.speed_mps) > _SLOW_MPS)
+    )
+    off = np.log(np.abs(initial_states.speed_mps[use]) / np.abs(told[use]))
+    session = initial_states.session[use]
     for name in np.unique(session):
         off[session == name] -= np.median(off[session == name])
-    return max(_LEAST_SCATTER, 2.0 * robust_std(off)) if len(off) else _LEAST_SCATTER
+    return max(_LEAST_DEVIATION, 2.0 * robust_std(off)) if len(off) else _LEAST_DEVIATION
 
 
-def redundancy(fitted: Fit) -> float:
+def autocorrelation_time(fitted: Fit) -> float:
     """Return how many windows tell as much as one, from how alike neighbours miss.
 
     One, and twice the correlation of what a window misses with what the next ones in its stretch do, as far as
@@ -117,4 +121,4 @@ def redundancy(fitted: Fit) -> float:
 _FARTHEST_ALIKE, _FEWEST_PAIRS = 10, 10
 _SHORTLY_S = 0.01
 _SLOW_MPS = 0.05
-_LEAST_SCATTER = 0.05
+_LEAST_DEVIATION = 0.05

@@ -9,7 +9,7 @@ import numpy as np
 
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
-from agvbench.diagnosis.selection.fitted_models import Scored
+from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selector
 from agvbench.types import Floats
 
@@ -32,9 +32,9 @@ class WindowSelector(Selector):
     elsewhere: Batch | None = None
     extrapolating: set[str] = field(default_factory=set)
 
-    def earns(self, without: Scored, with_it: Scored) -> bool:
+    def meets_criterion(self, without: ScoredModel, with_it: ScoredModel) -> bool:
         """Whether the larger model predicts better by enough, and where it was tried is where it is used."""
-        if not super().earns(without, with_it):
+        if not super().meets_criterion(without, with_it):
             return False
         added = set(with_it.names) - set(without.names)
         if self._extrapolates(without, with_it):
@@ -43,14 +43,14 @@ class WindowSelector(Selector):
         self.extrapolating -= added
         return True
 
-    def _extrapolates(self, without: Scored, with_it: Scored) -> bool:
+    def _extrapolates(self, without: ScoredModel, with_it: ScoredModel) -> bool:
         if self.elsewhere is None:
             return False
         learnt, used = (self._moved(batch, without, with_it) for batch in (self.batch, self.elsewhere))
         return bool(np.median(used) > np.quantile(learnt, _SEEN_QUANTILE))
 
     @staticmethod
-    def _moved(batch: Batch, without: Scored, with_it: Scored) -> Floats:
+    def _moved(batch: Batch, without: ScoredModel, with_it: ScoredModel) -> Floats:
         """Return how far apart both models predict each window to end (W,) [m]."""
         small, large = (Predictor(batch, m.fit.predictor.effects).predict(m.fit.parameters) for m in (without, with_it))
         return np.asarray(np.hypot(*(large - small)[:, -1, :2].T))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.diagnosis.data.readings import Readings
-from agvbench.diagnosis.model.nodal_maps import ROLES, FreeMaps
+from agvbench.diagnosis.model.nodal_maps import ROLES, NodalMaps
 from agvbench.effects import Effect
 from agvbench.model.simulation.simulation import Simulation
 from agvbench.types import Floats
@@ -20,7 +20,7 @@ Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Gathering:
+class GroupedSums:
     """Which of n terms add up to each of u sums.
 
     ``order`` (n,): the terms as they are added; ``first`` (u,): where each sum begins in that order; ``place`` (u, q):
@@ -32,7 +32,7 @@ class Gathering:
     place: Integers
 
     @classmethod
-    def of(cls, *place: Integers) -> Gathering:
+    def of(cls, *place: Integers) -> GroupedSums:
         """Return what gathers terms by their numbers, q arrays (n,); within a sum they keep their order."""
         order = np.lexsort(place[::-1])
         ordered = np.column_stack(place)[order]
@@ -46,7 +46,7 @@ class Gathering:
 
 
 @dataclass(frozen=True)
-class Lanes:
+class PerturbationBatch:
     """The variants of runs in which one level (or one free value) of one command is changed, n of them.
 
     ``lane`` (n,): which lanes these are; ``run`` (n,): of which run; ``row`` (n,): a row that has the level, or the
@@ -59,15 +59,15 @@ class Lanes:
     row: Integers
     term: Integers
     weight: Floats
-    by_run: Gathering
-    by_value: Gathering
+    by_run: GroupedSums
+    by_value: GroupedSums
 
     @classmethod
-    def of(cls, lane: Integers, run: Integers, row: Integers, weights: Floats, column: Integers) -> Lanes:
+    def of(cls, lane: Integers, run: Integers, row: Integers, weights: Floats, column: Integers) -> PerturbationBatch:
         """Return lanes whose changes count by `weights` (n, values) in the columns (runs, values) of their runs."""
         term, value = np.nonzero(weights)
-        by_value = Gathering.of(run[term], column[run[term], value])
-        return cls(lane, run, row, term, weights[term, value], Gathering.of(run), by_value)
+        by_value = GroupedSums.of(run[term], column[run[term], value])
+        return cls(lane, run, row, term, weights[term, value], GroupedSums.of(run), by_value)
 
 
 class Batch:
@@ -76,21 +76,25 @@ class Batch:
     A run's own levels of command are varied one by one, which gives the derivatives by the maps' values and by the
     run's offsets alike. Where commands change so often that a run has more levels than free values, the values are
     varied instead (``by_node``). Packed once, it serves every set of effects, also ``kinds``
-    beyond those of the library. ``level_scatter`` as for
-    `Simulation.predict`; ``redundancy``: so many windows are as much evidence as one.
+    beyond those of the library. ``nodal_deviation`` as for
+    `Simulation.predict`; ``autocorrelation_time``: so many windows are as much evidence as one.
     """
 
     def __init__(
         self,
         readings: Readings,
-        maps: FreeMaps,
+        maps: NodalMaps,
         geometry: Geometry,
-        level_scatter: float = np.inf,
-        redundancy: float = 1.0,
+        nodal_deviation: float = np.inf,
+        autocorrelation_time: float = 1.0,
         kinds: Sequence[type[Effect]] = (),
     ) -> None:
         self.readings, self.maps, self.geometry = readings, maps, geometry
-        self.level_scatter, self.redundancy, self.kinds = level_scatter, redundancy, tuple(kinds)
+        self.nodal_deviation, self.autocorrelation_time, self.kinds = (
+            nodal_deviation,
+            autocorrelation_time,
+            tuple(kinds),
+        )
         runs = readings.simulated()
         self.base = Simulation(geometry, maps.neutral, runs, kinds=kinds)
         self.commands: dict[str, Floats] = {role: getattr(self.base, role) for role in ROLES}
@@ -108,7 +112,7 @@ class Batch:
                 row.append(first)
                 changed.append(change)
         self.lane_run = np.array(run)
-        self.lanes = Simulation(geometry, maps.neutral, [runs[i] for i in run], kinds=kinds)
+        self.perturbations = Simulation(geometry, maps.neutral, [runs[i] for i in run], kinds=kinds)
         self.touched = self._touched(owns)
         self.turned = np.array(kind) == "heading"
         self.varied = self._varied(np.array(kind), np.array(row))
@@ -122,7 +126,7 @@ class Batch:
         )
         return np.argsort(~used, axis=1, kind="stable")[:, : max(1, int(used.sum(axis=1).max()))]
 
-    def _varied(self, kind: NDArray[np.str_], row: NDArray[np.int64]) -> dict[str, Lanes]:
+    def _varied(self, kind: NDArray[np.str_], row: NDArray[np.int64]) -> dict[str, PerturbationBatch]:
         """Return by role the lanes of that `kind` (lanes,): each varies a level that `row` has, or the node `row`."""
         # In which column of `touched` each run has each of the values.
         column = np.full((len(self.touched), self.maps.size), -1)
@@ -131,7 +135,7 @@ class Batch:
         for role, own in self.maps.slices().items():
             lane = np.flatnonzero(kind == role)
             values = np.eye(len(self.maps.nodes[role])) if self.by_node else self.weights[role]
-            varied[role] = Lanes.of(lane, self.lane_run[lane], row[lane], values[row[lane]], column[:, own])
+            varied[role] = PerturbationBatch.of(lane, self.lane_run[lane], row[lane], values[row[lane]], column[:, own])
         return varied
 
     def _count_levels(self, own: NDArray[np.int64]) -> int:

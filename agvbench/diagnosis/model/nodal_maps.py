@@ -20,7 +20,7 @@ _SLOWEST_MPS = 0.02
 
 
 @dataclass(frozen=True)
-class FreeMaps:
+class NodalMaps:
     """Commands at which the maps' values are free: ``nodes[role]`` ascending, neutral left out of the drive's.
 
     Their values stand one after another (front, rear, drive) in one vector. At neutral the drive stands still.
@@ -62,14 +62,14 @@ class FreeMaps:
             laid[own] = kind.beside(values[own], at_neutral, *parameters.tolist())
         return laid
 
-    def bridged(self, values: Floats, silent: NDArray[np.bool_]) -> Floats:
-        """Return `values` (size,) with those that are `silent` laid on straight lines between the others of their role.
+    def interpolated(self, values: Floats, unobserved: NDArray[np.bool_]) -> Floats:
+        """Return `values` (size,) with those that are `unobserved` interpolated between the others of their role.
 
         Where a role has no other, its values stay.
         """
         laid = values.copy()
         for role, own in self.slices().items():
-            nodes, heard = self.nodes[role], ~silent[own]
+            nodes, heard = self.nodes[role], ~unobserved[own]
             at, told = nodes[heard], values[own][heard]
             if role == "drive":
                 place = int(np.searchsorted(at, self.neutral))
@@ -79,7 +79,7 @@ class FreeMaps:
         return laid
 
 
-def free_maps(runs: Sequence[Run], neutral: float) -> FreeMaps:
+def nodal_maps(runs: Sequence[Run], neutral: float) -> NodalMaps:
     """Return a node for every level at which the vehicle drove; where there are too many, for `chosen_levels`."""
     nodes = {}
     for role in ROLES:
@@ -90,7 +90,7 @@ def free_maps(runs: Sequence[Run], neutral: float) -> FreeMaps:
             np.maximum.at(longest_s, which, held_s)
             levels = chosen_levels(levels, longest_s)
         nodes[role] = levels[levels != neutral] if role == "drive" else levels
-    return FreeMaps(nodes, neutral)
+    return NodalMaps(nodes, neutral)
 
 
 def chosen_levels(levels: Floats, longest_s: Floats) -> Floats:
@@ -128,10 +128,10 @@ def _told(runs: Sequence[Run], role: str, neutral: float) -> tuple[Floats, Float
     for run in runs:
         values, t_s, driven = getattr(run.commands, role), run.commands.t_s, _driven_rows(run.commands, neutral)
         # A row begins where any command changes: this one may be held over many.
-        begins = np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
-        ends_s = np.append(t_s[begins[1:]], max(float(np.max(run.frames.t_s, initial=-np.inf)), t_s[-1]))
+        initial_states = np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
+        ends_s = np.append(t_s[initial_states[1:]], max(float(np.max(run.frames.t_s, initial=-np.inf)), t_s[-1]))
         told.append(values[driven])
-        held_s.append(np.repeat(ends_s - t_s[begins], np.diff(np.append(begins, len(values))))[driven])
+        held_s.append(np.repeat(ends_s - t_s[initial_states], np.diff(np.append(initial_states, len(values))))[driven])
     return np.concatenate(told), np.concatenate(held_s)
 
 
@@ -139,7 +139,7 @@ def _driven_rows(commands: Commands, neutral: float) -> NDArray[np.bool_]:
     return np.asarray(commands.drive != neutral)
 
 
-def start_values(maps: FreeMaps, measured: Sequence[RunMeasurement], believed: dict[str, Floats]) -> Floats:
+def start_values(maps: NodalMaps, measured: Sequence[RunMeasurement], prior_model: dict[str, Floats]) -> Floats:
     """Return values to start a fit from: what steady drives imply by inverted kinematics, at their commands.
 
     Where no steady drive had the command, it is `believed[role]` (values at the nodes), moved by what measured nodes
@@ -155,8 +155,8 @@ def start_values(maps: FreeMaps, measured: Sequence[RunMeasurement], believed: d
             if seen:
                 known[k] = float(np.median(seen))
         measured_here = np.isfinite(known)
-        off = (known - believed[role])[measured_here]
-        moved = believed[role] + (np.interp(nodes, nodes[measured_here], off) if len(off) else 0.0)
+        off = (known - prior_model[role])[measured_here]
+        moved = prior_model[role] + (np.interp(nodes, nodes[measured_here], off) if len(off) else 0.0)
         values.append(np.where(measured_here, known, moved))
     return np.concatenate(values)
 

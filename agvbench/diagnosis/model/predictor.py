@@ -17,13 +17,13 @@ class Linearised:
     """Predicted poses and their derivatives, of which only those are kept that may differ from zero.
 
     ``poses`` (R, K, 3); ``own`` (R, m): the numbers of the parameters that each run depends on at most, of ``count``
-    (P); ``by_own`` (R, K, 3, m): derivatives by these; ``by_offsets`` (R, K, 3, 6).
+    (P); ``by_own`` (R, K, 3, m): derivatives by these; ``by_random_effects`` (R, K, 3, 6).
     """
 
     poses: Floats
     own: NDArray[np.int64]
     by_own: Floats
-    by_offsets: Floats
+    by_random_effects: Floats
     count: int
 
     @property
@@ -49,7 +49,7 @@ class Linearised:
         return replace(self, own=self.own[:, :kept], by_own=self.by_own[..., :kept], count=count)
 
 
-OFFSETS = ("x_m", "y_m", "heading_rad", "front_rad", "rear_rad", "log_speed")
+RANDOM_EFFECTS = ("x_m", "y_m", "heading_rad", "front_rad", "rear_rad", "log_speed")
 """What may differ from run to run: the start pose, an offset of each axle, and a factor on speed."""
 
 _STEP = 1e-4  # rad, m/s
@@ -74,7 +74,7 @@ class Predictor:
 
     def settled(self, parameters: Floats) -> tuple[Floats, Floats]:
         """Return settled angles and speed of every row (rows, 3), and initial states (R, 5)."""
-        return self._inputs(parameters, np.zeros((len(self.readings), len(OFFSETS))))
+        return self._inputs(parameters, np.zeros((len(self.readings), len(RANDOM_EFFECTS))))
 
     def all_parameters(self, parameters: Floats) -> Floats:
         """Return the simulation's whole parameter vector for the predictor's own."""
@@ -85,85 +85,87 @@ class Predictor:
         values[self._own] = own
         return values
 
-    def _inputs(self, parameters: Floats, offsets: Floats) -> tuple[Floats, Floats]:
+    def _inputs(self, parameters: Floats, random_effects: Floats) -> tuple[Floats, Floats]:
         """Return settled values of every row (rows, 3) and initial states (runs, 5)."""
         where, run = self.maps.slices(), self.batch.base.row_runs
         values = [self.batch.weights[role] @ parameters[where[role]] for role in ROLES]
-        front, rear = (np.clip(values[k] + offsets[run, 3 + k], -_FARTHEST_RAD, _FARTHEST_RAD) for k in (0, 1))
-        speed = np.where(self.batch.drives, values[2] * np.exp(offsets[run, 5]), 0.0)
+        front, rear = (np.clip(values[k] + random_effects[run, 3 + k], -_FARTHEST_RAD, _FARTHEST_RAD) for k in (0, 1))
+        speed = np.where(self.batch.drives, values[2] * np.exp(random_effects[run, 5]), 0.0)
         initial = np.zeros((len(self.readings), 5))
-        initial[:, :3] = self.readings.start + offsets[:, :3]
-        if self.readings.begins is not None:
-            initial[:, 3] = self.readings.begins.speed_mps
-            initial[:, 4] = self.readings.begins.lately_mps
+        initial[:, :3] = self.readings.start + random_effects[:, :3]
+        if self.readings.initial_states is not None:
+            initial[:, 3] = self.readings.initial_states.speed_mps
+            initial[:, 4] = self.readings.initial_states.recent_speed_mps
         return np.column_stack([front, rear, speed]), initial
 
-    def predict(self, parameters: Floats, offsets: Floats | None = None) -> Floats:
+    def predict(self, parameters: Floats, random_effects: Floats | None = None) -> Floats:
         """Return poses (R, K, 3) for parameters (P,) and offsets (R, 6), by default none.
 
         Those of the last time are kept, and so not to be written to: a fit looks around where it has just stepped.
         """
-        offsets = np.zeros((len(self.readings), len(OFFSETS))) if offsets is None else offsets
-        asked = (parameters.tobytes(), offsets.tobytes())
-        if asked != self._last[0]:
-            settled, initial = self._inputs(parameters, offsets)
+        random_effects = (
+            np.zeros((len(self.readings), len(RANDOM_EFFECTS))) if random_effects is None else random_effects
+        )
+        context = (parameters.tobytes(), random_effects.tobytes())
+        if context != self._last[0]:
+            settled, initial = self._inputs(parameters, random_effects)
             poses = self._simulate(settled, parameters[self.maps.size :], initial)
             poses.flags.writeable = False
-            self._last = asked, poses
+            self._last = context, poses
         return self._last[1]
 
     def _simulate(self, settled: Floats, own: Floats, initial: Floats) -> Floats:
-        poses = self.batch.base.predict(settled, self._all(own), initial, level_scatter=self.batch.level_scatter)
+        poses = self.batch.base.predict(settled, self._all(own), initial, nodal_deviation=self.batch.nodal_deviation)
         return poses.reshape(len(self.readings), -1, 3)
 
-    def linearise(self, parameters: Floats, offsets: Floats, near: Linearised | None = None) -> Linearised:
+    def linearise(self, parameters: Floats, random_effects: Floats, near: Linearised | None = None) -> Linearised:
         """Return poses and derivatives about parameters (P,) and offsets (R, 6).
 
         Where `near` is given, derivatives by the maps' values and by offsets are taken from there.
         """
-        base, inputs = self.predict(parameters, offsets), self._inputs(parameters, offsets)
+        base, inputs = self.predict(parameters, random_effects), self._inputs(parameters, random_effects)
         if near is None:
-            by_maps = self._by_lanes(parameters, offsets, base, *inputs)
+            by_maps = self._by_lanes(parameters, random_effects, base, *inputs)
         else:
             by_maps = replace(near.by_first(self.maps.size), poses=base)
         return by_maps.with_last(self._slopes(parameters, base, *inputs, len(parameters) - self.maps.size))
 
     def _by_lanes(
-        self, parameters: Floats, offsets: Floats, base: Floats, settled: Floats, initial: Floats
+        self, parameters: Floats, random_effects: Floats, base: Floats, settled: Floats, initial: Floats
     ) -> Linearised:
         """Return poses `base` with their derivatives by the maps' values and by offsets."""
         batch = self.batch
-        lanes = self._simulate_lanes(settled, initial, parameters[self.maps.size :])
+        perturbations = self._simulate_lanes(settled, initial, parameters[self.maps.size :])
         by_own = np.zeros((*base.shape, batch.touched.shape[1]))
         columns = by_own.transpose(0, 3, 1, 2)
-        by_offsets = np.zeros((*base.shape, len(OFFSETS)))
-        by_offsets[:, :, 0, 0] = by_offsets[:, :, 1, 1] = 1.0
-        by_offsets[..., 2] = (lanes[batch.turned] - base) / _STEP
+        by_random_effects = np.zeros((*base.shape, len(RANDOM_EFFECTS)))
+        by_random_effects[:, :, 0, 0] = by_random_effects[:, :, 1, 1] = 1.0
+        by_random_effects[..., 2] = (perturbations[batch.turned] - base) / _STEP
         for k, role in enumerate(ROLES):
             varied = batch.varied[role]
-            change = (lanes[varied.lane] - base[varied.run]) / _STEP
-            by_offset, by_level = self._shares(role, parameters, offsets, settled)
+            change = (perturbations[varied.lane] - base[varied.run]) / _STEP
+            by_offset, by_level = self._shares(role, parameters, random_effects, settled)
             gathered = varied.by_run
-            by_offsets[gathered.place[:, 0], :, :, 3 + k] = gathered.sums(change * by_offset[:, None, None])
+            by_random_effects[gathered.place[:, 0], :, :, 3 + k] = gathered.sums(change * by_offset[:, None, None])
             weight = varied.weight * by_level[varied.term]
             run, column = varied.by_value.place.T
             columns[run, column] = varied.by_value.sums(change[varied.term] * weight[:, None, None])
-        return Linearised(base, batch.touched, by_own, by_offsets, self.maps.size)
+        return Linearised(base, batch.touched, by_own, by_random_effects, self.maps.size)
 
-    def _shares(self, role: str, parameters: Floats, offsets: Floats, settled: Floats) -> tuple[Floats, Floats]:
+    def _shares(self, role: str, parameters: Floats, random_effects: Floats, settled: Floats) -> tuple[Floats, Floats]:
         """Return how much each lane of `role` changes (n,) with its run's offset, and with the level that it varies."""
         varied = self.batch.varied[role]
         if role != "drive":
             return np.ones(len(varied.run)), np.ones(len(varied.run))
-        faster = np.exp(offsets[varied.run, 5])
+        faster = np.exp(random_effects[varied.run, 5])
         if self.batch.by_node:
             return faster * parameters[self.maps.slices()[role]][varied.row], faster
         return settled[varied.row, 2], faster
 
-    def by_last(self, parameters: Floats, offsets: Floats, count: int) -> tuple[Floats, Floats]:
+    def by_last(self, parameters: Floats, random_effects: Floats, count: int) -> tuple[Floats, Floats]:
         """Return poses (R, K, 3), and their derivatives by the last `count` parameters (R, K, 3, count)."""
-        base = self.predict(parameters, offsets)
-        return base, self._slopes(parameters, base, *self._inputs(parameters, offsets), count)
+        base = self.predict(parameters, random_effects)
+        return base, self._slopes(parameters, base, *self._inputs(parameters, random_effects), count)
 
     def _slopes(self, parameters: Floats, base: Floats, settled: Floats, initial: Floats, count: int) -> Floats:
         """Return the derivatives (R, K, 3, count) of poses `base` by the last of the effects' parameters."""
@@ -180,6 +182,6 @@ class Predictor:
         varied = settled[batch.rows] + _STEP * batch.row_change
         first = initial[batch.lane_run]
         first[:, 2] += _STEP * batch.turned
-        return batch.lanes.predict(varied, self._all(own), first, level_scatter=batch.level_scatter).reshape(
-            len(batch.lane_run), -1, 3
-        )
+        return batch.perturbations.predict(
+            varied, self._all(own), first, nodal_deviation=batch.nodal_deviation
+        ).reshape(len(batch.lane_run), -1, 3)

@@ -12,13 +12,13 @@ from agvbench.diagnosis.residuals.body_rates import FEATURES, Rates
 from agvbench.diagnosis.residuals.covariate_test import RANDOM_PHASE, Dependence
 from agvbench.types import Floats
 
-_SWINGS_M = np.geomspace(0.15, 1.0, 48)
-_SHUFFLES, _LEAST_STEPS, _STEPS_PER_SWING, _LEAST_SWING = 999, 12, 1.6, 0.3
-_LOUDEST = 3.0  # times the median run
-_SWING_ALPHA = 5e-3  # as many shuffles resolve
+_PERIODS_M = np.geomspace(0.15, 1.0, 48)
+_SHUFFLES, _LEAST_STEPS, _STEPS_PER_PERIOD, _LEAST_AMPLITUDE = 999, 12, 1.6, 0.3
+_WINSOR_LIMIT = 3.0  # times the median run
+_PERIODIC_ALPHA = 5e-3  # as many shuffles resolve
 
 
-def swing(rates: Rates, group: NDArray[np.int64], seed: int) -> Dependence | None:
+def periodic_disturbance(rates: Rates, group: NDArray[np.int64], seed: int) -> Dependence | None:
     """Return the dependence on the distance modulo a period whose phase differs from run to run, if there is one.
 
     An eccentric wheel swings speed and course once per turn, from wherever it happens to stand. In each run a wave
@@ -30,7 +30,7 @@ def swing(rates: Rates, group: NDArray[np.int64], seed: int) -> Dependence | Non
     rng = np.random.default_rng([0x5F15, seed])
     best: Dependence | None = None
     for feature in ("speed", "turning"):
-        rests = _none_too_loud([_bent(*contrast) for contrast in _contrasts(rates, feature, group)])
+        rests = _winsorised([_bent(*contrast) for contrast in _contrasts(rates, feature, group)])
         total = sum(float(rest @ rest) for rest, _ in rests)
         if total <= 0.0:
             continue
@@ -38,14 +38,14 @@ def swing(rates: Rates, group: NDArray[np.int64], seed: int) -> Dependence | Non
         # A wave takes two numbers of a run's samples whatever they are.
         share = (size - 2.0 * sum(float(rest @ rest) / len(rest) for rest, _ in rests)) / total
         period = int(np.argmax(share))
-        if share[period] < max(_LEAST_SWING, best.share if best else 0.0):
+        if share[period] < max(_LEAST_AMPLITUDE, best.share if best else 0.0):
             continue
-        chance = np.zeros((_SHUFFLES, len(_SWINGS_M)))
+        chance = np.zeros((_SHUFFLES, len(_PERIODS_M)))
         for rest, waves in rests:
             chance += _explained(rng.permuted(np.tile(rest, (_SHUFFLES, 1)), axis=1), waves)
         p_value = (1.0 + float(np.count_nonzero(chance.max(axis=1) >= size[period]))) / (_SHUFFLES + 1.0)
         best = Dependence(RANDOM_PHASE, feature, p_value, float(share[period]))
-    return best if best is not None and best.p_value < _SWING_ALPHA else None
+    return best if best is not None and best.p_value < _PERIODIC_ALPHA else None
 
 
 def _contrasts(rates: Rates, feature: str, group: NDArray[np.int64]) -> Iterator[tuple[Floats, Floats, Floats]]:
@@ -69,10 +69,10 @@ def _contrasts(rates: Rates, feature: str, group: NDArray[np.int64]) -> Iterator
             yield distance[own], rates.weight[own], (values[:n].mean(axis=0) - values[n]) * np.sqrt(n / (n + 1.0))
 
 
-def _none_too_loud(rests: list[tuple[Floats, Floats]]) -> list[tuple[Floats, Floats]]:
+def _winsorised(rests: list[tuple[Floats, Floats]]) -> list[tuple[Floats, Floats]]:
     """Return what is left of the runs, the loudest turned down: a wheel swings in all of them, and not in a few."""
     size = np.array([float(rest @ rest) for rest, _ in rests])
-    most = _LOUDEST * float(np.median(size)) if len(size) else 0.0
+    most = _WINSOR_LIMIT * float(np.median(size)) if len(size) else 0.0
     return [
         (rest * np.sqrt(most / s) if s > most else rest, waves) for (rest, waves), s in zip(rests, size, strict=True)
     ]
@@ -85,8 +85,8 @@ def _bent(distance: Floats, weight: Floats, value: Floats) -> tuple[Floats, Floa
     """
     line, _ = np.linalg.qr(np.column_stack([weight, weight * distance]))
     rest = weight * value
-    angle = 2.0 * np.pi * distance[:, None] / _SWINGS_M
-    resolved = _STEPS_PER_SWING * float(np.median(weight)) <= _SWINGS_M
+    angle = 2.0 * np.pi * distance[:, None] / _PERIODS_M
+    resolved = _STEPS_PER_PERIOD * float(np.median(weight)) <= _PERIODS_M
     cosine, sine = (_apart(wave * weight[:, None], line) for wave in (np.cos(angle), np.sin(angle)))
     first = _normal(cosine)
     second = _normal(sine - first * np.sum(first * sine, axis=0))

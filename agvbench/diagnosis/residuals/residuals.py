@@ -47,11 +47,13 @@ def end_spread(every: Predictor, fitted: Fit) -> EndSpread:
     cos, sin = np.cos(readings.start[:, 2]), np.sin(readings.start[:, 2])
     turn[:, 0, 0] = turn[:, 1, 1] = cos
     turn[:, 0, 1], turn[:, 1, 0], turn[:, 2, 2] = sin, -sin, 1.0
-    a = turn @ linear.by_offsets[rows, last]
+    a = turn @ linear.by_random_effects[rows, last]
     j = turn @ linear.by_parameters[rows, last]
-    scatter = fitted.scatter
-    frame = np.diag(np.square([scatter.position_m, scatter.position_m, scatter.heading_rad]))
-    own = (a * priors(every, scatter)[:, None, :] ** 2) @ a.transpose(0, 2, 1) + frame
+    variance_components = fitted.variance_components
+    frame = np.diag(
+        np.square([variance_components.position_m, variance_components.position_m, variance_components.heading_rad])
+    )
+    own = (a * priors(every, variance_components)[:, None, :] ** 2) @ a.transpose(0, 2, 1) + frame
     return EndSpread(own, j, fitted.covariance)
 
 
@@ -61,7 +63,7 @@ QUANTITIES = (
 )
 """Errors of the end pose first (along and across in the start frame), then those along the way."""
 MEDIAN = "end_position_median_mm"
-AT_THE_FLOOR = 1.25
+WITHIN_REPEATABILITY = 1.25
 """What is left is at the floor up to this times it, or if repeats cannot tell it from the floor."""
 
 LACK_OF_FIT = 0.01
@@ -73,7 +75,7 @@ _UNITS = {name: 1e3 if name.endswith("_mm") else 180.0 / np.pi for name in QUANT
 
 
 @dataclass(frozen=True)
-class Misses:
+class PoseResiduals:
     """Measured minus predicted.
 
     ``path`` (R, K, 3) [m, m, rad] in each run's start frame, zero where nothing was ``seen`` (R, K);
@@ -114,7 +116,7 @@ class Misses:
         }
 
 
-def misses(readings: Readings, poses: Floats) -> Misses:
+def pose_residuals(readings: Readings, poses: Floats) -> PoseResiduals:
     """Return what predicted `poses` (R, K, 3) miss."""
     seen = readings.seen
     difference = np.where(seen[..., None], readings.poses - poses, 0.0)
@@ -131,11 +133,11 @@ def misses(readings: Readings, poses: Floats) -> Misses:
     last = seen.shape[1] - 1 - np.argmax(seen[:, ::-1], axis=1)
     went = np.hypot(*(readings.poses[rows, last, :2] - readings.start[:, :2]).T)
     told = np.hypot(*(poses[rows, last, :2] - readings.start[:, :2]).T)
-    return Misses(path, seen, went - told, path[rows, last, 2])
+    return PoseResiduals(path, seen, went - told, path[rows, last, 2])
 
 
-def floor(missed: Misses, group: NDArray[np.int64]) -> dict[str, float] | None:
-    """Return the scatter between repeats, as a root mean square to compare with `Misses.rms`; None without repeats.
+def repeatability(missed: PoseResiduals, group: NDArray[np.int64]) -> dict[str, float] | None:
+    """Return the root mean square between repeats, to compare with `PoseResiduals.rms`; None without repeats.
 
     What repeats of one command have in common is the model's to predict; what differs between them is not. Taken
     from what the *final* model misses, so that a cause that depends on place or time does not pass for scatter. Groups
@@ -178,7 +180,7 @@ def floor(missed: Misses, group: NDArray[np.int64]) -> dict[str, float] | None:
     return out | {MEDIAN: float(np.median(apart_mm))}
 
 
-def lack_of_fit(missed: Misses, group: NDArray[np.int64], spread: EndSpread | None = None) -> float | None:
+def lack_of_fit(missed: PoseResiduals, group: NDArray[np.int64], spread: EndSpread | None = None) -> float | None:
     """Return a p-value that what is missed is the same for all groups of repeats: lack of fit against pure error.
 
     The unit is the run. From each run come three numbers (where it ended: along, across, heading), in units of how far

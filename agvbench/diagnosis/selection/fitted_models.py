@@ -12,13 +12,13 @@ from agvbench.diagnosis.data.splits import folds
 from agvbench.diagnosis.data.window_splits import fold_groups
 from agvbench.diagnosis.estimation.cross_validation import FOLDS, cross_validated
 from agvbench.diagnosis.estimation.fit import Fit, fit
-from agvbench.diagnosis.estimation.score_test import begun, promised_gain
+from agvbench.diagnosis.estimation.score_test import begun, first_order_gain
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.candidates import Candidate, bounds_of, usual
 from agvbench.types import Floats
 
-Tell = Callable[[str], None]
+OnProgress = Callable[[str], None]
 
 _SHORT, _LONG = 3, 10
 _HOPELESS = 3.0  # what promises less, to first order, is not fitted
@@ -44,7 +44,7 @@ class Request:
 
 
 @dataclass(frozen=True)
-class Scored:
+class ScoredModel:
     """A fitted model, the effects in it, each run's cross-validated loss (R,), and its unusual starts."""
 
     names: tuple[str, ...]
@@ -67,7 +67,7 @@ class Scored:
         """The cross-validated loss of all runs."""
         return float(self.loss.sum())
 
-    def gain_over(self, other: Scored) -> float:
+    def gain_over(self, other: ScoredModel) -> float:
         """Return by how much this model predicts better, and fits better: the lesser of the two.
 
         Where few runs tell a value of the maps, predicting without them is a gamble, and wins or loses a hundred.
@@ -88,31 +88,31 @@ class FittedModels:
     candidates: dict[str, Candidate]
     start: Floats
     seed: int
-    tell: Tell
+    on_progress: OnProgress
     given: tuple[str, ...] = ()
     given_values: Floats = field(default_factory=lambda: np.empty(0))
     tried: int = 0
     _fold: NDArray[np.int64] = field(init=False)
-    _known: dict[Request, Scored] = field(init=False, default_factory=dict)
+    _known: dict[Request, ScoredModel] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         self._fold = folds(fold_groups(self.batch.readings), FOLDS, self.seed)
 
-    def base(self) -> Scored:
+    def base(self) -> ScoredModel:
         """Return the model without any effect that the vehicle is not known to have."""
         return self.score(self.given, np.r_[self.start, self.given_values], None)
 
-    def adopt(self, scored: Scored) -> Scored:
+    def adopt(self, scored_model: ScoredModel) -> ScoredModel:
         """Take over what was fitted elsewhere to runs that this model predicts alike, and return it as one's own."""
-        fitted = replace(scored.fit, predictor=self._predictor(scored.names))
-        own = self._known[scored.request] = replace(scored, fit=fitted)
+        fitted = replace(scored_model.fit, predictor=self._predictor(scored_model.names))
+        own = self._known[scored_model.request] = replace(scored_model, fit=fitted)
         return own
 
-    def known(self, names: tuple[str, ...]) -> Scored | None:
+    def known(self, names: tuple[str, ...]) -> ScoredModel | None:
         """Return the model with the effects `names`, all from their usual starts, if it was fitted."""
         return self._known.get(Request(frozenset(names)))
 
-    def shrunk(self, base: Scored, current: Scored, name: str) -> Scored:
+    def without_effect(self, base: ScoredModel, current: ScoredModel, name: str) -> ScoredModel:
         """Return the model without the effect called `name`."""
         names = tuple(n for n in current.names if n != name)
         if names == self.given:
@@ -123,7 +123,7 @@ class FittedModels:
         starts = frozenset(start for start in current.starts if start[0] != name)
         return self.score(names, np.r_[maps, kept], current.fit, starts=starts)
 
-    def grown(self, current: Scored, name: str, unusual: Candidate | None = None) -> Scored:
+    def with_effect(self, current: ScoredModel, name: str, unusual: Candidate | None = None) -> ScoredModel:
         """Return `current` with the effect called `name`, fitted from the best of its starts.
 
         These are the usual ones, or those of the candidate `unusual`.
@@ -133,38 +133,40 @@ class FittedModels:
         if found := self._known.get(Request(frozenset(names), starts)):
             return found
         try:
-            return self._grown(current, self._predictor(names), unusual or usual(name), starts)
+            return self._with_effect(current, self._predictor(names), unusual or usual(name), starts)
         except np.linalg.LinAlgError:
             # What runs away to where nothing can be predicted describes nothing.
             return replace(current, names=names)
 
-    def promise(self, current: Scored, name: str) -> float:
+    def predicted_gain(self, current: ScoredModel, name: str) -> float:
         """Return what the effect called `name` promises beside `current`, to first order, from its best start."""
-        return max(self._promises(current, self._predictor((*current.names, name)), usual(name)))
+        return max(self._predicted_gains(current, self._predictor((*current.names, name)), usual(name)))
 
     @staticmethod
-    def _promises(current: Scored, predictor: Predictor, candidate: Candidate) -> list[float]:
-        return [promised_gain(current.fit, predictor, start, candidate.bounds) for start in candidate.starts]
+    def _predicted_gains(current: ScoredModel, predictor: Predictor, candidate: Candidate) -> list[float]:
+        return [first_order_gain(current.fit, predictor, start, candidate.bounds) for start in candidate.starts]
 
-    def _grown(self, current: Scored, predictor: Predictor, candidate: Candidate, starts: Starts) -> Scored:
+    def _with_effect(
+        self, current: ScoredModel, predictor: Predictor, candidate: Candidate, starts: Starts
+    ) -> ScoredModel:
         names, now = predictor.effects, current.fit
         bounds = bounds_of(names)
-        promises = self._promises(current, predictor, candidate)
-        promise = max(promises)
-        if promise < _HOPELESS:
+        predicted_gains = self._predicted_gains(current, predictor, candidate)
+        predicted_gain = max(predicted_gains)
+        if predicted_gain < _HOPELESS:
             return replace(current, names=names)  # as good as without it, and never chosen
-        ordered = [candidate.starts[k] for k in np.argsort(promises)[::-1]]
-        believed = candidate.screened and promise > _LIKELY
-        short = self._begun(current, predictor, ordered, bounds, _KEPT * promise if believed else None)
+        ordered = [candidate.starts[k] for k in np.argsort(predicted_gains)[::-1]]
+        prior_model = candidate.screened and predicted_gain > _LIKELY
+        short = self._begun(current, predictor, ordered, bounds, _KEPT * predicted_gain if prior_model else None)
         # What promises much may have to climb first: maps that took up a cause must give it back before it shows.
-        if promise < _LIKELY and float(now.loss.sum() - short.loss.sum()) < _HOPELESS:
+        if predicted_gain < _LIKELY and float(now.loss.sum() - short.loss.sum()) < _HOPELESS:
             self.tried += 1
-            tried = Scored(names, short, cross_validated(short, self._fold, bounds), starts)
+            tried = ScoredModel(names, short, cross_validated(short, self._fold, bounds), starts)
             return self._known.setdefault(tried.request, tried)
-        return self.score(names, short.parameters, short, starts=starts, patient=believed and candidate.foremost)
+        return self.score(names, short.parameters, short, starts=starts, patient=prior_model and candidate.foremost)
 
     def _begun(
-        self, current: Scored, predictor: Predictor, starts: list[Floats], bounds: Floats, least: float | None
+        self, current: ScoredModel, predictor: Predictor, starts: list[Floats], bounds: Floats, least: float | None
     ) -> Fit:
         """Return a fit of some steps from the first of `starts`, or the best of them where it gains less than `least`.
 
@@ -184,7 +186,7 @@ class FittedModels:
 
     @staticmethod
     def _first_steps(
-        current: Scored,
+        current: ScoredModel,
         predictor: Predictor,
         start: Floats,
         bounds: Floats,
@@ -197,8 +199,8 @@ class FittedModels:
             predictor,
             begun(now, predictor, start) if beside is None else beside.parameters,
             bounds,
-            offsets=(beside or now).offsets,
-            scatter=(beside or now).scatter,
+            random_effects=(beside or now).random_effects,
+            variance_components=(beside or now).variance_components,
             iterations=iterations,
             near=now.linear,
         )
@@ -211,7 +213,7 @@ class FittedModels:
         *,
         starts: Starts = frozenset(),
         patient: bool = False,
-    ) -> Scored:
+    ) -> ScoredModel:
         """Fit the model with the effects `names` and cross-validate it; what was fitted before is remembered.
 
         Of these, `starts` begin elsewhere than usual. A `patient` fit is given more steps while they are worth it.
@@ -223,27 +225,27 @@ class FittedModels:
                 self._predictor(names) if near is None or near.predictor.effects != names else near.predictor,
                 parameters,
                 bounds,
-                offsets=None if near is None else near.offsets,
-                scatter=None if near is None else near.scatter,
+                random_effects=None if near is None else near.random_effects,
+                variance_components=None if near is None else near.variance_components,
                 iterations=_LONG,
                 patient=patient,
                 near=None if near is None else near.linear,
             )
             self.tried += 1
-            self._known[request] = Scored(names, fitted, cross_validated(fitted, self._fold, bounds), starts)
+            self._known[request] = ScoredModel(names, fitted, cross_validated(fitted, self._fold, bounds), starts)
         return self._known[request]
 
-    def left(self, smaller: Scored, larger: Scored) -> Scored:
+    def left(self, smaller: ScoredModel, larger: ScoredModel) -> ScoredModel:
         """Return what is left of `larger` when an effect is dropped that it does not need.
 
         The smaller model may have been fitted before, from elsewhere, and have ended somewhere else.
         """
         if smaller.names == self.given:
             return smaller
-        again = self._known[smaller.request] = self.retried(smaller, larger)
+        again = self._known[smaller.request] = self.refitted_from(smaller, larger)
         return again
 
-    def retried(self, model: Scored, beyond: Scored) -> Scored:
+    def refitted_from(self, model: ScoredModel, beyond: ScoredModel) -> ScoredModel:
         """Return `model` fitted again, patiently, from where the model `beyond` stands, if it predicts better.
 
         What another model gains may be nothing but the way that its fit went on. Effects that it lacks begin where they
@@ -254,11 +256,12 @@ class FittedModels:
         bounds = bounds_of(model.names)
         again = fit(
             self._predictor(model.names), np.r_[beyond.fit.parameters[: self.batch.maps.size], kept], bounds,
-            offsets=beyond.fit.offsets, scatter=beyond.fit.scatter, iterations=_LONG, patient=True,
+            random_effects=beyond.fit.random_effects, variance_components=beyond.fit.variance_components,
+            iterations=_LONG, patient=True,
         )  # fmt: skip
         self.tried += 1
-        scored = Scored(model.names, again, cross_validated(again, self._fold, bounds), model.starts)
-        return min(model, scored, key=lambda one: one.total)
+        scored_model = ScoredModel(model.names, again, cross_validated(again, self._fold, bounds), model.starts)
+        return min(model, scored_model, key=lambda one: one.total)
 
     def _predictor(self, names: tuple[str, ...]) -> Predictor:
         return Predictor(self.batch, names)

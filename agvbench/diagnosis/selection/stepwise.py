@@ -11,20 +11,20 @@ import numpy as np
 
 from agvbench.diagnosis.estimation.cross_validation import differs_from_nothing, without_best
 from agvbench.diagnosis.model.batch import Batch
-from agvbench.diagnosis.residuals.residuals import misses
-from agvbench.diagnosis.selection.fitted_models import FittedModels, Scored
+from agvbench.diagnosis.residuals.residuals import pose_residuals
+from agvbench.diagnosis.selection.fitted_models import FittedModels, ScoredModel
 
 LEAST_GAIN = 12.0
 """Least cross-validated gain in minus two log likelihood that earns an effect its place, before the correction for
 having tried many: each effect tried adds as if its gain came from one of so many."""
 
-RIVAL_MARGIN = 10.0
+ALTERNATIVE_MARGIN = 10.0
 """An effect that predicts this much worse, or less, in place of a named one is its rival."""
 
 NOTICEABLE = 0.15
 """An effect has to move the prediction by this part of what remains unpredicted, be it ever so certain."""
 
-_NEARLY_RIVAL = 100.0  # a rival may look so much worse because its fit ended sooner
+_NEARLY_ALTERNATIVE = 100.0  # a rival may look so much worse because its fit ended sooner
 _MOST_EFFECTS = 4
 
 
@@ -32,15 +32,15 @@ _MOST_EFFECTS = 4
 class Selection:
     """What was chosen.
 
-    ``base`` is the model without effects, ``chosen`` the one with all that earned their place; ``rivals`` by named
-    effect the others that would do in its place, with how much worse they predict; ``gains`` by named effect what its
-    loss would cost; ``tried`` how many models were fitted, ``rejected`` the gain of each effect that did not earn its
-    place.
+    ``base`` is the model without effects, ``chosen`` the one with all that meet the selection criterion;
+    ``alternatives`` by named effect the others that would do in its place, with how much worse they predict;
+    ``gains`` by named effect what its removal would cost; ``tried`` how many models were fitted, ``rejected`` the gain
+    of each effect that does not meet the criterion.
     """
 
-    base: Scored
-    chosen: Scored
-    rivals: dict[str, dict[str, float]]
+    base: ScoredModel
+    chosen: ScoredModel
+    alternatives: dict[str, dict[str, float]]
     gains: dict[str, float]
     rejected: dict[str, float]
     tried: int
@@ -64,29 +64,31 @@ class Selector(FittedModels):
 
     def over(self, batch: Batch) -> Selector:
         """Return a selector like this one of other runs, which knows nothing yet."""
-        return Selector(batch, dict(self.candidates), self.start, self.seed, self.tell, self.given, self.given_values)
+        return Selector(
+            batch, dict(self.candidates), self.start, self.seed, self.on_progress, self.given, self.given_values
+        )
 
     def select(self) -> Selection:
         """Add effects until none gains, then drop those without which the model predicts as well."""
         base = current = self.base()
         rejected: dict[str, float] = {}
         while len(current.names) < len(self.given) + _MOST_EFFECTS:
-            offers = {name: self.grown(current, name) for name in self.candidates if name not in current.names}
+            offers = {name: self.with_effect(current, name) for name in self.candidates if name not in current.names}
             rejected = {name: offer.gain_over(current) for name, offer in offers.items()}
-            worthy = {name: offer for name, offer in offers.items() if self.earns(current, offer)}
+            worthy = {name: offer for name, offer in offers.items() if self.meets_criterion(current, offer)}
             if not worthy:
                 break
             current = min(worthy.values(), key=lambda offer: offer.total)
-            self.tell(f"{' + '.join(current.names)}: gains {base.total - current.total:.0f}")
-        current, gains = self.pruned(base, current)
-        current, rivals = self.exchanged(base, current)
+            self.on_progress(f"{' + '.join(current.names)}: gains {base.total - current.total:.0f}")
+        current, gains = self.backward_elimination(base, current)
+        current, alternatives = self.with_swaps(base, current)
         if set(current.names) != set(gains) | set(self.given):
-            current, gains = self.pruned(base, current)
-            rivals = {name: others for name, others in rivals.items() if name in gains}
+            current, gains = self.backward_elimination(base, current)
+            alternatives = {name: others for name, others in alternatives.items() if name in gains}
         rejected = {name: gain for name, gain in rejected.items() if name not in current.names}
-        return Selection(base, current, rivals, gains, rejected, self.tried)
+        return Selection(base, current, alternatives, gains, rejected, self.tried)
 
-    def earns(self, without: Scored, with_it: Scored) -> bool:
+    def meets_criterion(self, without: ScoredModel, with_it: ScoredModel) -> bool:
         """Whether the larger model predicts better by enough, not in a few groups of runs alone, and to be noticed."""
         gain = without.loss - with_it.loss
         return bool(
@@ -99,34 +101,36 @@ class Selector(FittedModels):
             )
         )
 
-    def _noticeable(self, without: Scored, with_it: Scored) -> bool:
+    def _noticeable(self, without: ScoredModel, with_it: ScoredModel) -> bool:
         """Whether the prediction moves by a noticeable part of what the larger model misses anyway."""
         readings = self.batch.readings
         small, large = (model.fit.predictor.predict(model.fit.parameters) for model in (without, with_it))
-        missed = misses(readings, large).squares()
-        moved = misses(replace(readings, poses=np.where(readings.seen[..., None], small, np.nan)), large).squares()
+        missed = pose_residuals(readings, large).squares()
+        moved = pose_residuals(
+            replace(readings, poses=np.where(readings.seen[..., None], small, np.nan)), large
+        ).squares()
         return any(
             float(np.mean(moved[name])) > self.noticeable**2 * float(np.mean(missed[name]))
             for name in ("position_rms_mm", "heading_rms_deg")
         )
 
-    def _found(self, current: Scored) -> tuple[str, ...]:
+    def _found(self, current: ScoredModel) -> tuple[str, ...]:
         return tuple(name for name in current.names if name not in self.given)
 
-    def pruned(self, base: Scored, current: Scored) -> tuple[Scored, dict[str, float]]:
+    def backward_elimination(self, base: ScoredModel, current: ScoredModel) -> tuple[ScoredModel, dict[str, float]]:
         """Return the model with only the effects that earn their place, and what the loss of each would cost."""
         while found := self._found(current):
-            smaller = {name: self.shrunk(base, current, name) for name in found}
+            smaller = {name: self.without_effect(base, current, name) for name in found}
             gains = {name: model.total - current.total for name, model in smaller.items()}
-            useless = [name for name, model in smaller.items() if not self.earns(model, current)]
+            useless = [name for name, model in smaller.items() if not self.meets_criterion(model, current)]
             if not useless:
                 return current, gains
             current = self.left(smaller[min(useless, key=lambda name: gains[name])], current)
         return current, {}
 
-    def exchanged(
-        self, base: Scored, current: Scored, among: Mapping[str, Iterable[str]] | None = None
-    ) -> tuple[Scored, dict[str, dict[str, float]]]:
+    def with_swaps(
+        self, base: ScoredModel, current: ScoredModel, among: Mapping[str, Iterable[str]] | None = None
+    ) -> tuple[ScoredModel, dict[str, dict[str, float]]]:
         """Return the model with any effect replaced by another that predicts better in its place, and the rivals left.
 
         What was chosen first was chosen in the place of all the others, too, and may only look like one of them.
@@ -144,33 +148,38 @@ class Selector(FittedModels):
                 offer
                 for name, offers in swapped.items()
                 for offer in offers.values()
-                if offer.gain_over(current) > LEAST_GAIN and self.earns(self.shrunk(base, current, name), offer)
+                if offer.gain_over(current) > LEAST_GAIN
+                and self.meets_criterion(self.without_effect(base, current, name), offer)
             ]
             if not better:
                 break
             best = min(better, key=lambda offer: offer.total)
-            self.tell(f"{' + '.join(best.names)} in place of {' + '.join(current.names)}")
+            self.on_progress(f"{' + '.join(best.names)} in place of {' + '.join(current.names)}")
             current = best
-        return current, self._rivals(swapped, current)
+        return current, self._alternatives(swapped, current)
 
     def _in_place_of(
-        self, name: str, base: Scored, current: Scored, among: Mapping[str, Iterable[str]] | None
-    ) -> dict[str, Scored]:
+        self, name: str, base: ScoredModel, current: ScoredModel, among: Mapping[str, Iterable[str]] | None
+    ) -> dict[str, ScoredModel]:
         """Return, by its name, what each other effect makes of the model in the place of the one called `name`."""
         tried = self.candidates if among is None else among.get(name, ())
         return {
-            other: self.grown(self.shrunk(base, current, name), other) for other in tried if other not in current.names
+            other: self.with_effect(self.without_effect(base, current, name), other)
+            for other in tried
+            if other not in current.names
         }
 
-    def _rivals(self, swapped: dict[str, dict[str, Scored]], current: Scored) -> dict[str, dict[str, float]]:
+    def _alternatives(
+        self, swapped: dict[str, dict[str, ScoredModel]], current: ScoredModel
+    ) -> dict[str, dict[str, float]]:
         """Return, by named effect, those that predict nearly as well in its place, and by how much worse they do."""
         worse = {n: {o: self._worse(offer, current) for o, offer in offers.items()} for n, offers in swapped.items()}
-        rivals = {n: {o: w for o, w in others.items() if w < RIVAL_MARGIN} for n, others in worse.items()}
-        return {name: others for name, others in rivals.items() if name in current.names}
+        alternatives = {n: {o: w for o, w in others.items() if w < ALTERNATIVE_MARGIN} for n, others in worse.items()}
+        return {name: others for name, others in alternatives.items() if name in current.names}
 
-    def _worse(self, offer: Scored, current: Scored) -> float:
+    def _worse(self, offer: ScoredModel, current: ScoredModel) -> float:
         """Return by how much another effect predicts worse, its fit carried on from where the chosen one stands."""
         worse = offer.total - current.total
-        if RIVAL_MARGIN <= worse < _NEARLY_RIVAL and offer.is_fitted:
-            worse = self.retried(offer, current).total - current.total
+        if ALTERNATIVE_MARGIN <= worse < _NEARLY_ALTERNATIVE and offer.is_fitted:
+            worse = self.refitted_from(offer, current).total - current.total
         return worse

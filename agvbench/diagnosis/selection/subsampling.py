@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.data.window_splits import thinned
 from agvbench.diagnosis.model.batch import Batch
-from agvbench.diagnosis.selection.fitted_models import Scored
+from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.variants import BEYOND
-from agvbench.diagnosis.selection.with_term import Explained
+from agvbench.diagnosis.selection.with_term import TermSelection
 
 MOST_RUNS = 240
 """In so many runs causes are looked for, as far as commands with a repeat each leave it at that."""
@@ -46,8 +46,8 @@ def some_repeats(group: NDArray[np.int64], most: int) -> NDArray[np.bool_]:
 
 
 def measured_in_all(
-    selection: Selection, explained: Explained | None, selector: Selector, readings: Readings
-) -> tuple[Selection, Explained | None]:
+    selection: Selection, term_selection: TermSelection | None, selector: Selector, readings: Readings
+) -> tuple[Selection, TermSelection | None]:
     """Return what was found with its models fitted to all runs to be fitted; gains and rivals stay as they were found.
 
     Parameters
@@ -60,16 +60,16 @@ def measured_in_all(
         All runs to be fitted.
     """
     batch = selector.batch
-    stood = replace(readings, stood=batch.readings.stood)
-    whole = selector.over(Batch(stood, batch.maps, batch.geometry, kinds=BEYOND))
+    preset = replace(readings, preset=batch.readings.preset)
+    whole = selector.over(Batch(preset, batch.maps, batch.geometry, kinds=BEYOND))
 
-    def again(model: Scored) -> Scored:
+    def again(model: ScoredModel) -> ScoredModel:
         return whole.score(model.names, model.fit.parameters, None)
 
     def both(found: Selection) -> Selection:
         return replace(found, base=again(found.base), chosen=again(found.chosen))
 
-    if explained is None:
+    if term_selection is None:
         return both(selection), None
-    term = replace(explained, selection=both(explained.selection), without=again(explained.without))
+    term = replace(term_selection, selection=both(term_selection.selection), without=again(term_selection.without))
     return both(selection), term

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from agvbench.diagnosis.estimation.fit import fit
-from agvbench.diagnosis.estimation.score_test import promised_gain
+from agvbench.diagnosis.estimation.score_test import first_order_gain
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.candidates import Candidate, bounds_of, candidate, candidates
-from agvbench.diagnosis.selection.fitted_models import Scored
-from agvbench.diagnosis.selection.initial_steering import SLOW_STEERING, otherwise
-from agvbench.diagnosis.selection.stepwise import LEAST_GAIN, RIVAL_MARGIN, Selection, Selector
+from agvbench.diagnosis.selection.fitted_models import ScoredModel
+from agvbench.diagnosis.selection.initial_steering import SLOW_STEERING, under_other_initial_steering
+from agvbench.diagnosis.selection.stepwise import ALTERNATIVE_MARGIN, LEAST_GAIN, Selection, Selector
 from agvbench.diagnosis.terms import TERMS
 from agvbench.effects import Effect
 from agvbench.effects.forms import Form, cause_of, effect_forms
@@ -64,7 +64,7 @@ class _Law:
     starts: Floats
 
 
-def reform(selection: Selection, selector: Selector) -> Selection:
+def select_variants(selection: Selection, selector: Selector) -> Selection:
     """Return the selection with laws that predict better in place of the library's, where they do.
 
     An effect beside it that only made up for the wrong law loses its place. The names of laws are their own; a
@@ -75,7 +75,7 @@ def reform(selection: Selection, selector: Selector) -> Selection:
         return _another_law_alone(selection, selector)
     wide, current = wider(selector), selection.chosen
     laws = [law for name in found for law in _laws(selection, selector, wide, name)]
-    offered: list[tuple[_Law, Scored]] = []
+    offered: list[tuple[_Law, ScoredModel]] = []
     for name in found:
         for law in laws:
             if law.out == name and name in current.names:
@@ -83,14 +83,16 @@ def reform(selection: Selection, selector: Selector) -> Selection:
         current = _best(wide, current, [offer for law, offer in offered if law.out == name])
     if current.names == selection.chosen.names:
         return selection
-    current, gains = wide.pruned(selection.base, current)
+    current, gains = wide.backward_elimination(selection.base, current)
     better = selection.chosen.total - current.total
-    rivals = {name: _rivals(selection, name, better) | _other_causes(current, name, offered) for name in gains}
+    alternatives = {
+        name: _alternatives(selection, name, better) | _other_causes(current, name, offered) for name in gains
+    }
     # What another cause's law has replaced may still be right beside a term that is found later.
     causes = {cause_of(n) for n in current.names}
     rejected = {n: g for n, g in (selection.rejected | selection.gains).items() if n not in causes}
     selector.candidates |= {n: c for n, c in form_candidates().items() if n in current.names}
-    return Selection(selection.base, current, rivals, gains, rejected, selection.tried + wide.tried)
+    return Selection(selection.base, current, alternatives, gains, rejected, selection.tried + wide.tried)
 
 
 def _another_law_alone(selection: Selection, selector: Selector) -> Selection:
@@ -109,88 +111,88 @@ def _another_law_alone(selection: Selection, selector: Selector) -> Selection:
         (law, offer)
         for law, model in ((_Law(form.form_of, form, _starts_near(form, model)), model) for _, form, model in likely)
         for offer in _offers(wide, model, law)
-        if wide.earns(base, offer)
+        if wide.meets_criterion(base, offer)
     ]
     if not worthy:
         return selection
     law, best = min(worthy, key=lambda pair: pair[1].total)
     name, gain = law.form.name, base.total - best.total
-    wide.tell(f"{name}: gains {gain:.0f}")
+    wide.on_progress(f"{name}: gains {gain:.0f}")
     selector.candidates[name] = form_candidates()[name]
     rejected = {n: g for n, g in selection.rejected.items() if n != law.out}
-    rivals = {name: _other_causes(best, name, worthy)}
-    return Selection(base, best, rivals, {name: gain}, rejected, selection.tried + wide.tried)
+    alternatives = {name: _other_causes(best, name, worthy)}
+    return Selection(base, best, alternatives, {name: gain}, rejected, selection.tried + wide.tried)
 
 
-def reform_and_resettle(selection: Selection, selector: Selector) -> tuple[Selection, Selector]:
-    """Do as `reform` does, and select again under the other belief of where the steering stood if that is better now.
+def select_variants_and_reconsider(selection: Selection, selector: Selector) -> tuple[Selection, Selector]:
+    """Select variants, and select again under the other initial steering if that is better now.
 
     In the wrong law a slow servo may look as if it had stood elsewhere.
     """
-    reformed = reform(selection, selector)
-    if reformed is selection or not stood_elsewhere(reformed.chosen, selector):
+    reformed = select_variants(selection, selector)
+    if reformed is selection or not under_other_start(reformed.chosen, selector):
         return reformed, selector
-    again, other = selected_otherwise(selector)
+    again, other = selected_under_other_start(selector)
     return (again, other) if again.chosen.total < reformed.chosen.total else (reformed, selector)
 
 
-def stood_elsewhere(chosen: Scored, selector: Selector) -> bool:
+def under_other_start(chosen: ScoredModel, selector: Selector) -> bool:
     """Whether a model with slow steering predicts better by far under the other belief of where that stood."""
     if not {*SLOW_STEERING} & {cause_of(name) for name in chosen.names}:
         return False
-    there = otherwise(wider(selector))
+    there = under_other_initial_steering(wider(selector))
     return there.score(chosen.names, chosen.fit.parameters, None).total < chosen.total - LEAST_GAIN
 
 
-def selected_otherwise(selector: Selector) -> tuple[Selection, Selector]:
+def selected_under_other_start(selector: Selector) -> tuple[Selection, Selector]:
     """Return what is selected under the other belief of where the steering stood, and who selected it."""
-    other = otherwise(selector)
+    other = under_other_initial_steering(selector)
     other.candidates = {n: c for n, c in other.candidates.items() if n not in effect_forms() or n in selector.given}
-    return reform(other.select(), other), other
+    return select_variants(other.select(), other), other
 
 
 def _laws(selection: Selection, selector: Selector, wide: Selector, name: str) -> Iterator[_Law]:
     """Yield other laws of the cause `name`, and of others that do half as well in its place or promise to."""
     chosen = selection.chosen
-    rest = selector.shrunk(selection.base, chosen, name)
+    rest = selector.without_effect(selection.base, chosen, name)
     models = {name: chosen} | {
-        other: selector.grown(rest, other) for other in selector.candidates if other not in chosen.names
+        other: selector.with_effect(rest, other) for other in selector.candidates if other not in chosen.names
     }
     for form in effect_forms().values():
         if (model := models.get(form.form_of)) is None:
             continue
-        kind, explained = candidate(form), _explained(rest, chosen)
+        kind, term_selection = candidate(form), _explained(rest, chosen)
         # A strong cause of another law fits well, and predicts badly.
         if rest.total - model.total >= _HALF * (rest.total - chosen.total) or (
-            _explained(rest, model) >= _HALF * explained
+            _explained(rest, model) >= _HALF * term_selection
         ):
             yield _Law(name, form, _starts_near(form, model))
             continue
         # The library's law may fail where another does not.
         larger = Predictor(wide.batch, (*rest.names, form.name))
-        promises = [promised_gain(rest.fit, larger, start, kind.bounds) for start in kind.starts]
-        if max(promises) >= _HALF * explained:
-            yield _Law(name, form, kind.starts[[int(np.argmax(promises))]])
+        predicted_gains = [first_order_gain(rest.fit, larger, start, kind.bounds) for start in kind.starts]
+        if max(predicted_gains) >= _HALF * term_selection:
+            yield _Law(name, form, kind.starts[[int(np.argmax(predicted_gains))]])
 
 
-def _explained(without: Scored, model: Scored) -> float:
+def _explained(without: ScoredModel, model: ScoredModel) -> float:
     """Return by how much `model` fits better, whatever it predicts."""
     return float(without.fit.loss.sum() - model.fit.loss.sum())
 
 
-def _starts_near(form: type[Form], model: Scored) -> Floats:
+def _starts_near(form: type[Form], model: ScoredModel) -> Floats:
     """Return starts (n, p) of a law near the library's, as `model` has it."""
     bounds = candidate(form).bounds
     starts: Floats = np.clip(np.array(form.starts(_values(model, form.form_of))), bounds[:, 0], bounds[:, 1])
     return starts
 
 
-def _values(model: Scored, name: str) -> dict[str, float]:
+def _values(model: ScoredModel, name: str) -> dict[str, float]:
     own = model.fit.effect_values()
     return {key.partition(".")[2]: value for key, value in own.items() if key.partition(".")[0] == name}
 
 
-def _offers(wide: Selector, current: Scored, law: _Law) -> list[Scored]:
+def _offers(wide: Selector, current: ScoredModel, law: _Law) -> list[ScoredModel]:
     """Return `current` with a law in its place, and with it in place of one effect more each."""
     form = replace(candidate(law.form), starts=law.starts)
     # What stands beside a wrong law may only make up for it.
@@ -198,24 +200,24 @@ def _offers(wide: Selector, current: Scored, law: _Law) -> list[Scored]:
     return [_swapped(wide, current, {law.out, *more}, form) for more in ([], *([other] for other in others))]
 
 
-def _best(wide: Selector, current: Scored, offers: list[Scored]) -> Scored:
+def _best(wide: Selector, current: ScoredModel, offers: list[ScoredModel]) -> ScoredModel:
     """Return the best offer; one with fewer effects than `current` has to do as well as it, not better."""
     worthy = [offer for offer in offers if _does(offer, current)]
     best = min((current, *worthy), key=lambda offer: offer.total + LEAST_GAIN * len(offer.names))
     if best is current:
         return current
-    wide.tell(f"{' + '.join(best.names)}: another law gains {current.total - best.total:.0f}")
+    wide.on_progress(f"{' + '.join(best.names)}: another law gains {current.total - best.total:.0f}")
     return best
 
 
-def _does(offer: Scored, current: Scored) -> bool:
+def _does(offer: ScoredModel, current: ScoredModel) -> bool:
     """Whether an offer is better than `current` or, with fewer effects, predicts about as well."""
     if len(offer.names) < len(current.names):
         return offer.total < current.total + LEAST_GAIN
     return offer.gain_over(current) > LEAST_GAIN
 
 
-def _swapped(wide: Selector, current: Scored, out: set[str], form: Candidate) -> Scored:
+def _swapped(wide: Selector, current: ScoredModel, out: set[str], form: Candidate) -> ScoredModel:
     """Return `current` with a law in place of the effects `out`, fitted from the scatter and offsets that it has."""
     own = current.fit.effect_values()
     kept = [value for key, value in own.items() if key.partition(".")[0] not in out]
@@ -226,7 +228,7 @@ def _swapped(wide: Selector, current: Scored, out: set[str], form: Candidate) ->
     tries = [
         fit(
             Predictor(wide.batch, names), np.r_[maps, kept, start], bounds_of(names),
-            offsets=near.offsets, scatter=near.scatter, iterations=_SHORT,
+            random_effects=near.random_effects, variance_components=near.variance_components, iterations=_SHORT,
         )
         for start in form.starts
     ]  # fmt: skip
@@ -234,13 +236,13 @@ def _swapped(wide: Selector, current: Scored, out: set[str], form: Candidate) ->
     return wide.score(names, best.parameters, best, starts=starts)
 
 
-def _rivals(selection: Selection, name: str, better: float) -> dict[str, float]:
+def _alternatives(selection: Selection, name: str, better: float) -> dict[str, float]:
     """Return who would still do in the place of the cause `name`, now that its law predicts better."""
-    known = selection.rivals.get(cause_of(name), {})
-    return {other: worse + better for other, worse in known.items() if worse + better < RIVAL_MARGIN}
+    known = selection.alternatives.get(cause_of(name), {})
+    return {other: worse + better for other, worse in known.items() if worse + better < ALTERNATIVE_MARGIN}
 
 
-def _other_causes(current: Scored, name: str, offered: list[tuple[_Law, Scored]]) -> dict[str, float]:
+def _other_causes(current: ScoredModel, name: str, offered: list[tuple[_Law, ScoredModel]]) -> dict[str, float]:
     """Return other causes one of whose laws would do as well in the place of `name`."""
     beside = {*current.names} - {name}
     return {
@@ -248,5 +250,5 @@ def _other_causes(current: Scored, name: str, offered: list[tuple[_Law, Scored]]
         for law, offer in offered
         if {*offer.names} - {law.form.name} == beside
         and law.form.form_of != cause_of(name)
-        and offer.total - current.total < RIVAL_MARGIN
+        and offer.total - current.total < ALTERNATIVE_MARGIN
     }

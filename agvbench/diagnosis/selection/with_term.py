@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 from agvbench.diagnosis.estimation.cross_validation import by_group
 from agvbench.diagnosis.estimation.likelihood import residual_of
 from agvbench.diagnosis.residuals.covariate_test import Dependence
-from agvbench.diagnosis.selection.fitted_models import Scored
+from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection
-from agvbench.diagnosis.terms import EmpiricalTerm
+from agvbench.diagnosis.terms import DiscrepancyTerm
 from agvbench.types import Floats
 
 _FLIPS = 9999
 
 
 @dataclass(frozen=True)
-class Explained:
+class TermSelection:
     """A selection with an empirical term.
 
     ``selection.chosen`` holds the term beside the effects that predict better with it; ``without`` is the model of
@@ -28,8 +28,8 @@ class Explained:
     """
 
     selection: Selection
-    term: type[EmpiricalTerm]
-    without: Scored
+    term: type[DiscrepancyTerm]
+    without: ScoredModel
     gain: float
     p_value: float
 
@@ -40,33 +40,36 @@ class Explained:
         return {p.name: own[f"{self.term.name}.{p.name}"] for p in self.term.parameters()}
 
 
-def described(explained: Explained) -> dict[str, object]:
+def described(term_selection: TermSelection) -> dict[str, object]:
     """Return what is said of an empirical term in the diagnosis."""
     return {
-        "name": explained.term.name,
-        "covariate": explained.term.covariates[0],
-        "through": explained.term.through,
-        "parameters": explained.values,
-        "gain": explained.gain,
-        "p_value": explained.p_value,
+        "name": term_selection.term.name,
+        "covariate": term_selection.term.covariates[0],
+        "through": term_selection.term.through,
+        "parameters": term_selection.values,
+        "gain": term_selection.gain,
+        "p_value": term_selection.p_value,
     }
 
 
-def with_term_first(rest: list[Dependence], explained: Explained) -> list[Dependence]:
+def with_term_first(rest: list[Dependence], term_selection: TermSelection) -> list[Dependence]:
     """Return the dependences with what the term depends on first.
 
     Of covariates that the term leaves open (along x or along y) it is the one that smooth curves find stronger.
     """
-    own = [d for d in rest if d.covariate in explained.term.covariates]
+    own = [d for d in rest if d.covariate in term_selection.term.covariates]
     if own:
-        first = replace(own[0], p_value=min(own[0].p_value, explained.p_value))
+        first = replace(own[0], p_value=min(own[0].p_value, term_selection.p_value))
         return [first, *(d for d in rest if d is not own[0])]
-    with_term, without = (_missed(model) for model in (explained.selection.chosen, explained.without))
+    with_term, without = (_missed(model) for model in (term_selection.selection.chosen, term_selection.without))
     share = 1.0 - with_term / max(without, 1e-300)
-    return [Dependence(explained.term.covariates[0], explained.term.through, explained.p_value, share), *rest]
+    return [
+        Dependence(term_selection.term.covariates[0], term_selection.term.through, term_selection.p_value, share),
+        *rest,
+    ]
 
 
-def _missed(model: Scored) -> float:
+def _missed(model: ScoredModel) -> float:
     """Return the sum of squares that a model misses, no run's own offsets helping."""
     predictor = model.fit.predictor
     return float(np.nansum(residual_of(predictor, predictor.predict(model.fit.parameters)) ** 2))

@@ -5,7 +5,7 @@ They are shapes (a disc, a line, an exponential) and not tables, since a shape n
 predicts runs that it was not fitted to.
 """
 
-from agvbench.diagnosis.terms.base import EmpiricalTerm
+from agvbench.diagnosis.terms.base import DiscrepancyTerm
 from agvbench.diagnosis.terms.camera import BentPicture
 from agvbench.diagnosis.terms.speed import SpeedByHeading, SpeedByRunTime, SpeedInDisc, SpeedInStrip
 from agvbench.diagnosis.terms.steering import (
@@ -16,7 +16,7 @@ from agvbench.diagnosis.terms.steering import (
 )
 from agvbench.diagnosis.terms.turning import TurnAtLine, TurnByHeading, TwistAtStart, WaveByDistance
 
-TERMS: tuple[type[EmpiricalTerm], ...] = (
+TERMS: tuple[type[DiscrepancyTerm], ...] = (
     SpeedInDisc,
     SpeedInStrip,
     TurnAtLine,
@@ -36,7 +36,7 @@ TERMS: tuple[type[EmpiricalTerm], ...] = (
 __all__ = [
     "TERMS",
     "BentPicture",
-    "EmpiricalTerm",
+    "DiscrepancyTerm",
     "SpeedByHeading",
     "SpeedByRunTime",
     "SpeedInDisc",

@@ -9,7 +9,7 @@ from agvbench.effects.base import Effect
 
 
 @dataclass(frozen=True)
-class EmpiricalTerm(Effect):
+class DiscrepancyTerm(Effect):
     """A shape without a cause: ``covariates`` says on what the residual depends, ``through`` what it acts."""
 
     relaxes: ClassVar[str] = "none: it stands for an unknown cause"

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from agvbench.diagnosis.terms.base import EmpiricalTerm
+from agvbench.diagnosis.terms.base import DiscrepancyTerm
 from agvbench.effects.base import Stage, parameter
 from agvbench.effects.state import SEEN_X, SEEN_Y
 from agvbench.types import Floats
 
 
 @dataclass(frozen=True)
-class BentPicture(EmpiricalTerm):
+class BentPicture(DiscrepancyTerm):
     """The cameras' scale changes with the square of the distance from a centre."""
 
     name: ClassVar[str] = "bent_picture"

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from agvbench.diagnosis.terms.base import EmpiricalTerm
+from agvbench.diagnosis.terms.base import DiscrepancyTerm
 from agvbench.effects.base import Stage, parameter
 from agvbench.effects.state import FRONT_SPEED, HEADING, REAR_SPEED, TIME, X, Y
 from agvbench.types import Floats
@@ -15,7 +15,7 @@ _EDGE_M = 0.015
 
 
 @dataclass(frozen=True)
-class SpeedInDisc(EmpiricalTerm):
+class SpeedInDisc(DiscrepancyTerm):
     """In a disc of the floor the vehicle is slower: ``v ← v (1 − loss)``, with an edge of some centimetres."""
 
     name: ClassVar[str] = "speed_in_disc"
@@ -40,7 +40,7 @@ class SpeedInDisc(EmpiricalTerm):
 
 
 @dataclass(frozen=True)
-class SpeedInStrip(EmpiricalTerm):
+class SpeedInStrip(DiscrepancyTerm):
     """In a strip of the floor, such as a carpet, the vehicle is slower: ``v ← v (1 − loss)``, edges as of the disc.
 
     The strip lies across ``direction_rad``, its middle ``place_m`` from the origin.
@@ -68,7 +68,7 @@ class SpeedInStrip(EmpiricalTerm):
 
 
 @dataclass(frozen=True)
-class SpeedByHeading(EmpiricalTerm):
+class SpeedByHeading(DiscrepancyTerm):
     """Speed depends on where the vehicle points: ``v ← v (1 + a cos ψ + b sin ψ)``."""
 
     name: ClassVar[str] = "speed_by_heading"
@@ -90,7 +90,7 @@ class SpeedByHeading(EmpiricalTerm):
 
 
 @dataclass(frozen=True)
-class SpeedByRunTime(EmpiricalTerm):
+class SpeedByRunTime(DiscrepancyTerm):
     """Speed falls (or grows) within each run: ``v ← v (1 − share (1 − e^(−t/T)))``."""
 
     name: ClassVar[str] = "speed_by_run_time"

@@ -6,14 +6,14 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from agvbench.diagnosis.terms.base import EmpiricalTerm
+from agvbench.diagnosis.terms.base import DiscrepancyTerm
 from agvbench.effects.base import Stage, parameter
 from agvbench.effects.state import FRONT, FRONT_AIM, FRONT_BEFORE, HOURS, REAR, REAR_AIM, REAR_BEFORE, SPEED
 from agvbench.types import Floats
 
 
 @dataclass(frozen=True)
-class SteeringByCampaignTime(EmpiricalTerm):
+class SteeringByCampaignTime(DiscrepancyTerm):
     """Steering changes as hours pass: ``δ ← δ (1 + gain (1 − e^(−h/T)))``, both axles."""
 
     name: ClassVar[str] = "steering_by_campaign_time"
@@ -34,7 +34,7 @@ class SteeringByCampaignTime(EmpiricalTerm):
 
 
 @dataclass(frozen=True)
-class TrimByCampaignTime(EmpiricalTerm):
+class TrimByCampaignTime(DiscrepancyTerm):
     """Where axles point drifts as hours pass: ``δ ← δ + rate · hours``."""
 
     name: ClassVar[str] = "trim_by_campaign_time"
@@ -53,7 +53,7 @@ class TrimByCampaignTime(EmpiricalTerm):
 
 
 @dataclass(frozen=True)
-class SteeringByDirection(EmpiricalTerm):
+class SteeringByDirection(DiscrepancyTerm):
     """Axles point one way driving forward, the other way driving backward: ``δ ← δ ± angle``."""
 
     name: ClassVar[str] = "steering_by_direction"
@@ -73,7 +73,7 @@ class SteeringByDirection(EmpiricalTerm):
 
 
 @dataclass(frozen=True)
-class SteeringByHistory(EmpiricalTerm):
+class SteeringByHistory(DiscrepancyTerm):
     """Axles stop short of where they are sent, by a share of the way from where they stood, the same for both.
 
     Few runs turn an axle back, and often one axle alone: two shares would leave the other's to chance.

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from agvbench.diagnosis.terms.base import EmpiricalTerm
+from agvbench.diagnosis.terms.base import DiscrepancyTerm
 from agvbench.effects.base import Stage, parameter
 from agvbench.effects.state import DISTANCE, FORWARD, HEADING, LEFT, SPEED, X_RATE, Y_RATE, YAW_RATE, X, Y
 from agvbench.types import Floats
@@ -18,7 +18,7 @@ _PER_ROOT = 1.0 / math.sqrt(math.tau)
 
 
 @dataclass(frozen=True)
-class TurnAtLine(EmpiricalTerm):
+class TurnAtLine(DiscrepancyTerm):
     """A line on the floor turns what crosses it, one way across and the other way back."""
 
     name: ClassVar[str] = "turn_at_line"
@@ -42,7 +42,7 @@ class TurnAtLine(EmpiricalTerm):
 
 
 @dataclass(frozen=True)
-class TurnByHeading(EmpiricalTerm):
+class TurnByHeading(DiscrepancyTerm):
     """The path bends by where the vehicle points: ``κ ← κ + a cos ψ + b sin ψ``."""
 
     name: ClassVar[str] = "turn_by_heading"
@@ -63,7 +63,7 @@ class TurnByHeading(EmpiricalTerm):
 
 
 @dataclass(frozen=True)
-class TwistAtStart(EmpiricalTerm):
+class TwistAtStart(DiscrepancyTerm):
     """As it begins to move the vehicle loses time and turns, the other way when it starts backward."""
 
     name: ClassVar[str] = "twist_at_start"
@@ -91,7 +91,7 @@ class TwistAtStart(EmpiricalTerm):
 
 
 @dataclass(frozen=True)
-class WaveByDistance(EmpiricalTerm):
+class WaveByDistance(DiscrepancyTerm):
     """Speed and course swing with the way driven in the run, once per period."""
 
     name: ClassVar[str] = "wave_by_distance"

@@ -34,11 +34,11 @@ class SimulatedRun:
     t_s: Floats
     started_h: float = 0.0
     begins_s: float | None = None
-    stood: tuple[float, float] | None = None
+    preset: tuple[float, float] | None = None
 
     def before(self, neutral: float) -> dict[str, float]:
         """Return the command under which the vehicle stood before the first, by channel."""
-        front, rear = self.stood or (neutral, neutral)
+        front, rear = self.preset or (neutral, neutral)
         return {"drive": neutral, "front": front, "rear": rear}
 
 

@@ -172,7 +172,7 @@ class Simulation:
         *,
         runs: ArrayLike | None = None,
         out: Floats | None = None,
-        level_scatter: float = np.inf,
+        nodal_deviation: float = np.inf,
     ) -> Floats:
         """Return the predicted poses of every frame.
 
@@ -217,7 +217,7 @@ class Simulation:
                     self.geometry.rear_axle_m,
                     self._longest_step(parameters),
                     0.0,
-                    level_scatter,
+                    nodal_deviation,
                 ]
             ),
             np.ascontiguousarray(parameters, dtype=np.float64),

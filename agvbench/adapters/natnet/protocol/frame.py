@@ -37,9 +37,10 @@ class FrameOfData(NamedTuple):
     """A frame.
 
     ``bodies`` are records of `agvbench.adapters.natnet.protocol.bitstream.BODY`: position [m] in the server's axes,
-    quaternion (x, y, z, w), mean marker error [m]. ``markers`` are the labelled ones, where asked for. ``timestamp_s``
-    [s] counts from when the server began (NaN where 2.5 does not say); ``exposed_ticks`` (mid-exposure),
-    ``received_ticks`` and ``transmitted_ticks`` are readings of the server's clock, -1 before version 3.0.
+    quaternion (x, y, z, w), mean marker error [m]. ``markers`` are the labelled ones, where asked for.
+    ``timestamp_s`` [s] counts from when the server began (NaN where 2.5 does not say); ``exposed_ticks`` (mid-
+    exposure), ``received_ticks`` and ``transmitted_ticks`` are readings of the server's clock, -1 before version
+    3.0.
     """
 
     number: int
