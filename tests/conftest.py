@@ -11,6 +11,8 @@ from hypothesis import HealthCheck, settings
 
 # A mistake of agvbench itself is to be seen, not told in one line.
 os.environ.setdefault("AGVBENCH_DEBUG", "1")
+# Printed tables are as wide as COLUMNS says, which a worker of pytest or a shell may have set to anything.
+os.environ.pop("COLUMNS", None)
 
 # Generous, since a shared machine may be many times slower than an idle one.
 TIMEOUT_S, SLOW_TIMEOUT_S = 300, 1200
