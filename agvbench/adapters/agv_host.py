@@ -19,13 +19,13 @@ from agvbench.bus.messages.request import decode_claim, decode_replay, decode_re
 from agvbench.bus.messages.truth import Truth, TruthFlags
 from agvbench.bus.messages.wire import Kind, prefix
 from agvbench.errors import AdapterGoneError, LinkError, MessageError, RunStoppedError
-from agvbench.types import Floats
+from agvbench.types import Command, Floats
 
 _COMMANDS_WAITING = 256
 _OVERTAKEN_TOLD = 10
 _STOP_PATIENCE_S = 0.5
 _HANG_PATIENCE_S = 0.1
-_STOP = CommandFlags.STOP
+_STOP, _FLUSH = CommandFlags.STOP, CommandFlags.FLUSH
 _FOREIGN_TOLD_S = 1.0
 _COMMAND, _FLAGS, _SOURCE = prefix(Kind.COMMAND), slice(6, 8), slice(8, 12)
 
@@ -125,9 +125,10 @@ class AgvHost(Host):
         self._heard_s: float | None = None
         self._identity_bytes = encode_agv_identity(adapter.identity())
         self._lock_step = adapter.identity().lock_step
-        self._neutral_drive = adapter.identity().neutral
+        neutral = adapter.identity().neutral
+        self._neutral_drive, self._neutral = neutral, Command(neutral, neutral, neutral)
         self._gap_limit_s = min(adapter.watchdog_s, SILENCE_LIMIT_S)
-        self._drives, self._driven_s, self._longest_s = False, math.nan, 0.0
+        self._rest()
         self._claim = Claim(session, keys, required=not self._lock_step)
         self.foreign, self._foreign_told = 0, (False, -math.inf)
         self._answers |= {RESET: self._reset, REPLAY: self._replay}
@@ -153,7 +154,8 @@ class AgvHost(Host):
 
     def _rest(self) -> None:
         """Take note that the vehicle stands: no gap between commands counts, and none was told."""
-        self._drives, self._driven_s, self._longest_s = False, math.nan, 0.0
+        self._drives = self._holds = False
+        self._held_s, self._longest_s = math.nan, 0.0
 
     def _reset(self, payload: bytes) -> bytes:
         request = decode_reset(payload)
@@ -200,25 +202,30 @@ class AgvHost(Host):
                             self._heard_s = now()
                         apply(message)
                         self._drives = message.command.drive != self._neutral_drive
+                        self._holds = message.command != self._neutral
             except BaseException as error:  # noqa: BLE001  (whatever the adapter raises, the runner must hear of it)
                 self.failed(error, acknowledged=sequence)
             if sequence == loss.expected and source == loss.source:
                 loss.expected += 1
             else:
                 self._note(source, sequence)
-            if watched:
+            if watched and not flags & _FLUSH:  # which the vehicle does not hear
                 self._check_gap()
 
     def _check_gap(self) -> None:
-        """Tell of commands that were carried out further apart than the vehicle's watchdog allows, as it drove."""
+        """Tell of commands that were carried out further apart than the vehicle's watchdog allows.
+
+        It watches while any channel is away from neutral: wheels that were turned before the vehicle drives go straight
+        where it bites.
+        """
         now_s = self._clock.now()
-        gap_s = now_s - self._driven_s  # NaN, and so never too long, unless it drove
+        gap_s = now_s - self._held_s  # NaN, and so never too long, where all was neutral
         if gap_s > max(self._gap_limit_s, self._longest_s):
             self._longest_s = gap_s
             text = f"{gap_s:.2f} s between two commands (limit: {self._gap_limit_s:g} s, then the vehicle stops itself)"
             self.event(Level.WARNING, COMMANDS_LATE, text)
-        self._driven_s = now_s if self._drives else math.nan
-        if not self._drives:
+        self._held_s = now_s if self._holds else math.nan
+        if not self._holds:
             self._longest_s = 0.0
 
     def _newest(self, payload: bytes) -> bytes:
@@ -323,7 +330,7 @@ class AgvHost(Host):
                 return
             self._adapter.stop()
             self._heard_s = None
-            drove, self._drives = self._drives, False
+            drove, self._drives, self._holds = self._drives, False, False
         finally:
             self._lock.release()
         if drove:

@@ -249,13 +249,17 @@ def test_a_gap_is_told_to_each_runner_even_if_the_one_before_had_a_longer_one() 
     assert sum(b"commands_late" in one for one in told) == 2
 
 
-def test_commands_further_apart_than_the_watchdog_allows_are_told_with_both_figures_while_it_drives() -> None:
+@pytest.mark.parametrize("channel", ["drive", "front", "rear"])
+def test_commands_further_apart_than_the_watchdog_allows_are_told_with_both_figures_while_any_is_held(
+    channel: str,
+) -> None:
     adapter, keys, told = Stuttering(), Keys("lab", "agv1"), []
     with open_session() as session:
         events = session.declare_subscriber(keys.report, lambda sample: told.append(sample.payload.to_bytes()))
         host = claimed_host(session, keys, adapter)
-        for number, drive in enumerate((1500.0, 1500.0, 1800.0, 1500.0), start=1):
-            session.put(keys.command, encode_command(CommandMessage(number, 0.0, NEUTRAL._replace(drive=drive), 1.0)))
+        for number, value in enumerate((1500.0, 1500.0, 1800.0, 1500.0), start=1):
+            command = NEUTRAL._replace(**{channel: value})
+            session.put(keys.command, encode_command(CommandMessage(number, 0.0, command, 1.0)))
             while len(adapter.applied) < number:
                 time.sleep(0.01)
         host.close()
@@ -263,6 +267,19 @@ def test_commands_further_apart_than_the_watchdog_allows_are_told_with_both_figu
     late = [decode_event(one).text for one in told if b"commands_late" in one]
     assert len(late) == 1
     assert re.fullmatch(r"0\.\d\d s between two commands \(limit: 0.25 s, then the vehicle stops itself\)", late[0])
+
+
+def test_a_flush_which_the_vehicle_does_not_hear_ends_no_gap() -> None:
+    adapter, keys, told = Silent(), Keys("lab", "agv1"), []
+    with open_session() as session:
+        events = session.declare_subscriber(keys.report, lambda sample: told.append(sample.payload.to_bytes()))
+        host = claimed_host(session, keys, adapter)
+        for number, flags in enumerate((CommandFlags.NONE, CommandFlags.FLUSH, CommandFlags.NONE), start=1):
+            session.put(keys.command, encode_command(CommandMessage(number, 0.0, MOVING, 1.0, flags)))
+            time.sleep(0.2)
+        host.close()
+        events.undeclare()
+    assert sum(b"commands_late" in one for one in told) == 1
 
 
 def test_lost_commands_and_nonsense_are_told_and_do_not_stop_the_host() -> None:
