@@ -209,9 +209,15 @@ def run_name(item: pytest.Item) -> str:
 
 
 def _check_names(items: Iterable[pytest.Item]) -> None:
+    from agvbench.campaign.completeness import planned_id
+
     seen: dict[str, str] = {}
     for item in items:
         name = run_name(item)
+        if (other := planned_id(name)) != name:
+            raise pytest.UsageError(
+                f"{item.nodeid}: the run {name!r} would be taken for a further attempt at {other!r}; rename it"
+            )
         if name in seen:
             raise pytest.UsageError(
                 f"two benchmarks would record the run {name!r}: {seen[name]} and {item.nodeid}; rename one"

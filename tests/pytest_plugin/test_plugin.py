@@ -208,6 +208,16 @@ def test_runs_that_the_vehicle_cannot_drive_are_not_counted(pytester):
     assert any(line.split()[:2] == ["total", "5"] for line in result.outlines), result.outlines
 
 
+@pytest.mark.parametrize("ending", ["attempt2", "aborted1"])
+def test_a_benchmark_that_is_named_as_an_attempt_at_another_is_refused(pytester, ending):
+    source = f"# agvbench\ndef bench_turn_{ending}(drive):\n    drive.hold(drive=1.0, for_s=1.0)\n"
+    pytester.makepyfile(bench_it=source)
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "--agvbench-dry-run")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    line = f"the run 'turn-{ending}' would be taken for a further attempt at 'turn'; rename it"
+    assert line in result.stderr.str() + result.stdout.str()
+
+
 def test_two_benchmarks_of_one_run_name_are_refused(pytester):
     source = "# agvbench\ndef bench_a(drive):\n    drive.hold(drive=1.0, for_s=1.0)\n"
     pytester.makepyfile(bench_one=source, bench_two=source)
