@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import pytest
 
 from agvbench.errors import AgvbenchError, InputError
-from agvbench.pytest_plugin.options import option, settings_from
+from agvbench.pytest_plugin.options import option, settings_from, worded
 
 if TYPE_CHECKING:
     from agvbench.running.configuration.settings import BenchSettings
@@ -133,13 +133,15 @@ def _arrange(config: pytest.Config, items: list[pytest.Item], benches: list[pyte
         undriven = [item for item in benches if not _condition_applies(item)]
         unknown = [] if settings.corrected else [item for item in benches if _is_corrected(item)]
     except AgvbenchError as error:
-        raise pytest.UsageError(str(error)) from None
+        raise pytest.UsageError(worded(config, error)) from None
 
     _check_names(benches)
     if option(config, "--trajectories") and not any(item.get_closest_marker(TRAJECTORIES) for item in benches):
-        raise pytest.UsageError("--trajectories: none of these benchmarks takes it; drive the benchmark trajectories")
+        text = "--trajectories: none of these benchmarks takes it; drive the benchmark trajectories"
+        raise pytest.UsageError(worded(config, text))
     if len(unknown) == len(benches):
-        raise pytest.UsageError("--corrected: no corrected model; give the vehicle file that a diagnosis wrote")
+        text = "--corrected: no corrected model; give the vehicle file that a diagnosis wrote"
+        raise pytest.UsageError(worded(config, text))
     left_out = {*undriven, *unknown}
     driven = [item for item in benches if item not in left_out]
     driven = ordered(driven, settings.order, seed=settings.seed, phase=phase, repeat=repeat, name=run_name)

@@ -11,7 +11,7 @@ import pytest
 
 from agvbench.errors import AgvbenchError
 from agvbench.pytest_plugin.collection import chosen, experiment, is_bench, phase, plan_of, repeat, run_name
-from agvbench.pytest_plugin.options import given_options, option
+from agvbench.pytest_plugin.options import given_options, option, worded
 
 if TYPE_CHECKING:
     from agvbench.running.session.session import BenchSession, Driver
@@ -54,7 +54,7 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
             )
             config.stash[SESSION] = bench_session = stack.enter_context(opened)
         except AgvbenchError as error:
-            raise pytest.UsageError(str(error)) from None
+            raise pytest.UsageError(worded(config, error)) from None
         except KeyboardInterrupt as interrupt:
             config.stash[INTERRUPT] = interrupt
             raise
@@ -65,12 +65,12 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
         reporter = config.pluginmanager.get_plugin("terminalreporter")
         if reporter is not None:
             for notice in bench_session.notices:
-                reporter.write_line(notice)
+                reporter.write_line(worded(config, notice))
         try:
             done = yield
             stack.close()
         except AgvbenchError as error:
-            raise pytest.UsageError(str(error)) from None
+            raise pytest.UsageError(worded(config, error)) from None
         except KeyboardInterrupt as interrupt:
             config.stash[INTERRUPT] = interrupt
             raise
@@ -85,7 +85,7 @@ def _teller(config: pytest.Config) -> Callable[[str], None]:
 
     def tell(text: str) -> None:
         with capture.global_and_fixture_disabled() if capture is not None else nullcontext():
-            say(text)
+            say(worded(config, text))
 
     return tell
 
@@ -115,7 +115,7 @@ def stop_line(config: pytest.Config) -> str | None:
         return None
     where = f" in run {config.stash[STOPPED_IN]}" if STOPPED_IN in config.stash else ""
     remedy = "" if failure.remedy else "; correct it, then continue with --resume"
-    return f"ERROR: the bench was stopped{where}: {failure}{remedy}"
+    return worded(config, f"ERROR: the bench was stopped{where}: {failure}{remedy}")
 
 
 @pytest.fixture(scope="session")

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import argparse
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from agvbench.running.configuration.session_options import OPTIONS, PYTEST_PREFIX, add_options, destination, prefixed
+from agvbench.running.configuration.session_options import (
+    OPTIONS,
+    PYTEST_PREFIX,
+    SHORT_NAMES,
+    add_options,
+    destination,
+    in_pytest,
+    prefixed,
+)
 
 if TYPE_CHECKING:
     from agvbench.running.configuration.settings import BenchSettings
@@ -21,13 +30,20 @@ _MARKS = (
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Declare the options of a bench session."""
-    add_options(parser.getgroup("agvbench", "AGV bench").addoption, PYTEST_PREFIX)
+    group = parser.getgroup("agvbench", "AGV bench")
+    add_options(group.addoption, PYTEST_PREFIX)
+    group.addoption(SHORT_NAMES, action="store_true", help=argparse.SUPPRESS)
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Declare the marks."""
     for mark in _MARKS:
         config.addinivalue_line("markers", mark)
+
+
+def worded(config: pytest.Config, message: object) -> str:
+    """Return a message with the names that options have where the user gives them: here, or in ``agvbench bench``."""
+    return str(message) if config.getoption(destination(SHORT_NAMES)) else in_pytest(str(message))
 
 
 def option(config: pytest.Config, flag: str) -> Any:

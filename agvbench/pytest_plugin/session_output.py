@@ -11,7 +11,7 @@ import pytest
 from agvbench.errors import AgvbenchError, FlagError, InputError, PlanError
 from agvbench.pytest_plugin.collection import is_bench, run_name
 from agvbench.pytest_plugin.fixtures import ENDS_PROGRAM, INTERRUPT, SESSION, STOPPED_IN, stop_line
-from agvbench.pytest_plugin.options import option
+from agvbench.pytest_plugin.options import option, worded
 
 if TYPE_CHECKING:
     from agvbench.running.session.session import BenchSession
@@ -111,7 +111,7 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, object, o
     try:
         return (yield)
     except NotDrivenError as reason:
-        pytest.skip(str(reason))
+        pytest.skip(worded(pyfuncitem.config, reason))
     except SystemExit as error:
         pyfuncitem.config.stash[ENDS_PROGRAM] = True
         remedy = "return, or raise an error that says what is wrong"
@@ -138,7 +138,7 @@ def pytest_runtest_makereport(
         if SESSION in item.config.stash and _is_conclusive(report, call):
             item.config.stash[SESSION].concluded(run_name(item))
         if call.excinfo is not None and isinstance(call.excinfo.value, AgvbenchError):
-            report.longrepr = f"{item.name}: {call.excinfo.value}"
+            report.longrepr = f"{item.name}: {worded(item.config, call.excinfo.value)}"
         _tell_stop(item, report)
     return report
 
@@ -189,7 +189,8 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
 
     directory = shown(session.directory)
     if why:
-        terminalreporter.write_line(f"ended by {why}, the vehicle was stopped; go on with --resume --out {directory}")
+        text = f"ended by {why}, the vehicle was stopped; go on with --resume --out {directory}"
+        terminalreporter.write_line(worded(config, text))
         return
     if count := config.stash.get(_NOT_DRIVEN, 0):
         terminalreporter.write_line(f"{count} runs after it were not driven")
@@ -209,5 +210,5 @@ def _conclude(terminalreporter: pytest.TerminalReporter, config: pytest.Config, 
         terminalreporter.write_line(dry_run_table(session.planned))
     else:
         for line in session.events:
-            terminalreporter.write_line(line)
+            terminalreporter.write_line(worded(config, line))
         terminalreporter.write_line(conclude(shown(session.directory), report=not option(config, "--no-report")))

@@ -10,7 +10,7 @@ import pytest
 from agvbench.errors import INTERNAL_ERROR_EXIT_CODE, FlagError
 from agvbench.running.configuration.benchmark_files import find_benchmark
 from agvbench.running.configuration.campaign_directory import choose_directory
-from agvbench.running.configuration.session_options import OPTIONS, SESSION_OPTIONS, destination, prefixed
+from agvbench.running.configuration.session_options import OPTIONS, SESSION_OPTIONS, SHORT_NAMES, destination, prefixed
 from agvbench.running.configuration.settings import SETTINGS_FILE, BenchSettings
 
 _SIGNALLED = 128
@@ -37,7 +37,8 @@ def run_benchmarks(
         began = _begun_with(options.get("out"))
         names, only = began.benchmarks, only or began.only
     files = [str(find_benchmark(name)) for name in names or DEFAULT]
-    arguments = [*files, "-q", "--strict-markers", "-p", "no:cacheprovider", "-W", _IN_PROCESS, *_flags(options)]
+    quiet = ["-q", "--strict-markers", "-p", "no:cacheprovider", "-W", _IN_PROCESS]
+    arguments = [*files, *quiet, SHORT_NAMES, *_flags(options)]
     if only:
         arguments += ["-k", only]
     if not summary:

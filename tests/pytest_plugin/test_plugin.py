@@ -88,7 +88,7 @@ def test_the_eight_and_the_folders_own_are_driven_by_default(pytester):
 def test_trajectories_that_no_benchmark_takes_are_refused(pytester):
     result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "--agvbench-trajectories=garage")
     assert result.ret == pytest.ExitCode.USAGE_ERROR
-    assert "--trajectories: none of these benchmarks takes it" in result.stderr.str() + result.stdout.str()
+    assert "--agvbench-trajectories: none of these benchmarks takes it" in result.stderr.str() + result.stdout.str()
 
 
 @pytest.mark.usefixtures("bench_file")
@@ -111,10 +111,11 @@ def test_bench_files_of_other_tools_stay_theirs(pytester):
 @pytest.mark.parametrize(
     ("options", "line"),
     [
-        (["--agvbench-repeats=-1"], "--repeats: value cannot be used: -1 (limit: 1 to 1000)"),
+        (["--agvbench-repeats=-1"], "--agvbench-repeats: value cannot be used: -1 (limit: 1 to 1000)"),
         (["--agvbench-order=random"], "argument --agvbench-order: invalid choice: 'random'"),
-        (["--agvbench-seed=-4"], "--seed: value cannot be used: -4"),
-        (["--agvbench-attempts=0"], "--attempts: value cannot be used: 0"),
+        (["--agvbench-seed=-4"], "--agvbench-seed: value cannot be used: -4"),
+        (["--agvbench-attempts=0"], "--agvbench-attempts: value cannot be used: 0"),
+        (["--agvbench-resume", "--agvbench-out=no"], "--agvbench-resume --agvbench-out: no session to resume: no"),
     ],
 )
 @pytest.mark.usefixtures("bench_file")

@@ -8,6 +8,8 @@ from collections.abc import Callable
 from typing import Any
 
 PYTEST_PREFIX = "--agvbench-"
+SHORT_NAMES = "--agvbench-short-names"
+"""What ``agvbench bench`` hands to pytest, so that messages name options as its users do."""
 
 
 class Joined(argparse.Action):
@@ -135,6 +137,8 @@ SESSION_OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
     ("--dry-run", _FLAG, "say what would be driven, for how long and on how much floor; drive nothing"),
     ("--no-report", _FLAG, "write the campaign only, no report"),
 )
+_NAMES = "|".join(re.escape(flag) for flag, _, _ in OPTIONS + SESSION_OPTIONS)
+_OWN_OR_OTHERS = re.compile(rf"agvbench [a-z]+[^;,()]*|(?<![\w-])({_NAMES})(?![\w-])")
 
 
 def add_options(add: Callable[..., Any], prefix: str = "--") -> None:
@@ -150,6 +154,17 @@ def prefixed(flag: str, prefix: str = PYTEST_PREFIX) -> str:
     '--agvbench-seed'
     """
     return prefix + flag.removeprefix("--")
+
+
+def in_pytest(text: str) -> str:
+    """Return a message with the options of ``agvbench bench`` under their names in pytest; other commands keep theirs.
+
+    >>> in_pytest("--repeats: value cannot be used: -1")
+    '--agvbench-repeats: value cannot be used: -1'
+    >>> in_pytest("agvbench report DIR --out FILE writes it; go on with --resume --out c")
+    'agvbench report DIR --out FILE writes it; go on with --agvbench-resume --agvbench-out c'
+    """
+    return _OWN_OR_OTHERS.sub(lambda found: prefixed(found[1]) if found[1] else found[0], text)
 
 
 def destination(flag: str) -> str:
