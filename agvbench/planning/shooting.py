@@ -25,6 +25,8 @@ _LARGEST_TURN_RAD, _LARGEST_STRETCH = math.radians(20.0), math.log(3.0)
 _DEAR_M = 1e-4
 _STEP = 1e-2
 _REACHED_M = 2e-4
+_NEAR = 1.0
+"""Changes of at most one measure are near the plan."""
 # Play and dead bands can hide the steering's slopes at the plan; a few degrees off they show.
 _ELSEWHERE_RAD = ((0.07, 0.07), (-0.07, -0.07), (0.07, -0.07), (-0.07, 0.07))
 
@@ -67,16 +69,49 @@ def shoot(legs: Sequence[Leg], front: StaticMap, rear: StaticMap, target: tuple[
     """
     aim = np.array(target, dtype=np.float64)
     pieces = _divided(legs, front, rear)
-    problem = _Problem(pieces, _knobs(pieces, front, rear), aim, ends)
-    best, miss = problem.search()
-    if miss > _REACHED_M:
-        # On full circles every change returns to the start; a change of half of one does not.
-        finer = _halved(pieces)
-        other = _Problem(finer, _knobs(finer, front, rear), aim, ends)
-        found, closer = other.search()
-        if closer < 0.5 * miss:
-            problem, best, miss = other, found, closer
-    return Shot(tuple(problem.legs(best)), problem.limits(best) if miss > _REACHED_M else ())
+    # On full circles every change returns to the start; a change of half of one does not.
+    problems = [_Problem(each, _knobs(each, front, rear), aim, ends) for each in (pieces, _halved(pieces))]
+    found = _search(problems)
+    return Shot(tuple(found.problem.legs(found.changes)), () if found.reaches else found.problem.limits(found.changes))
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Changes of the legs of a problem, and how far from the target they end [m]."""
+
+    problem: _Problem
+    changes: Floats
+    miss: float
+
+    @property
+    def reaches(self) -> bool:
+        return self.miss <= _REACHED_M
+
+    @property
+    def largest(self) -> float:
+        return float(np.abs(self.changes).max())
+
+
+def _search(problems: Sequence[_Problem]) -> _Found:
+    """Return the first changes found that reach the target near the plan, else the least, else those that come closest.
+
+    Far from the plan is another way, on which it is not true what was learned near it. So the problem of finer legs is
+    tried before any search from elsewhere, and taken where it halves the changes or the miss.
+    """
+    tried: list[_Found] = []
+
+    def price(found: _Found, value: float) -> float:
+        return value if found.problem is problems[0] else 2.0 * value
+
+    for elsewhere in ((0.0, 0.0), *_ELSEWHERE_RAD):
+        for problem in problems:
+            changes = problem.solve_from(*elsewhere)
+            tried.append(_Found(problem, changes, problem.miss(changes)))
+            if tried[-1].reaches and tried[-1].largest <= _NEAR:
+                return tried[-1]
+        if reached := [found for found in tried if found.reaches]:
+            return min(reached, key=lambda found: price(found, found.largest))
+    return min(tried, key=lambda found: price(found, found.miss))
 
 
 class _Problem:
@@ -84,17 +119,10 @@ class _Problem:
         self._legs, self._knobs, self._target, self._ends = legs, knobs, target, ends
         self._bounds = np.array([k.low for k in knobs]), np.array([k.high for k in knobs])
 
-    def search(self) -> tuple[Floats, float]:
-        """Return the changes that come closest to the target, and how far from it they end [m]."""
-        knobs = self._knobs
-        best = self._solve(np.zeros(len(knobs)))
-        for front_rad, rear_rad in _ELSEWHERE_RAD:
-            if self._miss(best) <= _REACHED_M:
-                break
-            offsets = {"front_rad": front_rad / _ANGLE_RAD, "rear_rad": rear_rad / _ANGLE_RAD}
-            found = self._solve(np.array([offsets.get(knob.field, 0.0) for knob in knobs]))
-            best = min(best, found, key=self._miss)
-        return best, self._miss(best)
+    def solve_from(self, front_rad: float, rear_rad: float) -> Floats:
+        """Return the changes that a search ends with that begins so far from the plan's steering."""
+        offsets = {"front_rad": front_rad / _ANGLE_RAD, "rear_rad": rear_rad / _ANGLE_RAD}
+        return self._solve(np.array([offsets.get(knob.field, 0.0) for knob in self._knobs]))
 
     def legs(self, u: Floats) -> list[Leg]:
         """Return the legs with the changes `u`."""
@@ -123,7 +151,7 @@ class _Problem:
         )
         return np.asarray(found.x)
 
-    def _miss(self, u: Floats) -> float:
+    def miss(self, u: Floats) -> float:
         """Return how far from the target the changes `u` end [m]."""
         return float(np.linalg.norm(self._misses(u[None, :])[0]))
 
