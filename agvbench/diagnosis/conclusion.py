@@ -57,13 +57,13 @@ def conclude(
     batch, reformed = every.batch, bool(effect_forms().keys() & set(selection.chosen.names))
     poses, before = every.predict(fit.parameters), _poses_before(context.vehicle, batch, selection)
     spread = end_spread(every, fit)
-    # A test of fit needs all the groups that it can get; what is published is of the test runs alone.
-    assessment, tested = (assess(readings, own, before, poses, spread) for own in (~split.training, split.test))
-    if assessment is None or tested is None:
+    # Validation runs decided what is kept, and are not tested; how repeats scatter depends on no choice.
+    tested = assess(readings, split.test, before, poses, spread, repeats=~split.training)
+    if tested is None:
         return context.cannot_tell(readings, "there are no repeats among the runs, and so no floor")
     rest, likely = _what_is_left(batch, poses, term_selection, context.seed)
     effects = named_effects(selection, bounds_of(selection.chosen.names)) + map_effects(fit, context.vehicle)
-    significant = term_selection is not None or assessment.lacks or bool(rest)
+    significant = term_selection is not None or tested.lacks or bool(rest)
     verdict, why = _verdict(effects, significant, rest, term_selection)
     if significant and not rest and likely:
         rest, why = likely, f"{_REMAINS}it is likely to depend on {likely[0].covariate}"
@@ -80,7 +80,8 @@ def conclude(
         | _how_it_was_fitted(selection, readings)
         | {"fit_runs": int(split.training.sum()), "searched_runs": searched}
         | {"validation_runs": int(split.validation.sum())}
-        | {"lack_of_fit_p_value": assessment.lack_of_fit}
+        | {"lack_of_fit_p_value": tested.lack_of_fit}
+        | {"lack_of_fit_runs": {"tested": int(split.test.sum()), "repeats": int(np.sum(~split.training))}}
         | ({"empirical_term": described(term_selection)} if term_selection else {}),
     )
     found = with_residuals(found, readings, split.test, before, poses)

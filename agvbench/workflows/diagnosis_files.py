@@ -132,6 +132,16 @@ def left_in_words(content: Mapping[str, Any]) -> Iterator[str]:
             yield f"What is left depends on {d['covariate']} through {d.get('through', 'the motion')}{of_it}."
 
 
+def fit_in_words(content: Mapping[str, Any]) -> Iterator[str]:
+    """Yield which runs the lack of fit is of, against whose scatter, and its p-value."""
+    provenance = mapping(content.get("provenance"))
+    runs, p_value = mapping(provenance.get("lack_of_fit_runs")), number(provenance.get("lack_of_fit_p_value"))
+    tested, repeats = number(runs.get("tested")), number(runs.get("repeats"))
+    if not any(map(math.isnan, (tested, repeats, p_value))):
+        among = f"against the scatter of repeats in {repeats:.0f} validation and test runs"
+        yield f"Lack of fit of the {tested:.0f} test runs, {among}: p = {p_value:.2g}."
+
+
 def next_in_words(content: Mapping[str, Any]) -> Iterator[str]:
     """Yield what to drive next, what no run can tell apart, and which parameters these runs do not pin."""
     if following := mapping(content.get("next_experiment")):

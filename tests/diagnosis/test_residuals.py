@@ -63,6 +63,22 @@ def test_what_repeats_have_in_common_is_lack_of_fit():
     assert lack_of_fit(scattered(4, scatter_m=0.004, common_m=0.004), GROUP) < 1e-6
 
 
+def test_what_other_runs_miss_is_no_lack_of_fit_of_those_tested():
+    missed, tested = scattered(6, scatter_m=0.004, common_m=0.0), GROUP < 20
+    alone = lack_of_fit(missed, GROUP, tested=tested)
+    missed.path[~tested, :, 0] += 0.1 * GROUP[~tested, None]
+    assert lack_of_fit(missed, GROUP, tested=tested) == pytest.approx(alone, rel=1e-6)
+    assert lack_of_fit(missed, GROUP, tested=~tested) < 1e-12
+
+
+def test_single_runs_are_tested_against_the_repeats_of_others():
+    missed, tested = scattered(7, scatter_m=0.004, common_m=0.0), np.arange(160) < 8
+    group = np.where(tested, 100 + np.arange(160), GROUP)
+    assert lack_of_fit(missed, group, tested=tested) > 0.01
+    missed.path[tested, :, 0] += 0.02
+    assert lack_of_fit(missed, group, tested=tested) < 1e-6
+
+
 def test_commands_that_share_a_value_of_the_maps_share_its_error():
     """Thirty commands in groups of ten turn with one of three values, each of which is off by what it may be."""
     group = np.repeat(np.arange(30), 2)

@@ -9,7 +9,7 @@ import pytest
 from tiny_vehicle import FRONT_M, HEADER, NEUTRAL, REAR_M, InMemory, Tiny
 
 from agvbench.calibration import measure_run
-from agvbench.diagnosis import diagnose
+from agvbench.diagnosis import Verdict, diagnose
 from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.data.splits import split_runs
 from agvbench.diagnosis.discrepancy.stepwise import term_in_place
@@ -105,6 +105,11 @@ def test_test_runs_change_no_name_and_no_parameter(tiny_campaign):
     assert [effect.name for effect in found.effects] == ["battery_droop"]
     assert found.effects[0].parameters["per_hour"].value == pytest.approx(0.1, rel=0.05)
     assert found.held_out.runs == names.count("held_out")
+    # Half of the groups suffice, for what repeats scatter is known from validation runs, too.
+    assert found.verdict is Verdict.UNKNOWN
+    assert found.provenance["lack_of_fit_p_value"] < 1e-5
+    runs = {"tested": names.count("held_out"), "repeats": len(names) - names.count("fit")}
+    assert found.provenance["lack_of_fit_runs"] == runs
     assert found.held_out.errors["position_rms_mm"]["after"] > found.held_out.errors["position_rms_mm"]["before"]
 
 

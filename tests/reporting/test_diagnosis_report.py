@@ -110,3 +110,11 @@ def test_a_long_sentence_is_not_cut():
     shown = ShownDiagnosis({**content(), "verdict": "UNKNOWN", "provenance": {"why": why}}, None, ())
     lead = next(block for block in diagnosis_blocks(shown) if isinstance(block, Paragraph))
     assert lead.text == f"UNKNOWN: {why}"
+
+
+def test_what_the_lack_of_fit_is_of_is_said():
+    runs = {"lack_of_fit_p_value": 0.6712, "lack_of_fit_runs": {"tested": 35, "repeats": 67}}
+    blocks = diagnosis_blocks(ShownDiagnosis({**content(), "provenance": runs}, None, ()))
+    said = next(block for block in blocks if isinstance(block, Bullets)).items
+    among = "against the scatter of repeats in 67 validation and test runs"
+    assert f"Lack of fit of the 35 test runs, {among}: p = 0.67." in said

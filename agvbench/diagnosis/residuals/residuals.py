@@ -69,6 +69,9 @@ WITHIN_REPEATABILITY = 1.25
 LACK_OF_FIT = 0.01
 """Groups of repeats differ beyond their scatter below this p-value."""
 
+_FEWEST_WITHIN_DOF = 9
+"""Fewer degrees of freedom do not tell how repeats scatter."""
+
 _LEAST = 1e-6  # m, rad: less scatter than any camera shows
 
 _UNITS = {name: 1e3 if name.endswith("_mm") else 180.0 / np.pi for name in QUANTITIES}
@@ -180,7 +183,12 @@ def repeatability(missed: PoseResiduals, group: NDArray[np.int64]) -> dict[str, 
     return out | {MEDIAN: float(np.median(apart_mm))}
 
 
-def lack_of_fit(missed: PoseResiduals, group: NDArray[np.int64], spread: EndSpread | None = None) -> float | None:
+def lack_of_fit(
+    missed: PoseResiduals,
+    group: NDArray[np.int64],
+    spread: EndSpread | None = None,
+    tested: NDArray[np.bool_] | None = None,
+) -> float | None:
     """Return a p-value that what is missed is the same for all groups of repeats: lack of fit against pure error.
 
     The unit is the run. From each run come three numbers (where it ended: along, across, heading), in units of how far
@@ -188,29 +196,48 @@ def lack_of_fit(missed: PoseResiduals, group: NDArray[np.int64], spread: EndSpre
     The means of groups may also be off, and together, by what the parameters may be: two commands with a level in
     common share its error, and are not two pieces of evidence. Between and within groups they are compared by F, so
     that the size of the scatter itself does not matter. Without `spread` all runs scatter alike. None without repeats.
+
+    Means are those of the runs `tested` (R,), all by default; how repeats scatter about their own mean is known from
+    all runs: it does not depend on what their prediction was chosen by.
     """
     from scipy import special
 
-    names, index, sizes = np.unique(group, return_inverse=True, return_counts=True)
-    within_dof, between_dof = 3 * (len(group) - len(names)), 3 * len(names)
-    if within_dof < 9 or not between_dof:
+    if tested is None:
+        tested = np.ones(len(group), dtype=np.bool_)
+    names, index = np.unique(group, return_inverse=True)
+    asked, asked_index = np.unique(group[tested], return_inverse=True)
+    within_dof, between_dof = 3 * (len(group) - len(names)), 3 * len(asked)
+    if within_dof < _FEWEST_WITHIN_DOF or not between_dof:
         return None
-    ends = missed.ends
-    means = _by_group(ends, index)
-    apart = ends - means[index]
-    if spread is None:
-        alike = apart.T @ apart / (len(group) - len(names)) + np.eye(3) * _LEAST**2
-        own, shared = np.broadcast_to(alike, (len(names), 3, 3)), np.zeros((between_dof, between_dof))
-    else:
-        own, slopes = _by_group(spread.own, index), _by_group(spread.slopes, index).reshape(between_dof, -1)
-        shared = slopes @ spread.parameters @ slopes.T
-    within = sum(float(np.sum(_white(own[g], apart[index == g].T) ** 2)) for g in range(len(names)))
+    apart = missed.ends - _by_group(missed.ends, index)[index]
+    spread = spread or _alike(apart, within_dof // 3)
+    within = _within(apart, index, spread)
     if within <= 0.0:
         return 1.0
-    for g, size in enumerate(sizes):
-        shared[3 * g : 3 * g + 3, 3 * g : 3 * g + 3] += own[g] / size
-    between = float(np.sum(_white(shared, means.ravel()) ** 2))
+    between = _between(missed.ends[tested], asked_index, spread.select(tested))
     return float(special.fdtrc(between_dof, within_dof, between / between_dof / (within / within_dof)))
+
+
+def _alike(apart: Floats, dof: int) -> EndSpread:
+    """Return the spread of runs that all scatter as those do that are `apart` (R, 3) from their groups' means."""
+    runs, covariance = len(apart), apart.T @ apart / dof + np.eye(3) * _LEAST**2
+    return EndSpread(np.broadcast_to(covariance, (runs, 3, 3)), np.zeros((runs, 3, 0)), np.zeros((0, 0)))
+
+
+def _within(apart: Floats, index: NDArray[np.int64], spread: EndSpread) -> float:
+    """Return the square of what repeats are `apart` (R, 3) from their group's mean, in units of their spread."""
+    own = _by_group(spread.own, index)
+    return sum(float(np.sum(_white(own[g], apart[index == g].T) ** 2)) for g in range(len(own)))
+
+
+def _between(ends: Floats, index: NDArray[np.int64], spread: EndSpread) -> float:
+    """Return the square of what groups miss in the mean, in units of what they may."""
+    means, own = _by_group(ends, index), _by_group(spread.own, index)
+    slopes = _by_group(spread.slopes, index).reshape(means.size, -1)
+    shared = slopes @ spread.parameters @ slopes.T
+    for g, size in enumerate(np.bincount(index)):
+        shared[3 * g : 3 * g + 3, 3 * g : 3 * g + 3] += own[g] / size
+    return float(np.sum(_white(shared, means.ravel()) ** 2))
 
 
 def _by_group(values: Floats, index: NDArray[np.int64]) -> Floats:

@@ -50,17 +50,26 @@ class Assessment:
 
 
 def assess(
-    readings: Readings, held: NDArray[np.bool_], before: Floats, after: Floats, spread: EndSpread
+    readings: Readings,
+    held: NDArray[np.bool_],
+    before: Floats,
+    after: Floats,
+    spread: EndSpread,
+    repeats: NDArray[np.bool_] | None = None,
 ) -> Assessment | None:
-    """Return how poses (R, K, 3) predicted ``before`` and ``after`` miss the runs `held` (R,); None without repeats."""
+    """Return how poses (R, K, 3) predicted ``before`` and ``after`` miss the runs `held` (R,); None without repeats.
+
+    The lack of fit is held against the scatter of the runs `repeats` (R,), those `held` among them; by default these.
+    """
     kept = readings.select(held)
     missed = pose_residuals(kept, after[held])
     least = repeatability(missed, kept.group) or repeatability(pose_residuals(readings, after), readings.group)
     if least is None:
         return None
-    return Assessment(
-        pose_residuals(kept, before[held]), missed, least, lack_of_fit(missed, kept.group, spread.select(held))
-    )
+    among = held if repeats is None else repeats
+    several = readings.select(among)
+    p_value = lack_of_fit(pose_residuals(several, after[among]), several.group, spread.select(among), held[among])
+    return Assessment(pose_residuals(kept, before[held]), missed, least, p_value)
 
 
 def predicts(selection: Selection, term_selection: TermSelection | None, readings: Readings) -> Predictor:

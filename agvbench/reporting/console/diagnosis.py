@@ -19,6 +19,7 @@ from agvbench.workflows.diagnosis_files import (
     DEFINITIONS,
     QUANTITIES,
     effect_in_words,
+    fit_in_words,
     left_in_words,
     next_in_words,
 )
@@ -40,6 +41,7 @@ def print_diagnosis(found: Diagnosis, console: Console) -> None:
         )
         console.print(errors_table(found.held_out))
         console.print(Text(DEFINITIONS, style="dim"))
+        _say(fit_in_words(content), console)
         if windows := found.provenance.get("windows"):
             console.print(windows_table(windows))
         if found.held_out.worse_on:

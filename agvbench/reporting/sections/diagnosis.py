@@ -28,6 +28,7 @@ from agvbench.workflows.diagnosis_files import (
     DEFINITIONS,
     QUANTITIES,
     ShownDiagnosis,
+    fit_in_words,
     items,
     left_in_words,
     mapping,
@@ -88,7 +89,8 @@ def diagnosis_blocks(shown: ShownDiagnosis) -> list[Block]:
     verdict = plain_sentences(f"{content.get('verdict')}: {provenance.get('why', '')}")
     blocks: list[Block] = [Paragraph(verdict, lead=True)]
     blocks += [table for table in (_effects(content), _errors(content)) if table.rows]
-    sentences = [plain_sentences(text) for text in (*left_in_words(content), *next_in_words(content), *shown.problems)]
+    said = (*left_in_words(content), *fit_in_words(content), *next_in_words(content), *shown.problems)
+    sentences = [plain_sentences(text) for text in said]
     if sentences:
         blocks.append(Bullets(sentences))
     if shown.residuals is None or shown.residuals.empty:
