@@ -177,6 +177,10 @@ class MocapAdapter(ABC):
     def open(cls, address: str, options: AdapterOptions) -> Self:
         """Connect to what is at `address` (``""`` if the user gave none)."""
 
+    @classmethod  # noqa: B027  (an adapter need not say it earlier)
+    def check(cls, address: str, options: AdapterOptions) -> None:
+        """Raise what `open` would raise of `address` and `options` alone, and open nothing."""
+
     @abstractmethod
     def identity(self) -> MocapIdentity:
         """Return who this is; it does not change while the adapter is open."""

@@ -58,10 +58,21 @@ def open_mocap(spec: str, options: AdapterOptions) -> MocapAdapter:
     return _opened("mocap", spec, options, mocap_adapters(), MocapAdapter)  # type: ignore[type-abstract]
 
 
-def check_specs(agv: str, mocap: str) -> None:
-    """Raise `LinkError` unless there are adapters of these names; nothing is opened."""
-    _named("agv", agv, agv_adapters(), AgvAdapter)  # type: ignore[type-abstract]
-    _named("mocap", mocap, mocap_adapters(), MocapAdapter)  # type: ignore[type-abstract]
+def check_specs(agv: str, mocap: str, options: AdapterOptions) -> None:
+    """Raise `AgvbenchError` unless there are adapters of these names, the camera with these options; open nothing."""
+    check_agv(agv)
+    check_mocap(mocap, options)
+
+
+def check_agv(spec: str) -> None:
+    """Raise `LinkError` unless there is an AGV adapter of this name."""
+    _named("agv", spec, agv_adapters(), AgvAdapter)  # type: ignore[type-abstract]
+
+
+def check_mocap(spec: str, options: AdapterOptions) -> None:
+    """Raise `AgvbenchError` unless there is a mocap adapter of this name, whose camera can have these options."""
+    adapter = _named("mocap", spec, mocap_adapters(), MocapAdapter)  # type: ignore[type-abstract]
+    adapter.check(parse_spec(spec)[1], options)
 
 
 def _opened(

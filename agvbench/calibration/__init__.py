@@ -15,8 +15,8 @@ from agvbench.calibration.measurement.axle_angles import axle_angles_from_arc, a
 from agvbench.calibration.measurement.circle import CircleFit, CircleFits, fit_circle, fit_circles
 from agvbench.calibration.measurement.frames import FrameQuality, clean_frames, inspect_frames
 from agvbench.calibration.measurement.run_measurement import RunMeasurement, measure_run
-from agvbench.calibration.quaternion import quaternion_to_heading
 from agvbench.calibration.samples import CurvePoints
+from agvbench.vehicle.quaternion import quaternion_to_heading
 
 __all__ = [
     "CALIBRATION_EXPERIMENTS",

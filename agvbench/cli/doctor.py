@@ -32,7 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print what every check finds; return the exit code."""
-    from agvbench.adapters import check_specs
+    from agvbench.adapters import AdapterOptions, check_specs
+    from agvbench.adapters.contract import camera_options
     from agvbench.reporting.console.doctor import tell
     from agvbench.running.configuration.settings import BenchSettings
     from agvbench.running.configuration.vehicles import lab_vehicle
@@ -42,6 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     settings = BenchSettings.given(
         {"vehicle": lab_vehicle()} | {name: value for name, value in given.items() if value is not None}
     )
-    check_specs(settings.agv, settings.mocap)
+    camera = camera_options([settings.camera])
+    check_specs(settings.agv, settings.mocap, AdapterOptions(vehicle=settings.vehicle_name, camera=camera))
     states = [tell(name, finding) for name, finding in examine(Lab(settings))]
     return 1 if State.BAD in states else 0

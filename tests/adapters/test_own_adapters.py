@@ -122,7 +122,7 @@ def test_a_file_that_is_no_adapter_is_one_line(
     monkeypatch.chdir(tmp_path)
     if source is not None:
         (tmp_path / "own.py").write_text(source, encoding="utf-8")
-    for ask in (lambda: open_agv("own.py", AdapterOptions()), lambda: check_specs("own.py", "sim")):
+    for ask in (lambda: open_agv("own.py", AdapterOptions()), lambda: check_specs("own.py", "sim", AdapterOptions())):
         with pytest.raises(LinkError) as caught:
             ask()
         assert str(caught.value).startswith(line)

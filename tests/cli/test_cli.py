@@ -163,6 +163,14 @@ def test_an_unknown_command_suggests_the_nearest(capsys):
         (["bench", "--repeats=0"], "--repeats: value cannot be used: 0"),
         (["bench", "--workspace=hall"], "workspace cannot be read: 'hall'"),
         (["loop", "--vehicle=none.toml"], "none.toml: cannot read the vehicle file"),
+        (["bench", "--agv=serail:/dev/ttyACM0"], "no such agv adapter: 'serail'"),
+        (["bench", "--mocap=natnte:lab"], "no such mocap adapter: 'natnte'"),
+        (["bench", "--camera=lost"], "--camera: not a parameter and its value: 'lost'"),
+        (["bench", "--camera=lots=0.1"], "camera: unknown option: 'lots'"),
+        (["bench", "--mocap=natnet:lab", "--camera=up=x"], "--camera up: unknown vertical axis: x"),
+        (["bench", "--mocap=natnet:emulated", "--camera=packet_lots=1"], "no such fault of packets: packet_lots"),
+        (["bench", "--mocap=impaired:lost:natnet:lab:http"], "port is out of range: http"),
+        (["loop", "--agv=smi"], "no such agv adapter: 'smi'"),
     ],
 )
 def test_a_wrong_value_is_refused_before_what_takes_long_to_import(arguments, told, tmp_path):

@@ -10,7 +10,7 @@ import numpy as np
 from agvbench.adapters.contract import AdapterOptions, MocapAdapter, MocapReports
 from agvbench.adapters.impairment.faults import Faults, frame_fault
 from agvbench.adapters.impairment.spec import SCHEME, Impairment, parse_address
-from agvbench.adapters.registry import open_mocap
+from agvbench.adapters.registry import check_mocap, open_mocap
 from agvbench.bus.messages.event import Level
 from agvbench.bus.messages.frames import FrameClock
 from agvbench.bus.messages.identity import MocapIdentity
@@ -34,10 +34,20 @@ class ImpairedMocap(MocapAdapter):
     @classmethod
     def open(cls, address: str, options: AdapterOptions) -> ImpairedMocap:
         """Open the camera behind the faults."""
+        impairments, spec = cls._parsed(address)
+        return cls(open_mocap(spec, options), impairments, options)
+
+    @classmethod
+    def check(cls, address: str, options: AdapterOptions) -> None:
+        """Check the faults, and the camera behind them."""
+        check_mocap(cls._parsed(address)[1], options)
+
+    @staticmethod
+    def _parsed(address: str) -> tuple[list[Impairment], str]:
         impairments, spec = parse_address(address)
         for impairment in impairments:
             frame_fault(impairment)
-        return cls(open_mocap(spec, options), impairments, options)
+        return impairments, spec
 
     def identity(self) -> MocapIdentity:
         """Return who the camera is, and that it is impaired."""

@@ -57,6 +57,14 @@ class NatNetMocap(MocapAdapter):
             return EmulatedNatNet.open("", options)
         return cls(NatNetOptions.parse(address, options.camera, options.vehicle), options)
 
+    @classmethod
+    def check(cls, address: str, options: AdapterOptions) -> None:
+        """Refuse an address or an option that cannot be."""
+        if address == EMULATED:
+            EmulatedNatNet.check("", options)
+        else:
+            NatNetOptions.parse(address, options.camera, options.vehicle)
+
     def identity(self) -> MocapIdentity:
         """Return who this is."""
         info = self._client.info

@@ -28,11 +28,20 @@ class SimMocap(MocapAdapter):
     @classmethod
     def open(cls, address: str, options: AdapterOptions) -> SimMocap:
         """Make the camera that the options describe, ready to look: the first frame waits for nothing."""
-        if address:
-            raise LinkError("a simulated camera has no address", where=f"sim:{address}", remedy="write sim")
-        camera = Camera.from_options(options.camera)
+        camera = cls._described(address, options)
         camera.observe(np.zeros(1), np.zeros((1, 3)), np.random.default_rng(0))
         return cls(camera, options)
+
+    @classmethod
+    def check(cls, address: str, options: AdapterOptions) -> None:
+        """Refuse an address, and what no camera can be."""
+        cls._described(address, options)
+
+    @staticmethod
+    def _described(address: str, options: AdapterOptions) -> Camera:
+        if address:
+            raise LinkError("a simulated camera has no address", where=f"sim:{address}", remedy="write sim")
+        return Camera.from_options(options.camera)
 
     def identity(self) -> MocapIdentity:
         """Return who this is."""

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.adapters.natnet.protocol.bitstream import BODY, TRACKED
-from agvbench.calibration.quaternion import Up, quaternion_to_heading
 from agvbench.types import Floats, Frames
+from agvbench.vehicle.quaternion import Up, quaternion_to_heading
 
 
 def to_floor(position_m: NDArray[np.float32], quaternion: NDArray[np.float32], up: Up) -> Floats:

@@ -47,10 +47,8 @@ class EmulatedNatNet(MocapAdapter):
     scheme = "natnet:emulated"
 
     def __init__(self, options: AdapterOptions) -> None:
-        faults, camera = PacketFaults.split(options.camera)
-        camera.pop("version", None)
-        version = Version.parse(str(options.camera.get("version", "4.1")))
-        self._camera = SimMocap.open("", replace(options, camera=camera))
+        faults, version, simulated = self._split(options)
+        self._camera = SimMocap.open("", simulated)
         self._rate_hz = self._camera.identity().rate_hz
         self._clock, self._base_s, self._last_s = SimulatedClock(), 0.0, 0.0
         self._seen: list[Seen] = []
@@ -87,6 +85,18 @@ class EmulatedNatNet(MocapAdapter):
     def open(cls, address: str, options: AdapterOptions) -> EmulatedNatNet:
         """Make camera, server and client."""
         return cls(options)
+
+    @classmethod
+    def check(cls, address: str, options: AdapterOptions) -> None:
+        """Refuse an option that neither the network, the stream nor the camera has."""
+        SimMocap.check("", cls._split(options)[2])
+
+    @staticmethod
+    def _split(options: AdapterOptions) -> tuple[PacketFaults, Version, AdapterOptions]:
+        """Return the network's faults, the version of the stream, and what is left for the camera."""
+        faults, camera = PacketFaults.split(options.camera)
+        camera.pop("version", None)
+        return faults, Version.parse(str(options.camera.get("version", "4.1"))), replace(options, camera=camera)
 
     def identity(self) -> MocapIdentity:
         """Return who this is."""

@@ -8,8 +8,8 @@ from ipaddress import IPv4Address
 
 from agvbench.adapters.natnet.channel import COMMAND_PORT, Connection
 from agvbench.adapters.natnet.protocol.bitstream import Version
-from agvbench.calibration.quaternion import Up
 from agvbench.errors import FlagError
+from agvbench.vehicle.quaternion import Up
 
 _NAMES = ("body", "data_port", "local", "multicast", "rate_hz", "up", "version")
 _MAX_PORT = 65_535

@@ -52,7 +52,7 @@ from agvbench.running.links import UnbrokenLink
 from agvbench.running.positioning.placers import choose_placer
 from agvbench.running.positioning.start_pose import say
 from agvbench.running.session.end_pose_bias import read_remainders
-from agvbench.running.session.rig_checks import open_session_rig
+from agvbench.running.session.rig_checks import adapter_options, open_session_rig
 from agvbench.running.session.session import BenchSession
 from agvbench.running.session.termination_signals import interruptible
 from agvbench.simulator import load_plant
@@ -92,7 +92,7 @@ def open_session(
         steering=settings.steering,
     )
     if dry_run:
-        check_specs(settings.agv, settings.mocap)
+        check_specs(settings.agv, settings.mocap, adapter_options(settings, models))
         load_plant(settings.plant)
         models.setdefault("calibrated", expected_calibration(settings.vehicle))
         yield session_with(bench=None)
