@@ -51,23 +51,23 @@ def cached_njit(**options: Any) -> Callable[[F], F]:
 
 
 @contextmanager
-def telling_of_compilation(tell: Callable[[str], None]) -> Iterator[None]:
-    """Have `tell` say once that agvbench is compiled, where no machine code is kept yet: it takes some seconds."""
-    with event.install_listener("numba:compile", _FirstCompilation(tell)):
+def announcing_compilation(on_progress: Callable[[str], None]) -> Iterator[None]:
+    """Have `on_progress` say once that agvbench is compiled, where no machine code is kept: it takes some seconds."""
+    with event.install_listener("numba:compile", _FirstCompilation(on_progress)):
         yield
 
 
 class _FirstCompilation(event.Listener):  # type: ignore[misc] # numba is not typed
     """Tells of the first function of agvbench that is compiled; one that is loaded from disk is no event."""
 
-    def __init__(self, tell: Callable[[str], None]) -> None:
-        self._tell, self._told = tell, False
+    def __init__(self, on_progress: Callable[[str], None]) -> None:
+        self._on_progress, self._told = on_progress, False
 
     def on_start(self, event: Any) -> None:
         module = event.data["dispatcher"].py_func.__module__
         if not self._told and module.startswith("agvbench."):
             self._told = True
-            self._tell(COMPILING)
+            self._on_progress(COMPILING)
 
     def on_end(self, event: Any) -> None:
         """Nothing: the first run says that it goes on."""

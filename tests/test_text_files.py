@@ -20,7 +20,7 @@ from agvbench.errors import AgvbenchError, FileError
 from agvbench.model import VehicleModel
 from agvbench.planning.trajectories.loading import load_trajectory
 from agvbench.running.configuration.settings import BenchSettings
-from agvbench.running.session.end_pose_bias import read_remainders
+from agvbench.running.session.end_pose_bias import read_bias_corrections
 from agvbench.text_files import MAX_BYTES, MAX_DEPTH, read_json, read_text, read_toml
 
 READERS: dict[str, Callable[[Path], object]] = {
@@ -28,7 +28,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     "trajectory.toml": load_trajectory,
     "campaign.toml": CampaignHeader.load,
     "mapping.toml": load_mapping,
-    "remainders.json": lambda path: read_remainders(str(path)),
+    "remainders.json": lambda path: read_bias_corrections(str(path)),
     "bench.toml": lambda path: BenchSettings.load(path.parent),
 }
 FURTHER: dict[str, Callable[[Path], object]] = {

@@ -10,7 +10,7 @@ from typing import Any
 from agvbench.adapters.contract import SILENCE_LIMIT_S, AgvAdapter
 from agvbench.adapters.host import Host
 from agvbench.bus.clock import Clock
-from agvbench.bus.counters import LossCounter, Sequence, Tally
+from agvbench.bus.counters import LossCounter, RateLimitedCounter, Sequence
 from agvbench.bus.keys import AGV, CLAIM, RELEASE, REPLAY, RESET, Keys
 from agvbench.bus.messages.command import CommandFlags, CommandMessage, decode_command
 from agvbench.bus.messages.event import COMMANDS_LATE, COMMANDS_LOST, RUNNER_SILENT, Level
@@ -22,11 +22,11 @@ from agvbench.errors import AdapterGoneError, LinkError, MessageError, RunStoppe
 from agvbench.types import Command, Floats
 
 _COMMANDS_WAITING = 256
-_OVERTAKEN_TOLD = 10
+_REORDERED_REPORTED = 10
 _STOP_PATIENCE_S = 0.5
 _HANG_PATIENCE_S = 0.1
 _STOP, _FLUSH = CommandFlags.STOP, CommandFlags.FLUSH
-_FOREIGN_TOLD_S = 1.0
+_FOREIGN_REPORTED_S = 1.0
 _COMMAND, _FLAGS, _SOURCE = prefix(Kind.COMMAND), slice(6, 8), slice(8, 12)
 
 
@@ -121,7 +121,7 @@ class AgvHost(Host):
         self._adapter, self._show = adapter, show
         self._truths = Sequence()
         self.loss = LossCounter()
-        self.malformed, self.overtaken = Tally(), Tally(first=_OVERTAKEN_TOLD)
+        self.malformed, self.reordered = RateLimitedCounter(), RateLimitedCounter(first=_REORDERED_REPORTED)
         self._heard_s: float | None = None
         self._identity_bytes = encode_agv_identity(adapter.identity())
         self._lock_step = adapter.identity().lock_step
@@ -130,13 +130,13 @@ class AgvHost(Host):
         self._gap_limit_s = min(adapter.watchdog_s, SILENCE_LIMIT_S)
         self._rest()
         self._claim = Claim(session, keys, required=not self._lock_step)
-        self.foreign, self._foreign_told = 0, (False, -math.inf)
+        self.foreign, self._foreign_reported = 0, (False, -math.inf)
         self._answers |= {RESET: self._reset, REPLAY: self._replay}
         self._answers |= {CLAIM: self._take, RELEASE: self._claim.release}
         self._subscriber = session.declare_subscriber(keys.command, zenoh.handlers.FifoChannel(_COMMANDS_WAITING))
         self._closed, self._left = threading.Event(), False
         self._outdated: dict[int, int] = {}  # by source: the last command sent before the vehicle was placed anew
-        self._told_of_hanging = False
+        self._reported_hanging = False
         adapter.start(self)
         self._run("commands", self._serve_commands)
         if not self._lock_step:
@@ -252,7 +252,7 @@ class AgvHost(Host):
             return
         foreign = self._claim.is_foreign(payload)
         if foreign:
-            self._tell_of_foreign(message)
+            self._report_foreign(message)
         else:
             self._note(message.source, message.sequence)
         if message.flags & _STOP:
@@ -261,17 +261,17 @@ class AgvHost(Host):
                     self._refrain(message)
             except BaseException as error:  # noqa: BLE001  (as for every command)
                 self.failed(error, acknowledged=message.sequence)
-        elif not foreign and self.overtaken.add():
-            text = f"commands that were overtaken by newer ones: {self.overtaken}"
+        elif not foreign and self.reordered.add():
+            text = f"commands that were overtaken by newer ones: {self.reordered}"
             self.event(Level.WARNING, "commands_overtaken", text)
 
-    def _tell_of_foreign(self, message: CommandMessage) -> None:
+    def _report_foreign(self, message: CommandMessage) -> None:
         """Tell of commands that are not the runner's, at most once a second: an error while the vehicle drives."""
         self.foreign += 1
-        (told_while_driving, told_s), now_s = self._foreign_told, self._clock.now()
-        if now_s - told_s < _FOREIGN_TOLD_S and told_while_driving >= self._drives:
+        (reported_while_driving, told_s), now_s = self._foreign_reported, self._clock.now()
+        if now_s - told_s < _FOREIGN_REPORTED_S and reported_while_driving >= self._drives:
             return
-        self._foreign_told = self._drives, now_s
+        self._foreign_reported = self._drives, now_s
         error = RunStoppedError(
             "commands of another source", where=self._keys.command, value=f"{self.foreign}, of {message.source:08x}",
             limit="only those of the runner that has the vehicle", remedy="end the program that sends them",
@@ -319,13 +319,13 @@ class AgvHost(Host):
         if not self._lock.acquire(timeout=_HANG_PATIENCE_S):
             # Neither may wait for the other: a stop may need what the command holds, and so may an event. Silence lasts
             # until there was a stop with nothing else under way: what hangs may come back, and drive.
-            if not self._told_of_hanging:
-                self._told_of_hanging = True
-                threading.Thread(target=self._tell_of_hanging, daemon=True).start()
+            if not self._reported_hanging:
+                self._reported_hanging = True
+                threading.Thread(target=self._report_hanging, daemon=True).start()
             self._adapter.stop()
             return
         try:
-            self._told_of_hanging = False
+            self._reported_hanging = False
             if not self._is_silent():
                 return
             self._adapter.stop()
@@ -337,7 +337,7 @@ class AgvHost(Host):
             why = "its runner is gone" if self._claim.source is None else f"no command for {SILENCE_LIMIT_S} s"
             self.event(Level.WARNING, RUNNER_SILENT, f"{why}: vehicle stopped")
 
-    def _tell_of_hanging(self) -> None:
+    def _report_hanging(self) -> None:
         error = AdapterGoneError(
             "does not come back from a command", value=f"{SILENCE_LIMIT_S + _HANG_PATIENCE_S:g} s",
             remedy="see the vehicle and its cable, and start the adapter again",

@@ -19,7 +19,7 @@ from agvbench.bus.messages.request import encode_time
 from agvbench.bus.queries import refusal
 from agvbench.errors import AgvbenchError, LinkError
 
-_QUESTIONS_WAITING = 64
+_QUERIES_WAITING = 64
 
 
 def as_agvbench_error(error: BaseException, role: str) -> AgvbenchError:
@@ -50,10 +50,10 @@ class Host(ABC):
         self._session, self._keys, self._role, self._clock = session, keys, role, clock
         self._zenoh_error = zenoh.ZError
         self._lock = threading.RLock()
-        self._events, self._telling = Sequence(), threading.Lock()
+        self._events, self._reporting = Sequence(), threading.Lock()
         self._threads: list[threading.Thread] = []
-        self._questions = session.declare_queryable(
-            keys.question(role, "*"), zenoh.handlers.FifoChannel(_QUESTIONS_WAITING)
+        self._queryable = session.declare_queryable(
+            keys.queryable(role, "*"), zenoh.handlers.FifoChannel(_QUERIES_WAITING)
         )
         self._answers: dict[str, Callable[[bytes], bytes]] = {
             IDENTITY: lambda _: self._identity(),
@@ -66,7 +66,7 @@ class Host(ABC):
 
     def _announce(self) -> None:
         """Answer questions, then declare the token: who sees it may rely on everything declared before."""
-        self._run("questions", self._serve_questions)
+        self._run("questions", self._serve_queries)
         self._token = self._session.liveliness().declare_token(self._keys.alive(self._role))
 
     def _run(self, name: str, target: Callable[[], None]) -> None:
@@ -74,9 +74,9 @@ class Host(ABC):
         self._threads.append(thread)
         thread.start()
 
-    def _serve_questions(self) -> None:
+    def _serve_queries(self) -> None:
         # The queryable itself is locked while a thread waits in it; its handler is not.
-        handler = self._questions.handler
+        handler = self._queryable.handler
         while True:
             try:
                 query = handler.recv()
@@ -86,11 +86,11 @@ class Host(ABC):
                 self._answer(query)
 
     def _answer(self, query: Any) -> None:
-        question = str(query.key_expr).rpartition("/")[2]
+        queryable = str(query.key_expr).rpartition("/")[2]
         try:
-            answer = self._answers.get(question)
+            answer = self._answers.get(queryable)
             if answer is None:
-                raise LinkError("no such question", where=self._role, value=question, limit=" ".join(self._answers))
+                raise LinkError("no such question", where=self._role, value=queryable, limit=" ".join(self._answers))
             payload = b"" if query.payload is None else bytes(query.payload.to_bytes())
             query.reply(query.key_expr, answer(payload))
         except self._zenoh_error:
@@ -108,7 +108,7 @@ class Host(ABC):
         self._publish_event(Event.of_error(told, self._role, acknowledged=acknowledged))
 
     def _publish_event(self, event: Event) -> None:
-        with self._telling:
+        with self._reporting:
             sequence, t_s = self._events.take(), self._clock.now()
             numbered = replace(event, sequence=sequence, t_s=t_s, source=self._events.source)
             self._put(self._keys.report, encode_event(numbered))
@@ -132,7 +132,7 @@ class Host(ABC):
     def close(self) -> None:
         """Leave the bus."""
         self._token.undeclare()
-        self._questions.undeclare()
+        self._queryable.undeclare()
         for thread in self._threads:
             if thread is not threading.current_thread():
                 thread.join(timeout=2.0)

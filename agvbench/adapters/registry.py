@@ -16,7 +16,7 @@ from agvbench.adapters import agv, mocap
 from agvbench.adapters.contract import AdapterOptions, AgvAdapter, MocapAdapter
 from agvbench.errors import AgvbenchError, LinkError
 from agvbench.registry import classes_by_file, own_classes
-from agvbench.simulator.checked_plant import explain
+from agvbench.simulator.checked_plant import as_plant_error
 from agvbench.simulator.plant_loading import import_file
 
 _Adapter = TypeVar("_Adapter", AgvAdapter, MocapAdapter)
@@ -80,12 +80,12 @@ def _opened(
 ) -> _Adapter:
     scheme, address = parse_spec(spec)
     adapter = _named(role, spec, known, base)
-    return open_own(adapter, scheme, address, options) if is_file(scheme) else adapter.open(address, options)
+    return open_plug_in(adapter, scheme, address, options) if is_file(scheme) else adapter.open(address, options)
 
 
 def _named(role: str, spec: str, known: dict[str, type[_Adapter]], base: type[_Adapter]) -> type[_Adapter]:
     scheme, _ = parse_spec(spec)
-    return own_adapter(scheme, base) if is_file(scheme) else _choose(role, scheme, known)
+    return plug_in_adapter(scheme, base) if is_file(scheme) else _choose(role, scheme, known)
 
 
 def _choose(role: str, scheme: str, known: dict[str, type[_Adapter]]) -> type[_Adapter]:
@@ -109,7 +109,7 @@ def is_file(scheme: str) -> bool:
     return scheme.endswith(".py")
 
 
-def own_adapter(path: str, base: type[_Adapter]) -> type[_Adapter]:
+def plug_in_adapter(path: str, base: type[_Adapter]) -> type[_Adapter]:
     """Return the one class derived from `base` that the file `path` defines; its ``scheme`` may be left out.
 
     Raises
@@ -133,7 +133,7 @@ def own_adapter(path: str, base: type[_Adapter]) -> type[_Adapter]:
     return adapter
 
 
-def open_own(adapter: type[_Adapter], path: str, address: str, options: AdapterOptions) -> _Adapter:
+def open_plug_in(adapter: type[_Adapter], path: str, address: str, options: AdapterOptions) -> _Adapter:
     """Open an adapter of the file `path`.
 
     Raises
@@ -164,5 +164,5 @@ def _not_one(path: str, own: list[type], whole: list[type], base: type) -> LinkE
 
 
 def _told(error: BaseException, path: str) -> LinkError:
-    said = error if isinstance(error, AgvbenchError) else explain(error, path)
+    said = error if isinstance(error, AgvbenchError) else as_plant_error(error, path)
     return LinkError(said.what, where=said.where, value=said.value, limit=said.limit, remedy=said.remedy)

@@ -63,7 +63,7 @@ class LossCounter:
         return max(missing, 0)
 
 
-class Tally:
+class RateLimitedCounter:
     """Counts, and says when it is time to tell: at the `first`, and whenever there are ten times as many.
 
     However fast something comes, telling of it takes next to nothing, and the last number told is never off by more

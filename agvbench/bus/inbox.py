@@ -9,7 +9,7 @@ import threading
 from collections import deque
 from typing import Any
 
-from agvbench.bus.counters import LossCounter, Tally
+from agvbench.bus.counters import LossCounter, RateLimitedCounter
 from agvbench.bus.keys import AGV, MOCAP, Keys
 from agvbench.bus.messages.event import Event, Level, decode_event
 from agvbench.bus.messages.frames import FramesMessage, decode_frames
@@ -40,7 +40,7 @@ class Inbox:
 
         self.frames_loss = LossCounter()
         self.event_losses = {role: LossCounter() for role in (AGV, MOCAP)}
-        self.malformed = Tally()
+        self.malformed = RateLimitedCounter()
         self.events: deque[Event] = deque(maxlen=_EVENTS_KEPT)
         self._keys = keys
         self._subscriber = session.declare_subscriber(keys.report, zenoh.handlers.FifoChannel(_CAPACITY))

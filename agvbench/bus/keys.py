@@ -84,9 +84,9 @@ class Keys:
         """True poses, from a simulated AGV to a simulated camera."""
         return f"{self.root}/truth"
 
-    def question(self, role: str, question: str) -> str:
+    def queryable(self, role: str, queryable: str) -> str:
         """Return the queryable of an adapter (``"*"``: all of them)."""
-        return f"{self.root}/{role}/{question}"
+        return f"{self.root}/{role}/{queryable}"
 
     def alive(self, role: str) -> str:
         """Return the liveliness token of an adapter or runner (``"*"``: all of them)."""

@@ -10,7 +10,7 @@ from agvbench.bus.clock import Clock, SimulatedClock, WallClock, Watchdog
 from agvbench.bus.counters import LossCounter
 from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import AGV, CLAIM, IDENTITY, MOCAP, RELEASE, REPLAY, RESET, Keys
-from agvbench.bus.liveliness import SETTLES_S, Presence
+from agvbench.bus.liveliness import SETTLES_S, Liveliness
 from agvbench.bus.lock_step import LockStep
 from agvbench.bus.messages.event import Event, Level
 from agvbench.bus.messages.identity import Identity, decode_agv_identity, decode_mocap_identity
@@ -80,7 +80,7 @@ class VehicleLink:
         self._session, self._wall, self._limit_s = session, wall or WallClock(), answer_limit_s
         self._inbox = Inbox(session, self.keys)
         self._outbox = CommandOutbox(session, self.keys)
-        self._presence = Presence(session, self.keys, self._wall, self._inbox.wake)
+        self._liveliness = Liveliness(session, self.keys, self._wall, self._inbox.wake)
         self._watchdog = Watchdog(self._wall, answer_limit_s, self._inbox.wake)
         self._closed = False
         self._token = session.liveliness().declare_token(self.keys.runner(self._outbox.source))
@@ -94,16 +94,16 @@ class VehicleLink:
         self.clock = clock or (SimulatedClock() if self._identity.lock_step else WallClock())
         self._driver = self._make_driver()
 
-    def _claim(self, question: str, limit_s: float) -> None:
+    def _claim(self, queryable: str, limit_s: float) -> None:
         """Claim the vehicle for this runner, or release it: its adapter obeys one runner at a time."""
-        self._ask(AGV, question, encode_claim(self._outbox.source), limit_s)
+        self._ask(AGV, queryable, encode_claim(self._outbox.source), limit_s)
 
-    def _ask(self, role: str, question: str, payload: bytes, limit_s: float) -> bytes:
+    def _ask(self, role: str, queryable: str, payload: bytes, limit_s: float) -> bytes:
         """Return the answer of the adapter in this role; an adapter that vanishes ends the wait."""
-        return ask(self._session, self.keys.question(role, question), payload, limit_s, self._check_presence)
+        return ask(self._session, self.keys.queryable(role, queryable), payload, limit_s, self._check_liveliness)
 
-    def _check_presence(self) -> None:
-        self._presence.check(AGV, MOCAP, settles_s=SETTLES_S)
+    def _check_liveliness(self) -> None:
+        self._liveliness.check(AGV, MOCAP, settles_s=SETTLES_S)
 
     def _compare_calibration(self, driven_with: str) -> None:
         built_for = self._identity.agv.extra.get("firmware_calibration", "none")
@@ -113,7 +113,7 @@ class VehicleLink:
 
     def _meet(self, limit_s: float) -> Identity:
         for role in (AGV, MOCAP):
-            self._presence.wait_for(role, limit_s)
+            self._liveliness.wait_for(role, limit_s)
         agv = decode_agv_identity(self._ask(AGV, IDENTITY, b"", limit_s))
         mocap = decode_mocap_identity(self._ask(MOCAP, IDENTITY, b"", limit_s))
         return Identity.of(agv, mocap)
@@ -124,7 +124,7 @@ class VehicleLink:
             return LockStep(
                 self._inbox,
                 self._outbox,
-                self._presence,
+                self._liveliness,
                 self._watchdog,
                 keys=self.keys,
                 neutral=neutral,
@@ -133,7 +133,7 @@ class VehicleLink:
         return RealTime(
             self._inbox,
             self._outbox,
-            self._presence,
+            self._liveliness,
             session=self._session,
             keys=self.keys,
             neutral=neutral,
@@ -158,7 +158,7 @@ class VehicleLink:
         self._ask(AGV, RESET, payload, self._limit_s)
         self._driver.start()
 
-    def exchange(self, command: Command, *, t_s: float, hold_s: float) -> Frames:
+    def control_cycle(self, command: Command, *, t_s: float, hold_s: float) -> Frames:
         """Publish `command` at `t_s` [s] of the run's clock; return the frames that arrive until `t_s` + `hold_s`.
 
         The run's clock shows 0 at its first command; before, while the vehicle is watched at rest, it is negative.
@@ -172,7 +172,7 @@ class VehicleLink:
         PlantError
             If a simulated vehicle broke the plant protocol.
         """
-        return self._driver.exchange(command, t_s, hold_s)
+        return self._driver.control_cycle(command, t_s, hold_s)
 
     def flush(self) -> Frames:
         """Return the frames that were late."""
@@ -212,7 +212,7 @@ class VehicleLink:
                 where=self.keys.root,
                 remedy="place it by hand, or drive it back",
             )
-        self._check_presence()
+        self._check_liveliness()
         request = Reset(run_key, pose, _ANYWHERE, self._outbox.source, self._outbox.last)
         answer = self._ask(MOCAP, RESET, encode_reset(request), self._limit_s)
         return replace(request, sampling=decode_sampling(answer))
@@ -240,7 +240,7 @@ class VehicleLink:
     def _release(self) -> None:
         self._token.undeclare()
         self._watchdog.close()
-        self._presence.close()
+        self._liveliness.close()
         self._outbox.close()
         self._inbox.close()
 

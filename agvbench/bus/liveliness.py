@@ -14,7 +14,7 @@ SETTLES_S = 0.1
 """How long [s] the tokens of adapters that vanish together take to do so."""
 
 
-class Presence:
+class Liveliness:
     """Watches the liveliness tokens of a vehicle's adapters.
 
     Parameters

@@ -5,7 +5,7 @@ from __future__ import annotations
 from agvbench.bus.clock import SimulatedClock, Watchdog
 from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import AGV, MOCAP, Keys
-from agvbench.bus.liveliness import SETTLES_S, Presence
+from agvbench.bus.liveliness import SETTLES_S, Liveliness
 from agvbench.bus.messages.command import CommandFlags
 from agvbench.bus.messages.event import Event, Level
 from agvbench.bus.messages.frames import FramesFlags, FramesMessage
@@ -24,14 +24,14 @@ class LockStep:
         self,
         inbox: Inbox,
         outbox: CommandOutbox,
-        presence: Presence,
+        liveliness: Liveliness,
         watchdog: Watchdog,
         *,
         keys: Keys,
         neutral: float,
         clock: object,
     ) -> None:
-        self._inbox, self._outbox, self._presence, self._watchdog = inbox, outbox, presence, watchdog
+        self._inbox, self._outbox, self._liveliness, self._watchdog = inbox, outbox, liveliness, watchdog
         self._keys, self._neutral, self._clock = keys, Command(neutral, neutral, neutral), clock
         self._hung: AdapterGoneError | None = None
 
@@ -39,16 +39,16 @@ class LockStep:
         """Forget what went wrong before."""
         self._hung = None
 
-    def exchange(self, command: Command, t_s: float, hold_s: float) -> Frames:
+    def control_cycle(self, command: Command, t_s: float, hold_s: float) -> Frames:
         """Return the frames that arrive in [t_s, t_s + hold_s)."""
-        frames = self._exchange(command, t_s, hold_s, CommandFlags.NONE)
+        frames = self._control_cycle(command, t_s, hold_s, CommandFlags.NONE)
         if isinstance(self._clock, SimulatedClock):
             self._clock.sleep(hold_s)
         return frames
 
     def flush(self) -> Frames:
         """Return the frames that are still under way."""
-        return self._exchange(self._neutral, 0.0, 0.0, CommandFlags.FLUSH)
+        return self._control_cycle(self._neutral, 0.0, 0.0, CommandFlags.FLUSH)
 
     def stop(self) -> None:
         """Command neutral, and wait for nothing."""
@@ -57,10 +57,10 @@ class LockStep:
     def close(self) -> None:
         """Nothing to release."""
 
-    def _exchange(self, command: Command, t_s: float, hold_s: float, flags: int) -> Frames:
+    def _control_cycle(self, command: Command, t_s: float, hold_s: float, flags: int) -> Frames:
         if self._hung is not None:
             raise self._hung
-        self._presence.check(AGV, MOCAP, settles_s=SETTLES_S)
+        self._liveliness.check(AGV, MOCAP, settles_s=SETTLES_S)
         sequence = self._outbox.send(command, t_s, hold_s, flags)
         self._watchdog.arm()
         try:
@@ -90,7 +90,7 @@ class LockStep:
         return batches[0] if len(batches) == 1 else Frames.concatenate(batches)
 
     def _check_waiting(self) -> None:
-        self._presence.check(AGV, MOCAP, settles_s=SETTLES_S)
+        self._liveliness.check(AGV, MOCAP, settles_s=SETTLES_S)
         if self._watchdog.expired:
             self._hung = AdapterGoneError(
                 "the simulator does not answer",

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from agvbench.bus.clock import Clock, wait_until
-from agvbench.bus.counters import Tally
+from agvbench.bus.counters import RateLimitedCounter
 from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import AGV, MOCAP, TIME, Keys
-from agvbench.bus.liveliness import Presence
+from agvbench.bus.liveliness import Liveliness
 from agvbench.bus.messages.command import CommandFlags
 from agvbench.bus.messages.event import Event, Level
 from agvbench.bus.messages.frames import FramesMessage, unpack_columns
@@ -77,27 +77,27 @@ class RealTime:
         self,
         inbox: Inbox,
         outbox: CommandOutbox,
-        presence: Presence,
+        liveliness: Liveliness,
         *,
         session: Any,
         keys: Keys,
         neutral: float,
         clock: Clock,
     ) -> None:
-        self._inbox, self._outbox, self._presence = inbox, outbox, presence
+        self._inbox, self._outbox, self._liveliness = inbox, outbox, liveliness
         self._session, self._keys, self._clock = session, keys, clock
         self._neutral = Command(neutral, neutral, neutral)
         self._arrived: deque[tuple[float, FramesMessage]] = deque()
         # One is counted by the thread that receives, the other by the one that takes: no lock between them.
         self._came = self._gone = 0
-        self.dropped = Tally()
+        self.dropped = RateLimitedCounter()
         self._failure = Failure()
         self._start_s: float | None = None
         self._last_t_s = -np.inf
         self._offset_s = 0.0
         self._thread = threading.Thread(target=self._receive, name="agvbench-inbox", daemon=True)
         self._thread.start()
-        self._heartbeat = Heartbeat(session, keys.question(AGV, TIME), clock, self._failure.note)
+        self._heartbeat = Heartbeat(session, keys.queryable(AGV, TIME), clock, self._failure.note)
 
     def _receive(self) -> None:
         while True:
@@ -132,7 +132,7 @@ class RealTime:
         self._start_s, self._last_t_s = None, -np.inf
         self._failure.forget()
 
-    def exchange(self, command: Command, t_s: float, hold_s: float) -> Frames:
+    def control_cycle(self, command: Command, t_s: float, hold_s: float) -> Frames:
         """Publish at `t_s`; return the frames that arrived until `t_s + hold_s`."""
         if self._start_s is None or t_s < self._last_t_s:
             self._begin(t_s)
@@ -151,7 +151,7 @@ class RealTime:
 
     def _begin(self, t_s: float) -> None:
         self._failure.forget_run()
-        self._offset_s = measure_offset(self._session, self._keys.question(MOCAP, TIME), self._clock)
+        self._offset_s = measure_offset(self._session, self._keys.queryable(MOCAP, TIME), self._clock)
         while self._arrived:
             self._next()
         self._start_s = self._clock.now() - t_s
@@ -171,7 +171,7 @@ class RealTime:
         self._thread.join(timeout=2.0)
 
     def _check(self) -> None:
-        self._presence.check(AGV, MOCAP)
+        self._liveliness.check(AGV, MOCAP)
         self._failure.check()
 
     def _next(self) -> tuple[float, FramesMessage]:

@@ -77,7 +77,7 @@ def is_open_to_anybody(endpoint: str, config: BusConfig | None = None, where: st
     return not (is_loopback(host) or (protocol in _SECURED and config is not None and config.asks_who))
 
 
-def open_session(
+def open_bus_session(
     *,
     listen: Sequence[str] = (),
     connect: Sequence[str] = (),
@@ -128,7 +128,7 @@ def bus_session(
     allow_remote: bool = False,
     config: BusConfig | None = None,
 ) -> Iterator[zenoh.Session]:
-    """Open a session (`open_session`) while the context lasts, and close it also where a receiver takes nothing.
+    """Open a session (`open_bus_session`) while the context lasts, and close it also where a receiver takes nothing.
 
     Zenoh waits up to 10 s for a message that a receiver does not take, and then gives the session up with an error. The
     limit is a constant of Zenoh: neither its configuration nor its Python interface has a setting for it
@@ -138,11 +138,11 @@ def bus_session(
     Raises
     ------
     LinkError
-        As `open_session`.
+        As `open_bus_session`.
     """
     import zenoh
 
-    session = open_session(listen=listen, connect=connect, allow_remote=allow_remote, config=config)
+    session = open_bus_session(listen=listen, connect=connect, allow_remote=allow_remote, config=config)
     try:
         yield session
     finally:

@@ -3,7 +3,7 @@
 from agvbench.calibration.arc_samples import CALIBRATION_EXPERIMENTS
 from agvbench.calibration.calibrate import Calibration, calibrate
 from agvbench.calibration.identification import Identification, PoseNoise, identify
-from agvbench.calibration.maps.map_fit import LeftOut, MapFit
+from agvbench.calibration.maps.map_fit import ExcludedPoint, MapFit
 from agvbench.calibration.maps.selection import (
     compare_maps,
     drive_fitters,
@@ -24,9 +24,9 @@ __all__ = [
     "CircleFit",
     "CircleFits",
     "CurvePoints",
+    "ExcludedPoint",
     "FrameQuality",
     "Identification",
-    "LeftOut",
     "MapFit",
     "PoseNoise",
     "RunMeasurement",

@@ -12,7 +12,7 @@ from agvbench.calibration.arc_samples import CALIBRATION_EXPERIMENTS, arc_sample
 from agvbench.calibration.campaign_protocol import CampaignLike, HeaderLike
 from agvbench.calibration.free_driving import FreeDriving, read_free_driving
 from agvbench.calibration.maps.end_stops import saturated
-from agvbench.calibration.maps.map_fit import MapFit, judge, rounded
+from agvbench.calibration.maps.map_fit import MapFit, assess_map, rounded
 from agvbench.calibration.maps.selection import (
     DRIVE_KINDS,
     STEERING_KINDS,
@@ -95,7 +95,7 @@ def calibrate(campaign: CampaignLike, *, maps: Maps | str = "default", session: 
         free = read_free_driving(runs, geometry, header)
         samples, warnings, used = free.samples, free.words, free.runs_used
     fits, chosen = _fit_roles(samples, header, maps, free)
-    warnings = [*warnings, *_tell(fits, chosen, samples)]
+    warnings = [*warnings, *_warnings(fits, chosen, samples)]
     front, rear, drive = (_chosen_map(role, fits, chosen, samples) for role in ROLES)
     method = "windows of free driving" if free else "arcs and straights"
     model = VehicleModel(
@@ -133,7 +133,7 @@ def _fit_roles(
         if role != "drive" and len(points) == 1:
             fits[role], chosen[role] = {}, "fixed"
         elif role == "drive" and free is not None:
-            ramp = judge("ramp", free.drive.map, points, parameters=2, stderr=free.drive.stderr)
+            ramp = assess_map("ramp", free.drive.map, points, parameters=2, stderr=free.drive.stderr)
             fits[role], chosen[role] = {"ramp": replace(ramp, r_squared=free.drive.r_squared)}, "ramp"
         else:
             fits[role], chosen[role] = _fit_role(role, points, header, maps)
@@ -169,7 +169,7 @@ def _chosen_map(role: Role, fits: Fits, chosen: dict[Role, str], samples: list[S
     return Fixed(output=rounded(float(points.value[0])), command=float(points.command[0]))
 
 
-def _tell(fits: Fits, chosen: dict[Role, str], samples: list[Sample]) -> list[str]:
+def _warnings(fits: Fits, chosen: dict[Role, str], samples: list[Sample]) -> list[str]:
     """Return in words what was left out of the chosen fits, and what looks odd."""
     words = []
     for role in ROLES:

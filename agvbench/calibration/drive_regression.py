@@ -85,7 +85,7 @@ def regress_drive(data: DriveData, neutral: float) -> DriveRegression:
     FitError
         If no side of neutral was driven.
     """
-    problem = _Problem.of(data, neutral)
+    problem = _RegressionProblem.of(data, neutral)
     p, errors = problem.solve()
     _, _, scale = problem.unpack(p)
     explained = r_squared(data.speed_mps, data.speed_mps - problem.predicted(p))
@@ -121,7 +121,7 @@ class _Ramp:
 
 
 @dataclass(frozen=True)
-class _Problem:
+class _RegressionProblem:
     """The least-squares problem: parameters are lag, loss, a scale per other session, edge and gain per side.
 
     Edges are shares of the farthest command of their side, gains of the speed `quick_mps` there.
@@ -136,7 +136,7 @@ class _Problem:
     quick_mps: float
 
     @classmethod
-    def of(cls, data: DriveData, neutral: float) -> _Problem:
+    def of(cls, data: DriveData, neutral: float) -> _RegressionProblem:
         offset = data.command - neutral
         sides = [side for sign in (-1.0, 1.0) if (side := _side(sign, offset)) is not None]
         if not sides:

@@ -100,7 +100,7 @@ def identify(
     FitError
         If the frames do not determine the parameters, or no step helps.
     """
-    problem = _Problem(simulation, settled, observed, noise, effects)
+    problem = _IdentificationProblem(simulation, settled, observed, noise, effects)
     values = problem.first() if start is None else np.array(start, dtype=np.float64)
     initial = problem.first_poses()
     state = problem.at(values, initial)
@@ -123,7 +123,7 @@ def identify(
 
 
 @dataclass(frozen=True)
-class _State:
+class _Iterate:
     values: Floats
     initial: Floats
     poses: Floats
@@ -140,7 +140,7 @@ class _Normal:
     inner_pull: Floats
 
 
-class _Problem:
+class _IdentificationProblem:
     def __init__(
         self, simulation: Simulation, settled: Floats, observed: Floats, noise: PoseNoise, effects: Sequence[str]
     ) -> None:
@@ -177,13 +177,13 @@ class _Problem:
         """Return the poses (F, 3) from rest at `initial` (runs, 3)."""
         return self.simulation.predict(self.settled, values, np.column_stack([initial, np.zeros(len(initial))]))
 
-    def at(self, values: Floats, initial: Floats) -> _State:
+    def at(self, values: Floats, initial: Floats) -> _Iterate:
         """Return prediction and misfit."""
         poses = self.predict(values, initial)
         off = self.observed - poses
         off[:, 2] -= 2.0 * np.pi * np.round(off[:, 2] / (2.0 * np.pi))
         residual = off * self.weight
-        return _State(values, initial, poses, residual, float(np.sum(residual**2)))
+        return _Iterate(values, initial, poses, residual, float(np.sum(residual**2)))
 
     def slopes(self, values: Floats, initial: Floats, poses: Floats) -> Floats:
         """Return weighted derivatives (F, 3, p + 3): by the parameters, and by the run's initial x, y and heading."""
@@ -202,7 +202,7 @@ class _Problem:
         out *= self.weight[..., None]
         return out
 
-    def normal(self, state: _State, slopes: Floats) -> _Normal:
+    def normal(self, state: _Iterate, slopes: Floats) -> _Normal:
         """Return the equations in the parameters, initial poses solved for."""
         p = len(self.own)
         runs = len(self.spans)
@@ -217,7 +217,7 @@ class _Problem:
             pull += towards[:p] - mixed[r].T @ solved[:, p]
         return _Normal(matrix, pull, inner, mixed, inner_pull)
 
-    def moved(self, state: _State, normal: _Normal, move: Floats) -> tuple[_State, float]:
+    def moved(self, state: _Iterate, normal: _Normal, move: Floats) -> tuple[_Iterate, float]:
         """Return the state after as much of a step as helps, and that share; initial poses follow along."""
         s = self.simulation
         poses = np.linalg.solve(normal.inner, (normal.inner_pull - normal.mixed @ move)[..., None])[..., 0]
@@ -231,7 +231,7 @@ class _Problem:
             share *= 0.4
         return state, 0.0
 
-    def result(self, state: _State, normal: _Normal, steps: int) -> Identification:
+    def result(self, state: _Iterate, normal: _Normal, steps: int) -> Identification:
         """Return what was found."""
         return Identification(
             tuple(self.simulation.parameter_names[i] for i in self.own),

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import msgspec
 
 from agvbench.campaign.manifest import record
-from agvbench.campaign.toml_errors import explain
+from agvbench.campaign.toml_errors import validation_message
 from agvbench.errors import CampaignError, FileError
 from agvbench.text_files import read_toml
 from agvbench.types import CommandUnit
@@ -82,7 +82,7 @@ class CampaignHeader:
             file = msgspec.convert(table, _File)
         except msgspec.ValidationError as error:
             raise CampaignError(
-                explain(error, (_File, _Vehicle, _Mocap, _Prediction)),
+                validation_message(error, (_File, _Vehicle, _Mocap, _Prediction)),
                 where=path,
                 remedy="correct campaign.toml (docs/reference/campaign-directory.md)",
             ) from None

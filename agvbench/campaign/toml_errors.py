@@ -9,7 +9,7 @@ from typing import Any, get_args
 import msgspec
 
 
-def explain(error: msgspec.ValidationError, tables: Iterable[Any]) -> str:
+def validation_message(error: msgspec.ValidationError, tables: Iterable[Any]) -> str:
     """Return e.g. ``"runs: unknown key gaps_s (did you mean gap_s?)"``.
 
     Parameters

@@ -19,8 +19,8 @@ from agvbench.challenge.result_file import known_trials, write_trials
 from agvbench.challenge.scores import Scores, score
 from agvbench.challenge.trial import Trial
 from agvbench.errors import AgvbenchError, FlagError, PlantError
-from agvbench.running.configuration.benchmark_files import EXCITING
-from agvbench.simulator.hidden import SealedTruth, sealed_truth, true_rivals
+from agvbench.running.configuration.benchmark_files import EXCITATION_RUNS
+from agvbench.simulator.hidden import SealedTruth, indistinguishable_effects, sealed_truth
 from agvbench.simulator.hidden.catalogue import CATALOGUE, NOTHING, recipes
 from agvbench.simulator.hidden.sampling import vehicle_of
 
@@ -146,15 +146,19 @@ def unsealed(spec: str, seed: int, truth: SealedTruth, found: Diagnosis, seconds
         {e.name: {k: (p.value, p.stderr) for k, p in e.parameters.items()} for e in found.effects},
         {name: value**2 for name, value in held.items()},
         found.held_out.worse_on if found.held_out else (),
-        _rivals(seed, truth) if ask else (),
+        _indistinguishable(seed, truth) if ask else (),
         seconds,
     )
 
 
-def _rivals(seed: int, truth: SealedTruth) -> tuple[str, ...]:
+def _indistinguishable(seed: int, truth: SealedTruth) -> tuple[str, ...]:
     """Return the true rivals of every hidden effect of the library, each as if it were hidden alone."""
     alone = [effect.name for effect in truth.effects if effect.library_name]
-    return tuple(dict.fromkeys(r for name in alone for r in true_rivals(vehicle_of(seed), sealed_truth(name, seed))))
+    return tuple(
+        dict.fromkeys(
+            r for name in alone for r in indistinguishable_effects(vehicle_of(seed), sealed_truth(name, seed))
+        )
+    )
 
 
 def _drive(spec: str, seed: int, repeats: int, directory: Path) -> None:
@@ -165,7 +169,7 @@ def _drive(spec: str, seed: int, repeats: int, directory: Path) -> None:
         "--no-report",
         "--exchange=2",
     ]
-    command = [sys.executable, "-c", _PROGRAM, "bench", *EXCITING, *options, f"--out={directory}"]
+    command = [sys.executable, "-c", _PROGRAM, "bench", *EXCITATION_RUNS, *options, f"--out={directory}"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - our own program
     if done.returncode not in {0, 1}:
         said = " ".join((done.stderr or done.stdout).split())

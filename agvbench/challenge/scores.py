@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from agvbench.challenge.trial import Trial
-from agvbench.statistics.proportion import Share
+from agvbench.statistics.proportion import Proportion
 
 _Z = 1.959963984540054
 _THREE_FLOORS = 9.0
@@ -41,8 +41,8 @@ GROUPS: tuple[Group, ...] = (
     ("outside, without random phase", lambda t: _outside(t) and not t.random_phase),
 )
 
-Question = tuple[str, Callable[[Trial], bool], Callable[[Trial], bool]]
-QUESTIONS: tuple[Question, ...] = (
+Criterion = tuple[str, Callable[[Trial], bool], Callable[[Trial], bool]]
+CRITERIA: tuple[Criterion, ...] = (
     ("one of the library: named, or left open among its true rivals", _one, lambda t: t.is_right and t.is_final),
     ("one of the library: left open", _one, lambda t: t.verdict == "AMBIGUOUS"),
     ("one of the library: left open though it has no rival", lambda t: _one(t) and not t.rivals,
@@ -72,10 +72,10 @@ class Scores:
     """
 
     trials: int
-    shares: Mapping[str, Share]
+    shares: Mapping[str, Proportion]
     confusion: Mapping[str, Mapping[str, int]]
     list_length: float
-    coverage: Share
+    coverage: Proportion
     removed: Mapping[str, tuple[float, float]]
     worse_on: int
     seconds: tuple[float, float]
@@ -95,10 +95,10 @@ def score(trials: Sequence[Trial]) -> Scores:
     lists = [len({*t.named, *t.alternatives}) for t in trials if t.verdict == "AMBIGUOUS"]
     return Scores(
         len(trials),
-        {text: Share.of(hit(t) for t in trials if counts(t)) for text, counts, hit in QUESTIONS},
+        {text: Proportion.of(hit(t) for t in trials if counts(t)) for text, counts, hit in CRITERIA},
         {name: dict(answers) for name, answers in sorted(confusion.items())},
         sum(lists) / len(lists) if lists else math.nan,
-        Share.of(covered for trial in trials for covered in coverings(trial)),
+        Proportion.of(covered for trial in trials for covered in coverings(trial)),
         {name: _worst_and_median(t.removed for t in trials if counts(t)) for name, counts in GROUPS},
         sum(bool(t.worse_on) for t in trials),
         _median_and_most([t.seconds for t in trials]),

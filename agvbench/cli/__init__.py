@@ -139,9 +139,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             return 0
         except Exception as error:  # noqa: BLE001 - whatever it is, who runs a lab should not have to read a traceback
             if not interrupts.pressed:
-                from agvbench.cli._internal_error import tell_own_mistake
+                from agvbench.cli._internal_error import report_internal_error
 
-                return tell_own_mistake(given[0], error)
+                return report_internal_error(given[0], error)
         print(f"{who}: interrupted", file=sys.stderr)
         return EXIT_CODE
 

@@ -13,7 +13,7 @@ from agvbench.errors import INTERNAL_ERROR_EXIT_CODE, visible
 DEBUG = "AGVBENCH_DEBUG"
 
 
-def tell_own_mistake(command: str, error: Exception) -> int:
+def report_internal_error(command: str, error: Exception) -> int:
     """Print one line about an exception that nobody expected, keep its traceback in a file, and return the exit code.
 
     Raises

@@ -51,13 +51,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Compare, print the comparison, and return its exit code."""
-    from agvbench.reporting.console.tables import print_cautions, print_comparison, wide_console
+    from agvbench.reporting.console.tables import print_comparison, print_warnings, wide_console
     from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
     from agvbench.workflows.compare import comparability, compare_campaigns, exit_code, write_json
 
     console = wide_console()
     known = comparability(arguments.a, arguments.b, across_vehicles=arguments.across_vehicles)
-    print_cautions(console, known.sentences)
+    print_warnings(console, known.sentences)
     comparison = compare_campaigns(
         arguments.a,
         arguments.b,

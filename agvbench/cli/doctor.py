@@ -34,10 +34,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Print what every check finds; return the exit code."""
     from agvbench.adapters import AdapterOptions, check_specs
     from agvbench.adapters.contract import camera_options
-    from agvbench.reporting.console.doctor import tell
+    from agvbench.reporting.console.doctor import print_finding
     from agvbench.running.configuration.settings import BenchSettings
     from agvbench.running.configuration.vehicles import lab_vehicle
-    from agvbench.workflows.doctor import Lab, State, examine
+    from agvbench.workflows.doctor import FindingState, Lab, examine
 
     given = {destination(flag): getattr(arguments, destination(flag)) for flag in _OF_THE_RIG}
     settings = BenchSettings.given(
@@ -45,5 +45,5 @@ def run(arguments: argparse.Namespace) -> int:
     )
     camera = camera_options([settings.camera])
     check_specs(settings.agv, settings.mocap, AdapterOptions(vehicle=settings.vehicle_name, camera=camera))
-    states = [tell(name, finding) for name, finding in examine(Lab(settings))]
-    return 1 if State.BAD in states else 0
+    states = [print_finding(name, finding) for name, finding in examine(Lab(settings))]
+    return 1 if FindingState.BAD in states else 0

@@ -23,7 +23,7 @@ from agvbench.diagnosis.selection.candidates import bounds_of
 from agvbench.diagnosis.selection.stepwise import Selection
 from agvbench.diagnosis.selection.validation import Assessment, assess, predicts
 from agvbench.diagnosis.selection.with_term import TermSelection, described, with_term_first
-from agvbench.effects.forms import effect_forms
+from agvbench.effects.variants import effect_variants
 from agvbench.model import VehicleModel
 from agvbench.types import Floats
 
@@ -54,7 +54,7 @@ def conclude(
     selection = term_selection.selection if term_selection else library
     fit = selection.chosen.fit
     every = predicts(library, term_selection, readings)
-    batch, reformed = every.batch, bool(effect_forms().keys() & set(selection.chosen.names))
+    batch, reformed = every.batch, bool(effect_variants().keys() & set(selection.chosen.names))
     poses, before = every.predict(fit.parameters), _poses_before(context.vehicle, batch, selection)
     spread = end_spread(every, fit)
     # Validation runs decided what is kept, and are not tested; how repeats scatter depends on no choice.

@@ -13,7 +13,7 @@ from agvbench.types import Pose
 
 
 @dataclass(frozen=True)
-class Separation:
+class Discrimination:
     """What the proposed run does for one pair of rivals.
 
     ``between`` their names; ``evidence`` expected in minus two log likelihood for all repeats; ``apart_mm`` and
@@ -37,7 +37,7 @@ class NextExperiment:
     trajectory: Trajectory
     repeats: int
     starts: tuple[Pose, ...] = ()
-    separates: tuple[Separation, ...] = ()
+    separates: tuple[Discrimination, ...] = ()
     pins: tuple[str, ...] = ()
 
     def to_table(self) -> dict[str, Any]:

@@ -35,9 +35,9 @@ def effect_from_toml(table: object, *, where: str = "effect") -> Effect:
     if not isinstance(table, Mapping):
         raise VehicleError("must be a table", where=where, value=repr(table))
     # Other laws of a cause derive from what this module's package defines, and are found when they are needed.
-    from agvbench.effects.forms import effect_forms
+    from agvbench.effects.variants import effect_variants
 
-    kinds: dict[str, type[Effect]] = {**effect_kinds(), **effect_forms()}
+    kinds: dict[str, type[Effect]] = {**effect_kinds(), **effect_variants()}
     name: Any = table.get("name")
     if name is None:
         raise VehicleError("a key is missing", where=where, value="name", remedy=f'add name = "{next(iter(kinds))}"')

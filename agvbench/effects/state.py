@@ -15,7 +15,7 @@ DRIVE_COMMAND, FRONT_COMMAND, REAR_COMMAND = range(6, 9)
 # What the static maps make of it: where axles and drive settle.
 FRONT_AIM, REAR_AIM, SPEED_AIM = range(9, 12)
 # How they get there: servos obey δ̇ = (aim − δ) / lag within ± rate, and the axle follows with a play of this width.
-STEERING_LAG, STEERING_RATE, PLAY = range(12, 15)
+STEERING_LAG, STEERING_RATE, BACKLASH = range(12, 15)
 # The drive obeys v̇ = (aim − v) / lag, one lag for |v| growing, one for |v| falling.
 ACCELERATE_LAG, BRAKE_LAG = range(15, 17)
 # Angles of the axles, speed of the drive.

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from agvbench.effects.base import Effect, Stage, parameter
-from agvbench.effects.state import PLAY
+from agvbench.effects.state import BACKLASH
 from agvbench.types import Floats
 
 
@@ -40,4 +40,4 @@ class SteeringBacklash(Effect):
     @staticmethod
     def aim(state: Floats, width_rad: float) -> None:
         """Give the linkage its play."""
-        state[PLAY] = width_rad
+        state[BACKLASH] = width_rad

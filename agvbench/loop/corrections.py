@@ -18,18 +18,18 @@ from agvbench.campaign.campaign import session_starts
 from agvbench.errors import FitError, PlanError
 from agvbench.model import VehicleModel
 from agvbench.planning import (
-    NOTHING_LEFT,
+    NO_BIAS,
     THE_EIGHT,
     Correction,
     Departure,
-    Miss,
+    EndPoseError,
     Workspace,
     corrected_plan,
     load_trajectory,
     steered,
 )
 from agvbench.planning.end_pose_prediction import rest_poses
-from agvbench.running.session.end_pose_bias import NO_REMAINDERS
+from agvbench.running.session.end_pose_bias import NO_BIAS_CORRECTIONS
 from agvbench.statistics.rest_poses import end_pose, start_pose
 from agvbench.types import Floats, Pose, Run
 
@@ -37,7 +37,7 @@ FEWEST = 3
 """Fewer runs than this do not tell a bias from scatter."""
 
 
-def remainders(campaign: Campaign, model: VehicleModel, condition: str) -> dict[str, dict[str, float]]:
+def bias_corrections(campaign: Campaign, model: VehicleModel, condition: str) -> dict[str, dict[str, float]]:
     """Return, by trajectory, what `model` missed in the mean: the measured end pose in the frame of the predicted one.
 
     Learned from the runs of one condition: those with commands nearest to what will be driven. Each component is shrunk
@@ -49,12 +49,12 @@ def remainders(campaign: Campaign, model: VehicleModel, condition: str) -> dict[
         driven = ((run, run.started_s - began[run.session]) for run in runs if run.trajectory == name)
         missed = np.array(list(_missed(driven, model))).reshape(-1, 3)
         if len(missed) >= FEWEST:
-            x, y, heading = shrunk(missed).tolist()
+            x, y, heading = shrunken_mean(missed).tolist()
             out[name] = {"x_m": round(x, 6), "y_m": round(y, 6), "heading_rad": round(heading, 6), "runs": len(missed)}
     return out
 
 
-def shrunk(values: Floats) -> Floats:
+def shrunken_mean(values: Floats) -> Floats:
     """Return the mean of `values` (n, k), shape (k,), each shrunk towards zero by what scatter makes of it.
 
     >>> shrunk(np.array([[3.0, 1.0], [3.0, -1.0], [3.0, 0.5]])).tolist()
@@ -82,7 +82,7 @@ _NOTICEABLE_M, _NOTICEABLE_RAD = 5e-4, math.radians(0.05)
 def plans_of(
     model: VehicleModel,
     workspace: str,
-    remainders: Mapping[str, Pose] = NO_REMAINDERS,
+    bias_corrections: Mapping[str, Pose] = NO_BIAS_CORRECTIONS,
     names: Sequence[str] = THE_EIGHT,
     steering: str = "",
 ) -> dict[str, dict[str, Any]]:
@@ -99,9 +99,9 @@ def plans_of(
         trajectory = steered(load_trajectory(name), steering, model)
         if "corrected" not in trajectory.conditions:
             continue
-        left = remainders.get(trajectory.name, NOTHING_LEFT)
+        left = bias_corrections.get(trajectory.name, NO_BIAS)
         try:
-            made = corrected_plan(trajectory, model, workspace=floor, remainder=left)
+            made = corrected_plan(trajectory, model, workspace=floor, end_pose_bias=left)
         except PlanError as error:
             out[trajectory.name] = {"problem": str(error)}
             continue
@@ -121,13 +121,13 @@ def _entry(correction: Correction) -> dict[str, Any]:
     return entry
 
 
-def _numbers(miss: Miss) -> dict[str, float]:
+def _numbers(end_error: EndPoseError) -> dict[str, float]:
     return {
-        "position_mm": round(1e3 * miss.distance_m, 3),
-        "delta_s_mm": round(1e3 * miss.delta_s_m, 3),
-        "delta_heading_deg": round(math.degrees(miss.delta_heading_rad), 4),
-        "along_mm": round(1e3 * miss.along_m, 3),
-        "across_mm": round(1e3 * miss.across_m, 3),
+        "position_mm": round(1e3 * end_error.distance_m, 3),
+        "delta_s_mm": round(1e3 * end_error.delta_s_m, 3),
+        "delta_heading_deg": round(math.degrees(end_error.delta_heading_rad), 4),
+        "along_mm": round(1e3 * end_error.along_m, 3),
+        "across_mm": round(1e3 * end_error.across_m, 3),
     }
 
 
@@ -147,9 +147,9 @@ def _said(correction: Correction) -> list[str]:
     return said
 
 
-def _noticeable(miss: Miss) -> bool:
-    return miss.distance_m > _NOTICEABLE_M or abs(miss.delta_heading_rad) > _NOTICEABLE_RAD
+def _noticeable(end_error: EndPoseError) -> bool:
+    return end_error.distance_m > _NOTICEABLE_M or abs(end_error.delta_heading_rad) > _NOTICEABLE_RAD
 
 
-def _in_words(miss: Miss) -> str:
-    return f"{1e3 * miss.distance_m:.1f} mm and {math.degrees(miss.delta_heading_rad):.2f}°"
+def _in_words(end_error: EndPoseError) -> str:
+    return f"{1e3 * end_error.distance_m:.1f} mm and {math.degrees(end_error.delta_heading_rad):.2f}°"

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from agvbench.errors import AgvbenchError
-from agvbench.loop.sessions import Tell, drive
+from agvbench.loop.sessions import OnProgress, drive
 from agvbench.loop.settings import AFTER, BEFORE, DIAGNOSIS, PLANS, SETTINGS, VEHICLE, opened
 from agvbench.loop.stages import diagnosed, drive_corrected, learned, planned
-from agvbench.running.configuration.benchmark_files import EXCITING
+from agvbench.running.configuration.benchmark_files import EXCITATION_RUNS
 from agvbench.running.configuration.settings import BenchSettings
 
 SHOWING = ("trajectories",)
@@ -53,7 +53,9 @@ class Loop:
         return self.directory / AFTER
 
 
-def run_loop(given: Mapping[str, Any], *, out: str | None, resume: bool, on_progress: Tell = lambda _: None) -> Loop:
+def run_loop(
+    given: Mapping[str, Any], *, out: str | None, resume: bool, on_progress: OnProgress = lambda _: None
+) -> Loop:
     """Go round the loop, or on from where it was interrupted.
 
     Parameters
@@ -73,7 +75,7 @@ def run_loop(given: Mapping[str, Any], *, out: str | None, resume: bool, on_prog
         If an option, the plant, a campaign or a file cannot be used.
     """
     directory, settings = opened(given, out, resume=resume)
-    on_progress(f"1/5 driving to diagnose: {', '.join(EXCITING)} → {directory / BEFORE}")
+    on_progress(f"1/5 driving to diagnose: {', '.join(EXCITATION_RUNS)} → {directory / BEFORE}")
     if not (directory / DIAGNOSIS).exists():
         _first_bench(directory, settings, on_progress)
     on_progress(f"2/5 diagnosing → {directory / DIAGNOSIS}, {VEHICLE}")
@@ -86,9 +88,9 @@ def run_loop(given: Mapping[str, Any], *, out: str | None, resume: bool, on_prog
     return Loop(directory, settings, diagnosis, plans)
 
 
-def _first_bench(directory: Path, settings: BenchSettings, on_progress: Tell) -> None:
+def _first_bench(directory: Path, settings: BenchSettings, on_progress: OnProgress) -> None:
     try:
-        drive(directory / BEFORE, EXCITING, settings, {"remainders": ""}, on_progress)
+        drive(directory / BEFORE, EXCITATION_RUNS, settings, {"remainders": ""}, on_progress)
     except AgvbenchError:
         # What could not begin leaves nothing behind that would have to be resumed.
         if not (directory / BEFORE / "campaign.toml").exists():

@@ -23,11 +23,11 @@ _PROGRAM = (
 _DONE = {0, 1}  # 1: some run was never driven well enough; what was is a campaign all the same
 _ERROR = "ERROR: "
 
-Tell = Callable[[str], None]
+OnProgress = Callable[[str], None]
 
 
 def drive(
-    directory: Path, names: Sequence[str], settings: BenchSettings, more: Mapping[str, str], on_progress: Tell
+    directory: Path, names: Sequence[str], settings: BenchSettings, more: Mapping[str, str], on_progress: OnProgress
 ) -> None:
     """Drive the benchmarks `names` in a process of its own, on from where it was interrupted.
 
@@ -98,5 +98,5 @@ def moved(directory: Path, models: Mapping[str, str]) -> None:
     """Let a session that goes on find its models, which lie beside it, wherever the loop has been moved."""
     if (directory / SETTINGS_FILE).exists():
         began = BenchSettings.load(directory)
-        calibration, corrected, remainders = (models[name] for name in ("calibration", "corrected", "remainders"))
-        replace(began, calibration=calibration, corrected=corrected, remainders=remainders).save(directory)
+        calibration, corrected, bias_corrections = (models[name] for name in ("calibration", "corrected", "remainders"))
+        replace(began, calibration=calibration, corrected=corrected, remainders=bias_corrections).save(directory)

@@ -17,7 +17,7 @@ from agvbench.running.configuration.settings import BenchSettings, settings_for_
 
 SETTINGS = "loop.toml"
 BEFORE, DIAGNOSIS, VEHICLE, PLANS, AFTER = "before", "diagnosis.json", "vehicle.toml", "plans.json", "after"
-TRIAL, REMAINDERS, FIRST_REMAINDERS = "trial", "remainders.json", "remainders-before.json"
+TRIAL, BIAS_CORRECTIONS, FIRST_BIAS_CORRECTIONS = "trial", "remainders.json", "remainders-before.json"
 MODEL_ONLY, NO_TRIAL = "none", "before"
 """What `BenchSettings.remainders` says of a loop: plans of the model alone, or learned from the first session alone."""
 

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 from agvbench.campaign.atomic_files import replace_whole
 from agvbench.errors import FileError, FitError
 from agvbench.loop.corrections import plans_of
-from agvbench.loop.sessions import Tell, drive, moved
+from agvbench.loop.sessions import OnProgress, drive, moved
 from agvbench.loop.settings import (
     BEFORE,
+    BIAS_CORRECTIONS,
     DIAGNOSIS,
-    FIRST_REMAINDERS,
+    FIRST_BIAS_CORRECTIONS,
     MODEL_ONLY,
     NO_TRIAL,
     PLANS,
-    REMAINDERS,
     TRIAL,
     VEHICLE,
     write,
@@ -26,7 +26,7 @@ from agvbench.loop.settings import (
 from agvbench.model import VehicleModel
 from agvbench.planning import driven_trajectories
 from agvbench.running.configuration.settings import BenchSettings
-from agvbench.running.session.end_pose_bias import read_remainders
+from agvbench.running.session.end_pose_bias import read_bias_corrections
 from agvbench.text_files import read_json
 from agvbench.workflows.diagnosis_files import keep_residuals
 
@@ -38,7 +38,7 @@ TRYING = ("trial",)
 
 
 def drive_corrected(
-    directory: Path, session: str, names: Sequence[str], settings: BenchSettings, learned: str, on_progress: Tell
+    directory: Path, session: str, names: Sequence[str], settings: BenchSettings, learned: str, on_progress: OnProgress
 ) -> None:
     """Drive a session with what was found and learned."""
     models = {
@@ -50,7 +50,7 @@ def drive_corrected(
     drive(directory / session, names, settings, models, on_progress)
 
 
-def diagnosed(directory: Path, seed: int, on_progress: Tell) -> dict[str, Any]:
+def diagnosed(directory: Path, seed: int, on_progress: OnProgress) -> dict[str, Any]:
     """Return the diagnosis, after writing it and the corrected vehicle, unless they are there already."""
     from agvbench.campaign import Campaign
     from agvbench.diagnosis import diagnose
@@ -89,16 +89,16 @@ def _in_words(found: Diagnosis) -> list[str]:
     return lines
 
 
-def learned(directory: Path, settings: BenchSettings, on_progress: Tell) -> str:
+def learned(directory: Path, settings: BenchSettings, on_progress: OnProgress) -> str:
     """Return the file of what the corrected model missed so far, after learning it unless it is there; "" for nothing.
 
     First from the calibrated runs of the first session; then corrected plans are tried, for an effect that the model
     lacks does something else on another way.
     """
     from agvbench.campaign import Campaign
-    from agvbench.loop.corrections import remainders
+    from agvbench.loop.corrections import bias_corrections
 
-    path = directory / REMAINDERS
+    path = directory / BIAS_CORRECTIONS
     if settings.remainders == MODEL_ONLY:
         on_progress("3/5 corrected plans are not tried: --model-only")
         return ""
@@ -106,27 +106,27 @@ def learned(directory: Path, settings: BenchSettings, on_progress: Tell) -> str:
         on_progress(f"3/5 what corrected plans miss was learned before: {path}")
         return str(path)
     model = VehicleModel.load(directory / VEHICLE)
-    known = remainders(Campaign.open(directory / BEFORE), model, "calibrated")
+    known = bias_corrections(Campaign.open(directory / BEFORE), model, "calibrated")
     if settings.remainders == NO_TRIAL:
         on_progress("3/5 corrected plans are not tried: --no-trial")
     else:
         on_progress(f"3/5 trying corrected plans, for what they still miss → {directory / TRIAL}")
-        _write_remainders(directory / FIRST_REMAINDERS, known)
-        drive_corrected(directory, TRIAL, TRYING, settings, str(directory / FIRST_REMAINDERS), on_progress)
-        known |= remainders(Campaign.open(directory / TRIAL), model, "corrected")
-    _write_remainders(path, known)
+        _write_bias_corrections(directory / FIRST_BIAS_CORRECTIONS, known)
+        drive_corrected(directory, TRIAL, TRYING, settings, str(directory / FIRST_BIAS_CORRECTIONS), on_progress)
+        known |= bias_corrections(Campaign.open(directory / TRIAL), model, "corrected")
+    _write_bias_corrections(path, known)
     return str(path)
 
 
-def _write_remainders(path: Path, known: Mapping[str, Mapping[str, float]]) -> None:
+def _write_bias_corrections(path: Path, known: Mapping[str, Mapping[str, float]]) -> None:
     write(path, json.dumps({"schema": 1, "remainders": known}, indent=2, allow_nan=False) + "\n")
 
 
-def planned(directory: Path, settings: BenchSettings, learned: str, on_progress: Tell) -> dict[str, Any]:
+def planned(directory: Path, settings: BenchSettings, learned: str, on_progress: OnProgress) -> dict[str, Any]:
     """Return what corrected plans make up for, after writing it, unless it is there already."""
     path = directory / PLANS
     if not path.exists():
-        model, missed = VehicleModel.load(directory / VEHICLE), read_remainders(learned)
+        model, missed = VehicleModel.load(directory / VEHICLE), read_bias_corrections(learned)
         names = driven_trajectories(settings.trajectories)
         content = plans_of(model, settings.workspace, missed, names, settings.steering)
         write(path, json.dumps({"schema": 1, "plans": content}, indent=2, ensure_ascii=False, allow_nan=False) + "\n")

@@ -19,7 +19,7 @@ _CHANNELS = ("drive", "front", "rear")
 
 
 @dataclass(frozen=True)
-class Batch:
+class RolloutBatch:
     """Commands, times and initial poses of many runs, one after another.
 
     ``command_t_s``, ``drive``, ``front``, ``rear`` have shape (commands,), ``t_s`` has shape (times,); those of run i

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from agvbench.errors import VehicleError
-from agvbench.model.batch import Batch
+from agvbench.model.batch import RolloutBatch
 from agvbench.model.kernel import SLOTS, simulate
 from agvbench.types import Commands, Floats
 
@@ -58,7 +58,7 @@ def rollout(
     >>> thesis_vehicle().rollout([still], [(1.0, 2.0, 0.5)], [[0.0, 10.0]])[0].tolist()
     [[1.0, 2.0, 0.5], [1.0, 2.0, 0.5]]
     """
-    batch = Batch.pack(commands, initial, t_s)
+    batch = RolloutBatch.pack(commands, initial, t_s)
     runs = len(batch.initial)
     out = np.empty((3, batch.t_s.size))
     simulate(
@@ -106,7 +106,7 @@ def initial_states(model: VehicleModel, initial: Floats) -> Floats:
     return np.hstack([initial, rest])
 
 
-def settled_targets(model: VehicleModel, batch: Batch) -> Floats:
+def settled_targets(model: VehicleModel, batch: RolloutBatch) -> Floats:
     """Return (commands, 3): settled front angle, rear angle and speed of every command.
 
     Raises

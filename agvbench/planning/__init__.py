@@ -9,30 +9,30 @@
 `corrected_plan` changes steering and durations until the model comes to rest on the target.
 """
 
-from agvbench.planning.correction import NOTHING_LEFT, CorrectedPlan, Correction, corrected_plan, depends_on_time
+from agvbench.planning.correction import NO_BIAS, CorrectedPlan, Correction, corrected_plan, depends_on_time
 from agvbench.planning.dry_runs import DryRun, DryRunRow, dry_run
-from agvbench.planning.end_pose_prediction import Departure, Miss
+from agvbench.planning.end_pose_prediction import Departure, EndPoseError
 from agvbench.planning.planner import Plan, place, plan
 from agvbench.planning.trajectories.loading import (
     THE_EIGHT,
     driven_trajectories,
     list_trajectories,
     load_trajectory,
-    own_trajectories,
     trajectory_from_table,
+    user_trajectories,
 )
 from agvbench.planning.trajectories.trajectory import Trajectory, steered
 from agvbench.planning.workspace import Workspace
 
 __all__ = [
-    "NOTHING_LEFT",
+    "NO_BIAS",
     "THE_EIGHT",
     "CorrectedPlan",
     "Correction",
     "Departure",
     "DryRun",
     "DryRunRow",
-    "Miss",
+    "EndPoseError",
     "Plan",
     "Trajectory",
     "Workspace",
@@ -42,9 +42,9 @@ __all__ = [
     "dry_run",
     "list_trajectories",
     "load_trajectory",
-    "own_trajectories",
     "place",
     "plan",
     "steered",
     "trajectory_from_table",
+    "user_trajectories",
 ]

@@ -9,7 +9,7 @@ import numpy as np
 
 from agvbench.effects import Stage
 from agvbench.model import VehicleModel
-from agvbench.planning.end_pose_prediction import Departure, Miss, coasting_path, rest_poses
+from agvbench.planning.end_pose_prediction import Departure, EndPoseError, coasting_path, rest_poses
 from agvbench.planning.legs import Leg, axles_swept, legs_of
 from agvbench.planning.placement import check_fits
 from agvbench.planning.planner import Plan, commands_of, plan
@@ -18,7 +18,7 @@ from agvbench.planning.trajectories.trajectory import Trajectory
 from agvbench.planning.workspace import Workspace
 from agvbench.types import Commands, Floats, Pose
 
-NOTHING_LEFT = Pose(0.0, 0.0, 0.0)
+NO_BIAS = Pose(0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -39,9 +39,9 @@ class Correction:
         What could not be changed further, if anything remains.
     """
 
-    uncorrected: Miss
-    remaining: Miss
-    beyond_camera: Miss | None = None
+    uncorrected: EndPoseError
+    remaining: EndPoseError
+    beyond_camera: EndPoseError | None = None
     at_limits: tuple[str, ...] = ()
 
 
@@ -62,7 +62,7 @@ def corrected_plan(
     workspace: Workspace | None = None,
     departure: Departure | None = None,
     start: Pose | None = None,
-    remainder: Pose = NOTHING_LEFT,
+    end_pose_bias: Pose = NO_BIAS,
 ) -> CorrectedPlan:
     """Return timed commands with which `model`, effects and all, comes to rest on the target.
 
@@ -98,16 +98,18 @@ def corrected_plan(
     def ends(several: Sequence[Sequence[Leg]]) -> Floats:
         return rest_poses(model, [commands_of(each, model) for each in several], departure)
 
-    aim = made.target.compose(NOTHING_LEFT.relative_to(remainder))
+    aim = made.target.compose(NO_BIAS.relative_to(end_pose_bias))
     shot = shoot(legs, model.front, model.rear, aim, ends)
     commands = commands_of(shot.legs, model)
     path = coasting_path(model, commands, departure)
     swept = axles_swept(path, model.geometry)
     if workspace is not None:
         check_fits(swept, departure.start, workspace, where=trajectory.name)
-    before, after = (Miss(Pose(*end).compose(remainder), made.target) for end in ends([legs, shot.legs]).tolist())
-    truly = _beyond_camera(model, commands, departure)
-    beyond = None if truly is None else Miss(truly.compose(remainder), made.target)
+    before, after = (
+        EndPoseError(Pose(*end).compose(end_pose_bias), made.target) for end in ends([legs, shot.legs]).tolist()
+    )
+    physical_end = _beyond_camera(model, commands, departure)
+    beyond = None if physical_end is None else EndPoseError(physical_end.compose(end_pose_bias), made.target)
     correction = Correction(before, after, beyond, shot.at_limits)
     width, height = np.ptp(swept[:, 1:], axis=0).tolist()
     return replace(

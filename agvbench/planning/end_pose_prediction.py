@@ -34,7 +34,7 @@ class Departure:
 
 
 @dataclass(frozen=True)
-class Miss:
+class EndPoseError:
     """Where a run ends against where it should, both in the start frame; signs as in the tables of end poses."""
 
     reached: Pose

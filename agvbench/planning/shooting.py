@@ -70,7 +70,7 @@ def shoot(legs: Sequence[Leg], front: StaticMap, rear: StaticMap, target: tuple[
     aim = np.array(target, dtype=np.float64)
     pieces = _divided(legs, front, rear)
     # On full circles every change returns to the start; a change of half of one does not.
-    problems = [_Problem(each, _knobs(each, front, rear), aim, ends) for each in (pieces, _halved(pieces))]
+    problems = [_ShootingProblem(each, _knobs(each, front, rear), aim, ends) for each in (pieces, _halved(pieces))]
     found = _search(problems)
     return Shot(tuple(found.problem.legs(found.changes)), () if found.reaches else found.problem.limits(found.changes))
 
@@ -79,20 +79,20 @@ def shoot(legs: Sequence[Leg], front: StaticMap, rear: StaticMap, target: tuple[
 class _Found:
     """Changes of the legs of a problem, and how far from the target they end [m]."""
 
-    problem: _Problem
+    problem: _ShootingProblem
     changes: Floats
-    miss: float
+    distance_m: float
 
     @property
     def reaches(self) -> bool:
-        return self.miss <= _REACHED_M
+        return self.distance_m <= _REACHED_M
 
     @property
     def largest(self) -> float:
         return float(np.abs(self.changes).max())
 
 
-def _search(problems: Sequence[_Problem]) -> _Found:
+def _search(problems: Sequence[_ShootingProblem]) -> _Found:
     """Return the first changes found that reach the target near the plan, else the least, else those that come closest.
 
     Far from the plan is another way, on which it is not true what was learned near it. So the problem of finer legs is
@@ -107,15 +107,15 @@ def _search(problems: Sequence[_Problem]) -> _Found:
     for elsewhere in ((0.0, 0.0), *_ELSEWHERE_RAD):
         for problem in problems:
             changes = problem.solve_from(*elsewhere)
-            tried.append(_Found(problem, changes, problem.miss(changes)))
+            tried.append(_Found(problem, changes, problem.distance_m(changes)))
             if problem is problems[0] and tried[-1].reaches and tried[-1].largest <= _NEAR:
                 return tried[-1]
         if reached := [found for found in tried if found.reaches]:
             return min(reached, key=lambda found: price(found, found.largest, 5.0))
-    return min(tried, key=lambda found: price(found, found.miss, 2.0))
+    return min(tried, key=lambda found: price(found, found.distance_m, 2.0))
 
 
-class _Problem:
+class _ShootingProblem:
     def __init__(self, legs: Sequence[Leg], knobs: Sequence[_Knob], target: Floats, ends: Ends) -> None:
         self._legs, self._knobs, self._target, self._ends = legs, knobs, target, ends
         self._bounds = np.array([k.low for k in knobs]), np.array([k.high for k in knobs])
@@ -152,22 +152,22 @@ class _Problem:
         )
         return np.asarray(found.x)
 
-    def miss(self, u: Floats) -> float:
+    def distance_m(self, u: Floats) -> float:
         """Return how far from the target the changes `u` end [m]."""
-        return float(np.linalg.norm(self._misses(u[None, :])[0]))
+        return float(np.linalg.norm(self._errors_of(u[None, :])[0]))
 
     def _residual(self, u: Floats) -> Floats:
-        return np.concatenate([self._misses(u[None, :])[0], _DEAR_M * u])
+        return np.concatenate([self._errors_of(u[None, :])[0], _DEAR_M * u])
 
     def _jacobian(self, u: Floats) -> Floats:
         # Central differences, one-sided where a limit is near.
         low, high = self._bounds
         below, above = np.maximum(u - _STEP, low) - u, np.minimum(u + _STEP, high) - u
-        misses = self._misses(u + np.vstack([np.diag(below), np.diag(above)]))
-        slopes = (misses[len(u) :] - misses[: len(u)]) / (above - below)[:, None]
+        errors = self._errors_of(u + np.vstack([np.diag(below), np.diag(above)]))
+        slopes = (errors[len(u) :] - errors[: len(u)]) / (above - below)[:, None]
         return np.vstack([slopes.T, _DEAR_M * np.eye(len(u))])
 
-    def _misses(self, changes: Floats) -> Floats:
+    def _errors_of(self, changes: Floats) -> Floats:
         off = self._ends([_changed(self._legs, self._knobs, u) for u in changes]) - self._target
         off[:, 2] = [HEADING_ARM_M * wrap_angle(angle) for angle in off[:, 2]]
         return off

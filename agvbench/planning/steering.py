@@ -28,7 +28,7 @@ _SQUARE = math.radians(89.0)
 """An axle without end stops may turn so far."""
 
 
-def centre_ahead(mode: Steering, geometry: Geometry) -> float:
+def centre_forward(mode: Steering, geometry: Geometry) -> float:
     """Return x_c [m], how far the centre of rotation lies ahead of the centroid."""
     front, rear = geometry.front_axle_m, geometry.rear_axle_m
     return {"abeam": 0.0, "front": -rear, "rear": front, "opposite": 0.5 * (front - rear)}[mode]
@@ -48,7 +48,7 @@ def axle_angles(mode: Steering, radius_m: float, geometry: Geometry, *, where: s
     >>> round(math.degrees(front), 2), round(math.degrees(rear), 2)
     (10.26, -6.9)
     """
-    ahead = centre_ahead(mode, geometry)
+    ahead = centre_forward(mode, geometry)
     if radius_m <= abs(ahead):
         raise PlanError(
             f"turn radius is too small for {mode} steering at any angle",
@@ -65,14 +65,14 @@ def axle_angles(mode: Steering, radius_m: float, geometry: Geometry, *, where: s
 
 def radius_of(mode: Steering, axle_angle_rad: float, geometry: Geometry) -> float:
     """Return the centroid's radius [m] where the steered axle (the front one of two) is at `axle_angle_rad` > 0."""
-    ahead = centre_ahead(mode, geometry)
+    ahead = centre_forward(mode, geometry)
     lever = geometry.wheelbase_m if mode == "rear" else geometry.front_axle_m - ahead
     return math.hypot(ahead, lever / math.tan(axle_angle_rad))
 
 
 def smallest_radius(mode: Steering, front_limit_rad: float, rear_limit_rad: float, geometry: Geometry) -> float:
     """Return the smallest radius [m] at which neither axle is beyond its limit (both positive; infinite if none)."""
-    ahead = centre_ahead(mode, geometry)
+    ahead = centre_forward(mode, geometry)
     levers = (geometry.front_axle_m - ahead, geometry.rear_axle_m + ahead)
     beside = 0.0
     for lever, limit in zip(levers, (front_limit_rad, rear_limit_rad), strict=True):

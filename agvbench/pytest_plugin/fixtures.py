@@ -38,11 +38,11 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
     parallel = hasattr(config, "workerinput") or getattr(config.option, "dist", "no") != "no"
     if config.option.collectonly or parallel or not any(is_bench(item) for item in session.items):
         return (yield)
-    from agvbench.compiled import telling_of_compilation
+    from agvbench.compiled import announcing_compilation
     from agvbench.running.session.opening import open_session
 
     with ExitStack() as stack:
-        stack.enter_context(telling_of_compilation(_teller(config)))
+        stack.enter_context(announcing_compilation(_progress_printer(config)))
         try:
             opened = open_session(
                 given_options(config) | chosen(config, session.items),
@@ -50,7 +50,7 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
                 resume=bool(option(config, "--resume")),
                 dry_run=bool(option(config, "--dry-run")),
                 plan=plan_of(session.items),
-                tell=_teller(config),
+                on_progress=_progress_printer(config),
             )
             config.stash[SESSION] = bench_session = stack.enter_context(opened)
         except AgvbenchError as error:
@@ -77,17 +77,17 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
         return done
 
 
-def _teller(config: pytest.Config) -> Callable[[str], None]:
+def _progress_printer(config: pytest.Config) -> Callable[[str], None]:
     """Return what tells the operator something while a benchmark is driven, whose output pytest captures."""
-    from agvbench.running.positioning.start_pose import say
+    from agvbench.running.positioning.start_pose import notify_operator
 
     capture = config.pluginmanager.get_plugin("capturemanager")
 
-    def tell(text: str) -> None:
+    def on_progress(text: str) -> None:
         with capture.global_and_fixture_disabled() if capture is not None else nullcontext():
-            say(worded(config, text))
+            notify_operator(worded(config, text))
 
-    return tell
+    return on_progress
 
 
 @pytest.hookimpl(trylast=True)

@@ -203,7 +203,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
 
 
 def _conclude(terminalreporter: pytest.TerminalReporter, config: pytest.Config, session: BenchSession) -> None:
-    from agvbench.reporting.console.bench import conclude, dry_run_table
+    from agvbench.reporting.console.bench import bench_summary, dry_run_table
     from agvbench.running.configuration.campaign_directory import shown
 
     if session.is_dry:
@@ -211,4 +211,4 @@ def _conclude(terminalreporter: pytest.TerminalReporter, config: pytest.Config, 
     else:
         for line in session.events:
             terminalreporter.write_line(worded(config, line))
-        terminalreporter.write_line(conclude(shown(session.directory), report=not option(config, "--no-report")))
+        terminalreporter.write_line(bench_summary(shown(session.directory), report=not option(config, "--no-report")))

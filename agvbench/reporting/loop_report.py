@@ -192,7 +192,7 @@ def _headline(loop: Loop, rows: Sequence[BeforeAfter], ends: Sequence[EndPositio
     total = sum(found.values())
     yield (
         f"Of {total} corrected biases (along, across, heading) {found[Bias.WITHIN]} are within ± 1 standard deviation "
-        f"of a repeat, {found[Bias.BEYOND]} beyond; of {found[Bias.UNKNOWN]} the repeats cannot say."
+        f"of a repeat, {found[Bias.BEYOND]} beyond; of {found[Bias.INCONCLUSIVE]} the repeats cannot say."
     )
     moved = [entry["remainder"] for entry in loop.plans.values() if any(entry.get("remainder", {}).values())]
     if moved:

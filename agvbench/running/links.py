@@ -26,7 +26,7 @@ class RunnerLink(Protocol):
         """Place a simulated vehicle at rest."""
         ...
 
-    def exchange(self, command: Command, *, t_s: float, hold_s: float) -> Frames:
+    def control_cycle(self, command: Command, *, t_s: float, hold_s: float) -> Frames:
         """Publish a command; return the frames that arrive while it holds. Where `t_s` goes back, a clock begins."""
         ...
 
@@ -51,7 +51,7 @@ _SLACK_S = 1e-9
 _ORIGIN = Pose(0.0, 0.0, 0.0)
 
 
-class UnbrokenLink:
+class ContinuousLink:
     """A link on which a run's clock may begin anew without a reset, as it may with a real vehicle.
 
     A simulator in lock step knows one clock since its last reset; here every exchange that goes back in time begins
@@ -77,18 +77,18 @@ class UnbrokenLink:
         self._link.reset(pose, run_key=run_key)
         self._passed_s, self._end_s = 0.0, math.inf
 
-    def exchange(self, command: Command, *, t_s: float, hold_s: float) -> Frames:
-        """Exchange as `VehicleLink.exchange` does."""
+    def control_cycle(self, command: Command, *, t_s: float, hold_s: float) -> Frames:
+        """Exchange as `VehicleLink.control_cycle` does."""
         if t_s < self._end_s - _SLACK_S:
             self._offset_s = self._passed_s - t_s
         self._end_s = t_s + hold_s
-        frames = self._link.exchange(command, t_s=t_s + self._offset_s, hold_s=hold_s)
+        frames = self._link.control_cycle(command, t_s=t_s + self._offset_s, hold_s=hold_s)
         self._passed_s = self._end_s + self._offset_s
-        return self._told(frames)
+        return self._on_run_clock(frames)
 
     def flush(self) -> Frames:
         """Return the frames that were late."""
-        return self._told(self._link.flush())
+        return self._on_run_clock(self._link.flush())
 
     def take_events(self) -> list[Event]:
         """Return what adapters and link reported since the last call."""
@@ -102,5 +102,5 @@ class UnbrokenLink:
         """Let the vehicle drive a recorded run again; it has to be placed anew after it."""
         self._link.replay(run_key, commands, pose=pose, until_s=until_s)
 
-    def _told(self, frames: Frames) -> Frames:
+    def _on_run_clock(self, frames: Frames) -> Frames:
         return replace(frames, t_s=frames.t_s - self._offset_s, received_s=frames.received_s - self._offset_s)

@@ -107,10 +107,10 @@ def raised(error: BaseException, where: str) -> BaseException:
     A plant that ends the thread in which it is driven (`sys.exit`) would leave its runner without an answer.
     """
     in_main = threading.current_thread() is threading.main_thread()
-    return error if isinstance(error, KeyboardInterrupt) and in_main else explain(error, where)
+    return error if isinstance(error, KeyboardInterrupt) and in_main else as_plant_error(error, where)
 
 
-def explain(error: BaseException, where: str) -> PlantError:
+def as_plant_error(error: BaseException, where: str) -> PlantError:
     """Return an exception from a plant as a `PlantError` that says what, and on which line."""
     if isinstance(error, PlantError):
         inner = where if error.where is None or where.endswith(f": {error.where}") else f"{where}: {error.where}"
@@ -150,7 +150,7 @@ def _short(value: object, limit: int = 60) -> str | None:
 LONGEST_ADVANCE_S = 86_400.0
 
 
-def asked_pose(pose: tuple[float, float, float]) -> tuple[float, float, float]:
+def checked_pose(pose: tuple[float, float, float]) -> tuple[float, float, float]:
     """Return a pose to be reset to (m, m, rad) as plain floats.
 
     Raises
@@ -166,7 +166,7 @@ def asked_pose(pose: tuple[float, float, float]) -> tuple[float, float, float]:
     return x, y, heading
 
 
-def asked_advance(drive: float, front: float, rear: float, dt: float) -> tuple[float, float, float, float]:
+def checked_advance(drive: float, front: float, rear: float, dt: float) -> tuple[float, float, float, float]:
     """Return a command and how long to hold it [s] as plain floats.
 
     Raises

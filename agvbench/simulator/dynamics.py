@@ -43,7 +43,7 @@ FRONT, REAR, FORWARD, BACKWARD = 0, 9, 18, 23
 SLOPE, CUBIC, OFFSET, STOP_LOW, STOP_HIGH, COMPLIANCE, FREQUENCY, DAMPING, RATE_LIMIT = range(9)
 DEAD_BAND, KNEE, UNLOADED, FULL, ACCELERATION = range(5)
 SENSE, STIFFNESS, OVERRUN, REAR_RATIO, SCRUB, SCRUB_DRY = range(28, 34)
-BRAKE, BRAKE_DRY, WINDUP_RATE, WINDUP_RELAXES, DRIVE_PLAY = range(34, 39)
+BRAKE, BRAKE_DRY, WINDUP_RATE, WINDUP_RELAXES, DRIVE_BACKLASH = range(34, 39)
 FRONT_AXLE, REAR_AXLE, MARKER_LEFT, RELIEF, UNDERSTEER = range(39, 44)
 CAPACITY, RUNNING, DROOP, SHAPE = range(44, 48)
 NEUTRAL, COMMAND_LOW, COMMAND_HIGH, DELAY_FRAMES = range(51, 55)
@@ -79,11 +79,11 @@ def speed_target(p: Floats, offset: float) -> float:
 
 
 @cached_njit()
-def _wheel_tangents(p: Floats, play: Floats, at: Floats) -> tuple[float, float]:
+def _wheel_tangents(p: Floats, run_variation: Floats, at: Floats) -> tuple[float, float]:
     """Return tan δ of front and rear wheels: the servos' plus play, less what compliance takes in reverse."""
     back = min(1.0, max(0.0, -at[SPEED] / _RELIEF_SPEED))
     share = 1.0 - p[RELIEF] * back * back * (3.0 - 2.0 * back)
-    return math.tan(share * (at[FRONT_ANGLE] + play[0])), math.tan(share * (at[REAR_ANGLE] + play[1]))
+    return math.tan(share * (at[FRONT_ANGLE] + run_variation[0])), math.tan(share * (at[REAR_ANGLE] + run_variation[1]))
 
 
 @cached_njit()
@@ -114,14 +114,14 @@ def _servo_acceleration(p: Floats, base: int, target: float, angle: float, rate:
 
 
 @cached_njit()
-def _derivative(p: Floats, play: Floats, state: Floats, at: Floats, out: Floats) -> None:
+def _derivative(p: Floats, run_variation: Floats, state: Floats, at: Floats, out: Floats) -> None:
     """Write the time derivative at the moving state `at`, under the aims in `state`."""
     wheel, speed = state[AIMS], at[SPEED]
-    tan_front, tan_rear = _wheel_tangents(p, play, at)
+    tan_front, tan_rear = _wheel_tangents(p, run_variation, at)
     spring = -p[WINDUP_RATE] * at[WINDUP]
     out[WINDUP] = -at[WINDUP] / p[WINDUP_RELAXES]
     if wheel != 0.0:
-        taken_up = min(1.0, at[SLACK] / p[DRIVE_PLAY]) if p[DRIVE_PLAY] > 0.0 else 1.0
+        taken_up = min(1.0, at[SLACK] / p[DRIVE_BACKLASH]) if p[DRIVE_BACKLASH] > 0.0 else 1.0
         out[SLACK] = abs(wheel) if taken_up < 1.0 else 0.0
         out[SPEED] = taken_up**3 * _powered(p, wheel, tan_front, tan_rear, speed) + spring
     else:
@@ -141,7 +141,9 @@ def _derivative(p: Floats, play: Floats, state: Floats, at: Floats, out: Floats)
 
 
 @cached_njit()
-def _latch(p: Floats, play: Floats, state: Floats, counters: np.ndarray, command: tuple[float, float, float]) -> None:
+def _latch(
+    p: Floats, run_variation: Floats, state: Floats, counters: np.ndarray, command: tuple[float, float, float]
+) -> None:
     """Begin a pulse frame: queue the command and aim for the one of `delay_frames` frames ago."""
     head = counters[RING_HEAD]
     obeyed = QUEUE + 3 * ((head - int(p[DELAY_FRAMES])) % RING)
@@ -149,25 +151,25 @@ def _latch(p: Floats, play: Floats, state: Floats, counters: np.ndarray, command
         state[QUEUE + 3 * head + i] = command[i] - p[NEUTRAL]
     counters[RING_HEAD] = (head + 1) % RING
     left = max(0.0, 1.0 - p[DROOP] * (state[CHARGE] / p[CAPACITY]) ** p[SHAPE])
-    state[AIMS] = speed_target(p, state[obeyed]) * left * (1.0 + play[2])
+    state[AIMS] = speed_target(p, state[obeyed]) * left * (1.0 + run_variation[2])
     state[AIMS + 1] = servo_target(p, FRONT, state[obeyed + 1])
     state[AIMS + 2] = servo_target(p, REAR, state[obeyed + 2])
 
 
 @cached_njit()
-def _step(p: Floats, play: Floats, state: Floats, dt: float, work: Floats) -> None:
+def _step(p: Floats, run_variation: Floats, state: Floats, dt: float, work: Floats) -> None:
     """Write into ``work[2]`` the moving state `dt` later, by Heun's method; `work` has shape (3, MOVING)."""
-    _derivative(p, play, state, state, work[0])
+    _derivative(p, run_variation, state, state, work[0])
     for i in range(MOVING):
         work[2, i] = state[i] + dt * work[0, i]
-    _derivative(p, play, state, work[2], work[1])
+    _derivative(p, run_variation, state, work[2], work[1])
     for i in range(MOVING):
         work[2, i] = state[i] + 0.5 * dt * (work[0, i] + work[1, i])
 
 
 @cached_njit()
 def advance(
-    p: Floats, play: Floats, state: Floats, counters: np.ndarray, work: Floats, drive: float, front: float,
+    p: Floats, run_variation: Floats, state: Floats, counters: np.ndarray, work: Floats, drive: float, front: float,
     rear: float, dt: float,
 ) -> tuple[float, float, float]:  # fmt: skip
     """Hold the command for `dt` seconds; return the pose then. `work` has shape (3, MOVING)."""
@@ -181,14 +183,14 @@ def advance(
         remainder = 0.0
     for cell in range(cells + (remainder > 0.0)):
         if not begun and counters[STEPS] % FRAME_STEPS == 0:
-            _latch(p, play, state, counters, command)
+            _latch(p, run_variation, state, counters, command)
         begun = False
         if cell < cells:
-            _step(p, play, state, STEP_S, work)
+            _step(p, run_variation, state, STEP_S, work)
             state[:MOVING] = work[2]
             counters[STEPS] += 1
     state[REMAINDER] = remainder
     if remainder == 0.0:
         return state[X], state[Y], state[HEADING]
-    _step(p, play, state, remainder, work)
+    _step(p, run_variation, state, remainder, work)
     return work[2, X], work[2, Y], work[2, HEADING]

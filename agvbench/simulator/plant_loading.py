@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 
 from agvbench.errors import PlantError
-from agvbench.simulator.checked_plant import CheckedPlant, explain, raised
+from agvbench.simulator.checked_plant import CheckedPlant, as_plant_error, raised
 from agvbench.types import PlantFactory
 
 _FORM = "write MODULE:FACTORY or path/to/FILE.py:FACTORY"
@@ -99,9 +99,9 @@ def _import_module(name: str) -> ModuleType:
                     where=name,
                     remedy="install it, or run where it lies",
                 ) from error
-            raise explain(error, name) from error
+            raise as_plant_error(error, name) from error
         except (Exception, SystemExit) as error:
-            raise explain(error, name) from error
+            raise as_plant_error(error, name) from error
 
 
 def import_file(path: Path) -> ModuleType:
@@ -125,7 +125,7 @@ def import_file(path: Path) -> ModuleType:
             spec.loader.exec_module(module)
         except (Exception, SystemExit) as error:
             del sys.modules[name]
-            raise explain(error, str(path)) from error
+            raise as_plant_error(error, str(path)) from error
     return module
 
 

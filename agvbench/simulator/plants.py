@@ -13,7 +13,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from agvbench.simulator.vehicle_parameters import Battery, Body, Drive, DriveSide, Play, SimulatedVehicle, Steering
+from agvbench.simulator.vehicle_parameters import (
+    Battery,
+    Body,
+    DriveSide,
+    Drivetrain,
+    RunVariation,
+    SimulatedVehicle,
+    SteeringServo,
+)
 from agvbench.types import PlantFactory
 
 if TYPE_CHECKING:
@@ -27,7 +35,7 @@ _SERVO_DAMPING = 0.85  # free: hardly any overshoot
 _SERVO_RATE = 5.0  # rad/s, free: about 60° in 0.2 s
 
 THESIS_VEHICLE = SimulatedVehicle(
-    front=Steering(
+    front=SteeringServo(
         slope_rad_per_unit=-0.0861 * _DEG,  # table 7.1, line through 1100…1900 µs (two points left out at each end)
         cubic_rad_per_unit3=0.0,
         offset_rad=-1.5 * _DEG,  # tables 7.1, 7.2 at 1500 µs: medians −1.59°, −1.44°
@@ -38,7 +46,7 @@ THESIS_VEHICLE = SimulatedVehicle(
         damping_ratio=_SERVO_DAMPING,
         rate_limit_rad_per_s=_SERVO_RATE,
     ),
-    rear=Steering(
+    rear=SteeringServo(
         slope_rad_per_unit=-0.0880 * _DEG,  # table 7.2, line through 1100…1900 µs
         cubic_rad_per_unit3=0.0,
         offset_rad=-2.15 * _DEG,  # tables 7.1, 7.2 at 1500 µs: medians −2.04°, −2.27°
@@ -58,14 +66,14 @@ THESIS_VEHICLE = SimulatedVehicle(
         dead_band=53.7, knee=144.6, unloaded_mps=0.4816, full_mps=0.3243,
         acceleration_mps2=0.94,  # free: a little less than forward
     ),
-    drive=Drive(
+    drive=Drivetrain(
         sense=-1.0,  # table 7.4: 900 µs drives forward
         stiffness_per_s=30.0,  # free: full speed is reached within 0.1 s of the end of the constant acceleration
         overrun=3.0, scrub=0.017, scrub_dry_mps=0.0027,  # appendix B, least squares over its 336 speeds
         rear_speed_ratio=1.01,  # free (thesis 9.2)
         # 8.1: 0.32 to 0.02 m/s in 0.588 s, then a short movement backward (here 3 mm).
         brake_per_s=3.2, brake_dry_mps2=0.02, windup_per_s2=2.35, windup_relaxes_s=0.5,
-        play_m=0.012,  # free (thesis 9.2: insufficiently tightened parts)
+        backlash_m=0.012,  # free (thesis 9.2: insufficiently tightened parts)
     ),
     body=Body(
         # Table 5.1 (0.181, 0.121 m), the centroid 4 mm further back: the angle of the axle that is not steered drifts
@@ -84,31 +92,31 @@ THESIS_VEHICLE = SimulatedVehicle(
     ),
     # Table 7.1 scatters by up to 0.46°, quartiles 0.05…0.15° from the median; the calibrated straights' headings
     # (tables 8.3–8.6) by about 1°, their lengths by about 8 mm of 2 m.
-    play=Play(front_rad=0.12 * _DEG, rear_rad=0.12 * _DEG, speed=0.003),
+    run_variation=RunVariation(front_rad=0.12 * _DEG, rear_rad=0.12 * _DEG, speed=0.003),
     neutral=1500.0, command_low=900.0, command_high=2100.0,  # table 5.2
     delay_frames=1.0,  # free (thesis 9.2 suspects delays in the controller)
 )  # fmt: skip
 
 SMALL_VEHICLE = SimulatedVehicle(
-    front=Steering(
+    front=SteeringServo(
         slope_rad_per_unit=0.42, cubic_rad_per_unit3=-0.06, offset_rad=0.02, stop_low_rad=-0.36, stop_high_rad=0.35,
         stop_compliance=0.02, natural_frequency_rad_per_s=18.0, damping_ratio=0.9, rate_limit_rad_per_s=6.0,
     ),
-    rear=Steering(
+    rear=SteeringServo(
         slope_rad_per_unit=0.0, cubic_rad_per_unit3=0.0, offset_rad=0.0, stop_low_rad=-0.1, stop_high_rad=0.1,
         stop_compliance=0.0, natural_frequency_rad_per_s=18.0, damping_ratio=0.9, rate_limit_rad_per_s=6.0,
     ),
     forward=DriveSide(dead_band=0.08, knee=0.9, unloaded_mps=5.0, full_mps=2.5, acceleration_mps2=2.5),
     backward=DriveSide(dead_band=0.10, knee=0.9, unloaded_mps=4.5, full_mps=2.0, acceleration_mps2=2.0),
-    drive=Drive(
+    drive=Drivetrain(
         sense=1.0, stiffness_per_s=4.0, overrun=1.5, rear_speed_ratio=1.0, scrub=0.05, scrub_dry_mps=0.0,
-        brake_per_s=2.5, brake_dry_mps2=0.3, windup_per_s2=0.0, windup_relaxes_s=0.3, play_m=0.0,
+        brake_per_s=2.5, brake_dry_mps2=0.3, windup_per_s2=0.0, windup_relaxes_s=0.3, backlash_m=0.0,
     ),
     body=Body(
         front_axle_m=0.060, rear_axle_m=0.115, marker_left_m=0.002, reverse_relief=0.0, understeer_s2_per_m2=0.06,
     ),
     battery=Battery(capacity_ah=2.0, running_a=4.0, droop=0.15, shape=1.0),
-    play=Play(front_rad=0.003, rear_rad=0.0, speed=0.005),
+    run_variation=RunVariation(front_rad=0.003, rear_rad=0.0, speed=0.005),
     neutral=0.0, command_low=-1.0, command_high=1.0,
     delay_frames=1.0,
 )  # fmt: skip
@@ -162,19 +170,19 @@ def random_vehicle(seed: int) -> SimulatedVehicle:
         drive=replace(
             base.drive, rear_speed_ratio=draw(0.97, 1.03), overrun=draw(1.0, 3.5), scrub=draw(0.0, 0.04),
             scrub_dry_mps=draw(0.0, 0.004), brake_per_s=draw(2.0, 4.0), windup_per_s2=draw(0.0, 3.0),
-            play_m=draw(0.0, 0.02),
+            backlash_m=draw(0.0, 0.02),
         ),
         body=replace(
             base.body, front_axle_m=0.181 - lever, rear_axle_m=0.121 + lever, marker_left_m=draw(-0.005, 0.005),
             reverse_relief=draw(0.0, 0.05),
         ),
         battery=replace(base.battery, droop=draw(0.04, 0.12)),
-        play=Play(draw(0.05, 0.25) * _DEG, draw(0.05, 0.25) * _DEG, draw(0.001, 0.006)),
+        run_variation=RunVariation(draw(0.05, 0.25) * _DEG, draw(0.05, 0.25) * _DEG, draw(0.001, 0.006)),
         delay_frames=float(rng.integers(4)),
     )  # fmt: skip
 
 
-def _random_steering(base: Steering, draw: Draw) -> Steering:
+def _random_steering(base: SteeringServo, draw: Draw) -> SteeringServo:
     return replace(
         base, slope_rad_per_unit=-draw(0.068, 0.098) * _DEG, offset_rad=draw(-4.0, 4.0) * _DEG,
         stop_low_rad=-draw(35.0, 45.0) * _DEG, stop_high_rad=draw(35.0, 45.0) * _DEG, stop_compliance=draw(0.0, 0.1),

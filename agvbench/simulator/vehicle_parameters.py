@@ -20,7 +20,7 @@ MAX_DELAY_FRAMES = 7
 
 
 @dataclass(frozen=True, slots=True)
-class Steering:
+class SteeringServo:
     """One steered axle: pulse → servo (second order, rate limited) → axle with compliant end stops.
 
     The servo aims at ``slope u + cubic u³ + offset``, u = command − neutral; counter-clockwise positive.
@@ -54,7 +54,7 @@ class DriveSide:
 
 
 @dataclass(frozen=True, slots=True)
-class Drive:
+class Drivetrain:
     """Both motors, one per axle, and what resists them. All forces are per unit of mass.
 
     A powered axle pulls the body towards ``w cos δ`` with `stiffness_per_s` (limited by the acceleration of its
@@ -76,7 +76,7 @@ class Drive:
     brake_dry_mps2: float
     windup_per_s2: float
     windup_relaxes_s: float
-    play_m: float
+    backlash_m: float
     """Slack of the drive train, taken up at every start before the wheels pull."""
 
 
@@ -103,7 +103,7 @@ class Battery:
 
 
 @dataclass(frozen=True, slots=True)
-class Play:
+class RunVariation:
     """Run-to-run scatter, drawn at every reset: standard deviations of axle angle and of speed."""
 
     front_rad: float
@@ -119,14 +119,14 @@ class SimulatedVehicle:
     pulse frame, and `delay_frames` frames later.
     """
 
-    front: Steering
-    rear: Steering
+    front: SteeringServo
+    rear: SteeringServo
     forward: DriveSide
     backward: DriveSide
-    drive: Drive
+    drive: Drivetrain
     body: Body
     battery: Battery
-    play: Play
+    run_variation: RunVariation
     neutral: float
     command_low: float
     command_high: float

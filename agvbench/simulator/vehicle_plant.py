@@ -6,7 +6,7 @@ import numpy as np
 
 from agvbench.errors import PlantError
 from agvbench.simulator import dynamics
-from agvbench.simulator.checked_plant import asked_advance, asked_pose
+from agvbench.simulator.checked_plant import checked_advance, checked_pose
 from agvbench.simulator.vehicle_parameters import MAX_DELAY_FRAMES, SimulatedVehicle
 
 _SEEDS = 2**64
@@ -46,7 +46,7 @@ class VehiclePlant:
         self._constants = vehicle.pack()
         self._state = np.zeros(dynamics.STATE_SIZE)
         self._counters = np.zeros(2, dtype=np.int64)
-        self._play = np.zeros(3)
+        self._run_variation = np.zeros(3)
         self._work = np.empty((3, dynamics.MOVING))
         self._pose = (0.0, 0.0, 0.0)
         self.reset(self._pose, seed=0)
@@ -59,10 +59,14 @@ class VehiclePlant:
         PlantError
             If the pose is not finite.
         """
-        x, y, heading = asked_pose(pose)
+        x, y, heading = checked_pose(pose)
         rng = np.random.default_rng([self._seed % _SEEDS, seed % _SEEDS])
-        play = self.vehicle.play
-        self._play[:] = rng.standard_normal(3) * (play.front_rad, play.rear_rad, play.speed)
+        run_variation = self.vehicle.run_variation
+        self._run_variation[:] = rng.standard_normal(3) * (
+            run_variation.front_rad,
+            run_variation.rear_rad,
+            run_variation.speed,
+        )
         self._counters[:] = rng.integers(dynamics.FRAME_STEPS), 0
         charge = self._state[dynamics.CHARGE]
         self._state[:] = 0.0
@@ -81,9 +85,9 @@ class VehiclePlant:
         PlantError
             If a command is not a finite number, or `dt` is negative, not finite or over a day.
         """
-        drive, front, rear, dt = asked_advance(drive, front, rear, dt)
+        drive, front, rear, dt = checked_advance(drive, front, rear, dt)
         self._pose = dynamics.advance(
-            self._constants, self._play, self._state, self._counters, self._work, drive, front, rear, dt
+            self._constants, self._run_variation, self._state, self._counters, self._work, drive, front, rear, dt
         )
         return self._pose
 
@@ -96,4 +100,4 @@ class VehiclePlant:
         state = dict(zip(dynamics.STATE_NAMES, map(float, self._state), strict=False))
         state["x_m"], state["y_m"], state["heading_rad"] = self._pose
         names = ("play_front_rad", "play_rear_rad", "play_speed")
-        return state | dict(zip(names, map(float, self._play), strict=True))
+        return state | dict(zip(names, map(float, self._run_variation), strict=True))

@@ -1,15 +1,15 @@
 """Errors of runs, their spread, and comparisons."""
 
 from agvbench.statistics.comparison import Comparison, compare
-from agvbench.statistics.differences import Difference, Verdict
+from agvbench.statistics.differences import ComparisonVerdict, Difference
 from agvbench.statistics.end_poses import end_pose_table
 from agvbench.statistics.repeatability import bias_and_spread
 from agvbench.statistics.run_errors import pose_errors, valid
 
 __all__ = [
     "Comparison",
+    "ComparisonVerdict",
     "Difference",
-    "Verdict",
     "bias_and_spread",
     "compare",
     "end_pose_table",

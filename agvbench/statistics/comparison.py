@@ -18,11 +18,11 @@ from agvbench.errors import FlagError
 from agvbench.statistics.bootstrap import RESAMPLES
 from agvbench.statistics.differences import (
     ALPHA,
+    ComparisonVerdict,
     Difference,
     EndShift,
-    Verdict,
+    decide_families,
     end_shift,
-    judge_families,
     of_all,
     of_cell,
     overall,
@@ -60,14 +60,14 @@ class Comparison:
         """Return the differences that decide whether something is worse; the others are notes."""
         return [difference for difference in self.differences if difference.decides]
 
-    def of(self, verdict: Verdict) -> list[Difference]:
+    def of(self, verdict: ComparisonVerdict) -> list[Difference]:
         """Return the differences that decide and have this verdict."""
         return [difference for difference in self.deciding if difference.verdict is verdict]
 
     @property
-    def verdicts(self) -> dict[tuple[str, str], Verdict]:
+    def verdicts(self) -> dict[tuple[str, str], ComparisonVerdict]:
         """Return the verdict on each trajectory and condition, by the differences that decide."""
-        found: dict[tuple[str, str], list[Verdict]] = {}
+        found: dict[tuple[str, str], list[ComparisonVerdict]] = {}
         for d in self.deciding:
             found.setdefault((d.trajectory, d.condition), []).append(d.verdict)
         return {cell: overall(verdicts) for cell, verdicts in found.items()}
@@ -79,7 +79,9 @@ class Comparison:
         return [
             d
             for d in self.differences
-            if not d.decides and d.verdict is Verdict.WORSE and verdicts[d.trajectory, d.condition] is not Verdict.WORSE
+            if not d.decides
+            and d.verdict is ComparisonVerdict.WORSE
+            and verdicts[d.trajectory, d.condition] is not ComparisonVerdict.WORSE
         ]
 
     @property
@@ -88,7 +90,12 @@ class Comparison:
 
         Worse comes before undecided, same and better, and in each the largest first, in multiples of the margin.
         """
-        order = (Verdict.WORSE, Verdict.UNKNOWN, Verdict.SAME, Verdict.BETTER)
+        order = (
+            ComparisonVerdict.WORSE,
+            ComparisonVerdict.INCONCLUSIVE,
+            ComparisonVerdict.SAME,
+            ComparisonVerdict.BETTER,
+        )
         worst: dict[tuple[str, str], tuple[int, float]] = {}
         for d in self.deciding:
             rank = order.index(d.verdict), -d.interval.estimate / (d.margin or 1.0)
@@ -99,12 +106,12 @@ class Comparison:
     @property
     def is_regression(self) -> bool:
         """Whether anything that decides is worse beyond its margin."""
-        return bool(self.of(Verdict.WORSE))
+        return bool(self.of(ComparisonVerdict.WORSE))
 
     @property
     def could_compare(self) -> bool:
         """Whether some difference could have been found, or every one was ruled out."""
-        return any(d.able for d in self.deciding) or not self.of(Verdict.UNKNOWN)
+        return any(d.testable for d in self.deciding) or not self.of(ComparisonVerdict.INCONCLUSIVE)
 
 
 def compare(
@@ -158,7 +165,7 @@ def compare(
     raw = [of_cell(cell, q, margins[q], resamples, seed) for cell in cells for q in QUANTITIES]
     if len(cells) > 1:
         raw += [of_all(cells, q, margins[q], resamples, seed) for q in QUANTITIES]
-    differences, tests = judge_families(raw, deciding, alpha)
+    differences, tests = decide_families(raw, deciding, alpha)
     shifts = sorted(map(end_shift, cells), key=lambda shift: -shift.length_mm)
     note = session_note(cells, same_campaign=same_campaign)
     return Comparison(*names, tuple(differences), tuple(shifts), tuple(left_out), (note,), alpha, tests)

@@ -7,28 +7,28 @@ from typing import Any
 
 from agvbench.statistics.bootstrap import CONFIDENCE
 from agvbench.statistics.comparison import Comparison
-from agvbench.statistics.differences import ALL, Difference, EndShift, Sample, Verdict
-from agvbench.statistics.hypothesis_tests import fewest_repeats
+from agvbench.statistics.differences import ALL, ComparisonVerdict, Difference, EndShift, SampleSummary
+from agvbench.statistics.hypothesis_tests import required_sample_size
 from agvbench.statistics.quantities import DISTANCE, POSITION
 
 
 def describe(difference: Difference, comparison: Comparison) -> str:
     """Return what one difference of `comparison` amounts to, as a clause."""
-    if difference.verdict in (Verdict.WORSE, Verdict.BETTER):
+    if difference.verdict in (ComparisonVerdict.WORSE, ComparisonVerdict.BETTER):
         return f"{_amount(difference, abs(difference.interval.estimate))} {difference.verdict}"
-    if difference.verdict is Verdict.SAME:
+    if difference.verdict is ComparisonVerdict.SAME:
         return f"the same to within {_amount(difference, difference.margin)}"
-    if not difference.able:
+    if not difference.testable:
         return _too_few(difference, comparison)
     return _undecided(difference, comparison.alpha)
 
 
 def headline(comparison: Comparison) -> str:
     """Return the comparison's answer: a sentence by what decides, and one about notes that say something else."""
-    worse, better = len(comparison.of(Verdict.WORSE)), len(comparison.of(Verdict.BETTER))
-    same, unknown = len(comparison.of(Verdict.SAME)), len(comparison.of(Verdict.UNKNOWN))
+    worse, better = len(comparison.of(ComparisonVerdict.WORSE)), len(comparison.of(ComparisonVerdict.BETTER))
+    same, unknown = len(comparison.of(ComparisonVerdict.SAME)), len(comparison.of(ComparisonVerdict.INCONCLUSIVE))
     if not comparison.could_compare:
-        return f"Could not compare: {describe(comparison.of(Verdict.UNKNOWN)[0], comparison)}."
+        return f"Could not compare: {describe(comparison.of(ComparisonVerdict.INCONCLUSIVE)[0], comparison)}."
     counts = [f"{worse} worse", f"{better} better", f"{same} the same within the margin", f"{unknown} undecided"]
     answer = "Regression" if worse else "No regression shown"
     decided = f"{answer}: of {len(comparison.deciding)} comparisons {', '.join(counts)}."
@@ -65,19 +65,20 @@ def _too_few(difference: Difference, comparison: Comparison) -> str:
     # Where repeats are few, |Δs| is left out so that end poses can be judged.
     family = [d for d in comparison.differences if d.decides == difference.decides]
     among = [d for d in family if difference.quantity == DISTANCE or d.quantity != DISTANCE]
-    needed = fewest_repeats(comparison.alpha / len(among))
+    needed = required_sample_size(comparison.alpha / len(among))
     return f"{repeats} cannot show any difference here, however large; {needed} of each could"
 
 
 def _undecided(difference: Difference, alpha: float) -> str:
     significant = min(difference.p_worse, difference.p_better) <= alpha
     if significant:
-        way = Verdict.WORSE if difference.p_worse <= alpha else Verdict.BETTER
+        way = ComparisonVerdict.WORSE if difference.p_worse <= alpha else ComparisonVerdict.BETTER
         return f"{way}, but perhaps by no more than the margin of {_amount(difference, difference.margin)}"
-    if not math.isfinite(difference.visible):
+    if not math.isfinite(difference.minimum_detectable):
         return "no scatter to judge by"
     fewest = min(difference.a.repeats, difference.b.repeats)
-    return f"{fewest} repeats cannot show a difference smaller than about {_amount(difference, difference.visible)}"
+    amount = _amount(difference, difference.minimum_detectable)
+    return f"{fewest} repeats cannot show a difference smaller than about {amount}"
 
 
 SCHEMA = 1
@@ -120,7 +121,7 @@ def _difference(d: Difference, comparison: Comparison) -> dict[str, Any]:
         "p_better": d.p_better,
         "p_same": d.p_same,
         "cliffs_delta": d.cliffs_delta,
-        "smallest_visible_difference": _finite(d.visible),
+        "smallest_visible_difference": _finite(d.minimum_detectable),
         "verdict": str(d.verdict),
         "decides": d.decides,
         "words": describe(d, comparison),
@@ -139,7 +140,7 @@ def _shift(shift: EndShift) -> dict[str, Any]:
     }
 
 
-def _sample(sample: Sample) -> dict[str, Any]:
+def _sample(sample: SampleSummary) -> dict[str, Any]:
     return {
         "repeats": sample.repeats,
         "median": _finite(sample.median),

@@ -16,10 +16,10 @@ import numpy as np
 from agvbench.statistics.bootstrap import CONFIDENCE, Interval, average_difference_interval, median_difference_interval
 from agvbench.statistics.descriptive import classify_outliers
 from agvbench.statistics.hypothesis_tests import (
-    can_speak,
-    holm_of_those_that_can_speak,
+    holm_tarone,
+    minimum_detectable_difference,
     rank_test,
-    smallest_visible_difference,
+    tarone_testable,
 )
 from agvbench.statistics.matching import Cell, Strata
 from agvbench.statistics.quantities import DISTANCE, Quantity
@@ -29,16 +29,16 @@ ALPHA = 0.01
 ALPHA_SAME = 0.05
 
 
-class Verdict(StrEnum):
+class ComparisonVerdict(StrEnum):
     """What the repeats say about b against a; smaller errors are better."""
 
     BETTER = "better"
     SAME = "same within margin"
     WORSE = "worse"
-    UNKNOWN = "cannot say"
+    INCONCLUSIVE = "cannot say"
 
 
-def overall(verdicts: Collection[Verdict]) -> Verdict:
+def overall(verdicts: Collection[ComparisonVerdict]) -> ComparisonVerdict:
     """Return the verdict on something of which several quantities were judged.
 
     It is worse where one of them is, better where one of them is and none can be worse, and the same where all are.
@@ -46,10 +46,10 @@ def overall(verdicts: Collection[Verdict]) -> Verdict:
     >>> overall([Verdict.BETTER, Verdict.WORSE]), overall([Verdict.BETTER, Verdict.SAME])
     (<Verdict.WORSE: 'worse'>, <Verdict.BETTER: 'better'>)
     """
-    for verdict in (Verdict.WORSE, Verdict.UNKNOWN, Verdict.BETTER):
+    for verdict in (ComparisonVerdict.WORSE, ComparisonVerdict.INCONCLUSIVE, ComparisonVerdict.BETTER):
         if verdict in verdicts:
             return verdict
-    return Verdict.SAME
+    return ComparisonVerdict.SAME
 
 
 def decide(
@@ -61,7 +61,7 @@ def decide(
     p_same: float,
     alpha: float = ALPHA,
     alpha_same: float = ALPHA_SAME,
-) -> Verdict:
+) -> ComparisonVerdict:
     """Return the verdict on a `difference` of medians (b − a) against a noise band of ±`margin`.
 
     Worse (better) takes both: significance after correction for all comparisons, and an estimate beyond the margin. The
@@ -86,17 +86,17 @@ def decide(
     <Verdict.UNKNOWN: 'cannot say'>
     """
     if p_worse <= alpha and difference > margin:
-        return Verdict.WORSE
+        return ComparisonVerdict.WORSE
     if p_better <= alpha and difference < -margin:
-        return Verdict.BETTER
-    return Verdict.SAME if p_same <= alpha_same else Verdict.UNKNOWN
+        return ComparisonVerdict.BETTER
+    return ComparisonVerdict.SAME if p_same <= alpha_same else ComparisonVerdict.INCONCLUSIVE
 
 
 ALL = "all trajectories"
 
 
 @dataclass(frozen=True)
-class Sample:
+class SampleSummary:
     """One side of a comparison: how many repeats, their median and standard deviation, and their outliers."""
 
     repeats: int
@@ -110,8 +110,8 @@ class Difference:
     """Side b against side a in one quantity of one trajectory and condition (or of all together).
 
     ``interval`` is the difference of medians with its 95 % bootstrap interval, for itself alone; ``p_worse`` and
-    ``p_better`` are corrected for all comparisons, ``p_same`` is not; ``able`` says whether so many repeats could
-    reach significance at all, ``visible`` about the smallest difference that they find nine times in ten
+    ``p_better`` are corrected for all comparisons, ``p_same`` is not; ``testable`` says whether so many repeats could
+    reach significance at all, ``minimum_detectable`` about the smallest difference that they find nine times in ten
     (infinite: none); ``cliffs_delta`` is positive where b is worse. Where it does not `decide`, its verdict is a note.
     """
 
@@ -119,16 +119,16 @@ class Difference:
     condition: str
     quantity: Quantity
     margin: float
-    a: Sample
-    b: Sample
+    a: SampleSummary
+    b: SampleSummary
     interval: Interval
     p_worse: float
     p_better: float
     p_same: float
     cliffs_delta: float
-    visible: float
-    able: bool
-    verdict: Verdict
+    minimum_detectable: float
+    testable: bool
+    verdict: ComparisonVerdict
     decides: bool = True
 
     @property
@@ -138,14 +138,14 @@ class Difference:
 
 
 @dataclass(frozen=True)
-class Untold:
+class RawDifference:
     """A difference before correction, with the smallest p-value its test could give."""
 
     difference: Difference
-    least_p: float
+    minimum_p: float
 
 
-def of_cell(cell: Cell, quantity: Quantity, margin: float, resamples: int, seed: int) -> Untold:
+def of_cell(cell: Cell, quantity: Quantity, margin: float, resamples: int, seed: int) -> RawDifference:
     """Return the difference in one cell, before correction."""
     a, b = cell.values(quantity)
     interval = median_difference_interval(a, b, resamples=resamples, seed=seed)
@@ -153,7 +153,7 @@ def of_cell(cell: Cell, quantity: Quantity, margin: float, resamples: int, seed:
     return _tested(names, quantity, margin, (_sample(a), _sample(b)), interval, cell.strata(quantity))
 
 
-def of_all(cells: Sequence[Cell], quantity: Quantity, margin: float, resamples: int, seed: int) -> Untold:
+def of_all(cells: Sequence[Cell], quantity: Quantity, margin: float, resamples: int, seed: int) -> RawDifference:
     """Test all cells together: a small change everywhere shows here before it shows anywhere."""
     pairs = [cell.values(quantity) for cell in cells]
     samples = [
@@ -169,10 +169,10 @@ def _tested(
     names: tuple[str, str],
     quantity: Quantity,
     margin: float,
-    samples: tuple[Sample, Sample],
+    samples: tuple[SampleSummary, SampleSummary],
     interval: Interval,
     strata: Strata,
-) -> Untold:
+) -> RawDifference:
     plain = rank_test(strata)
     at_least_worse = rank_test([(a + margin, b) for a, b in strata]).p_less
     at_least_better = rank_test([(a - margin, b) for a, b in strata]).p_greater
@@ -186,64 +186,72 @@ def _tested(
         p_better=plain.p_less,
         p_same=max(at_least_worse, at_least_better),
         cliffs_delta=cliffs_delta(plain.superiority),
-        visible=math.nan,
-        able=False,
-        verdict=Verdict.UNKNOWN,
+        minimum_detectable=math.nan,
+        testable=False,
+        verdict=ComparisonVerdict.INCONCLUSIVE,
     )
-    return Untold(difference, plain.least_p)
+    return RawDifference(difference, plain.minimum_p)
 
 
-def judge_families(raw: Sequence[Untold], deciding: Collection[Quantity], alpha: float) -> tuple[list[Difference], int]:
-    """Return what `judge` does, with the quantities that decide and those that are notes as two families.
+def decide_families(
+    raw: Sequence[RawDifference], deciding: Collection[Quantity], alpha: float
+) -> tuple[list[Difference], int]:
+    """Return what `decide_family` does, with the quantities that decide and those that are notes as two families.
 
     Each family has its own chance `alpha` of a false alarm: notes cost the decision no power, and cannot change it.
     """
-    judged: dict[int, Difference] = {}
+    decided: dict[int, Difference] = {}
     counts = {True: 1, False: 1}
     for decides in counts:
         family = [k for k, r in enumerate(raw) if (r.difference.quantity in deciding) is decides]
-        found, counts[decides] = judge([raw[k] for k in family], alpha)
-        judged |= {k: replace(d, decides=decides) for k, d in zip(family, found, strict=True)}
-    return [judged[k] for k in range(len(raw))], counts[True]
+        found, counts[decides] = decide_family([raw[k] for k in family], alpha)
+        decided |= {k: replace(d, decides=decides) for k, d in zip(family, found, strict=True)}
+    return [decided[k] for k in range(len(raw))], counts[True]
 
 
-def judge(raw: Sequence[Untold], alpha: float) -> tuple[list[Difference], int]:
+def decide_family(raw: Sequence[RawDifference], alpha: float) -> tuple[list[Difference], int]:
     """Return the differences with corrected p-values and verdicts, and how many tests the correction counted.
 
     |Δs| is not tested where counting its tests would leave too few repeats for a test of the end pose: of a run that
     ends elsewhere it sees a part of what the end position error sees.
     """
-    least = _least_p(raw, alpha)
-    able = can_speak(least, alpha)
-    tests = max(1, sum(able))
-    worse = holm_of_those_that_can_speak([r.difference.p_worse for r in raw], least, alpha)
-    better = holm_of_those_that_can_speak([r.difference.p_better for r in raw], least, alpha)
-    judged = []
-    for r, p_worse, p_better, spoke in zip(raw, worse, better, able, strict=True):
-        d = replace(r.difference, p_worse=p_worse, p_better=p_better, able=spoke)
+    least = _minimum_p(raw, alpha)
+    testable = tarone_testable(least, alpha)
+    tests = max(1, sum(testable))
+    worse = holm_tarone([r.difference.p_worse for r in raw], least, alpha)
+    better = holm_tarone([r.difference.p_better for r in raw], least, alpha)
+    decided = []
+    for r, p_worse, p_better, is_testable in zip(raw, worse, better, testable, strict=True):
+        d = replace(r.difference, p_worse=p_worse, p_better=p_better, testable=is_testable)
         verdict = decide(
             d.interval.estimate, d.margin, p_worse=p_worse, p_better=p_better, p_same=d.p_same, alpha=alpha
         )
-        judged.append(replace(d, verdict=verdict, visible=_visible(d, alpha / tests) if spoke else math.inf))
-    return judged, tests
+        decided.append(
+            replace(
+                d,
+                verdict=verdict,
+                minimum_detectable=_minimum_detectable(d, alpha / tests) if is_testable else math.inf,
+            )
+        )
+    return decided, tests
 
 
-def _least_p(raw: Sequence[Untold], alpha: float) -> list[float]:
+def _minimum_p(raw: Sequence[RawDifference], alpha: float) -> list[float]:
     """Return the smallest p-values that tests could give, 1 for those that are not made."""
-    every = [r.least_p for r in raw]
-    end_poses = [1.0 if r.difference.quantity == DISTANCE else r.least_p for r in raw]
-    silenced = zip(can_speak(end_poses, alpha), can_speak(every, alpha), strict=True)
-    return end_poses if any(alone and not together for alone, together in silenced) else every
+    every = [r.minimum_p for r in raw]
+    end_poses = [1.0 if r.difference.quantity == DISTANCE else r.minimum_p for r in raw]
+    testable_pairs = zip(tarone_testable(end_poses, alpha), tarone_testable(every, alpha), strict=True)
+    return end_poses if any(alone and not together for alone, together in testable_pairs) else every
 
 
-def _visible(d: Difference, alpha: float) -> float:
+def _minimum_detectable(d: Difference, alpha: float) -> float:
     sd = math.sqrt((d.a.sd**2 + d.b.sd**2) / 2.0)
-    return smallest_visible_difference(sd, d.a.repeats, d.b.repeats, alpha=alpha)
+    return minimum_detectable_difference(sd, d.a.repeats, d.b.repeats, alpha=alpha)
 
 
-def _sample(values: Floats) -> Sample:
+def _sample(values: Floats) -> SampleSummary:
     sd = float(np.std(values, ddof=1)) if len(values) > 1 else math.nan
-    return Sample(len(values), float(np.median(values)), sd, str(classify_outliers(values)))
+    return SampleSummary(len(values), float(np.median(values)), sd, str(classify_outliers(values)))
 
 
 def _pooled_sd(groups: Sequence[Floats]) -> float:

@@ -26,7 +26,7 @@ class Bias(StrEnum):
 
     WITHIN = "within"
     BEYOND = "beyond"
-    UNKNOWN = "cannot say"
+    INCONCLUSIVE = "cannot say"
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Equivalence:
         """Within the margin or beyond it at the 5 % level, or neither."""
         if self.p_within < LEVEL:
             return Bias.WITHIN
-        return Bias.BEYOND if self.p_beyond < LEVEL else Bias.UNKNOWN
+        return Bias.BEYOND if self.p_beyond < LEVEL else Bias.INCONCLUSIVE
 
 
 def equivalence(values: Floats, *, margin_sds: float = 1.0) -> Equivalence:

@@ -28,13 +28,13 @@ _WIDEST_EXACT = 20_000
 class RankTest:
     """One-sided p-values of a rank-sum test of b against a.
 
-    ``p_greater`` is small if b tends to be larger; ``p_less`` if smaller; ``least_p`` is the smallest p-value that
+    ``p_greater`` is small if b tends to be larger; ``p_less`` if smaller; ``minimum_p`` is the smallest p-value that
     samples of this size and ties can give at all. ``superiority`` is P(b > a) + P(b = a) / 2, Vargha and Delaney's A₁₂.
     """
 
     p_greater: float
     p_less: float
-    least_p: float
+    minimum_p: float
     superiority: float
 
 
@@ -156,7 +156,7 @@ def holm(p_values: Sequence[float]) -> list[float]:
     return [float(value) for value in adjusted]
 
 
-def can_speak(least_p: Sequence[float], alpha: float) -> list[bool]:
+def tarone_testable(minimum_p: Sequence[float], alpha: float) -> list[bool]:
     """Return which tests could reach significance at all after correction (Tarone, 1990).
 
     A test of few repeats has a smallest possible p-value. Tests whose smallest is above α / k, with k the least
@@ -166,16 +166,16 @@ def can_speak(least_p: Sequence[float], alpha: float) -> list[bool]:
     >>> can_speak([0.2, 0.2, 0.001], alpha=0.05)
     [False, False, True]
     """
-    least = np.asarray(least_p, dtype=float)
+    least = np.asarray(minimum_p, dtype=float)
     k = next((k for k in range(1, len(least) + 1) if np.sum(least <= alpha / k) <= k), 1)
     return [bool(value <= alpha / k) for value in least]
 
 
-def holm_of_those_that_can_speak(p_values: Sequence[float], least_p: Sequence[float], alpha: float) -> list[float]:
-    """Return Holm's adjusted p-values among the tests that `can_speak`; 1 for the others."""
-    spoken = can_speak(least_p, alpha)
-    adjusted = iter(holm([p for p, able in zip(p_values, spoken, strict=True) if able]))
-    return [next(adjusted) if able else 1.0 for able in spoken]
+def holm_tarone(p_values: Sequence[float], minimum_p: Sequence[float], alpha: float) -> list[float]:
+    """Return Holm's adjusted p-values among the tests that are `tarone_testable`; 1 for the others."""
+    testable_tests = tarone_testable(minimum_p, alpha)
+    adjusted = iter(holm([p for p, testable in zip(p_values, testable_tests, strict=True) if testable]))
+    return [next(adjusted) if testable else 1.0 for testable in testable_tests]
 
 
 POWER = 0.9
@@ -183,7 +183,7 @@ _DRAWS = 2000
 _MOST_SIMULATED = 100
 
 
-def smallest_visible_difference(sd: float, n_a: int, n_b: int, *, alpha: float, power: float = POWER) -> float:
+def minimum_detectable_difference(sd: float, n_a: int, n_b: int, *, alpha: float, power: float = POWER) -> float:
     """Return which shift a one-sided rank-sum test of n_a against n_b repeats finds with probability `power`.
 
     Infinite where even full separation would not be significant. For normal noise; about the same for heavier tails.
@@ -197,12 +197,12 @@ def smallest_visible_difference(sd: float, n_a: int, n_b: int, *, alpha: float, 
     alpha
         One-sided level after correction for other comparisons.
     """
-    if smallest_p(n_a, n_b) > alpha:
+    if minimum_attainable_p(n_a, n_b) > alpha:
         return math.inf
     return sd * (_simulated if n_a + n_b <= _MOST_SIMULATED else _approximated)(n_a, n_b, alpha, power)
 
 
-def smallest_p(n_a: int, n_b: int) -> float:
+def minimum_attainable_p(n_a: int, n_b: int) -> float:
     """Return the smallest one-sided p-value of a rank-sum test without ties.
 
     >>> round(smallest_p(5, 5), 5)
@@ -214,13 +214,13 @@ def smallest_p(n_a: int, n_b: int) -> float:
     return 1 / math.comb(n_a + n_b, n_a)
 
 
-def fewest_repeats(alpha: float) -> int:
+def required_sample_size(alpha: float) -> int:
     """Return how many repeats on either side it takes before a rank-sum test can be significant at `alpha`.
 
     >>> fewest_repeats(0.05 / 8)
     5
     """
-    return next(n for n in range(1, 1000) if smallest_p(n, n) <= alpha)
+    return next(n for n in range(1, 1000) if minimum_attainable_p(n, n) <= alpha)
 
 
 @lru_cache(maxsize=256)

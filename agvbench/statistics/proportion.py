@@ -10,7 +10,7 @@ CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
-class Share:
+class Proportion:
     """``count`` of ``total``, with the bounds that hold with 95 % confidence (Clopper and Pearson 1934).
 
     Examples
@@ -26,7 +26,7 @@ class Share:
     high: float
 
     @classmethod
-    def of(cls, outcomes: Iterable[bool]) -> Share:
+    def of(cls, outcomes: Iterable[bool]) -> Proportion:
         """Return the share of outcomes that are true."""
         from scipy.stats import binomtest
 

@@ -16,13 +16,13 @@ import numpy as np
 
 from agvbench.thesis.prediction.assumptions import Assumptions, Condition
 from agvbench.thesis.prediction.calibrated_vehicle import true_speed
-from agvbench.thesis.prediction.commands import Told, told
-from agvbench.thesis.prediction.end_pose import Prediction, arc_end, driven
+from agvbench.thesis.prediction.commands import CommandedDrive, commanded
+from agvbench.thesis.prediction.end_pose import EndPosePrediction, arc_end, driven
 from agvbench.thesis.prediction.scoring import CONDITIONS, ScoredRow, score_row
-from agvbench.thesis.prediction.trajectories import Trajectory
+from agvbench.thesis.prediction.trajectories import ThesisTrajectory
 from agvbench.thesis.refits.cornering import NEUTRAL_US, cornering_share, fitted_loss
 from agvbench.thesis.refits.steering import true_maps
-from agvbench.thesis.section import Table
+from agvbench.thesis.section import ThesisTable
 from agvbench.thesis.tables import GEOMETRY, end_pose_rows
 from agvbench.vehicle.kinematics import body_motion
 
@@ -30,7 +30,7 @@ _VALUES = 81
 
 
 @dataclass
-class Drive:
+class PredictedDrive:
     """One drive while effects act on it: axle angles [rad], distance along the wheels [m], curvature added [1/m]."""
 
     front_rad: float
@@ -50,40 +50,40 @@ class Cause:
     unit: str
     low: float
     high: float
-    act: Callable[[Drive, float], None]
+    act: Callable[[PredictedDrive, float], None]
 
 
-def _reverse(d: Drive, gain: float) -> None:
+def _reverse(d: PredictedDrive, gain: float) -> None:
     if d.distance_m < 0.0:
         d.front_rad, d.rear_rad = (1.0 + gain) * d.front_rad, (1.0 + gain) * d.rear_rad
 
 
-def _right(d: Drive, gain: float) -> None:
+def _right(d: PredictedDrive, gain: float) -> None:
     if d.side < 0:
         d.front_rad, d.rear_rad = (1.0 + gain) * d.front_rad, (1.0 + gain) * d.rear_rad
 
 
-def _coupled(d: Drive, share: float) -> None:
+def _coupled(d: PredictedDrive, share: float) -> None:
     d.front_rad, d.rear_rad = d.front_rad + share * d.rear_rad, d.rear_rad + share * d.front_rad
 
 
-def _wheels(d: Drive, curvature: float) -> None:
+def _wheels(d: PredictedDrive, curvature: float) -> None:
     d.curvature_per_m = curvature
 
 
-def _slip(d: Drive, gradient: float) -> None:
+def _slip(d: PredictedDrive, gradient: float) -> None:
     d.bend = 1.0 / (1.0 + gradient * d.speed_mps**2)
 
 
-def _roll(d: Drive, seconds: float) -> None:
+def _roll(d: PredictedDrive, seconds: float) -> None:
     d.distance_m += d.speed_mps * seconds
 
 
-def _faster(d: Drive, share: float) -> None:
+def _faster(d: PredictedDrive, share: float) -> None:
     d.distance_m *= 1.0 + share
 
 
-def _offset(d: Drive, angle: float) -> None:
+def _offset(d: PredictedDrive, angle: float) -> None:
     d.front_rad, d.rear_rad = d.front_rad + angle, d.rear_rad - angle
 
 
@@ -100,22 +100,26 @@ CAUSES = (
 
 
 @cache
-def _told_drives(condition: Condition, assumed: Assumptions) -> tuple[tuple[Trajectory, Told, Drive], ...]:
+def _commanded_drives(
+    condition: Condition, assumed: Assumptions
+) -> tuple[tuple[ThesisTrajectory, CommandedDrive, PredictedDrive], ...]:
     drives = []
     for trajectory in driven(condition):
-        command = told(trajectory, condition, assumed)
+        command = commanded(trajectory, condition, assumed)
         front, rear = true_maps(assumed.true_steering)
         speed = true_speed(command.drive_us, assumed.true_drive if condition == "calibrated" else "measured")
         angles = float(front(command.front_us)), float(rear(command.rear_us))
-        drives.append((trajectory, command, Drive(*angles, speed * command.duration_s, speed, trajectory.side)))
+        drives.append(
+            (trajectory, command, PredictedDrive(*angles, speed * command.duration_s, speed, trajectory.side))
+        )
     return tuple(drives)
 
 
-def predicted(cause: Cause | None, value: float, condition: Condition, assumed: Assumptions) -> list[Prediction]:
+def predicted(cause: Cause | None, value: float, condition: Condition, assumed: Assumptions) -> list[EndPosePrediction]:
     """Return the predictions of one condition with `cause` at `value`; without a cause those of the plain model."""
     out = []
-    for trajectory, command, as_told in _told_drives(condition, assumed):
-        drive = replace(as_told)
+    for trajectory, command, as_commanded in _commanded_drives(condition, assumed):
+        drive = replace(as_commanded)
         if cause is not None:
             cause.act(drive, value)
         speed, sideslip, yaw = (float(x) for x in body_motion(drive.front_rad, drive.rear_rad, 1.0, 1.0, GEOMETRY))
@@ -124,7 +128,7 @@ def predicted(cause: Cause | None, value: float, condition: Condition, assumed: 
         turned = drive.distance_m * kept * yaw * drive.bend + drive.curvature_per_m * length
         end, turned = arc_end(length, sideslip, turned)
         delta_s = math.hypot(end.x_m, end.y_m) - trajectory.distance_m(assumed.turn_target)
-        out.append(Prediction(trajectory, condition, command, end, math.degrees(turned), 1000.0 * delta_s))
+        out.append(EndPosePrediction(trajectory, condition, command, end, math.degrees(turned), 1000.0 * delta_s))
     return out
 
 
@@ -139,7 +143,7 @@ def rows_with(cause: Cause | None, value: float) -> list[ScoredRow]:
     """Return the 28 rows with `cause` at `value`."""
     assumed = Assumptions()
     every = [(p.trajectory.number, c, p) for c in CONDITIONS for p in predicted(cause, value, c, assumed)]
-    by_key: dict[tuple[int, str], Prediction] = {(number, condition): p for number, condition, p in every}
+    by_key: dict[tuple[int, str], EndPosePrediction] = {(number, condition): p for number, condition, p in every}
     return [score_row(row, by_key[row.trajectory, row.condition]) for row in end_pose_rows()]
 
 
@@ -219,7 +223,7 @@ def checks() -> tuple[Checked, ...]:
     return tuple(check(cause) for cause in CAUSES)
 
 
-def chapter_8_table() -> Table:
+def chapter_8_table() -> ThesisTable:
     """Return each effect's value from either condition, and the errors before and after on the other's drives."""
     plain = rows_with(None, 0.0)
     null = {c: null_error(r for r in plain if r.measured.condition == c) for c in CONDITIONS}
@@ -239,7 +243,9 @@ def chapter_8_table() -> Table:
         f"other's; 'left out' is one trajectory at a time. The null scores {null['calibrated']:.2f} calibrated and "
         f"{null['uncalibrated']:.2f} uncalibrated."
     )
-    return Table("residuals_chapter_8", "Chapter 8: one effect at a time, carried over", columns, rows, note, (), 3)
+    return ThesisTable(
+        "residuals_chapter_8", "Chapter 8: one effect at a time, carried over", columns, rows, note, (), 3
+    )
 
 
 def asymmetry_with(checked: Checked) -> tuple[float, float, float]:

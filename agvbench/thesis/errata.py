@@ -14,7 +14,7 @@ from agvbench.thesis.refits.drive import half_speed_errors, printed_cubic
 from agvbench.thesis.refits.idle_axle import common_lever_arm
 from agvbench.thesis.refits.polynomial import fit_polynomial
 from agvbench.thesis.refits.steering import refit_line
-from agvbench.thesis.section import Cell, Figure, Section, Table, figures_table
+from agvbench.thesis.section import Cell, Figure, ThesisSection, ThesisTable, figures_table
 from agvbench.thesis.tables import (
     GEOMETRY,
     MeasuredRow,
@@ -191,12 +191,12 @@ def _figures() -> list[Figure]:
     ]
 
 
-def errata_section() -> Section:
+def errata_section() -> ThesisSection:
     """Return the errata, each with the number that shows it."""
     rows: tuple[tuple[Cell, ...], ...] = tuple(_kinematics() + _fits() + _measurements())
     columns = ("where", "printed", "what shows it", "use instead")
     tables = (
-        Table("errata", "Errata and open ends", columns, rows),
+        ThesisTable("errata", "Errata and open ends", columns, rows),
         figures_table("text_figures", "Figures in the text", _figures()),
     )
     findings = (
@@ -209,4 +209,4 @@ def errata_section() -> Section:
             "the fits of eq. 7.1 to 7.3."
         ),
     )
-    return Section("errata", "Errata", findings, tables)
+    return ThesisSection("errata", "Errata", findings, tables)

@@ -19,7 +19,7 @@ from agvbench.thesis.refits.battery import fit_droop, held_out_errors
 from agvbench.thesis.refits.cornering import NEUTRAL_US, fit_loss, residual_of, samples, steering_measure
 from agvbench.thesis.refits.idle_axle import arm_across_tables, idle, idle_errors, slope_and_error
 from agvbench.thesis.refits.polynomial import fit_polynomial
-from agvbench.thesis.section import Cell, Section, Table
+from agvbench.thesis.section import Cell, ThesisSection, ThesisTable
 from agvbench.thesis.tables import drive_table, endurance_table, rms, steering_table
 from agvbench.types import Floats
 
@@ -33,8 +33,8 @@ class Traced:
     """One residual and its effect.
 
     ``source`` where it is; ``before`` and ``after`` models in words; ``effect`` the library's name; ``size`` of it in
-    words; ``left_out`` what was held out; ``at`` (n,) the places, in the unit of ``axis``; ``missed_before`` and
-    ``missed_after`` (n,) held-out errors there, measured minus predicted, in ``unit``; ``floor`` what no model can
+    words; ``left_out`` what was held out; ``at`` (n,) the places, in the unit of ``axis``; ``residual_before`` and
+    ``residual_after`` (n,) held-out errors there, measured minus predicted, in ``unit``; ``floor`` what no model can
     remove, or NaN where the table does not say; ``unexplained`` in words.
     """
 
@@ -48,20 +48,20 @@ class Traced:
     axis: str
     unit: str
     at: Floats
-    missed_before: Floats
-    missed_after: Floats
+    residual_before: Floats
+    residual_after: Floats
     floor: float
     unexplained: str
 
     @property
     def rms_before(self) -> float:
         """Held-out root mean square before."""
-        return rms(self.missed_before)
+        return rms(self.residual_before)
 
     @property
     def rms_after(self) -> float:
         """Held-out root mean square after."""
-        return rms(self.missed_after)
+        return rms(self.residual_after)
 
 
 def _left_out(points: CurvePoints, fitter: Callable[[CurvePoints], MapFit]) -> Floats:
@@ -161,17 +161,17 @@ def traced() -> tuple[Traced, ...]:
     return (_steering("front"), _steering("rear"), _drive(), _cornering(), _battery(), _idle("rear"), _idle("front"))
 
 
-def residuals_section() -> Section:
+def residuals_section() -> ThesisSection:
     """Return residual, effect, before and after, for every table, and chapter 8's effects carried over."""
     values: dict[str, Cell] = {f"{t.name}_before": t.rms_before for t in traced()}
     values |= {f"{t.name}_after": t.rms_after for t in traced()}
     values["kinematics_alone_mm_per_s"] = kinematics_alone()
     findings = (*_findings(), *chapter_8_findings())
     tables = (_residual_table(), _idle_table(), chapter_8_table())
-    return Section("residuals", "From residual to effect, held out", findings, tables, values)
+    return ThesisSection("residuals", "From residual to effect, held out", findings, tables, values)
 
 
-def _residual_table() -> Table:
+def _residual_table() -> ThesisTable:
     columns: tuple[str, ...] = ("where", "before", "after", "effect", "size", "left out", "unit", "before, held out")
     columns += ("after, held out", "floor", "unexplained")
     rows = tuple(
@@ -183,11 +183,11 @@ def _residual_table() -> Table:
     )  # fmt: skip
     narrow = ("where", "", "after", "effect", "size", "left out", "unit", "before", "held out", "floor", "")
     note = "Root mean squares of held-out errors; the floor of appendix B is its printed step of 10 mm/s."
-    return Table("residuals", "From residual to effect", columns, rows, note, narrow, 3)
+    return ThesisTable("residuals", "From residual to effect", columns, rows, note, narrow, 3)
 
 
-def _idle_table() -> Table:
-    return Table(
+def _idle_table() -> ThesisTable:
+    return ThesisTable(
         "residuals_idle_axle", "The idle axle, each table predicted with the other's effect",
         ("idle axle", "its mean [deg]", "lever arm [deg]", "coupling [deg]"),
         tuple((f"{a} axle", *values) for a, values in arm_across_tables().items()),

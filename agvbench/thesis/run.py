@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from agvbench.errors import FlagError
-from agvbench.thesis.section import Section
+from agvbench.thesis.section import ThesisSection
 from agvbench.workflows.output_files import write_file
 
 SCHEMA = 1
@@ -34,7 +34,7 @@ def section_names() -> tuple[str, ...]:
     return tuple(_MODULES)
 
 
-def thesis_sections(names: Sequence[str] = ()) -> Iterator[Section]:
+def thesis_sections(names: Sequence[str] = ()) -> Iterator[ThesisSection]:
     """Yield the sections of these names in reading order, each as soon as it is computed; all if none is named.
 
     Raises
@@ -48,13 +48,13 @@ def thesis_sections(names: Sequence[str] = ()) -> Iterator[Section]:
     return (_section(name) for name in _MODULES if not names or name in names)
 
 
-def _section(name: str) -> Section:
+def _section(name: str) -> ThesisSection:
     module = importlib.import_module(f"{__package__}.{_MODULES[name]}")
-    section: Section = getattr(module, f"{name}_section")()
+    section: ThesisSection = getattr(module, f"{name}_section")()
     return section
 
 
-def write_json(sections: Sequence[Section], path: Path) -> None:
+def write_json(sections: Sequence[ThesisSection], path: Path) -> None:
     """Write all sections as one JSON file (``schema``, ``sections``).
 
     Raises
@@ -66,7 +66,7 @@ def write_json(sections: Sequence[Section], path: Path) -> None:
     _write("--json", path, json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 
-def write_tables(sections: Sequence[Section], directory: Path) -> list[Path]:
+def write_tables(sections: Sequence[ThesisSection], directory: Path) -> list[Path]:
     """Write one CSV per table and ``thesis.md`` with everything; return the paths.
 
     Raises

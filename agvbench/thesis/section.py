@@ -13,7 +13,7 @@ Cell = str | float | int | bool | None
 
 
 @dataclass(frozen=True)
-class Table:
+class ThesisTable:
     """A table: `columns` are headings, ``rows[i][j]`` the cells; `name` is a file name without its ending.
 
     `narrow_columns` are shorter headings for a terminal, explained by the note; an empty one is not shown there.
@@ -55,13 +55,13 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Section:
+class ThesisSection:
     """A part of the answer: what was found in plain words, and the tables it rests on."""
 
     name: str
     title: str
     findings: tuple[str, ...]
-    tables: tuple[Table, ...]
+    tables: tuple[ThesisTable, ...]
     values: dict[str, Cell] = field(default_factory=dict)
 
     def markdown(self) -> str:
@@ -151,6 +151,6 @@ class Figure:
         return (self.what, self.where, self.printed, float(self.ours), self.agrees, self.remark)
 
 
-def figures_table(name: str, title: str, figures: list[Figure], note: str = "") -> Table:
+def figures_table(name: str, title: str, figures: list[Figure], note: str = "") -> ThesisTable:
     """Return a table of figures."""
-    return Table(name, title, COLUMNS, tuple(figure.row() for figure in figures), note, digits=6)
+    return ThesisTable(name, title, COLUMNS, tuple(figure.row() for figure in figures), note, digits=6)

@@ -18,7 +18,7 @@ GEOMETRY = Geometry(front_axle_m=0.181, rear_axle_m=0.121)
 STATISTICS = ("min", "q1", "median", "q3", "max")
 
 
-class Columns:
+class NumberedColumns:
     """A table as printed: its rows by column name, every cell as text."""
 
     def __init__(self, rows: list[dict[str, str]]) -> None:
@@ -29,7 +29,7 @@ class Columns:
         return np.array([float(row[name]) for row in self.rows])
 
 
-def load_table(name: str) -> Columns:
+def load_table(name: str) -> NumberedColumns:
     """Return one transcribed table, for example ``"table_7_4_straight_speed"``.
 
     Raises
@@ -40,7 +40,7 @@ def load_table(name: str) -> Columns:
     path = resource_directory("reports") / "reference" / "thesis" / f"{name}.csv"
     try:
         with path.open(encoding="utf-8", newline="") as stream:
-            return Columns(list(csv.DictReader(stream)))
+            return NumberedColumns(list(csv.DictReader(stream)))
     except OSError as error:
         raise FileError(
             "table of the thesis cannot be read", where=path, value=error.strerror, remedy="install agvbench again"

@@ -12,7 +12,7 @@ from agvbench.campaign.completeness import Completeness
 from agvbench.errors import AgvbenchError, FlagError
 from agvbench.running.configuration.provenance import INPUTS_TABLE
 from agvbench.running.configuration.settings import BenchSettings
-from agvbench.statistics import Comparison, Verdict, compare, pose_errors
+from agvbench.statistics import Comparison, ComparisonVerdict, compare, pose_errors
 from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
 from agvbench.statistics.comparison_summary import comparison_to_json
 from agvbench.statistics.quantities import END_POSE, QUANTITIES
@@ -198,7 +198,7 @@ def exit_code(comparison: Comparison, fail_on: str, known: Comparability = NOTHI
         return 0
     if known.incomparable:
         return 3
-    bad = {"regression": [Verdict.WORSE], "any": [Verdict.WORSE, Verdict.BETTER]}[fail_on]
+    bad = {"regression": [ComparisonVerdict.WORSE], "any": [ComparisonVerdict.WORSE, ComparisonVerdict.BETTER]}[fail_on]
     if any(comparison.of(verdict) for verdict in bad):
         return 1
     return 3 if known.incomplete else 0

@@ -60,8 +60,8 @@ def run_diagnose(
     if seed < 0:
         raise FlagError("must not be negative", where="--seed", value=seed)
     campaign = Campaign.open(directory).check()
-    believed = Path(vehicle) if vehicle is not None else campaign.path / "vehicle.toml"
-    model = VehicleModel.load(believed) if vehicle is not None or believed.exists() else None
+    vehicle_file = Path(vehicle) if vehicle is not None else campaign.path / "vehicle.toml"
+    model = VehicleModel.load(vehicle_file) if vehicle is not None or vehicle_file.exists() else None
     found = _diagnosed(campaign, model, seed, progress)
     show(found)
     if next_file is not None and found.next_experiment is not None:

@@ -21,7 +21,7 @@ from agvbench.errors import FileError, PlanError
 from agvbench.model import VehicleModel
 from agvbench.planning import plan
 from agvbench.running.configuration.settings import SETTINGS_FILE, BenchSettings
-from agvbench.running.execution.run_records import DriveOrder
+from agvbench.running.execution.run_records import RunRequest
 from agvbench.running.session.opening import open_session
 from agvbench.types import Run
 from agvbench.workflows.diagnosis_files import RESIDUALS
@@ -137,7 +137,7 @@ def _driven(
         for repeat, run_id in zip(range(1, experiment.repeats + 1), free, strict=False):
             start = experiment.starts[(repeat - 1) % len(experiment.starts)] if experiment.starts else None
             planned = plan(trajectory, model or session.nominal, workspace=session.workspace, start=start)
-            order = DriveOrder(
+            request = RunRequest(
                 run_id=run_id,
                 experiment=trajectory.experiment,
                 trajectory=trajectory.name,
@@ -147,7 +147,7 @@ def _driven(
                 target=planned.target,
                 start=planned.start,
             )
-            run = session.run(order, planned)
+            run = session.run(request, planned)
             if run.is_ok:
                 runs.append(run)
             else:

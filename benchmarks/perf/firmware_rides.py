@@ -49,7 +49,7 @@ class Rides:
             pulses += self._controller.exchange(b"", began_s + at_s)[1]
             for one in what:
                 if isinstance(one, Command):
-                    self._controller.say(one)
+                    self._controller.set_command(one)
                 else:
                     self._controller.exchange(one, self._controller.now_s)
         pulses += self._controller.exchange(b"", began_s + said[-1][0] + SETTLE_S)[1]

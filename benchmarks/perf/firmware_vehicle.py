@@ -1,7 +1,7 @@
 """A vehicle without scatter whose static maps are known: what its runs differ in, firmware and line have done.
 
-`make_plant` is the vehicle for ``--plant benchmarks/perf/firmware_vehicle.py:make_plant``, `believed` the model that
-equals it. Its pulses take effect at once: it adds no servo frame of its own to that of the firmware.
+`make_plant` is the vehicle for ``--plant benchmarks/perf/firmware_vehicle.py:make_plant``, `nominal_vehicle` the
+model that equals it. Its pulses take effect at once: it adds no servo frame of its own to that of the firmware.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def _plant(seed: int, play: tuple[float, float, float]) -> HiddenPlant:
     return HiddenPlant(dict(BASE), play, seed, SealedTruth("nothing", constants=dict(BASE)))
 
 
-def believed() -> VehicleModel:
+def nominal_vehicle() -> VehicleModel:
     """Return the model that knows all of it."""
     neutral, dead = BASE["neutral"], BASE["drive_dead"]
     low, high = BASE["command_low"], BASE["command_high"]

@@ -39,7 +39,7 @@ from agvbench.bus.messages.frames import FrameClock, FramesMessage
 from agvbench.bus.messages.identity import AgvIdentity, MocapIdentity
 from agvbench.bus.messages.request import Reset, Sampling
 from agvbench.bus.outbox import CommandOutbox
-from agvbench.bus.session import open_session
+from agvbench.bus.session import open_bus_session
 from agvbench.errors import LinkError
 from agvbench.types import Command, Frames, Pose
 
@@ -241,7 +241,7 @@ def lock_steps(table: Table, session: zenoh.Session, where: str, plans: list[Pla
             command = Command(0.0, float(count), 0.0)
 
             def ours(command: Command = command) -> object:
-                return link.exchange(command, t_s=0.0, hold_s=0.8)
+                return link.control_cycle(command, t_s=0.0, hold_s=0.8)
 
             table.compare(label("exchange", where, plan, count), ours, bare(count), plan, None)
 
@@ -278,7 +278,7 @@ def bare_peer(session: zenoh.Session) -> Iterator[Callable[[int], Callable[[], o
 def publish_load(endpoint: str, rate_hz: float, duration_s: float) -> None:
     """Publish for each of 25 vehicles what frames have come since the last time; say how many and how long it took."""
     with ExitStack() as stack:
-        session = stack.enter_context(open_session(connect=[endpoint]))
+        session = stack.enter_context(open_bus_session(connect=[endpoint]))
         clock, hosts = WallClock(), []
         for number in range(VEHICLES):
             keys, adapter = Keys("perf", f"agv{number}"), EchoMocap()
@@ -345,7 +345,7 @@ def child(*arguments: str) -> subprocess.Popen[str]:
 
 def load(endpoint: str, rate_hz: float, duration_s: float) -> None:
     """Print what arrived of the load, and whether anything was lost without being counted."""
-    with open_session(listen=[endpoint]) as session:
+    with open_bus_session(listen=[endpoint]) as session:
         recorder = Recorder(session)
         process = child("--load", endpoint, str(rate_hz), str(duration_s))
         assert process.stdin is not None
@@ -389,7 +389,7 @@ def main() -> None:
     arguments = parser.parse_args()
     if arguments.echo:
         with (
-            open_session(listen=[arguments.echo]) as session,
+            open_bus_session(listen=[arguments.echo]) as session,
             echo_node(session, bare_first=arguments.bare_first),
         ):
             print("ready", flush=True)
@@ -404,14 +404,14 @@ def main() -> None:
     few = [Plan("back to back", 5, 100, 0.0), Plan("at 240 Hz", 3, 40, 1 / 240.0)]
     print(f"{'what':56s} {'ours':>11s} {'bare Zenoh':>11s} {'ratio':>7s}  bound  met?")
     table = Table()
-    with open_session() as session, echo_node(session):
+    with open_bus_session() as session, echo_node(session):
         round_trips(table, session, "one session", plans)
         lock_steps(table, session, "one session", plans)
     table.tell()
     for launch in range(4 * more):
         endpoint = free_endpoint()
         process = child("--echo", endpoint, *(["--bare-first"] if launch % 2 else []))
-        with open_session(connect=[endpoint]) as session:
+        with open_bus_session(connect=[endpoint]) as session:
             round_trips(table, session, "two processes", few)
             lock_steps(table, session, "two processes", few)
         process.communicate("\n")

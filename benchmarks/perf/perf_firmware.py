@@ -40,7 +40,7 @@ def respond(version: str, given: list[Command]) -> tuple[np.ndarray, np.ndarray,
     delays, errors, mixed = [], [], 0
     for command in given:
         said_s = microcontroller.now_s
-        microcontroller.say(command)
+        microcontroller.set_command(command)
         pulses = microcontroller.run_until(said_s + 0.06 + luck.uniform(0.0, 0.02))
         first = [_first(pulses, channel, wanted) for channel, wanted in enumerate(command)]
         delays.append([1e3 * (pulse.fall / CYCLES_PER_S - said_s) for pulse in first])
@@ -60,7 +60,7 @@ def watchdog_ms(repeats: int) -> list[float]:
     for _ in range(repeats):
         microcontroller.run_until(microcontroller.now_s + luck.uniform(0.0, 0.02))
         said_s = microcontroller.now_s
-        microcontroller.say(Command(1800.0, 1500.0, 1500.0))
+        microcontroller.set_command(Command(1800.0, 1500.0, 1500.0))
         drives = [pulse for pulse in microcontroller.run_until(said_s + 0.4) if pulse.channel == 0]
         last = max(pulse.rise for pulse in drives if pulse.width_us > 1700.0)
         found.append(1e3 * (min(pulse.rise for pulse in drives if pulse.rise > last) / CYCLES_PER_S - said_s))
@@ -100,7 +100,7 @@ def driven(agv: str, mocap: str) -> float:
         link.reset(Pose(0.0, 0.0, 0.0), run_key="speed")
         began, t_s = time.perf_counter(), 0.0
         for index in range(int(DRIVEN_S / 0.5)):
-            link.exchange(NEUTRAL._replace(drive=1600.0 + index), t_s=t_s, hold_s=0.5)
+            link.control_cycle(NEUTRAL._replace(drive=1600.0 + index), t_s=t_s, hold_s=0.5)
             t_s += 0.5
         return DRIVEN_S / (time.perf_counter() - began)
 

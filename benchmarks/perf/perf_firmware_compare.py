@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from firmware_needed import exit_code
 from firmware_rides import FRAME_S, Rides
-from firmware_vehicle import believed
+from firmware_vehicle import nominal_vehicle
 
 from agvbench.campaign import Campaign
 from agvbench.planning import load_trajectory, plan
@@ -100,7 +100,7 @@ def worst(commands: Commands) -> Commands:
 
 def rides(version: str) -> dict[int, dict[str, dict[str, Floats]]]:
     """Return the errors of rides at evenly spread phases, by trajectory and by who timed them."""
-    rig, model, found = Rides(version), believed(), {}
+    rig, model, found = Rides(version), nominal_vehicle(), {}
     for case, target in CASES.items():
         commands = plan(load_trajectory(str(case)), model, workspace=None).commands
         found[case] = {"worst": errors_of(rig.ends(worst(commands), PHASES), target)}
@@ -160,7 +160,7 @@ def main() -> int:
     def measure() -> None:
         folder = arguments.out or Path(tempfile.mkdtemp(prefix="agvbench-firmware-"))
         folder.mkdir(parents=True, exist_ok=True)
-        believed().save(vehicle := folder / "vehicle.toml")
+        nominal_vehicle().save(vehicle := folder / "vehicle.toml")
         campaigns = drive(folder, vehicle, arguments.repeats)
         print("\n── firmware 1 against firmware 2", flush=True)
         agvbench("compare", str(campaigns["1"]), str(campaigns["2"]), "--fail-on=never")

@@ -34,7 +34,7 @@ from agvbench.loop.before_after import (
     end_positions,
     root_mean_square_bias,
 )
-from agvbench.simulator.hidden import drawn_spec
+from agvbench.simulator.hidden import sampled_spec
 from agvbench.statistics import pose_errors
 from agvbench.statistics.equivalence import Bias
 from agvbench.statistics.quantities import COMPONENTS, DISTANCE, THESIS
@@ -57,10 +57,10 @@ class Driven:
     ends: list[EndPosition]
 
 
-def _drawn(plants: int, first_seed: int) -> Iterator[tuple[str, str, int]]:
+def _sampled(plants: int, first_seed: int) -> Iterator[tuple[str, str, int]]:
     seed = first_seed
     while plants:
-        spec = drawn_spec(seed)
+        spec = sampled_spec(seed)
         if spec != "nothing":
             plants -= 1
             yield spec, f"agvbench.simulator.hidden:{spec}", seed
@@ -85,7 +85,7 @@ def _go_round(name: str, plant: str, seed: int, repeats: int, folder: Path, *, m
     return Driven(f"{name} {seed}", f"{found['verdict']} {named}".strip(), *tables)
 
 
-def _tell(driven: Driven) -> None:
+def _report(driven: Driven) -> None:
     conditions = ("uncalibrated", "calibrated", "corrected")
     medians = [[end.median_mm[c] for end in driven.ends if c in end.median_mm] for c in conditions]
     parts = ["end position " + " → ".join(f"{mean(found):.1f}" for found in medians if found) + " mm"]
@@ -130,7 +130,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1, help="loops at a time (default 1)")
     parser.add_argument("--cells", action="store_true", help="print every trajectory")
     given = parser.parse_args()
-    wanted = [DEFAULT, *_drawn(given.plants, given.first_seed)]
+    wanted = [DEFAULT, *_sampled(given.plants, given.first_seed)]
     if given.only:
         wanted = [(name, f"agvbench.simulator.hidden:{name}", given.first_seed) for name in given.only]
     with contextlib.ExitStack() as stack:
@@ -140,7 +140,7 @@ def main() -> None:
         loops = []
         for driven in pool.map(go_round, *zip(*wanted, strict=True)):
             loops.append(driven)
-            _tell(driven)
+            _report(driven)
             if given.cells:
                 _tell_cells(driven)
     if any(loop.rows for loop in loops):

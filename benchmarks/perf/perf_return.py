@@ -27,7 +27,7 @@ from agvbench.running.execution.drive import drive
 from agvbench.running.positioning.placers import Auto, Rig
 from agvbench.running.quality import DEFAULT_LIMITS
 from agvbench.running.supervision import Supervisor
-from agvbench.simulator.hidden import drawn_spec
+from agvbench.simulator.hidden import sampled_spec
 from agvbench.types import Command, Commands, Pose, wrap_angle
 from agvbench.vehicle.geometry import Geometry
 
@@ -110,7 +110,7 @@ def _note(driven: Driven, start: Pose, room: Workspace) -> None:
     driven.outside += bool((clearances < 0.0).any())
 
 
-def _tell(driven: Driven) -> None:
+def _report(driven: Driven) -> None:
     if driven.position_m:
         mm, deg = np.array(driven.position_m) * 1e3, np.degrees(driven.heading_rad)
         print(
@@ -134,7 +134,7 @@ def _plants(given: argparse.Namespace) -> Iterator[tuple[str, str, int]]:
         yield "default", "agvbench.simulator:make_plant", 0
         yield "small, front-steered", SMALL, 0
     for seed in range(given.first_seed, given.first_seed + given.plants):
-        yield f"{drawn_spec(seed)} {seed}", "agvbench.simulator.hidden:make_plant", seed
+        yield f"{sampled_spec(seed)} {seed}", "agvbench.simulator.hidden:make_plant", seed
 
 
 def _sum(loops: Sequence[Driven], of: Callable[[Driven], int]) -> int:
@@ -156,7 +156,7 @@ def main() -> None:
     driven = []
     for name, spec, seed in _plants(given):
         driven.append(_go(name, spec, seed, given.returns, bus=given.bus))
-        _tell(driven[-1])
+        _report(driven[-1])
     asked, within = len(driven) * given.returns, _sum(driven, lambda one: one.within)
     outside = _sum(driven, lambda one: one.outside)
     print("\nwhat                               | ours             | asked | bound met?")

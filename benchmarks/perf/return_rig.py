@@ -18,7 +18,7 @@ from agvbench.bus.messages.identity import Identity
 from agvbench.bus.messages.request import Reset, Sampling
 from agvbench.bus.messages.truth import Truth
 from agvbench.model import VehicleModel
-from agvbench.running.links import RunnerLink, UnbrokenLink
+from agvbench.running.links import ContinuousLink, RunnerLink
 from agvbench.simulator import load_plant
 from agvbench.types import Command, Floats, Frames, Plant, Pose
 
@@ -56,10 +56,10 @@ def rig(seed: int, model: VehicleModel, *, bus: bool) -> Iterator[RunnerLink]:
     if bus:
         plant = f"{__name__}:make_watched"
         with open_rig("sim", plant=plant, seed=seed, command_unit=unit, neutral=neutral) as link:
-            yield UnbrokenLink(link)
+            yield ContinuousLink(link)
         return
     options = AdapterOptions(plant=Watched.spec, seed=seed, command_unit=unit, neutral=neutral)
-    yield UnbrokenLink(cast("VehicleLink", ShortCircuit(make_watched(seed), options)))
+    yield ContinuousLink(cast("VehicleLink", ShortCircuit(make_watched(seed), options)))
 
 
 class ShortCircuit:
@@ -80,7 +80,7 @@ class ShortCircuit:
         request = Reset(run_key, pose, Sampling(1.0, 0.0), 0, 0)
         self._agv.reset(replace(request, sampling=self._mocap.reset(request)))
 
-    def exchange(self, command: Command, *, t_s: float, hold_s: float) -> Frames:
+    def control_cycle(self, command: Command, *, t_s: float, hold_s: float) -> Frames:
         """Let the vehicle drive, and return what was seen."""
         return self._carry(CommandMessage(1, t_s, command, hold_s))
 

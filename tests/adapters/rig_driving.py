@@ -25,12 +25,12 @@ START = Pose(0.5, -0.25, 0.75)
 def drive_run(link: VehicleLink, run_key: str, holds_s: tuple[float, ...] = (0.7, 0.05, 1.3)) -> Frames:
     """Watch the vehicle at rest, drive, and wait for late frames."""
     link.reset(START, run_key=run_key)
-    parts = [link.exchange(NEUTRAL, t_s=-0.5, hold_s=0.5)]
+    parts = [link.control_cycle(NEUTRAL, t_s=-0.5, hold_s=0.5)]
     t_s = 0.0
     for index, hold_s in enumerate(holds_s):
-        parts.append(link.exchange(Command(1800.0, 1400.0 + 50.0 * index, 1550.0), t_s=t_s, hold_s=hold_s))
+        parts.append(link.control_cycle(Command(1800.0, 1400.0 + 50.0 * index, 1550.0), t_s=t_s, hold_s=hold_s))
         t_s += hold_s
-    parts += [link.exchange(NEUTRAL, t_s=t_s, hold_s=0.5), link.flush()]
+    parts += [link.control_cycle(NEUTRAL, t_s=t_s, hold_s=0.5), link.flush()]
     link.stop()
     return Frames.concatenate(parts)
 

@@ -20,7 +20,7 @@ from agvbench.bus.link import VehicleLink
 from agvbench.bus.messages.command import CommandMessage, decode_command, encode_command
 from agvbench.bus.messages.frames import FramesMessage, decode_frames, encode_frames, pack_columns, unpack_columns
 from agvbench.bus.messages.identity import AgvIdentity, Identity, MocapIdentity
-from agvbench.bus.session import open_session
+from agvbench.bus.session import open_bus_session
 from agvbench.cli import main
 from agvbench.errors import AgvbenchError
 from agvbench.types import Command, Frames
@@ -37,7 +37,7 @@ def command_line(*arguments: str) -> Callable[[], int]:
 def placed(**options: Any) -> Iterator[VehicleLink]:
     with open_rig(**({"plant": TINY} | options)) as link:
         link.reset(START, run_key="a")
-        link.exchange(NEUTRAL, t_s=0.0, hold_s=0.5)
+        link.control_cycle(NEUTRAL, t_s=0.0, hold_s=0.5)
         yield link
 
 
@@ -49,10 +49,12 @@ def rig(**options: Any) -> Callable[[], None]:
     return open_it
 
 
-def exchange(command: Command = NEUTRAL, t_s: float = 0.5, hold_s: float = 0.5, **options: Any) -> Callable[[], object]:
+def control_cycle(
+    command: Command = NEUTRAL, t_s: float = 0.5, hold_s: float = 0.5, **options: Any
+) -> Callable[[], object]:
     def exchange_once() -> object:
         with placed(**options) as link:
-            return link.exchange(command, t_s=t_s, hold_s=hold_s)
+            return link.control_cycle(command, t_s=t_s, hold_s=hold_s)
 
     return exchange_once
 
@@ -63,7 +65,10 @@ def real_and_simulated(agv_simulated: bool) -> Callable[[], Identity]:
 
 
 def without_a_camera() -> None:
-    with open_session() as session, host_adapters(session, "lab", AdapterOptions(plant=TINY), agv="sim", mocap=None):
+    with (
+        open_bus_session() as session,
+        host_adapters(session, "lab", AdapterOptions(plant=TINY), agv="sim", mocap=None),
+    ):
         VehicleLink(session, "lab", "agv1", discovery_limit_s=0.1)
 
 
@@ -72,7 +77,7 @@ def another_seed() -> None:
         probe.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
     options = AdapterOptions(plant=TINY, seed=1)
-    with open_session(listen=[endpoint]) as session, host_adapters(session, "lab", options, agv="sim", mocap="sim"):
+    with open_bus_session(listen=[endpoint]) as session, host_adapters(session, "lab", options, agv="sim", mocap="sim"):
         rig(connect=endpoint, seed=2)()
 
 
@@ -95,9 +100,9 @@ MISTAKES: dict[str, Callable[[], object]] = {
     "no endpoint": command_line("sim", "--listen", "localhost"),
     "protocol that loses messages": command_line("sim", "--connect", "udp/127.0.0.1:7447"),
     "port out of range": command_line("sim", "--listen", "tcp/127.0.0.1:70000"),
-    "nobody listens there": lambda: open_session(connect=["tcp/127.0.0.1:9"], timeout_s=0.1),
+    "nobody listens there": lambda: open_bus_session(connect=["tcp/127.0.0.1:9"], timeout_s=0.1),
     "address of another machine": command_line("mocap", "sim", "--listen", "tcp/192.0.2.1:7448"),
-    "open to others unasked": lambda: open_session(listen=["tcp/0.0.0.0:7447"]),
+    "open to others unasked": lambda: open_bus_session(listen=["tcp/0.0.0.0:7447"]),
     "certificates are not named": command_line("sim", "--listen", "tls/192.0.2.1:7447"),
     "configuration of the bus is missing": command_line("sim", "--bus-config", "no.json5"),
     "configuration says where to listen": a_configuration_that_listens,
@@ -112,11 +117,11 @@ MISTAKES: dict[str, Callable[[], object]] = {
     "another seed": another_seed,
     "real vehicle, simulated camera": real_and_simulated(False),
     "simulated vehicle, real camera": real_and_simulated(True),
-    "command is NaN": exchange(Command(float("nan"), 1500.0, 1500.0)),
-    "hold is negative": exchange(hold_s=-1.0),
-    "time goes back": exchange(t_s=0.25),
-    "time leaps ahead": exchange(t_s=9.0),
-    "plant raises": exchange(Command(1700.0, 1500.0, 1500.0), plant=FAILING),
+    "command is NaN": control_cycle(Command(float("nan"), 1500.0, 1500.0)),
+    "hold is negative": control_cycle(hold_s=-1.0),
+    "time goes back": control_cycle(t_s=0.25),
+    "time leaps ahead": control_cycle(t_s=9.0),
+    "plant raises": control_cycle(Command(1700.0, 1500.0, 1500.0), plant=FAILING),
     "message of another program": damaged(b"\x00" * 64, decode_command),
     "message of another version": damaged(COMMAND[:4] + b"\x01" + COMMAND[5:], decode_command),
     "message of another kind": damaged(COMMAND, decode_frames),

@@ -15,7 +15,7 @@ from test_real_time import MOVING, NEUTRAL, Silent, claimed_host
 from agvbench.bus.clock import WallClock
 from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import AGV, TIME, Keys
-from agvbench.bus.liveliness import Presence
+from agvbench.bus.liveliness import Liveliness
 from agvbench.bus.messages.command import CommandFlags, CommandMessage, pack_command
 from agvbench.bus.messages.event import Event, Level, encode_event
 from agvbench.bus.messages.frames import FrameClock, FramesFlags, pack_columns, pack_frames
@@ -23,7 +23,7 @@ from agvbench.bus.messages.wire import MAX_MESSAGE_BYTES, MAX_ROWS
 from agvbench.bus.outbox import CommandOutbox
 from agvbench.bus.queries import ask
 from agvbench.bus.real_time import RealTime
-from agvbench.bus.session import open_session
+from agvbench.bus.session import open_bus_session
 from agvbench.errors import LinkError, MessageError
 from agvbench.types import Frames
 
@@ -60,7 +60,7 @@ def kinds(told: list[bytes]) -> list[bytes]:
 
 def test_a_stop_passes_commands_that_wait() -> None:
     adapter, told = Slow(), []
-    with open_session() as session:
+    with open_bus_session() as session:
         events = session.declare_subscriber(KEYS.report, lambda sample: told.append(sample.payload.to_bytes()))
         host = claimed_host(session, KEYS, adapter, 7)
         for number in range(1, 2001):
@@ -72,14 +72,14 @@ def test_a_stop_passes_commands_that_wait() -> None:
         events.undeclare()
     # Each of 2000 would have taken 5 ms; of every 256 that waited, the newest was carried out.
     assert applied < 400
-    assert host.overtaken.count == 2000 - applied
+    assert host.reordered.count == 2000 - applied
     assert host.loss.lost == 0
     assert 1 <= kinds(told).count(b"commands_overtaken") <= 3
 
 
 def test_a_stop_between_commands_that_wait_is_carried_out_and_so_is_what_came_after() -> None:
     adapter = Slow()
-    with open_session() as session:
+    with open_bus_session() as session:
         host = claimed_host(session, KEYS, adapter, 7)
         flags = [CommandFlags.NONE] * 50 + [CommandFlags.STOP] + [CommandFlags.NONE] * 50
         for number, flag in enumerate(flags, start=1):
@@ -91,7 +91,7 @@ def test_a_stop_between_commands_that_wait_is_carried_out_and_so_is_what_came_af
 
 def test_nonsense_is_counted_told_seldom_and_does_not_hold_up_a_stop() -> None:
     adapter, told = Silent(), []
-    with open_session() as session:
+    with open_bus_session() as session:
         events = session.declare_subscriber(KEYS.report, lambda sample: told.append(sample.payload.to_bytes()))
         host = claimed_host(session, KEYS, adapter, 7)
         for _ in range(5000):
@@ -114,11 +114,11 @@ def test_what_a_runner_keeps_of_a_flood_is_bounded_and_its_stop_goes_out() -> No
     numbers = np.zeros(MAX_ROWS)
     many = Frames(numbers, numbers, numbers, numbers, numbers == 0.0, np.zeros(MAX_ROWS, np.int64), numbers, numbers)
     columns = pack_columns(many)
-    with open_session() as session:
+    with open_bus_session() as session:
         vehicle = session.declare_subscriber(KEYS.command, heard)
         inbox, outbox = Inbox(session, KEYS), CommandOutbox(session, KEYS)
-        presence = Presence(session, KEYS, WallClock())
-        runner = RealTime(inbox, outbox, presence, session=session, keys=KEYS, neutral=1500.0, clock=WallClock())
+        liveliness = Liveliness(session, KEYS, WallClock())
+        runner = RealTime(inbox, outbox, liveliness, session=session, keys=KEYS, neutral=1500.0, clock=WallClock())
         for number in range(1, 101):
             session.put(KEYS.report, pack_frames(number, columns, 0, FrameClock.ADAPTER, 0.0, FramesFlags.LAST, 5))
             session.put(KEYS.report, b"nonsense")
@@ -135,7 +135,7 @@ def test_what_a_runner_keeps_of_a_flood_is_bounded_and_its_stop_goes_out() -> No
         texts = [event.text for event in inbox.events if event.role == "runner"]
         assert sum("100 so far" in text for text in texts) == 1
         assert any("frames that nobody took were dropped" in text for text in texts)
-        for closed in (presence, outbox, inbox):
+        for closed in (liveliness, outbox, inbox):
             closed.close()
         runner.close()
         vehicle.undeclare()
@@ -148,7 +148,7 @@ def test_an_outbox_closes_while_another_thread_is_inside_a_send() -> None:
         sent.append(outbox.send(MOVING, 0.0, 1.0))
         sent.append(outbox.send(MOVING, 0.1, 1.0))
 
-    with open_session() as session:
+    with open_bus_session() as session:
         takes_nothing = session.declare_subscriber(KEYS.command, zenoh.handlers.FifoChannel(1))
         outbox = CommandOutbox(session, KEYS)
         sender = threading.Thread(target=send)
@@ -166,20 +166,20 @@ def test_an_outbox_closes_while_another_thread_is_inside_a_send() -> None:
 
 
 def test_tokens_of_roles_that_do_not_exist_are_not_remembered() -> None:
-    with open_session() as session:
-        presence = Presence(session, KEYS, WallClock())
+    with open_bus_session() as session:
+        liveliness = Liveliness(session, KEYS, WallClock())
         tokens = [session.liveliness().declare_token(KEYS.alive(f"role-{number}")) for number in range(200)]
         token = session.liveliness().declare_token(KEYS.alive(AGV))
-        presence.wait_for(AGV, 10.0)
-        assert set(presence._present) == {AGV}
+        liveliness.wait_for(AGV, 10.0)
+        assert set(liveliness._present) == {AGV}
         for one in (*tokens, token):
             one.undeclare()
-        presence.close()
+        liveliness.close()
 
 
 def test_an_answer_that_never_ends_is_not_read_to_its_end() -> None:
-    with open_session() as session:
-        asked = session.declare_queryable(KEYS.question(AGV, TIME))
+    with open_bus_session() as session:
+        asked = session.declare_queryable(KEYS.queryable(AGV, TIME))
         given = threading.Event()
 
         def answer() -> None:
@@ -191,7 +191,7 @@ def test_an_answer_that_never_ends_is_not_read_to_its_end() -> None:
         thread = threading.Thread(target=answer)
         thread.start()
         with pytest.raises(Exception, match="no answer"):
-            ask(session, KEYS.question(AGV, TIME), b"", 15.0)
+            ask(session, KEYS.queryable(AGV, TIME), b"", 15.0)
         assert not given.is_set()
         given.set()
         thread.join()
@@ -199,7 +199,7 @@ def test_an_answer_that_never_ends_is_not_read_to_its_end() -> None:
 
 def test_messages_that_are_too_long_do_not_arrive_and_the_rest_does(free_endpoint: str) -> None:
     arrived: list[int] = []
-    with open_session(listen=[free_endpoint]) as here, open_session(connect=[free_endpoint]) as there:
+    with open_bus_session(listen=[free_endpoint]) as here, open_bus_session(connect=[free_endpoint]) as there:
         subscriber = here.declare_subscriber("x", lambda sample: arrived.append(len(sample.payload.to_bytes())))
         assert until(lambda: bool(list(here.info.transports())))
         publisher = there.declare_publisher("x", congestion_control=zenoh.CongestionControl.BLOCK)

@@ -84,8 +84,8 @@ def test_the_how_tos_vehicle_drives_is_seen_and_is_stopped(file: Path, lab: Lab)
     with open_rig(f"{file}:127.0.0.1:{lab.vehicle_port}", f"{file}:{lab.camera_port}") as link:
         assert (link.identity().firmware, link.identity().simulated) == ("my firmware 3", False)
         assert link.identity().agv.adapter == "my_lab"
-        link.exchange(NEUTRAL, t_s=0.0, hold_s=0.3)
-        frames = link.exchange(Command(1900.0, 1500.0, 1500.0), t_s=0.3, hold_s=0.8)
+        link.control_cycle(NEUTRAL, t_s=0.0, hold_s=0.3)
+        frames = link.control_cycle(Command(1900.0, 1500.0, 1500.0), t_s=0.3, hold_s=0.8)
     assert frames.x_m[-1] - frames.x_m[0] > 0.05
     deadline_s = time.monotonic() + 10.0
     while lab.told[-1]["drive"] != 1500.0 and time.monotonic() < deadline_s:

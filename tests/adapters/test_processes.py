@@ -17,7 +17,7 @@ from rig_driving import HANGING, NEUTRAL, START, TINY, digest, drive_run, proces
 
 from agvbench.adapters import AdapterOptions, host_adapters, open_rig
 from agvbench.bus.link import VehicleLink
-from agvbench.bus.session import open_session
+from agvbench.bus.session import open_bus_session
 from agvbench.errors import AdapterGoneError, LinkError
 
 pytestmark = pytest.mark.real_time
@@ -42,7 +42,7 @@ def endpoint() -> str:
 def test_same_frames_over_tcp_between_two_sessions(expected: list[str], endpoint: str) -> None:
     options = AdapterOptions(plant=TINY, seed=11)
     with (
-        open_session(listen=[endpoint]) as session,
+        open_bus_session(listen=[endpoint]) as session,
         host_adapters(session, "lab", options, agv="sim", mocap="sim"),
         open_rig(connect=endpoint, seed=11) as link,
     ):
@@ -82,13 +82,13 @@ def test_a_simulator_that_is_killed_ends_the_reset(endpoint: str) -> None:
 def test_a_simulator_that_is_killed_ends_the_exchange(endpoint: str) -> None:
     with process("sim", "--plant", HANGING, "--listen", endpoint) as child, open_rig(connect=endpoint) as link:
         link.reset(START, run_key="a")
-        link.exchange(NEUTRAL, t_s=0.0, hold_s=0.1)
+        link.control_cycle(NEUTRAL, t_s=0.0, hold_s=0.1)
         killer = killing(child)
         with pytest.raises(AdapterGoneError, match=r"the (agv|mocap) adapter vanished: .* ago"):
-            link.exchange(NEUTRAL._replace(drive=1700.0), t_s=0.1, hold_s=0.1)
+            link.control_cycle(NEUTRAL._replace(drive=1700.0), t_s=0.1, hold_s=0.1)
         killer.wait()
         with pytest.raises(AdapterGoneError, match="vanished"):
-            link.exchange(NEUTRAL, t_s=0.2, hold_s=0.1)
+            link.control_cycle(NEUTRAL, t_s=0.2, hold_s=0.1)
 
 
 @contextmanager
@@ -114,14 +114,14 @@ def test_a_suspended_adapter_is_named_long_before_the_answer_limit(endpoint: str
             with pytest.raises(AdapterGoneError, match=f"the {role} adapter vanished: .*if that was suspended"):
                 link.reset(START, run_key="b")
             with pytest.raises(AdapterGoneError, match=f"the {role} adapter vanished"):
-                link.exchange(NEUTRAL, t_s=0.0, hold_s=0.1)
+                link.control_cycle(NEUTRAL, t_s=0.0, hold_s=0.1)
         assert time.monotonic() - began_s < 30.0  # it takes about 3 s, but for a busy machine; the limit is 60 s
 
 
 def test_a_simulator_with_another_seed_is_refused(endpoint: str) -> None:
     options = AdapterOptions(plant=TINY, seed=1)
     with (
-        open_session(listen=[endpoint]) as session,
+        open_bus_session(listen=[endpoint]) as session,
         host_adapters(session, "lab", options, agv="sim", mocap="sim"),
         pytest.raises(LinkError, match="runs with another seed: 1"),
         open_rig(connect=endpoint, seed=2),
@@ -131,7 +131,7 @@ def test_a_simulator_with_another_seed_is_refused(endpoint: str) -> None:
 
 def test_an_adapter_that_is_not_there_is_missed(endpoint: str) -> None:
     with (
-        open_session(listen=[endpoint]) as session,
+        open_bus_session(listen=[endpoint]) as session,
         host_adapters(session, "lab", AdapterOptions(plant=TINY), agv="sim", mocap=None),
         pytest.raises(AdapterGoneError, match="no mocap adapter on the bus"),
         open_rig(connect=endpoint, discovery_limit_s=0.3),
@@ -143,9 +143,9 @@ def test_a_vehicle_without_a_camera_says_so(endpoint: str) -> None:
     """The camera's process is on the bus of the runner, but the vehicle's process does not see it."""
     options = AdapterOptions(plant=TINY)
     with (
-        open_session(listen=[endpoint]) as session,
+        open_bus_session(listen=[endpoint]) as session,
         host_adapters(session, "lab", options, agv="sim", mocap=None),
-        open_session(connect=[endpoint]) as other,
+        open_bus_session(connect=[endpoint]) as other,
         host_adapters(other, "lab", options, agv=None, mocap="sim"),
     ):
         link = VehicleLink(session, "lab", "agv1")
@@ -186,8 +186,8 @@ def test_a_second_runner_of_one_vehicle_is_refused_until_the_first_has_gone(endp
 
 def test_of_runners_that_start_together_one_has_the_vehicle_until_its_connection_ends(endpoint: str) -> None:
     options = AdapterOptions(plant=TINY)
-    with open_session(listen=[endpoint]) as bus, host_adapters(bus, "lab", options, agv="sim", mocap="sim"):
-        sessions = [open_session(connect=[endpoint]) for _ in range(4)]
+    with open_bus_session(listen=[endpoint]) as bus, host_adapters(bus, "lab", options, agv="sim", mocap="sim"):
+        sessions = [open_bus_session(connect=[endpoint]) for _ in range(4)]
 
         def start(session: Any) -> VehicleLink | str:
             try:

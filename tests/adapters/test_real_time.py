@@ -23,7 +23,7 @@ from agvbench.bus.messages.identity import AgvIdentity
 from agvbench.bus.messages.request import encode_claim, encode_time
 from agvbench.bus.queries import ask
 from agvbench.bus.real_time import Failure, measure_offset
-from agvbench.bus.session import open_session
+from agvbench.bus.session import open_bus_session
 from agvbench.errors import AgvbenchError, LinkError, RunStoppedError
 from agvbench.types import Command, Frames
 
@@ -38,9 +38,9 @@ def test_frames_carry_the_runs_clock_and_show_the_drive() -> None:
         assert link.identity().simulated
         assert not link.identity().lock_step
         link.reset(START, run_key="a")
-        parts = [link.exchange(NEUTRAL, t_s=-0.3, hold_s=0.3)]
-        parts.append(link.exchange(Command(1900.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.4))
-        parts.append(link.exchange(NEUTRAL, t_s=0.4, hold_s=0.2))
+        parts = [link.control_cycle(NEUTRAL, t_s=-0.3, hold_s=0.3)]
+        parts.append(link.control_cycle(Command(1900.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.4))
+        parts.append(link.control_cycle(NEUTRAL, t_s=0.4, hold_s=0.2))
         parts.append(link.flush())
         assert link.loss.lost == 0
     frames = Frames.concatenate(parts)
@@ -59,7 +59,7 @@ def test_a_second_run_begins_at_its_own_zero() -> None:
     with open_rig("live", plant=TINY) as link:
         for run_key in ("a", "b"):
             link.reset(START, run_key=run_key)
-            frames = link.exchange(NEUTRAL, t_s=-0.2, hold_s=0.2)
+            frames = link.control_cycle(NEUTRAL, t_s=-0.2, hold_s=0.2)
             assert np.all(frames.t_s < 0.1)
 
 
@@ -71,7 +71,7 @@ def test_what_ends_a_run_does_not_replace_what_ends_the_session(order: tuple[typ
         while len(link._inbox.events) < len(order):
             time.sleep(0.01)
         with pytest.raises(LinkError, match="made up LinkError"):
-            link.exchange(NEUTRAL, t_s=0.0, hold_s=0.05)
+            link.control_cycle(NEUTRAL, t_s=0.0, hold_s=0.05)
 
 
 def test_what_ends_the_session_is_not_forgotten_with_what_ended_a_run_at_the_same_instant(
@@ -128,13 +128,13 @@ class Silent(AgvAdapter):
 def claimed_host(session: zenoh.Session, keys: Keys, adapter: AgvAdapter, source: int = 0) -> AgvHost:
     """Put a vehicle on the bus, and claim it for the runner `source`."""
     host = AgvHost(session, keys, adapter, WallClock(), show=lambda _: None)
-    ask(session, keys.question(AGV, CLAIM), encode_claim(source), 5.0)
+    ask(session, keys.queryable(AGV, CLAIM), encode_claim(source), 5.0)
     return host
 
 
 def test_a_vehicle_whose_runner_falls_silent_is_stopped() -> None:
     adapter, keys = Silent(), Keys("lab", "agv1")
-    with open_session() as session:
+    with open_bus_session() as session:
         events = session.declare_subscriber(keys.report)
         host = claimed_host(session, keys, adapter)
         session.put(keys.command, encode_command(CommandMessage(1, 0.0, MOVING, 10.0)))
@@ -148,7 +148,7 @@ def test_a_vehicle_whose_runner_falls_silent_is_stopped() -> None:
 
 def test_a_vehicle_at_rest_is_stopped_without_an_event_when_no_command_comes() -> None:
     adapter, keys, told = Silent(), Keys("lab", "agv1"), []
-    with open_session() as session:
+    with open_bus_session() as session:
         events = session.declare_subscriber(keys.report, lambda sample: told.append(sample.payload.to_bytes()))
         host = claimed_host(session, keys, adapter)
         session.put(keys.command, encode_command(CommandMessage(1, 0.0, NEUTRAL, 10.0)))
@@ -160,7 +160,7 @@ def test_a_vehicle_at_rest_is_stopped_without_an_event_when_no_command_comes() -
 
 def test_a_vehicle_that_no_runner_has_takes_stops_only_and_is_stopped_when_its_runner_vanishes() -> None:
     adapter, keys = Silent(), Keys("lab", "agv1")
-    with open_session() as session:
+    with open_bus_session() as session:
         events = session.declare_subscriber(keys.report)
         token = session.liveliness().declare_token(keys.runner(7))
         host = claimed_host(session, keys, adapter, 7)
@@ -191,7 +191,7 @@ class Jammed(Silent):
 
 def test_a_stop_that_fails_is_told_and_tried_again() -> None:
     adapter, keys = Jammed(), Keys("lab", "agv1")
-    with open_session() as session:
+    with open_bus_session() as session:
         events = session.declare_subscriber(keys.report)
         host = claimed_host(session, keys, adapter)
         session.put(keys.command, encode_command(CommandMessage(1, 0.0, NEUTRAL, 10.0)))
@@ -217,7 +217,7 @@ class Hanging(Silent):
 
 def test_what_hangs_and_comes_back_driving_is_stopped_again() -> None:
     adapter, keys = Hanging(), Keys("lab", "agv1")
-    with open_session() as session:
+    with open_bus_session() as session:
         host = claimed_host(session, keys, adapter)
         session.put(keys.command, encode_command(CommandMessage(1, 0.0, NEUTRAL, 10.0)))
         assert adapter.stopped.wait(10.0)
@@ -236,12 +236,12 @@ class Stuttering(Silent):
 
 def test_a_gap_is_told_to_each_runner_even_if_the_one_before_had_a_longer_one() -> None:
     adapter, keys, told = Silent(), Keys("lab", "agv1"), []
-    with open_session() as session:
+    with open_bus_session() as session:
         events = session.declare_subscriber(keys.report, lambda sample: told.append(sample.payload.to_bytes()))
         host = claimed_host(session, keys, adapter)
         for number, pause_s in enumerate((0.45, 0.1, 0.3, 0.1), start=1):
             if number == 3:
-                ask(session, keys.question(AGV, CLAIM), encode_claim(0), 5.0)
+                ask(session, keys.queryable(AGV, CLAIM), encode_claim(0), 5.0)
             session.put(keys.command, encode_command(CommandMessage(number, 0.0, MOVING, 1.0)))
             time.sleep(pause_s)
         host.close()
@@ -254,7 +254,7 @@ def test_commands_further_apart_than_the_watchdog_allows_are_told_with_both_figu
     channel: str,
 ) -> None:
     adapter, keys, told = Stuttering(), Keys("lab", "agv1"), []
-    with open_session() as session:
+    with open_bus_session() as session:
         events = session.declare_subscriber(keys.report, lambda sample: told.append(sample.payload.to_bytes()))
         host = claimed_host(session, keys, adapter)
         for number, value in enumerate((1500.0, 1500.0, 1800.0, 1500.0), start=1):
@@ -271,7 +271,7 @@ def test_commands_further_apart_than_the_watchdog_allows_are_told_with_both_figu
 
 def test_a_flush_which_the_vehicle_does_not_hear_ends_no_gap() -> None:
     adapter, keys, told = Silent(), Keys("lab", "agv1"), []
-    with open_session() as session:
+    with open_bus_session() as session:
         events = session.declare_subscriber(keys.report, lambda sample: told.append(sample.payload.to_bytes()))
         host = claimed_host(session, keys, adapter)
         for number, flags in enumerate((CommandFlags.NONE, CommandFlags.FLUSH, CommandFlags.NONE), start=1):
@@ -284,7 +284,7 @@ def test_a_flush_which_the_vehicle_does_not_hear_ends_no_gap() -> None:
 
 def test_lost_commands_and_nonsense_are_told_and_do_not_stop_the_host() -> None:
     adapter, keys = Silent(), Keys("lab", "agv1")
-    with open_session() as session:
+    with open_bus_session() as session:
         events = session.declare_subscriber(keys.report)
         host = claimed_host(session, keys, adapter)
         session.put(keys.command, b"nonsense")
@@ -301,7 +301,7 @@ def test_lost_commands_and_nonsense_are_told_and_do_not_stop_the_host() -> None:
 
 def test_the_offset_of_another_clock_is_found() -> None:
     here, ahead_s = SimulatedClock(50.0), 1234.5
-    with open_session() as session:
+    with open_bus_session() as session:
         clock = session.declare_queryable("agvbench/v2/lab/agv1/mocap/time")
 
         def answer() -> None:
@@ -321,11 +321,11 @@ def test_a_real_runner_that_thinks_between_runs_does_not_hold_up_the_camera() ->
     with open_rig("live", plant=TINY, camera={"rate_hz": 1000.0}) as link:
         link.reset(START, run_key="a")
         began_s = time.monotonic()
-        link.exchange(NEUTRAL, t_s=0.0, hold_s=0.05)
+        link.control_cycle(NEUTRAL, t_s=0.0, hold_s=0.05)
         time.sleep(0.5)
         while link.loss.received <= 100 and time.monotonic() < began_s + 20.0:
             time.sleep(0.05)
         assert link.loss.received > 100
-        frames = link.exchange(NEUTRAL, t_s=time.monotonic() - began_s + 0.1, hold_s=0.05)
+        frames = link.control_cycle(NEUTRAL, t_s=time.monotonic() - began_s + 0.1, hold_s=0.05)
         assert len(frames) > 100
         assert link.loss.lost == 0

@@ -22,11 +22,11 @@ from agvbench.bus.link import VehicleLink
 from agvbench.bus.messages.command import CommandFlags, pack_command
 from agvbench.bus.messages.event import Event, Level, encode_event
 from agvbench.bus.queries import ask
-from agvbench.bus.session import open_session
+from agvbench.bus.session import open_bus_session
 from agvbench.campaign import Campaign
 from agvbench.errors import AdapterGoneError, LinkError, PlantError
 from agvbench.running.configuration.settings import BenchSettings
-from agvbench.workflows.doctor import Lab, State, examine
+from agvbench.workflows.doctor import FindingState, Lab, examine
 
 KEYS = Keys("lab", "agv1")
 pytestmark = [
@@ -56,7 +56,7 @@ def until(condition: Callable[[], bool], limit_s: float = 10.0) -> bool:
 
 def stand(link: VehicleLink, steps: range) -> None:
     for step in steps:
-        link.exchange(NEUTRAL, t_s=0.1 * step, hold_s=0.1)
+        link.control_cycle(NEUTRAL, t_s=0.1 * step, hold_s=0.1)
 
 
 def test_a_campaign_with_vehicle_camera_and_bench_on_a_secured_bus(
@@ -90,16 +90,16 @@ def test_the_doctor_looks_at_certificates_before_anybody_is_called(tmp_path: Pat
     config = set_up(tmp_path)["bench-pc"]
     lab = Lab(BenchSettings(bus_config=str(config)), tmp_path)
     finding = dict(examine(lab))["certificates"]
-    assert finding.state is State.GOOD
+    assert finding.state is FindingState.GOOD
     assert "takes those with a certificate of the lab's; its authority ends in" in finding.found
     _name_a_certificate_that_signs_nothing(config, tmp_path)
     finding = dict(examine(lab))["certificates"]
-    assert (finding.state, "is no authority's" in finding.found) == (State.DOUBTFUL, True)
+    assert (finding.state, "is no authority's" in finding.found) == (FindingState.DOUBTFUL, True)
     for file in tmp_path.rglob("*bench-pc*"):
         if file.suffix not in (".json5",):
             file.write_text("nothing of use")
     finding = dict(examine(lab))["certificates"]
-    assert (finding.state, "cannot be used" in finding.found) == (State.BAD, True)
+    assert (finding.state, "cannot be used" in finding.found) == (FindingState.BAD, True)
 
 
 def test_who_shows_no_certificate_or_a_strangers_is_refused(
@@ -110,14 +110,14 @@ def test_who_shows_no_certificate_or_a_strangers_is_refused(
     authority = machines["bench-pc"].parent / "authority.pem"
     nameless.write_text(f'{{transport: {{link: {{tls: {{root_ca_certificate: "{authority}"}}}}}}}}')
     known = BusConfig.load(machines["vehicle-pc"])
-    with open_session(listen=[endpoint], config=known):
+    with open_bus_session(listen=[endpoint], config=known):
         for config, reason in ((nameless, "certificate required"), (strangers["bench-pc"], "its certificate: ")):
             with pytest.raises(LinkError, match=f"connect {endpoint}: refused: .*{reason}"):
-                open_session(connect=[endpoint], config=BusConfig.load(config), timeout_s=0.5)
+                open_bus_session(connect=[endpoint], config=BusConfig.load(config), timeout_s=0.5)
         plain = endpoint.replace("tls", "tcp")
         with pytest.raises(LinkError, match="nobody answers"):
-            open_session(connect=[plain], timeout_s=0.5)
-        with open_session(connect=[endpoint], config=BusConfig.load(machines["bench-pc"])) as session:
+            open_bus_session(connect=[plain], timeout_s=0.5)
+        with open_bus_session(connect=[endpoint], config=BusConfig.load(machines["bench-pc"])) as session:
             assert list(session.info.links())
 
 
@@ -127,23 +127,23 @@ def test_who_may_only_listen_hears_everything_and_commands_nothing(machines: dic
     bench = BusConfig.load(machines["bench-pc"])
     with (
         process("sim", "--plant", TINY, "--listen", endpoint, "--bus-config", str(machines["vehicle-pc"])),
-        open_session(connect=[endpoint], config=BusConfig.load(machines["hall-display"])) as display,
-        open_session(connect=[endpoint], config=bench) as second_bench,
+        open_bus_session(connect=[endpoint], config=BusConfig.load(machines["hall-display"])) as display,
+        open_bus_session(connect=[endpoint], config=bench) as second_bench,
         open_rig(connect=endpoint, bus_config=bench) as link,
     ):
         subscriber = display.declare_subscriber(KEYS.report, lambda sample: heard.append(str(sample.key_expr)))
         link.reset(START, run_key="a")
-        link.exchange(NEUTRAL, t_s=0.0, hold_s=0.1)
+        link.control_cycle(NEUTRAL, t_s=0.0, hold_s=0.1)
         assert until(lambda: KEYS.report in heard)
         subscriber.undeclare()
         # It reaches neither the vehicle (a command that leaps in time is answered by an error) nor the bench.
         display.put(KEYS.command, pack_command(1, 9.0, NEUTRAL, 0.1, CommandFlags.NONE, 77))
         display.put(KEYS.report, made_up)
         with pytest.raises(AdapterGoneError, match="no answer"):
-            ask(display, KEYS.question(AGV, IDENTITY), b"", 0.3)
+            ask(display, KEYS.queryable(AGV, IDENTITY), b"", 0.3)
         stand(link, range(1, 20))
         # The rules kept them away, not the way they were sent.
-        assert ask(second_bench, KEYS.question(AGV, IDENTITY), b"", 5.0)
+        assert ask(second_bench, KEYS.queryable(AGV, IDENTITY), b"", 5.0)
         second_bench.put(KEYS.report, made_up)
         with pytest.raises(PlantError, match="made up"):
             stand(link, range(20, 500))

@@ -35,7 +35,7 @@ def test_an_exchange_returns_every_frame_of_its_interval_once() -> None:
         link.reset(START, run_key="a")
         ends, parts = [-0.5, 0.0, 0.3301, 0.3302, 2.0], []
         for start_s, end_s in itertools.pairwise(ends):
-            frames = link.exchange(NEUTRAL, t_s=start_s, hold_s=end_s - start_s)
+            frames = link.control_cycle(NEUTRAL, t_s=start_s, hold_s=end_s - start_s)
             assert np.all((frames.t_s >= start_s - 1e-9) & (frames.t_s < end_s + 1e-9))
             parts.append(frames)
         everything = Frames.concatenate(parts)
@@ -47,8 +47,8 @@ def test_an_exchange_returns_every_frame_of_its_interval_once() -> None:
 def test_frames_show_where_the_plant_was() -> None:
     with open_rig(plant=TINY, camera=PERFECT) as link:
         link.reset(Pose(1.0, 2.0, math.pi / 2), run_key="a")
-        rest = link.exchange(NEUTRAL, t_s=-0.5, hold_s=0.5)
-        driven = link.exchange(Command(1800.0, 1500.0, 1500.0), t_s=0.0, hold_s=1.0)
+        rest = link.control_cycle(NEUTRAL, t_s=-0.5, hold_s=0.5)
+        driven = link.control_cycle(Command(1800.0, 1500.0, 1500.0), t_s=0.0, hold_s=1.0)
     assert np.allclose((rest.x_m, rest.y_m, rest.heading_rad), np.array([[1.0], [2.0], [math.pi / 2]]))
     speed_mps = np.diff(driven.y_m) / np.diff(driven.t_s)
     assert np.allclose(driven.x_m, 1.0)
@@ -61,13 +61,13 @@ def test_how_a_hold_is_cut_changes_no_pose() -> None:
     command = Command(1800.0, 1400.0, 1500.0)
     with open_rig(plant=TINY, camera=PERFECT) as link:
         link.reset(START, run_key="a")
-        whole = link.exchange(command, t_s=0.0, hold_s=1.0)
+        whole = link.control_cycle(command, t_s=0.0, hold_s=1.0)
         link.reset(START, run_key="b")
     with open_rig(plant=TINY, camera=PERFECT) as link:
         link.reset(START, run_key="a")
         cut = Frames.concatenate(
             [
-                link.exchange(command, t_s=t_s, hold_s=hold_s)
+                link.control_cycle(command, t_s=t_s, hold_s=hold_s)
                 for t_s, hold_s in ((0.0, 0.123), (0.123, 0.4), (0.523, 0.477))
             ]
         )
@@ -98,7 +98,7 @@ def test_replay_leaves_the_plant_as_driving_did() -> None:
 def test_a_long_hold_takes_several_messages_and_loses_nothing() -> None:
     with open_rig(plant=TINY, camera=PERFECT | {"rate_hz": 1000.0}) as link:
         link.reset(START, run_key="a")
-        frames = link.exchange(NEUTRAL, t_s=0.0, hold_s=20.0)
+        frames = link.control_cycle(NEUTRAL, t_s=0.0, hold_s=20.0)
         assert len(frames) == 20_000
         assert np.array_equal(frames.frame, np.arange(20_000))
         assert link.loss.received == 3
@@ -108,7 +108,7 @@ def test_a_long_hold_takes_several_messages_and_loses_nothing() -> None:
 def test_late_frames_arrive_in_a_later_exchange_or_the_flush() -> None:
     with open_rig(plant=TINY, camera=PERFECT | {"latency_s": 0.05}) as link:
         link.reset(START, run_key="a")
-        parts = [link.exchange(NEUTRAL, t_s=0.5 * index, hold_s=0.5) for index in range(4)]
+        parts = [link.control_cycle(NEUTRAL, t_s=0.5 * index, hold_s=0.5) for index in range(4)]
         late = link.flush()
     for index, frames in enumerate(parts):
         assert np.all(frames.received_s < 0.5 * (index + 1))
@@ -121,8 +121,8 @@ def test_simulated_time_passes_as_commands_are_held() -> None:
     clock = SimulatedClock(100.0)
     with open_rig(plant=TINY, clock=clock) as link:
         link.reset(START, run_key="a")
-        link.exchange(NEUTRAL, t_s=-0.5, hold_s=0.5)
-        link.exchange(NEUTRAL, t_s=0.0, hold_s=2.0)
+        link.control_cycle(NEUTRAL, t_s=-0.5, hold_s=0.5)
+        link.control_cycle(NEUTRAL, t_s=0.0, hold_s=2.0)
         assert link.clock.now() == pytest.approx(102.5)
 
 
@@ -141,14 +141,14 @@ def test_a_plant_that_raises_ends_the_exchange_with_its_error() -> None:
     with open_rig(plant=FAILING) as link:
         link.reset(START, run_key="a")
         with pytest.raises(PlantError, match="speed of light reached"):
-            link.exchange(Command(1700.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.5)
+            link.control_cycle(Command(1700.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.5)
         assert len(drive_run_slowly(link)) > 0
 
 
 def drive_run_slowly(link: object) -> Frames:
     """A rig goes on after a failed run."""
     link.reset(START, run_key="b")  # type: ignore[attr-defined]
-    return link.exchange(NEUTRAL, t_s=0.0, hold_s=0.5)  # type: ignore[attr-defined,no-any-return]
+    return link.control_cycle(NEUTRAL, t_s=0.0, hold_s=0.5)  # type: ignore[attr-defined,no-any-return]
 
 
 def test_a_plant_that_hangs_ends_the_exchange_and_fails_at_once_afterwards() -> None:
@@ -156,16 +156,16 @@ def test_a_plant_that_hangs_ends_the_exchange_and_fails_at_once_afterwards() -> 
         link.reset(START, run_key="a")
         for _ in range(2):
             with pytest.raises(AdapterGoneError, match="the simulator does not answer"):
-                link.exchange(Command(1700.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.5)
+                link.control_cycle(Command(1700.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.5)
 
 
 @pytest.mark.parametrize(("t_s", "what"), [(0.4, "time goes back"), (0.6, "time leaps ahead")])
 def test_time_that_does_not_follow_on_is_refused(t_s: float, what: str) -> None:
     with open_rig(plant=TINY) as link:
         link.reset(START, run_key="a")
-        link.exchange(NEUTRAL, t_s=0.0, hold_s=0.5)
+        link.control_cycle(NEUTRAL, t_s=0.0, hold_s=0.5)
         with pytest.raises(LinkError, match=what):
-            link.exchange(NEUTRAL, t_s=t_s, hold_s=0.5)
+            link.control_cycle(NEUTRAL, t_s=t_s, hold_s=0.5)
 
 
 def test_two_rigs_in_one_process_do_not_hear_each_other() -> None:
@@ -173,8 +173,8 @@ def test_two_rigs_in_one_process_do_not_hear_each_other() -> None:
         alone = digest(drive_run(one, "a"))
         one.reset(START, run_key="a")
         two.reset(START, run_key="b")
-        one.exchange(NEUTRAL, t_s=0.0, hold_s=0.1)
-        two.exchange(NEUTRAL, t_s=0.0, hold_s=0.1)
+        one.control_cycle(NEUTRAL, t_s=0.0, hold_s=0.1)
+        two.control_cycle(NEUTRAL, t_s=0.0, hold_s=0.1)
     with open_rig(plant=TINY, vehicle="one") as link:
         assert digest(drive_run(link, "a")) == alone
 
@@ -204,4 +204,4 @@ def test_a_plant_that_ends_its_thread_is_one_line_at_once(tmp_path, error, metho
     line = f"plant.py:make: {method}: raised {error}; look at plant.py, line 5"
     with pytest.raises(PlantError, match=line), open_rig(plant=f"{tmp_path / 'plant.py'}:make") as link:  # noqa: PT012
         link.reset(Pose(0.0, 0.0, 0.0), run_key="a")
-        link.exchange(Command(1500.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.1)
+        link.control_cycle(Command(1500.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.1)

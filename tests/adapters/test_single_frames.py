@@ -14,7 +14,7 @@ from agvbench.bus.keys import Keys
 from agvbench.bus.messages.frames import FrameClock, FramesMessage
 from agvbench.bus.messages.identity import MocapIdentity
 from agvbench.bus.messages.request import Reset, Sampling
-from agvbench.bus.session import open_session
+from agvbench.bus.session import open_bus_session
 from agvbench.types import Frames
 
 
@@ -41,7 +41,7 @@ class Camera(MocapAdapter):
 def test_one_frame_in_plain_numbers_is_the_same_message() -> None:
     camera, keys = Camera(), Keys("lab", "agv1")
     columns = Frames(*(np.array([v]) for v in (0.5, 1.0, -2.0, 3.0)), np.array([True]), np.array([9]), np.array([1e-4]), np.array([0.51]))  # fmt: skip  # noqa: E501
-    with open_session() as session:
+    with open_bus_session() as session:
         inbox = Inbox(session, keys)
         host = MocapHost(session, keys, camera, WallClock(), listens_for_truth=False)
         camera.reports.frames(columns, clock=FrameClock.ADAPTER, acknowledged=4)

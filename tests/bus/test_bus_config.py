@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from agvbench.bus.bus_config import MAX_BYTES, BusConfig
-from agvbench.bus.session import is_open_to_anybody, open_session
+from agvbench.bus.session import is_open_to_anybody, open_bus_session
 from agvbench.errors import FileError, LinkError
 
 
@@ -73,7 +73,7 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
 def test_secured_endpoints_need_a_configuration() -> None:
     for end in ("listen", "connect"):
         with pytest.raises(LinkError, match=f"{end} tls/127.0.0.1:7447: needs certificates; .*--bus-config FILE"):
-            open_session(**{end: ["tls/127.0.0.1:7447"]})
+            open_bus_session(**{end: ["tls/127.0.0.1:7447"]})
 
 
 def test_who_is_asked_is_what_the_configuration_says(tmp_path: Path) -> None:
@@ -82,7 +82,7 @@ def test_who_is_asked_is_what_the_configuration_says(tmp_path: Path) -> None:
     assert is_open_to_anybody("tcp/0.0.0.0:7447", asking)
     assert is_open_to_anybody("tls/0.0.0.0:7447", None)
     with pytest.raises(LinkError, match="let other machines drive the vehicle"):
-        open_session(listen=["tcp/0.0.0.0:7447"], config=asking)
+        open_bus_session(listen=["tcp/0.0.0.0:7447"], config=asking)
 
 
 def test_rules_that_contradict_themselves_are_one_line(tmp_path: Path) -> None:
@@ -90,5 +90,5 @@ def test_rules_that_contradict_themselves_are_one_line(tmp_path: Path) -> None:
     policies = '[{rules: ["b"], subjects: ["c"]}]'
     rules = f'{{access_control: {{enabled: true, rules: [{rule}], subjects: [{{id: "c"}}], policies: {policies}}}}}'
     with pytest.raises(LinkError, match="'b'") as caught:
-        open_session(config=BusConfig.load(written(tmp_path, rules)))
+        open_bus_session(config=BusConfig.load(written(tmp_path, rules)))
     assert ".rs" not in str(caught.value)

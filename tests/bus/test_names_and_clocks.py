@@ -31,7 +31,7 @@ def test_every_key_is_one_that_zenoh_takes_and_stays_below_its_vehicle() -> None
         keys.report,
         keys.truth,
         keys.alive("agv"),
-        keys.question("a", "b"),
+        keys.queryable("a", "b"),
     ):
         assert everything.includes(zenoh.KeyExpr(key))
     assert len({keys.command, keys.report, keys.truth}) == 3

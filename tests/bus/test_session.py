@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from agvbench.bus.session import is_loopback, open_session, parse_endpoint
+from agvbench.bus.session import is_loopback, open_bus_session, parse_endpoint
 from agvbench.errors import LinkError
 
 
@@ -24,7 +24,7 @@ def test_endpoints_that_cannot_be_used_are_refused(endpoint: str) -> None:
     with pytest.raises(LinkError):
         parse_endpoint(endpoint)
     with pytest.raises(LinkError):
-        open_session(connect=[endpoint])
+        open_bus_session(connect=[endpoint])
 
 
 def test_endpoints_that_can_be_used() -> None:
@@ -35,12 +35,12 @@ def test_endpoints_that_can_be_used() -> None:
 @pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.2", "[::]", "lab-pc"])  # noqa: S104
 def test_other_machines_are_kept_out_unless_asked_in(host: str) -> None:
     with pytest.raises(LinkError, match="let other machines drive the vehicle"):
-        open_session(listen=[f"tcp/{host}:7447"])
+        open_bus_session(listen=[f"tcp/{host}:7447"])
     assert not is_loopback(host.strip("[]"))
 
 
 def test_a_session_without_endpoints_opens_no_socket() -> None:
-    with open_session() as session:
+    with open_bus_session() as session:
         assert list(session.info.links()) == []
         assert list(session.info.transports()) == []
 
@@ -48,7 +48,7 @@ def test_a_session_without_endpoints_opens_no_socket() -> None:
 def test_nobody_answers() -> None:
     port = free_port()
     with pytest.raises(LinkError, match=f"connect tcp/127.0.0.1:{port}: nobody answers"):
-        open_session(connect=[f"tcp/127.0.0.1:{port}"], timeout_s=0.2)
+        open_bus_session(connect=[f"tcp/127.0.0.1:{port}"], timeout_s=0.2)
 
 
 def test_a_port_that_is_taken() -> None:
@@ -56,7 +56,7 @@ def test_a_port_that_is_taken() -> None:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         with pytest.raises(LinkError, match="endpoint cannot be used") as caught:
-            open_session(listen=[f"tcp/127.0.0.1:{taken.getsockname()[1]}"])
+            open_bus_session(listen=[f"tcp/127.0.0.1:{taken.getsockname()[1]}"])
     assert ".rs" not in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -64,10 +64,10 @@ def test_a_port_that_is_taken() -> None:
 def test_connections_that_never_say_who_they_are_do_not_lock_out_others() -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     address = parse_endpoint(endpoint)[1:]
-    with open_session(listen=[endpoint]), ExitStack() as idle:
+    with open_bus_session(listen=[endpoint]), ExitStack() as idle:
         for _ in range(300):
             idle.enter_context(socket.create_connection(address))
-        open_session(connect=[endpoint]).close()
+        open_bus_session(connect=[endpoint]).close()
 
 
 def free_port() -> int:

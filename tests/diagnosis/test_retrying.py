@@ -84,7 +84,7 @@ def test_what_another_causes_law_replaced_may_be_tried_again(selector, monkeypat
     lag = selector.with_effect(base, "steering_lag")
     monkeypatch.setattr(forms, "_laws", lambda *_: iter(()))
     monkeypatch.setattr(forms, "_best", lambda _wide, current, _offers: replace(current, names=(law,)))
-    monkeypatch.setattr(Selector, "pruned", lambda _self, _base, current: (current, {law: 100.0}))
+    monkeypatch.setattr(Selector, "backward_elimination", lambda _self, _base, current: (current, {law: 100.0}))
     reformed = forms.select_variants(Selection(base, lag, {}, {"steering_lag": 500.0}, {}, 2), selector)
     assert reformed.chosen.names == (law,)
     assert reformed.rejected == again
@@ -129,6 +129,6 @@ def test_a_term_that_is_worth_nothing_alone_leaves_the_explanation_as_it_is(sele
     with_term = wide.score((SpeedInDisc.name,), np.r_[base.fit.parameters, elsewhere], None)
     chosen = Selection(base, with_term, {}, {}, {}, 1)
     term_selection = TermSelection(chosen, SpeedInDisc, base, 0.0, 1.0)
-    monkeypatch.setattr(empirical, "explain", lambda *_: term_selection)
+    monkeypatch.setattr(empirical, "add_term", lambda *_: term_selection)
     named = Selection(base, selector.with_effect(base, "lateral_slip"), {}, {"lateral_slip": 20.0}, {}, 1)
     assert empirical.add_term_and_reconsider(named, selector) == (named, term_selection, selector)

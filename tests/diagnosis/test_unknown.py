@@ -12,7 +12,7 @@ from tiny_vehicle import FRONT_M, REAR_M, Tiny, campaign_runs
 from agvbench.diagnosis import Verdict, diagnose, terms
 from agvbench.diagnosis.checks.consistency import require_consistent_repeats
 from agvbench.diagnosis.data.readings import read_runs
-from agvbench.diagnosis.discrepancy.regression import Steering
+from agvbench.diagnosis.discrepancy.regression import SteeringTangents
 from agvbench.diagnosis.discrepancy.screening import Start, screen
 from agvbench.diagnosis.residuals.body_rates import Rates
 from agvbench.diagnosis.residuals.covariate_test import ALPHA, LIKELY, RANDOM_PHASE, dependences
@@ -56,7 +56,7 @@ def drives(seed: int, *, variance_components: float = 0.01) -> Rates:
 
 def screened(rates: Rates) -> list[Start]:
     straight = np.zeros((len(rates.run), 2))
-    stands = Steering(straight, straight, np.zeros((len(rates.run), 3), dtype=np.int64))
+    stands = SteeringTangents(straight, straight, np.zeros((len(rates.run), 3), dtype=np.int64))
     return screen(rates, stands, GEOMETRY, GROUP, 0)
 
 

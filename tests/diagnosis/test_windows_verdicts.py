@@ -11,7 +11,7 @@ from free_drives import FREE_HEADER, free_runs
 from tiny_vehicle import Tiny
 
 from agvbench.diagnosis import Diagnosis, Verdict, diagnose
-from agvbench.effects.forms import effect_forms
+from agvbench.effects.variants import effect_variants
 from agvbench.errors import CampaignError
 from agvbench.model import VehicleModel
 from agvbench.types import Run
@@ -64,7 +64,7 @@ def test_every_effect_is_listed_with_what_it_does_to_sessions_held_out(lagging):
 
 
 def test_a_corrected_vehicle_with_another_law_is_diagnosed_again(lagging, tmp_path):
-    law = effect_forms()["steering_lag_inertia"](time_constant_s=0.25, inertia_s=0.01)
+    law = effect_variants()["steering_lag_inertia"](time_constant_s=0.25, inertia_s=0.01)
     replace(lagging.model, effects=(law,)).save(tmp_path / "corrected.toml")
     again = diagnose(
         FreeCampaign(free_runs(Tiny(steering_lag_s=0.25), runs=1, seconds=20.0)),

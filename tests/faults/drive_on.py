@@ -7,6 +7,6 @@ from agvbench.types import Command
 
 with open_rig(connect=sys.argv[1:]) as link:
     for second in range(30):
-        link.exchange(Command(1700.0, 1500.0, 1500.0), t_s=float(second), hold_s=1.0)
+        link.control_cycle(Command(1700.0, 1500.0, 1500.0), t_s=float(second), hold_s=1.0)
         if not second:
             print("driving", flush=True)

@@ -115,20 +115,20 @@ def _trip(session: BenchSession, do: Callable[[], None]) -> None:
     """Call `do` when the fault is to begin, between two slices of the second run."""
     assert session._bench is not None
     link, runs = session._bench.link, iter(range(1, 10))
-    plain_reset, plain_exchange = link.reset, link.exchange
+    plain_reset, plain_control_cycle = link.reset, link.control_cycle
     state = {"run": 0, "done": 0}
 
     def reset(*args: Any, **keywords: Any) -> None:
         state["run"] = next(runs)
         plain_reset(*args, **keywords)
 
-    def exchange(*args: Any, **keywords: Any) -> Any:
+    def control_cycle(*args: Any, **keywords: Any) -> Any:
         if state["run"] == 2 and not state["done"] and keywords["t_s"] >= FROM_S - 1e-9:
             state["done"] = 1
             do()
-        return plain_exchange(*args, **keywords)
+        return plain_control_cycle(*args, **keywords)
 
-    link.reset, link.exchange = reset, exchange  # type: ignore[method-assign]
+    link.reset, link.control_cycle = reset, control_cycle  # type: ignore[method-assign]
 
 
 def _before_retries(session: BenchSession, do: Callable[[], None]) -> None:

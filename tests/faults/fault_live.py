@@ -103,15 +103,15 @@ def _driven(link: VehicleLink, rest_s: float, limits: SafetyLimits) -> str:
 
 
 def _trip(link: VehicleLink, do: Callable[[], Any]) -> None:
-    plain, done = link.exchange, [False]
+    plain, done = link.control_cycle, [False]
 
-    def exchange(*args: Any, **keywords: Any) -> Any:
+    def control_cycle(*args: Any, **keywords: Any) -> Any:
         if not done[0] and keywords["t_s"] >= FROM_S - 1e-9:
             done[0] = True
             do()
         return plain(*args, **keywords)
 
-    link.exchange = exchange  # type: ignore[method-assign]
+    link.control_cycle = control_cycle  # type: ignore[method-assign]
 
 
 @dataclass(frozen=True)

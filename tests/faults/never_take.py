@@ -5,9 +5,9 @@ import time
 
 import zenoh
 
-from agvbench.bus.session import open_session
+from agvbench.bus.session import open_bus_session
 
-with open_session(connect=sys.argv[1:]) as session:
+with open_bus_session(connect=sys.argv[1:]) as session:
     subscriber = session.declare_subscriber("agvbench/**", zenoh.handlers.FifoChannel(1))
     print("listening", flush=True)
     time.sleep(60.0)

@@ -54,12 +54,12 @@ class Witness:
     def _watch_pins(self, vehicle: SimavrAgv) -> None:
         plain = vehicle.line.exchange
 
-        def exchange(data: bytes, end_s: float) -> Any:
+        def control_cycle(data: bytes, end_s: float) -> Any:
             heard, pulses = plain(data, end_s)
             self._pulses += pulses
             return heard, pulses
 
-        vehicle.line.exchange = exchange  # type: ignore[method-assign]
+        vehicle.line.exchange = control_cycle  # type: ignore[method-assign]
 
     def _watch_plant(self, vehicle: SimAgv) -> None:
         plain = vehicle._drive

@@ -130,11 +130,11 @@ def test_a_campaigns_link_drives_the_firmware_in_real_time() -> None:
         assert identity.agv.extra["firmware_unit"] == "us"
         for key in ("a", "b"):
             link.reset(start, run_key=key)
-            rest = link.exchange(Command(1500.0, 1500.0, 1500.0), t_s=-0.2, hold_s=0.2)
+            rest = link.control_cycle(Command(1500.0, 1500.0, 1500.0), t_s=-0.2, hold_s=0.2)
             at_rest_m = rest.x_m[rest.t_s > -0.15]  # frames of before it was placed may come late
             assert np.all(np.abs(at_rest_m - start.x_m) < 0.01)
             for index in range(40):  # a busy machine may be late with pulses, frames and all else
-                seen = link.exchange(Command(900.0, 1500.0, 1500.0), t_s=0.25 * index, hold_s=0.25)
+                seen = link.control_cycle(Command(900.0, 1500.0, 1500.0), t_s=0.25 * index, hold_s=0.25)
                 if np.any(seen.x_m - start.x_m > 0.03):
                     break
             else:
@@ -151,14 +151,14 @@ def test_a_run_in_which_the_firmwares_watchdog_bit_is_rejected_with_both_figures
     with open_session(given, out=str(tmp_path / "c"), resume=False, dry_run=False) as session:
         assert session._bench is not None
         link = session._bench.link
-        plain, stalls_s = link.exchange, [0.4]
+        plain, stalls_s = link.control_cycle, [0.4]
 
-        def exchange(command: Command, *, t_s: float, hold_s: float) -> Frames:
+        def control_cycle(command: Command, *, t_s: float, hold_s: float) -> Frames:
             if command.drive != 1500.0 and t_s > 0.7 and stalls_s:
                 time.sleep(stalls_s.pop())
             return plain(command, t_s=t_s, hold_s=hold_s)
 
-        link.exchange = exchange  # type: ignore[method-assign]
+        link.control_cycle = control_cycle  # type: ignore[method-assign]
         with pytest.raises(AgvbenchError, match="no attempt counted"):
             session.driver("stalled", experiment="free", repeat=1).hold(for_s=0.8, drive=0.5)
     campaign = Campaign.open(tmp_path / "c")
@@ -173,11 +173,11 @@ def test_a_run_in_which_the_firmwares_watchdog_bit_is_rejected_with_both_figures
 def test_a_microcontroller_that_dies_while_it_is_driven_stops_the_run() -> None:
     with open_rig("simavr-live") as link:
         link.reset(Pose(0.0, 0.0, 0.0), run_key="a")
-        link.exchange(Command(900.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.2)
+        link.control_cycle(Command(900.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.2)
         [pid] = _children("simavr_host")
         os.kill(pid, signal.SIGKILL)
         with pytest.raises(LinkError, match="serial port is gone"):
-            link.exchange(Command(900.0, 1500.0, 1500.0), t_s=0.2, hold_s=5.0)
+            link.control_cycle(Command(900.0, 1500.0, 1500.0), t_s=0.2, hold_s=5.0)
 
 
 def _children(name: str) -> list[int]:

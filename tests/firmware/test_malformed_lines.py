@@ -171,7 +171,7 @@ def test_no_malformed_line_moves_anything_though_its_checksum_is_right(version_2
 @given(LINES)
 def test_no_malformed_line_disturbs_what_is_driven(microcontroller: Microcontroller, line: bytes) -> None:
     assume(not MAY_BE_RIGHT.fullmatch(line))
-    microcontroller.say(Command(*DRIVEN))
+    microcontroller.set_command(Command(*DRIVEN))
     microcontroller.run_until(microcontroller.now_s + 0.05)
     said, pulses = ask(microcontroller, line + b"\n", 0.08)
     widths = widths_by_frame(pulses)

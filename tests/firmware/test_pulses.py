@@ -18,7 +18,7 @@ def drive(microcontroller: Microcontroller, commands: list[Command], seed: int =
     """Give one command after the other, at all phases of the frame; return the widths [µs] in every frame."""
     luck, pulses = random.Random(seed), []
     for command in commands:
-        microcontroller.say(command)
+        microcontroller.set_command(command)
         pulses += microcontroller.run_until(microcontroller.now_s + luck.uniform(0.02, 0.06))
     pulses += microcontroller.run_until(microcontroller.now_s + 0.06)
     return widths_by_frame(pulses)
@@ -35,7 +35,7 @@ def test_every_width_between_the_limits_is_kept_within_a_microsecond(version_2: 
     wanted += [Command(600.0, 2400.0, 600.0), Command(2400.0, 2400.0, 2400.0), Command(600.0, 600.0, 600.0)]
     worst_us = 0.0
     for command in wanted:
-        version_2.say(command)
+        version_2.set_command(command)
         version_2.run_until(version_2.now_s + 0.03)
         widths = widths_by_frame(version_2.run_until(version_2.now_s + 0.05))[0]
         worst_us = max(worst_us, *(abs(a - b) for a, b in zip(widths, command, strict=True)))
@@ -45,14 +45,14 @@ def test_every_width_between_the_limits_is_kept_within_a_microsecond(version_2: 
 def test_whole_degrees_are_kept_within_a_microsecond(version_1: Microcontroller) -> None:
     for degrees in range(30, 151, 7):
         pulse_us = 1500.0 + (degrees - 90) * 40.0 / 3.0
-        version_1.say(Command(pulse_us, 3000.0 - pulse_us, pulse_us))
+        version_1.set_command(Command(pulse_us, 3000.0 - pulse_us, pulse_us))
         version_1.run_until(version_1.now_s + 0.03)
         widths = widths_by_frame(version_1.run_until(version_1.now_s + 0.05))[0]
         assert is_near(widths, (pulse_us, 3000.0 - pulse_us, pulse_us))
 
 
 def test_version_1_rounds_to_degrees(version_1: Microcontroller) -> None:
-    version_1.say(Command(1506.0, 1507.0, 1494.0))
+    version_1.set_command(Command(1506.0, 1507.0, 1494.0))
     version_1.run_until(version_1.now_s + 0.03)
     widths = widths_by_frame(version_1.run_until(version_1.now_s + 0.05))[0]
     assert is_near(widths, (1500.0, 1513.333, 1500.0))
@@ -61,7 +61,7 @@ def test_version_1_rounds_to_degrees(version_1: Microcontroller) -> None:
 def test_frames_begin_every_20_ms_whatever_is_on_the_line(microcontroller: Microcontroller) -> None:
     pulses = microcontroller.run_until(microcontroller.now_s + 0.1)
     for command in distinct_commands(50):
-        microcontroller.say(command)
+        microcontroller.set_command(command)
         pulses += microcontroller.run_until(microcontroller.now_s + 0.013)
     rises = [pulse.rise for pulse in pulses if pulse.channel == 0]
     assert len(rises) > 30
@@ -94,7 +94,7 @@ def test_the_same_commands_give_the_same_pulses_to_the_cycle(version_2: Microcon
         version_2.reset()
         found: list[object] = []
         for command in distinct_commands(20):
-            version_2.say(command)
+            version_2.set_command(command)
             found += version_2.run_until(version_2.now_s + 0.0371)
         return found
 
@@ -109,7 +109,7 @@ def test_the_same_commands_give_the_same_pulses_to_the_cycle(version_2: Microcon
 
 def test_what_was_said_before_a_reset_is_not_heard_after_it(version_2: Microcontroller) -> None:
     for _ in range(5):
-        version_2.say(Command(1800.0, 1300.0, 1700.0))
+        version_2.set_command(Command(1800.0, 1300.0, 1700.0))
         version_2.reset()
         assert version_2.conversation.garbled == 0
         assert all(is_near(widths, NEUTRAL) for widths in widths_by_frame(version_2.run_until(0.2)))
@@ -119,7 +119,7 @@ def test_what_was_said_before_a_reset_is_not_heard_after_it(version_2: Microcont
 def test_the_watchdog_bites_after_250_ms_of_silence(version_2: Microcontroller, after_s: float) -> None:
     version_2.run_until(version_2.now_s + after_s)
     said_s = version_2.now_s
-    version_2.say(Command(1800.0, 1300.0, 1700.0))
+    version_2.set_command(Command(1800.0, 1300.0, 1700.0))
     pulses = version_2.run_until(said_s + 0.6)
     driven = [pulse for pulse in pulses if pulse.channel == 0 and pulse.width_us > 1700.0]
     neutral = next(pulse for pulse in pulses if pulse.channel == 0 and pulse.rise > driven[-1].rise)
@@ -127,19 +127,19 @@ def test_the_watchdog_bites_after_250_ms_of_silence(version_2: Microcontroller, 
     assert is_near(widths_by_frame(pulses)[-1], NEUTRAL)
     assert version_2.conversation.watchdog_bites == 1
     # The next command drives again.
-    version_2.say(Command(1800.0, 1300.0, 1700.0))
+    version_2.set_command(Command(1800.0, 1300.0, 1700.0))
     assert is_near(widths_by_frame(version_2.run_until(version_2.now_s + 0.1))[-1], (1800.0, 1300.0, 1700.0))
 
 
 def test_the_watchdog_sleeps_while_commands_come_and_when_the_vehicle_stands(version_2: Microcontroller) -> None:
     for _ in range(10):
-        version_2.say(Command(1800.0, 1500.0, 1500.0))
+        version_2.set_command(Command(1800.0, 1500.0, 1500.0))
         assert widths_by_frame(version_2.run_until(version_2.now_s + 0.2))[-1][0] > 1700.0
-    version_2.say(Command(*NEUTRAL))
+    version_2.set_command(Command(*NEUTRAL))
     version_2.run_until(version_2.now_s + 1.0)
     assert version_2.conversation.watchdog_bites == 0
 
 
 def test_version_1_drives_on_for_ever(version_1: Microcontroller) -> None:
-    version_1.say(Command(1800.0, 1500.0, 1500.0))
+    version_1.set_command(Command(1800.0, 1500.0, 1500.0))
     assert widths_by_frame(version_1.run_until(version_1.now_s + 5.0))[-1][0] > 1700.0

@@ -39,11 +39,11 @@ PLANT = f"{__file__}:SlopingPlant"
 def drive(agv: str, holds_s: tuple[float, ...], *, key: str = "a", seed: int = 0, mocap: str = "sim") -> Frames:
     with open_rig(agv=agv, mocap=mocap, plant=PLANT, seed=seed, camera=PERFECT) as link:
         link.reset(START, run_key=key)
-        parts, t_s = [link.exchange(NEUTRAL, t_s=-0.5, hold_s=0.5)], 0.0
+        parts, t_s = [link.control_cycle(NEUTRAL, t_s=-0.5, hold_s=0.5)], 0.0
         for hold_s in holds_s:
-            parts.append(link.exchange(Command(1800.0, 1400.0, 1600.0), t_s=t_s, hold_s=hold_s))
+            parts.append(link.control_cycle(Command(1800.0, 1400.0, 1600.0), t_s=t_s, hold_s=hold_s))
             t_s += hold_s
-        parts += [link.exchange(NEUTRAL, t_s=t_s, hold_s=0.3), link.flush()]
+        parts += [link.control_cycle(NEUTRAL, t_s=t_s, hold_s=0.3), link.flush()]
     return Frames.concatenate(parts)
 
 
@@ -72,8 +72,8 @@ def test_a_run_does_not_depend_on_what_was_driven_before() -> None:
         ends = []
         for key in ("a", "b", "a"):
             link.reset(START, run_key=key)
-            link.exchange(Command(1800.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.31)
-            ends.append(float(link.exchange(NEUTRAL, t_s=0.31, hold_s=0.2).x_m[-1]))
+            link.control_cycle(Command(1800.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.31)
+            ends.append(float(link.control_cycle(NEUTRAL, t_s=0.31, hold_s=0.2).x_m[-1]))
     assert ends[0] == ends[2] != ends[1]
 
 
@@ -114,9 +114,9 @@ def test_a_pulse_out_of_range_is_one_line_and_the_rig_goes_on() -> None:
         with pytest.raises(
             LinkError, match=r"drive pulse is out of what the firmware takes: 3000 µs \(limit: 600 to 2400"
         ):
-            link.exchange(Command(3000.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.1)
+            link.control_cycle(Command(3000.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.1)
         link.reset(START, run_key="b")
-        assert len(link.exchange(NEUTRAL, t_s=0.0, hold_s=0.1))
+        assert len(link.control_cycle(NEUTRAL, t_s=0.0, hold_s=0.1))
 
 
 def test_without_the_built_firmware_the_line_says_what_to_do(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -44,10 +44,10 @@ def test_the_runner_hears_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(SimavrAgv, "__init__", remember)
     with open_rig(agv="simavr") as link:
         link.reset(Pose(0.0, 0.0, 0.0), run_key="a")
-        link.exchange(Command(1600.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.1)
+        link.control_cycle(Command(1600.0, 1500.0, 1500.0), t_s=0.0, hold_s=0.1)
         opened[0]._controller.host.process.kill()
         with pytest.raises(AdapterGoneError, match="simulated microcontroller has ended"):
-            link.exchange(Command(1600.0, 1500.0, 1500.0), t_s=0.1, hold_s=0.1)
+            link.control_cycle(Command(1600.0, 1500.0, 1500.0), t_s=0.1, hold_s=0.1)
 
 
 def test_no_process_outlives_a_bench_that_was_killed() -> None:

@@ -93,7 +93,7 @@ def test_what_a_model_is_known_to_miss_is_taken_off_its_aim(name):
     first = corrected_plan(trajectory, model, start=START)
     end = driven(truth, first.commands, START)
     missed = end.relative_to(Pose(*first.expected[-1, 1:]))
-    made = corrected_plan(trajectory, model, start=START, remainder=missed)
+    made = corrected_plan(trajectory, model, start=START, end_pose_bias=missed)
     left = miss(driven(truth, made.commands, START), made.target)
     # To first order: of a decimetre some millimetres stay.
     assert np.abs(left).max() < max(0.15 * np.abs(miss(end, made.target)).max(), 0.1)
@@ -111,7 +111,7 @@ def test_paths_of_several_legs(name):
 def test_full_circles_stay_near_the_plan_whatever_their_aim(calibrated, degrees):
     model, trajectory = calibrated.with_effects(SteeringLag(0.14)), load_trajectory("figure_eight")
     planned = plan(trajectory, calibrated).commands
-    made = corrected_plan(trajectory, model, remainder=Pose(0.002, 0.0014, math.radians(degrees)))
+    made = corrected_plan(trajectory, model, end_pose_bias=Pose(0.002, 0.0014, math.radians(degrees)))
     assert made.correction.remaining.distance_m < 1e-4
     for axle in ("front", "rear"):
         by_turn = getattr(made.commands, axle)[[0, -1]] - getattr(planned, axle)[[0, -1]]

@@ -120,11 +120,11 @@ def test_a_path_does_not_depend_on_the_frame(shortest, shift, start, goal):
 
 @paths
 @pytest.mark.parametrize("ahead_m", [1e-8, 3e-6, 2e-4, 0.01, 1.0])
-def test_the_way_straight_ahead_is_one_straight(shortest, ahead_m):
+def test_the_way_straight_ahead_is_one_straight(shortest, forward_m):
     backward = shortest is dubins.shortest_path_backward
-    (piece,) = shortest(ORIGIN, Pose(-ahead_m if backward else ahead_m, 0.0, 0.0), 0.5)
+    (piece,) = shortest(ORIGIN, Pose(-forward_m if backward else forward_m, 0.0, 0.0), 0.5)
     assert (piece.side, piece.backward) == ("straight", backward)
-    assert piece.length_m == pytest.approx(ahead_m, abs=1e-9)
+    assert piece.length_m == pytest.approx(forward_m, abs=1e-9)
 
 
 @paths

@@ -13,7 +13,7 @@ from agvbench.errors import PlanError
 from agvbench.planning import Workspace
 from agvbench.planning.shortest_paths.pieces import end_of, length_of
 from agvbench.planning.shortest_paths.reeds_shepp import paths_by_length, shortest_path
-from agvbench.planning.shortest_paths.return_path import GearLeg, Guided, way_back
+from agvbench.planning.shortest_paths.return_path import GearLeg, Guided, plan_return_path
 from agvbench.types import Pose, wrap_angle
 from agvbench.vehicle.geometry import Geometry
 
@@ -38,17 +38,17 @@ def driven(leg: GearLeg, start: np.ndarray) -> np.ndarray:
 @settings(max_examples=30)
 @given(POSES, POSES, st.sampled_from([0.0, -0.121]), st.floats(-0.1, 0.1))
 def test_a_way_leads_to_the_start_along_a_straight_and_inside(
-    seen: Pose, start: Pose, ahead_m: float, crab_rad: float
+    seen: Pose, start: Pose, forward_m: float, crab_rad: float
 ) -> None:
-    guided = Guided(GEOMETRY, ahead_m, crab_rad)
-    legs = way_back(seen, start, guided, ROOM, radii_m=RADII, leads_m=LEADS)
+    guided = Guided(GEOMETRY, forward_m, crab_rad)
+    legs = plan_return_path(seen, start, guided, ROOM, radii_m=RADII, leads_m=LEADS)
     at = np.array(guided.pose(seen))
     for leg in legs:
         np.testing.assert_allclose(leg.points[0][:2], at[:2], atol=1e-4)
         at = driven(leg, at)
         np.testing.assert_allclose(at[:2], leg.points[-1][:2], atol=1e-4)
         heading = leg.points[:, 2] - crab_rad
-        for axle_m in (0.181 - ahead_m, -0.121 - ahead_m):
+        for axle_m in (0.181 - forward_m, -0.121 - forward_m):
             x, y = leg.points[:, 0] + axle_m * np.cos(heading), leg.points[:, 1] + axle_m * np.sin(heading)
             inside_m = np.minimum(2.5 - abs(x), 2.0 - abs(y)).min()
             assert inside_m > 0.25 - 0.01 or inside_m > min(_inside(seen), _inside(start)) - 0.01
@@ -80,7 +80,7 @@ def test_every_word_reaches_the_goal_and_the_first_is_the_shortest(start: Pose, 
 
 def test_the_gear_can_be_asked_for() -> None:
     for backward in (False, True):
-        legs = way_back(
+        legs = plan_return_path(
             Pose(0.01, 0.0, 0.0), Pose(0.0, 0.0, 0.0), Guided(GEOMETRY), ROOM, radii_m=RADII, leads_m=LEADS,
             gears=(backward,),
         )  # fmt: skip
@@ -90,6 +90,8 @@ def test_the_gear_can_be_asked_for() -> None:
 def test_where_there_is_no_way_that_is_said() -> None:
     narrow = Workspace.rectangle(1.0, 0.55, margin_m=0.25)
     with pytest.raises(PlanError, match=r"cannot drive back to its start: every way comes too close to the edge"):
-        way_back(Pose(0.0, 0.0, 0.0), Pose(0.0, 0.0, 3.0), Guided(GEOMETRY), narrow, radii_m=RADII, leads_m=LEADS)
+        plan_return_path(
+            Pose(0.0, 0.0, 0.0), Pose(0.0, 0.0, 3.0), Guided(GEOMETRY), narrow, radii_m=RADII, leads_m=LEADS
+        )
     with pytest.raises(PlanError, match=r"the vehicle stands 0.\d\d m outside"):
-        way_back(Pose(2.6, 0.0, 0.0), Pose(0.0, 0.0, 0.0), Guided(GEOMETRY), ROOM, radii_m=RADII, leads_m=LEADS)
+        plan_return_path(Pose(2.6, 0.0, 0.0), Pose(0.0, 0.0, 0.0), Guided(GEOMETRY), ROOM, radii_m=RADII, leads_m=LEADS)

@@ -7,14 +7,14 @@ import pytest
 from agvbench.model import example_vehicle
 from agvbench.planning import load_trajectory, plan
 from agvbench.reporting.console.bench import dry_run_table
-from agvbench.running.execution.run_records import DriveOrder
+from agvbench.running.execution.run_records import RunRequest
 from agvbench.types import Pose
 
 
 def planned(name):
     made = plan(load_trajectory(name), example_vehicle("thesis"))
     start = Pose(0.0, 0.0, 0.0)
-    return DriveOrder(name, "trajectory", name, "calibrated", 1, made.commands, made.target, start), made
+    return RunRequest(name, "trajectory", name, "calibrated", 1, made.commands, made.target, start), made
 
 
 def minutes(line):

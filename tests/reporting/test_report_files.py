@@ -15,7 +15,7 @@ from report_samples import HOSTILE
 from agvbench.reporting import write_report
 from agvbench.reporting.content import Column, plain
 from agvbench.reporting.sections.diagnosis import DiagnosisSection
-from agvbench.reporting.sections.provenance import Provenance
+from agvbench.reporting.sections.provenance import ProvenanceSection
 from agvbench.reporting.table_files import frame_to_csv
 from agvbench.statistics.rest_poses import start_pose
 
@@ -217,5 +217,5 @@ def test_a_missing_diagnosis_is_one_command_away(report_data):
 )
 def test_how_long_was_driven_says_whose_time_it_is(clock, words, report_data):
     data = report_data("one condition")
-    (table,) = Provenance().blocks(replace(data, provenance={"time": clock}))
+    (table,) = ProvenanceSection().blocks(replace(data, provenance={"time": clock}))
     assert dict(table.rows)["runs"] == f"{len(data.runs)}, over {words}"

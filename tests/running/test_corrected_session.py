@@ -32,9 +32,9 @@ class Later:
         """It drives on."""
 
 
-def session(tmp_path, model, bench=None, remainders=MISSED):
+def session(tmp_path, model, bench=None, bias_corrections=MISSED):
     models = {"uncalibrated": thesis_vehicle(), "calibrated": thesis_vehicle(), "corrected": model}
-    return BenchSession(tmp_path, models=models, workspace=FLOOR, bench=bench, remainders=remainders)
+    return BenchSession(tmp_path, models=models, workspace=FLOOR, bench=bench, bias_corrections=bias_corrections)
 
 
 def same(a, b):
@@ -45,8 +45,8 @@ def test_aims_are_moved_by_what_the_model_is_known_to_miss(tmp_path):
     model = thesis_vehicle().with_effects(LateralSlip(0.5))
     five, one = load_trajectory("5"), load_trajectory("1")
     made = session(tmp_path, model)
-    assert same(made.plan(five, "corrected"), corrected_plan(five, model, workspace=FLOOR, remainder=MISSED["5"]))
-    assert not same(made.plan(five, "corrected"), session(tmp_path, model, remainders={}).plan(five, "corrected"))
+    assert same(made.plan(five, "corrected"), corrected_plan(five, model, workspace=FLOOR, end_pose_bias=MISSED["5"]))
+    assert not same(made.plan(five, "corrected"), session(tmp_path, model, bias_corrections={}).plan(five, "corrected"))
     assert same(made.plan(one, "corrected"), corrected_plan(one, model, workspace=FLOOR))
 
 

@@ -28,12 +28,12 @@ def test_a_new_lab_can_plan_every_trajectory(tmp_path):
 def test_half_speed_is_expected_halfway_and_the_rest_is_believed(tmp_path):
     uncalibrated_vehicle().save(tmp_path / "vehicle.toml")
     expected = expected_calibration(str(tmp_path / "vehicle.toml"))
-    believed = uncalibrated_vehicle(str(tmp_path / "vehicle.toml"))
-    full = believed.drive.output_low
+    nominal = uncalibrated_vehicle(str(tmp_path / "vehicle.toml"))
+    full = nominal.drive.output_low
     assert expected.drive.inverse(full / 2.0) == pytest.approx(
-        (believed.drive.command_low + believed.drive.command_stop) / 2.0
+        (nominal.drive.command_low + nominal.drive.command_stop) / 2.0
     )
-    assert dataclasses.replace(expected, drive=believed.drive) == believed
+    assert dataclasses.replace(expected, drive=nominal.drive) == nominal
 
 
 def test_a_drive_that_is_known_stays(tmp_path):
@@ -67,9 +67,9 @@ def test_a_folder_with_a_car_drives_its_own_trajectory_too_and_steers_in_front(t
 
 def held_for(tmp_path, speed_mps, workspace="circle:6.1", **held):
     """Return how long [s] a calibration run is planned to be driven, and with which share of full command."""
-    believed = uncalibrated_vehicle()
-    drive = dataclasses.replace(believed.drive, output_low=speed_mps, output_high=-speed_mps)
-    dataclasses.replace(believed, drive=drive).save(tmp_path / "vehicle.toml")
+    nominal = uncalibrated_vehicle()
+    drive = dataclasses.replace(nominal.drive, output_low=speed_mps, output_high=-speed_mps)
+    dataclasses.replace(nominal, drive=drive).save(tmp_path / "vehicle.toml")
     options = {"vehicle": str(tmp_path / "vehicle.toml"), "workspace": workspace}
     with open_session(options, out=str(tmp_path / "c"), resume=False, dry_run=True) as session:
         with pytest.raises(NotDrivenError) as reason:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from agvbench.campaign import Campaign
-from agvbench.running.execution.pause import PAUSE_FILE, Pause
+from agvbench.running.execution.pause import PAUSE_FILE, PauseRequest
 from agvbench.running.session.opening import open_session
 from agvbench.running.session.session import BenchSession
 
@@ -26,7 +26,7 @@ OPTIONS = {"vehicle": "", "seed": 2}
 
 @contextmanager
 def session(path: Path, told: list[str]) -> Iterator[BenchSession]:
-    with open_session(OPTIONS, out=str(path), resume=False, dry_run=False, tell=told.append) as opened:
+    with open_session(OPTIONS, out=str(path), resume=False, dry_run=False, on_progress=told.append) as opened:
         yield opened
 
 
@@ -92,14 +92,14 @@ def test_ctrl_z_pauses_and_again_goes_on(tmp_path: Path, told: list[str]) -> Non
 
 
 def test_fg_goes_on_after_ctrl_z_but_ends_nobody_elses_pause(tmp_path: Path) -> None:
-    pause = Pause(tmp_path, lambda _: None)
+    pause = PauseRequest(tmp_path, lambda _: None)
     with pause.by_signal():
         signal.raise_signal(signal.SIGTSTP)
         signal.raise_signal(signal.SIGCONT)
-        assert not pause.is_asked()
+        assert not pause.is_requested()
         (tmp_path / PAUSE_FILE).touch()
         signal.raise_signal(signal.SIGCONT)
-        assert pause.is_asked()
+        assert pause.is_requested()
 
 
 @pytest.fixture

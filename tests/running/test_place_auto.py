@@ -17,7 +17,7 @@ from agvbench.errors import FlagError
 from agvbench.model import nominal_model
 from agvbench.planning import Workspace
 from agvbench.running.configuration.settings import PLACES
-from agvbench.running.links import UnbrokenLink
+from agvbench.running.links import ContinuousLink
 from agvbench.running.positioning.placers import PLACERS, Auto, Rig, choose_placer
 from agvbench.running.quality import DEFAULT_LIMITS
 from agvbench.running.session.opening import open_session
@@ -78,7 +78,7 @@ def test_who_can_place_what() -> None:
         choose_placer("teleport", simulated=False)
 
 
-class Real(UnbrokenLink):
+class Real(ContinuousLink):
     """A link to a simulated vehicle that passes for a real one."""
 
     def identity(self) -> Any:

@@ -15,7 +15,7 @@ from agvbench.adapters import AdapterOptions, host_adapters, open_rig
 from agvbench.bus.keys import Keys
 from agvbench.bus.messages.command import CommandFlags, pack_command
 from agvbench.bus.messages.event import Event, Level, encode_event
-from agvbench.bus.session import open_session as open_bus
+from agvbench.bus.session import open_bus_session as open_bus
 from agvbench.campaign import Campaign
 from agvbench.errors import AgvbenchError
 from agvbench.reporting.sections import all_sections
@@ -41,14 +41,14 @@ def endpoint() -> Iterator[str]:
 
 def in_mid_run(link: Any, do: Callable[[], object]) -> None:
     """Call `do` once while the vehicle drives in the next run."""
-    plain, left = link.exchange, [do]
+    plain, left = link.control_cycle, [do]
 
-    def exchange(command: Command, *, t_s: float, hold_s: float) -> Any:
+    def control_cycle(command: Command, *, t_s: float, hold_s: float) -> Any:
         if left and command.drive != 1500.0 and t_s > 0.7:
             left.pop()()
         return plain(command, t_s=t_s, hold_s=hold_s)
 
-    link.exchange = exchange
+    link.control_cycle = control_cycle
 
 
 @pytest.mark.real_time
@@ -67,7 +67,7 @@ def test_events_are_told_kept_counted_and_spoil_the_runs_that_were_not_driven_as
     }
     given = {"connect": endpoint, "vehicle": "", "attempts": 1, "workspace": "circle:12"}
     with (
-        open_session(given, out=str(tmp_path / "c"), resume=False, dry_run=False, tell=told.append) as session,
+        open_session(given, out=str(tmp_path / "c"), resume=False, dry_run=False, on_progress=told.append) as session,
         stranger,
     ):
         assert session._bench is not None

@@ -16,7 +16,7 @@ from agvbench.errors import AgvbenchError, PlacingError, SafetyStopError
 from agvbench.model import VehicleModel, nominal_model, thesis_vehicle
 from agvbench.planning import Workspace
 from agvbench.planning.shortest_paths.return_path import GearLeg
-from agvbench.running.links import UnbrokenLink
+from agvbench.running.links import ContinuousLink
 from agvbench.running.positioning.automatic_return.path_following import Follower
 from agvbench.running.positioning.automatic_return.returner import Returner
 from agvbench.running.supervision import Supervisor
@@ -34,11 +34,11 @@ STARTS = (Pose(1.2, 0.8, 2.5), Pose(-1.0, 0.3, 0.0), Pose(-1.0, -0.9, -1.6), Pos
 @contextmanager
 def returner(
     plant: str, model: VehicleModel = NOMINAL, room: str = "circle:6.1"
-) -> Iterator[tuple[UnbrokenLink, Returner]]:
+) -> Iterator[tuple[ContinuousLink, Returner]]:
     spec = f"returning_plants:{plant}"
     with open_rig("sim", plant=spec, seed=3, command_unit=model.command_unit, neutral=model.neutral) as link:
-        unbroken, space = UnbrokenLink(link), Workspace.parse(room)
-        yield unbroken, Returner(unbroken, model, space, Supervisor(space, model.neutral))
+        continuous, space = ContinuousLink(link), Workspace.parse(room)
+        yield continuous, Returner(continuous, model, space, Supervisor(space, model.neutral))
 
 
 @pytest.mark.parametrize(
@@ -120,10 +120,10 @@ def test_errors_die_off_without_overshoot_in_either_gear(offset_m: float, *, bac
 def test_time_goes_on_where_a_clock_begins_anew() -> None:
     neutral = Command(1500.0, 1500.0, 1500.0)
     with open_rig("sim", seed=3) as direct:
-        link = UnbrokenLink(direct)
+        link = ContinuousLink(direct)
         link.reset(Pose(0.0, 0.0, 0.0), run_key="a")
-        first = link.exchange(neutral, t_s=-0.5, hold_s=1.5)
-        second = link.exchange(neutral, t_s=-0.25, hold_s=1.0)
+        first = link.control_cycle(neutral, t_s=-0.5, hold_s=1.5)
+        second = link.control_cycle(neutral, t_s=-0.25, hold_s=1.0)
     assert first.t_s[0] < -0.49
     assert second.t_s[-1] < 0.75
     assert second.t_s[0] + 1.25 == pytest.approx(first.t_s[-1] + 1.0 / 120.0, abs=0.02)

@@ -16,10 +16,10 @@ from agvbench.planning import Workspace
 from agvbench.running.execution.drive import drive
 from agvbench.running.supervision import DEFAULT_SAFETY, SafetyLimits, Supervisor
 from agvbench.running.supervision.rule import Slice
-from agvbench.running.supervision.rules.frozen import Frozen
-from agvbench.running.supervision.rules.jump import Jump
-from agvbench.running.supervision.rules.lost import Lost
-from agvbench.running.supervision.rules.volume import Volume
+from agvbench.running.supervision.rules.frozen import FrozenRule
+from agvbench.running.supervision.rules.jump import JumpRule
+from agvbench.running.supervision.rules.lost import LostRule
+from agvbench.running.supervision.rules.volume import VolumeRule
 from agvbench.types import Command, Commands, Frames, Pose
 
 PLANTS = Path(__file__).with_name("runaway_plants.py")
@@ -42,8 +42,8 @@ def stopped(
         with pytest.raises(SafetyStopError) as caught:
             drive(link, commands, neutral=NEUTRAL, start=START, run_key="a", supervisor=supervisor, seen=seen)
         until_s = float(max(frames.t_s.max() for frames in seen if len(frames)))
-        simulated_s = max(_end_s(str(caught.value)), limits.exchange_s)
-        seen.append(link.exchange(NEUTRAL, t_s=simulated_s, hold_s=1.0))
+        simulated_s = max(_end_s(str(caught.value)), limits.control_cycle_s)
+        seen.append(link.control_cycle(NEUTRAL, t_s=simulated_s, hold_s=1.0))
     frames = Frames.concatenate(seen)
     assert until_s < 14.0
     return str(caught.value), frames
@@ -72,7 +72,10 @@ def test_a_vehicle_that_is_taken_for_another_is_stopped() -> None:
 
 
 def test_what_is_exchanged_for_longer_is_judged_just_as_often() -> None:
-    told = {exchange_s: stopped("Swapped", limits=SafetyLimits(exchange_s=exchange_s))[0] for exchange_s in (0.1, 5.0)}
+    told = {
+        control_cycle_s: stopped("Swapped", limits=SafetyLimits(control_cycle_s=control_cycle_s))[0]
+        for control_cycle_s in (0.1, 5.0)
+    }
     assert told[0.1] == told[5.0]
 
 
@@ -93,7 +96,7 @@ def test_a_vehicle_that_drives_about_is_not_stopped(seed: int, speed: float, sta
     t_s = np.arange(240) / 120.0
     x_m = start_m + speed * np.where(t_s < 1.0, t_s, 2.0 - t_s) + noise_m * rng.standard_normal(240)
     x_m[rng.integers(240, size=3)] += rng.uniform(-3.0, 3.0, 3)  # single wrong frames
-    for rule in (Lost, Frozen, Jump, Volume):
+    for rule in (LostRule, FrozenRule, JumpRule, VolumeRule):
         watching = rule(DEFAULT_SAFETY, Workspace.circle(8.0))
         assert [watching.complaint(one) for one in slices(x_m)] == [None] * 20
 
@@ -101,13 +104,13 @@ def test_a_vehicle_that_drives_about_is_not_stopped(seed: int, speed: float, sta
 def test_a_camera_that_repeats_itself_is_noticed_if_it_flickered_before() -> None:
     flicker = 1e-4 * np.random.default_rng(0).standard_normal(60)
     frozen = np.concatenate([flicker, np.full(120, 0.5)])
-    watching = Frozen(DEFAULT_SAFETY, ROOM)
+    watching = FrozenRule(DEFAULT_SAFETY, ROOM)
     said = [watching.complaint(one) for one in slices(frozen)]
     first = next(index for index, one in enumerate(said) if one)
     assert 10 <= first <= 11  # half a second after it froze, and a slice
-    watching = Frozen(DEFAULT_SAFETY, ROOM)
+    watching = FrozenRule(DEFAULT_SAFETY, ROOM)
     assert not any(watching.complaint(one) for one in slices(np.full(240, 0.5)))
-    watching = Frozen(DEFAULT_SAFETY, ROOM)
+    watching = FrozenRule(DEFAULT_SAFETY, ROOM)
     assert not any(watching.complaint(one) for one in slices(frozen, driving_s=0.0))
 
 
@@ -117,7 +120,7 @@ class Scripted:
     def __init__(self, frames: Frames) -> None:
         self.keys, self._frames, self.stops = Keys("lab", "agv1"), frames, 0
 
-    def exchange(self, _: Command, *, t_s: float, hold_s: float) -> Frames:
+    def control_cycle(self, _: Command, *, t_s: float, hold_s: float) -> Frames:
         """Return the frames that arrive in the interval."""
         received = self._frames.received_s
         return self._frames.select((received >= t_s) & (received < t_s + hold_s))
@@ -142,5 +145,5 @@ def test_a_lone_late_or_wrong_frame_stops_nobody(late_s: float, aside_m: float, 
     y_m[lone] = aside_m
     link = Scripted(Frames(captured_s, x_m, y_m, zeros, tracked, np.arange(len(t_s)), zeros, t_s))
     watching = Supervisor(ROOM, 1500.0)
-    watching.exchange(link, Command(1900.0, 1500.0, 1500.0), t_s=0.0, hold_s=3.0, seen=[])
+    watching.control_cycle(link, Command(1900.0, 1500.0, 1500.0), t_s=0.0, hold_s=3.0, seen=[])
     assert link.stops == 0

@@ -34,8 +34,8 @@ ENDURANCE_MPS = (0.311, 0.315, 0.314, 0.311, 0.310, 0.303, 0.303, 0.300, 0.296, 
 
 def still(**changes):
     """Return the default plant without play."""
-    play = replace(THESIS_VEHICLE.play, front_rad=0.0, rear_rad=0.0, speed=0.0)
-    return VehiclePlant(replace(THESIS_VEHICLE, play=play, **changes), 0)
+    run_variation = replace(THESIS_VEHICLE.run_variation, front_rad=0.0, rear_rad=0.0, speed=0.0)
+    return VehiclePlant(replace(THESIS_VEHICLE, run_variation=run_variation, **changes), 0)
 
 
 def test_steering_maps_are_those_of_tables_7_1_and_7_2():

@@ -50,7 +50,7 @@ def test_the_integrator_reads_the_constants_where_they_are_packed():
     assert names[dynamics.BACKWARD + dynamics.ACCELERATION] == "backward.acceleration_mps2"
     for group, constants in {
         "drive": "SENSE STIFFNESS OVERRUN REAR_RATIO SCRUB SCRUB_DRY "
-        "BRAKE BRAKE_DRY WINDUP_RATE WINDUP_RELAXES DRIVE_PLAY",
+        "BRAKE BRAKE_DRY WINDUP_RATE WINDUP_RELAXES DRIVE_BACKLASH",
         "body": "FRONT_AXLE REAR_AXLE MARKER_LEFT RELIEF UNDERSTEER",
         "battery": "CAPACITY RUNNING DROOP SHAPE",
     }.items():
@@ -94,13 +94,13 @@ def test_halving_the_step_changes_a_minute_of_driving_by_less_than_a_tenth_of_a_
     """Against the same equations on a grid eight times finer, in plain Python: a check of the integrator alone."""
     plant = VehiclePlant(replace(THESIS_VEHICLE, delay_frames=0.0), 0)
     plant.reset((0.0, 0.0, 0.0), seed=4)
-    constants, play, work = plant._constants, plant._play, np.empty((3, dynamics.MOVING))
+    constants, run_variation, work = plant._constants, plant._run_variation, np.empty((3, dynamics.MOVING))
     fine, phase = plant._state.copy(), int(plant._counters[0])
     counters = np.array([0, 0])
     for step in range(8 * 1200):
         if step % 8 == 0 and (step // 8 + phase) % dynamics.FRAME_STEPS == 0:
-            dynamics._latch(constants, play, fine, counters, COMMAND)
-        dynamics._step(constants, play, fine, dynamics.STEP_S / 8, work)
+            dynamics._latch(constants, run_variation, fine, counters, COMMAND)
+        dynamics._step(constants, run_variation, fine, dynamics.STEP_S / 8, work)
         fine[: dynamics.MOVING] = work[2]
     coarse = plant.advance(*COMMAND, 1.0)
     assert coarse == pytest.approx(tuple(fine[:3]), abs=2e-5)
@@ -151,14 +151,14 @@ def test_numpy_and_whole_numbers_are_commands():
 def test_a_reset_keeps_the_charge_and_draws_new_play():
     plant = fresh()
     plant.advance(*COMMAND, 5.0)
-    drawn, play = plant.true_state()["charge_ah"], plant.true_state()["play_front_rad"]
+    drawn, run_variation = plant.true_state()["charge_ah"], plant.true_state()["play_front_rad"]
     plant.reset((1.0, 2.0, 3.0), seed=2)
     state = plant.true_state()
     assert (state["x_m"], state["y_m"], state["heading_rad"], state["speed_mps"]) == (1.0, 2.0, 3.0, 0.0)
     assert state["charge_ah"] == drawn > 0.0
-    assert state["play_front_rad"] != play
+    assert state["play_front_rad"] != run_variation
     plant.reset((0.0, 0.0, 0.0), seed=1)
-    assert plant.true_state()["play_front_rad"] == play
+    assert plant.true_state()["play_front_rad"] == run_variation
 
 
 def test_play_scatters_as_declared():
@@ -166,8 +166,10 @@ def test_play_scatters_as_declared():
     for seed in range(2000):
         plant.reset((0.0, 0.0, 0.0), seed=seed)
         drawn.append([plant.true_state()[name] for name in ("play_front_rad", "play_rear_rad", "play_speed")])
-    play = THESIS_VEHICLE.play
-    assert np.std(drawn, axis=0) == pytest.approx([play.front_rad, play.rear_rad, play.speed], rel=0.06)
+    run_variation = THESIS_VEHICLE.run_variation
+    assert np.std(drawn, axis=0) == pytest.approx(
+        [run_variation.front_rad, run_variation.rear_rad, run_variation.speed], rel=0.06
+    )
     assert np.abs(np.corrcoef(np.transpose(drawn)) - np.eye(3)).max() < 0.08
 
 

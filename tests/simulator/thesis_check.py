@@ -109,7 +109,7 @@ def main() -> None:
     """Print simulated beside measured medians."""
     from agvbench.simulator import make_plant
     from agvbench.simulator.plants import THESIS_VEHICLE
-    from agvbench.simulator.vehicle_parameters import Play
+    from agvbench.simulator.vehicle_parameters import RunVariation
     from agvbench.simulator.vehicle_plant import VehiclePlant
 
     measured = {
@@ -118,7 +118,7 @@ def main() -> None:
         7: (136.15, -9.5, 9.6, -4.2), 8: (68.29, -7.2, 62.9, -3.1),
     }  # fmt: skip
     plant = make_plant(0)
-    maps = ideal_maps(VehiclePlant(replace(THESIS_VEHICLE, play=Play(0.0, 0.0, 0.0)), 0))
+    maps = ideal_maps(VehiclePlant(replace(THESIS_VEHICLE, run_variation=RunVariation(0.0, 0.0, 0.0)), 0))
     nominal = medians(plant, NOMINAL, (FULL_SPEED_MPS, FULL_SPEED_MPS), 20)
     ideal = medians(plant, maps, (float(maps.speed[0]), float(-maps.speed[-1])), 20)
     print("| trajectory | uncal. Δs [mm] | thesis \\|Δs\\| | uncal. Δδ [deg] | thesis | ideal Δs [mm] | thesis \\|Δs\\| | ideal Δδ [deg] | thesis |")  # fmt: skip  # noqa: E501

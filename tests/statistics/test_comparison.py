@@ -8,7 +8,7 @@ import pytest
 from statistics_samples import TARGETS, error_table
 
 from agvbench.errors import FlagError, InputError
-from agvbench.statistics import Verdict, compare
+from agvbench.statistics import ComparisonVerdict, compare
 from agvbench.statistics.comparison_summary import comparison_to_json, describe, headline
 from agvbench.statistics.differences import ALL
 from agvbench.statistics.quantities import QUANTITIES
@@ -68,7 +68,7 @@ def test_a_shift_of_three_sd_in_one_of_twenty_eight_comparisons_is_found(noise, 
         comparison = compare(
             error_table(draw, repeats=10, shift=base), error_table(draw, repeats=10, shift=worse), resamples=2
         )
-        found += find(comparison, "6_forward_right", condition="calibrated").verdict is Verdict.WORSE
+        found += find(comparison, "6_forward_right", condition="calibrated").verdict is ComparisonVerdict.WORSE
     assert found >= least * PAIRS / 4
 
 
@@ -100,15 +100,18 @@ def test_the_four_verdicts_and_their_words():
         return d.verdict, describe(d, comparison)
 
     verdict, words = against(20.0)
-    assert verdict is Verdict.WORSE
+    assert verdict is ComparisonVerdict.WORSE
     assert words.endswith(" mm worse")
-    assert against(-20.0)[0] is Verdict.BETTER
-    assert against(0.0, margin_mm=5.0) == (Verdict.SAME, "the same to within 5.0 mm")
+    assert against(-20.0)[0] is ComparisonVerdict.BETTER
+    assert against(0.0, margin_mm=5.0) == (ComparisonVerdict.SAME, "the same to within 5.0 mm")
     verdict, words = against(0.0, margin_mm=0.0)
-    assert verdict is Verdict.UNKNOWN
+    assert verdict is ComparisonVerdict.INCONCLUSIVE
     assert words.startswith("10 repeats cannot show a difference smaller than about ")
     # Significant, but its estimate lies inside the noise band, and repeats do not prove it to be inside either.
-    assert against(6.0, margin_mm=7.0) == (Verdict.UNKNOWN, "worse, but perhaps by no more than the margin of 7.0 mm")
+    assert against(6.0, margin_mm=7.0) == (
+        ComparisonVerdict.INCONCLUSIVE,
+        "worse, but perhaps by no more than the margin of 7.0 mm",
+    )
 
 
 @pytest.mark.parametrize("repeats", [5, 10])
@@ -123,7 +126,7 @@ def test_runs_that_end_further_left_are_a_regression_although_distance_and_headi
     comparison = compare(a, b)
     assert comparison.is_regression
     verdicts = {d.quantity.column: d.verdict for d in comparison.differences}
-    assert [column for column, verdict in verdicts.items() if verdict is Verdict.WORSE] == ["position_mm"]
+    assert [column for column, verdict in verdicts.items() if verdict is ComparisonVerdict.WORSE] == ["position_mm"]
     (shift,) = comparison.shifts
     assert shift.across.low < 60.0 < shift.across.high
     assert shift.along.covers(-0.9)
@@ -143,9 +146,9 @@ def further_along_and_less_across():
 def test_distance_worse_alone_is_a_note_and_no_regression():
     comparison = compare(*further_along_and_less_across())
     verdicts = {d.quantity.column: d.verdict for d in comparison.differences if d.trajectory == "parallel_park"}
-    assert (verdicts["position_mm"], verdicts["delta_s_mm"]) == (Verdict.BETTER, Verdict.WORSE)
+    assert (verdicts["position_mm"], verdicts["delta_s_mm"]) == (ComparisonVerdict.BETTER, ComparisonVerdict.WORSE)
     assert not comparison.is_regression
-    assert comparison.verdicts["parallel_park", "calibrated"] is not Verdict.WORSE
+    assert comparison.verdicts["parallel_park", "calibrated"] is not ComparisonVerdict.WORSE
     assert headline(comparison).endswith("is worse alone in parallel_park, which is no regression.")
     assert headline(comparison).startswith("No regression shown: of 6 comparisons 0 worse")
     made = comparison_to_json(comparison)
@@ -156,7 +159,7 @@ def test_distance_worse_alone_is_a_note_and_no_regression():
 def test_distance_counts_where_it_is_asked_to_and_shares_the_chance_of_a_false_alarm():
     comparison = compare(*further_along_and_less_across(), deciding=QUANTITIES)
     assert comparison.is_regression
-    assert comparison.verdicts["parallel_park", "calibrated"] is Verdict.WORSE
+    assert comparison.verdicts["parallel_park", "calibrated"] is ComparisonVerdict.WORSE
     assert comparison.tests == 9
     assert "Note" not in headline(comparison)
 
@@ -184,16 +187,18 @@ def test_rows_come_by_trajectory_the_worst_first_with_the_end_position_before_ot
     rows = [d for d in comparison.worst_first if d.trajectory != ALL]
     assert [d.trajectory for d in rows] == ["5_forward_left"] * 3 + ["2_backward"] * 3 + ["1_forward"] * 3
     assert [d.quantity.column for d in rows] == ["position_mm", "delta_heading_deg", "delta_s_mm"] * 3
-    assert [d.trajectory for d in rows if d.verdict is Verdict.WORSE] == ["5_forward_left"] * 2 + ["2_backward"] * 2
+    assert [d.trajectory for d in rows if d.verdict is ComparisonVerdict.WORSE] == ["5_forward_left"] * 2 + [
+        "2_backward"
+    ] * 2
 
 
 def test_where_repeats_are_few_the_distance_is_not_tested_before_the_end_pose():
     rng = np.random.default_rng(49)
     make = {"repeats": 5, "trajectories": ("1_forward",), "conditions": ("calibrated",)}
     a, b = (error_table(normal(rng), **make) for _ in range(2))
-    assert all(d.able for d in compare(a, b).differences)  # |Δs| is a note, which costs the others nothing
+    assert all(d.testable for d in compare(a, b).differences)  # |Δs| is a note, which costs the others nothing
     comparison = compare(a, b, deciding=QUANTITIES)
-    assert {d.quantity.column: d.able for d in comparison.differences} == {
+    assert {d.quantity.column: d.testable for d in comparison.differences} == {
         "position_mm": True, "delta_heading_deg": True, "delta_s_mm": False,
     }  # fmt: skip
     assert "6 of each could" in describe(find(comparison, "1_forward"), comparison)
@@ -220,7 +225,7 @@ def test_a_difference_within_the_margin_is_no_regression_however_significant():
     assert compare(a, b, margin_mm=1.0).is_regression
     wide = compare(a, b, margin_mm=6.0)
     assert not wide.is_regression
-    assert find(wide, "1_forward").verdict is Verdict.SAME
+    assert find(wide, "1_forward").verdict is ComparisonVerdict.SAME
 
 
 def test_a_small_change_everywhere_shows_in_all_trajectories_together():
@@ -233,7 +238,7 @@ def test_a_small_change_everywhere_shows_in_all_trajectories_together():
         error_table(normal(rng), repeats=10, conditions=conditions, shift=worse),
         margin_mm=2.0,
     )
-    assert find(comparison, ALL).verdict is Verdict.WORSE
+    assert find(comparison, ALL).verdict is ComparisonVerdict.WORSE
 
 
 def test_outliers_are_named_and_not_dropped():
@@ -256,9 +261,9 @@ def test_conditions_are_compared_within_the_sessions_that_they_share():
     table["session"] = [f"s{repeat % 3}" for repeat in table["repeat"]]
     table["delta_s_mm"] += 200.0 + 100.0 * (table["repeat"] % 3)
     blind = compare(table, table, conditions=("uncalibrated", "calibrated"))
-    assert find(blind, "1_forward").verdict is Verdict.UNKNOWN
+    assert find(blind, "1_forward").verdict is ComparisonVerdict.INCONCLUSIVE
     seen = compare(table, table, conditions=("uncalibrated", "calibrated"), same_campaign=True)
-    assert find(seen, "1_forward").verdict is Verdict.WORSE
+    assert find(seen, "1_forward").verdict is ComparisonVerdict.WORSE
     assert find(seen, "1_forward").condition == "uncalibrated → calibrated"
 
 

@@ -29,9 +29,9 @@ def test_thirty_repeats_find_a_small_bias_within_and_a_large_one_beyond():
 
 
 def test_few_repeats_say_nothing():
-    assert equivalence(np.array([0.1, -0.1])).verdict is Bias.UNKNOWN
+    assert equivalence(np.array([0.1, -0.1])).verdict is Bias.INCONCLUSIVE
     nothing = equivalence(np.array([]))
-    assert nothing.verdict is Bias.UNKNOWN
+    assert nothing.verdict is Bias.INCONCLUSIVE
     assert math.isnan(nothing.bias)
 
 

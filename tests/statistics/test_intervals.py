@@ -12,12 +12,12 @@ from statistics_samples import error_table
 from agvbench.statistics import bias_and_spread
 from agvbench.statistics.bootstrap import average_difference_interval, median_difference_interval, median_interval
 from agvbench.statistics.hypothesis_tests import (
-    can_speak,
-    fewest_repeats,
     holm,
-    holm_of_those_that_can_speak,
+    holm_tarone,
+    minimum_detectable_difference,
     rank_test,
-    smallest_visible_difference,
+    required_sample_size,
+    tarone_testable,
 )
 from agvbench.statistics.repeatability import spread
 
@@ -96,15 +96,15 @@ def test_holm_is_between_no_correction_and_bonferroni_and_keeps_order(p):
 
 
 def test_tests_that_cannot_speak_cost_the_others_nothing():
-    assert can_speak([0.05, 0.05, 1e-5, 1e-5], 0.01) == [False, False, True, True]
-    assert holm_of_those_that_can_speak([0.05, 0.05, 0.004, 0.5], [0.05, 0.05, 1e-5, 1e-5], 0.01) == [1, 1, 0.008, 0.5]
-    assert can_speak([0.5], 0.01) == [False]
+    assert tarone_testable([0.05, 0.05, 1e-5, 1e-5], 0.01) == [False, False, True, True]
+    assert holm_tarone([0.05, 0.05, 0.004, 0.5], [0.05, 0.05, 1e-5, 1e-5], 0.01) == [1, 1, 0.008, 0.5]
+    assert tarone_testable([0.5], 0.01) == [False]
 
 
 @pytest.mark.parametrize("repeats", [7, 10, 20, 60])
 def test_the_smallest_visible_difference_is_found_about_nine_times_in_ten(repeats):
     alpha = 0.01 / 18
-    shift = smallest_visible_difference(1.0, repeats, repeats, alpha=alpha)
+    shift = minimum_detectable_difference(1.0, repeats, repeats, alpha=alpha)
     rng = np.random.default_rng(repeats)
     a, b = rng.normal(size=(2, 500, repeats))
     found = [rank_test([(x, y + shift)]).p_greater <= alpha for x, y in zip(a, b, strict=True)]
@@ -112,5 +112,5 @@ def test_the_smallest_visible_difference_is_found_about_nine_times_in_ten(repeat
 
 
 def test_where_no_difference_is_visible():
-    assert smallest_visible_difference(1.0, 5, 5, alpha=1e-3) == math.inf
-    assert fewest_repeats(1e-3) == 7  # 1 / C(14, 7) = 1/3432, while 1 / C(12, 6) = 1/924
+    assert minimum_detectable_difference(1.0, 5, 5, alpha=1e-3) == math.inf
+    assert required_sample_size(1e-3) == 7  # 1 / C(14, 7) = 1/3432, while 1 / C(12, 6) = 1/924

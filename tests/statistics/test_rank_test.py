@@ -36,7 +36,7 @@ def test_p_values_are_those_of_counting_every_deal_ties_and_strata_included(stra
     greater, less = brute_force(strata)
     assert test.p_greater == pytest.approx(greater)
     assert test.p_less == pytest.approx(less)
-    assert test.least_p <= min(test.p_greater, test.p_less) + 1e-12
+    assert test.minimum_p <= min(test.p_greater, test.p_less) + 1e-12
 
 
 @pytest.mark.parametrize(("n", "m"), [(5, 5), (10, 10), (7, 20), (50, 50)])
@@ -67,7 +67,7 @@ def test_the_normal_approximation_joins_the_exact_distribution_without_a_step():
 
 def test_constant_and_empty_samples_say_nothing():
     same = np.full(6, 2.0)
-    assert rank_test([(same, same)]).least_p == 1.0
+    assert rank_test([(same, same)]).minimum_p == 1.0
     assert rank_test([(same, np.empty(0))]).p_greater == 1.0
     assert rank_test([]).superiority == 0.5
     huge = np.full(200, 1.0)

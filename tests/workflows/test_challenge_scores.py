@@ -9,10 +9,10 @@ import pytest
 from scipy.stats import beta
 
 from agvbench.challenge.challenge import run_challenge
-from agvbench.challenge.scores import QUESTIONS, coverings, score
+from agvbench.challenge.scores import CRITERIA, coverings, score
 from agvbench.challenge.trial import Trial
 from agvbench.errors import FlagError
-from agvbench.statistics.proportion import Share
+from agvbench.statistics.proportion import Proportion
 
 
 def trial(hidden=(), library=None, verdict="ADEQUATE", named=(), **more):
@@ -26,7 +26,7 @@ def shares(*trials):
     return {text: (s.count, s.total) for text, s in score(trials).shares.items()}
 
 
-ONE, OPEN, OPEN_ALONE, TAKEN_UP, STATIC, NOTHING, WRONG, UNKNOWN, MIXED, TWO = (text for text, _, _ in QUESTIONS)
+ONE, OPEN, OPEN_ALONE, TAKEN_UP, STATIC, NOTHING, WRONG, UNKNOWN, MIXED, TWO = (text for text, _, _ in CRITERIA)
 
 
 def test_one_hidden_effect_is_right_when_named_or_left_open_among_true_rivals():
@@ -79,7 +79,7 @@ def test_what_free_maps_take_up_is_not_asked_for_by_name():
 
 @pytest.mark.parametrize(("count", "total"), [(0, 20), (7, 20), (20, 20)])
 def test_bounds_are_exact(count, total):
-    share = Share.of([True] * count + [False] * (total - count))
+    share = Proportion.of([True] * count + [False] * (total - count))
     assert share.low == pytest.approx(beta.ppf(0.025, count, total - count + 1) if count else 0.0)
     assert share.high == pytest.approx(beta.ppf(0.975, count + 1, total - count) if count < total else 1.0)
 

@@ -52,7 +52,7 @@ def test_a_blind_trial_from_drive_to_score():
 def test_a_pair_left_open_between_a_delay_and_its_true_rival_is_right(monkeypatch):
     """Rivals are looked for per effect, as if it were hidden alone; driving plants for that takes minutes."""
     alone = {"actuation_delay": {"mocap_latency": 0.1}, "battery_droop": {}}
-    monkeypatch.setattr(challenge, "true_rivals", lambda _, sealed: alone[sealed.effects[0].name])
+    monkeypatch.setattr(challenge, "indistinguishable_effects", lambda _, sealed: alone[sealed.effects[0].name])
     spec = "actuation_delay_and_battery_droop"
     found = Diagnosis(
         Verdict.AMBIGUOUS,

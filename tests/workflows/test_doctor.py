@@ -20,10 +20,10 @@ from agvbench.errors import AgvbenchError, VehicleError
 from agvbench.model import example_vehicle, thesis_vehicle
 from agvbench.running.configuration.settings import BenchSettings
 from agvbench.running.configuration.vehicles import uncalibrated_vehicle
-from agvbench.workflows.doctor import Lab, State, examine
-from agvbench.workflows.doctor.checks.adapters import Adapters
-from agvbench.workflows.doctor.checks.ports import Ports
-from agvbench.workflows.doctor.checks.workspace import Floor
+from agvbench.workflows.doctor import FindingState, Lab, examine
+from agvbench.workflows.doctor.checks.adapters import AdaptersCheck
+from agvbench.workflows.doctor.checks.ports import PortsCheck
+from agvbench.workflows.doctor.checks.workspace import FloorCheck
 
 
 def lab(folder: Path, **settings: str) -> Lab:
@@ -31,7 +31,7 @@ def lab(folder: Path, **settings: str) -> Lab:
     return Lab(BenchSettings.given(settings), folder)
 
 
-def found(lab: Lab) -> dict[str, tuple[State, str]]:
+def found(lab: Lab) -> dict[str, tuple[FindingState, str]]:
     """Return state and text of every check."""
     return {name: (finding.state, f"{finding.found} {finding.remedy}") for name, finding in examine(lab)}
 
@@ -62,56 +62,56 @@ def test_a_calibration_grows_old(tmp_path: Path) -> None:
     file = tmp_path / "campaigns" / "monday" / "vehicle.toml"
     file.parent.mkdir(parents=True)
     thesis_vehicle().save(file)
-    assert found(Lab(folder=tmp_path))["calibration"][0] is State.GOOD
+    assert found(Lab(folder=tmp_path))["calibration"][0] is FindingState.GOOD
     old_s = file.stat().st_mtime - 40 * 86_400
     os.utime(file, (old_s, old_s))
     state, said = found(Lab(folder=tmp_path))["calibration"]
-    assert (state, "40 days old (limit: 30)" in said) == (State.DOUBTFUL, True)
+    assert (state, "40 days old (limit: 30)" in said) == (FindingState.DOUBTFUL, True)
     own = tmp_path / "vehicle.toml"
     uncalibrated_vehicle().save(own)
     assert str(file) in found(Lab(folder=tmp_path))["calibration"][1]
     replace(thesis_vehicle(), provenance={"campaign": "monday"}).save(own)
-    assert found(Lab(folder=tmp_path))["calibration"][0] is State.GOOD
+    assert found(Lab(folder=tmp_path))["calibration"][0] is FindingState.GOOD
     file.write_text("not = [toml")
-    assert found(Lab(folder=tmp_path))["calibration"][0] is State.BAD
+    assert found(Lab(folder=tmp_path))["calibration"][0] is FindingState.BAD
 
 
 def test_a_small_floor_is_said(tmp_path: Path) -> None:
     state, said = found(lab(tmp_path, workspace="circle:2"))["workspace"]
-    assert state is State.DOUBTFUL
+    assert state is FindingState.DOUBTFUL
     assert "cannot be driven by the thesis' vehicle on circle:2" in said
-    assert found(lab(tmp_path, workspace="circle:x"))["workspace"][0] is State.BAD
+    assert found(lab(tmp_path, workspace="circle:x"))["workspace"][0] is FindingState.BAD
 
 
 def test_a_port_is_looked_at(tmp_path: Path) -> None:
     master, slave = os.openpty()
     try:
-        finding = Ports().examine(lab(tmp_path, agv=f"serial:{os.ttyname(slave)}"))
-        assert (finding.state, "may be used" in finding.found) == (State.GOOD, True)
+        finding = PortsCheck().examine(lab(tmp_path, agv=f"serial:{os.ttyname(slave)}"))
+        assert (finding.state, "may be used" in finding.found) == (FindingState.GOOD, True)
     finally:
         os.close(master)
         os.close(slave)
     state, said = found(lab(tmp_path, agv="serial:/dev/none"))["serial ports"]
-    assert (state, "no port '/dev/none'" in said) == (State.BAD, True)
+    assert (state, "no port '/dev/none'" in said) == (FindingState.BAD, True)
 
 
 def test_a_bus_that_is_not_secured_has_no_certificates(tmp_path: Path) -> None:
-    assert found(Lab(folder=tmp_path))["certificates"][0] is State.IDLE
+    assert found(Lab(folder=tmp_path))["certificates"][0] is FindingState.IDLE
     state, said = found(lab(tmp_path, bus_config=str(tmp_path / "none.json5")))["certificates"]
-    assert (state, "none.json5: cannot be read" in said) == (State.BAD, True)
+    assert (state, "none.json5: cannot be read" in said) == (FindingState.BAD, True)
 
 
 def test_a_folder_that_is_not_there_is_said(tmp_path: Path) -> None:
-    assert found(Lab(folder=tmp_path / "none"))["disk"][0] is State.BAD
+    assert found(Lab(folder=tmp_path / "none"))["disk"][0] is FindingState.BAD
 
 
 @pytest.mark.parametrize(("body", "state", "said"), [
-    ("agv1", State.GOOD, "streams NatNet 4.1 at 120 Hz; agv1; capture times known to ±"),
-    ("agv7", State.BAD, "no rigid body is called 'agv7' (there are: agv1) rename"),
-    ("²", State.BAD, "no rigid body is called '²' (there are: agv1) rename"),
+    ("agv1", FindingState.GOOD, "streams NatNet 4.1 at 120 Hz; agv1; capture times known to ±"),
+    ("agv7", FindingState.BAD, "no rigid body is called 'agv7' (there are: agv1) rename"),
+    ("²", FindingState.BAD, "no rigid body is called '²' (there are: agv1) rename"),
 ])  # fmt: skip
 @pytest.mark.real_time
-def test_cameras_are_asked_for_the_vehicle(tmp_path: Path, body: str, state: State, said: str) -> None:
+def test_cameras_are_asked_for_the_vehicle(tmp_path: Path, body: str, state: FindingState, said: str) -> None:
     server = Emulator(Settings(), [Model(1, "agv1")])
     frame = FrameOfData(0, np.zeros(1, BODY), np.zeros(0, MARKER), 0.0, 0, 0, 0, 0)
     streaming = True
@@ -143,7 +143,7 @@ def test_cameras_are_asked_for_the_vehicle(tmp_path: Path, body: str, state: Sta
 ])  # fmt: skip
 def test_an_adapter_that_does_not_exist_fails(settings: dict[str, str], said: str, tmp_path: Path) -> None:
     with pytest.raises(AgvbenchError, match=said):
-        Adapters().examine(lab(tmp_path, **settings))
+        AdaptersCheck().examine(lab(tmp_path, **settings))
 
 
 def test_what_fails_is_the_exit_code(
@@ -168,7 +168,7 @@ def test_a_vehicle_that_commands_in_another_unit_than_its_file_says_fails(tmp_pa
         "        return super().open('', AdapterOptions(vehicle=options.vehicle))\n"
     )
     with pytest.raises(VehicleError, match="commands in another unit than its file says: normalised"):
-        Adapters().examine(lab(tmp_path, agv=str(own), vehicle=str(file)))
+        AdaptersCheck().examine(lab(tmp_path, agv=str(own), vehicle=str(file)))
 
 
 def test_the_trajectories_of_this_folder_are_planned_for_its_vehicle(
@@ -179,8 +179,8 @@ def test_the_trajectories_of_this_folder_are_planned_for_its_vehicle(
     (tmp_path / "trajectories").mkdir()
     tight = 'schema = 1\nname = "tight"\n[[segments]]\nkind = "arc"\nturn = "left"\nradius_m = 0.01\nangle_deg = 9'
     (tmp_path / "trajectories" / "tight.toml").write_text(tight)
-    finding = Floor().examine(lab(tmp_path, vehicle="vehicle.toml"))
-    assert (finding.state, "trajectories tight cannot be driven" in finding.found) == (State.DOUBTFUL, True)
+    finding = FloorCheck().examine(lab(tmp_path, vehicle="vehicle.toml"))
+    assert (finding.state, "trajectories tight cannot be driven" in finding.found) == (FindingState.DOUBTFUL, True)
     (tmp_path / "trajectories" / "tight.toml").write_text(tight.replace("0.01", "1.0"))
-    finding = Floor().examine(lab(tmp_path, vehicle="vehicle.toml"))
-    assert (finding.state, "eight trajectories and tight can be driven" in finding.found) == (State.GOOD, True)
+    finding = FloorCheck().examine(lab(tmp_path, vehicle="vehicle.toml"))
+    assert (finding.state, "eight trajectories and tight can be driven" in finding.found) == (FindingState.GOOD, True)

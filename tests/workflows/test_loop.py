@@ -20,7 +20,7 @@ from agvbench.loop.stages import learned
 from agvbench.model import VehicleModel
 from agvbench.reporting.loop_report import before_after_table, end_position_table
 from agvbench.running.configuration.settings import BenchSettings
-from agvbench.running.session.end_pose_bias import read_remainders
+from agvbench.running.session.end_pose_bias import read_bias_corrections
 from agvbench.statistics.equivalence import Bias
 from agvbench.statistics.quantities import THESIS
 
@@ -161,7 +161,9 @@ def test_what_is_tried_is_not_what_is_compared(driven):
     assert len(tried) == 8 * 3
     # All randomness of a simulated run follows from its name: the same names would mean the same scatter.
     assert not {run.run_id for run in tried} & {run.run_id for run in compared}
-    first, then = (read_remainders(str(directory / f"{name}.json")) for name in ("remainders-before", "remainders"))
+    first, then = (
+        read_bias_corrections(str(directory / f"{name}.json")) for name in ("remainders-before", "remainders")
+    )
     assert set(first) == set(then)
     assert first != then
 
@@ -174,7 +176,7 @@ def test_less_may_be_learned(driven, tmp_path):
     shutil.rmtree(directory / "trial")
     (directory / "remainders.json").unlink()
     known = learned(directory, replace(settings, remainders=NO_TRIAL), said.append)
-    assert read_remainders(known) == read_remainders(str(directory / "remainders-before.json"))
+    assert read_bias_corrections(known) == read_bias_corrections(str(directory / "remainders-before.json"))
     assert not (directory / "trial").exists()
     assert [line.partition(": ")[2] for line in said] == ["--model-only", "--no-trial"]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from agvbench.effects import SteeringLag
-from agvbench.loop.corrections import plans_of, remainders, shrunk
+from agvbench.loop.corrections import bias_corrections, plans_of, shrunken_mean
 from agvbench.model import thesis_vehicle
 from agvbench.planning import Departure, corrected_plan, load_trajectory
 from agvbench.planning.end_pose_prediction import coasting_path
@@ -20,7 +20,7 @@ REST_S = 0.5
 def errors_left(bias_sds, n=10, draws=4000):
     """Root mean square of what is left of a bias after learning it from n repeats of standard deviation 1."""
     rng = np.random.default_rng(3)
-    learned = [shrunk(bias_sds + rng.standard_normal((n, 1)))[0] for _ in range(draws)]
+    learned = [shrunken_mean(bias_sds + rng.standard_normal((n, 1)))[0] for _ in range(draws)]
     return float(np.sqrt(np.mean((bias_sds - np.array(learned)) ** 2)))
 
 
@@ -35,11 +35,11 @@ def test_where_there_is_no_bias_less_is_learned_than_the_mean_says():
 
 def test_a_large_bias_is_learned_whole():
     values = 40.0 + np.random.default_rng(1).standard_normal((10, 3))
-    np.testing.assert_allclose(shrunk(values), values.mean(axis=0), rtol=1e-3)
+    np.testing.assert_allclose(shrunken_mean(values), values.mean(axis=0), rtol=1e-3)
 
 
 class Driven:
-    """A campaign of one run, as `remainders` takes it, three times over."""
+    """A campaign of one run, as `bias_corrections` takes it, three times over."""
 
     def __init__(self, run):
         self.runs = [run] * 3
@@ -67,7 +67,7 @@ def as_the_model_says(model, commands, target):
 def test_a_vehicle_that_does_what_the_model_says_leaves_nothing_to_learn():
     model = thesis_vehicle().with_effects(SteeringLag(0.4))
     made = corrected_plan(load_trajectory("5"), model, departure=Departure(START))
-    left = remainders(Driven(as_the_model_says(model, made.commands, made.target)), model, "corrected")["5"]
+    left = bias_corrections(Driven(as_the_model_says(model, made.commands, made.target)), model, "corrected")["5"]
     assert [1e3 * left["x_m"], 1e3 * left["y_m"]] == pytest.approx([0.0, 0.0], abs=0.1)
     assert math.degrees(left["heading_rad"]) == pytest.approx(0.0, abs=0.02)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from agvbench.adapters.contract import AdapterOptions, AgvAdapter, AgvReports
-from agvbench.adapters.impairment.faults import Faults, Line, vehicle_fault
+from agvbench.adapters.impairment.faults import Faults, SerialLine, vehicle_fault
 from agvbench.adapters.impairment.spec import SCHEME, Impairment, parse_address
 from agvbench.adapters.registry import open_agv
 from agvbench.bus.messages.command import CommandFlags, CommandMessage
@@ -25,7 +25,7 @@ class ImpairedAgv(AgvAdapter):
     def __init__(self, vehicle: AgvAdapter, impairments: list[Impairment], options: AdapterOptions) -> None:
         self.vehicle, self._faults = vehicle, Faults(impairments, vehicle_fault, seed=options.seed)
         line = getattr(vehicle, "line", None)
-        self._line = line if isinstance(line, Line) else None
+        self._line = line if isinstance(line, SerialLine) else None
         for when, fault in self._faults:
             if fault.needs_line and self._line is None:
                 raise LinkError("vehicle has no serial line", where=f"{SCHEME}:{when.name}", value=vehicle.scheme)
@@ -57,7 +57,7 @@ class ImpairedAgv(AgvAdapter):
         if not message.flags & CommandFlags.FLUSH:
             for when, fault in self._faults:
                 if when.holds(self._faults.run, message.t_s):
-                    fault.strike(self._line)
+                    fault.inject(self._line)
                     message = message._replace(command=fault.alter(message.command, self._neutral))
         self.vehicle.apply(message)
 
@@ -83,5 +83,5 @@ class ImpairedAgv(AgvAdapter):
     def close(self) -> None:
         """Close the vehicle."""
         for _, fault in self._faults:
-            fault.cease()
+            fault.release()
         self.vehicle.close()

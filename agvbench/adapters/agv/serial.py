@@ -9,7 +9,7 @@ from agvbench.adapters.serial_line.conversation import Conversation
 from agvbench.adapters.serial_line.dialect import check_unit
 from agvbench.adapters.serial_line.port import SerialPort
 from agvbench.bus.clock import Clock
-from agvbench.bus.counters import Tally
+from agvbench.bus.counters import RateLimitedCounter
 from agvbench.bus.messages.command import CommandFlags, CommandMessage
 from agvbench.bus.messages.event import VEHICLE_STOPPED_ITSELF, Level
 from agvbench.bus.messages.identity import AgvIdentity
@@ -49,7 +49,7 @@ class SerialAgv(AgvAdapter):
         self._greet()
         self.hello = self._conversation.begin()
         self.watchdog_s = self._conversation.watchdog_s or SILENCE_LIMIT_S
-        self._tallies = (Tally(), Tally())
+        self._counters = (RateLimitedCounter(), RateLimitedCounter())
         self._told = self._counts()  # half a line of a banner, heard while greeting, is nothing to tell
         self._thread = threading.Thread(target=self._listen, name="agvbench-serial", daemon=True)
 
@@ -155,7 +155,7 @@ class SerialAgv(AgvAdapter):
                     return
                 self._fail(error)
                 return
-            self._tell()
+            self._report()
 
     def _fail(self, error: LinkError) -> None:
         """Keep the first failure, say it, and try to stop the vehicle: it may hear what it cannot answer."""
@@ -165,7 +165,7 @@ class SerialAgv(AgvAdapter):
         if self._reports is not None:
             self._reports.failed(error)
 
-    def _tell(self) -> None:
+    def _report(self) -> None:
         """Report what went wrong and was made good, seldom where there is much of it."""
         now = self._counts()
         if now == self._told or self._reports is None:
@@ -174,9 +174,9 @@ class SerialAgv(AgvAdapter):
             ("line_garbled", "the vehicle said something garbled"),
             ("command_resent", "the vehicle heard something garbled; the command was sent again"),
         )
-        for (kind, text), tally, count, before in zip(kinds, self._tallies, now[:2], self._told[:2], strict=True):
-            if count > before and tally.add(count - before):
-                self._reports.event(Level.WARNING, kind, f"{text} ({tally})")
+        for (kind, text), counter, count, before in zip(kinds, self._counters, now[:2], self._told[:2], strict=True):
+            if count > before and counter.add(count - before):
+                self._reports.event(Level.WARNING, kind, f"{text} ({counter})")
         if now[2] > self._told[2]:  # each of them spoils a run: none is left untold
             gap_s, limit_s = self._conversation.bitten_after_s, self.watchdog_s
             text = f"the vehicle's watchdog stopped it: {gap_s:.2f} s between two commands (limit: {limit_s:g} s)"

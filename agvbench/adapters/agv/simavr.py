@@ -52,8 +52,8 @@ class SimavrAgv(SimAgv):
         super().__init__(plant, options)
         self._phase_s = address.phase_s
         self._controller = Microcontroller(address.version)
-        self._said: Command | None = None
-        self._said_s = self._base_s = math.nan
+        self._sent: Command | None = None
+        self._sent_s = self._base_s = math.nan
         self._pulses: list[Pulse] = []
 
     @property
@@ -82,7 +82,7 @@ class SimavrAgv(SimAgv):
         super().reset(request)
         self._controller.reset()
         self._controller.run_until(self._controller.now_s + self._wait_s(request.run_key))
-        self._said, self._base_s, self._pulses = None, math.nan, []
+        self._sent, self._base_s, self._pulses = None, math.nan, []
 
     def _wait_s(self, run_key: str) -> float:
         """Return how long after its reset the vehicle is left alone: this decides on the phase of its frames."""
@@ -93,8 +93,8 @@ class SimavrAgv(SimAgv):
     def stop(self) -> None:
         """Say neutral: the vehicle heeds it as soon as time passes, if it still hears anything."""
         with suppress(LinkError, OSError):
-            self._controller.say(self._neutral)
-        self._said = None
+            self._controller.set_command(self._neutral)
+        self._sent = None
 
     def close(self) -> None:
         """End the simulated microcontroller."""
@@ -104,12 +104,12 @@ class SimavrAgv(SimAgv):
         """Say the command at `from_s`, unless it has been said."""
         if math.isnan(self._base_s):
             self._base_s = self._controller.now_s - from_s
-        if command != self._said:
-            self._say(command, from_s)
+        if command != self._sent:
+            self._send_command(command, from_s)
 
-    def _say(self, command: Command, at_s: float) -> None:
-        self._controller.say(command)
-        self._said, self._said_s = command, at_s
+    def _send_command(self, command: Command, at_s: float) -> None:
+        self._controller.set_command(command)
+        self._sent, self._sent_s = command, at_s
 
     def _advance_through(self, instants: Floats) -> tuple[Floats, Floats]:
         """Let firmware and plant go on until the command's interval ends."""
@@ -122,10 +122,10 @@ class SimavrAgv(SimAgv):
 
     def _run_firmware(self, end_s: float) -> None:
         """Run until `end_s`, saying the command again every `KEEP_ALIVE_S` as a runner does in real time."""
-        while (next_s := self._said_s + KEEP_ALIVE_S) < end_s - _SLACK_S:
+        while (next_s := self._sent_s + KEEP_ALIVE_S) < end_s - _SLACK_S:
             self._pulses += self._controller.run_until(self._base_s + next_s)
-            assert self._said is not None  # noqa: S101  (an interval begins with a command)
-            self._say(self._said, next_s)
+            assert self._sent is not None  # noqa: S101  (an interval begins with a command)
+            self._send_command(self._sent, next_s)
         self._pulses += self._controller.run_until(self._base_s + end_s)
 
     def _take_pulses_until(self, until_s: float) -> None:

@@ -23,13 +23,13 @@ class Fault(ABC):
     """A fault that is as grave as `value` says; made once, begun anew for every run."""
 
     name: ClassVar[str]
-    usual: ClassVar[float] = 1.0
+    default: ClassVar[float] = 1.0
     """The value where none is given."""
     lowest: ClassVar[float] = 0.0
     highest: ClassVar[float] = 1.0
 
     def __init__(self, value: float | None = None) -> None:
-        self.value = self.usual if value is None else value
+        self.value = self.default if value is None else value
         if not self.lowest <= self.value <= self.highest:
             limit = f"{self.lowest:g} to {self.highest:g}"
             raise LinkError("fault cannot be so grave", where=f"{SCHEME}:{self.name}", value=self.value, limit=limit)
@@ -49,7 +49,7 @@ class FrameFault(Fault):
 
 
 @runtime_checkable
-class Line(Protocol):
+class SerialLine(Protocol):
     """A serial line to a vehicle, as far as faults go."""
 
     wire: Callable[[bytes], bytes]
@@ -67,14 +67,14 @@ class VehicleFault(Fault):
 
     needs_line: ClassVar[bool] = False
 
-    def strike(self, line: Line | None) -> None:
+    def inject(self, line: SerialLine | None) -> None:
         """Do it; called before every command from when the fault begins. `line` is None where there is none."""
 
     def alter(self, command: Command, neutral: float) -> Command:
         """Return what the vehicle is told in place of `command`; `neutral` is what moves nothing."""
         return command
 
-    def cease(self) -> None:
+    def release(self) -> None:
         """Let go of whoever is held; the adapter is closed."""
 
 
@@ -83,7 +83,7 @@ class LineFault(VehicleFault):
 
     needs_line = True
 
-    def strike(self, line: Line | None) -> None:
+    def inject(self, line: SerialLine | None) -> None:
         """Take over the wire."""
         assert line is not None  # noqa: S101  (the adapter was asked)
         line.wire = self.carry

@@ -79,12 +79,12 @@ class ImpairedMocap(MocapAdapter):
     def frames(self, frames: Frames, *, clock: FrameClock, acknowledged: int = 0) -> None:
         """Publish what the faults leave of the camera's frames."""
         for when, fault in self._faults:
-            struck = self._struck(when, frames, clock)
+            struck = self._injected(when, frames, clock)
             if struck.any():
                 frames = Frames.concatenate([frames.select(~struck), fault.change(frames.select(struck))])
         self._reports.frames(frames, clock=clock, acknowledged=acknowledged)
 
-    def _struck(self, when: Impairment, frames: Frames, clock: FrameClock) -> np.ndarray:
+    def _injected(self, when: Impairment, frames: Frames, clock: FrameClock) -> np.ndarray:
         if clock is FrameClock.RUN:
             return np.array([when.holds(self._faults.run, t_s) for t_s in frames.t_s.tolist()], np.bool_)
         if math.isnan(self._origin_s) and len(frames):

@@ -32,7 +32,7 @@ class NatNetMocap(MocapAdapter):
     def __init__(self, options: NatNetOptions, adapter: AdapterOptions) -> None:
         self._options, self._clock = options, adapter.clock
         self._told_s, self._told = -math.inf, (0, 0, 0)
-        self._client = Client(options.connection, adapter.clock, self._see, self._tell_what_went_wrong)
+        self._client = Client(options.connection, adapter.clock, self._see, self._report_problems)
         self._every, self._rate_hz = self._decimation(self._client.rate_hz)
         self._body: int | None = None
         self._began_s = adapter.clock.now()
@@ -115,7 +115,7 @@ class NatNetMocap(MocapAdapter):
             self._reports.failed(error)
         return None
 
-    def _tell_what_went_wrong(self, now_s: float) -> None:
+    def _report_problems(self, now_s: float) -> None:
         counters = self._client.counters
         now = (counters.lost, counters.malformed, counters.foreign)
         if now != self._told and now_s - self._told_s > _QUIET_S:

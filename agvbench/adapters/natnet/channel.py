@@ -136,7 +136,7 @@ class Channel:
             raise self._unusable(error) from None
         self._joined, self._frames_s = True, self._clock.now()
 
-    def tell(self, message: Message, payload: bytes = b"") -> None:
+    def send(self, message: Message, payload: bytes = b"") -> None:
         """Send a packet; while the network is away, what is missing shows in what does not arrive."""
         try:
             self._command.sendto(join(message, payload), self._server)
@@ -156,7 +156,7 @@ class Channel:
         deadline_s, again_s = self._clock.now() + limit_s, -math.inf
         while (now_s := self._clock.now()) < deadline_s:
             if now_s >= again_s:
-                self.tell(message, payload)
+                self.send(message, payload)
                 again_s = now_s + limit_s / _ATTEMPTS
             for number, answer in self.arrived():
                 if number == wanted:

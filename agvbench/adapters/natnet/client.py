@@ -159,13 +159,13 @@ class Client:
     def _send_what_is_due(self) -> None:
         now_s = self._clock.now()
         if now_s >= self._keep_alive_s:
-            self._channel.tell(Message.KEEPALIVE)
+            self._channel.send(Message.KEEPALIVE)
             self._keep_alive_s = now_s + KEEP_ALIVE_S
         if now_s >= self._echo_s and self.info.clock_hz is not None:
-            self._channel.tell(Message.ECHO_REQUEST, _TICKS.pack(max(0, int(now_s * 1e9))))
+            self._channel.send(Message.ECHO_REQUEST, _TICKS.pack(max(0, int(now_s * 1e9))))
             self._echo_s = now_s + (FAST_ECHO_S if self._echoes < _FAST_ECHOES else ECHO_S)
         if now_s >= self._models_s:
-            self._channel.tell(Message.REQUEST_MODELDEF)
+            self._channel.send(Message.REQUEST_MODELDEF)
             self._models_s = now_s + MODELS_S
 
     def _take(self, message: int, payload: bytes) -> None:
@@ -210,5 +210,5 @@ class Client:
         self._closed.set()
         if self._thread.is_alive():
             self._thread.join(timeout=2.0)
-        self._channel.tell(Message.DISCONNECT)
+        self._channel.send(Message.DISCONNECT)
         self._channel.close()

@@ -59,7 +59,7 @@ class Network:
 
     def __init__(self, faults: PacketFaults, seed: int = 0) -> None:
         self._faults, self._random = faults, random.Random(seed)  # noqa: S311  (faults, not secrets)
-        self._overtaken: list[bytes] = []
+        self._reordered: list[bytes] = []
 
     def carry(self, packet: bytes) -> list[bytes]:
         """Return what arrives now that `packet` was sent.
@@ -73,8 +73,8 @@ class Network:
         if chance() < faults.cut:
             packet = packet[: len(packet) // 2]
         arriving = [packet] * (2 if chance() < faults.doubled else 1)
-        if not self._overtaken and chance() < faults.reordered:
-            self._overtaken = arriving
+        if not self._reordered and chance() < faults.reordered:
+            self._reordered = arriving
             return []
-        late, self._overtaken = self._overtaken, []
+        late, self._reordered = self._reordered, []
         return arriving + late

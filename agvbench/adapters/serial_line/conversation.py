@@ -46,7 +46,7 @@ class Conversation:
         self._sequence, self._failures = 0, 0
         self._waiting: tuple[int, float] | None = None  # the oldest number without an answer, and when it was sent
         self._last: Command | None = None
-        self._said_s, self._gap_s, self.bitten_after_s = math.inf, 0.0, 0.0
+        self._sent_s, self._gap_s, self.bitten_after_s = math.inf, 0.0, 0.0
         self._heard = b""
 
     @property
@@ -98,7 +98,7 @@ class Conversation:
         numbers = self._dialect.numbers(command, where=self._where)
         self._sequence = self._sequence % _NUMBERS + 1
         self._last = command
-        self._gap_s, self._said_s = max(0.0, now_s - self._said_s), now_s
+        self._gap_s, self._sent_s = max(0.0, now_s - self._sent_s), now_s
         self._waiting = self._waiting or (self._sequence, now_s)
         text = f"S {self._sequence} {numbers[0]} {numbers[1]} {numbers[2]}"
         return encode_line(text, checksum=self._dialect.checksums)
@@ -156,7 +156,7 @@ class Conversation:
         elif isinstance(reply, WatchdogBit):
             # The next command may have been said before the vehicle's word for the silence before it was read.
             self.watchdog_bites += 1
-            self.bitten_after_s = max(self._gap_s, now_s - self._said_s)
+            self.bitten_after_s = max(self._gap_s, now_s - self._sent_s)
         elif isinstance(reply, Hello):
             raise LinkError(
                 "the vehicle was reset while it was driven",

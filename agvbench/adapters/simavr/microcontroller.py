@@ -73,7 +73,7 @@ class Microcontroller:
         """End the process, as a cable that is pulled out ends a port."""
         self.host.process.kill()
 
-    def say(self, command: Command) -> None:
+    def set_command(self, command: Command) -> None:
         """Send a command [µs] now."""
         self._write(self.conversation.command(command, self.now_s))
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agvbench.calibration.maps.map_fit import MapFit, judge, require_points, rounded
+from agvbench.calibration.maps.map_fit import MapFit, assess_map, require_points, rounded
 from agvbench.calibration.samples import CurvePoints
 from agvbench.errors import FitError
 from agvbench.types import Floats
@@ -52,11 +52,11 @@ def fit_dead_band(points: CurvePoints, *, neutral: float) -> MapFit:
         high_exponent=rounded(high.exponent),
     )
     stderr = {f"{side}_{name}": error for side, fit in (("low", low), ("high", high)) for name, error in fit.stderr}
-    return judge("dead_band_with_saturation", static_map, points, parameters=8, stderr=stderr)
+    return assess_map("dead_band_with_saturation", static_map, points, parameters=8, stderr=stderr)
 
 
 @dataclass(frozen=True)
-class _Side:
+class _DeadBandSide:
     edge: float
     saturation: float
     exponent: float
@@ -70,7 +70,7 @@ def _shape(offset: Floats, edge: Floats | float, saturation: Floats | float, exp
     return np.asarray(1.0 - (1.0 - u) ** exponent)
 
 
-def _fit_side(offset: Floats, value: Floats, side: str) -> _Side:
+def _fit_side(offset: Floats, value: Floats, side: str) -> _DeadBandSide:
     from scipy.optimize import least_squares
 
     here = offset >= 0.0
@@ -110,4 +110,4 @@ def _fit_side(offset: Floats, value: Floats, side: str) -> _Side:
     both = float(np.sqrt(covariance[0, 0] + covariance[1, 1] + 2.0 * covariance[0, 1])) * farthest
     names = ("edge", "saturation", "exponent", "output")
     values = (float(errors[0]), both, float(errors[2]), float(errors[3]))
-    return _Side(edge_, edge_ + width, exponent_, full_, tuple(zip(names, values, strict=True)))
+    return _DeadBandSide(edge_, edge_ + width, exponent_, full_, tuple(zip(names, values, strict=True)))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.calibration.maps.map_fit import LeftOut, MapFit, judge, require_points, rounded, without
+from agvbench.calibration.maps.map_fit import ExcludedPoint, MapFit, assess_map, require_points, rounded, without
 from agvbench.calibration.maps.polynomial import polynomial
 from agvbench.calibration.samples import CurvePoints
 from agvbench.errors import FitError
@@ -49,7 +49,7 @@ def fit_line_with_end_stops(points: CurvePoints) -> MapFit:
             break
         reasons[float(kept.command[worst])] = "off the map by more than the scatter of the others explains"
     static_map = LineWithEndStops(rounded(best.slope), rounded(best.intercept), rounded(best.low), rounded(best.high))
-    return judge(
+    return assess_map(
         "line_with_end_stops",
         static_map,
         points,
@@ -138,11 +138,11 @@ def _between(points: CurvePoints, split: _Split) -> NDArray[np.bool_]:
     return (index >= split.first) & (index < split.last)
 
 
-def saturated(fit: MapFit) -> tuple[LeftOut, ...]:
+def saturated(fit: MapFit) -> tuple[ExcludedPoint, ...]:
     """Return the points that a fit holds for saturated: at a stop, and so not on the line."""
     low, high = fit.map.command_range
     return tuple(
-        LeftOut(float(c), float(v), "at the end stop")
+        ExcludedPoint(float(c), float(v), "at the end stop")
         for c, v in zip(fit.points.command, fit.points.value, strict=True)
         if c < low or c > high
     )

@@ -15,7 +15,7 @@ from agvbench.vehicle.maps import StaticMap
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class ExcludedPoint:
     """A point that a fit was not made from, and why."""
 
     command: float
@@ -42,12 +42,12 @@ class MapFit:
     stderr: Mapping[str, float]
     points: CurvePoints
     used: NDArray[np.bool_]
-    left_out: tuple[LeftOut, ...] = ()
+    left_out: tuple[ExcludedPoint, ...] = ()
     notes: tuple[str, ...] = ()
     cross_validated_rms: float = field(default=np.nan)
 
 
-def judge(
+def assess_map(
     name: str,
     static_map: StaticMap,
     points: CurvePoints,
@@ -76,7 +76,9 @@ def judge(
         stderr=dict(stderr),
         points=points,
         used=used,
-        left_out=tuple(LeftOut(c, float(points.value[points.command == c][0]), why) for c, why in reasons.items()),
+        left_out=tuple(
+            ExcludedPoint(c, float(points.value[points.command == c][0]), why) for c, why in reasons.items()
+        ),
         notes=notes,
     )
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from agvbench.calibration.maps.map_fit import MapFit, judge, require_points, rounded, without
+from agvbench.calibration.maps.map_fit import MapFit, assess_map, require_points, rounded, without
 from agvbench.calibration.samples import CurvePoints
 from agvbench.errors import FitError, VehicleError
 from agvbench.types import Floats
@@ -29,7 +29,7 @@ def fit_line(points: CurvePoints, *, name: str = "line", reasons: Mapping[float,
         raise FitError("the output does not change with the command", value=f"{used.value[0]:.4g} throughout")
     static_map = Line(slope, intercept, command_low=used.command[0], command_high=used.command[-1])
     stderr = {"slope": slope_se, "intercept": intercept_se}
-    return judge(name, static_map, points, parameters=2, stderr=stderr, reasons=reasons)
+    return assess_map(name, static_map, points, parameters=2, stderr=stderr, reasons=reasons)
 
 
 def fit_cubic(points: CurvePoints, *, name: str = "cubic", reasons: Mapping[float, str] | None = None) -> MapFit:
@@ -55,7 +55,7 @@ def fit_cubic(points: CurvePoints, *, name: str = "cubic", reasons: Mapping[floa
     notes: tuple[str, ...] = ()
     if (low, high) != (used.command[0], used.command[-1]):
         notes = (f"monotone from {low:g} to {high:g} only",)
-    return judge(
+    return assess_map(
         name,
         static_map,
         points,

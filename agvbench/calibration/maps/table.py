@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from agvbench.calibration.maps.map_fit import MapFit, judge, require_points, rounded
+from agvbench.calibration.maps.map_fit import MapFit, assess_map, require_points, rounded
 from agvbench.calibration.samples import CurvePoints
 from agvbench.errors import FitError
 from agvbench.types import Floats
@@ -34,7 +34,7 @@ def fit_monotone_table(points: CurvePoints, *, interpolation: str = "pchip") -> 
         raise FitError("the output does not change with the command", value=f"{value[0]:.4g} throughout")
     static_map = MonotoneTable(tuple(points.command.tolist()), tuple(rounded(v) for v in value.tolist()), interpolation)
     stderr = {f"outputs[{k}]": float(se) for k, se in enumerate(points.stderr) if np.isfinite(se)}
-    return judge("monotone_table", static_map, points, parameters=len(np.unique(value)), stderr=stderr)
+    return assess_map("monotone_table", static_map, points, parameters=len(np.unique(value)), stderr=stderr)
 
 
 def fit_refined(points: CurvePoints, base: Callable[[CurvePoints], MapFit]) -> MapFit:
@@ -65,7 +65,7 @@ def fit_refined(points: CurvePoints, base: Callable[[CurvePoints], MapFit]) -> M
     if np.ptp(value) == 0.0:
         raise FitError("the output does not change with the command", value=f"{value[0]:.4g} throughout")
     static_map = MonotoneTable(tuple(map(rounded, knots.tolist())), tuple(map(rounded, value.tolist())))
-    return judge(
+    return assess_map(
         f"{fit.name}_refined",
         static_map,
         points,

@@ -71,7 +71,7 @@ def clean_frames(frames: Frames, *, max_speed_mps: float | None = None) -> Frame
 def inspect_frames(frames: Frames, *, max_speed_mps: float | None = None) -> tuple[Frames, FrameQuality]:
     """Return what `clean_frames` does, and the counts of what was found."""
     pose_known = np.all([np.abs(c) < _FARTHEST for c in (frames.x_m, frames.y_m, frames.heading_rad)], axis=0)
-    bad_time, late = _judge_times(frames.t_s)
+    bad_time, late = _check_times(frames.t_s)
     order = np.argsort(frames.t_s, kind="stable")
     order = order[~bad_time[order]]
     doubled = _repeats(frames, order)
@@ -98,7 +98,7 @@ def inspect_frames(frames: Frames, *, max_speed_mps: float | None = None) -> tup
     )
 
 
-def _judge_times(t_s: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _check_times(t_s: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return which times are unusable and which frames are merely late.
 
     The frames in order are the longest rising sequence of times, so that a single time far ahead does not make all that

@@ -11,8 +11,8 @@ from pathlib import Path
 import msgspec
 
 from agvbench.campaign.header import SCHEMA
-from agvbench.campaign.recordings.mapping_schema import ISO_8601, TABLES, Mapping, Quantity
-from agvbench.campaign.toml_errors import explain
+from agvbench.campaign.recordings.mapping_schema import ISO_8601, TABLES, Mapping, QuantityColumn
+from agvbench.campaign.toml_errors import validation_message
 from agvbench.errors import FileError, InputError
 from agvbench.text_files import read_toml
 
@@ -57,12 +57,14 @@ def load_mapping(name: str | Path) -> Mapping:
     except OSError as error:
         raise FileError(f"cannot be read ({error.strerror})", where=path, remedy="check its permissions") from None
     except msgspec.ValidationError as error:
-        raise FileError(explain(error, TABLES), where=path, remedy="see docs/how-to/import-your-csv.md") from None
+        raise FileError(
+            validation_message(error, TABLES), where=path, remedy="see docs/how-to/import-your-csv.md"
+        ) from None
     _check(mapping, path)
     return mapping
 
 
-def quantities(mapping: Mapping) -> Iterator[tuple[str, Quantity, dict[str, float]]]:
+def quantities(mapping: Mapping) -> Iterator[tuple[str, QuantityColumn, dict[str, float]]]:
     """Yield each measured column that is mapped: its name, its declaration and the units it may have."""
     columns = mapping.columns
     yield "x", columns.x, LENGTH

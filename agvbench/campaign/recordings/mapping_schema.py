@@ -40,7 +40,7 @@ class Mocap(_Strict, frozen=True):
     rate_hz: FrameRate
 
 
-class Prediction(_Strict, frozen=True):
+class PredictionSettings(_Strict, frozen=True):
     """As ``[prediction]`` of ``campaign.toml``."""
 
     horizon_s: _Positive
@@ -64,7 +64,7 @@ class Time(_Strict, frozen=True):
     clock: Literal["file", "absolute"] = "file"
 
 
-class Quantity(_Strict, frozen=True):
+class QuantityColumn(_Strict, frozen=True):
     """A measured column: SI value = cell · unit · scale + offset; a scale of −1 mirrors."""
 
     column: str
@@ -104,14 +104,14 @@ class Columns(_Strict, frozen=True):
     """Which column is what."""
 
     time: Time
-    x: Quantity
-    y: Quantity
+    x: QuantityColumn
+    y: QuantityColumn
     drive: Signal
     front: Signal
     rear: Signal | None = None
-    heading: Quantity | None = None
+    heading: QuantityColumn | None = None
     quaternion: Quaternion | None = None
-    mean_error: Quantity | None = None
+    mean_error: QuantityColumn | None = None
     frame: str | None = None
     tracked: Flag | None = None
     driven: Flag | None = None
@@ -160,7 +160,7 @@ class Mapping(_Strict, frozen=True):
     vehicle: Vehicle
     mocap: Mocap
     columns: Columns
-    prediction: Prediction | None = None
+    prediction: PredictionSettings | None = None
     csv: Csv = Csv()
     gate: Gate | None = None
     runs: Runs = Runs()
@@ -194,10 +194,10 @@ TABLES = (
     Mapping,
     Vehicle,
     Mocap,
-    Prediction,
+    PredictionSettings,
     Csv,
     Time,
-    Quantity,
+    QuantityColumn,
     Signal,
     Quaternion,
     Flag,

@@ -15,7 +15,7 @@ from agvbench.campaign.recordings.jump_detection import jumped
 from agvbench.campaign.recordings.mapping import TIME, factor, quantities
 from agvbench.campaign.recordings.mapping_schema import ISO_8601, Axis, Flag, Mapping
 from agvbench.campaign.tables.csv_text import read_csv_text
-from agvbench.campaign.tables.schema import UNKNOWN_COUNT, Column, Kind, fill_columns, type_columns
+from agvbench.campaign.tables.schema import UNKNOWN_COUNT, ColumnSpec, Kind, fill_columns, type_columns
 from agvbench.errors import FileError
 from agvbench.types import Floats
 
@@ -172,7 +172,7 @@ class Cells:
         text = self.text(column)
         if self.mapping.csv.decimal == ",":
             text = pc.replace_substring(text, ",", ".")
-        known = [Column(column, kind, required=False)]
+        known = [ColumnSpec(column, kind, required=False)]
         typed = fill_columns(type_columns(pa.table({column: text}), known, self.path), known, self.path)
         values: NDArray[Any] = typed[column].to_numpy()
         return values

@@ -14,7 +14,7 @@ from agvbench.errors import CampaignError
 Kind = Literal["text", "number", "count", "flag"]
 
 
-class Column(NamedTuple):
+class ColumnSpec(NamedTuple):
     """A known column: `number` is a float, `count` an integer, `flag` a truth value."""
 
     name: str
@@ -22,8 +22,8 @@ class Column(NamedTuple):
     required: bool = True
 
 
-def _columns(kind: Kind, names: str, *, required: bool = True) -> tuple[Column, ...]:
-    return tuple(Column(name, kind, required) for name in names.split())
+def _columns(kind: Kind, names: str, *, required: bool = True) -> tuple[ColumnSpec, ...]:
+    return tuple(ColumnSpec(name, kind, required) for name in names.split())
 
 
 RUNS = (
@@ -41,7 +41,7 @@ POSES = (
     *_columns("count", "frame", required=False),
     *_columns("number", "mean_error_m received_s", required=False),
 )
-TABLES: dict[str, tuple[Column, ...]] = {"runs": RUNS, "commands": COMMANDS, "poses": POSES}
+TABLES: dict[str, tuple[ColumnSpec, ...]] = {"runs": RUNS, "commands": COMMANDS, "poses": POSES}
 PLANNED_TABLE = "planned"
 SPLITS = ("fit", "validation", "held_out")
 
@@ -52,7 +52,7 @@ _LONGEST_VALUE = 80
 UNKNOWN_COUNT = -1
 
 
-def type_columns(table: pa.Table, columns: Sequence[Column], where: object) -> pa.Table:
+def type_columns(table: pa.Table, columns: Sequence[ColumnSpec], where: object) -> pa.Table:
     """Return `table` with its known columns as text, float64, int64 or bool; unknown columns stay as they are.
 
     Raises
@@ -72,7 +72,7 @@ def type_columns(table: pa.Table, columns: Sequence[Column], where: object) -> p
     return table
 
 
-def fill_columns(table: pa.Table, columns: Sequence[Column], where: object) -> pa.Table:
+def fill_columns(table: pa.Table, columns: Sequence[ColumnSpec], where: object) -> pa.Table:
     """Return `table` without nulls in its known columns, but for optional text.
 
     A missing number is NaN, a missing text empty, a missing optional count −1, a missing flag false.
@@ -98,7 +98,7 @@ def _absent(name: str, names: Sequence[str], where: object) -> CampaignError:
     return CampaignError(f"has no column {name} ({found})", where=where, remedy=remedy)
 
 
-def _convert(values: pa.ChunkedArray, column: Column, where: object) -> pa.ChunkedArray:
+def _convert(values: pa.ChunkedArray, column: ColumnSpec, where: object) -> pa.ChunkedArray:
     target, kind = _TYPES[column.kind], values.type
     if pa.types.is_null(kind):
         return values.cast(target)
@@ -118,7 +118,7 @@ def _convert(values: pa.ChunkedArray, column: Column, where: object) -> pa.Chunk
         raise _bad_cell(values, column, where, lambda cell: float(cell).is_integer()) from None
 
 
-def _parse(values: pa.ChunkedArray, column: Column, where: object) -> pa.ChunkedArray:
+def _parse(values: pa.ChunkedArray, column: ColumnSpec, where: object) -> pa.ChunkedArray:
     values = pc.utf8_trim_whitespace(values)
     values = pc.if_else(pc.equal(values, ""), None, values)
     try:
@@ -134,7 +134,7 @@ def _as_flag(cell: str) -> bool:
 _PARSERS: dict[Kind, Callable[[str], object]] = {"text": str, "number": float, "count": int, "flag": _as_flag}
 
 
-def _fill(values: pa.ChunkedArray, column: Column, where: object) -> pa.ChunkedArray:
+def _fill(values: pa.ChunkedArray, column: ColumnSpec, where: object) -> pa.ChunkedArray:
     if column.kind == "number":
         return values.fill_null(float("nan"))
     if column.kind == "flag":
@@ -147,7 +147,7 @@ def _fill(values: pa.ChunkedArray, column: Column, where: object) -> pa.ChunkedA
     raise CampaignError(f"row {row} has no {column.name}", where=where, remedy=f"fill in {column.name}")
 
 
-def _wrong_type(column: Column, where: object, kind: pa.DataType) -> CampaignError:
+def _wrong_type(column: ColumnSpec, where: object, kind: pa.DataType) -> CampaignError:
     return CampaignError(
         f"column {column.name} has the wrong type",
         where=where,
@@ -157,7 +157,7 @@ def _wrong_type(column: Column, where: object, kind: pa.DataType) -> CampaignErr
     )
 
 
-def _bad_cell(values: Any, column: Column, where: object, accepts: Callable[[Any], object]) -> CampaignError:
+def _bad_cell(values: Any, column: ColumnSpec, where: object, accepts: Callable[[Any], object]) -> CampaignError:
     for row, cell in enumerate(values.to_pylist(), start=1):
         try:
             good = cell is None or accepts(cell) is not False or cell is False

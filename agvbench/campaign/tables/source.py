@@ -12,7 +12,7 @@ from agvbench.campaign.atomic_files import is_temporary
 from agvbench.campaign.manifest import Manifest
 from agvbench.campaign.tables.csv_text import read_csv_text
 from agvbench.campaign.tables.parquet import MAX_BYTES, MAX_ROWS, read_parquet
-from agvbench.campaign.tables.schema import Column, fill_columns, type_columns
+from agvbench.campaign.tables.schema import ColumnSpec, fill_columns, type_columns
 from agvbench.errors import CampaignError
 
 SUFFIXES = (".parquet", ".csv")
@@ -51,7 +51,7 @@ class Source:
         is_directory = path.is_dir()
         return cls(path, parts(path) if is_directory else (path,), is_directory, manifest)
 
-    def read(self, columns: Sequence[Column]) -> pa.Table:
+    def read(self, columns: Sequence[ColumnSpec]) -> pa.Table:
         """Read all of it, with the types of `columns`.
 
         Raises
@@ -94,11 +94,11 @@ def parts(directory: Path) -> tuple[Path, ...]:
     return tuple(sorted(files, key=lambda file: file.name))
 
 
-def _read_file(file: Path, columns: Sequence[Column], max_rows: int, max_bytes: int) -> pa.Table:
+def _read_file(file: Path, columns: Sequence[ColumnSpec], max_rows: int, max_bytes: int) -> pa.Table:
     if file.suffix == ".csv":
         return read_csv_text(file, columns=[column.name for column in columns])
     return read_parquet(file, max_rows=max_rows, max_bytes=max_bytes)
 
 
-def _nothing(columns: Sequence[Column]) -> pa.Table:
+def _nothing(columns: Sequence[ColumnSpec]) -> pa.Table:
     return pa.table({column.name: pa.array([], pa.null()) for column in columns if column.required})

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from agvbench.calibration import inspect_frames
 from agvbench.calibration.campaign_protocol import HeaderLike
 from agvbench.diagnosis.data.initial_pose import frame_noise, rests
-from agvbench.model.simulation.loop import LATELY_S
+from agvbench.model.simulation.loop import RECENT_SPEED_S
 from agvbench.statistics.rest_poses import SPEED_LIMIT_MPS
 from agvbench.types import Commands, Floats, Frames, Run
 
@@ -166,11 +166,11 @@ def _state(t: Floats, motion: Floats, noise: Floats) -> _State | None:
 
 
 def _recent_speed(t: Floats, motion: Floats) -> float:
-    """Return the speed ahead, averaged with weights that fall by e every `LATELY_S` before the last frame."""
-    own = t > t[-1] - _RECENT_SPANS * LATELY_S
+    """Return the speed ahead, averaged with weights that fall by e every `RECENT_SPEED_S` before the last frame."""
+    own = t > t[-1] - _RECENT_SPANS * RECENT_SPEED_S
     dt, step = np.diff(t[own]), np.diff(motion[own], axis=0)
     heading = motion[own][1:, 2] - 0.5 * step[:, 2]
-    weight = np.exp((t[own][1:] - t[-1]) / LATELY_S)
+    weight = np.exp((t[own][1:] - t[-1]) / RECENT_SPEED_S)
     ahead = np.cos(heading) * step[:, 0] + np.sin(heading) * step[:, 1]
     return float(np.sum(weight * ahead) / np.sum(weight * dt))
 

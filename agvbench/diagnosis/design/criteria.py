@@ -27,7 +27,7 @@ _WEAK = 1e-6
 
 
 @dataclass(frozen=True)
-class Information:
+class DesignInformation:
     """What runs of one design say about parameters, offsets integrated out: ``matrix`` (D, P, P), D designs.
 
     ``pull`` (D, P) and ``square`` (D,) are of a difference in prediction, if one was given.
@@ -95,7 +95,9 @@ def starts_within(path: Floats, workspace: Workspace, geometry: Geometry) -> lis
     return out
 
 
-def information(fitted: Fit, predictor: Predictor, parameters: Floats, difference: Floats | None = None) -> Information:
+def information(
+    fitted: Fit, predictor: Predictor, parameters: Floats, difference: Floats | None = None
+) -> DesignInformation:
     """Return what the runs of `predictor` would say about `parameters`, with the noise and scatter of `fitted`.
 
     ``difference`` (R, K, 3), if given, is what another model predicts otherwise.
@@ -111,7 +113,7 @@ def information(fitted: Fit, predictor: Predictor, parameters: Floats, differenc
     parts = (jt @ fixed, (jt @ off)[..., 0], np.sum(e * off[..., 0], axis=1))
     sizes = np.bincount(readings.group)
     first = np.concatenate([[0], np.cumsum(sizes)[:-1]])
-    return Information(*(np.add.reduceat(part, first, axis=0) / sizes[0] for part in parts))
+    return DesignInformation(*(np.add.reduceat(part, first, axis=0) / sizes[0] for part in parts))
 
 
 class Weighted:
@@ -148,7 +150,7 @@ class Weighted:
         return np.asarray(columns - self._a @ (self._inverse @ (self._a.transpose(0, 2, 1) @ columns)))
 
 
-def evidence(known: Floats, new: Information, repeats: float) -> Floats:
+def evidence(known: Floats, new: DesignInformation, repeats: float) -> Floats:
     """Return by how much minus two log likelihood of the wrong model would rise (D,), after it was fitted again.
 
     ``known`` (P, P) is what the data say about its parameters already. It is the quadratic minimum over what

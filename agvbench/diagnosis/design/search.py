@@ -21,7 +21,7 @@ from agvbench.diagnosis.design.identifiability import Unidentified, pin_scores
 from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import RANDOM_EFFECTS, Predictor
-from agvbench.diagnosis.proposal import Separation
+from agvbench.diagnosis.proposal import Discrimination
 from agvbench.planning import Workspace
 from agvbench.types import Floats, Pose
 
@@ -129,7 +129,7 @@ class Search:
 
     def separations(
         self, pairs: Sequence[tuple[Alternative, Alternative]], design: Design, gains: Floats
-    ) -> tuple[Separation, ...]:
+    ) -> tuple[Discrimination, ...]:
         """Return how well a design parts each pair."""
         readings = self.readings([design])
         out = []
@@ -137,7 +137,7 @@ class Search:
             a, b = (like(r.fit, readings, self.geometry).predict(r.fit.parameters) for r in (one, other))
             apart = a - b
             out.append(
-                Separation(
+                Discrimination(
                     (one.name, other.name),
                     float(gain),
                     float(1e3 * np.hypot(apart[..., 0], apart[..., 1]).max()),

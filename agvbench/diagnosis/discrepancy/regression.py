@@ -25,7 +25,7 @@ Columns = dict[int, Floats]
 
 
 @dataclass(frozen=True)
-class Steering:
+class SteeringTangents:
     """Tangents of both axles' settled angles (n, 2) at each residual rate, ``before`` under the command before.
 
     ``levels`` (n, 3): which level of drive, front and rear was in force.
@@ -36,7 +36,7 @@ class Steering:
     levels: NDArray[np.int64]
 
 
-def steering(batch: Batch, parameters: Floats, rates: Rates) -> Steering:
+def steering(batch: Batch, parameters: Floats, rates: Rates) -> SteeringTangents:
     """Return how the axles stood at each rate, by the maps' values in `parameters`."""
     where = batch.maps.slices()
     settled = np.column_stack([batch.weights[role] @ parameters[where[role]] for role in ("front", "rear")])
@@ -56,13 +56,13 @@ def steering(batch: Batch, parameters: Floats, rates: Rates) -> Steering:
     levels = np.column_stack(
         [np.unique(batch.commands[role], return_inverse=True)[1][rows] for role in ("drive", "front", "rear")]
     )
-    return Steering(tangent[rows], before[rows], levels)
+    return SteeringTangents(tangent[rows], before[rows], levels)
 
 
 class GroupedRegression:
     """Residual rates ready for regression: what maps take up removed, each feature in units of its misfit."""
 
-    def __init__(self, rates: Rates, stands: Steering, fold: NDArray[np.int64]) -> None:
+    def __init__(self, rates: Rates, stands: SteeringTangents, fold: NDArray[np.int64]) -> None:
         self.folds, self.root = [np.flatnonzero(fold == f) for f in range(FOLDS)], np.sqrt(rates.weight)
         drive, axles = _dummies(stands.levels[:, 0]), [_dummies(stands.levels[:, k]) for k in (1, 2)]
         self.known = [self._orthogonal([drive]), *[self._orthogonal(axles)] * 2]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis import terms
 from agvbench.diagnosis.data.splits import folds
-from agvbench.diagnosis.discrepancy.regression import FOLDS, Columns, GroupedRegression, Steering
+from agvbench.diagnosis.discrepancy.regression import FOLDS, Columns, GroupedRegression, SteeringTangents
 from agvbench.diagnosis.residuals.body_rates import Rates
 from agvbench.diagnosis.terms import DiscrepancyTerm
 from agvbench.types import Floats
@@ -61,7 +61,7 @@ class _Wave(Values):
 
 
 def options(
-    rates: Rates, stands: Steering, geometry: Geometry, assess: GroupedRegression
+    rates: Rates, stands: SteeringTangents, geometry: Geometry, assess: GroupedRegression
 ) -> Iterator[tuple[type[terms.DiscrepancyTerm], Iterator[Option]]]:
     """Yield each term with its regressors and what makes values of their sizes."""
     c = rates.covariates
@@ -86,7 +86,7 @@ def options(
     yield terms.WaveByDistance, _waves(rates)
 
 
-def _axles(front: Floats, rear: Floats, stands: Steering, geometry: Geometry) -> Columns:
+def _axles(front: Floats, rear: Floats, stands: SteeringTangents, geometry: Geometry) -> Columns:
     """Return what turning each axle by these angles [rad] does, sideways and turning: a column per axle."""
     slope = 1.0 + stands.tangent**2
     f, r = front * slope[:, 0], rear * slope[:, 1]
@@ -94,7 +94,7 @@ def _axles(front: Floats, rear: Floats, stands: Steering, geometry: Geometry) ->
     return {1: np.column_stack([lr * f, lf * r]) / base, 2: np.column_stack([f, -r]) / base}
 
 
-def _campaign_times(rates: Rates, stands: Steering, geometry: Geometry) -> Iterator[Option]:
+def _campaign_times(rates: Rates, stands: SteeringTangents, geometry: Geometry) -> Iterator[Option]:
     angle = np.arctan(stands.tangent)
     for hours in _HOURS:
         warm = -np.expm1(-rates.covariates["campaign_time_h"] / hours)
@@ -222,7 +222,9 @@ class Start:
     gain: float
 
 
-def screen(rates: Rates, stands: Steering, geometry: Geometry, group: NDArray[np.int64], seed: int) -> list[Start]:
+def screen(
+    rates: Rates, stands: SteeringTangents, geometry: Geometry, group: NDArray[np.int64], seed: int
+) -> list[Start]:
     """Return for each term its best start, the most promising term first; terms without promise are left out."""
     assess = GroupedRegression(rates, stands, folds(group, FOLDS, seed)[rates.run])
     found = []

@@ -8,7 +8,7 @@ from agvbench.calibration.campaign_protocol import HeaderLike
 from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.model.nodal_maps import NodalMaps
 from agvbench.effects import Effect, effect_kinds
-from agvbench.effects.forms import effect_forms
+from agvbench.effects.variants import effect_variants
 from agvbench.model import VehicleModel
 from agvbench.types import Floats
 from agvbench.vehicle.geometry import Geometry
@@ -43,7 +43,7 @@ def corrected_vehicle(header: HeaderLike, geometry: Geometry, fitted: Fit, maps:
 
 
 def _effects(fitted: Fit) -> tuple[Effect, ...]:
-    kinds, values = {**effect_kinds(), **effect_forms()}, fitted.effect_values()
+    kinds, values = {**effect_kinds(), **effect_variants()}, fitted.effect_values()
     return tuple(
         kinds[name](**{key.partition(".")[2]: v for key, v in values.items() if key.partition(".")[0] == name})
         for name in fitted.predictor.effects

@@ -7,7 +7,7 @@ from agvbench.diagnosis.result import Estimate, NamedEffect
 from agvbench.diagnosis.selection.stepwise import ALTERNATIVE_MARGIN, Selection
 from agvbench.diagnosis.terms import TERMS, DiscrepancyTerm
 from agvbench.effects import Effect, effect_kinds
-from agvbench.effects.forms import cause_of, effect_forms
+from agvbench.effects.variants import cause_of, effect_variants
 from agvbench.types import Floats
 
 _FLAT = 3.0
@@ -21,7 +21,7 @@ def named_effects(selection: Selection, bounds: Floats) -> tuple[NamedEffect, ..
     fit = selection.chosen.fit
     maps = fit.predictor.maps.size
     stderr = standard_errors(fit, fit.predictor.readings.group)
-    kinds: dict[str, type[Effect]] = {**effect_kinds(), **effect_forms(), **{term.name: term for term in TERMS}}
+    kinds: dict[str, type[Effect]] = {**effect_kinds(), **effect_variants(), **{term.name: term for term in TERMS}}
     at = 0
     found = []
     for name in selection.chosen.names:
@@ -42,7 +42,7 @@ def named_effects(selection: Selection, bounds: Floats) -> tuple[NamedEffect, ..
                 {
                     "loss_without_it": selection.gains[name],
                     "rival_margin": ALTERNATIVE_MARGIN,
-                    **({"form": name} if name in effect_forms() else {}),
+                    **({"form": name} if name in effect_variants() else {}),
                     **{f"{alternative}_instead": worse for alternative, worse in alternatives},
                 },
             )

@@ -12,7 +12,7 @@ import numpy as np
 
 from agvbench.diagnosis.terms import TERMS
 from agvbench.effects import Effect, effect_kinds
-from agvbench.effects.forms import effect_forms
+from agvbench.effects.variants import effect_variants
 from agvbench.model import VehicleModel
 from agvbench.types import Floats
 
@@ -83,7 +83,7 @@ def given_effects(vehicle: VehicleModel | None, tried: Iterable[str]) -> tuple[t
 @cache
 def usual(name: str) -> Candidate:
     """Return how the effect called `name` is tried unless asked otherwise: of the library, another law, or a term."""
-    kinds: dict[str, type[Effect]] = {**effect_kinds(), **effect_forms(), **{term.name: term for term in TERMS}}
+    kinds: dict[str, type[Effect]] = {**effect_kinds(), **effect_variants(), **{term.name: term for term in TERMS}}
     return candidate(kinds[name])
 
 

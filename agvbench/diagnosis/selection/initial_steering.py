@@ -15,7 +15,7 @@ from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.candidates import usual
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import LEAST_GAIN, Selection, Selector
-from agvbench.effects.forms import cause_of
+from agvbench.effects.variants import cause_of
 
 SLOW_STEERING = ("steering_lag", "steering_rate_limit", "steering_backlash")
 _LIKELY = 20.0

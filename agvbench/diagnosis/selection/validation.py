@@ -25,7 +25,7 @@ from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection
 from agvbench.diagnosis.selection.variants import BEYOND
 from agvbench.diagnosis.selection.with_term import TermSelection
-from agvbench.effects.forms import effect_forms
+from agvbench.effects.variants import effect_variants
 from agvbench.types import Floats
 
 
@@ -76,7 +76,7 @@ def predicts(selection: Selection, term_selection: TermSelection | None, reading
     """Return what predicts `readings` with the effects that were chosen, and the term if there is one."""
     chosen = (term_selection.selection if term_selection else selection).chosen
     fitted = chosen.fit.predictor.batch
-    reformed = bool(effect_forms().keys() & set(chosen.names))
+    reformed = bool(effect_variants().keys() & set(chosen.names))
     batch = Batch(readings, fitted.maps, fitted.geometry, kinds=BEYOND if term_selection or reformed else ())
     return Predictor(batch, chosen.names)
 

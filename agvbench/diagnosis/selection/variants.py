@@ -17,11 +17,11 @@ from agvbench.diagnosis.selection.initial_steering import SLOW_STEERING, under_o
 from agvbench.diagnosis.selection.stepwise import ALTERNATIVE_MARGIN, LEAST_GAIN, Selection, Selector
 from agvbench.diagnosis.terms import TERMS
 from agvbench.effects import Effect
-from agvbench.effects.forms import Form, cause_of, effect_forms
+from agvbench.effects.variants import Variant, cause_of, effect_variants
 from agvbench.model import VehicleModel
 from agvbench.types import Floats
 
-BEYOND: tuple[type[Effect], ...] = (*TERMS, *effect_forms().values())
+BEYOND: tuple[type[Effect], ...] = (*TERMS, *effect_variants().values())
 """What the widest simulation has beyond the library. One simulation for all, since each takes long to compile."""
 
 _SHORT = 3
@@ -32,7 +32,7 @@ _HALF = 0.5  # of what an effect gains: another cause that gains less in its pla
 
 def form_candidates() -> dict[str, Candidate]:
     """Return every other law by its name, as effects are tried."""
-    return {name: candidate(form) for name, form in effect_forms().items()}
+    return {name: candidate(variant) for name, variant in effect_variants().items()}
 
 
 def tried_beside(vehicle: VehicleModel | None) -> tuple[dict[str, Candidate], tuple[type[Effect], ...]]:
@@ -42,7 +42,7 @@ def tried_beside(vehicle: VehicleModel | None) -> tuple[dict[str, Candidate], tu
     """
     carried = {effect.name for effect in (vehicle.effects if vehicle else ()) if not effect.is_null}
     laws = {name: law for name, law in form_candidates().items() if name in carried}
-    known = {effect_forms()[name].form_of for name in laws}
+    known = {effect_variants()[name].variant_of for name in laws}
     return candidates(exclude=known) | laws, BEYOND if laws else ()
 
 
@@ -60,7 +60,7 @@ class _Law:
     """A law that may take the place of the effect called ``out``, fitted from ``starts`` (n, p)."""
 
     out: str
-    form: type[Form]
+    variant: type[Variant]
     starts: Floats
 
 
@@ -101,22 +101,24 @@ def _another_law_alone(selection: Selection, selector: Selector) -> Selection:
     A cause that is strong, and of another law, pulls the maps along: what they then say of runs left out is far off.
     """
     base = selection.base
-    known = ((form, selector.known((*base.names, form.form_of))) for form in effect_forms().values())
-    fitted = [(_explained(base, model), form, model) for form, model in known if model]
+    known = ((variant, selector.known((*base.names, variant.variant_of))) for variant in effect_variants().values())
+    fitted = [(_explained(base, model), variant, model) for variant, model in known if model]
     likely = sorted((one for one in fitted if one[0] > _LIKELY), key=lambda one: -one[0])[:_MOST_ALONE]
     if not likely:
         return selection
     wide = wider(selector)
     worthy = [
         (law, offer)
-        for law, model in ((_Law(form.form_of, form, _starts_near(form, model)), model) for _, form, model in likely)
+        for law, model in (
+            (_Law(variant.variant_of, variant, _starts_near(variant, model)), model) for _, variant, model in likely
+        )
         for offer in _offers(wide, model, law)
         if wide.meets_criterion(base, offer)
     ]
     if not worthy:
         return selection
     law, best = min(worthy, key=lambda pair: pair[1].total)
-    name, gain = law.form.name, base.total - best.total
+    name, gain = law.variant.name, base.total - best.total
     wide.on_progress(f"{name}: gains {gain:.0f}")
     selector.candidates[name] = form_candidates()[name]
     rejected = {n: g for n, g in selection.rejected.items() if n != law.out}
@@ -147,7 +149,7 @@ def under_other_start(chosen: ScoredModel, selector: Selector) -> bool:
 def selected_under_other_start(selector: Selector) -> tuple[Selection, Selector]:
     """Return what is selected under the other belief of where the steering stood, and who selected it."""
     other = under_other_initial_steering(selector)
-    other.candidates = {n: c for n, c in other.candidates.items() if n not in effect_forms() or n in selector.given}
+    other.candidates = {n: c for n, c in other.candidates.items() if n not in effect_variants() or n in selector.given}
     return select_variants(other.select(), other), other
 
 
@@ -158,21 +160,21 @@ def _laws(selection: Selection, selector: Selector, wide: Selector, name: str) -
     models = {name: chosen} | {
         other: selector.with_effect(rest, other) for other in selector.candidates if other not in chosen.names
     }
-    for form in effect_forms().values():
-        if (model := models.get(form.form_of)) is None:
+    for variant in effect_variants().values():
+        if (model := models.get(variant.variant_of)) is None:
             continue
-        kind, term_selection = candidate(form), _explained(rest, chosen)
+        kind, term_selection = candidate(variant), _explained(rest, chosen)
         # A strong cause of another law fits well, and predicts badly.
         if rest.total - model.total >= _HALF * (rest.total - chosen.total) or (
             _explained(rest, model) >= _HALF * term_selection
         ):
-            yield _Law(name, form, _starts_near(form, model))
+            yield _Law(name, variant, _starts_near(variant, model))
             continue
         # The library's law may fail where another does not.
-        larger = Predictor(wide.batch, (*rest.names, form.name))
+        larger = Predictor(wide.batch, (*rest.names, variant.name))
         predicted_gains = [first_order_gain(rest.fit, larger, start, kind.bounds) for start in kind.starts]
         if max(predicted_gains) >= _HALF * term_selection:
-            yield _Law(name, form, kind.starts[[int(np.argmax(predicted_gains))]])
+            yield _Law(name, variant, kind.starts[[int(np.argmax(predicted_gains))]])
 
 
 def _explained(without: ScoredModel, model: ScoredModel) -> float:
@@ -180,10 +182,10 @@ def _explained(without: ScoredModel, model: ScoredModel) -> float:
     return float(without.fit.loss.sum() - model.fit.loss.sum())
 
 
-def _starts_near(form: type[Form], model: ScoredModel) -> Floats:
+def _starts_near(variant: type[Variant], model: ScoredModel) -> Floats:
     """Return starts (n, p) of a law near the library's, as `model` has it."""
-    bounds = candidate(form).bounds
-    starts: Floats = np.clip(np.array(form.starts(_values(model, form.form_of))), bounds[:, 0], bounds[:, 1])
+    bounds = candidate(variant).bounds
+    starts: Floats = np.clip(np.array(variant.starts(_values(model, variant.variant_of))), bounds[:, 0], bounds[:, 1])
     return starts
 
 
@@ -194,10 +196,10 @@ def _values(model: ScoredModel, name: str) -> dict[str, float]:
 
 def _offers(wide: Selector, current: ScoredModel, law: _Law) -> list[ScoredModel]:
     """Return `current` with a law in its place, and with it in place of one effect more each."""
-    form = replace(candidate(law.form), starts=law.starts)
+    variant = replace(candidate(law.variant), starts=law.starts)
     # What stands beside a wrong law may only make up for it.
     others = [other for other in current.names if other != law.out and other not in wide.given]
-    return [_swapped(wide, current, {law.out, *more}, form) for more in ([], *([other] for other in others))]
+    return [_swapped(wide, current, {law.out, *more}, variant) for more in ([], *([other] for other in others))]
 
 
 def _best(wide: Selector, current: ScoredModel, offers: list[ScoredModel]) -> ScoredModel:
@@ -217,12 +219,12 @@ def _does(offer: ScoredModel, current: ScoredModel) -> bool:
     return offer.gain_over(current) > LEAST_GAIN
 
 
-def _swapped(wide: Selector, current: ScoredModel, out: set[str], form: Candidate) -> ScoredModel:
+def _swapped(wide: Selector, current: ScoredModel, out: set[str], variant: Candidate) -> ScoredModel:
     """Return `current` with a law in place of the effects `out`, fitted from the scatter and offsets that it has."""
     own = current.fit.effect_values()
     kept = [value for key, value in own.items() if key.partition(".")[0] not in out]
-    names = (*(name for name in current.names if name not in out), form.name)
-    starts = frozenset(start for start in current.starts if start[0] not in out) | form.key
+    names = (*(name for name in current.names if name not in out), variant.name)
+    starts = frozenset(start for start in current.starts if start[0] not in out) | variant.key
     maps = current.fit.parameters[: wide.batch.maps.size]
     near = current.fit
     tries = [
@@ -230,7 +232,7 @@ def _swapped(wide: Selector, current: ScoredModel, out: set[str], form: Candidat
             Predictor(wide.batch, names), np.r_[maps, kept, start], bounds_of(names),
             random_effects=near.random_effects, variance_components=near.variance_components, iterations=_SHORT,
         )
-        for start in form.starts
+        for start in variant.starts
     ]  # fmt: skip
     best = min(tries, key=lambda one: float(one.loss.sum()))
     return wide.score(names, best.parameters, best, starts=starts)
@@ -246,9 +248,9 @@ def _other_causes(current: ScoredModel, name: str, offered: list[tuple[_Law, Sco
     """Return other causes one of whose laws would do as well in the place of `name`."""
     beside = {*current.names} - {name}
     return {
-        law.form.form_of: offer.total - current.total
+        law.variant.variant_of: offer.total - current.total
         for law, offer in offered
-        if {*offer.names} - {law.form.name} == beside
-        and law.form.form_of != cause_of(name)
+        if {*offer.names} - {law.variant.name} == beside
+        and law.variant.variant_of != cause_of(name)
         and offer.total - current.total < ALTERNATIVE_MARGIN
     }

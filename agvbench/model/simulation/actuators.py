@@ -14,11 +14,11 @@ import math
 from agvbench.effects.state import (
     ACCELERATE_LAG,
     ACCELERATION_LIMIT,
+    BACKLASH,
     BRAKE_LAG,
     BRAKING_LIMIT,
     FRONT,
     FRONT_AIM,
-    PLAY,
     REAR,
     REAR_AIM,
     SPEED,
@@ -58,7 +58,7 @@ _FRONT, _REAR = 0, _SERVO_SIZE
 _FIRST = 2 * _SERVO_SIZE
 _SECOND = _FIRST + 6
 _SPEED_AIM, _SPEED_DIRECTION, _RESTS_S = range(_SECOND + 6, _SECOND + 9)
-_HALF_PLAY, _ORDER = range(_SECOND + 9, _SECOND + 11)
+_HALF_BACKLASH, _ORDER = range(_SECOND + 9, _SECOND + 11)
 _EVENTS = _SECOND + 11
 _EVENT_COUNT = 11
 PLAN_SIZE = _EVENTS + _EVENT_COUNT
@@ -74,7 +74,7 @@ _FIRST_STEP, _STEP_GROWTH = 0.5, 0.15
 # The longest step while a servo or the drive ramps, and how close to a kink counts as there [s].
 _RAMP_STEP_S, _TOGETHER = 0.05, 1e-12
 # Where play and a way of second order meet, kinks are not looked for: steps are short [s].
-_PLAY_STEP_S = 0.005
+_BACKLASH_STEP_S = 0.005
 # Numbers that ask for shorter steps are nonsense, but must not hang the loop [s].
 _SHORTEST_S = 1e-6
 # Less swings faster than any camera sees, undamped for ever, and would be simulated swing by swing.
@@ -121,7 +121,7 @@ def _kink(plan: Floats, at: int) -> float:
 def _plan_servo(plan: Floats, servo: int, position: float, axle: float, aim: float, lag: float, rate: float) -> None:
     _plan_gap(plan, servo, abs(aim - position), lag, rate)
     plan[servo + _AIM], plan[servo + _DIRECTION], plan[servo + _AXLE] = aim, math.copysign(1.0, aim - position), axle
-    events, direction, half = _EVENTS + 4 * (servo > 0), plan[servo + _DIRECTION], plan[_HALF_PLAY]
+    events, direction, half = _EVENTS + 4 * (servo > 0), plan[servo + _DIRECTION], plan[_HALF_BACKLASH]
     plan[events] = _kink(plan, servo)
     plan[events + 1] = plan[servo + _SETTLED_S]
     # The axle begins to follow; the axle passes the middle.
@@ -165,7 +165,7 @@ def _plan_drive(
 @compiled(inner=True)
 def plan_command(plan: Floats, state: Floats, servos: Floats) -> None:
     """Plan how servos and drive, of which `servos` says where they are, go to the aims in `state`."""
-    plan[_HALF_PLAY], plan[_ORDER] = 0.5 * state[PLAY], FIRST_ORDER
+    plan[_HALF_BACKLASH], plan[_ORDER] = 0.5 * state[BACKLASH], FIRST_ORDER
     inert = state[STEERING_INERTIA] >= _LEAST_INERTIA_S
     if inert or state[STEERING_ACCELERATION] < math.inf:
         plan[_ORDER] = INERT if inert else LIMITED
@@ -182,7 +182,7 @@ def plan_command(plan: Floats, state: Floats, servos: Floats) -> None:
 
 @compiled(inner=True)
 def _follow(plan: Floats, axle: float, position: float) -> float:
-    half = plan[_HALF_PLAY]
+    half = plan[_HALF_BACKLASH]
     return min(max(axle, position - half), position + half)
 
 
@@ -200,7 +200,7 @@ def _way_position(plan: Floats, servo: int, tau: float) -> float:
 def _way_axle(plan: Floats, servo: int, tau: float) -> float:
     """Return where the axle is: a servo of second order took it along to wherever it turned back."""
     axle = plan[servo + _AXLE]
-    if plan[_HALF_PLAY] > 0.0:
+    if plan[_HALF_BACKLASH] > 0.0:
         turns = plan[servo + TURNS_S]
         while turns < min(tau, plan[servo + SETTLED_S]):
             axle = _follow(plan, axle, _way_position(plan, servo, turns))
@@ -274,7 +274,7 @@ def _within_gap(plan: Floats, at: int, tau: float, longest: float) -> float:
 def _within_way(plan: Floats, servo: int, tau: float, longest: float) -> float:
     if tau >= plan[servo + SETTLED_S]:
         return longest
-    step = min(longest, _RAMP_STEP_S if plan[_HALF_PLAY] == 0.0 else _PLAY_STEP_S)
+    step = min(longest, _RAMP_STEP_S if plan[_HALF_BACKLASH] == 0.0 else _BACKLASH_STEP_S)
     return max(_SHORTEST_S, longest_step(plan, servo, plan[_ORDER], tau, step))
 
 

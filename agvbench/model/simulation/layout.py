@@ -15,12 +15,12 @@ TO_NODES = np.stack([c * (BASIS @ c ** np.arange(COUNT)) for c in NODES])
 WEIGHTS = BASIS.sum(axis=1)
 
 # Work of one step: at the nodes, motion forward, left and turning, then velocity along x, y and turning.
-AHEAD, ASIDE, TURN, ALONG_X, ALONG_Y, TURNED = range(0, 6 * COUNT, COUNT)
+LONGITUDINAL, LATERAL, TURN, ALONG_X, ALONG_Y, TURNED = range(0, 6 * COUNT, COUNT)
 SMOOTH = 6 * COUNT
 WORK_SIZE = SMOOTH + SMOOTH_SIZE
 # Where a step starts: pose, distance driven, and the pose that a smoothing camera reports.
 START_SIZE = 7
 
 # Numbers of the vehicle: axles, longest step, when the run began in hours, and the scatter of the drive's level.
-FRONT_AXLE, REAR_AXLE, LONGEST_STEP, STARTED, LEVEL_SCATTER = range(5)
+FRONT_AXLE, REAR_AXLE, LONGEST_STEP, STARTED, NODAL_DEVIATION = range(5)
 SECONDS_PER_HOUR = 3600.0

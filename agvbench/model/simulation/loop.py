@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from agvbench.effects.state import (
     ACCELERATE_LAG,
     ACCELERATION_LIMIT,
+    BACKLASH,
     BRAKE_LAG,
     BRAKING_LIMIT,
     DRIVE_COMMAND,
@@ -25,7 +26,6 @@ from agvbench.effects.state import (
     FRONT_COMMAND,
     HEADING,
     KNOWN_FRONT,
-    PLAY,
     REAR_AIM,
     REAR_BEFORE,
     REAR_COMMAND,
@@ -59,7 +59,7 @@ _FIRST_STEP_S, _TURN_PER_STEP = 0.05, 0.15
 _FASTEST_TURN = 150.0
 _TOGETHER = 1e-12
 # Lately: averaged with weights that fall with this time constant [s].
-LATELY_S = 0.5
+RECENT_SPEED_S = 0.5
 _STATE = 4
 
 
@@ -79,7 +79,7 @@ def _obey(
     s[FRONT_AIM], s[REAR_AIM], s[SPEED_AIM] = settled[front, 0], settled[rear, 1], settled[driven, 2]
     if settled[driven, 2] != 0.0:
         s[SPEED_AIM] += lift
-    s[STEERING_LAG], s[STEERING_RATE], s[PLAY], s[ACCELERATE_LAG], s[BRAKE_LAG] = 0.0, math.inf, 0.0, 0.0, 0.0
+    s[STEERING_LAG], s[STEERING_RATE], s[BACKLASH], s[ACCELERATE_LAG], s[BRAKE_LAG] = 0.0, math.inf, 0.0, 0.0, 0.0
     s[STEERING_INERTIA], s[STEERING_ACCELERATION] = 0.0, math.inf
     s[ACCELERATION_LIMIT] = s[BRAKING_LIMIT] = math.inf
     aim(s, p)
@@ -131,7 +131,7 @@ def _drive_run(
     vehicle: Floats,
     begin: float,
     speed: float,
-    lately: float,
+    recent_speed: float,
     commands: Floats,
     settled: Floats,
     command_t_s: Floats,
@@ -166,12 +166,12 @@ def _drive_run(
             until = min(begin, end)
             plan_command(plan, s, servos)
             leave_command(plan, until - now, servos)
-            servos[5] += (servos[4] - servos[5]) * -math.expm1((now - until) / LATELY_S)
+            servos[5] += (servos[4] - servos[5]) * -math.expm1((now - until) / RECENT_SPEED_S)
             now = until
         if now < end:
             if now == begin:
                 if not math.isnan(speed):
-                    lift = level_lift(s, p, vehicle, servos, now, lately, speed)
+                    lift = level_lift(s, p, vehicle, servos, now, recent_speed, speed)
                     servos[4] = drive_speed(s, p, vehicle, servos, now, speed)
                     _obey(s, p, commands, settled, driven, front, rear, lift)
                 if s[SEEN_LAG] > 0.0:
@@ -249,9 +249,9 @@ def simulate(
             begin = capture(s, begins_s[run], p)
         k = wait(s, p, start, begin, t_s, out, k, stop)
         speed = initial[run, 3]
-        lately = initial[run, 4] if initial.shape[1] > _STATE else speed
+        recent_speed = initial[run, 4] if initial.shape[1] > _STATE else speed
         if k < stop:
             _drive_run(
-                s, p, plan, work, vehicle, begin, speed, lately, commands, settled, command_t_s, first, last, start,
-                servos, t_s, out, k, stop,
+                s, p, plan, work, vehicle, begin, speed, recent_speed, commands, settled, command_t_s, first, last,
+                start, servos, t_s, out, k, stop,
             )  # fmt: skip

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from agvbench.effects import Effect, effect_kinds
-from agvbench.effects.forms import effect_forms
-from agvbench.model.batch import Batch
+from agvbench.effects.variants import effect_variants
+from agvbench.model.batch import RolloutBatch
 from agvbench.model.rollout import settled_targets
 from agvbench.model.simulation.simulated_run import SimulatedRun
 from agvbench.model.simulation.simulation import Simulation
@@ -48,7 +48,7 @@ def general_rollout(
     VehicleError
         If the model turns an axle beyond 89°.
     """
-    batch = Batch.pack(commands, initial, t_s)
+    batch = RolloutBatch.pack(commands, initial, t_s)
     if not len(batch.initial):
         return []
     settled_targets(model, batch)
@@ -64,6 +64,6 @@ def general_rollout(
 
 def _beyond_the_library(kinds: Sequence[type[Effect]]) -> list[type[Effect]]:
     """Return what a simulation needs for `kinds`: other laws all together, since each set takes long to compile."""
-    forms = list(effect_forms().values())
-    others = [kind for kind in kinds if kind not in effect_kinds().values() and kind not in forms]
-    return [*(forms if any(kind in forms for kind in kinds) else []), *others]
+    variants = list(effect_variants().values())
+    others = [kind for kind in kinds if kind not in effect_kinds().values() and kind not in variants]
+    return [*(variants if any(kind in variants for kind in kinds) else []), *others]

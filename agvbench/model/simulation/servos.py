@@ -35,10 +35,10 @@ def plan_inert(plan: Floats, way: int, gap: float, gap_rate: float, lag: float, 
     slowest = decay
     if square < 0.0:
         slowest = 1.0 / (tau * tau * (decay + math.sqrt(-square)))
-    swing = abs(gap) + _LONG * tau * (abs(gap_rate) + decay * abs(gap))
+    amplitude = abs(gap) + _LONG * tau * (abs(gap_rate) + decay * abs(gap))
     plan[way + SETTLED_S] = 0.0
-    if swing > _SETTLED:
-        plan[way + SETTLED_S] = math.log(swing / _SETTLED) / slowest if slowest > 0.0 else math.inf
+    if amplitude > _SETTLED:
+        plan[way + SETTLED_S] = math.log(amplitude / _SETTLED) / slowest if slowest > 0.0 else math.inf
     _plan_turns(plan, way)
 
 

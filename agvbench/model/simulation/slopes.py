@@ -31,9 +31,9 @@ def slopes(
     """Return the derivatives that `Simulation.jacobian` describes."""
     from agvbench.model.simulation.simulation import Slopes
 
-    asked = np.empty((0, *settled.shape)) if directions is None else directions
+    requested = np.empty((0, *settled.shape)) if directions is None else directions
     return Slopes(
-        settled=_by_settled(simulation, settled, parameters, initial, asked),
+        settled=_by_settled(simulation, settled, parameters, initial, requested),
         parameters=_by_parameters(simulation, settled, parameters, initial, varied),
         parameter_names=tuple(simulation.parameter_names[i] for i in varied),
         initial=_by_initial(simulation, settled, parameters, initial, range(4 if initial_state else 0)),

@@ -50,9 +50,9 @@ def smoothed(work: Floats, channel: int, before: float, lags: float, share: floa
         p1 = q1 - 2.0 / lags * p2
         p0 = -p1 / lags
         return q0 + p0 + share * (p1 + share * (p2 + share * (p3 + share * p4))) + decay * (before - q0 - p0)
-    lately = 0.0
+    recent_speed = 0.0
     for i in range(_COUNT):
         u = share * _NODES[i]
         seen = u * (q1 + u * (q2 + u * (q3 + u * q4)))
-        lately += _WEIGHTS[i] * math.exp(-lags * (share - u)) * seen
-    return q0 + lags * share * lately + decay * (before - q0)
+        recent_speed += _WEIGHTS[i] * math.exp(-lags * (share - u)) * seen
+    return q0 + lags * share * recent_speed + decay * (before - q0)

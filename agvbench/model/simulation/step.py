@@ -35,12 +35,12 @@ from agvbench.effects.state import (
 from agvbench.model.compiled import compiled
 from agvbench.model.simulation.actuators import actuate
 from agvbench.model.simulation.layout import (
-    AHEAD,
     ALONG_X,
     ALONG_Y,
-    ASIDE,
     COUNT,
     FRONT_AXLE,
+    LATERAL,
+    LONGITUDINAL,
     NODES,
     REAR_AXLE,
     SECONDS_PER_HOUR,
@@ -89,7 +89,7 @@ def take_step(
         s[X], s[Y], s[HEADING] = start[0] + elapsed * x_rate, start[1] + elapsed * y_rate, start[2]
         s[DISTANCE] = start[3] + elapsed * abs(s[SPEED])
         set_motion(s, p, vehicle[FRONT_AXLE], vehicle[REAR_AXLE])
-        work[AHEAD + i], work[ASIDE + i], work[TURN + i] = s[FORWARD], s[LEFT], s[YAW_RATE]
+        work[LONGITUDINAL + i], work[LATERAL + i], work[TURN + i] = s[FORWARD], s[LEFT], s[YAW_RATE]
     for i in range(COUNT):
         turned = 0.0
         for j in range(COUNT):
@@ -97,7 +97,7 @@ def take_step(
         heading = start[2] + length * turned
         cosine, sine = math.cos(heading), math.sin(heading)
         s[HEADING] = heading
-        s[FORWARD], s[LEFT], s[YAW_RATE] = work[AHEAD + i], work[ASIDE + i], work[TURN + i]
+        s[FORWARD], s[LEFT], s[YAW_RATE] = work[LONGITUDINAL + i], work[LATERAL + i], work[TURN + i]
         s[X_RATE] = cosine * s[FORWARD] - sine * s[LEFT]
         s[Y_RATE] = sine * s[FORWARD] + cosine * s[LEFT]
         drift(s, p)
@@ -107,11 +107,11 @@ def take_step(
 @compiled(inner=True, fast=True)
 def end_step(work: Floats, start: Floats, length: float) -> None:
     """Move `start`, pose and distance, to the end of the step."""
-    ahead = 0.0
+    longitudinal = 0.0
     for j in range(COUNT):
         weight = WEIGHTS[j] * length
         start[0] += weight * work[ALONG_X + j]
         start[1] += weight * work[ALONG_Y + j]
         start[2] += weight * work[TURNED + j]
-        ahead += weight * abs(work[AHEAD + j])
-    start[3] += ahead
+        longitudinal += weight * abs(work[LONGITUDINAL + j])
+    start[3] += longitudinal

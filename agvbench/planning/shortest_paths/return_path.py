@@ -55,13 +55,13 @@ class GearLeg:
 
 @dataclass(frozen=True)
 class Guided:
-    """The point of the vehicle that keeps to a path: `ahead_m` of the markers' centroid, where nothing slips sideways.
+    """The point of the vehicle that keeps to a path: `forward_m` of the marker centroid, where nothing slips sideways.
 
     Its course is the vehicle's heading plus `crab_rad`, at which the vehicle is seen to move.
     """
 
     geometry: Geometry
-    ahead_m: float = 0.0
+    forward_m: float = 0.0
     crab_rad: float = 0.0
 
     def pose(self, seen: Pose) -> Pose:
@@ -71,19 +71,19 @@ class Guided:
         Pose(x_m=0.9, y_m=2.0, heading_rad=0.0)
         """
         x_m, y_m, heading_rad = seen
-        ahead = (self.ahead_m * math.cos(heading_rad), self.ahead_m * math.sin(heading_rad))
+        ahead = (self.forward_m * math.cos(heading_rad), self.forward_m * math.sin(heading_rad))
         return Pose(x_m + ahead[0], y_m + ahead[1], heading_rad + self.crab_rad)
 
     def clearance_m(self, points: Floats, workspace: Workspace) -> float:
         """Return how far inside the edge the axles' centres stay [m] while the guided point passes `points` (n, 3)."""
         heading = points[:, 2] - self.crab_rad
         along = np.column_stack([np.cos(heading), np.sin(heading)])
-        ends = (self.geometry.front_axle_m - self.ahead_m, -self.geometry.rear_axle_m - self.ahead_m)
+        ends = (self.geometry.front_axle_m - self.forward_m, -self.geometry.rear_axle_m - self.forward_m)
         axles = np.concatenate([points[:, :2] + end * along for end in ends])
         return float(workspace.clearances(axles).min())
 
 
-def way_back(
+def plan_return_path(
     seen: Pose,
     start: Pose,
     guided: Guided,
@@ -113,17 +113,17 @@ def way_back(
     ends = [guided.clearance_m(np.array([pose]), workspace) for pose in (here, there)]
     limit_m = min(workspace.margin_m, *ends)
     if limit_m < 0.0:
-        raise _no_way(workspace, f"the vehicle stands {-limit_m:.2f} m outside")
+        raise _no_return_path(workspace, f"the vehicle stands {-limit_m:.2f} m outside")
     for lead_m in leads_m:
         for radius_m in radii_m:
             for pieces in _by_cost(here, there, radius_m, lead_m, gears):
                 path = _leg(pieces, here, _CHECK_M, backward=False).points
                 if guided.clearance_m(path, workspace) >= limit_m - 1e-6:
                     return _legs(pieces, here)
-    raise _no_way(workspace, "every way comes too close to the edge")
+    raise _no_return_path(workspace, "every way comes too close to the edge")
 
 
-def _no_way(workspace: Workspace, value: str) -> PlanError:
+def _no_return_path(workspace: Workspace, value: str) -> PlanError:
     return PlanError(
         "the vehicle cannot drive back to its start", where=f"workspace {workspace.name}", value=value,
         limit=f"{workspace.margin_m:.2f} m inside", remedy="put it there by hand",

@@ -97,7 +97,7 @@ def trajectory_files(directory: Path | None = None) -> list[Path]:
     return _local_files() or _shipped_files()
 
 
-def own_trajectories() -> list[str]:
+def user_trajectories() -> list[str]:
     """Return the names of the lab's own trajectories: the files under ``trajectories`` that do not ship.
 
     A bench drives them after the eight. They are named by their files, which are not read.
@@ -113,7 +113,7 @@ def driven_trajectories(named: str = "") -> list[str]:
     ['figure_eight', 'garage']
     """
     names = dict.fromkeys(name.strip() for name in named.split(","))
-    return [name for name in names if name] or [*THE_EIGHT, *own_trajectories()]
+    return [name for name in names if name] or [*THE_EIGHT, *user_trajectories()]
 
 
 def _local_files() -> list[Path]:

@@ -18,7 +18,7 @@ from agvbench.reporting.console.tables import end_pose_summary, said_first
 from agvbench.reporting.write import write_report
 from agvbench.running.execution.campaign_time import TURNAROUND_S
 from agvbench.running.execution.drive import DEFAULT_TIMING
-from agvbench.running.execution.run_records import DriveOrder
+from agvbench.running.execution.run_records import RunRequest
 from agvbench.statistics.quantities import DEFINITIONS
 from agvbench.workflows.report import ReportData, gather
 
@@ -42,7 +42,7 @@ _NAMES = ("experiment", "trajectory", "condition")
 _NUMBERS = ("runs", "longest\n[s]", "driving\n[min]", "between\n[min]", "total\n[min]", "floor\n[m]")
 
 
-def dry_run_table(planned: Sequence[tuple[DriveOrder, Plan]]) -> str:
+def dry_run_table(planned: Sequence[tuple[RunRequest, Plan]]) -> str:
     """Return the table as text: a row for each experiment, trajectory and condition, and the sum of each column.
 
     Times are those of the plans; beside them stands what passes between two runs.
@@ -63,10 +63,10 @@ def dry_run_table(planned: Sequence[tuple[DriveOrder, Plan]]) -> str:
     return as_text(table)
 
 
-def _by_kind(planned: Sequence[tuple[DriveOrder, Plan]]) -> dict[tuple[str, str, str], list[Plan]]:
+def _by_kind(planned: Sequence[tuple[RunRequest, Plan]]) -> dict[tuple[str, str, str], list[Plan]]:
     kinds: dict[tuple[str, str, str], list[Plan]] = {}
-    for order, plan in planned:
-        kinds.setdefault((order.experiment, order.trajectory or "–", order.condition), []).append(plan)
+    for request, plan in planned:
+        kinds.setdefault((request.experiment, request.trajectory or "–", request.condition), []).append(plan)
     return kinds
 
 
@@ -81,10 +81,10 @@ def _times(plans: Sequence[Plan]) -> tuple[str, ...]:
     return str(len(plans)), f"{max(durations, default=0.0):.1f}", *minutes, floor
 
 
-def _caption(planned: Sequence[tuple[DriveOrder, Plan]]) -> str:
+def _caption(planned: Sequence[tuple[RunRequest, Plan]]) -> str:
     if not planned:
         return "nothing"
-    radius_m = max(_reach(order, plan) for order, plan in planned)
+    radius_m = max(_reach(request, plan) for request, plan in planned)
     total_s = sum(plan.duration_s + _BETWEEN_S for _, plan in planned)
     return (
         f"{len(planned)} runs, {total_s / 3600.0:.1f} h: driving, and {_BETWEEN_S:g} s between two runs "
@@ -94,18 +94,18 @@ def _caption(planned: Sequence[tuple[DriveOrder, Plan]]) -> str:
     )
 
 
-def _reach(order: DriveOrder, plan: Plan) -> float:
+def _reach(request: RunRequest, plan: Plan) -> float:
     """Return how far from the floor's origin a run leads the vehicle [m]."""
     import numpy as np
 
-    start, path = order.start, plan.expected
+    start, path = request.start, plan.expected
     turn = np.exp(1j * start.heading_rad)
     floor = complex(start.x_m, start.y_m) + turn * (path[:, 1] + 1j * path[:, 2])
     longest_axle = max(plan.geometry.front_axle_m, plan.geometry.rear_axle_m)
     return float(np.abs(floor).max() + longest_axle + DEFAULT_MARGIN_M)
 
 
-def conclude(directory: Path, *, report: bool) -> str:
+def bench_summary(directory: Path, *, report: bool) -> str:
     """Return the summary of the campaign in `directory`, after writing its report where that is wanted.
 
     What cannot be reported is said, not raised: the campaign is recorded all the same.

@@ -17,7 +17,7 @@ SHARES = ("", "count", "share", "95 % bounds")
 ANSWERS = ("hidden", "answers")
 
 
-def share_rows(scores: Scores) -> Iterator[tuple[str, str, str, str]]:
+def proportion_rows(scores: Scores) -> Iterator[tuple[str, str, str, str]]:
     """Yield a row under `SHARES` for each question that some trial answers, and for the intervals."""
     for text, share in (*scores.shares.items(), ("95 % intervals that cover", scores.coverage)):
         if share.total:
@@ -51,7 +51,7 @@ def print_scores(scores: Scores, console: Console) -> None:
     table = Table(title=f"{scores.trials} blind trials", box=box.SIMPLE_HEAD, title_justify="left")
     for heading in SHARES:
         table.add_column(heading, justify="left" if not heading else "right")
-    for row in share_rows(scores):
+    for row in proportion_rows(scores):
         table.add_row(*row)
     console.print(table)
     answers = Table(title="hidden, and answered", box=box.SIMPLE_HEAD, title_justify="left")
@@ -66,7 +66,7 @@ def print_scores(scores: Scores, console: Console) -> None:
 
 def scores_markdown(scores: Scores) -> str:
     """Return the shares with their bounds, the rest, and the confusion matrix."""
-    lines = [f"{scores.trials} blind trials:", "", *_table(SHARES, share_rows(scores)), ""]
+    lines = [f"{scores.trials} blind trials:", "", *_table(SHARES, proportion_rows(scores)), ""]
     lines += [f"- {escape(line)}" for line in other_lines(scores)]
     lines += ["", *_table(ANSWERS, answer_rows(scores)), ""]
     return "\n".join(lines)

@@ -6,14 +6,19 @@ from rich.markup import escape
 
 from agvbench.reporting.console.tables import wide_console
 from agvbench.reporting.content import plain_sentences
-from agvbench.workflows.doctor import Finding, State
+from agvbench.workflows.doctor import Finding, FindingState
 
-_COLOURS = {State.GOOD: "green", State.DOUBTFUL: "yellow", State.BAD: "bold red", State.IDLE: "dim"}
+_COLOURS = {
+    FindingState.GOOD: "green",
+    FindingState.DOUBTFUL: "yellow",
+    FindingState.BAD: "bold red",
+    FindingState.IDLE: "dim",
+}
 _NAME_WIDTH = 13
-_STATE_WIDTH = max(len(state.value) for state in State)
+_STATE_WIDTH = max(len(state.value) for state in FindingState)
 
 
-def tell(name: str, finding: Finding) -> State:
+def print_finding(name: str, finding: Finding) -> FindingState:
     """Print a finding; return its state."""
     colour = _COLOURS[finding.state]
     state = f"[{colour}]{finding.state.value:<{_STATE_WIDTH}}[/{colour}]"

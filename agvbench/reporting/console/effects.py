@@ -7,7 +7,7 @@ import inspect
 from rich.table import Table
 
 from agvbench.effects import Effect, Parameter, Stage, effect_kinds
-from agvbench.effects.forms import Form, effect_forms
+from agvbench.effects.variants import Variant, effect_variants
 
 _PREFACE = """\
 # Effects
@@ -52,7 +52,7 @@ def effects_table() -> Table:
 
 def reference_page() -> str:
     """Return ``docs/reference/effects.md``."""
-    return "\n".join([_PREFACE, *map(_section, ordered_effects()), _LAWS, *map(_section, effect_forms().values())])
+    return "\n".join([_PREFACE, *map(_section, ordered_effects()), _LAWS, *map(_section, effect_variants().values())])
 
 
 def _section(kind: type[Effect]) -> str:
@@ -60,7 +60,7 @@ def _section(kind: type[Effect]) -> str:
     lines += ["| parameter | unit | null | bounds | typical size |", "|---|---|---|---|---|"]
     for p in kind.parameters():
         lines.append(f"| `{p.name}` | {p.unit} | {_number(p.null)} | {_bounds(p)} | {_number(p.scale)} |")
-    lines += ["", *([f"- Law of: {kind.form_of}"] if issubclass(kind, Form) else [])]
+    lines += ["", *([f"- Law of: {kind.variant_of}"] if issubclass(kind, Variant) else [])]
     lines += [f"- Stage: {kind.stage.value}", f"- Relaxes: {kind.relaxes}", f"- Reference: {kind.reference}"]
     return "\n".join([*lines, f"- Limits: {kind.limits}", ""])
 

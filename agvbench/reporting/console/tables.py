@@ -195,7 +195,7 @@ def print_report(console: Console, report: WrittenReport) -> None:
     console.print(Text(f"wrote {report.files[0]} and {len(report.files) - 1} more files"), soft_wrap=True)
 
 
-def print_cautions(console: Console, sentences: Sequence[str]) -> None:
+def print_warnings(console: Console, sentences: Sequence[str]) -> None:
     """Print what to know before a comparison."""
     from rich.text import Text
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from agvbench.thesis.section import Cell, Section, Table, show
+from agvbench.thesis.section import Cell, ThesisSection, ThesisTable, show
 
 if TYPE_CHECKING:
     import rich.table
@@ -24,7 +24,7 @@ def thesis_console() -> Console:
     return console if console.width >= _MIN_WIDTH else Console(width=_MIN_WIDTH)
 
 
-def with_progress(sections: Iterator[Section]) -> Iterator[Section]:
+def with_progress(sections: Iterator[ThesisSection]) -> Iterator[ThesisSection]:
     """Yield the sections; while one is computed, a terminal shows on standard error that something goes on."""
     from rich.console import Console
 
@@ -40,7 +40,7 @@ def with_progress(sections: Iterator[Section]) -> Iterator[Section]:
         yield section
 
 
-def print_section(section: Section, console: Console) -> None:
+def print_section(section: ThesisSection, console: Console) -> None:
     """Print a section: its title, its findings, its tables."""
     from rich.markup import escape
     from rich.padding import Padding
@@ -56,7 +56,7 @@ def print_section(section: Section, console: Console) -> None:
     console.print()
 
 
-def _rich_table(table: Table) -> rich.table.Table:
+def _rich_table(table: ThesisTable) -> rich.table.Table:
     import rich.box
     import rich.table
     from rich.markup import escape
@@ -78,7 +78,7 @@ def _rich_table(table: Table) -> rich.table.Table:
     return shown
 
 
-def _width(table: Table, index: int) -> int:
+def _width(table: ThesisTable, index: int) -> int:
     """Return the width below which a column's numbers, or its words of usual length, would break."""
     cells = [row[index] for row in table.rows]
     words = [len(word) for cell in cells for word in show(cell).split() if isinstance(cell, str)]

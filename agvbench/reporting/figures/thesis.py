@@ -38,7 +38,7 @@ def _write(item: Traced, path: Path) -> Path:
     axes.axhline(0.0, color=_INK, linewidth=0.8)
     # Before a little to the left, after to the right, where both have the same place.
     shift = 0.004 * float(np.ptp(item.at))
-    for side, missed, words in ((-1, item.missed_before, item.before), (1, item.missed_after, item.after)):
+    for side, missed, words in ((-1, item.residual_before, item.before), (1, item.residual_after, item.after)):
         index = (side + 1) // 2
         root = item.rms_after if index else item.rms_before
         label = f"{words}: rms {root:.3g} {item.unit}"

@@ -27,7 +27,7 @@ _CAPTION = (
 )
 
 
-class Calibration(Section):
+class CalibrationSection(Section):
     """A panel and a row per axle."""
 
     slug, title, order = "calibration", "Calibration", 80

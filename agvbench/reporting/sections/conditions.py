@@ -76,7 +76,7 @@ def _row(d: Difference, comparison: Comparison) -> list[Value]:
     ]
 
 
-class Conditions(Section):
+class ConditionsSection(Section):
     """Two tables per pair of conditions: errors with verdicts, and the shift of the mean end position."""
 
     slug, title, order = "conditions", "Conditions compared", 20

@@ -25,7 +25,7 @@ _CAPTION = (
 )
 
 
-class EndPoseFigure(Section):
+class EndPoseFigureSection(Section):
     """A panel per trajectory."""
 
     slug, title, order = "end-pose-figure", "End poses seen from the target", 40

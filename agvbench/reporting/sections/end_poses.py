@@ -13,7 +13,7 @@ from agvbench.workflows.report import ReportData
 _TITLES = {"min": "MIN", "q1": "Q1", "median": "MED", "q3": "Q3", "max": "MAX"}
 
 
-class EndPoses(Section):
+class EndPosesSection(Section):
     """One table, headed by trajectory."""
 
     slug, title, order = "end-poses", "End poses", 30

@@ -18,7 +18,7 @@ _COLUMNS = (
 )
 
 
-class Events(Section):
+class EventsSection(Section):
     """A row for each kind of event."""
 
     slug, title, order = "events", "Events", 95

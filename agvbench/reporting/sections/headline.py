@@ -9,7 +9,7 @@ import numpy as np
 
 from agvbench.reporting.content import Block, Bullets, Paragraph, plain, plain_sentences
 from agvbench.reporting.sections.base import Section
-from agvbench.statistics import Comparison, Difference, Verdict, valid
+from agvbench.statistics import Comparison, ComparisonVerdict, Difference, valid
 from agvbench.statistics.comparison_summary import describe, note_of
 from agvbench.statistics.differences import ALL
 from agvbench.statistics.quantities import DEFINITIONS, QUANTITIES
@@ -26,7 +26,7 @@ _BOUGHT = {
 _MOST_NAMED = 6
 
 
-class Headline(Section):
+class HeadlineSection(Section):
     """One sentence per pair of conditions, what the errors are, what got worse and what the repeats could not say."""
 
     slug, title, order = "headline", "In short", 10
@@ -60,7 +60,7 @@ def _bought(comparison: Comparison) -> str:
     where = f"on average over {trajectories} trajectories" if trajectories > 1 else f"on {counted[0].trajectory}"
     *first, last = map(_moved, _summary(comparison))
     moved = f"{', '.join(first)} and {last}"
-    better, worse = (sum(d.verdict is v for d in counted) for v in (Verdict.BETTER, Verdict.WORSE))
+    better, worse = (sum(d.verdict is v for d in counted) for v in (ComparisonVerdict.BETTER, ComparisonVerdict.WORSE))
     score = (
         f"Of {len(counted)} medians of end position and heading error {better or 'none'} improved beyond doubt, "
         f"{worse or 'none'} got worse"
@@ -87,7 +87,7 @@ def _reached(rows: pd.DataFrame, condition: str) -> str:
 
 def _details(comparison: Comparison) -> Iterator[str]:
     pair = f"{comparison.name_a} → {comparison.name_b}"
-    for verdict, lead in ((Verdict.WORSE, "Worse"), (Verdict.UNKNOWN, "Cannot say")):
+    for verdict, lead in ((ComparisonVerdict.WORSE, "Worse"), (ComparisonVerdict.INCONCLUSIVE, "Cannot say")):
         found = [d for d in comparison.of(verdict) if d.trajectory != ALL]
         if found:
             named = "; ".join(

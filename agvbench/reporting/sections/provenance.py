@@ -13,7 +13,7 @@ from agvbench.workflows.report import ReportData
 _COLUMNS = (Column("name", "what"), Column("value", "value"))
 
 
-class Provenance(Section):
+class ProvenanceSection(Section):
     """One table."""
 
     slug, title, order = "provenance", "Provenance", 100

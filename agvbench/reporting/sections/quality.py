@@ -24,7 +24,7 @@ _COLUMNS = (
 _MOST_REASONS = 12
 
 
-class Quality(Section):
+class QualitySection(Section):
     """One table, and the reasons why runs do not count."""
 
     slug, title, order = "quality", "Run quality", 90

@@ -29,7 +29,7 @@ _NOTE = (
 )
 
 
-class Spread(Section):
+class SpreadSection(Section):
     """One table, headed by trajectory."""
 
     slug, title, order = "spread", "Accuracy and repeatability", 70

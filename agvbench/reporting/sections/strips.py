@@ -22,7 +22,7 @@ _CAPTION_THESIS = (
 )
 
 
-class Strips(Section):
+class StripsSection(Section):
     """One figure per quantity."""
 
     slug, title, order = "strips", "Every run", 50

@@ -23,7 +23,7 @@ _FROM_START = (
 )
 
 
-class Trajectories(Section):
+class TrajectoriesSection(Section):
     """One drawing of the floor and a panel per trajectory."""
 
     slug, title, order = "trajectories", "Trajectories", 60

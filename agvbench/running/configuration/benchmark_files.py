@@ -40,5 +40,5 @@ def _file(folder: Path, name: str) -> Path:
     return folder / f"bench_{name}.py"
 
 
-EXCITING = ("calibration", "trajectories", "step_response", "free_driving")
+EXCITATION_RUNS = ("calibration", "trajectories", "step_response", "free_driving")
 """Benchmarks that excite every effect: the last two tell lags, which steady driving hides."""

@@ -68,7 +68,7 @@ class BenchSettings:
     lab: str = "lab"
     vehicle_name: str = "agv1"
     session: str = ""
-    exchange: float = DEFAULT_SAFETY.exchange_s
+    exchange: float = DEFAULT_SAFETY.control_cycle_s
     benchmarks: tuple[str, ...] = ()
     only: str = ""
 
@@ -80,7 +80,13 @@ class BenchSettings:
         _check(self.order in ORDERS, "--order", self.order, ", ".join(ORDERS), "choose one of these")
         _check(self.place in ("", *PLACES), "--place", self.place, ", ".join(PLACES), "choose one of these")
         least = DEFAULT_SAFETY.watch_s
-        _check(least <= self.exchange < math.inf, "--exchange", self.exchange, f"from {least:g} s", "leave it out")
+        _check(
+            least <= self.exchange < math.inf,
+            "--exchange",
+            self.exchange,
+            f"from {least:g} s",
+            "leave it out",
+        )
         modes = get_args(Steering)
         _check(self.steering in ("", *modes), "--steering", self.steering, ", ".join(modes), "choose one of these")
         _check(self.maps in MAPS, "--maps", self.maps, ", ".join(MAPS), "choose one of these")

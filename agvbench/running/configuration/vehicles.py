@@ -60,10 +60,10 @@ def expected_calibration(path: str = "") -> VehicleModel:
     """
     if not path:
         return thesis_vehicle()
-    believed = uncalibrated_vehicle(path)
-    drive = believed.drive
+    nominal = uncalibrated_vehicle(path)
+    drive = nominal.drive
     if not isinstance(drive, FullSpeedOrStop):
-        return believed
+        return nominal
     commands = (drive.command_low, drive.command_stop, drive.command_high)
     speeds = (drive.output_low, 0.0, drive.output_high)
-    return replace(believed, drive=MonotoneTable(commands, speeds, interpolation="linear"))
+    return replace(nominal, drive=MonotoneTable(commands, speeds, interpolation="linear"))

@@ -22,11 +22,11 @@ from agvbench.planning import Departure, Workspace
 from agvbench.running.configuration.settings import BenchSettings
 from agvbench.running.execution.calibration import unfinished_calibration
 from agvbench.running.execution.campaign_time import CampaignTime, SessionBegan
-from agvbench.running.execution.drive import DEFAULT_TIMING, Drive, Timing, drive, exchanged
+from agvbench.running.execution.drive import DEFAULT_TIMING, Drive, Timing, control_cycles_of, drive
 from agvbench.running.execution.event_log import EventLog
-from agvbench.running.execution.pause import Pause, standing
+from agvbench.running.execution.pause import PauseRequest, holding_neutral
 from agvbench.running.execution.run_records import (
-    DriveOrder,
+    RunRequest,
     attempts_by_run,
     record_aborted,
     recorded_run,
@@ -35,7 +35,7 @@ from agvbench.running.execution.run_records import (
 )
 from agvbench.running.links import RunnerLink
 from agvbench.running.positioning.placers import Rig, make_placer
-from agvbench.running.positioning.start_pose import say
+from agvbench.running.positioning.start_pose import notify_operator
 from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess, not_as_planned
 from agvbench.running.supervision import DEFAULT_SAFETY, Supervisor
 from agvbench.types import Command, Frames, Run
@@ -51,7 +51,7 @@ class Bench:
     ``calibrate`` is called once, with the calibration runs that are still `awaited`, when the first order asks for the
     calibrated model; ``corrected`` is the model of the
     condition of that name, if there is one.
-    ``tell`` tells the operator.
+    ``on_progress`` tells the operator.
     """
 
     def __init__(
@@ -68,25 +68,25 @@ class Bench:
         session: SessionBegan = _UNNAMED,
         timing: Timing = DEFAULT_TIMING,
         limits: QualityLimits = DEFAULT_LIMITS,
-        tell: Callable[[str], None] = say,
+        on_progress: Callable[[str], None] = notify_operator,
     ) -> None:
         self.settings = settings
         self.link, self.writer = link, writer
         self.nominal, self._calibrate = nominal, calibrate
         self._calibrated: VehicleModel | None = None
         self._corrected = corrected
-        self._tell = tell
+        self._on_progress = on_progress
         self._time, self._timing, self._limits = campaign_time, timing, limits
         self._identity = link.identity()
-        self._latch, self.pause = Latch(), Pause(writer.path, tell)
-        self.log = EventLog(writer, tell)
+        self._latch, self.pause = Latch(), PauseRequest(writer.path, on_progress)
+        self.log = EventLog(writer, on_progress)
         self._recorded, self._session = recorded, session
         self._unseen = 0
         self.awaited: set[str] = set()
         workspace = Workspace.parse(settings.workspace)
-        safety = replace(DEFAULT_SAFETY, flickers=not self._identity.simulated, exchange_s=settings.exchange)
+        safety = replace(DEFAULT_SAFETY, flickers=not self._identity.simulated, control_cycle_s=settings.exchange)
         self._supervisor = Supervisor(workspace, nominal.neutral, safety)
-        self._placer = make_placer(settings.place, Rig(link, nominal, workspace, self._supervisor, limits, tell))
+        self._placer = make_placer(settings.place, Rig(link, nominal, workspace, self._supervisor, limits, on_progress))
 
     def model(self, condition: str) -> VehicleModel:
         """Return the vehicle model that commands are computed with under `condition`.
@@ -143,8 +143,8 @@ class Bench:
         """When the next run begins, since the first of its session did."""
         return Departure(started_h=self._session.hours(self._time.now_s()))
 
-    def run(self, order: DriveOrder) -> Run:
-        """Drive `order` until an attempt counts; return the last attempt.
+    def run(self, request: RunRequest) -> Run:
+        """Drive `request` until an attempt counts; return the last attempt.
 
         Attempts that an interrupted session recorded are not driven again; a simulated plant repeats them unseen,
         so that what wears or drains is as it was.
@@ -157,10 +157,10 @@ class Bench:
             If the run was driven and cannot be recorded; the bench drives no more, either.
         """
         self.check()
-        order = replace(order, session=self._session.name)
+        request = replace(request, session=self._session.name)
         with self._latch.remembering():
-            for attempt in range(1, self._attempts(order) + 1):
-                run = self._attempt(order, attempt)
+            for attempt in range(1, self._attempts(request) + 1):
+                run = self._attempt(request, attempt)
                 if run.is_ok:
                     break
         return run
@@ -171,19 +171,19 @@ class Bench:
         with suppress(CampaignError):  # what ended the session has to be told, not that this could not be recorded
             self.log.save()
 
-    def _attempts(self, order: DriveOrder) -> int:
+    def _attempts(self, request: RunRequest) -> int:
         """Return how many attempts there are: as many again where all of an earlier session's were rejected."""
         limit = self.settings.attempts
-        while _attempt_id(order, limit) in self._recorded and not self._recorded[_attempt_id(order, limit)].is_ok:
+        while _attempt_id(request, limit) in self._recorded and not self._recorded[_attempt_id(request, limit)].is_ok:
             limit += self.settings.attempts
         return limit
 
-    def _attempt(self, order: DriveOrder, attempt: int) -> Run:
-        run_id = _attempt_id(order, attempt)
+    def _attempt(self, request: RunRequest, attempt: int) -> Run:
+        run_id = _attempt_id(request, attempt)
         if run_id in self._recorded:
-            return self._repeat_unseen(order, self._recorded[run_id])
-        self.pause.wait(run_id, standing(self.link, self._neutral()))
-        order = self._placed(order, run_id)
+            return self._repeat_unseen(request, self._recorded[run_id])
+        self.pause.wait(run_id, holding_neutral(self.link, self._neutral()))
+        request = self._placed(request, run_id)
         started_s = self._time.now_s()
         self._session = self._session.with_run(started_s)
         self.log.take(self.link, "", started_s)
@@ -192,34 +192,34 @@ class Bench:
         stopped = False
         try:
             driven = self._drive(
-                order, run_id, seen, at_rest=lambda: before.extend(self.log.take(self.link, run_id, started_s))
+                request, run_id, seen, at_rest=lambda: before.extend(self.log.take(self.link, run_id, started_s))
             )
-            status = self._status(order, driven)
+            status = self._status(request, driven)
         except RunStoppedError as stop:
             stopped = True
-            driven, status = self._stopped(order, seen, stop)
-            self._tell(f"{run_id} {status}")
+            driven, status = self._stopped(request, seen, stop)
+            self._on_progress(f"{run_id} {status}")
         except BaseException as error:
-            record_aborted(self.writer, order, run_id, started_s, seen, error, self._identity.firmware)
+            record_aborted(self.writer, request, run_id, started_s, seen, error, self._identity.firmware)
             self.log.take(self.link, run_id, started_s)
             raise
         events = self.log.take(self.link, run_id, started_s + driven.duration_s)
         if (count := len(before) + len(events)) and not self._identity.lock_step:
-            order = replace(order, extra={**order.extra, "events": count})
+            request = replace(request, extra={**request.extra, "events": count})
         if not stopped and (event := not_as_planned(events)) is not None:
             status = f"rejected: {event.line}"
-        run = recorded_run(order, run_id, started_s, status, driven, self._identity.firmware)
+        run = recorded_run(request, run_id, started_s, status, driven, self._identity.firmware)
         self.writer.append(run)
         self.log.save()
         self._time.has_run(started_s, driven.duration_s)
         self._check_seen(run)
         return run
 
-    def _stopped(self, order: DriveOrder, seen: list[Frames], stop: RunStoppedError) -> tuple[Drive, str]:
+    def _stopped(self, request: RunRequest, seen: list[Frames], stop: RunStoppedError) -> tuple[Drive, str]:
         """Return what was driven of a run that the supervisor stopped, and its status: it does not count."""
         self._placer.was_moved()
         rest_s = self._timing.rest_before_s
-        driven = stopped_drive(order.commands, seen, max(self._supervisor.exchanged_s, -rest_s), rest_s)
+        driven = stopped_drive(request.commands, seen, max(self._supervisor.commanded_until_s, -rest_s), rest_s)
         return driven, f"rejected: {RunStoppedError(stop.what, value=stop.value, limit=stop.limit)}"
 
     def _check_seen(self, run: Run) -> None:
@@ -237,41 +237,41 @@ class Bench:
                 remedy="look at camera and markers, then continue with --resume",
             )  # fmt: skip
 
-    def _repeat_unseen(self, order: DriveOrder, run: Run) -> Run:
+    def _repeat_unseen(self, request: RunRequest, run: Run) -> Run:
         if self._identity.simulated:
             duration_s = float(str(run.extra["duration_s"]))
-            commands, until_s = exchanged(run.commands, self._neutral(), duration_s, self._timing)
-            self.link.replay(self._drawn_as(run.run_id), commands, pose=order.start, until_s=until_s)
+            commands, until_s = control_cycles_of(run.commands, self._neutral(), duration_s, self._timing)
+            self.link.replay(self._random_key(run.run_id), commands, pose=request.start, until_s=until_s)
             self._placer.was_moved()
             self._time.has_run(run.started_s, duration_s)
         return run
 
-    def _placed(self, order: DriveOrder, run_id: str) -> DriveOrder:
-        """Bring the vehicle to the start; return the order with what the campaign is to say of that."""
-        placing = self._placer.place(order.start, self._drawn_as(run_id))
+    def _placed(self, request: RunRequest, run_id: str) -> RunRequest:
+        """Bring the vehicle to the start; return the request with what the campaign is to say of that."""
+        placing = self._placer.place(request.start, self._random_key(run_id))
         if placing is None:
-            return order
+            return request
         self._time.has_placed(placing.duration_s)
-        return replace(order, extra={**order.extra, **placing.columns()})
+        return replace(request, extra={**request.extra, **placing.columns()})
 
     def _neutral(self) -> Command:
         """Return the command before a run: everything neutral, since a run's first command is the first recorded."""
         return Command(self.nominal.neutral, self.nominal.neutral, self.nominal.neutral)
 
-    def _drive(self, order: DriveOrder, run_id: str, seen: list[Frames], at_rest: Callable[[], object]) -> Drive:
+    def _drive(self, request: RunRequest, run_id: str, seen: list[Frames], at_rest: Callable[[], object]) -> Drive:
         return drive(
             self.link,
-            order.commands,
+            request.commands,
             neutral=self._neutral(),
-            start=order.start,
-            run_key=self._placer.run_key(self._drawn_as(run_id)),
+            start=request.start,
+            run_key=self._placer.run_key(self._random_key(run_id)),
             supervisor=self._supervisor,
             timing=self._timing,
             seen=seen,
             at_rest=at_rest,
         )
 
-    def _drawn_as(self, run_id: str) -> str:
+    def _random_key(self, run_id: str) -> str:
         """Return what a simulated run's randomness follows from: its name, and how often it was stopped before.
 
         By its name alone a camera would lose the vehicle in the same way whenever the session goes on.
@@ -279,11 +279,11 @@ class Bench:
         stopped = times_stopped(run_id, self._recorded)
         return f"{run_id}-again{stopped}" if stopped else run_id
 
-    def _status(self, order: DriveOrder, driven: Drive) -> str:
+    def _status(self, request: RunRequest, driven: Drive) -> str:
         begin_s = -self._timing.rest_before_s
         quality = assess(
             driven.frames,
-            start=order.start,
+            start=request.start,
             begin_s=begin_s,
             end_s=begin_s + driven.duration_s,
             rate_hz=self._identity.mocap_rate_hz,
@@ -291,8 +291,8 @@ class Bench:
         return quality.status(self._limits)
 
 
-def _attempt_id(order: DriveOrder, attempt: int) -> str:
-    return order.run_id if attempt == 1 else f"{order.run_id}-attempt{attempt}"
+def _attempt_id(request: RunRequest, attempt: int) -> str:
+    return request.run_id if attempt == 1 else f"{request.run_id}-attempt{attempt}"
 
 
 Failure = LinkError | PlantError | RecordingError

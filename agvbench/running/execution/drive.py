@@ -68,7 +68,7 @@ def drive(
         If the bus or an adapter fails; the vehicle has been told to stop.
     """
     batches = [] if seen is None else seen
-    watched = partial(supervisor.exchange, link, seen=batches)
+    watched = partial(supervisor.control_cycle, link, seen=batches)
     supervisor.begin()
     try:
         if run_key is not None:
@@ -113,7 +113,7 @@ def _until(frames: Frames, end_s: float) -> Frames:
     return frames.select(np.asarray(frames.t_s <= end_s + 1e-9))
 
 
-def exchanged(
+def control_cycles_of(
     commands: Commands, neutral: Command, duration_s: float, timing: Timing = DEFAULT_TIMING
 ) -> tuple[Commands, float]:
     """Return every exchange that `drive` made for a run of `duration_s`, and when the last ended [s]."""

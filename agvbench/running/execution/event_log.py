@@ -26,8 +26,8 @@ class EventLog:
         Tells the operator, of each kind of event the first.
     """
 
-    def __init__(self, writer: CampaignWriter, tell: Callable[[str], None]) -> None:
-        self._writer, self._tell = writer, tell
+    def __init__(self, writer: CampaignWriter, on_progress: Callable[[str], None]) -> None:
+        self._writer, self._on_progress = writer, on_progress
         self._rows = recorded_rows(writer.path, EVENTS_TABLE)
         self._saved = self._earlier = len(self._rows)
 
@@ -42,7 +42,7 @@ class EventLog:
             self._rows.append(dict(zip(_COLUMNS, row, strict=True)))
             if event.kind not in known:
                 known.add(event.kind)
-                self._tell(f"{event.role} reports {event.kind}: {event.line}")
+                self._on_progress(f"{event.role} reports {event.kind}: {event.line}")
         return events
 
     def save(self) -> None:

@@ -22,7 +22,7 @@ PAUSE_FILE = "pause"
 _STAND_S = 0.25
 
 
-def standing(link: RunnerLink, neutral: Command) -> Callable[[], None]:
+def holding_neutral(link: RunnerLink, neutral: Command) -> Callable[[], None]:
     """Return what lets a vehicle stand at `neutral` for a moment, everybody being heard; simulated time stops."""
     waited_s = itertools.count(0.0, _STAND_S)
 
@@ -30,19 +30,19 @@ def standing(link: RunnerLink, neutral: Command) -> Callable[[], None]:
         if link.identity().lock_step:
             time.sleep(_STAND_S)
         else:
-            link.exchange(neutral, t_s=next(waited_s), hold_s=_STAND_S)
+            link.control_cycle(neutral, t_s=next(waited_s), hold_s=_STAND_S)
 
     return stand
 
 
-class Pause:
-    """Whether the campaign in `directory` is to pause; `tell` tells the operator."""
+class PauseRequest:
+    """Whether the campaign in `directory` is to pause; `on_progress` tells the operator."""
 
-    def __init__(self, directory: Path, tell: Callable[[str], None]) -> None:
-        self._file, self._tell = directory / PAUSE_FILE, tell
+    def __init__(self, directory: Path, on_progress: Callable[[str], None]) -> None:
+        self._file, self._on_progress = directory / PAUSE_FILE, on_progress
         self._by_signal = False
 
-    def is_asked(self) -> bool:
+    def is_requested(self) -> bool:
         """Whether somebody asked for a pause."""
         return self._file.exists()
 
@@ -51,13 +51,15 @@ class Pause:
 
         `stand` lets the vehicle stand at neutral for a moment; what it raises ends the pause.
         """
-        if not self.is_asked():
+        if not self.is_requested():
             return
-        self._tell(f"paused before {before}, the vehicle at neutral: press Ctrl-Z or remove {self._file} to go on")
-        while self.is_asked():
+        self._on_progress(
+            f"paused before {before}, the vehicle at neutral: press Ctrl-Z or remove {self._file} to go on"
+        )
+        while self.is_requested():
             stand()
         self._by_signal = False
-        self._tell("going on")
+        self._on_progress("going on")
 
     @contextmanager
     def by_signal(self) -> Iterator[None]:
@@ -82,10 +84,10 @@ class Pause:
     def _signalled(self, number: int, _: FrameType | None) -> None:
         # Without its directory the session ends by itself; and what is just being printed cannot be printed into.
         with suppress(OSError, RuntimeError):
-            if number == signal.SIGTSTP and not self.is_asked():
+            if number == signal.SIGTSTP and not self.is_requested():
                 self._file.touch()
                 self._by_signal = True
-                self._tell("pausing when this run is finished; Ctrl-Z again goes on")
+                self._on_progress("pausing when this run is finished; Ctrl-Z again goes on")
             elif number == signal.SIGTSTP or self._by_signal:
                 self._file.unlink(missing_ok=True)
                 self._by_signal = False

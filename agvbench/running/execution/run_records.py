@@ -19,7 +19,7 @@ _ABORTED = "-aborted"
 
 
 @dataclass(frozen=True)
-class DriveOrder:
+class RunRequest:
     """What is to be driven: the plan of one run, before any attempt at it."""
 
     run_id: str
@@ -34,10 +34,10 @@ class DriveOrder:
     extra: Mapping[str, object] = field(default_factory=dict)
 
 
-def recorded_run(order: DriveOrder, run_id: str, started_s: float, status: str, driven: Drive, firmware: str) -> Run:
-    """Return the run that `order` became."""
-    extra = {**order.extra, "duration_s": driven.duration_s}
-    return _run(order, run_id, started_s, status, driven.commands, driven.frames, firmware, extra)
+def recorded_run(request: RunRequest, run_id: str, started_s: float, status: str, driven: Drive, firmware: str) -> Run:
+    """Return the run that `request` became."""
+    extra = {**request.extra, "duration_s": driven.duration_s}
+    return _run(request, run_id, started_s, status, driven.commands, driven.frames, firmware, extra)
 
 
 def stopped_drive(commands: Commands, seen: list[Frames], until_s: float, rest_before_s: float) -> Drive:
@@ -48,18 +48,18 @@ def stopped_drive(commands: Commands, seen: list[Frames], until_s: float, rest_b
     return Drive(commands, Frames.concatenate(seen), rest_before_s + until_s)
 
 
-def aborted_run(order: DriveOrder, run_id: str, started_s: float, status: str, frames: Frames, firmware: str) -> Run:
+def aborted_run(request: RunRequest, run_id: str, started_s: float, status: str, frames: Frames, firmware: str) -> Run:
     """Return what is left of a run that was stopped: its frames, and the commands sent until the last of them."""
     last_s = float(np.max(frames.t_s))
-    sent = np.asarray(order.commands.t_s <= max(last_s, 0.0))
-    commands = Commands(*(column[sent] for column in vars(order.commands).values()))
-    extra = {**order.extra, "duration_s": last_s - float(np.min(frames.t_s))}
-    return _run(order, run_id, started_s, status, commands, frames, firmware, extra)
+    sent = np.asarray(request.commands.t_s <= max(last_s, 0.0))
+    commands = Commands(*(column[sent] for column in vars(request.commands).values()))
+    extra = {**request.extra, "duration_s": last_s - float(np.min(frames.t_s))}
+    return _run(request, run_id, started_s, status, commands, frames, firmware, extra)
 
 
 def record_aborted(
     writer: CampaignWriter,
-    order: DriveOrder,
+    request: RunRequest,
     run_id: str,
     started_s: float,
     seen: list[Frames],
@@ -73,7 +73,7 @@ def record_aborted(
         return
     name = free_name(run_id + _ABORTED, writer.finished_ids)
     with suppress(CampaignError):  # what ended the run has to be told, not that it could not be recorded
-        writer.append(aborted_run(order, name, started_s, f"aborted: {why}", frames, firmware))
+        writer.append(aborted_run(request, name, started_s, f"aborted: {why}", frames, firmware))
 
 
 def times_stopped(run_id: str, recorded: Mapping[str, Run]) -> int:
@@ -99,7 +99,7 @@ def free_name(stem: str, taken: Collection[str]) -> str:
 
 
 def _run(
-    order: DriveOrder,
+    request: RunRequest,
     run_id: str,
     started_s: float,
     status: str,
@@ -110,16 +110,16 @@ def _run(
 ) -> Run:
     return Run(
         run_id=run_id,
-        experiment=order.experiment,
-        trajectory=order.trajectory,
-        condition=order.condition,
-        repeat=order.repeat,
-        target=order.target,
+        experiment=request.experiment,
+        trajectory=request.trajectory,
+        condition=request.condition,
+        repeat=request.repeat,
+        target=request.target,
         started_s=started_s,
         status=status,
         firmware=firmware,
         commands=commands,
         frames=frames,
-        session=order.session,
+        session=request.session,
         extra=extra,
     )

@@ -11,8 +11,8 @@ from agvbench.errors import FlagError, PlacingError, RunStoppedError
 from agvbench.model import VehicleModel
 from agvbench.planning import Workspace
 from agvbench.running.links import RunnerLink
-from agvbench.running.positioning.automatic_return.returner import Placing, Returner
-from agvbench.running.positioning.start_pose import say, wait_for_start, wait_until_seen
+from agvbench.running.positioning.automatic_return.returner import Returner, ReturnResult
+from agvbench.running.positioning.start_pose import notify_operator, wait_for_start, wait_until_seen
 from agvbench.running.quality import QualityLimits
 from agvbench.running.supervision import Supervisor
 from agvbench.types import Command, Pose
@@ -27,7 +27,7 @@ class Rig:
     workspace: Workspace
     supervisor: Supervisor
     limits: QualityLimits
-    tell: Callable[[str], None] = say
+    on_progress: Callable[[str], None] = notify_operator
 
 
 class Placer(ABC):
@@ -45,7 +45,7 @@ class Placer(ABC):
         return Command(*[self._rig.model.neutral] * 3)
 
     @abstractmethod
-    def place(self, start: Pose, run_id: str) -> Placing | None:
+    def place(self, start: Pose, run_id: str) -> ReturnResult | None:
         """Bring the vehicle to `start` (floor frame) for the run `run_id`; None if there is nothing to tell of it.
 
         Raises
@@ -84,7 +84,7 @@ class Operator(Placer):
 
     def place(self, start: Pose, run_id: str) -> None:
         """Wait."""
-        wait_for_start(self._rig.link, self._neutral, start, limits=self._rig.limits, tell=self._rig.tell)
+        wait_for_start(self._rig.link, self._neutral, start, limits=self._rig.limits, on_progress=self._rig.on_progress)
 
 
 _MOST_STOPS = 3
@@ -106,18 +106,18 @@ class Auto(Placer):
         self._is_simulated = rig.link.identity().simulated
         self._stands = not self._is_simulated
 
-    def place(self, start: Pose, run_id: str) -> Placing | None:
+    def place(self, start: Pose, run_id: str) -> ReturnResult | None:
         """Drive to `start`."""
         try:
             return self._drive_to(start, run_id)
         except (PlacingError, RunStoppedError) as error:
             if self._is_simulated:
                 raise
-            self._rig.tell(str(error))
+            self._rig.on_progress(str(error))
         Operator(self._rig).place(start, run_id)
         return None
 
-    def _drive_to(self, start: Pose, run_id: str) -> Placing:
+    def _drive_to(self, start: Pose, run_id: str) -> ReturnResult:
         """Drive to `start`; after a stop that does not end the session, try again as soon as the vehicle is seen."""
         for _ in range(_MOST_STOPS):
             try:
@@ -125,10 +125,10 @@ class Auto(Placer):
             except RunStoppedError:
                 self.was_moved()
                 if not self._is_simulated:
-                    wait_until_seen(self._rig.link, self._neutral, tell=self._rig.tell)
+                    wait_until_seen(self._rig.link, self._neutral, on_progress=self._rig.on_progress)
         return self._returned(start, run_id)
 
-    def _returned(self, start: Pose, run_id: str) -> Placing:
+    def _returned(self, start: Pose, run_id: str) -> ReturnResult:
         if not self._stands:
             self._rig.link.reset(start, run_key=run_id)
             self._stands = True

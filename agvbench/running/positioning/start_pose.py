@@ -15,19 +15,19 @@ from agvbench.running.rest_detection import is_at_rest, pose_before
 from agvbench.types import Command, Frames, Pose, wrap_angle
 
 LOOK_S = 0.5
-TELL_S = 2.0
+PROGRESS_S = 2.0
 PATIENCE_S = 600.0
 
 
 @dataclass(frozen=True)
-class _Place:
+class _StartCheck:
     """How far from the start the vehicle is, in words, and whether that will do."""
 
     said: str
     good: bool
 
 
-def say(text: str) -> None:
+def notify_operator(text: str) -> None:
     """Tell the operator, over a line of progress that may be there."""
     to = sys.__stderr__
     print(f"\r\x1b[K{text}" if to is not None and to.isatty() else text, file=to, flush=True)
@@ -40,7 +40,7 @@ def wait_for_start(
     *,
     limits: QualityLimits = DEFAULT_LIMITS,
     patience_s: float = PATIENCE_S,
-    tell: Callable[[str], None] = say,
+    on_progress: Callable[[str], None] = notify_operator,
 ) -> None:
     """Wait until the vehicle is seen at rest at `start` (floor frame), within half of what a run may be off.
 
@@ -52,8 +52,8 @@ def wait_for_start(
     x_m, y_m, heading_rad = start
     where = f"x = {x_m:.3f} m, y = {y_m:.3f} m, heading {math.degrees(heading_rad):.1f}°"
     asked = f"put {link.identity().vehicle} at {where}"
-    judge = partial(_place, start=start, limits=limits)
-    place = _wait(link, neutral, judge, asked, patience_s=patience_s, tell=tell)
+    check = partial(_place, start=start, limits=limits)
+    place = _wait(link, neutral, check, asked, patience_s=patience_s, on_progress=on_progress)
     if not place.good:
         raise PlacingError(
             "the vehicle was not put at the start", where=link.keys.root, value=place.said, limit=f"{patience_s:g} s",
@@ -62,47 +62,58 @@ def wait_for_start(
 
 
 def wait_until_seen(
-    link: RunnerLink, neutral: Command, *, patience_s: float = PATIENCE_S, tell: Callable[[str], None] = say
+    link: RunnerLink,
+    neutral: Command,
+    *,
+    patience_s: float = PATIENCE_S,
+    on_progress: Callable[[str], None] = notify_operator,
 ) -> None:
     """Wait until the vehicle is seen anywhere, for at most `patience_s` [s]."""
-    _wait(link, neutral, _anywhere, f"waiting for {link.identity().vehicle}", patience_s=patience_s, tell=tell)
+    _wait(
+        link,
+        neutral,
+        _anywhere,
+        f"waiting for {link.identity().vehicle}",
+        patience_s=patience_s,
+        on_progress=on_progress,
+    )
 
 
 def _wait(
     link: RunnerLink,
     neutral: Command,
-    judge: Callable[[Frames, float], _Place],
+    check: Callable[[Frames, float], _StartCheck],
     asked: str,
     *,
     patience_s: float,
-    tell: Callable[[str], None],
-) -> _Place:
-    """Let the vehicle stand until `judge` finds its place good, and tell every `TELL_S`; return its last place."""
-    waited_s, told_s, place = 0.0, -math.inf, _Place("", False)
+    on_progress: Callable[[str], None],
+) -> _StartCheck:
+    """Let the vehicle stand until `check` finds its place good, and tell every `PROGRESS_S`; return its last place."""
+    waited_s, reported_s, place = 0.0, -math.inf, _StartCheck("", False)
     while waited_s < patience_s:
         # The run's clock begins anew at its first exchange, which is before any of these.
-        frames = link.exchange(neutral, t_s=waited_s, hold_s=LOOK_S)
+        frames = link.control_cycle(neutral, t_s=waited_s, hold_s=LOOK_S)
         waited_s += LOOK_S
-        place = judge(frames, waited_s)
+        place = check(frames, waited_s)
         if place.good:
             break
-        if waited_s - told_s >= TELL_S:
-            tell(f"{asked}: {place.said}")
-            told_s = waited_s
+        if waited_s - reported_s >= PROGRESS_S:
+            on_progress(f"{asked}: {place.said}")
+            reported_s = waited_s
     return place
 
 
-def _anywhere(frames: Frames, now_s: float) -> _Place:
-    return _Place("it is not seen", good=pose_before(frames, now_s) is not None)
+def _anywhere(frames: Frames, now_s: float) -> _StartCheck:
+    return _StartCheck("it is not seen", good=pose_before(frames, now_s) is not None)
 
 
-def _place(frames: Frames, now_s: float, start: Pose, limits: QualityLimits) -> _Place:
+def _place(frames: Frames, now_s: float, start: Pose, limits: QualityLimits) -> _StartCheck:
     found = pose_before(frames, now_s)
     if found is None:
-        return _Place("it is not seen", False)
+        return _StartCheck("it is not seen", False)
     off_m = math.dist(found[:2], start[:2])
     off_rad = abs(wrap_angle(found.heading_rad - start.heading_rad))
     said = f"it is {off_m * 1e3:.0f} mm and {math.degrees(off_rad):.1f}° off"
     if not is_at_rest(frames, until_s=now_s):
-        return _Place(f"{said}, and moving", False)
-    return _Place(said, off_m <= limits.start_position_m / 2.0 and off_rad <= limits.start_heading_rad / 2.0)
+        return _StartCheck(f"{said}, and moving", False)
+    return _StartCheck(said, off_m <= limits.start_position_m / 2.0 and off_rad <= limits.start_heading_rad / 2.0)

@@ -10,11 +10,11 @@ from agvbench.errors import FileError
 from agvbench.text_files import read_json
 from agvbench.types import Pose
 
-NO_REMAINDERS: Mapping[str, Pose] = MappingProxyType({})
+NO_BIAS_CORRECTIONS: Mapping[str, Pose] = MappingProxyType({})
 _KEYS = ("x_m", "y_m", "heading_rad")
 
 
-def read_remainders(path: str) -> Mapping[str, Pose]:
+def read_bias_corrections(path: str) -> Mapping[str, Pose]:
     """Return, by trajectory, the measured end pose in the frame of the predicted one; nothing for the path "".
 
     The file is JSON: ``{"schema": 1, "remainders": {"5": {"x_m": 0.004, "y_m": 0.0, "heading_rad": 0.01}}}``.
@@ -25,7 +25,7 @@ def read_remainders(path: str) -> Mapping[str, Pose]:
         If the file cannot be read, or is not of this form.
     """
     if not path:
-        return NO_REMAINDERS
+        return NO_BIAS_CORRECTIONS
     try:
         content = read_json(Path(path))
         made = {str(name): Pose(*(float(entry[key]) for key in _KEYS)) for name, entry in content["remainders"].items()}

@@ -48,10 +48,10 @@ from agvbench.running.execution.campaign_time import (
     idle_notice,
     last_end_s,
 )
-from agvbench.running.links import UnbrokenLink
+from agvbench.running.links import ContinuousLink
 from agvbench.running.positioning.placers import choose_placer
-from agvbench.running.positioning.start_pose import say
-from agvbench.running.session.end_pose_bias import read_remainders
+from agvbench.running.positioning.start_pose import notify_operator
+from agvbench.running.session.end_pose_bias import read_bias_corrections
 from agvbench.running.session.rig_checks import adapter_options, open_session_rig
 from agvbench.running.session.session import BenchSession
 from agvbench.running.session.termination_signals import interruptible
@@ -69,11 +69,11 @@ def open_session(
     resume: bool,
     dry_run: bool,
     plan: Sequence[Row] = (),
-    tell: Callable[[str], None] = say,
+    on_progress: Callable[[str], None] = notify_operator,
 ) -> Iterator[BenchSession]:
     """Open the session that the options `given` ask for, and close it whatever happens.
 
-    ``plan`` lists the runs that it is to drive, as rows of the campaign's table ``planned``; `tell` tells the operator.
+    ``plan`` lists the runs that it is to drive, as rows of the campaign's table ``planned``; `on_progress` tells it.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def open_session(
         directory,
         models=models,
         workspace=Workspace.parse(settings.workspace),
-        remainders=read_remainders(settings.remainders),
+        bias_corrections=read_bias_corrections(settings.remainders),
         steering=settings.steering,
     )
     if dry_run:
@@ -113,7 +113,7 @@ def open_session(
             _record_plan(writer, settings, plan)
             recorded = _recorded(writer)
             campaign_time = _campaign_time(link, writer, recorded, drives_back=settings.place == "auto")
-            bench = _bench(settings, models, link, writer, recorded, campaign_time, tell)
+            bench = _bench(settings, models, link, writer, recorded, campaign_time, on_progress)
             session = session_with(bench=bench, inputs=recorded_files)
             session.notices = _notices(settings, given, given_directory)
             session.notices += idle_notice(recorded.values(), campaign_time.now_s(), settings.session)
@@ -197,7 +197,7 @@ def _bench(
     writer: CampaignWriter,
     recorded: Mapping[str, Run],
     campaign_time: CampaignTime,
-    tell: Callable[[str], None],
+    on_progress: Callable[[str], None],
 ) -> Bench:
     def calibrated(awaited: Collection[str]) -> VehicleModel:
         return models.get("calibrated") or calibrate_campaign(writer, maps=settings.maps, awaited=awaited)
@@ -206,13 +206,13 @@ def _bench(
         settings,
         nominal=models["uncalibrated"],
         corrected=models.get("corrected"),
-        link=UnbrokenLink(link) if settings.place == "auto" and link.identity().lock_step else link,
+        link=ContinuousLink(link) if settings.place == "auto" and link.identity().lock_step else link,
         writer=writer,
         campaign_time=campaign_time,
         session=SessionBegan.of(settings.session, recorded.values()),
         calibrate=calibrated,
         recorded=recorded,
-        tell=tell,
+        on_progress=on_progress,
     )
 
 

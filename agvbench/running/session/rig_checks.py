@@ -72,7 +72,7 @@ def check_rig(models: Mapping[str, VehicleModel], settings: BenchSettings, link:
         If an option is not for this rig.
     """
     check_commands(models, link.identity())
-    _check_exchange(settings, link)
+    _check_control_cycle(settings, link)
     _check_session(settings, link)
     _check_rate(link)
 
@@ -91,13 +91,13 @@ def check_commands(models: Mapping[str, VehicleModel], identity: AgvIdentity | I
                 )
 
 
-def _check_exchange(settings: BenchSettings, link: VehicleLink) -> None:
-    if settings.exchange > DEFAULT_SAFETY.exchange_s and not link.identity().lock_step:
+def _check_control_cycle(settings: BenchSettings, link: VehicleLink) -> None:
+    if settings.exchange > DEFAULT_SAFETY.control_cycle_s and not link.identity().lock_step:
         raise FlagError(
             "a vehicle in real time must be watched while it drives",
             where="--exchange",
             value=f"{settings.exchange:g} s",
-            limit=f"{DEFAULT_SAFETY.exchange_s:g} s",
+            limit=f"{DEFAULT_SAFETY.control_cycle_s:g} s",
             remedy="leave it out",
         )
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from agvbench.errors import FitError, FlagError, PlanError
 from agvbench.model import VehicleModel
 from agvbench.planning import (
-    NOTHING_LEFT,
+    NO_BIAS,
     Departure,
     Plan,
     Trajectory,
@@ -24,17 +24,17 @@ from agvbench.planning.trajectories.shapes import CommandTable
 from agvbench.running.command_shares import Shares, falling, held
 from agvbench.running.configuration.provenance import RecordedInputs, trajectory_inputs
 from agvbench.running.execution.bench import Bench, Failure
-from agvbench.running.execution.run_records import DriveOrder
-from agvbench.running.session.end_pose_bias import NO_REMAINDERS
+from agvbench.running.execution.run_records import RunRequest
+from agvbench.running.session.end_pose_bias import NO_BIAS_CORRECTIONS
 from agvbench.types import CONDITIONS, Commands, CommandUnit, Pose, Run
 
 
 class BenchSession:
     """A session that drives with `bench` or, where that is None, a dry run that plans everything and drives nothing.
 
-    ``models`` are those known before anything is driven, by condition; a dry run needs one of each. ``remainders`` is
-    what the corrected one still misses, by trajectory; ``steering`` the mode in which all are steered, "" for each its
-    own. ``inputs`` records the files of the trajectories that are driven.
+    ``models`` are those known before anything is driven, by condition; a dry run needs one of each.
+    ``bias_corrections`` are its end-pose biases, by trajectory; ``steering`` is the mode in which all are steered, ""
+    for each its own. ``inputs`` records the files of the trajectories that are driven.
     """
 
     def __init__(
@@ -44,15 +44,15 @@ class BenchSession:
         models: Mapping[str, VehicleModel],
         workspace: Workspace,
         bench: Bench | None,
-        remainders: Mapping[str, Pose] = NO_REMAINDERS,
+        bias_corrections: Mapping[str, Pose] = NO_BIAS_CORRECTIONS,
         steering: str = "",
         inputs: RecordedInputs | None = None,
     ) -> None:
         self.directory, self.workspace = directory, workspace
         self.nominal = models["uncalibrated"]
         self.shares = Shares.of_model(self.nominal)
-        self.planned: list[tuple[DriveOrder, Plan]] = []
-        self._models, self._bench, self._remainders, self._steering = models, bench, remainders, steering
+        self.planned: list[tuple[RunRequest, Plan]] = []
+        self._models, self._bench, self._bias_corrections, self._steering = models, bench, bias_corrections, steering
         self._inputs = inputs
         self._plans: dict[tuple[Trajectory, str], Plan] = {}
         self._undrivable: dict[tuple[Trajectory, str], PlanError] = {}
@@ -145,8 +145,8 @@ class BenchSession:
         if condition != "corrected":
             return plan(trajectory, model, workspace=self.workspace)
         departure = Departure() if self._bench is None else self._bench.departure
-        missed = self._remainders.get(trajectory.name, NOTHING_LEFT)
-        made = corrected_plan(trajectory, model, workspace=self.workspace, departure=departure, remainder=missed)
+        missed = self._bias_corrections.get(trajectory.name, NO_BIAS)
+        made = corrected_plan(trajectory, model, workspace=self.workspace, departure=departure, end_pose_bias=missed)
         if depends_on_time(made, model, departure):
             self._hourly.add((trajectory, condition))
         return made
@@ -164,8 +164,8 @@ class BenchSession:
         """Return what drives the run `run_id`."""
         return Driver(self, run_id, experiment=experiment, repeat=repeat)
 
-    def run(self, order: DriveOrder, planned: Plan) -> Run:
-        """Drive `order`; in a dry run only note it.
+    def run(self, request: RunRequest, planned: Plan) -> Run:
+        """Drive `request`; in a dry run only note it.
 
         Raises
         ------
@@ -173,9 +173,9 @@ class BenchSession:
             In a dry run.
         """
         if self._bench is None:
-            self.planned.append((order, planned))
+            self.planned.append((request, planned))
             raise NotDrivenError("dry run")
-        return self._bench.run(order)
+        return self._bench.run(request)
 
 
 _LEAST_SHARE = 0.2
@@ -290,7 +290,7 @@ class Driver:
         return self._session.plan(trajectory, "uncalibrated")
 
     def _drive(self, planned: Plan, condition: str, *, trajectory: str | None = None) -> Run:
-        order = DriveOrder(
+        request = RunRequest(
             run_id=self._run_id,
             experiment=self._experiment,
             trajectory=planned.trajectory.name if trajectory is None else trajectory,
@@ -300,7 +300,7 @@ class Driver:
             target=planned.target,
             start=planned.start,
         )
-        run = self._session.run(order, planned)
+        run = self._session.run(request, planned)
         if not run.is_ok:
             raise RunRejectedError(
                 "no attempt counted", where=self._run_id, value=run.status, remedy="see the campaign's rejected runs"

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 class SafetyLimits:
     """Limits of a run under way.
 
-    ``watch_s`` [s] is how often frames are looked at; a simulated vehicle may be told for ``exchange_s`` [s] at a time,
-    and what it did meanwhile is looked at afterwards in slices of ``watch_s``. ``lost_s`` [s] is how long the vehicle
+    ``watch_s`` [s] is how often frames are looked at; a simulated vehicle may get commands for ``control_cycle_s`` [s]
+    at a time, and its motion is looked at afterwards in slices of ``watch_s``. ``lost_s`` [s] is how long the vehicle
     may go unseen, ``frozen_s`` [s] how long a camera that is never quite still may say the very same pose of a vehicle
     that was told to drive, ``jump_m`` [m] how far a vehicle may be from where it was going, ``clock_s`` [s] how far a
     camera's clock may be off. ``braking_s`` [s] is how long it takes to come to rest (thesis 8.1: 0.59 s), at half its
@@ -19,7 +19,7 @@ class SafetyLimits:
     """
 
     watch_s: float = 0.1
-    exchange_s: float = 0.1
+    control_cycle_s: float = 0.1
     lost_s: float = 0.5
     frozen_s: float = 0.5
     jump_m: float = 0.3

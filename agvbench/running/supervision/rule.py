@@ -17,7 +17,7 @@ _FEWEST_FRAMES = 3
 """A single wrong frame moves the median of fewer."""
 
 
-class Window:
+class WatchWindow:
     """The tracked frames that rules judge by: those of a slice and, where they are fewer than three, the last before.
 
     A slice of which only a late or wrong frame is tracked is thus judged by two right ones, too.

@@ -14,7 +14,7 @@ from agvbench.registry import classes_by_file
 from agvbench.running.links import RunnerLink
 from agvbench.running.supervision import rules
 from agvbench.running.supervision.limits import DEFAULT_SAFETY, SafetyLimits
-from agvbench.running.supervision.rule import Rule, Slice, Window
+from agvbench.running.supervision.rule import Rule, Slice, WatchWindow
 from agvbench.types import Command, Frames
 
 STOPPED = " s into the run: "
@@ -42,7 +42,7 @@ _SLACK_S = 1e-9
 class Supervisor:
     """Watches a run as it is driven.
 
-    A hold is exchanged in parts of ``exchange_s``, and every rule looks at what was seen in each ``watch_s`` of them.
+    A hold is divided into parts of ``control_cycle_s``; every rule checks the frames of each ``watch_s`` of them.
     How a hold is cut makes no difference to what a simulated vehicle does.
     """
 
@@ -54,13 +54,15 @@ class Supervisor:
     def begin(self) -> None:
         """Forget the last run."""
         self._rules = [rule(self._limits, self._workspace) for rule in self._classes]
-        self._window = Window()
+        self._window = WatchWindow()
         self._driving_since_s: float | None = None
-        self.exchanged_s = -math.inf
+        self.commanded_until_s = -math.inf
         """Until when [s] commands of this run were exchanged."""
 
-    def exchange(self, link: RunnerLink, command: Command, *, t_s: float, hold_s: float, seen: list[Frames]) -> None:
-        """Exchange a command as `VehicleLink.exchange` does, watching; add the frames of every slice to `seen`.
+    def control_cycle(
+        self, link: RunnerLink, command: Command, *, t_s: float, hold_s: float, seen: list[Frames]
+    ) -> None:
+        """Exchange a command as `VehicleLink.control_cycle` does, watching; add the frames of every slice to `seen`.
 
         Raises
         ------
@@ -74,9 +76,9 @@ class Supervisor:
             self._driving_since_s = None
         elif self._driving_since_s is None:
             self._driving_since_s = t_s
-        for until_s in _parts(t_s, end_s, self._limits.exchange_s):
-            seen.append(link.exchange(command, t_s=t_s, hold_s=until_s - t_s))
-            self.exchanged_s = until_s
+        for until_s in _parts(t_s, end_s, self._limits.control_cycle_s):
+            seen.append(link.control_cycle(command, t_s=t_s, hold_s=until_s - t_s))
+            self.commanded_until_s = until_s
             self._look_through(link, seen[-1], t_s, until_s)
             t_s = until_s
 

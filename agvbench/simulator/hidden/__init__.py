@@ -19,33 +19,33 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from agvbench.errors import PlantError
-from agvbench.simulator.hidden.base_vehicle import BaseVehicle, draw_vehicle
+from agvbench.simulator.hidden.base_vehicle import BaseVehicle, sample_vehicle
 from agvbench.simulator.hidden.catalogue import CATALOGUE, NOTHING, recipes
 from agvbench.simulator.hidden.plant import HiddenPlant
-from agvbench.simulator.hidden.sampling import drawn_spec, factory, make_hidden_plant
-from agvbench.simulator.hidden.separation import Bench, Separation, separation, true_rivals
+from agvbench.simulator.hidden.sampling import factory, make_hidden_plant, sampled_spec
+from agvbench.simulator.hidden.separation import Separation, SeparationStudy, indistinguishable_effects, separation
 from agvbench.simulator.hidden.truth import HiddenEffect, SealedTruth
 
 __all__ = [
     "CATALOGUE",
     "BaseVehicle",
-    "Bench",
     "HiddenEffect",
     "HiddenPlant",
     "SealedTruth",
     "Separation",
-    "draw_vehicle",
+    "SeparationStudy",
+    "indistinguishable_effects",
     "make_hidden_plant",
     "make_plant",
+    "sample_vehicle",
     "sealed_truth",
     "separation",
-    "true_rivals",
 ]
 
 
 def make_plant(seed: int) -> HiddenPlant:
     """Return a plant that hides what its seed draws: nothing, one effect or two."""
-    return make_hidden_plant(drawn_spec(seed), seed)
+    return make_hidden_plant(sampled_spec(seed), seed)
 
 
 def sealed_truth(spec: str, seed: int) -> SealedTruth:

@@ -65,11 +65,11 @@ def rear_aim(p: Floats, command: float) -> float:
 @cached_njit()
 def wheel_aim(p: Floats, command: float) -> float:
     """Return the wheel speed [m/s] of a fresh battery; a falling pulse drives forward."""
-    ahead = p[NEUTRAL] - command
-    beyond = abs(ahead) - p[DRIVE_DEAD]
-    if beyond <= 0.0 or abs(ahead) <= p[DEAD_WIDTH]:
+    longitudinal = p[NEUTRAL] - command
+    beyond = abs(longitudinal) - p[DRIVE_DEAD]
+    if beyond <= 0.0 or abs(longitudinal) <= p[DEAD_WIDTH]:
         return 0.0
-    return p[GAIN_FORWARD] * beyond if ahead > 0.0 else -p[GAIN_BACKWARD] * beyond
+    return p[GAIN_FORWARD] * beyond if longitudinal > 0.0 else -p[GAIN_BACKWARD] * beyond
 
 
 @cached_njit()

@@ -85,20 +85,20 @@ def motion(
     lf, lr = p[FRONT_AXLE], p[REAR_AXLE]
     tan_front, tan_rear = math.tan(front), math.tan(rear)
     left_of_speed = _grip(p, x, y, heading, front, rear)
-    ahead = speed * left_of_speed * _shared(p, math.cos(front), (1.0 + p[AXLE_RATIO]) * math.cos(rear))
-    aside = ahead * (lr * tan_front + lf * tan_rear) / (lf + lr)
-    path_speed = math.copysign(math.hypot(ahead, aside), ahead)
+    longitudinal = speed * left_of_speed * _shared(p, math.cos(front), (1.0 + p[AXLE_RATIO]) * math.cos(rear))
+    lateral = longitudinal * (lr * tan_front + lf * tan_rear) / (lf + lr)
+    path_speed = math.copysign(math.hypot(longitudinal, lateral), longitudinal)
     fast = abs(path_speed)
-    turn = ahead * (tan_front - tan_rear) / (lf + lr)
+    turn = longitudinal * (tan_front - tan_rear) / (lf + lr)
     turn = turn / (1.0 + p[SLIP_SQUARE] * fast * fast + p[SLIP_LINEAR] * fast) + p[WHEEL_CURVATURE] * path_speed
     uneven = p[RUNOUT] * math.sin(2.0 * math.pi * rolled / p[RUNOUT_PERIOD] + p[RUNOUT_PHASE])
-    turn -= uneven / p[RUNOUT_TRACK] * ahead
-    ahead += 0.5 * uneven * ahead
+    turn -= uneven / p[RUNOUT_TRACK] * longitudinal
+    longitudinal += 0.5 * uneven * longitudinal
     drift = p[DRIFT_SHARE] * fast + (p[DRIFT] if fast > MOVES_MPS else 0.0)
     c, s = math.cos(heading), math.sin(heading)
     return (
-        c * ahead - s * aside + drift * math.cos(p[DRIFT_DIRECTION]),
-        s * ahead + c * aside + drift * math.sin(p[DRIFT_DIRECTION]),
+        c * longitudinal - s * lateral + drift * math.cos(p[DRIFT_DIRECTION]),
+        s * longitudinal + c * lateral + drift * math.sin(p[DRIFT_DIRECTION]),
         turn,
         abs(speed),
     )

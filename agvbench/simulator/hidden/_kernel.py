@@ -72,10 +72,10 @@ _ROUNDING_S = 1e-10
     X, Y, HEADING, ROLLED, CLOCK, GRID, SESSION,
     DRIVE, FRONT, REAR, AIM_WHEEL, AIM_FRONT, AIM_REAR,
     SERVO_FRONT, RATE_FRONT, SERVO_REAR, RATE_REAR, AXLE_FRONT, AXLE_REAR, WHEEL,
-    STARTED, MOVING, SMOOTH_X, SMOOTH_Y, SMOOTH_HEADING, ASKED_DRIVE, ASKED_FRONT, ASKED_REAR,
+    STARTED, MOVING, SMOOTH_X, SMOOTH_Y, SMOOTH_HEADING, COMMANDED_DRIVE, COMMANDED_FRONT, COMMANDED_REAR,
 ) = range(28)  # fmt: skip
 STATE_SIZE = 28
-PLAY_FRONT, PLAY_REAR, PLAY_SPEED = range(3)
+VARIATION_FRONT, VARIATION_REAR, VARIATION_SPEED = range(3)
 
 # Commands on their way: a ring of (when, which, value), which = 0 drive, 1 front, 2 rear.
 RING = 256
@@ -92,7 +92,7 @@ def begin(p: Floats, state: Floats, past: Floats, marks: np.ndarray, pose: tuple
     state[X], state[Y], state[HEADING] = unseen(p, pose[0], pose[1], pose[2])
     state[SMOOTH_X], state[SMOOTH_Y], state[SMOOTH_HEADING] = pose
     state[DRIVE] = state[FRONT] = state[REAR] = p[NEUTRAL]
-    state[ASKED_DRIVE] = state[ASKED_FRONT] = state[ASKED_REAR] = p[NEUTRAL]
+    state[COMMANDED_DRIVE] = state[COMMANDED_FRONT] = state[COMMANDED_REAR] = p[NEUTRAL]
     state[AIM_FRONT] = state[SERVO_FRONT] = state[AXLE_FRONT] = actuators.front_aim(p, p[NEUTRAL])
     state[AIM_REAR] = state[SERVO_REAR] = state[AXLE_REAR] = actuators.rear_aim(p, p[NEUTRAL])
     state[GRID] = STEP_S
@@ -102,12 +102,12 @@ def begin(p: Floats, state: Floats, past: Floats, marks: np.ndarray, pose: tuple
 
 
 @cached_njit()
-def _ask(p: Floats, state: Floats, ring: Floats, marks: np.ndarray, which: int, value: float) -> None:
+def _command(p: Floats, state: Floats, ring: Floats, marks: np.ndarray, which: int, value: float) -> None:
     """Send a changed command on its way."""
     value = actuators.clip(value, p[COMMAND_LOW], p[COMMAND_HIGH])
-    if value == state[ASKED_DRIVE + which]:
+    if value == state[COMMANDED_DRIVE + which]:
         return
-    state[ASKED_DRIVE + which] = value
+    state[COMMANDED_DRIVE + which] = value
     share = p[DRIVE_DELAY_SHARE] if which == 0 else 1.0
     at = marks[1] % RING
     ring[at, 0], ring[at, 1], ring[at, 2] = state[CLOCK] + share * p[DELAY_S], which, value
@@ -139,24 +139,26 @@ def _next_arrival(ring: Floats, marks: np.ndarray) -> int:
 
 @cached_njit()
 def _rates(
-    p: Floats, state: Floats, play: Floats, at: tuple[float, float, float, float], front: float, rear: float,
+    p: Floats, state: Floats, run_variation: Floats, at: tuple[float, float, float, float], front: float, rear: float,
     speed: float, t: float,
 ) -> tuple[float, float, float, float]:  # fmt: skip
     """Return the derivatives of x, y, heading and rolled distance at `at`, `t` seconds into the step."""
     since = state[CLOCK] + t - state[STARTED]
     if since < p[STICK_S] and abs(speed) > body.MOVES_MPS:
         return 0.0, 0.0, math.copysign(p[STICK_TWIST] / p[STICK_S], speed), abs(speed)
-    front, rear = body.wheels(p, front + play[PLAY_FRONT], rear + play[PLAY_REAR], speed, state[SESSION])
+    front, rear = body.wheels(
+        p, front + run_variation[VARIATION_FRONT], rear + run_variation[VARIATION_REAR], speed, state[SESSION]
+    )
     return body.motion(p, at[0], at[1], at[2], at[3], front, rear, speed)
 
 
 @cached_njit()
-def _step(p: Floats, state: Floats, play: Floats, dt: float, out: Floats) -> None:
+def _step(p: Floats, state: Floats, run_variation: Floats, dt: float, out: Floats) -> None:
     """Write the state `dt` later into `out`."""
     out[:] = state
     h = 0.5 * dt
     driven = state[CLOCK] - state[STARTED] if state[MOVING] > 0.0 else 0.0
-    aim = state[AIM_WHEEL] * actuators.supply(p, state[SESSION], driven) * (1.0 + play[PLAY_SPEED])
+    aim = state[AIM_WHEEL] * actuators.supply(p, state[SESSION], driven) * (1.0 + run_variation[VARIATION_SPEED])
     w0 = actuators.wheel(p, aim, state[WHEEL], 0.0)
     w1 = actuators.wheel(p, aim, state[WHEEL], h)
     w2 = actuators.wheel(p, aim, w1, h)
@@ -173,10 +175,12 @@ def _step(p: Floats, state: Floats, play: Floats, dt: float, out: Floats) -> Non
     b1 = actuators.linked(p, r1, b0)
     b2 = actuators.linked(p, r2, b1)
     x, y, z, d = state[X], state[Y], state[HEADING], state[ROLLED]
-    k1 = _rates(p, state, play, (x, y, z, d), a0, b0, w0, 0.0)
-    k2 = _rates(p, state, play, (x + h * k1[0], y + h * k1[1], z + h * k1[2], d + h * k1[3]), a1, b1, w1, h)
-    k3 = _rates(p, state, play, (x + h * k2[0], y + h * k2[1], z + h * k2[2], d + h * k2[3]), a1, b1, w1, h)
-    k4 = _rates(p, state, play, (x + dt * k3[0], y + dt * k3[1], z + dt * k3[2], d + dt * k3[3]), a2, b2, w2, dt)
+    k1 = _rates(p, state, run_variation, (x, y, z, d), a0, b0, w0, 0.0)
+    k2 = _rates(p, state, run_variation, (x + h * k1[0], y + h * k1[1], z + h * k1[2], d + h * k1[3]), a1, b1, w1, h)
+    k3 = _rates(p, state, run_variation, (x + h * k2[0], y + h * k2[1], z + h * k2[2], d + h * k2[3]), a1, b1, w1, h)
+    k4 = _rates(
+        p, state, run_variation, (x + dt * k3[0], y + dt * k3[1], z + dt * k3[2], d + dt * k3[3]), a2, b2, w2, dt
+    )
     for i in range(4):
         out[X + i] = state[X + i] + dt / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
     out[SERVO_FRONT], out[RATE_FRONT], out[SERVO_REAR], out[RATE_REAR] = f2, rf2, r2, rr2
@@ -251,7 +255,7 @@ def _look(p: Floats, work: Floats, past: Floats, marks: np.ndarray, dt: float) -
 
 @cached_njit()
 def advance(
-    p: Floats, play: Floats, state: Floats, ring: Floats, past: Floats, marks: np.ndarray, work: Floats,
+    p: Floats, run_variation: Floats, state: Floats, ring: Floats, past: Floats, marks: np.ndarray, work: Floats,
     drive: float, front: float, rear: float, dt: float,
 ) -> tuple[float, float, float]:  # fmt: skip
     """Hold the command for `dt` seconds; return the pose that the camera sees then.
@@ -260,19 +264,19 @@ def advance(
     step that is under way is kept in ``work[1, 0]``.
     """
     target = work[1, 0] + dt  # time since the last committed state
-    asked = (drive, front, rear)
+    commanded = (drive, front, rear)
     changed = False
     for which in range(3):
-        value = actuators.clip(asked[which], p[COMMAND_LOW], p[COMMAND_HIGH])
-        changed = changed or value != state[ASKED_DRIVE + which]
+        value = actuators.clip(commanded[which], p[COMMAND_LOW], p[COMMAND_HIGH])
+        changed = changed or value != state[COMMANDED_DRIVE + which]
     if changed:
         if work[1, 0] > _ROUNDING_S:
-            _step(p, state, play, work[1, 0], work[0])
+            _step(p, state, run_variation, work[1, 0], work[0])
             _commit(p, state, work[0], past, marks)
         work[1, 0], target = 0.0, dt
         state[GRID] = state[CLOCK] + STEP_S
         for which in range(3):
-            _ask(p, state, ring, marks, which, asked[which])
+            _command(p, state, ring, marks, which, commanded[which])
     while True:
         arrival = _next_arrival(ring, marks)
         if arrival >= 0 and ring[arrival, 0] <= state[CLOCK] + _ROUNDING_S:
@@ -285,12 +289,12 @@ def advance(
             end = min(end, ring[arrival, 0] - state[CLOCK])
         if end > target + _ROUNDING_S:
             break
-        _step(p, state, play, end, work[0])
+        _step(p, state, run_variation, end, work[0])
         _commit(p, state, work[0], past, marks)
         if state[CLOCK] >= state[GRID] - _ROUNDING_S:
             state[GRID] += STEP_S
         target -= end
     target = max(0.0, target)
     work[1, 0] = target
-    _step(p, state, play, target, work[0])
+    _step(p, state, run_variation, target, work[0])
     return _look(p, work[0], past, marks, target)

@@ -17,10 +17,10 @@ class BaseVehicle:
     """A vehicle that hides nothing: its constants by name, and its run-to-run play (rad, rad, relative)."""
 
     constants: dict[str, float]
-    play: tuple[float, float, float]
+    run_variation: tuple[float, float, float]
 
 
-def draw_vehicle(rng: np.random.Generator) -> BaseVehicle:
+def sample_vehicle(rng: np.random.Generator) -> BaseVehicle:
     """Draw a vehicle of the thesis' build.
 
     Uniform: servo lines −0.072…−0.095 °/µs with offsets ±3° and end stops 38…45° on either side; dead band 15…45 µs,

@@ -81,7 +81,7 @@ def _other(name: str, library_name: str, sizes: dict[str, Size], /, **names: str
     return Recipe(name, library_name, "other form", sizes, renamed(**names))
 
 
-OTHER_FORMS = (
+OTHER_VARIANTS = (
     _other(  # the drive answers later than the servos, or sooner
         "actuation_delay_uneven", "actuation_delay",
         {"delay_s": Size(0.08, 0.20), "drive_share": Size(0.6, 0.8, grows=0)},
@@ -188,7 +188,7 @@ OUTSIDE = (
 )  # fmt: skip
 
 
-CATALOGUE: Mapping[str, Recipe] = MappingProxyType({r.name: r for r in (*LIBRARY, *OTHER_FORMS, *OUTSIDE)})
+CATALOGUE: Mapping[str, Recipe] = MappingProxyType({r.name: r for r in (*LIBRARY, *OTHER_VARIANTS, *OUTSIDE)})
 NOTHING = "nothing"
 AND = "_and_"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from agvbench.errors import PlantError
-from agvbench.simulator.checked_plant import asked_advance, asked_pose
+from agvbench.simulator.checked_plant import checked_advance, checked_pose
 from agvbench.simulator.hidden import _kernel as kernel
 from agvbench.simulator.hidden.constants import LATENCY_S, pack
 from agvbench.simulator.hidden.truth import SealedTruth
@@ -39,7 +39,7 @@ class HiddenPlant:
     def __init__(
         self,
         constants: dict[str, float],
-        play: tuple[float, float, float],
+        run_variation: tuple[float, float, float],
         seed: int,
         truth: SealedTruth,
         *,
@@ -51,12 +51,12 @@ class HiddenPlant:
                 "camera latency is too long", value=f"{self._constants[LATENCY_S]:g} s",
                 limit=f"{0.9 * kernel.PAST * kernel.STEP_S:.1f} s",
             )  # fmt: skip
-        self._spread, self._seed, self._truth, self._turnaround_s = play, seed, truth, turnaround_s
+        self._spread, self._seed, self._truth, self._turnaround_s = run_variation, seed, truth, turnaround_s
         self._state = np.zeros(kernel.STATE_SIZE)
         self._ring, self._past = np.zeros((kernel.RING, 3)), np.zeros((kernel.PAST, 4))
         self._marks = np.zeros(3, dtype=np.int64)
         self._work = np.zeros((2, kernel.STATE_SIZE))
-        self._play = np.zeros(3)
+        self._run_variation = np.zeros(3)
         self._driven = False
         self.reset((0.0, 0.0, 0.0), seed=0)
 
@@ -68,9 +68,9 @@ class HiddenPlant:
         PlantError
             If the pose is not finite.
         """
-        x, y, heading = asked_pose(pose)
+        x, y, heading = checked_pose(pose)
         rng = np.random.default_rng([self._seed % _SEEDS, seed % _SEEDS])
-        self._play[:] = rng.standard_normal(3) * self._spread
+        self._run_variation[:] = rng.standard_normal(3) * self._spread
         if self._driven:
             self._state[kernel.SESSION] += self._work[1, 0] + self._turnaround_s
         self._driven = False
@@ -85,10 +85,10 @@ class HiddenPlant:
         PlantError
             If a command is not a finite number, or `dt` is negative, not finite or over a day.
         """
-        drive, front, rear, dt = asked_advance(drive, front, rear, dt)
+        drive, front, rear, dt = checked_advance(drive, front, rear, dt)
         self._driven = self._driven or dt > 0.0
         pose: tuple[float, float, float] = kernel.advance(
-            self._constants, self._play, self._state, self._ring, self._past, self._marks, self._work,
+            self._constants, self._run_variation, self._state, self._ring, self._past, self._marks, self._work,
             drive, front, rear, dt,
         )  # fmt: skip
         return pose

@@ -9,11 +9,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from agvbench.simulator.hidden.base_vehicle import BaseVehicle, draw_vehicle
+from agvbench.simulator.hidden.base_vehicle import BaseVehicle, sample_vehicle
 from agvbench.simulator.hidden.catalogue import AND, CATALOGUE, NOTHING, recipes
 from agvbench.simulator.hidden.plant import HiddenPlant
 from agvbench.simulator.hidden.recipe import Recipe, Values
-from agvbench.simulator.hidden.separation import Bench, Separation, separation
+from agvbench.simulator.hidden.separation import Separation, SeparationStudy, separation
 from agvbench.simulator.hidden.truth import HiddenEffect, Kind, SealedTruth
 
 FLOORS = 3.0
@@ -46,16 +46,16 @@ def make_hidden_plant(spec: str, seed: int, *, floors: float = FLOORS) -> Hidden
     >>> plant.sealed_truth().effects
     ()
     """
-    base, truth = _drawn(spec, seed % _SEEDS, floors)
-    return HiddenPlant(dict(truth.constants), base.play, seed, truth)
+    base, truth = _sampled(spec, seed % _SEEDS, floors)
+    return HiddenPlant(dict(truth.constants), base.run_variation, seed, truth)
 
 
 def vehicle_of(seed: int) -> BaseVehicle:
     """Return the vehicle that all plants of a seed share, whatever they hide."""
-    return draw_vehicle(np.random.default_rng([0xBA5E, seed % _SEEDS]))
+    return sample_vehicle(np.random.default_rng([0xBA5E, seed % _SEEDS]))
 
 
-def drawn_spec(seed: int) -> str:
+def sampled_spec(seed: int) -> str:
     """Return what `make_plant` hides for a seed: nothing in a fifth of cases, two effects in a fifth, else one."""
     rng = np.random.default_rng([0x5EA1, seed % _SEEDS])
     share, names = rng.random(), list(CATALOGUE)
@@ -80,7 +80,7 @@ def factory(spec: str) -> Callable[[int], HiddenPlant]:
 
 
 @functools.lru_cache(maxsize=256)
-def _drawn(spec: str, seed: int, floors: float) -> tuple[BaseVehicle, SealedTruth]:
+def _sampled(spec: str, seed: int, floors: float) -> tuple[BaseVehicle, SealedTruth]:
     base = vehicle_of(seed)
     hidden = recipes(spec)
     override = {name: value for recipe in hidden for name, value in recipe.base.items()}
@@ -98,15 +98,15 @@ def _drawn(spec: str, seed: int, floors: float) -> tuple[BaseVehicle, SealedTrut
 
 
 @functools.lru_cache(maxsize=4)
-def _bench(seed: int, override: tuple[tuple[str, float], ...]) -> Bench:
-    return Bench(vehicle_of(seed), dict(override))
+def _bench(seed: int, override: tuple[tuple[str, float], ...]) -> SeparationStudy:
+    return SeparationStudy(vehicle_of(seed), dict(override))
 
 
 def _kind(effects: tuple[HiddenEffect, ...]) -> Kind:
     return effects[0].kind if len(effects) == 1 else "two"
 
 
-def _large_enough(bench: Bench | None, recipe: Recipe, seed: int, floors: float) -> Values:
+def _large_enough(bench: SeparationStudy | None, recipe: Recipe, seed: int, floors: float) -> Values:
     """Draw an effect's parameters; let it grow until it leaves `floors`, or is 1.3⁶ ≈ 4.8 times as strong."""
     values = recipe.draw(np.random.default_rng([zlib.crc32(recipe.name.encode()), seed]))
     for _ in range(_MOST_GROWTHS):

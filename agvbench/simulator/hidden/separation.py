@@ -64,7 +64,7 @@ class Separation:
     floor_m: float
 
 
-class Bench:
+class SeparationStudy:
     """Drives plants of one base vehicle through the reference drives.
 
     Parameters
@@ -76,16 +76,16 @@ class Bench:
     """
 
     def __init__(self, base: BaseVehicle, override: dict[str, float] | None = None) -> None:
-        self._constants, self._play = base.constants | (override or {}) | _UNBOUNDED, base.play
+        self._constants, self._run_variation = base.constants | (override or {}) | _UNBOUNDED, base.run_variation
         self.drives = [centred(self.plant({}), drive) for drive in reference_drives(base.constants)]
         self.base_path = self.paths({})
         self.floor_m = self._floor_m()
         self.levels = self._free_levels()
         self._columns: Floats | None = None
 
-    def plant(self, mechanism: dict[str, float], *, play: bool = False) -> HiddenPlant:
+    def plant(self, mechanism: dict[str, float], *, run_variation: bool = False) -> HiddenPlant:
         """Return a plant with the mechanism's constants, without play unless it is asked for."""
-        spread = self._play if play else (0.0, 0.0, 0.0)
+        spread = self._run_variation if run_variation else (0.0, 0.0, 0.0)
         constants = self._constants | mechanism
         return HiddenPlant(constants, spread, 0, SealedTruth("nothing"), turnaround_s=_STRETCH * TURNAROUND_S)
 
@@ -134,7 +134,7 @@ class Bench:
 
     def _floor_m(self) -> float:
         """Return the rms scatter of the drives between runs, with the camera's noise."""
-        plant = self.plant({}, play=True)
+        plant = self.plant({}, run_variation=True)
         repeats = [
             np.concatenate([_scaled(path(plant, d, seed=1 + 100 * k + i)) for i, d in enumerate(self.drives)])
             for k in range(REPEATS)
@@ -149,7 +149,7 @@ def _moved(drive: ReferenceDrive, levels: Levels) -> ReferenceDrive:
     return replace(drive, rows=rows)  # type: ignore[arg-type]
 
 
-def separation(bench: Bench, mechanism: dict[str, float]) -> Separation:
+def separation(bench: SeparationStudy, mechanism: dict[str, float]) -> Separation:
     """Return how far a mechanism moves the reference drives.
 
     Parameters
@@ -164,7 +164,7 @@ def separation(bench: Bench, mechanism: dict[str, float]) -> Separation:
     return Separation(rms(bench.refitted(moved)) / bench.floor_m, held / bench.floor_m, bench.floor_m)
 
 
-def fit_mechanism(bench: Bench, wanted: Floats, constants: Mechanism, start: Sequence[float]) -> float:
+def fit_mechanism(bench: SeparationStudy, wanted: Floats, constants: Mechanism, start: Sequence[float]) -> float:
     """Return the rms [m] that a mechanism leaves of `wanted` (samples, 3) when fitted together with all levels.
 
     Parameters
@@ -201,7 +201,7 @@ def fit_mechanism(bench: Bench, wanted: Floats, constants: Mechanism, start: Seq
 
 
 def _left(
-    bench: Bench, wanted: Floats, constants: Mechanism, values: Floats, levels: Floats
+    bench: SeparationStudy, wanted: Floats, constants: Mechanism, values: Floats, levels: Floats
 ) -> Floats:  # fmt: skip
     moves = dict(zip(bench.levels, levels.tolist(), strict=True))
     left: Floats = wanted - np.concatenate(bench.paths(constants(values.tolist()), moves))
@@ -212,7 +212,9 @@ INDISTINGUISHABLE = 1.0
 """A rival leaves less than this [floors] of what an effect leaves when static maps alone are refitted."""
 
 
-def true_rivals(base: BaseVehicle, truth: SealedTruth, *, limit: float = INDISTINGUISHABLE) -> dict[str, float]:
+def indistinguishable_effects(
+    base: BaseVehicle, truth: SealedTruth, *, limit: float = INDISTINGUISHABLE
+) -> dict[str, float]:
     """Return the library's effects that explain the reference drives of a plant with one hidden effect.
 
     Each is fitted to the plant's own paths together with every level of the static maps, by driving base plants.
@@ -231,7 +233,7 @@ def true_rivals(base: BaseVehicle, truth: SealedTruth, *, limit: float = INDISTI
     Name to what it leaves [floors], the best first, without the hidden effect itself.
     """
     names = set(truth.library_names)
-    bench = Bench(base, {k: v for k, v in truth.constants.items() if k in base.constants})
+    bench = SeparationStudy(base, {k: v for k, v in truth.constants.items() if k in base.constants})
     mechanism = {k: v for k, v in truth.constants.items() if k not in base.constants}
     wanted = np.concatenate(bench.paths(mechanism))
     left = {
@@ -240,7 +242,7 @@ def true_rivals(base: BaseVehicle, truth: SealedTruth, *, limit: float = INDISTI
     return {name: rest for name, rest in sorted(left.items(), key=lambda item: item[1]) if rest < limit}
 
 
-def fit_recipe(bench: Bench, wanted: np.ndarray, recipe: Recipe) -> float:
+def fit_recipe(bench: SeparationStudy, wanted: np.ndarray, recipe: Recipe) -> float:
     """Return the rms [m] that the best size of an effect leaves, begun from a small and, if signed, a negative one."""
     names = list(recipe.sizes)
 

@@ -15,7 +15,7 @@ from agvbench.thesis.prediction.assumptions import (
     WholeDegrees,
 )
 from agvbench.thesis.prediction.calibrated_vehicle import true_speed
-from agvbench.thesis.prediction.trajectories import Trajectory, wanted_angles
+from agvbench.thesis.prediction.trajectories import ThesisTrajectory, wanted_angles
 from agvbench.thesis.refits.drive import PARTIAL_US, cubic_map
 from agvbench.thesis.refits.steering import published_lines, unrounded_lines
 from agvbench.thesis.tables import GEOMETRY
@@ -26,7 +26,7 @@ FULL_SPEED_MPS = 0.32
 NOMINAL_US_PER_DEG = 600.0 / 45.0
 
 
-class Told(NamedTuple):
+class CommandedDrive(NamedTuple):
     """One drive's command: three pulses [µs], held for `duration_s`, then stop."""
 
     drive_us: float
@@ -35,7 +35,7 @@ class Told(NamedTuple):
     duration_s: float
 
 
-def told(trajectory: Trajectory, condition: str, assumed: Assumptions) -> Told:
+def commanded(trajectory: ThesisTrajectory, condition: str, assumed: Assumptions) -> CommandedDrive:
     """Return what the vehicle was told on `trajectory` under `condition`."""
     angles = wanted_angles(trajectory.side, assumed.steering, GEOMETRY)
     if condition == "uncalibrated":
@@ -46,11 +46,11 @@ def told(trajectory: Trajectory, condition: str, assumed: Assumptions) -> Told:
             trajectory.drive, trajectory.half_speed, assumed.calibrated_drive, assumed.true_drive
         )
         front_us, rear_us = _calibrated_pulses(angles, assumed.calibrated_steering)
-    return Told(drive_us, front_us, rear_us, _duration(trajectory, angles, abs(speed), assumed.duration))
+    return CommandedDrive(drive_us, front_us, rear_us, _duration(trajectory, angles, abs(speed), assumed.duration))
 
 
 @cache
-def _duration(trajectory: Trajectory, angles: tuple[float, float], speed_mps: float, duration: str) -> float:
+def _duration(trajectory: ThesisTrajectory, angles: tuple[float, float], speed_mps: float, duration: str) -> float:
     if duration == "path" or not trajectory.is_turn:
         return trajectory.path_m / speed_mps
     _, _, yaw_rate = body_motion(*angles, speed_mps, speed_mps, GEOMETRY)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 from agvbench.thesis.prediction.assumptions import Assumptions, Condition, Ramps
 from agvbench.thesis.prediction.calibrated_vehicle import steady_motion, true_speed
-from agvbench.thesis.prediction.commands import Told, told
-from agvbench.thesis.prediction.trajectories import EIGHT, Trajectory
+from agvbench.thesis.prediction.commands import CommandedDrive, commanded
+from agvbench.thesis.prediction.trajectories import EIGHT, ThesisTrajectory
 from agvbench.types import Pose
 
 # 0.0 to 0.3 m/s in 0.294 s, and 0.32 to 0.02 m/s in 0.588 s.
@@ -41,12 +41,12 @@ def driven_distance(speed_mps: float, duration_s: float, ramps: Ramps) -> float:
 
 
 @dataclass(frozen=True)
-class Prediction:
+class EndPosePrediction:
     """Where one drive ends: `end` in the start frame, Δs [mm] and heading change [deg], both signed."""
 
-    trajectory: Trajectory
+    trajectory: ThesisTrajectory
     condition: Condition
-    command: Told
+    command: CommandedDrive
     end: Pose
     turned_deg: float
     delta_s_mm: float
@@ -57,15 +57,15 @@ class Prediction:
         return self.turned_deg - math.degrees(self.trajectory.heading_rad)
 
 
-def predict(trajectory: Trajectory, condition: Condition, assumed: Assumptions) -> Prediction:
+def predict(trajectory: ThesisTrajectory, condition: Condition, assumed: Assumptions) -> EndPosePrediction:
     """Return the predicted end of `trajectory` driven under `condition`."""
-    command = told(trajectory, condition, assumed)
+    command = commanded(trajectory, condition, assumed)
     drive = assumed.true_drive if condition == "calibrated" else "measured"
     motion = steady_motion(command.front_us, command.rear_us, condition, assumed)
     distance = driven_distance(true_speed(command.drive_us, drive), command.duration_s, assumed.ramps)
     end, turned = arc_end(distance * motion.speed, motion.sideslip_rad, distance * motion.yaw_per_m)
     delta_s = math.hypot(end.x_m, end.y_m) - trajectory.distance_m(assumed.turn_target)
-    return Prediction(trajectory, condition, command, end, math.degrees(turned), 1000.0 * delta_s)
+    return EndPosePrediction(trajectory, condition, command, end, math.degrees(turned), 1000.0 * delta_s)
 
 
 def arc_end(length_m: float, sideslip_rad: float, turned_rad: float) -> tuple[Pose, float]:
@@ -92,11 +92,11 @@ def arc_end(length_m: float, sideslip_rad: float, turned_rad: float) -> tuple[Po
     return Pose(chord * math.cos(direction), chord * math.sin(direction), turned_rad), turned_rad
 
 
-def driven(condition: Condition) -> tuple[Trajectory, ...]:
+def driven(condition: Condition) -> tuple[ThesisTrajectory, ...]:
     """Return the trajectories that were driven under `condition`: uncalibrated knows no half speed."""
     return tuple(t for t in EIGHT if not (t.half_speed and condition == "uncalibrated"))
 
 
-def predict_all(assumed: Assumptions, condition: Condition) -> list[Prediction]:
+def predict_all(assumed: Assumptions, condition: Condition) -> list[EndPosePrediction]:
     """Return a prediction for every trajectory driven under `condition`, in order."""
     return [predict(trajectory, condition, assumed) for trajectory in driven(condition)]

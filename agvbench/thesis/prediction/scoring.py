@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from statistics import median
 
 from agvbench.thesis.prediction.assumptions import MEANING, ONLY, Assumptions, Condition, choices
-from agvbench.thesis.prediction.end_pose import Prediction, predict_all
-from agvbench.thesis.section import Cell, Section, Table
+from agvbench.thesis.prediction.end_pose import EndPosePrediction, predict_all
+from agvbench.thesis.section import Cell, ThesisSection, ThesisTable
 from agvbench.thesis.tables import MeasuredRow, end_pose_rows
 
 CONDITIONS: tuple[Condition, ...] = ("uncalibrated", "calibrated")
@@ -57,7 +57,7 @@ class ScoredRow:
         return self.measured.q1 <= abs(self.predicted) <= self.measured.q3
 
 
-def score_row(measured: MeasuredRow, prediction: Prediction) -> ScoredRow:
+def score_row(measured: MeasuredRow, prediction: EndPosePrediction) -> ScoredRow:
     """Return `measured` with its prediction: Δs, or the heading in the way the thesis prints it."""
     if measured.quantity == "delta_s_mm":
         return ScoredRow(measured, prediction.delta_s_mm, 0.0, has_sign=False)
@@ -131,10 +131,10 @@ def verdict(ours: float, null: float) -> str:
     return "prediction" if ours < null else "null"
 
 
-def _rows_table(rows: list[ScoredRow]) -> Table:
+def _rows_table(rows: list[ScoredRow]) -> ThesisTable:
     columns: tuple[str, ...] = ("trajectory", "condition", "quantity", "measured", "Q1", "Q3", "predicted", "error")
     columns += ("error, other sign", "null", "null error", "inside quartiles")
-    return Table(
+    return ThesisTable(
         "prediction_rows",
         "Tables 8.3–8.10: measured medians, predicted, and the null",
         columns,
@@ -165,23 +165,23 @@ def _cells(row: ScoredRow) -> tuple[Cell, ...]:
     return (*cells, row.other_sign, row.null, row.null_error, row.in_quartiles)
 
 
-def _summary_table(rows: list[ScoredRow]) -> Table:
+def _summary_table(rows: list[ScoredRow]) -> ThesisTable:
     ours, other = median_errors(rows), median_errors(rows, "other_sign")
     null = median_errors(rows, "null_error")
     counts = {g: sum(1 for r in rows if r.group == g) for g in groups()}
     cells = tuple((describe(g), counts[g], ours[g], other[g], null[g], verdict(ours[g], null[g])) for g in groups())
     columns = ("group", "rows", "median error", "other sign", "null", "closer")
-    return Table("prediction_summary", "Median absolute error by group", columns, cells)
+    return ThesisTable("prediction_summary", "Median absolute error by group", columns, cells)
 
 
-def _assumed_table(assumed: Assumptions) -> Table:
+def _assumed_table(assumed: Assumptions) -> ThesisTable:
     rows = tuple(
         (name, getattr(assumed, name), MEANING[name, getattr(assumed, name)], ONLY.get(name, "both"), ", ".join(others))
         for name in Assumptions.__dataclass_fields__
         for others in [[c for c in choices(name) if c != getattr(assumed, name)]]
     )
     columns = ("assumption", "choice", "meaning", "condition", "other choices")
-    return Table("prediction_assumptions", "Assumed before looking", columns, rows)
+    return ThesisTable("prediction_assumptions", "Assumed before looking", columns, rows)
 
 
 def _findings(rows: list[ScoredRow]) -> tuple[str, ...]:
@@ -252,7 +252,7 @@ def _list(items: list[str]) -> str:
     return "; ".join(items) if items else "none"
 
 
-def prediction_section(assumed: Assumptions | None = None) -> Section:
+def prediction_section(assumed: Assumptions | None = None) -> ThesisSection:
     """Return the 28 rows under one set of assumptions (default: the one fixed beforehand)."""
     assumed = assumed or Assumptions()
     rows = score_all(assumed)
@@ -263,4 +263,4 @@ def prediction_section(assumed: Assumptions | None = None) -> Section:
         "rows_inside_quartiles": sum(r.in_quartiles for r in rows),
         "error_over_null_geometric_mean": score_against_null(rows),
     }
-    return Section("prediction", "Chapter 8 predicted (tables 8.3–8.10)", _findings(rows), tables, values)
+    return ThesisSection("prediction", "Chapter 8 predicted (tables 8.3–8.10)", _findings(rows), tables, values)

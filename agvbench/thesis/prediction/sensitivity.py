@@ -27,7 +27,7 @@ from agvbench.thesis.prediction.scoring import (
     score_against_null,
     score_all,
 )
-from agvbench.thesis.section import Cell, Section, Table
+from agvbench.thesis.section import Cell, ThesisSection, ThesisTable
 
 Progress = Callable[[int, int], None]
 
@@ -59,7 +59,7 @@ def shared_only(assumed: Assumptions) -> Assumptions:
     return replace(assumed, **{name: getattr(default, name) for name in ONLY})
 
 
-def _one_at_a_time_table() -> Table:
+def _one_at_a_time_table() -> ThesisTable:
     base = Assumptions()
     rows: list[tuple[Cell, ...]] = [_error_row("as assumed", "", score_all(base))]
     rows += [_error_row(name, choice, score_all(a)) for name, choice, a in one_at_a_time(base)]
@@ -69,7 +69,7 @@ def _one_at_a_time_table() -> Table:
         "One assumption changed at a time: median errors",
         "U uncalibrated, C calibrated; line: straight; Δs in mm, δ (heading) in deg.",
     )
-    return Table("sensitivity_one_at_a_time", title, columns, tuple(rows), note, narrow, digits=3)
+    return ThesisTable("sensitivity_one_at_a_time", title, columns, tuple(rows), note, narrow, digits=3)
 
 
 def _abbreviated(group: Group) -> str:
@@ -84,10 +84,10 @@ def _error_row(name: str, choice: str, rows: list[ScoredRow]) -> tuple[Cell, ...
     return (name, choice, *(errors[g] for g in groups()), score_against_null(rows))
 
 
-def _groups_table() -> Table:
+def _groups_table() -> ThesisTable:
     rows = [row for condition in CONDITIONS for row in _group_rows(condition)]
     columns = ("group", "null", "as assumed", "best", "median", "worst", "combinations better than null")
-    return Table(
+    return ThesisTable(
         "sensitivity_combinations",
         "Median error over every combination",
         columns,
@@ -108,7 +108,7 @@ def _group_rows(condition: Condition) -> list[tuple[Cell, ...]]:
     return rows
 
 
-def _ranges_table() -> tuple[Table, list[str]]:
+def _ranges_table() -> tuple[ThesisTable, list[str]]:
     """Return the range of every row over all combinations, and the rows that none of them reaches."""
     rows: list[tuple[Cell, ...]] = []
     missed: list[str] = []
@@ -121,7 +121,9 @@ def _ranges_table() -> tuple[Table, list[str]]:
                 missed.append(f"{m.trajectory} {condition} {QUANTITY[m.quantity].partition(' ')[0]}")
     columns = ("trajectory", "condition", "quantity", "measured", "Q1", "Q3", "lowest", "highest", "reached")
     note = "Magnitudes; 'reached': the range of predictions meets the quartiles of the ten drives."
-    return Table("sensitivity_ranges", "Every row's range over all combinations", columns, tuple(rows), note), missed
+    return ThesisTable(
+        "sensitivity_ranges", "Every row's range over all combinations", columns, tuple(rows), note
+    ), missed
 
 
 def _extent(scored: tuple[ScoredRow, ...]) -> tuple[float, float]:
@@ -133,7 +135,7 @@ def _other(condition: Condition) -> Condition:
     return "calibrated" if condition == "uncalibrated" else "uncalibrated"
 
 
-def _post_hoc_table() -> Table:
+def _post_hoc_table() -> ThesisTable:
     rows: list[tuple[Cell, ...]] = []
     for condition in CONDITIONS:
         chosen, other = best(condition), _other(condition)
@@ -157,7 +159,7 @@ def _post_hoc_table() -> Table:
         "Error / null, geometric mean over groups; below 1 beats the null. What concerns one condition only is not "
         "carried over."
     )
-    return Table(
+    return ThesisTable(
         "sensitivity_post_hoc",
         "Post hoc: the best combination, checked on the other condition",
         columns,
@@ -172,7 +174,7 @@ def _differences(assumed: Assumptions) -> str:
     return ", ".join(f"{f.name} = {getattr(assumed, f.name)}" for f in changed) or "as assumed"
 
 
-def _findings(post_hoc: Table, missed: list[str]) -> tuple[str, ...]:
+def _findings(post_hoc: ThesisTable, missed: list[str]) -> tuple[str, ...]:
     every = {c: [x.against_null for x in combinations(c)] for c in CONDITIONS}
     counts = " and ".join(
         f"{sum(x < 1.0 for x in scores)} of {len(scores)} beat the null on the {c} rows (median {median(scores):.2f} "
@@ -211,16 +213,16 @@ def _is_full_speed_straight(row: ScoredRow) -> bool:
     return row.measured.trajectory <= 2 and row.measured.quantity == "delta_s_mm"
 
 
-def sensitivity_section() -> Section:
+def sensitivity_section() -> ThesisSection:
     """Return the sensitivity of the 28 predictions."""
     post_hoc = _post_hoc_table()
     ranges, missed = _ranges_table()
     choices = tuple((name, choice, meaning) for (name, choice), meaning in MEANING.items())
-    meanings = Table("sensitivity_choices", "What the choices mean", ("assumption", "choice", "meaning"), choices)
+    meanings = ThesisTable("sensitivity_choices", "What the choices mean", ("assumption", "choice", "meaning"), choices)
     tables = (_one_at_a_time_table(), _groups_table(), ranges, post_hoc, meanings)
     values: dict[str, Cell] = {f"{c}_combinations": len(combinations(c)) for c in CONDITIONS}
     values |= {f"{c}_better_than_null": sum(x.against_null < 1.0 for x in combinations(c)) for c in CONDITIONS}
-    return Section("sensitivity", "What the prediction hangs on", _findings(post_hoc, missed), tables, values)
+    return ThesisSection("sensitivity", "What the prediction hangs on", _findings(post_hoc, missed), tables, values)
 
 
 __all__ = ["Combination", "Group", "best", "combinations", "sensitivity_section", "shared_only"]

@@ -13,7 +13,7 @@ STRAIGHT_M = 2.0
 
 
 @dataclass(frozen=True)
-class Trajectory:
+class ThesisTrajectory:
     """One of the eight: `drive` is +1 forward or −1 backward, `side` +1 left, −1 right or 0 straight."""
 
     number: int
@@ -44,7 +44,7 @@ class Trajectory:
 
 
 EIGHT = tuple(
-    Trajectory(*row)
+    ThesisTrajectory(*row)
     for row in (
         (1, 1, 0, False),
         (2, -1, 0, False),

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from statistics import mean, median
 
 from agvbench.thesis.prediction.assumptions import Assumptions
-from agvbench.thesis.prediction.end_pose import Prediction, predict_all
+from agvbench.thesis.prediction.end_pose import EndPosePrediction, predict_all
 from agvbench.thesis.prediction.scoring import CONDITIONS
-from agvbench.thesis.section import Cell, Section, Table
+from agvbench.thesis.section import Cell, ThesisSection, ThesisTable
 from agvbench.thesis.tables import end_pose_rows
 
 TARGET_MM = 1000.0 * math.sqrt(2.0)
@@ -41,7 +41,7 @@ def measured_turns() -> tuple[MeasuredTurn, ...]:
     )
 
 
-def _predicted_turns(assumed: Assumptions) -> dict[tuple[int, str], Prediction]:
+def _predicted_turns(assumed: Assumptions) -> dict[tuple[int, str], EndPosePrediction]:
     return {(p.trajectory.number, c): p for c in CONDITIONS for p in predict_all(assumed, c) if p.trajectory.is_turn}
 
 
@@ -74,7 +74,7 @@ def carried_over(assumed: Assumptions) -> list[tuple[Cell, ...]]:
     return rows
 
 
-def turns_section() -> Section:
+def turns_section() -> ThesisSection:
     """Return both readings of every turn, and the factor on backward turns checked across conditions."""
     assumed = Assumptions()
     ratios = heading_ratios(assumed)
@@ -96,11 +96,11 @@ def turns_section() -> Section:
     carried_columns: tuple[str, ...] = ("condition", "own factor", "factor from", "factor", "error as predicted [deg]")
     carried_columns += ("error with that factor [deg]", "null [deg]")
     tables = (
-        Table("turns_readings", "Both readings of the turns", columns, readings, narrow_columns=narrow),
-        Table("turns_backward", "One factor on backward headings, carried over", carried_columns, tuple(carried)),
+        ThesisTable("turns_readings", "Both readings of the turns", columns, readings, narrow_columns=narrow),
+        ThesisTable("turns_backward", "One factor on backward headings, carried over", carried_columns, tuple(carried)),
     )
     factors = backward_factors(assumed)
-    return Section("turns", "The turns, afterwards (post hoc)", _findings(ratios, factors), tables, dict(factors))
+    return ThesisSection("turns", "The turns, afterwards (post hoc)", _findings(ratios, factors), tables, dict(factors))
 
 
 def _findings(ratios: dict[tuple[int, str], float], factors: dict[str, float]) -> tuple[str, ...]:

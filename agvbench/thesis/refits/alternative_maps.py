@@ -16,7 +16,7 @@ from agvbench.calibration import CurvePoints, MapFit, compare_maps, drive_fitter
 from agvbench.errors import FitError
 from agvbench.thesis.refits.polynomial import fit_polynomial
 from agvbench.thesis.refits.steering import AXLES
-from agvbench.thesis.section import Cell, Section, Table
+from agvbench.thesis.section import Cell, ThesisSection, ThesisTable
 from agvbench.thesis.tables import drive_table, rms, steering_table
 
 NEUTRAL_US = 1500.0
@@ -81,10 +81,10 @@ def _clean(error: float) -> float:
     return 0.0 if error < 1e-9 else error
 
 
-def _table(name: str, title: str, unit: str, rows: list[tuple[Cell, ...]]) -> Table:
+def _table(name: str, title: str, unit: str, rows: list[tuple[Cell, ...]]) -> ThesisTable:
     columns = ("what", "map", "left out", "R²", f"residual sd [{unit}]", f"rms, all pulses [{unit}]")
     note = "R² and residual sd over the points used; R² of a monotone table is 1 by construction and says nothing."
-    return Table(name, title, (*columns, f"held-out rms [{unit}]"), tuple(rows), note)
+    return ThesisTable(name, title, (*columns, f"held-out rms [{unit}]"), tuple(rows), note)
 
 
 def held_out(fits: Fits, name: str) -> float:
@@ -93,7 +93,7 @@ def held_out(fits: Fits, name: str) -> float:
     return fit.cross_validated_rms if isinstance(fit, MapFit) else math.nan
 
 
-def maps_section() -> Section:
+def maps_section() -> ThesisSection:
     """Return the better maps beside the thesis' forms."""
     steering = [row for axle in AXLES for row in _rows(axle, steering_fits(axle), math.degrees(1.0))]
     drive = _rows("drive", drive_fits(), 1000.0)
@@ -120,4 +120,4 @@ def maps_section() -> Section:
     values: dict[str, Cell] = {f"{a}_end_stops_held_out_deg": stops[a] for a in AXLES}
     values |= {f"{a}_thesis_held_out_deg": printed[a] for a in AXLES}
     values |= {"drive_dead_band_held_out_mm_per_s": band, "drive_thesis_held_out_mm_per_s": cubic}
-    return Section("maps", "Better maps (tables 7.1, 7.2, 7.4)", findings, tables, values)
+    return ThesisSection("maps", "Better maps (tables 7.1, 7.2, 7.4)", findings, tables, values)

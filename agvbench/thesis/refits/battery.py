@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agvbench.thesis.section import Figure, Section, Table, figures_table
+from agvbench.thesis.section import Figure, ThesisSection, ThesisTable, figures_table
 from agvbench.thesis.tables import endurance_percentiles, endurance_table, rms
 from agvbench.types import Floats
 
@@ -42,7 +42,7 @@ def held_out_errors() -> tuple[Floats, Floats]:
     return constant, line
 
 
-def battery_section() -> Section:
+def battery_section() -> ThesisSection:
     """Return the refit of tables 8.1 and 8.2 beside the text's figures."""
     start_s, speed = endurance_table()
     droop = fit_droop(start_s / 3600.0, speed)
@@ -68,7 +68,7 @@ def battery_section() -> Section:
             "11 samples against 298 770, tracking peaks left in",
         ),
     ]
-    held_out = Table(
+    held_out = ThesisTable(
         "battery_held_out",
         "Table 8.2: each interval predicted from the others",
         ("model", "held-out rms [mm/s]"),
@@ -85,7 +85,7 @@ def battery_section() -> Section:
             "interleaved."
         ),
     )
-    return Section(
+    return ThesisSection(
         "battery",
         "Battery (tables 8.1 and 8.2)",
         findings,

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from agvbench.thesis.refits.steering import true_maps
-from agvbench.thesis.section import Figure, Section, Table, figures_table
+from agvbench.thesis.section import Figure, ThesisSection, ThesisTable, figures_table
 from agvbench.thesis.tables import GEOMETRY, CorneringTable, cornering_table, drive_table, rms
 from agvbench.types import Floats
 from agvbench.vehicle.kinematics import body_motion
@@ -248,7 +248,7 @@ def _asymmetry() -> str:
     return "; ".join(words)
 
 
-def cornering_section() -> Section:
+def cornering_section() -> ThesisSection:
     """Return what appendix B holds, and the loss fitted to it."""
     count, blocks, rows = count_mirrored(), identical_blocks(), _form_rows()
     measured = sum(grid.size for grid in cornering_table().speed_mps.values())
@@ -276,7 +276,9 @@ def cornering_section() -> Section:
     columns = ("model", "loss", "rms [mm/s]", "held-out rms [mm/s]")
     tables = (
         figures_table("cornering", "Appendix B as printed", figures),
-        Table("cornering_forms", "Speed lost in corners: competing forms", columns, rows, "Held out: mirrored pairs."),
+        ThesisTable(
+            "cornering_forms", "Speed lost in corners: competing forms", columns, rows, "Held out: mirrored pairs."
+        ),
     )
     values = {"loss": fitted_loss(), "mirrored_pairs": count.pairs, "mirrored_identical": count.identical}
-    return Section("cornering", "Cornering (appendix B)", findings, tables, dict(values))
+    return ThesisSection("cornering", "Cornering (appendix B)", findings, tables, dict(values))

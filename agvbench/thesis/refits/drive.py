@@ -8,7 +8,7 @@ import numpy as np
 
 from agvbench.calibration import fit_drive_map
 from agvbench.thesis.refits.polynomial import Polynomial, fit_polynomial
-from agvbench.thesis.section import Figure, Section, Table, figures_table
+from agvbench.thesis.section import Figure, ThesisSection, ThesisTable, figures_table
 from agvbench.thesis.tables import drive_table
 from agvbench.vehicle.maps import Cubic, StaticMap
 
@@ -86,7 +86,7 @@ def half_speed_errors() -> dict[float, float]:
     return {p: 100.0 * (float(cubic(p)) / table_speed(p) - 1.0) for p in (1350.0, 1400.0, 1650.0)}
 
 
-def drive_section() -> Section:
+def drive_section() -> ThesisSection:
     """Return the refit of table 7.4."""
     errors = half_speed_errors()
     findings = (
@@ -104,8 +104,8 @@ def drive_section() -> Section:
     columns = ("pulse [µs]", "table 7.4 [m/s]", "refitted cubic [m/s]", "eq. 7.3 as printed [m/s]")
     tables = (
         figures_table("drive", "Drive curve, as printed and refitted", _figures()),
-        Table("drive_rounding", "What the rounding of eq. 7.3 does", columns, _rounding_rows()),
+        ThesisTable("drive_rounding", "What the rounding of eq. 7.3 does", columns, _rounding_rows()),
     )
     names = ("cubic", "quadratic", "linear", "constant")
     values = dict(zip(names, refit_drive(3, PARTIAL_US).coefficients, strict=True))
-    return Section("drive", "Drive (table 7.4, eq. 7.3, table 7.5)", findings, tables, dict(values))
+    return ThesisSection("drive", "Drive (table 7.4, eq. 7.3, table 7.5)", findings, tables, dict(values))

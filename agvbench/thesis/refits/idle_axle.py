@@ -13,7 +13,7 @@ from functools import cache
 
 import numpy as np
 
-from agvbench.thesis.section import Cell, Section, Table
+from agvbench.thesis.section import Cell, ThesisSection, ThesisTable
 from agvbench.thesis.tables import GEOMETRY, idle_axle_table, rms, steering_table
 from agvbench.types import Floats
 from agvbench.vehicle.kinematics import body_motion
@@ -73,13 +73,13 @@ def _rows() -> list[tuple[Cell, ...]]:
     return rows
 
 
-def lever_arm_section() -> Section:
+def lever_arm_section() -> ThesisSection:
     """Return what moves the axle that stands still."""
     rows = _rows()
     arm, error = common_lever_arm()
     columns: tuple[str, ...] = ("idle axle", "drift, rms [deg]", "lever arm [mm]", "± [mm]", "left [deg]", "coupling")
     columns += ("± coupling", "left by coupling [deg]")
-    table = Table("lever_arm", "The axle that stands still", columns, tuple(rows))
+    table = ThesisTable("lever_arm", "The axle that stands still", columns, tuple(rows))
     findings = (
         (
             f"One lever arm explains the drift of both tables: {rows[0][2]:.1f} ± {rows[0][3]:.1f} mm from the rear "
@@ -93,7 +93,7 @@ def lever_arm_section() -> Section:
         ),
     )
     values: dict[str, Cell] = {"lever_arm_m": arm, "lever_arm_stderr_m": error}
-    return Section("lever_arm", "The axle that stands still (tables 7.1, 7.2)", findings, (table,), values)
+    return ThesisSection("lever_arm", "The axle that stands still (tables 7.1, 7.2)", findings, (table,), values)
 
 
 @cache

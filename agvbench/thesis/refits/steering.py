@@ -9,7 +9,7 @@ import numpy as np
 
 from agvbench.model import thesis_vehicle
 from agvbench.thesis.refits.polynomial import Polynomial, fit_polynomial
-from agvbench.thesis.section import Figure, Section, Table, figures_table
+from agvbench.thesis.section import Figure, ThesisSection, ThesisTable, figures_table
 from agvbench.thesis.tables import STATISTICS, steering_table, verification_table
 from agvbench.types import Floats
 from agvbench.vehicle.maps import Line, MonotoneTable, StaticMap
@@ -102,7 +102,7 @@ def neutral_error_deg(axle: str) -> float:
     return math.degrees(float(true_maps("end_stops")[index](pulse)))
 
 
-def steering_section() -> Section:
+def steering_section() -> ThesisSection:
     """Return the refit of tables 7.1 and 7.2."""
     two = {axle: refit_line(axle, 2) for axle in AXLES}
     rows = [row for axle in AXLES for row in _line_rows(axle)]
@@ -123,10 +123,10 @@ def steering_section() -> Section:
     )
     tables = (
         figures_table("steering", "Steering lines, as printed and refitted", [f for a in AXLES for f in _figures(a)]),
-        Table("steering_lines", "Lines by points dropped and by statistic", columns, tuple(rows), digits=5),
+        ThesisTable("steering_lines", "Lines by points dropped and by statistic", columns, tuple(rows), digits=5),
     )
     values = {f"{a}_{k}": v for a in AXLES for k, v in _named(two[a])}
-    return Section("steering", "Steering (tables 7.1, 7.2, eq. 7.1, 7.2)", findings, tables, dict(values))
+    return ThesisSection("steering", "Steering (tables 7.1, 7.2, eq. 7.1, 7.2)", findings, tables, dict(values))
 
 
 def _percent(two: dict[str, Polynomial], axle: str) -> float:

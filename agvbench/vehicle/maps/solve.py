@@ -28,14 +28,14 @@ def solve_monotone(
     rising = function(high) >= function(low)
     x = 0.5 * (low + high)
     for _ in range(_MAX_ITERATIONS):
-        miss = function(x) - target
-        above = (miss > 0.0) == rising
+        residual = function(x) - target
+        above = (residual > 0.0) == rising
         high = np.where(above, x, high)
         low = np.where(above, low, x)
         with np.errstate(divide="ignore", invalid="ignore"):
-            newton = x - miss / slope(x)
+            newton = x - residual / slope(x)
         inside = (newton > low) & (newton < high)
-        following = np.where(miss == 0.0, x, np.where(inside, newton, 0.5 * (low + high)))
+        following = np.where(residual == 0.0, x, np.where(inside, newton, 0.5 * (low + high)))
         if np.all(np.abs(following - x) <= 2.0 * np.spacing(np.abs(x))):
             return following
         x = following

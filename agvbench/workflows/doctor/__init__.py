@@ -1,6 +1,6 @@
 """Whether a lab is ready to drive: checks, a file each, and what to do where one fails."""
 
 from agvbench.workflows.doctor.examine import examine
-from agvbench.workflows.doctor.finding import Check, Finding, Lab, State
+from agvbench.workflows.doctor.finding import Check, Finding, FindingState, Lab
 
-__all__ = ["Check", "Finding", "Lab", "State", "examine"]
+__all__ = ["Check", "Finding", "FindingState", "Lab", "examine"]

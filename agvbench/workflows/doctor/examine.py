@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from agvbench.errors import AgvbenchError
 from agvbench.registry import classes_by_file
 from agvbench.workflows.doctor import checks
-from agvbench.workflows.doctor.finding import Check, Finding, Lab, State
+from agvbench.workflows.doctor.finding import Check, Finding, FindingState, Lab
 
 
 def examine(lab: Lab) -> Iterator[tuple[str, Finding]]:
@@ -16,5 +16,5 @@ def examine(lab: Lab) -> Iterator[tuple[str, Finding]]:
         try:
             finding = cls().examine(lab)
         except AgvbenchError as error:
-            finding = Finding(State.BAD, str(error))
+            finding = Finding(FindingState.BAD, str(error))
         yield cls.name, finding

@@ -11,7 +11,7 @@ from typing import ClassVar
 from agvbench.running.configuration.settings import BenchSettings
 
 
-class State(Enum):
+class FindingState(Enum):
     """How a check ended."""
 
     GOOD = "ok"
@@ -24,7 +24,7 @@ class State(Enum):
 class Finding:
     """One line: what was found, and what to do about it."""
 
-    state: State
+    state: FindingState
     found: str
     remedy: str = ""
 

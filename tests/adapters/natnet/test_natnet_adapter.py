@@ -27,7 +27,7 @@ from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import Keys
 from agvbench.bus.messages.event import Event
 from agvbench.bus.messages.frames import FramesMessage
-from agvbench.bus.session import open_session
+from agvbench.bus.session import open_bus_session
 from agvbench.errors import FlagError
 from agvbench.types import Frames
 
@@ -45,7 +45,7 @@ class Bench:
         self.server = Emulator(Settings(rate_hz=240.0), MODELS)
         stack.callback(self.server.close)
         host, port = self.server.address
-        keys, session = Keys("lab", "agv2"), stack.enter_context(open_session())
+        keys, session = Keys("lab", "agv2"), stack.enter_context(open_bus_session())
         self.inbox = Inbox(session, keys)
         stack.callback(self.inbox.close)
         options = AdapterOptions(vehicle="agv2", camera={"up": up, **camera}, clock=WallClock())

@@ -186,7 +186,7 @@ class Wire:
         self.counters = Counters()
         self.channel = Channel(Connection("127.0.0.1", port, "127.0.0.1", data_port=free_port()), self.counters)
         stack.callback(self.channel.close)
-        self.channel.tell(Message.KEEPALIVE)
+        self.channel.send(Message.KEEPALIVE)
         self.client = self.server.recvfrom(100)[1]
 
     def takes(self, sender: socket.socket) -> bool:

@@ -18,8 +18,8 @@ def driven(mocap: str, **camera: float | str) -> list[Frames]:
     with open_rig("sim", mocap, plant=PLANT, seed=3, camera=camera) as link:
         for run_key in ("a", "b"):
             link.reset(START, run_key=run_key)
-            parts = [link.exchange(Command(1500.0, 1500.0, 1500.0), t_s=-0.5, hold_s=0.5)]
-            parts += [link.exchange(Command(1700.0, 1450.0, 1550.0), t_s=0.8 * n, hold_s=0.8) for n in range(4)]
+            parts = [link.control_cycle(Command(1500.0, 1500.0, 1500.0), t_s=-0.5, hold_s=0.5)]
+            parts += [link.control_cycle(Command(1700.0, 1450.0, 1550.0), t_s=0.8 * n, hold_s=0.8) for n in range(4)]
             frames = Frames.concatenate([*parts, link.flush()])
             runs.append(frames.select(np.argsort(frames.t_s, kind="stable")))
     return runs

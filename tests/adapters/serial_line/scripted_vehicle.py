@@ -42,7 +42,7 @@ class ScriptedVehicle:
             return with_checksum(HELLO)
         return with_checksum(f"ok {text.split()[1]}") if text.startswith("S ") else b""
 
-    def say(self, data: bytes) -> None:
+    def set_command(self, data: bytes) -> None:
         os.write(self._near, data)
 
     def unplug(self) -> None:

@@ -109,10 +109,10 @@ def test_version_1_is_told_whole_degrees_and_no_checksum() -> None:
 def test_a_reset_on_open_half_a_line_and_noise_before_the_banner_are_waited_out() -> None:
     booted = threading.Event()
     vehicle = ScriptedVehicle(lambda text: ScriptedVehicle.obey(text) if booted.is_set() else b"")
-    vehicle.say(b"ok 3\xff\x00\x17boot\r\nok 41")
+    vehicle.set_command(b"ok 3\xff\x00\x17boot\r\nok 41")
 
     def boot() -> None:
-        vehicle.say(b"2\n" + HELLO.encode() + b"\n")
+        vehicle.set_command(b"2\n" + HELLO.encode() + b"\n")
         booted.set()
 
     timer = threading.Timer(0.3, boot)
@@ -227,7 +227,7 @@ def test_noise_on_the_way_back_is_told_and_moves_on() -> None:
         agv.apply(FORWARD)
         events.wait_for("line_garbled")
         for number in (1, 2):  # every one is told, for each spoils a run
-            vehicle.say(with_checksum("W"))
+            vehicle.set_command(with_checksum("W"))
             said = events.wait_for("vehicle_stopped_itself", number)
         assert re.fullmatch(
             r"the vehicle's watchdog stopped it: \d\.\d\d s between two commands \(limit: 0.25 s\)", said

@@ -122,7 +122,7 @@ def test_misspelt_name_is_corrected():
 
 
 def test_seeds_draw_nothing_one_and_two():
-    specs = [drawing.drawn_spec(seed) for seed in range(400)]
+    specs = [drawing.sampled_spec(seed) for seed in range(400)]
     nothing, pairs = specs.count(NOTHING), sum("_and_" in spec for spec in specs)
     assert 50 < nothing < 110
     assert 50 < pairs < 110

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from agvbench.simulator.hidden import Bench, make_hidden_plant, separation
+from agvbench.simulator.hidden import SeparationStudy, make_hidden_plant, separation
 from agvbench.simulator.hidden.catalogue import CATALOGUE
 from agvbench.simulator.hidden.sampling import FLOORS, vehicle_of
 from agvbench.simulator.hidden.separation import fit_recipe
@@ -13,7 +13,7 @@ from agvbench.simulator.hidden.separation import fit_recipe
 
 @pytest.fixture(scope="module")
 def bench():
-    return Bench(vehicle_of(5))
+    return SeparationStudy(vehicle_of(5))
 
 
 def explained(bench, hidden, candidate, **sizes):

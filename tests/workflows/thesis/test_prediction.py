@@ -16,7 +16,7 @@ from agvbench.thesis.prediction.assumptions import (
     every_combination,
     one_at_a_time,
 )
-from agvbench.thesis.prediction.commands import cut_to_degrees, told
+from agvbench.thesis.prediction.commands import commanded, cut_to_degrees
 from agvbench.thesis.prediction.end_pose import arc_end, driven, driven_distance, predict
 from agvbench.thesis.prediction.trajectories import EIGHT, wanted_angles
 from agvbench.thesis.tables import GEOMETRY
@@ -153,11 +153,11 @@ def test_whole_degrees(angle):
 
 
 def test_uncalibrated_pulses_follow_the_nominal_map():
-    command = told(EIGHT[4], "uncalibrated", Assumptions())
+    command = commanded(EIGHT[4], "uncalibrated", Assumptions())
     assert command.front_us == pytest.approx(1500.0 - math.degrees(math.atan(0.181)) * 600.0 / 45.0)
     assert command.rear_us == pytest.approx(1500.0 + math.degrees(math.atan(0.121)) * 600.0 / 45.0)
     assert command.duration_s == pytest.approx(math.pi / 2.0 / 0.32)
-    whole = told(EIGHT[4], "uncalibrated", Assumptions(whole_degrees="toward_straight"))
+    whole = commanded(EIGHT[4], "uncalibrated", Assumptions(whole_degrees="toward_straight"))
     assert whole.front_us == pytest.approx(1500.0 - 10.0 * 600.0 / 45.0)
 
 

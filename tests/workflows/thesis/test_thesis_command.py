@@ -13,7 +13,7 @@ from agvbench.cli import main, thesis
 from agvbench.thesis import section_names, thesis_sections
 from agvbench.thesis.errata import errata_section, printed_speed, printed_yaw_rate
 from agvbench.thesis.refits.alternative_maps import maps_section
-from agvbench.thesis.section import Table, key_of, show
+from agvbench.thesis.section import ThesisTable, key_of, show
 
 
 def test_files(tmp_path, capsys):
@@ -95,7 +95,7 @@ def test_errata_are_shown_by_numbers():
 
 def test_tables_refuse_ragged_rows_and_show_cells():
     with pytest.raises(ValueError, match="2 cells under 1 columns"):
-        Table("t", "T", ("a",), ((1, 2),))
+        ThesisTable("t", "T", ("a",), ((1, 2),))
     assert key_of("radius if − [mm]") != key_of("radius if + [mm]")
     assert show(float("nan")) == "–"
-    assert json.dumps(Table("t", "T", ("a",), ((float("nan"),),)).records()) == '[{"a": null}]'
+    assert json.dumps(ThesisTable("t", "T", ("a",), ((float("nan"),),)).records()) == '[{"a": null}]'

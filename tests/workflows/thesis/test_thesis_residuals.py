@@ -21,7 +21,7 @@ def _of(name):
 
 def test_every_residual_shrinks_on_what_was_left_out():
     for t in traced():
-        assert len(t.at) == len(t.missed_before) == len(t.missed_after) >= 9
+        assert len(t.at) == len(t.residual_before) == len(t.residual_after) >= 9
         assert t.rms_after < 0.65 * t.rms_before
 
 
@@ -33,7 +33,7 @@ def test_the_straight_lines_errors_are_those_of_least_squares():
         kept = [i for i in range(1, len(x) - 1) if i != k]
         slope, level = np.polyfit(x[kept], y[kept], 1)
         missed.append(y[k] - slope * x[k] - level)
-    np.testing.assert_allclose(_of("steering_front").missed_before, missed, atol=1e-6)
+    np.testing.assert_allclose(_of("steering_front").residual_before, missed, atol=1e-6)
 
 
 def test_constant_speed_and_droop_are_those_of_the_other_intervals():
@@ -41,9 +41,9 @@ def test_constant_speed_and_droop_are_those_of_the_other_intervals():
     t = _of("battery")
     for k in range(len(speed)):
         others = np.delete(np.arange(len(speed)), k)
-        assert t.missed_before[k] == pytest.approx(1000.0 * (speed[k] - speed[others].mean()))
+        assert t.residual_before[k] == pytest.approx(1000.0 * (speed[k] - speed[others].mean()))
         line = np.polyval(np.polyfit(start_s[others], speed[others], 1), start_s[k])
-        assert t.missed_after[k] == pytest.approx(1000.0 * (speed[k] - line))
+        assert t.residual_after[k] == pytest.approx(1000.0 * (speed[k] - line))
 
 
 def test_drive_pulses_left_out_are_all_but_the_outermost():

@@ -12,7 +12,7 @@ class ClockStep(FrameFault):
     """Capture times jump; the poses are right."""
 
     name = "clock_step"
-    usual = 1.0
+    default = 1.0
     lowest, highest = -3600.0, 3600.0
 
     def change(self, frames: Frames) -> Frames:

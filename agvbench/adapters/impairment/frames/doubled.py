@@ -8,11 +8,11 @@ from agvbench.adapters.impairment.faults import FrameFault
 from agvbench.types import Frames
 
 
-class Doubled(FrameFault):
+class Duplicate(FrameFault):
     """Says frames twice, each by chance."""
 
     name = "doubled"
-    usual = 0.1
+    default = 0.1
 
     def change(self, frames: Frames) -> Frames:
         """Repeat them at once."""

@@ -10,7 +10,7 @@ from agvbench.adapters.impairment.faults import FrameFault
 from agvbench.types import Frames
 
 
-class Guessed(FrameFault):
+class Extrapolated(FrameFault):
     """Motion capture software that extrapolates: the pose is as good as ever, only nobody saw it."""
 
     name = "guessed"

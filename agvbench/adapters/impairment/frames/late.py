@@ -12,7 +12,7 @@ class Late(FrameFault):
     """Holds frames back until later ones are captured: a network or a computer that cannot keep up."""
 
     name = "late"
-    usual = 0.1
+    default = 0.1
     highest = 60.0
 
     def begin(self, rng: np.random.Generator) -> None:

@@ -6,11 +6,11 @@ from agvbench.adapters.impairment.faults import FrameFault
 from agvbench.types import Frames
 
 
-class Lost(FrameFault):
+class Dropped(FrameFault):
     """Leaves frames out, each by chance."""
 
     name = "lost"
-    usual = 0.1
+    default = 0.1
 
     def change(self, frames: Frames) -> Frames:
         """Keep the others."""

@@ -12,7 +12,7 @@ class Reordered(FrameFault):
     """Swaps neighbours, each pair by chance."""
 
     name = "reordered"
-    usual = 0.1
+    default = 0.1
 
     def change(self, frames: Frames) -> Frames:
         """Let frames be overtaken."""

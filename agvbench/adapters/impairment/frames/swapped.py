@@ -12,7 +12,7 @@ class Swapped(FrameFault):
     """Two bodies were taken for each other."""
 
     name = "swapped"
-    usual = 0.8
+    default = 0.8
     lowest, highest = -10.0, 10.0
 
     def change(self, frames: Frames) -> Frames:

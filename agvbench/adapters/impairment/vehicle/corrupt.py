@@ -9,7 +9,7 @@ class Corrupt(LineFault):
     """A noisy line."""
 
     name = "corrupt"
-    usual = 0.01
+    default = 0.01
 
     def carry(self, data: bytes) -> bytes:
         """Turn single bits."""

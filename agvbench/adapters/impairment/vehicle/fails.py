@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from agvbench.adapters.impairment.faults import Line, VehicleFault
+from agvbench.adapters.impairment.faults import SerialLine, VehicleFault
 
 
 class Fails(VehicleFault):
@@ -10,6 +10,6 @@ class Fails(VehicleFault):
 
     name = "fails"
 
-    def strike(self, line: Line | None) -> None:
+    def inject(self, line: SerialLine | None) -> None:
         """Raise."""
         raise RuntimeError("impaired on purpose")

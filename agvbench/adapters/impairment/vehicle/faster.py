@@ -10,7 +10,7 @@ class Faster(VehicleFault):
     """A speed controller that was exchanged, or set up anew: neutral is still neutral."""
 
     name = "faster"
-    usual = 1.5
+    default = 1.5
     highest = 10.0
 
     def alter(self, command: Command, neutral: float) -> Command:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from agvbench.adapters.impairment.faults import LineFault
 
 
-class Halved(LineFault):
+class Truncated(LineFault):
     """A buffer that overflows: what is left of a line runs into the next."""
 
     name = "halved"
-    usual = 0.1
+    default = 0.1
 
     def carry(self, data: bytes) -> bytes:
         """Keep the first half of some."""

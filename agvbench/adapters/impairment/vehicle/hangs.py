@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import threading
 
-from agvbench.adapters.impairment.faults import Line, VehicleFault
+from agvbench.adapters.impairment.faults import SerialLine, VehicleFault
 
 
 class Hangs(VehicleFault):
     """A driver that waits for what does not come."""
 
     name = "hangs"
-    usual = highest = 3600.0
+    default = highest = 3600.0
 
     def __init__(self, value: float | None = None) -> None:
         super().__init__(value)
         self._ceased = threading.Event()
 
-    def strike(self, line: Line | None) -> None:
+    def inject(self, line: SerialLine | None) -> None:
         """Wait, in real time: whoever waits for an adapter does."""
         self._ceased.wait(self.value)
 
-    def cease(self) -> None:
+    def release(self) -> None:
         """Let go."""
         self._ceased.set()

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from agvbench.adapters.impairment.faults import Line, VehicleFault
+from agvbench.adapters.impairment.faults import SerialLine, VehicleFault
 
 
-class Reset(VehicleFault):
+class MicrocontrollerReset(VehicleFault):
     """A drop in voltage when the motor starts, or somebody at the button."""
 
     name = "reset"
@@ -18,7 +18,7 @@ class Reset(VehicleFault):
         super().begin(rng)
         self._is_done = False
 
-    def strike(self, line: Line | None) -> None:
+    def inject(self, line: SerialLine | None) -> None:
         """Press the button."""
         assert line is not None  # noqa: S101  (the adapter was asked)
         if not self._is_done:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from agvbench.adapters.impairment.faults import Line, VehicleFault
+from agvbench.adapters.impairment.faults import SerialLine, VehicleFault
 
 
 class Unplugged(VehicleFault):
@@ -11,7 +11,7 @@ class Unplugged(VehicleFault):
     name = "unplugged"
     needs_line = True
 
-    def strike(self, line: Line | None) -> None:
+    def inject(self, line: SerialLine | None) -> None:
         """Pull it."""
         assert line is not None  # noqa: S101  (the adapter was asked)
         line.pull()

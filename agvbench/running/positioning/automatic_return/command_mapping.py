@@ -8,7 +8,7 @@ import numpy as np
 
 from agvbench.errors import PlanError
 from agvbench.model import VehicleModel
-from agvbench.planning.steering import centre_ahead
+from agvbench.planning.steering import centre_forward
 from agvbench.planning.trajectories.segments import Steering
 from agvbench.running.command_shares import Shares
 from agvbench.types import Command
@@ -19,17 +19,17 @@ _PLANNED, _STEERED = 0.4, 0.95
 """Of the angle at which an axle stops: what a way back is planned with, and what keeping to it may take."""
 
 
-class Helm:
+class CommandMapping:
     """Steers a believed vehicle about a centre abeam of its guided point, with every axle that it steers.
 
-    ``ahead_m`` is how far the guided point lies ahead of the markers' centroid.
+    ``forward_m`` is how far the guided point lies ahead of the markers' centroid.
     """
 
     def __init__(self, model: VehicleModel) -> None:
         self.model = model
         self.shares = Shares.of_model(model)
-        self.ahead_m = centre_ahead(_mode(model), model.geometry)
-        self._levers = (model.geometry.front_axle_m - self.ahead_m, -model.geometry.rear_axle_m - self.ahead_m)
+        self.forward_m = centre_forward(_mode(model), model.geometry)
+        self._levers = (model.geometry.front_axle_m - self.forward_m, -model.geometry.rear_axle_m - self.forward_m)
         self._most_per_m = self._curvature_at(_STEERED)
         if not self._most_per_m > 0.0:
             raise PlanError(

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 from agvbench.errors import PlacingError
 from agvbench.planning.shortest_paths.return_path import GearLeg, Guided
-from agvbench.running.positioning.automatic_return.command_mapping import Helm
-from agvbench.running.positioning.automatic_return.motion_interface import Reins
-from agvbench.running.positioning.automatic_return.online_adaptation import Habits
+from agvbench.running.positioning.automatic_return.command_mapping import CommandMapping
+from agvbench.running.positioning.automatic_return.motion_interface import MotionInterface
+from agvbench.running.positioning.automatic_return.online_adaptation import OnlineAdaptation
 from agvbench.running.positioning.automatic_return.path_following import Follower, Guidance
-from agvbench.running.positioning.automatic_return.speed_controller import Throttle
+from agvbench.running.positioning.automatic_return.speed_controller import SpeedController
 
 
 @dataclass(frozen=True)
@@ -62,20 +62,25 @@ class LegDrive:
     def __init__(
         self,
         leg: GearLeg,
-        reins: Reins,
-        helm: Helm,
-        habits: Habits,
+        motion_interface: MotionInterface,
+        command_mapping: CommandMapping,
+        online_adaptation: OnlineAdaptation,
         limits: ReturnLimits,
         *,
         goal_crab_rad: float | None,
     ) -> None:
-        self._leg, self._reins, self._helm, self._limits = leg, reins, helm, limits
-        self._steering, self._drive = habits.steering(leg.backward), habits.drive(leg.backward)
+        self._leg, self._motion_interface, self._command_mapping, self._limits = (
+            leg,
+            motion_interface,
+            command_mapping,
+            limits,
+        )
+        self._steering, self._drive = online_adaptation.steering(leg.backward), online_adaptation.drive(leg.backward)
         self._sign, self._is_last = -1.0 if leg.backward else 1.0, goal_crab_rad is not None
         self._fast_mps = limits.mean_mps if self._is_last else limits.fast_mps
-        length_m = max(0.5 * helm.model.geometry.wheelbase_m, self._fast_mps * limits.die_off_s)
+        length_m = max(0.5 * command_mapping.model.geometry.wheelbase_m, self._fast_mps * limits.die_off_s)
         self._follower = Follower(leg, length_m, goal_crab_rad=goal_crab_rad)
-        self._asked = 0.0
+        self._commanded = 0.0
         self._past: deque[float] = deque([0.0] * _LATE_TICKS, maxlen=_LATE_TICKS)
 
     def run(self) -> bool:
@@ -86,43 +91,43 @@ class LegDrive:
         PlacingError
             If the vehicle does not move, or moves the other way.
         """
-        reins = self._reins
-        reins.begin()
+        motion_interface = self._motion_interface
+        motion_interface.begin()
         self._steering.begin()
         self._steer(self._guide())
-        reins.hold(self._helm.command(0.0, self._asked), self._limits.steer_first_s)
-        throttle = Throttle(self._drive, self._fast_mps)
-        until_s = reins.now_s + self._limits.patience_s + self._leg.length_m / (0.5 * self._limits.slow_mps)
+        motion_interface.hold(self._command_mapping.command(0.0, self._commanded), self._limits.steer_first_s)
+        speed_controller = SpeedController(self._drive, self._fast_mps)
+        until_s = motion_interface.now_s + self._limits.patience_s + self._leg.length_m / (0.5 * self._limits.slow_mps)
         tick_s, stuck_s, kept = TICK_S, 0.0, True
         while kept:
             guidance = self._guide()
             tick_s = self._tick(guidance)
             if tick_s == 0.0:
                 break
-            throttle.want(self._speed(guidance))
+            speed_controller.set_setpoint(self._speed(guidance))
             self._steer(guidance)
-            share = throttle.step(self._speed_seen, tick_s)
+            share = speed_controller.step(self._speed_seen, tick_s)
             self._hold(share, tick_s)
             stuck_s = stuck_s + tick_s if share == 1.0 and self._speed_seen < 2.0 * _REST_MPS else 0.0
             self._check(stuck_s)
-            kept = abs(guidance.offset_m) < self._limits.astray_m and reins.now_s < until_s
+            kept = abs(guidance.offset_m) < self._limits.astray_m and motion_interface.now_s < until_s
         self._roll_out()
         return kept
 
     @property
     def _speed_seen(self) -> float:
-        return self._sign * self._reins.sight.speed_mps
+        return self._sign * self._motion_interface.pose_estimator.speed_mps
 
     def _guide(self) -> Guidance:
-        pose = self._reins.sight.pose
+        pose = self._motion_interface.pose_estimator.pose
         assert pose is not None  # noqa: S101  (a way back begins where the vehicle was seen)
         crab_rad = self._steering.crab_rad
         return self._follower.guide(
-            Guided(self._helm.model.geometry, self._helm.ahead_m, crab_rad).pose(pose), crab_rad
+            Guided(self._command_mapping.model.geometry, self._command_mapping.forward_m, crab_rad).pose(pose), crab_rad
         )
 
     def _steer(self, guidance: Guidance) -> None:
-        self._asked = self._helm.curvature(self._steering.asked_for(guidance.curvature_per_m))
+        self._commanded = self._command_mapping.curvature(self._steering.commanded_for(guidance.curvature_per_m))
 
     def _speed(self, guidance: Guidance) -> float:
         """Return the speed wanted [m/s]: slow at the end of the last leg, and from a distance that allows for it."""
@@ -143,28 +148,29 @@ class LegDrive:
 
     def _hold(self, share: float, tick_s: float) -> None:
         late = self._past[0]
-        self._past.append(self._asked)
-        self._reins.hold(self._helm.command(self._sign * share, self._asked), tick_s)
-        if self._reins.step is not None:
-            self._steering.learn(late, self._reins.step, ahead_m=self._helm.ahead_m)
+        self._past.append(self._commanded)
+        self._motion_interface.hold(self._command_mapping.command(self._sign * share, self._commanded), tick_s)
+        if self._motion_interface.step is not None:
+            self._steering.update(late, self._motion_interface.step, forward_m=self._command_mapping.forward_m)
 
     def _check(self, stuck_s: float) -> None:
         if stuck_s > _STUCK_S:
             raise PlacingError(
-                "the vehicle does not move", where=self._reins.where, value=f"full drive for {stuck_s:.0f} s",
+                "the vehicle does not move", where=self._motion_interface.where,
+                value=f"full drive for {stuck_s:.0f} s",
                 remedy="see to its battery and wheels, then go on with --resume",
             )  # fmt: skip
         if self._speed_seen < _WRONG_WAY_MPS:
             raise PlacingError(
-                "the vehicle drives the other way than it is told", where=self._reins.where,
+                "the vehicle drives the other way than it is told", where=self._motion_interface.where,
                 remedy="give the right file with --vehicle",
             )  # fmt: skip
 
     def _roll_out(self) -> None:
         """Stop, wait until the vehicle rests, and learn how far it rolled."""
         left_m, speed_mps = self._guide().left_m, self._speed_seen
-        until_s, rested = self._reins.now_s + self._limits.settle_limit_s, 0
-        while rested < _REST_TICKS and self._reins.now_s < until_s:
-            self._reins.hold(self._helm.command(0.0, self._asked), TICK_S)
+        until_s, rested = self._motion_interface.now_s + self._limits.settle_limit_s, 0
+        while rested < _REST_TICKS and self._motion_interface.now_s < until_s:
+            self._motion_interface.hold(self._command_mapping.command(0.0, self._commanded), TICK_S)
             rested = rested + 1 if abs(self._speed_seen) < _REST_MPS else 0
-        self._drive.rolled(left_m - self._guide().left_m, speed_mps)
+        self._drive.record_coasting(left_m - self._guide().left_m, speed_mps)

@@ -22,12 +22,12 @@ _FARTHEST_S = 0.5
 class Step:
     """What a vehicle did between two looks: how far it went ahead and to its left [m], how far it turned [rad]."""
 
-    ahead_m: float
+    forward_m: float
     left_m: float
     turn_rad: float
 
 
-class Sight:
+class PoseEstimator:
     """Medians of the last tenth of a second, carried on to the present at the speed seen.
 
     Single wrong frames, metres off, move no median; a camera that says nothing for a while is believed to see what it
@@ -41,7 +41,7 @@ class Sight:
         self._now_s = 0.0
         self.speed_mps = 0.0
 
-    def see(self, frames: Frames, now_s: float) -> Step | None:
+    def update(self, frames: Frames, now_s: float) -> Step | None:
         """Take in `frames`, the time being `now_s` [s]; return the step since the last look.
 
         None if too little was seen.
@@ -65,7 +65,7 @@ class Sight:
         ahead, left = math.cos(middle), math.sin(middle)
         dx, dy, turn = moved.tolist()
         step = Step(ahead * dx + left * dy, ahead * dy - left * dx, turn)
-        self.speed_mps += _SMOOTHING * (step.ahead_m / since_s - self.speed_mps)
+        self.speed_mps += _SMOOTHING * (step.forward_m / since_s - self.speed_mps)
         return step
 
     @property
@@ -93,13 +93,13 @@ def _median(frames: Frames) -> tuple[float, Floats]:
     return float(np.median(frames.t_s)), pose
 
 
-class Reins:
+class MotionInterface:
     """Holds commands one after another on the clock of a return, which begins at 0."""
 
     def __init__(self, link: RunnerLink, supervisor: Supervisor) -> None:
         self._link, self._supervisor = link, supervisor
         self.where = link.keys.root
-        self.sight, self.now_s = Sight(), 0.0
+        self.pose_estimator, self.now_s = PoseEstimator(), 0.0
         self.step: Step | None = None
 
     def begin(self) -> None:
@@ -107,7 +107,7 @@ class Reins:
         self._supervisor.begin()
 
     def hold(self, command: Command, hold_s: float) -> Frames:
-        """Hold `command` for `hold_s` [s]; return the frames that arrived, which ``sight`` and ``step`` have seen.
+        """Hold `command` for `hold_s` [s]; return the frames that arrived; ``pose_estimator`` and ``step`` follow them.
 
         Raises
         ------
@@ -117,8 +117,8 @@ class Reins:
             As from the link.
         """
         seen: list[Frames] = []
-        self._supervisor.exchange(self._link, command, t_s=self.now_s, hold_s=hold_s, seen=seen)
+        self._supervisor.control_cycle(self._link, command, t_s=self.now_s, hold_s=hold_s, seen=seen)
         self.now_s += hold_s
         frames = Frames.concatenate(seen)
-        self.step = self.sight.see(frames, self.now_s)
+        self.step = self.pose_estimator.update(frames, self.now_s)
         return frames

@@ -8,19 +8,19 @@ from dataclasses import dataclass
 from agvbench.errors import PlacingError, PlanError
 from agvbench.model import VehicleModel
 from agvbench.planning import Workspace
-from agvbench.planning.shortest_paths.return_path import GearLeg, Guided, way_back
+from agvbench.planning.shortest_paths.return_path import GearLeg, Guided, plan_return_path
 from agvbench.running.links import RunnerLink
-from agvbench.running.positioning.automatic_return.command_mapping import Helm
+from agvbench.running.positioning.automatic_return.command_mapping import CommandMapping
 from agvbench.running.positioning.automatic_return.leg_drive import DEFAULT_RETURN, LegDrive, ReturnLimits
-from agvbench.running.positioning.automatic_return.motion_interface import Reins
-from agvbench.running.positioning.automatic_return.online_adaptation import Habits
+from agvbench.running.positioning.automatic_return.motion_interface import MotionInterface
+from agvbench.running.positioning.automatic_return.online_adaptation import OnlineAdaptation
 from agvbench.running.rest_detection import is_at_rest, pose_before
 from agvbench.running.supervision import Supervisor
 from agvbench.types import Pose, wrap_angle
 
 
 @dataclass(frozen=True)
-class Placing:
+class ReturnResult:
     """How a vehicle came to its start: time taken [s], ways driven, and how far off it was seen at rest [m, rad]."""
 
     duration_s: float
@@ -39,7 +39,7 @@ _FARTHEST_M, _FARTHEST_RAD = 0.03, 0.06
 _MOST_IN_A_GEAR = 4
 
 
-class Aim:
+class GoalOffset:
     """The pose to aim at for a start, learned over the attempts of one return.
 
     What a vehicle misses again and again in one place (a slope, a camera's distortion, a drive that pulls to one side)
@@ -58,19 +58,19 @@ class Aim:
         return (False, True) if self._backward is None else (self._backward,)
 
     @property
-    def is_plain(self) -> bool:
+    def is_zero(self) -> bool:
         """Whether the aim is the start itself, in any gear."""
         return self._backward is None and self.pose == self._start
 
-    def begin_anew(self) -> None:
+    def reset(self) -> None:
         """Aim at the start itself, in any gear."""
         self.pose, self._backward, self._attempts = self._start, None, 0
 
-    def took(self, backward: bool) -> None:
+    def record_attempt(self, backward: bool) -> None:
         """Note the gear of an attempt that was driven to its end."""
         self._backward, self._attempts = backward, self._attempts + 1
 
-    def came_to(self, seen: Pose) -> None:
+    def update(self, seen: Pose) -> None:
         """Aim off by a share of what was missed; after some attempts, from the other side."""
         if self._backward is None:
             return
@@ -112,11 +112,11 @@ class Returner:
         supervisor: Supervisor,
         limits: ReturnLimits = DEFAULT_RETURN,
     ) -> None:
-        self._link, self._supervisor, self._helm = link, supervisor, Helm(model)
+        self._link, self._supervisor, self._command_mapping = link, supervisor, CommandMapping(model)
         self._workspace, self._limits = workspace, limits
-        self._habits = Habits()
+        self._online_adaptation = OnlineAdaptation()
 
-    def bring_to(self, start: Pose) -> Placing:
+    def bring_to(self, start: Pose) -> ReturnResult:
         """Drive to `start` (floor frame) and return how it went; the vehicle stands still, its commands neutral.
 
         Raises
@@ -129,24 +129,24 @@ class Returner:
         LinkError
             If the bus or an adapter fails.
         """
-        reins = Reins(self._link, self._supervisor)
+        motion_interface = MotionInterface(self._link, self._supervisor)
         try:
-            return self._bring_to(start, reins)
+            return self._bring_to(start, motion_interface)
         except BaseException:
             # As in a run: before anything else the vehicle stands still.
             self._link.stop()
             raise
 
-    def _bring_to(self, start: Pose, reins: Reins) -> Placing:
-        limits, aim = self._limits, Aim(start)
+    def _bring_to(self, start: Pose, motion_interface: MotionInterface) -> ReturnResult:
+        limits, goal_offset = self._limits, GoalOffset(start)
         for attempt in range(limits.most_attempts + 1):
-            seen = self._look(reins)
+            seen = self._look(motion_interface)
             off_m, off_rad = math.dist(seen[:2], start[:2]), abs(wrap_angle(seen.heading_rad - start.heading_rad))
             if max(off_m / limits.position_m, off_rad / limits.heading_rad) <= limits.reserve:
-                return Placing(reins.now_s, attempt, off_m, off_rad)
-            aim.came_to(seen)
+                return ReturnResult(motion_interface.now_s, attempt, off_m, off_rad)
+            goal_offset.update(seen)
             if attempt < limits.most_attempts:
-                self._drive_way(seen, aim, reins)
+                self._drive_return_path(seen, goal_offset, motion_interface)
         raise PlacingError(
             "the vehicle did not come to its start", where=self._link.keys.root,
             value=f"{off_m * 1e3:.1f} mm and {math.degrees(off_rad):.2f}° off after {limits.most_attempts} attempts",
@@ -154,40 +154,49 @@ class Returner:
             remedy="put it there by hand, and go on with --resume",
         )  # fmt: skip
 
-    def _look(self, reins: Reins) -> Pose:
+    def _look(self, motion_interface: MotionInterface) -> Pose:
         """Return where the vehicle stands, once it does."""
-        reins.begin()
-        until_s = reins.now_s + self._limits.settle_limit_s
+        motion_interface.begin()
+        until_s = motion_interface.now_s + self._limits.settle_limit_s
         while True:
-            frames = reins.hold(self._helm.neutral, self._limits.look_s)
-            seen = pose_before(frames, reins.now_s)
-            if seen is not None and is_at_rest(frames, until_s=reins.now_s):
+            frames = motion_interface.hold(self._command_mapping.neutral, self._limits.look_s)
+            seen = pose_before(frames, motion_interface.now_s)
+            if seen is not None and is_at_rest(frames, until_s=motion_interface.now_s):
                 return seen
-            if reins.now_s >= until_s:
+            if motion_interface.now_s >= until_s:
                 raise PlacingError("the vehicle does not come to rest", where=self._link.keys.root,
                                 limit=f"{self._limits.settle_limit_s:g} s")  # fmt: skip
 
-    def _drive_way(self, seen: Pose, aim: Aim, reins: Reins) -> None:
+    def _drive_return_path(self, seen: Pose, goal_offset: GoalOffset, motion_interface: MotionInterface) -> None:
         """Drive a way until its end, or until the vehicle is astray."""
-        crab_rad = self._habits.crab_rad
+        crab_rad = self._online_adaptation.crab_rad
         try:
-            legs = self._way(seen, aim, crab_rad)
+            legs = self._return_legs(seen, goal_offset, crab_rad)
         except PlanError as error:
-            if aim.is_plain:
+            if goal_offset.is_zero:
                 raise PlacingError(
                     error.what, where=error.where, value=error.value, limit=error.limit, remedy=error.remedy
                 ) from None
-            return aim.begin_anew()
+            return goal_offset.reset()
         for leg in legs:
             goal_crab_rad = crab_rad if leg is legs[-1] else None
-            drive = LegDrive(leg, reins, self._helm, self._habits, self._limits, goal_crab_rad=goal_crab_rad)
+            drive = LegDrive(
+                leg,
+                motion_interface,
+                self._command_mapping,
+                self._online_adaptation,
+                self._limits,
+                goal_crab_rad=goal_crab_rad,
+            )
             if not drive.run():
-                return aim.begin_anew()
-        return aim.took(legs[-1].backward)
+                return goal_offset.reset()
+        return goal_offset.record_attempt(legs[-1].backward)
 
-    def _way(self, seen: Pose, aim: Aim, crab_rad: float) -> list[GearLeg]:
-        geometry, radius_m = self._helm.model.geometry, self._helm.radius_m
-        guided = Guided(geometry, self._helm.ahead_m, crab_rad)
+    def _return_legs(self, seen: Pose, goal_offset: GoalOffset, crab_rad: float) -> list[GearLeg]:
+        geometry, radius_m = self._command_mapping.model.geometry, self._command_mapping.radius_m
+        guided = Guided(geometry, self._command_mapping.forward_m, crab_rad)
         radii_m = [share * radius_m for share in _RADII]
         leads_m = [share * geometry.wheelbase_m for share in _LEADS]
-        return way_back(seen, aim.pose, guided, self._workspace, radii_m=radii_m, leads_m=leads_m, gears=aim.gears)
+        return plan_return_path(
+            seen, goal_offset.pose, guided, self._workspace, radii_m=radii_m, leads_m=leads_m, gears=goal_offset.gears
+        )

@@ -7,7 +7,7 @@ import math
 from agvbench.running.supervision.rule import Rule, Slice
 
 
-class Clock(Rule):
+class ClockRule(Rule):
     """Stops on poses from the future, and on capture times that go back.
 
     A stepped clock makes old poses look new: every other rule would judge by them.

@@ -9,7 +9,7 @@ import numpy as np
 from agvbench.running.supervision.rule import Rule, Slice
 
 
-class Frozen(Rule):
+class FrozenRule(Rule):
     """Stops on a stream that repeats itself: a real camera is never quite still.
 
     A simulated camera without noise says the same pose of a vehicle that stands still; so this holds only for one that

@@ -10,7 +10,7 @@ from agvbench.running.supervision.rule import Rule, Slice
 from agvbench.types import Floats
 
 
-class Jump(Rule):
+class JumpRule(Rule):
     """Stops on a pose far from where the vehicle was going."""
 
     _before: tuple[float, Floats] | None = None

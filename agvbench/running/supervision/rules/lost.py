@@ -7,7 +7,7 @@ import math
 from agvbench.running.supervision.rule import Rule, Slice
 
 
-class Lost(Rule):
+class LostRule(Rule):
     """Stops on tracking that is lost, and on a camera that has fallen silent."""
 
     ends_session = False

@@ -8,7 +8,7 @@ from agvbench.running.supervision.rule import Rule, Slice
 from agvbench.types import Floats
 
 
-class Volume(Rule):
+class VolumeRule(Rule):
     """Stops a vehicle that could not come to rest inside any more."""
 
     ends_session = False

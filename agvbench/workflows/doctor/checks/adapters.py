@@ -12,12 +12,12 @@ from agvbench.running.configuration.settings import BenchSettings
 from agvbench.running.configuration.vehicles import known_models
 from agvbench.running.positioning.placers import choose_placer
 from agvbench.running.session.rig_checks import adapter_options, check_commands, open_session_rig
-from agvbench.workflows.doctor.finding import Check, Finding, Lab, State
+from agvbench.workflows.doctor.finding import Check, Finding, FindingState, Lab
 
 _SIM = BenchSettings().agv
 
 
-class Adapters(Check):
+class AdaptersCheck(Check):
     """Opens the rig as a bench does, with the vehicle stopped; an adapter that is named alone is opened alone."""
 
     name = "adapters"
@@ -27,11 +27,11 @@ class Adapters(Check):
         settings = lab.settings
         models = known_models(settings)
         if not settings.connect and (settings.agv == _SIM) != (settings.mocap == _SIM):
-            return Finding(State.GOOD, _alone(settings, models))
+            return Finding(FindingState.GOOD, _alone(settings, models))
         with open_session_rig(settings, models) as link:
             identity = link.identity()
         choose_placer(settings.place, simulated=identity.simulated)
-        return Finding(State.GOOD, f"{_vehicle(identity.agv)}; {_camera(identity.mocap)}")
+        return Finding(FindingState.GOOD, f"{_vehicle(identity.agv)}; {_camera(identity.mocap)}")
 
 
 def _alone(settings: BenchSettings, models: Mapping[str, VehicleModel]) -> str:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from agvbench.bus.session import open_session
-from agvbench.workflows.doctor.finding import Check, Finding, Lab, State
+from agvbench.bus.session import open_bus_session
+from agvbench.workflows.doctor.finding import Check, Finding, FindingState, Lab
 
 
-class Bus(Check):
+class BusCheck(Check):
     """Opens a session that nobody else can reach."""
 
     name = "bus"
 
     def examine(self, lab: Lab) -> Finding:
         """Open and close it."""
-        with open_session():
-            return Finding(State.GOOD, "Zenoh opens a session on this machine")
+        with open_bus_session():
+            return Finding(FindingState.GOOD, "Zenoh opens a session on this machine")

@@ -5,12 +5,12 @@ from __future__ import annotations
 from agvbench.adapters.registry import parse_spec
 from agvbench.adapters.simavr.address import FirmwareAddress
 from agvbench.adapters.simavr.firmware_files import missing_packages, why_not_built
-from agvbench.workflows.doctor.finding import Check, Finding, Lab, State
+from agvbench.workflows.doctor.finding import Check, Finding, FindingState, Lab
 
 _SCHEMES = ("simavr", "simavr-live")
 
 
-class Firmware(Check):
+class FirmwareCheck(Check):
     """Looks for the compiler, simavr, and what they have built."""
 
     name = "firmware"
@@ -21,12 +21,12 @@ class Firmware(Check):
         asked = scheme in _SCHEMES
         why = why_not_built(FirmwareAddress.parse(address, where=scheme).version) if asked else why_not_built()
         if not why:
-            return Finding(State.GOOD, "built, and can be simulated: --agv simavr")
+            return Finding(FindingState.GOOD, "built, and can be simulated: --agv simavr")
         if asked:
-            return Finding(State.BAD, why)
+            return Finding(FindingState.BAD, why)
         missing = missing_packages()
         if not missing:
-            return Finding(State.IDLE, "simulated firmware: not built", "for --agv simavr: agvbench firmware")
+            return Finding(FindingState.IDLE, "simulated firmware: not built", "for --agv simavr: agvbench firmware")
         lacks = " ".join(missing)
         remedy = f"for --agv simavr: apt-get install {lacks}, then agvbench firmware"
-        return Finding(State.IDLE, f"simulated firmware: without {lacks}", remedy)
+        return Finding(FindingState.IDLE, f"simulated firmware: without {lacks}", remedy)

@@ -10,13 +10,13 @@ from agvbench.adapters.natnet.client import Client, Seen
 from agvbench.adapters.natnet.options import NatNetOptions
 from agvbench.adapters.registry import parse_spec
 from agvbench.bus.clock import WallClock
-from agvbench.workflows.doctor.finding import Check, Finding, Lab, State
+from agvbench.workflows.doctor.finding import Check, Finding, FindingState, Lab
 
 _WATCHED_S = 1.0
 _UNSURE_S = 0.005
 
 
-class Mocap(Check):
+class MocapCheck(Check):
     """Connects to a NatNet server, and watches for a second."""
 
     name = "mocap"
@@ -26,7 +26,9 @@ class Mocap(Check):
         scheme, address = parse_spec(lab.settings.mocap)
         if scheme != "natnet" or address == "emulated":
             return Finding(
-                State.IDLE, f"{lab.settings.mocap}: nothing to connect to", "give the cameras: --mocap natnet:HOST"
+                FindingState.IDLE,
+                f"{lab.settings.mocap}: nothing to connect to",
+                "give the cameras: --mocap natnet:HOST",
             )
         camera = camera_options([lab.settings.camera])
         options = NatNetOptions.parse(address, camera, lab.settings.vehicle_name)
@@ -43,16 +45,18 @@ class Mocap(Check):
         said = f"{client.info.application} streams NatNet {client.version} at {client.rate_hz:g} Hz"
         known = " ".join(sorted(client.names)) or "none"
         if not seen:
-            return Finding(State.BAD, f"{said}, but no frame came", "start streaming; see unicast, interface, firewall")
+            return Finding(
+                FindingState.BAD, f"{said}, but no frame came", "start streaming; see unicast, interface, firewall"
+            )
         if body not in client.names and not (body.isascii() and body.isdigit()):
             remedy = "rename the rigid body in Motive, or say --camera body=NAME"
-            return Finding(State.BAD, f"{said}; no rigid body is called {body!r} (there are: {known})", remedy)
+            return Finding(FindingState.BAD, f"{said}; no rigid body is called {body!r} (there are: {known})", remedy)
         bound_s = min(one.captured.uncertainty_s for one in seen)
         if client.counters.lost:
             said = f"{said}; {client.counters.lost} frames were lost in {_WATCHED_S:g} s"
-            return Finding(State.DOUBTFUL, said, "use a cable, not wireless; see what else the network carries")
+            return Finding(FindingState.DOUBTFUL, said, "use a cable, not wireless; see what else the network carries")
         if bound_s > _UNSURE_S and math.isfinite(bound_s):
             said = f"{said}; capture times are known to ± {bound_s * 1e3:.1f} ms (limit: {_UNSURE_S * 1e3:g} ms)"
-            return Finding(State.DOUBTFUL, said, "put both machines on one switch")
+            return Finding(FindingState.DOUBTFUL, said, "put both machines on one switch")
         clock = f"to ± {bound_s * 1e3:.2f} ms" if math.isfinite(bound_s) else "by arrival only"
-        return Finding(State.GOOD, f"{said}; {known}; capture times known {clock}")
+        return Finding(FindingState.GOOD, f"{said}; {known}; capture times known {clock}")

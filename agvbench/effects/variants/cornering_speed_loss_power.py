@@ -7,17 +7,17 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.forms.base import Form
 from agvbench.effects.state import FRONT_SPEED, REAR_SPEED, TAN_FRONT, TAN_REAR
+from agvbench.effects.variants.base import Variant
 from agvbench.types import Floats
 
 
 @dataclass(frozen=True)
-class CorneringSpeedLossPower(Form):
+class CorneringSpeedLossPower(Variant):
     """Speed falls with a power of the angle: ``v ← v (1 − loss (|tan δf|ᵖ + |tan δr|ᵖ))``; p = 1 is the library's."""
 
     name: ClassVar[str] = "cornering_speed_loss_power"
-    form_of: ClassVar[str] = "cornering_speed_loss"
+    variant_of: ClassVar[str] = "cornering_speed_loss"
     stage: ClassVar[Stage] = Stage.WHEELS
     relaxes: ClassVar[str] = "speed does not depend on steering (7.4)"
     reference: ClassVar[str] = "Bentvelsen 2015, appendix B; the power is our own"

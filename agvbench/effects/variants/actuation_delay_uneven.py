@@ -7,17 +7,17 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.forms.base import Form
 from agvbench.effects.state import DRIVE_WAIT, REAR_WAIT
+from agvbench.effects.variants.base import Variant
 from agvbench.types import Floats
 
 
 @dataclass(frozen=True)
-class ActuationDelayUneven(Form):
+class ActuationDelayUneven(Variant):
     """Each channel obeys at t the command given at t − its delay: front servo, rear servo and drive."""
 
     name: ClassVar[str] = "actuation_delay_uneven"
-    form_of: ClassVar[str] = "actuation_delay"
+    variant_of: ClassVar[str] = "actuation_delay"
     stage: ClassVar[Stage] = Stage.TRANSPORT
     relaxes: ClassVar[str] = "no variable delay in the controller (9.2)"
     reference: ClassVar[str] = (

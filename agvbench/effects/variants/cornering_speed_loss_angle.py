@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from agvbench.effects.forms.cornering_speed_loss_power import CorneringSpeedLossPower
 from agvbench.effects.state import FRONT, FRONT_SPEED, REAR, REAR_SPEED
+from agvbench.effects.variants.cornering_speed_loss_power import CorneringSpeedLossPower
 from agvbench.types import Floats
 
 

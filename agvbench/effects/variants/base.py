@@ -14,13 +14,13 @@ from agvbench.registry import classes_by_file
 
 
 @dataclass(frozen=True)
-class Form(Effect, ABC):
-    """The cause that the library calls ``form_of``, with another law; in vehicle files it has its own name.
+class Variant(Effect, ABC):
+    """The cause that the library calls ``variant_of``, with another law; in vehicle files it has its own name.
 
     A law with an exponent of its own stands for many: the library's is the one at which a diagnosis begins.
     """
 
-    form_of: ClassVar[str]
+    variant_of: ClassVar[str]
 
     @classmethod
     @abstractmethod
@@ -29,13 +29,13 @@ class Form(Effect, ABC):
 
 
 @cache
-def effect_forms() -> Mapping[str, type[Form]]:
+def effect_variants() -> Mapping[str, type[Variant]]:
     """Return every other law by its own name, in alphabetical order."""
-    found = {cls.name: cls for cls in classes_by_file("agvbench.effects.forms", Form)}  # type: ignore[type-abstract]
+    found = {cls.name: cls for cls in classes_by_file("agvbench.effects.variants", Variant)}  # type: ignore[type-abstract]
     return MappingProxyType(dict(sorted(found.items())))
 
 
 def cause_of(name: str) -> str:
     """Return what the library calls the cause whose law is called `name`."""
-    form = effect_forms().get(name)
-    return name if form is None else form.form_of
+    variant = effect_variants().get(name)
+    return name if variant is None else variant.variant_of

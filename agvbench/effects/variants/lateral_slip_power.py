@@ -7,19 +7,19 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.forms.base import Form
 from agvbench.effects.state import FORWARD, LEFT, YAW_RATE
+from agvbench.effects.variants.base import Variant
 from agvbench.types import Floats
 
 _TYPICAL_MPS = 0.3
 
 
 @dataclass(frozen=True)
-class LateralSlipPower(Form):
+class LateralSlipPower(Variant):
     """Turning falls short with a power of the speed: ``κ ← κ / (1 + loss (v / 0.3 m/s)ᵖ)``; p = 2 is the library's."""
 
     name: ClassVar[str] = "lateral_slip_power"
-    form_of: ClassVar[str] = "lateral_slip"
+    variant_of: ClassVar[str] = "lateral_slip"
     stage: ClassVar[Stage] = Stage.BODY
     relaxes: ClassVar[str] = "slip is negligible (3.2)"
     reference: ClassVar[str] = "Gillespie 1992, ch. 6, for p = 2; the power is our own"

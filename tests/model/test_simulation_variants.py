@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from simulation_forms_truth import aims, drive, servo_path, true_form, with_play
 from simulation_truth import COMMANDS, FRAMES, LF, LR, REST, RUN_TIMES, SETTLED
+from simulation_variants_truth import aims, drive, servo_path, true_form, with_play
 
 from agvbench.effects import effect_kinds
-from agvbench.effects.forms import effect_forms
+from agvbench.effects.variants import effect_variants
 from agvbench.model.simulation.compose import kernel_text
 from agvbench.model.simulation.simulated_run import SimulatedRun
 from agvbench.model.simulation.simulation import Simulation
@@ -41,13 +41,13 @@ each = pytest.mark.parametrize(("name", "values"), SIZES)
 
 def simulated(effects, *, begins_s=None, first=0, initial=INITIAL):
     run = SimulatedRun(DRIVEN, FRAMES[first:], begins_s=begins_s)
-    simulation = Simulation(Geometry(LF, LR), 1500.0, [run], kinds=tuple(effect_forms().values()))
+    simulation = Simulation(Geometry(LF, LR), 1500.0, [run], kinds=tuple(effect_variants().values()))
     return simulation.predict(ROWS, simulation.parameters(effects), initial)
 
 
 @each
 def test_a_law_of_another_order(name, values):
-    predicted = simulated([effect_forms()[name](**values)])
+    predicted = simulated([effect_variants()[name](**values)])
     np.testing.assert_allclose(predicted, true_form(name, values, START, FRAMES), atol=3e-6)
 
 
@@ -57,12 +57,12 @@ def test_a_window_goes_on_where_the_run_was(name, values):
     whole = true_form(name, values, START, FRAMES)
     for first in (20, 63, 90):
         initial = np.array([[*whole[first], np.nan]])
-        predicted = simulated([effect_forms()[name](**values)], begins_s=FRAMES[first], first=first, initial=initial)
+        predicted = simulated([effect_variants()[name](**values)], begins_s=FRAMES[first], first=first, initial=initial)
         np.testing.assert_allclose(predicted, whole[first:], atol=2e-5)
 
 
 def test_a_window_of_smoothed_poses_begins_as_in_a_steady_motion():
-    law = effect_forms()["mocap_latency_smoothing"](0.0, 0.1)
+    law = effect_variants()["mocap_latency_smoothing"](0.0, 0.1)
     whole = simulated([law])
     first = int(np.searchsorted(FRAMES, 1.25))  # a second after the last change
     initial = np.array([[*whole[first], np.nan]])
@@ -83,18 +83,18 @@ def test_a_window_of_smoothed_poses_begins_as_in_a_steady_motion():
     ],
 )
 def test_it_has_the_librarys_law_for_a_limit(form, library):
-    ours = simulated([effect_forms()[form[0]](*form[1])])
+    ours = simulated([effect_variants()[form[0]](*form[1])])
     np.testing.assert_allclose(ours, simulated([effect_kinds()[library[0]](*library[1])]), atol=1e-4)
 
 
 def test_an_axle_that_swings_faster_than_anybody_sees_costs_no_more_than_one_that_does_not():
     """Swing by swing, 8 s of a thousandth of this inertia would be millions of steps."""
-    ours = simulated([effect_forms()["steering_lag_inertia"](0.0, 1e-6)])
+    ours = simulated([effect_variants()["steering_lag_inertia"](0.0, 1e-6)])
     np.testing.assert_allclose(ours, simulated([]), atol=1e-4)
 
 
 def test_critical_damping_is_no_edge():
-    near = [simulated([effect_forms()["steering_lag_inertia"](0.2, tau)]) for tau in (0.1 - 1e-9, 0.1, 0.1 + 1e-9)]
+    near = [simulated([effect_variants()["steering_lag_inertia"](0.2, tau)]) for tau in (0.1 - 1e-9, 0.1, 0.1 + 1e-9)]
     np.testing.assert_allclose(near[1] - near[0], near[2] - near[1], atol=1e-9)
     np.testing.assert_allclose(near[0], near[2], atol=1e-7)
 
@@ -109,7 +109,7 @@ def test_critical_damping_is_no_edge():
 def test_an_axle_with_play_is_taken_along_to_where_its_servo_turns_back(law):
     name, values = law
     width = 0.06
-    predicted = simulated([effect_forms()[name](**values), effect_kinds()["steering_backlash"](width)])
+    predicted = simulated([effect_variants()[name](**values), effect_kinds()["steering_backlash"](width)])
     moments, end = RUN_TIMES, FRAMES[-1] + 2.0
     paths = [servo_path(name, values, channel, moments, end) for channel in (0, 1)]
     behind = [with_play(path, rest, width, end) for path, rest in zip(paths, REST, strict=True)]
@@ -118,6 +118,6 @@ def test_an_axle_with_play_is_taken_along_to_where_its_servo_turns_back(law):
 
 
 def test_the_branch_for_servos_of_second_order_is_compiled_where_it_is_needed_only():
-    library, forms = tuple(effect_kinds().values()), tuple(effect_forms().values())
+    library, forms = tuple(effect_kinds().values()), tuple(effect_variants().values())
     assert "actuate_any_order" not in kernel_text(library)
     assert "actuate_any_order as actuate" in kernel_text((*library, *forms))

@@ -8,17 +8,17 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.forms.base import Form
 from agvbench.effects.state import FRONT_SPEED, HOURS, REAR_SPEED
+from agvbench.effects.variants.base import Variant
 from agvbench.types import Floats
 
 
 @dataclass(frozen=True)
-class BatteryDroopExponential(Form):
+class BatteryDroopExponential(Variant):
     """Speed settles at a share of itself: ``v ← v (1 − share (1 − exp(−hours / time_constant)))``."""
 
     name: ClassVar[str] = "battery_droop_exponential"
-    form_of: ClassVar[str] = "battery_droop"
+    variant_of: ClassVar[str] = "battery_droop"
     stage: ClassVar[Stage] = Stage.WHEELS
     relaxes: ClassVar[str] = "the battery is negligible (9.2)"
     reference: ClassVar[str] = "Bentvelsen 2015, section 8.2 (the steep end of a full battery)"

@@ -12,12 +12,12 @@ from effect_checks import check_form, check_null_hooks
 
 from agvbench.effects import effect_from_toml, effect_kinds
 from agvbench.effects.cornering_speed_loss import CorneringSpeedLoss
-from agvbench.effects.forms import Form, effect_forms
 from agvbench.effects.lateral_slip import LateralSlip
+from agvbench.effects.variants import Variant, effect_variants
 from agvbench.model import VehicleModel, example_vehicle
 from agvbench.types import Commands
 
-FORMS = effect_forms()
+FORMS = effect_variants()
 each_form = pytest.mark.parametrize("form", FORMS.values(), ids=FORMS.keys())
 STEPS = np.array([0.0, 1.0, 2.5, 4.0])
 COMMANDS = Commands(STEPS, np.array([900.0, 900.0, 1100.0, 1500.0]), np.array([1300.0, 1750.0, 1250.0, 1500.0]), np.array([1600.0, 1500.0, 1500.0, 1500.0]))  # fmt: skip  # noqa: E501
@@ -30,15 +30,15 @@ def drive(*effects):
 
 
 @each_form
-def test_it_is_declared_as_an_effect_is(form: type[Form]) -> None:
+def test_it_is_declared_as_an_effect_is(form: type[Variant]) -> None:
     check_form(form)
     check_null_hooks(form)
-    assert form.form_of in effect_kinds()
+    assert form.variant_of in effect_kinds()
     assert form.name not in effect_kinds()
 
 
 @each_form
-def test_a_vehicle_file_keeps_it_and_drives_with_it(form: type[Form], tmp_path: Path) -> None:
+def test_a_vehicle_file_keeps_it_and_drives_with_it(form: type[Variant], tmp_path: Path) -> None:
     effect = form(**{p.name: p.scale for p in form.parameters()})
     assert effect_from_toml(tomllib.loads(tomli_w.dumps(effect.to_toml()))) == effect
     example_vehicle("thesis").with_effects(effect).save(tmp_path / "vehicle.toml")
@@ -49,8 +49,8 @@ def test_a_vehicle_file_keeps_it_and_drives_with_it(form: type[Form], tmp_path: 
 
 
 @each_form
-def test_starts_lie_within_bounds(form: type[Form]) -> None:
-    library = effect_kinds()[form.form_of]
+def test_starts_lie_within_bounds(form: type[Variant]) -> None:
+    library = effect_kinds()[form.variant_of]
     starts = form.starts({p.name: p.scale for p in library.parameters()})
     low, high = ([getattr(p, side) for p in form.parameters()] for side in ("low", "high"))
     assert np.all((np.array(starts) >= low) & (np.array(starts) <= high))
@@ -64,8 +64,8 @@ def test_at_the_librarys_exponent_a_power_is_the_librarys_law() -> None:
 
 
 @each_form
-def test_at_null_it_leaves_the_librarys_law_alone(form: type[Form]) -> None:
-    library = effect_kinds()[form.form_of]
+def test_at_null_it_leaves_the_librarys_law_alone(form: type[Variant]) -> None:
+    library = effect_kinds()[form.variant_of]
     effect = library(**{p.name: p.scale for p in library.parameters()})
     # Hardly anything, but in the simulation that has all laws.
     laws = {law.name: law for law in (form(), FORMS["lateral_slip_power"](loss=1e-12))}

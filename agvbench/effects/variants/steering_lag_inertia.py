@@ -7,20 +7,20 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.forms.base import Form
 from agvbench.effects.state import STEERING_INERTIA, STEERING_LAG
+from agvbench.effects.variants.base import Variant
 from agvbench.types import Floats
 
 
 @dataclass(frozen=True)
-class SteeringLagInertia(Form):
+class SteeringLagInertia(Variant):
     """Lag of second order: ``inertia_s² δ̈ + time_constant_s δ̇ = δ_map − δ``; without inertia it is the library's.
 
     Its natural frequency is 1 / inertia_s, its damping time_constant_s / (2 inertia_s): below 1 the axle swings.
     """
 
     name: ClassVar[str] = "steering_lag_inertia"
-    form_of: ClassVar[str] = "steering_lag"
+    variant_of: ClassVar[str] = "steering_lag"
     stage: ClassVar[Stage] = Stage.SERVO
     relaxes: ClassVar[str] = "axles rotate instantaneously (7.3)"
     reference: ClassVar[str] = "second-order actuator, as in textbooks of control (Ogata 2010, section 5.3)"

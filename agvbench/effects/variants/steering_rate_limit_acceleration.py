@@ -8,17 +8,17 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.forms.base import Form
 from agvbench.effects.state import STEERING_ACCELERATION, STEERING_RATE
+from agvbench.effects.variants.base import Variant
 from agvbench.types import Floats
 
 
 @dataclass(frozen=True)
-class SteeringRateLimitAcceleration(Form):
+class SteeringRateLimitAcceleration(Variant):
     """Servos go to their aim as fast as ``|δ̇| ≤ rate`` and ``|δ̈| ≤ acceleration`` allow, and stop there."""
 
     name: ClassVar[str] = "steering_rate_limit_acceleration"
-    form_of: ClassVar[str] = "steering_rate_limit"
+    variant_of: ClassVar[str] = "steering_rate_limit"
     stage: ClassVar[Stage] = Stage.SERVO
     relaxes: ClassVar[str] = "axles rotate instantaneously (7.3)"
     reference: ClassVar[str] = "trapezoidal profile of velocity (Biagiotti and Melchiorri 2008, section 3.2)"

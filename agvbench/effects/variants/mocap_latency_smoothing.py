@@ -7,20 +7,20 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.forms.base import Form
 from agvbench.effects.state import SEEN_LAG
+from agvbench.effects.variants.base import Variant
 from agvbench.types import Floats
 
 
 @dataclass(frozen=True)
-class MocapLatencySmoothing(Form):
+class MocapLatencySmoothing(Variant):
     """The pose m stamped t is what a filter made of poses q seen up to t − latency: ``ṁ = (q − m) / time_constant_s``.
 
     A window of free driving begins with a pose that is behind as in a steady motion.
     """
 
     name: ClassVar[str] = "mocap_latency_smoothing"
-    form_of: ClassVar[str] = "mocap_latency"
+    variant_of: ClassVar[str] = "mocap_latency"
     stage: ClassVar[Stage] = Stage.CAMERA
     relaxes: ClassVar[str] = "the motion capture system is exact (3.2)"
     reference: ClassVar[str] = "first-order low-pass filter, as trackers offer against jitter"

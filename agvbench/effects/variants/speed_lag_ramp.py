@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.forms.base import Form
 from agvbench.effects.state import ACCELERATION_LIMIT, BRAKING_LIMIT
+from agvbench.effects.variants.base import Variant
 from agvbench.types import Floats
 
 _TYPICAL_MPS = 0.3
@@ -17,14 +17,14 @@ _SHORTEST_S = 0.01
 
 
 @dataclass(frozen=True)
-class SpeedLagRamp(Form):
+class SpeedLagRamp(Variant):
     """Speed ramps to where it settles: ``|v̇| ≤ acceleration`` while |v| grows, ``|v̇| ≤ braking`` while it falls.
 
     From forward to backward the vehicle brakes to rest first and accelerates then.
     """
 
     name: ClassVar[str] = "speed_lag_ramp"
-    form_of: ClassVar[str] = "speed_lag"
+    variant_of: ClassVar[str] = "speed_lag"
     stage: ClassVar[Stage] = Stage.SERVO
     relaxes: ClassVar[str] = "acceleration and deceleration are negligible (3.2, assumption 5)"
     reference: ClassVar[str] = "Bentvelsen 2015, section 8.1: distances of acceleration and braking"

@@ -7,17 +7,17 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.forms.base import Form
 from agvbench.effects.state import DRIVE_WAIT, REAR_WAIT
+from agvbench.effects.variants.base import Variant
 from agvbench.types import Floats
 
 
 @dataclass(frozen=True)
-class ActuationDelayServos(Form):
+class ActuationDelayServos(Variant):
     """Both servos obey at t the command given at t − steering_s, the drive the one given at t − drive_s."""
 
     name: ClassVar[str] = "actuation_delay_servos"
-    form_of: ClassVar[str] = "actuation_delay"
+    variant_of: ClassVar[str] = "actuation_delay"
     stage: ClassVar[Stage] = Stage.TRANSPORT
     relaxes: ClassVar[str] = "no variable delay in the controller (9.2)"
     reference: ClassVar[str] = (

@@ -8,19 +8,19 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.forms.base import Form
 from agvbench.effects.state import FORWARD, LEFT, X_RATE, Y_RATE
+from agvbench.effects.variants.base import Variant
 from agvbench.types import Floats
 
 _TYPICAL_MPS = 0.3
 
 
 @dataclass(frozen=True)
-class FloorTiltPower(Form):
+class FloorTiltPower(Variant):
     """The drift grows with the speed: ``drift (v / 0.3 m/s)ᵖ`` in one direction; p near 0 is the library's."""
 
     name: ClassVar[str] = "floor_tilt_power"
-    form_of: ClassVar[str] = "floor_tilt"
+    variant_of: ClassVar[str] = "floor_tilt"
     stage: ClassVar[Stage] = Stage.FLOOR
     relaxes: ClassVar[str] = "the floor is level (3.2)"
     reference: ClassVar[str] = "a form of our own"
