@@ -1,6 +1,6 @@
 """Machine code that is kept on disk, under a hash of every source from which it was compiled.
 
-numba by itself compiles a function again when the function's own file has changed, and not when a file has changed
+numba by itself compiles a function again when the file of the function has changed, and not when a file has changed
 whose functions or constants are compiled into it. It lies in ``$NUMBA_CACHE_DIR`` or ``$AGVBENCH_CACHE``, else in the
 user's cache.
 """

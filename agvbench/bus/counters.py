@@ -69,8 +69,8 @@ class RateLimitedCounter:
     However fast something comes, telling of it takes next to nothing, and the last number told is never off by more
     than a factor of ten.
 
-    >>> tally = Tally()
-    >>> [number for number in range(1, 1001) if tally.add()]
+    >>> counter = RateLimitedCounter()
+    >>> [number for number in range(1, 1001) if counter.add()]
     [1, 10, 100, 1000]
     """
 

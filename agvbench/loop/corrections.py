@@ -57,7 +57,7 @@ def bias_corrections(campaign: Campaign, model: VehicleModel, condition: str) ->
 def shrunken_mean(values: Floats) -> Floats:
     """Return the mean of `values` (n, k), shape (k,), each shrunk towards zero by what scatter makes of it.
 
-    >>> shrunk(np.array([[3.0, 1.0], [3.0, -1.0], [3.0, 0.5]])).tolist()
+    >>> shrunken_mean(np.array([[3.0, 1.0], [3.0, -1.0], [3.0, 0.5]])).tolist()
     [3.0, 0.0]
     """
     mean, stderr = values.mean(axis=0), values.std(axis=0, ddof=1) / np.sqrt(len(values))

@@ -42,7 +42,7 @@ class EndPoseError:
 
     @property
     def delta_s_m(self) -> float:
-        """Distance driven minus distance to the target, both as the crow flies [m]."""
+        """Distance driven minus distance to the target, both in a straight line [m]."""
         return math.hypot(*self.reached[:2]) - math.hypot(*self.target[:2])
 
     @property

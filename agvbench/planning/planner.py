@@ -101,7 +101,7 @@ def plan(
 
 
 def _made(trajectory: Trajectory, model: VehicleModel) -> Plan:
-    """Return the plan that starts at the floor's origin."""
+    """Return the plan that starts at the origin of the floor frame."""
     if trajectory.commands is not None:
         commands, legs = commands_and_legs(trajectory, model)
     else:

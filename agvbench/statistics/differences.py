@@ -43,7 +43,7 @@ def overall(verdicts: Collection[ComparisonVerdict]) -> ComparisonVerdict:
 
     It is worse where one of them is, better where one of them is and none can be worse, and the same where all are.
 
-    >>> overall([Verdict.BETTER, Verdict.WORSE]), overall([Verdict.BETTER, Verdict.SAME])
+    >>> overall([ComparisonVerdict.BETTER, ComparisonVerdict.WORSE]), overall([ComparisonVerdict.BETTER, ComparisonVerdict.SAME])
     (<Verdict.WORSE: 'worse'>, <Verdict.BETTER: 'better'>)
     """
     for verdict in (ComparisonVerdict.WORSE, ComparisonVerdict.INCONCLUSIVE, ComparisonVerdict.BETTER):
@@ -81,9 +81,9 @@ def decide(
     Examples
     --------
     >>> decide(9.0, 2.0, p_worse=0.001, p_better=1.0, p_same=1.0)
-    <Verdict.WORSE: 'worse'>
+    <ComparisonVerdict.WORSE: 'worse'>
     >>> decide(0.1, 2.0, p_worse=0.4, p_better=0.6, p_same=0.2)
-    <Verdict.UNKNOWN: 'cannot say'>
+    <ComparisonVerdict.UNKNOWN: 'cannot say'>
     """
     if p_worse <= alpha and difference > margin:
         return ComparisonVerdict.WORSE

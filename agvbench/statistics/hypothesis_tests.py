@@ -163,7 +163,7 @@ def tarone_testable(minimum_p: Sequence[float], alpha: float) -> list[bool]:
     number for which at most k tests are not, are left out: they cannot be false alarms, so the others need not pay
     for them.
 
-    >>> can_speak([0.2, 0.2, 0.001], alpha=0.05)
+    >>> tarone_testable([0.2, 0.2, 0.001], alpha=0.05)
     [False, False, True]
     """
     least = np.asarray(minimum_p, dtype=float)
@@ -205,9 +205,9 @@ def minimum_detectable_difference(sd: float, n_a: int, n_b: int, *, alpha: float
 def minimum_attainable_p(n_a: int, n_b: int) -> float:
     """Return the smallest one-sided p-value of a rank-sum test without ties.
 
-    >>> round(smallest_p(5, 5), 5)
+    >>> round(minimum_attainable_p(5, 5), 5)
     0.00397
-    >>> smallest_p(660, 660)
+    >>> minimum_attainable_p(660, 660)
     0.0
     """
     # Whole numbers divide into 0.0 where there are more orders than a float can count; 1.0 over them would not.
@@ -217,7 +217,7 @@ def minimum_attainable_p(n_a: int, n_b: int) -> float:
 def required_sample_size(alpha: float) -> int:
     """Return how many repeats on either side it takes before a rank-sum test can be significant at `alpha`.
 
-    >>> fewest_repeats(0.05 / 8)
+    >>> required_sample_size(0.05 / 8)
     5
     """
     return next(n for n in range(1, 1000) if minimum_attainable_p(n, n) <= alpha)

@@ -15,7 +15,7 @@ class Proportion:
 
     Examples
     --------
-    >>> share = Share.of([True] * 10)
+    >>> share = Proportion.of([True] * 10)
     >>> share.value, round(share.low, 3), share.high
     (1.0, 0.692, 1.0)
     """

@@ -83,7 +83,7 @@ def test_a_cause_that_makes_it_worse_is_withdrawn(found, spoilt):
     assert left.chosen is spoilt.base
     assert left.gains == left.alternatives == {}
     assert left.rejected == {"steering_lag": 500.0}
-    assert said == ["steering_lag: withdrawn, for the validation runs are predicted better without"]
+    assert said == ["steering_lag: rejected in validation: the validation runs are predicted better without"]
 
 
 def test_runs_set_aside_contradict_maps_that_lack_the_cause_and_not_the_cause(tried, found):

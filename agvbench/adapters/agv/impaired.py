@@ -62,7 +62,7 @@ class ImpairedAgv(AgvAdapter):
         self.vehicle.apply(message)
 
     def reset(self, request: Reset) -> None:
-        """Place a simulated vehicle; what was wrong with the line is mended."""
+        """Place a simulated vehicle; the line works again."""
         self._begin(request)
         self.vehicle.reset(request)
 

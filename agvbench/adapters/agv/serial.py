@@ -177,7 +177,7 @@ class SerialAgv(AgvAdapter):
         for (kind, text), counter, count, before in zip(kinds, self._counters, now[:2], self._told[:2], strict=True):
             if count > before and counter.add(count - before):
                 self._reports.event(Level.WARNING, kind, f"{text} ({counter})")
-        if now[2] > self._told[2]:  # each of them spoils a run: none is left untold
+        if now[2] > self._told[2]:  # each of them spoils a run: all are reported
             gap_s, limit_s = self._conversation.bitten_after_s, self.watchdog_s
             text = f"the vehicle's watchdog stopped it: {gap_s:.2f} s between two commands (limit: {limit_s:g} s)"
             self._reports.event(Level.WARNING, VEHICLE_STOPPED_ITSELF, text)

@@ -91,7 +91,7 @@ class SimavrAgv(SimAgv):
         return FRAME_S * run_seed(self._options.seed, run_key, "servo frame") / 2.0**32
 
     def stop(self) -> None:
-        """Say neutral: the vehicle heeds it as soon as time passes, if it still hears anything."""
+        """Send neutral: the vehicle obeys as soon as time passes, if it still receives anything."""
         with suppress(LinkError, OSError):
             self._controller.set_command(self._neutral)
         self._sent = None

@@ -23,7 +23,7 @@ from agvbench.errors import AgvbenchError, LinkError
 from agvbench.simulator import load_plant
 from agvbench.types import Command, Plant
 
-_FRAMES_TO_HEED = 3
+_FRAMES_TO_OBEY = 3
 
 
 class SimavrLiveAgv(LiveAgv):
@@ -84,7 +84,7 @@ class SimavrLiveAgv(LiveAgv):
     def reset(self, request: Reset) -> None:
         """Say neutral, and place the plant at rest once the pulses are so."""
         self._serial.stop()
-        self._clock.sleep(_FRAMES_TO_HEED * FRAME_S)
+        self._clock.sleep(_FRAMES_TO_OBEY * FRAME_S)
         super().reset(request)
 
     def apply(self, message: CommandMessage) -> None:

@@ -58,7 +58,7 @@ class EmulatedNatNet(MocapAdapter):
         self._client = self._connected(options.vehicle)
 
     def _connected(self, vehicle: str) -> Client:
-        """Return a client that has shaken hands; the server answers in a thread for as long as that takes."""
+        """Return a client after its handshake; the server answers in a thread for as long as that takes."""
         done = threading.Event()
 
         def serve() -> None:

@@ -66,7 +66,7 @@ def fold_groups(readings: Readings) -> NDArray[np.int64]:
 
 
 def _initial_states(readings: Readings) -> InitialStates:
-    assert readings.initial_states is not None, "windows have beginnings"  # noqa: S101 - a contract between two files
+    assert readings.initial_states is not None, "windows have initial states"  # noqa: S101 - a contract between two files
     return readings.initial_states
 
 

@@ -48,10 +48,10 @@ _BY_STAGE = {
 }
 
 
-def what_it_takes(names: tuple[str, ...]) -> str:
+def required_measurements(names: tuple[str, ...]) -> str:
     """Return what would tell the effects called `names` apart, in words.
 
-    >>> what_it_takes(("mocap_latency", "actuation_delay")).partition(":")[0]
+    >>> required_measurements(("mocap_latency", "actuation_delay")).partition(":")[0]
     'a time that vehicle and cameras share'
     """
     for pair in combinations(names, 2):
@@ -115,7 +115,7 @@ def discriminate(
     # Each pair on its own first: a pair that nothing parts must not decide between designs for the others.
     table = search.pair_scores(pairs, search.first)
     most = MOST_REPEATS * table.max(axis=1)
-    hopeless = {_names(p): what_it_takes(_names(p)) for p, m in zip(pairs, most, strict=True) if m < HOPELESS}
+    hopeless = {_names(p): required_measurements(_names(p)) for p, m in zip(pairs, most, strict=True) if m < HOPELESS}
     parted = [p for p, m in zip(pairs, most, strict=True) if m >= HOPELESS]
     if not parted:
         return Proposal(None, hopeless)

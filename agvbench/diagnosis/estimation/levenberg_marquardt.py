@@ -162,7 +162,8 @@ class LevenbergMarquardt:
     ) -> tuple[FitState, Evaluation]:
         """Return the end of the way, and what is seen from there.
 
-        A creeping fit tries an excursion. One that is `patient` goes on also where that leads nowhere, and round after
+        A fit that converges slowly tries non-monotone steps. One that is `patient` goes on also where that leads
+        nowhere, and round after
         round as long as they are worth their steps.
         """
         evaluation = self.evaluate(state)

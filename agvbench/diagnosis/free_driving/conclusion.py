@@ -66,7 +66,7 @@ class WindowConclusion:
         perturbed = by_speed_error(Predictor(self._every, chosen.fit.predictor.effects), chosen.fit.parameters)
         effects = named_effects(self.selection, bounds_of(chosen.names))
         held_out = self._held_out(before, poses, perturbed)
-        # Small structure shows in many windows; what lies at the floor needs no further cause.
+        # Small structure shows in many windows; what lies within repeatability needs no further cause.
         rest = self._dependences(poses) if _above(held_out, WITHIN_REPEATABILITY) else []
         far = _above(held_out, FAR_ABOVE)
         verdict, why = _verdict(effects, rest, far)

@@ -64,7 +64,7 @@ QUANTITIES = (
 """Errors of the end pose first (along and across in the start frame), then those along the way."""
 MEDIAN = "end_position_median_mm"
 WITHIN_REPEATABILITY = 1.25
-"""What is left is at the floor up to this times it, or if repeats cannot tell it from the floor."""
+"""A residual is within repeatability up to this factor, or where repeats cannot distinguish it from their scatter."""
 
 LACK_OF_FIT = 0.01
 """Groups of repeats differ beyond their scatter below this p-value."""

@@ -112,7 +112,7 @@ def validated(
     kept
         The validation runs; without any, what was found is kept.
     tell
-        Called with a line if it is withdrawn.
+        Called with a line if it is rejected.
     """
     chosen = term_selection.selection.chosen if term_selection else selection.chosen
     if chosen.names == selection.base.names or not len(kept):
@@ -121,7 +121,7 @@ def validated(
     batch = Batch(kept, fitted.maps, fitted.geometry, kinds=fitted.kinds)
     if _missed(chosen, batch) <= _missed(selection.base, batch):
         return selection, term_selection
-    on_progress(f"{' + '.join(chosen.names)}: withdrawn, for the validation runs are predicted better without")
+    on_progress(f"{' + '.join(chosen.names)}: rejected in validation: the validation runs are predicted better without")
     rejected = selection.rejected | selection.gains
     return replace(selection, chosen=selection.base, alternatives={}, gains={}, rejected=rejected), None
 

@@ -67,7 +67,7 @@ class Guided:
     def pose(self, seen: Pose) -> Pose:
         """Return place and course of the guided point of a vehicle that is seen at `seen`.
 
-        >>> Guided(Geometry(0.2, 0.1), ahead_m=-0.1).pose(Pose(1.0, 2.0, 0.0))
+        >>> Guided(Geometry(0.2, 0.1), forward_m=-0.1).pose(Pose(1.0, 2.0, 0.0))
         Pose(x_m=0.9, y_m=2.0, heading_rad=0.0)
         """
         x_m, y_m, heading_rad = seen

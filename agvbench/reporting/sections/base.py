@@ -11,7 +11,7 @@ from agvbench.workflows.report import ReportData
 
 
 class Section(ABC):
-    """One section of a report, in its own file of this package.
+    """One section of a report, in a file of this package.
 
     A section turns numbers that are already there into blocks: it reads no files and computes no statistics. It never
     raises for what a campaign lacks, but says in one sentence what is absent. Names that it shows come from

@@ -315,7 +315,7 @@ class Latch:
     def check(self) -> None:
         """Raise `LinkError` with the first failure as its cause, if there was one."""
         if self._failure is not None:
-            remedy = None if self._failure.remedy else "mend it and go on with --resume"
+            remedy = None if self._failure.remedy else "fix it and go on with --resume"
             raise LinkError("the bench drives no more after the first failure", value=self._failure, remedy=remedy)
 
     @contextmanager

@@ -158,7 +158,7 @@ def _writer(
     directory: Path, settings: BenchSettings, header: CampaignHeader, *, resume: bool, simulated: bool
 ) -> CampaignWriter:
     open_writer = CampaignWriter.resume if resume and (directory / FILE_NAME).exists() else CampaignWriter.create
-    # What a power cut takes of a simulation is simulated again; what it takes of a laboratory's day is gone.
+    # What a power cut destroys of a simulation is simulated again; a laboratory's recording is lost.
     writer = open_writer(directory, header, durable=not simulated)
     if not (directory / SETTINGS_FILE).exists():
         settings.save(directory)

@@ -34,7 +34,7 @@ class CommandMapping:
         if not self._most_per_m > 0.0:
             raise PlanError(
                 "a vehicle that cannot steer both ways cannot drive itself back", where=f"vehicle {model.name}",
-                value="a radius of inf m", remedy="bench with --place operator, or mend its steering maps",
+                value="a radius of inf m", remedy="bench with --place operator, or fix its steering maps",
             )  # fmt: skip
 
     @property

@@ -33,7 +33,7 @@ class SteeringAdaptation:
         self._block = np.zeros(4)
 
     def as_prior(self) -> SteeringAdaptation:
-        """Return a habit that begins where this one is, and is as ready to learn as a new one."""
+        """Return an adaptation that begins where this one is, and learns as fast as a new one."""
         prior = SteeringAdaptation()
         prior._state, prior.crab_rad = self._state.copy(), self.crab_rad
         return prior
@@ -97,7 +97,7 @@ class DriveAdaptation:
 
 
 class OnlineAdaptation:
-    """The habits of one vehicle in either gear. Until it has driven in one, what the other taught is the best guess."""
+    """The adaptation of one vehicle in either gear. Until it has driven in one, the other's is the best guess."""
 
     def __init__(self) -> None:
         self._steering: dict[bool, SteeringAdaptation] = {}

@@ -92,7 +92,7 @@ _LEADS = (2.7, 2.0, 1.4)
 
 
 class Returner:
-    """Brings one vehicle to start poses, and learns its habits as it does.
+    """Brings one vehicle to start poses, and adapts to it as it does.
 
     Parameters
     ----------
