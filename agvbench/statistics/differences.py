@@ -43,8 +43,9 @@ def overall(verdicts: Collection[ComparisonVerdict]) -> ComparisonVerdict:
 
     It is worse where one of them is, better where one of them is and none can be worse, and the same where all are.
 
-    >>> overall([ComparisonVerdict.BETTER, ComparisonVerdict.WORSE]), overall([ComparisonVerdict.BETTER, ComparisonVerdict.SAME])
-    (<Verdict.WORSE: 'worse'>, <Verdict.BETTER: 'better'>)
+    >>> better, same, worse = ComparisonVerdict.BETTER, ComparisonVerdict.SAME, ComparisonVerdict.WORSE
+    >>> overall([better, worse]), overall([better, same])
+    (<ComparisonVerdict.WORSE: 'worse'>, <ComparisonVerdict.BETTER: 'better'>)
     """
     for verdict in (ComparisonVerdict.WORSE, ComparisonVerdict.INCONCLUSIVE, ComparisonVerdict.BETTER):
         if verdict in verdicts:
@@ -83,7 +84,7 @@ def decide(
     >>> decide(9.0, 2.0, p_worse=0.001, p_better=1.0, p_same=1.0)
     <ComparisonVerdict.WORSE: 'worse'>
     >>> decide(0.1, 2.0, p_worse=0.4, p_better=0.6, p_same=0.2)
-    <ComparisonVerdict.UNKNOWN: 'cannot say'>
+    <ComparisonVerdict.INCONCLUSIVE: 'cannot say'>
     """
     if p_worse <= alpha and difference > margin:
         return ComparisonVerdict.WORSE
