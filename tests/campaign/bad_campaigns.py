@@ -137,6 +137,18 @@ def _changed() -> None:
     _open()
 
 
+def _lost() -> None:
+    CampaignWriter.create(HERE, HEADER).append(make_run("a"))
+    (HERE / "poses.parquet" / "a.parquet").unlink()
+    _open()
+
+
+def _list_damaged() -> None:
+    CampaignWriter.create(HERE, HEADER).append(make_run("a"))
+    (HERE / "SHA256SUMS").write_text("no hash\n")
+    _open()
+
+
 def _unknown_run() -> None:
     Campaign.open(write_campaign(HERE)).run("z")
 
@@ -207,6 +219,8 @@ CASES: Cases = {
     "parquet-empty": ("a parquet file of no bytes", _file("poses.parquet", lambda p: p.write_bytes(b""))),
     "parquet-damaged": ("parquet pages overwritten with zeros", _file("poses.parquet", _scratch)),
     "file-changed": ("a recorded file that was overwritten in part", _changed),
+    "file-lost": ("a recorded file that is gone", _lost),
+    "hashes-damaged": ("a line of `SHA256SUMS` that is none", _list_damaged),
     "parquet-too-long": ("more rows than the limit (lowered to 5 here)", _too_many_rows),
     "parts-disagree": ("an extra column that is a number in one part and text in another", _parts_disagree),
     "csv-semicolons": ("CSV separated by semicolons", _poses_csv(lambda t: t.replace(",", ";").encode())),
