@@ -2,17 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-import numpy as np
-
-from agvbench.reporting.figures.style import INK, MUTED, PAPER, colour, dress, new_figure, to_svg
+from agvbench.plot.calibration_curves import draw_measured
+from agvbench.reporting.figures.style import INK, ON_PAGE, dress, new_figure, to_svg
 from agvbench.workflows.calibration_curves import Curve
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-_MEASURED, _LEFT_OUT = 1, 0
 
 
 def draw_curve(curve: Curve, name: str, *, command_label: str) -> str:
@@ -27,23 +19,7 @@ def draw_curve(curve: Curve, name: str, *, command_label: str) -> str:
         top.plot(curve.map_command, curve.map_value, color=INK, linewidth=1.2)
         dress(below[0], x=command_label, y=f"residual [{curve.unit}]")
         below[0].axhline(0.0, color=INK, linewidth=1.0)
-        _points(below[0], curve, curve.value - curve.fitted)
-    _points(top, curve, curve.value)
+        residual = curve.value - curve.fitted
+        draw_measured(below[0], curve.command, residual, curve.stderr, curve.left_out, ON_PAGE)
+    draw_measured(top, curve.command, curve.value, curve.stderr, curve.left_out, ON_PAGE)
     return to_svg(figure, name)
-
-
-def _points(axes: Axes, curve: Curve, values: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
-    for chosen, index, shape in ((~curve.left_out, _MEASURED, "o"), (curve.left_out, _LEFT_OUT, "x")):
-        errors = np.where(np.isfinite(curve.stderr), curve.stderr, 0.0)[chosen]
-        axes.errorbar(
-            curve.command[chosen],
-            values[chosen],
-            yerr=errors,
-            fmt=shape,
-            markersize=4,
-            color=colour(index),
-            ecolor=MUTED,
-            elinewidth=0.8,
-            markeredgecolor=PAPER if shape == "o" else colour(index),
-            markeredgewidth=0.5 if shape == "o" else 1.2,
-        )

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from agvbench.reporting.figures.style import INK, MUTED, PAPER, colour, dress, new_figure, to_svg
+from agvbench.plot.driven_paths import draw_group, draw_start_and_target, tip
+from agvbench.reporting.figures.style import ON_PAGE, dress, new_figure, to_svg
 from agvbench.types import Floats, Pose
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-_ARROW_M = 0.22
 _FLATTEST, _TALLEST = 0.45, 1.1
 
 
@@ -29,11 +24,9 @@ def draw_paths(paths: Mapping[int, Sequence[Floats]], name: str, *, target: Pose
     axes = figure.add_subplot()
     dress(axes, x="x [m]", y="y [m]", size=10.0 if target else 9.0)
     for index, group in paths.items():
-        line = _joined(group)
-        axes.plot(line[:, 0], line[:, 1], color=colour(index), linewidth=0.9, alpha=0.75, solid_capstyle="round")
+        draw_group(axes, group, index)
     if target is not None:
-        _mark(axes, Pose(0.0, 0.0, 0.0), filled=False)
-        _mark(axes, target, filled=True)
+        draw_start_and_target(axes, target, ON_PAGE)
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal", adjustable="box")
@@ -43,28 +36,10 @@ def draw_paths(paths: Mapping[int, Sequence[Floats]], name: str, *, target: Pose
 
 def _extent(paths: Sequence[Floats], target: Pose | None) -> tuple[Floats, Floats]:
     """Return the corners of what is to be drawn: all paths and marks with a margin, neither too flat nor too tall."""
-    marks = [] if target is None else [(0.0, 0.0), target[:2], _tip(target)]
+    marks = [] if target is None else [(0.0, 0.0), target[:2], tip(target)]
     points = np.concatenate([*(path[:, :2] for path in paths), np.reshape(marks, (-1, 2))])
     low, high = points.min(axis=0), points.max(axis=0)
     width, height = high - low
     least = np.array([max(width, height / _TALLEST, 0.1), max(height, _FLATTEST * width, 0.1)])
     middle, half = (low + high) / 2.0, 0.54 * least
     return middle - half, middle + half
-
-
-def _tip(pose: Pose) -> tuple[float, float]:
-    return pose.x_m + _ARROW_M * math.cos(pose.heading_rad), pose.y_m + _ARROW_M * math.sin(pose.heading_rad)
-
-
-def _joined(group: Sequence[Floats]) -> Floats:
-    """Return many paths as one line with gaps, which is drawn many times faster."""
-    gap = np.full((1, 2), np.nan)
-    return np.concatenate([piece for path in group for piece in (path[:, :2], gap)] or [gap])
-
-
-def _mark(axes: Axes, pose: Pose, *, filled: bool) -> None:
-    ink = INK if filled else MUTED
-    axes.annotate(
-        "", _tip(pose), pose[:2], arrowprops={"arrowstyle": "->", "color": ink, "linewidth": 1.1, "shrinkA": 0}
-    )
-    axes.plot(*pose[:2], marker="o", markersize=5, color=ink, markerfacecolor=ink if filled else PAPER, zorder=5)

@@ -3,21 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
+from agvbench.plot.style import condition_numbers
 from agvbench.reporting.content import plain
-from agvbench.types import CONDITIONS, Pose
+from agvbench.types import Pose
 
-
-def condition_numbers(conditions: Sequence[str]) -> dict[str, int]:
-    """Return the number of every condition; the known ones keep theirs whether the others are there or not.
-
-    >>> condition_numbers(["calibrated", "by_hand"])
-    {'calibrated': 1, 'by_hand': 3}
-    """
-    others = [condition for condition in conditions if condition not in CONDITIONS]
-    known = {c: CONDITIONS.index(c) for c in conditions if c in CONDITIONS}
-    return known | {c: len(CONDITIONS) + index for index, c in enumerate(others)}
+__all__ = ["condition_numbers", "legend", "panel_title"]
 
 
 def legend(numbers: Mapping[str, int]) -> list[tuple[str, int]]:

@@ -7,29 +7,34 @@ import re
 import warnings
 from typing import TYPE_CHECKING, Any
 
+from agvbench.plot.style import CONDITION_COLOURS, MARKERS, Ink, colour, marker
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+__all__ = [
+    "CONDITION_COLOURS",
+    "GRID",
+    "INK",
+    "MARKERS",
+    "MUTED",
+    "ON_PAGE",
+    "PAPER",
+    "colour",
+    "dress",
+    "marker",
+    "new_figure",
+    "to_svg",
+]
+
 # Stand-ins that become CSS variables, so that one drawing serves light and dark pages.
 INK, MUTED, GRID, PAPER = "#010101", "#020202", "#030303", "#040404"
-# Okabe and Ito (2008), in the order of the conditions; markers repeat what colours say.
-CONDITION_COLOURS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-MARKERS = ("o", "s", "^", "D", "v", "P")
+ON_PAGE = Ink(INK, MUTED, GRID, PAPER)
 _VARIABLES = {INK: "ink", MUTED: "muted", GRID: "grid", PAPER: "paper"} | {
     colour: f"c{index}" for index, colour in enumerate(CONDITION_COLOURS)
 }
 _FONT = "font-family:inherit"
-
-
-def colour(index: int) -> str:
-    """Return the colour of the condition with this number."""
-    return CONDITION_COLOURS[index % len(CONDITION_COLOURS)]
-
-
-def marker(index: int) -> str:
-    """Return the marker of the condition with this number."""
-    return MARKERS[index % len(MARKERS)]
 
 
 def new_figure(width_in: float, height_in: float) -> Figure:

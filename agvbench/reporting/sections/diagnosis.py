@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from agvbench.plot.residual_steps import AFTER, BEFORE
 from agvbench.reporting.content import (
     Block,
     Bullets,
@@ -21,7 +22,7 @@ from agvbench.reporting.content import (
     Value,
     plain_sentences,
 )
-from agvbench.reporting.figures.residuals import AFTER, BEFORE, draw_dependence, draw_floor
+from agvbench.reporting.figures.residuals import draw_dependence, draw_floor
 from agvbench.reporting.sections.base import Section
 from agvbench.workflows.diagnosis_files import (
     COLUMNS,

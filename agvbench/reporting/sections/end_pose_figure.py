@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
+from agvbench.plot.target_frame import in_target_frame
 from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph
 from agvbench.reporting.figures.end_pose import draw_end_poses
 from agvbench.reporting.figures.labels import condition_numbers, legend, panel_title
 from agvbench.reporting.sections.base import Section
 from agvbench.statistics import valid
-from agvbench.types import Floats, Pose
+from agvbench.types import Pose
 from agvbench.workflows.report import ReportData
 
 if TYPE_CHECKING:
@@ -42,14 +41,7 @@ class EndPoseFigureSection(Section):
 def _panels(counted: pd.DataFrame, numbers: dict[str, int]) -> Iterator[Panel]:
     for index, name in enumerate(dict.fromkeys(counted["trajectory"])):
         rows = counted[counted["trajectory"] == name]
-        ends = {n: _in_target_frame(rows[rows["condition"] == c]) for c, n in numbers.items()}
+        ends = {n: in_target_frame(rows[rows["condition"] == c]) for c, n in numbers.items()}
         drawn = {n: points for n, points in ends.items() if len(points)}
         target = Pose(*rows[[f"target_{axis}" for axis in _POSE]].iloc[0])
         yield Panel(panel_title(str(name), target), draw_end_poses(drawn, f"end-pose-{index}"))
-
-
-def _in_target_frame(rows: pd.DataFrame) -> Floats:
-    """Return mm ahead of the target, mm to its left and the heading error [rad], shape (n, 3)."""
-    ends, targets = (rows[[f"{side}_{axis}" for axis in _POSE]].to_numpy(dtype=float) for side in ("end", "target"))
-    seen = [Pose(*end).relative_to(Pose(*target)) for end, target in zip(ends, targets, strict=True)]
-    return np.array([[1e3 * x, 1e3 * y, heading] for x, y, heading in seen]).reshape(-1, 3)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
+from agvbench.plot.drawn_path import drawn_path
+from agvbench.plot.driven_paths import from_start
 from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph
 from agvbench.reporting.figures.floor import draw_paths
 from agvbench.reporting.figures.labels import condition_numbers, legend, panel_title
-from agvbench.reporting.figures.paths import drawn_path
 from agvbench.reporting.sections.base import Section
 from agvbench.statistics.end_poses import in_order
 from agvbench.types import Floats, Run
@@ -53,7 +52,7 @@ class TrajectoriesSection(Section):
 def _panels(runs: Sequence[Run], paths: dict[str, Floats], numbers: dict[str, int]) -> Iterator[Panel]:
     for index, name in enumerate(dict.fromkeys(run.trajectory for run in runs)):
         chosen = [run for run in runs if run.trajectory == name]
-        moved = {run.run_id: _from_start(paths[run.run_id]) for run in chosen}
+        moved = {run.run_id: from_start(paths[run.run_id]) for run in chosen}
         svg = draw_paths(
             _by_condition(chosen, moved, numbers), f"trajectory-{index}", target=chosen[0].target, size_in=3.1
         )
@@ -65,13 +64,3 @@ def _by_condition(runs: Sequence[Run], paths: dict[str, Floats], numbers: dict[s
     for run in runs:
         grouped[numbers[run.condition]].append(paths[run.run_id][:, 1:3])
     return {number: group[:_MOST_PER_PANEL] for number, group in grouped.items() if group}
-
-
-def _from_start(path: Floats) -> Floats:
-    """Return the path in its start frame; the first poses' median stands for the start."""
-    at_rest = path[path[:, 0] <= 0.0]
-    start = np.median(at_rest if len(at_rest) else path[:1], axis=0)
-    c, s = np.cos(start[3]), np.sin(start[3])
-    moved = path.copy()
-    moved[:, 1:3] = (path[:, 1:3] - start[1:3]) @ np.array([[c, -s], [s, c]])
-    return moved

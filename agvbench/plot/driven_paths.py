@@ -1,0 +1,104 @@
+"""The ways that were driven, from a common start, beside what was planned."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from agvbench.errors import InputError
+from agvbench.plot.drawn_path import drawn_path
+from agvbench.plot.style import ON_WHITE, Ink, colour, condition_numbers, label, literal
+from agvbench.types import Floats, Pose, Run
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from agvbench.planning import Plan
+
+ARROW_M = 0.22
+
+
+def paths(axes: Axes, runs: Iterable[Run], plan: Plan | None = None) -> Axes:
+    """Draw the paths that `runs` drove in their start frame, by condition, and beside them what was planned.
+
+    The hollow mark is the start, the filled one the target with its heading.
+
+    Parameters
+    ----------
+    axes
+        Where to draw [m].
+    runs
+        Runs of one trajectory, such as ``campaign.select(trajectory="5")``.
+    plan
+        What `agvbench.plan` returned; its expected path is dashed.
+
+    Raises
+    ------
+    InputError
+        If no run has frames to draw.
+    """
+    driven = [(run, path) for run in runs if len(path := drawn_path(run.frames)) > 1]
+    if not driven:
+        raise InputError("no run has frames to draw", remedy="choose runs with campaign.select")
+    numbers = condition_numbers(list(dict.fromkeys(run.condition for run, _ in driven)))
+    label(axes, x="x [m]", y="y [m]", title=driven[0][0].trajectory)
+    for name, number in numbers.items():
+        group = [from_start(path)[:, 1:3] for run, path in driven if run.condition == name]
+        draw_group(axes, group, number, label=literal(name) or "no condition")
+    if plan is not None:
+        axes.plot(plan.expected[:, 1], plan.expected[:, 2], color=ON_WHITE.ink, linestyle="--", label="planned")
+    target = driven[0][0].target if plan is None else plan.target
+    draw_start_and_target(axes, target, ON_WHITE)
+    axes.update_datalim([tip(pose) for pose in (Pose(0.0, 0.0, 0.0), target) if pose.is_finite])
+    axes.autoscale_view()
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.legend()
+    return axes
+
+
+def from_start(path: Floats) -> Floats:
+    """Return a path, shape (n, 4): t [s], x, y [m], heading [rad], with x and y in its start frame.
+
+    The first poses' median stands for the start.
+    """
+    at_rest = path[path[:, 0] <= 0.0]
+    start = np.median(at_rest if len(at_rest) else path[:1], axis=0)
+    c, s = np.cos(start[3]), np.sin(start[3])
+    moved = path.copy()
+    moved[:, 1:3] = (path[:, 1:3] - start[1:3]) @ np.array([[c, -s], [s, c]])
+    return moved
+
+
+def draw_group(axes: Axes, group: Sequence[Floats], index: int, label: str | None = None) -> None:
+    """Draw paths, shape (n, 2) or more with x, y [m] first, of the condition with this number."""
+    line = _joined(group)
+    axes.plot(
+        line[:, 0], line[:, 1], color=colour(index), linewidth=0.9, alpha=0.75, solid_capstyle="round", label=label
+    )
+
+
+def draw_start_and_target(axes: Axes, target: Pose, ink: Ink) -> None:
+    """Mark the start, at the origin, and the target with their headings; a target of NaN is none."""
+    _mark(axes, Pose(0.0, 0.0, 0.0), ink.muted, ink.paper)
+    if target.is_finite:
+        _mark(axes, target, ink.ink, ink.ink)
+
+
+def tip(pose: Pose) -> tuple[float, float]:
+    """Return where the arrow of a marked pose ends [m]."""
+    return pose.x_m + ARROW_M * math.cos(pose.heading_rad), pose.y_m + ARROW_M * math.sin(pose.heading_rad)
+
+
+def _joined(group: Sequence[Floats]) -> Floats:
+    """Return many paths as one line with gaps, which is drawn many times faster."""
+    gap = np.full((1, 2), np.nan)
+    return np.concatenate([piece for path in group for piece in (path[:, :2], gap)] or [gap])
+
+
+def _mark(axes: Axes, pose: Pose, ink: str, inside: str) -> None:
+    arrow = {"arrowstyle": "->", "color": ink, "linewidth": 1.1, "shrinkA": 0}
+    axes.annotate("", tip(pose), pose[:2], arrowprops=arrow)
+    axes.plot(*pose[:2], marker="o", markersize=5, color=ink, markerfacecolor=inside, zorder=5)
