@@ -36,4 +36,11 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
 
     if not parent.config.pluginmanager.is_registered(session_hooks):
         parent.config.pluginmanager.register(session_hooks, "agvbench-session")
+    pytest.register_assert_rewrite(*_module_names(file_path, parent.config.rootpath))
     return cast(pytest.Collector, BenchModule.from_parent(parent, path=file_path))
+
+
+def _module_names(path: Path, root: Path) -> set[str]:
+    """Return the names under which pytest may import `path`, so that a failing ``assert`` says what it compared."""
+    inside = path.relative_to(root) if path.is_relative_to(root) else path.relative_to(path.parent)
+    return {path.stem, ".".join(inside.with_suffix("").parts)}

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from agvbench.errors import FitError
+from agvbench.errors import FitError, InputError
 from agvbench.statistics.rest_poses import RestPose, end_pose, start_pose
 from agvbench.types import Pose, Run, wrap_angle
 
@@ -130,3 +130,55 @@ def pose_error(start: RestPose, end: RestPose, target: Pose) -> PoseError:
 def _position_stderr(rest: RestPose) -> float:
     """Return the standard error [m] of a position along any one direction."""
     return math.hypot(rest.stderr_x_m, rest.stderr_y_m) / math.sqrt(2.0)
+
+
+@dataclass(frozen=True)
+class RunError:
+    """Where a run ended against its target, in the start frame; columns of `pose_errors` have the same names.
+
+    Parameters
+    ----------
+    position_mm
+        End position error: distance from the target position to the end position [mm], not negative.
+    along_mm, across_mm
+        Its components along x and y of the start frame [mm], signed.
+    heading_deg, delta_heading_deg
+        Heading change minus that of the target [deg], signed, wrapped to (−180, 180]; both are one number, Δδ.
+    delta_s_mm
+        Δs, distance from start to end minus distance from start to target [mm], signed.
+    """
+
+    position_mm: float
+    along_mm: float
+    across_mm: float
+    heading_deg: float
+    delta_s_mm: float
+    delta_heading_deg: float
+
+    def __repr__(self) -> str:
+        numbers = ", ".join(f"{name}={value:.2f}" for name, value in vars(self).items())
+        return f"RunError({numbers})"
+
+
+def run_error(run: Run) -> RunError:
+    """Return the error of `run`.
+
+    Raises
+    ------
+    InputError
+        If the run has no target.
+    FitError
+        If its start or end pose cannot be measured.
+    """
+    if not run.target.is_finite:
+        raise InputError("the run has no target, so no error", where=run.run_id, remedy="drive a trajectory that has")
+    error = pose_error(start_pose(run), end_pose(run), run.target)
+    heading_deg = math.degrees(error.delta_heading_rad)
+    return RunError(
+        position_mm=1e3 * error.position_m,
+        along_mm=1e3 * error.along_m,
+        across_mm=1e3 * error.across_m,
+        heading_deg=heading_deg,
+        delta_s_mm=1e3 * error.delta_s_m,
+        delta_heading_deg=heading_deg,
+    )

@@ -25,6 +25,7 @@ from agvbench.running.command_shares import Shares, falling, held
 from agvbench.running.configuration.provenance import RecordedInputs, trajectory_inputs
 from agvbench.running.execution.bench import Bench, Failure
 from agvbench.running.execution.run_records import RunRequest
+from agvbench.running.session.driven_run import DrivenRun
 from agvbench.running.session.end_pose_bias import NO_BIAS_CORRECTIONS
 from agvbench.types import CONDITIONS, Commands, CommandUnit, Pose, Run
 
@@ -194,7 +195,7 @@ class RunRejectedError(PlanError):
 
 
 class Driver:
-    """Drives the runs of one benchmark; each returns the recorded run that counts.
+    """Drives the runs of one benchmark; each returns the recorded run that counts, with its ``error``.
 
     Parameters
     ----------
@@ -210,7 +211,7 @@ class Driver:
         self._session, self._run_id = session, run_id
         self._experiment, self._repeat = experiment, repeat
 
-    def trajectory(self, name: str, *, condition: str) -> Run:
+    def trajectory(self, name: str, *, condition: str) -> DrivenRun:
         """Drive the trajectory `name` (shipped, or a TOML file) with the commands that `condition` gives.
 
         Raises
@@ -240,7 +241,7 @@ class Driver:
         rear: float = 0.0,
         least_s: float | None = None,
         slower: bool = False,
-    ) -> Run:
+    ) -> DrivenRun:
         """Hold shares of full command for `for_s` seconds: drive 1 is full speed forward, steering 1 full left.
 
         With `least_s` the time is shortened, down to that, until the path fits the workspace; with `slower` the drive
@@ -258,7 +259,7 @@ class Driver:
             )
         return self.steps(fitting or steps[-1])
 
-    def steps(self, steps: Sequence[tuple[float, Mapping[str, float]]]) -> Run:
+    def steps(self, steps: Sequence[tuple[float, Mapping[str, float]]]) -> DrivenRun:
         """Hold several commands one after another: (duration [s], shares of full command) each."""
         with self._planning():
             planned = self._held(steps)
@@ -289,7 +290,7 @@ class Driver:
         trajectory = _as_trajectory(self._experiment, commands, self._session.nominal.command_unit)
         return self._session.plan(trajectory, "uncalibrated")
 
-    def _drive(self, planned: Plan, condition: str, *, trajectory: str | None = None) -> Run:
+    def _drive(self, planned: Plan, condition: str, *, trajectory: str | None = None) -> DrivenRun:
         request = RunRequest(
             run_id=self._run_id,
             experiment=self._experiment,
@@ -305,7 +306,8 @@ class Driver:
             raise RunRejectedError(
                 "no attempt counted", where=self._run_id, value=run.status, remedy="see the campaign's rejected runs"
             )
-        return run
+        self._session.concluded(self._run_id)  # whatever the benchmark says of it then: it was driven
+        return DrivenRun.of(run)
 
 
 def _as_trajectory(name: str, commands: Commands, unit: CommandUnit) -> Trajectory:
