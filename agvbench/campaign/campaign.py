@@ -148,6 +148,11 @@ class Campaign:
     def _index(self) -> dict[str, int]:
         return {run_id: index for index, run_id in enumerate(self.run_ids)}
 
+    def _repr_html_(self) -> str:
+        from agvbench.campaign.notebook import campaign_html
+
+        return campaign_html(self)
+
     def run(self, run_id: str) -> Run:
         """Return one run.
 

@@ -95,6 +95,30 @@ class Diagnosis:
         """Whether the model needs nothing but its maps."""
         return self.verdict is Verdict.ADEQUATE
 
+    def effects_frame(self) -> pd.DataFrame:
+        """Return one row per parameter of each effect found.
+
+        Columns: ``effect``, ``parameter``, ``value`` and ``stderr`` in ``unit``, ``confounded_with`` (names, with
+        commas between).
+        """
+        from agvbench.diagnosis.notebook import effects_frame
+
+        return effects_frame(self)
+
+    def errors_frame(self) -> pd.DataFrame:
+        """Return one row per quantity, predicted for the test runs; without any where nothing could be predicted.
+
+        Columns: ``quantity`` (its unit ends the name), ``before``, ``after`` and ``floor``, the repeatability.
+        """
+        from agvbench.diagnosis.notebook import errors_frame
+
+        return errors_frame(self)
+
+    def _repr_html_(self) -> str:
+        from agvbench.diagnosis.notebook import diagnosis_html
+
+        return diagnosis_html(self)
+
     def to_json(self) -> dict[str, Any]:
         """Return the content of the JSON file, schema 1; numbers that are not finite are null."""
         none: dict[str, dict[str, float]] = {}

@@ -140,6 +140,11 @@ class VehicleModel:
 
         return physics_digest(self)
 
+    def _repr_html_(self) -> str:
+        from agvbench.model.notebook import model_html
+
+        return model_html(self)
+
     @classmethod
     def load(cls, path: Path | str) -> VehicleModel:
         """Read a vehicle file; see `agvbench.model.toml.load_vehicle`."""

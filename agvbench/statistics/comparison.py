@@ -103,6 +103,22 @@ class Comparison:
             worst[cell] = min(rank, worst.get(cell, rank))
         return sorted(self.differences, key=lambda d: worst[d.trajectory, d.condition])
 
+    def differences_frame(self) -> pd.DataFrame:
+        """Return one row per difference, worst first.
+
+        Columns: ``trajectory``, ``condition``, ``quantity`` in ``unit``; ``repeats_a``, ``median_a``, ``repeats_b``,
+        ``median_b``; ``difference`` of medians, b minus a, with its 95 % interval ``low`` … ``high``; ``margin``;
+        ``verdict`` and whether it ``decides``; ``p_worse``, ``p_better`` (corrected) and ``cliffs_delta``.
+        """
+        from agvbench.statistics.notebook import differences_frame
+
+        return differences_frame(self)
+
+    def _repr_html_(self) -> str:
+        from agvbench.statistics.notebook import comparison_html
+
+        return comparison_html(self)
+
     @property
     def is_regression(self) -> bool:
         """Whether anything that decides is worse beyond its margin."""

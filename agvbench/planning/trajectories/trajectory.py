@@ -115,6 +115,11 @@ class Trajectory(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, 
         """Return how messages call segment `index`: ``"u_turn: dubins[2]"``."""
         return f"{self.name}: {self.shape}[{index}]"
 
+    def _repr_html_(self) -> str:
+        from agvbench.planning.notebook import trajectory_html
+
+        return trajectory_html(self)
+
     def with_steering(self, steering: Steering) -> Trajectory:
         """Return the same trajectory steered in another mode; its target is then where the kinematics lead.
 

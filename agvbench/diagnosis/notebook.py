@@ -1,0 +1,48 @@
+"""How a notebook shows a diagnosis: as tables of pandas, and as HTML."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from agvbench.notebook_html import heading_html, table_html
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from agvbench.diagnosis.result import Diagnosis
+
+_EFFECTS = ("effect", "parameter", "value", "stderr", "unit", "confounded_with")
+_ERRORS = ("quantity", "before", "after", "floor")
+
+
+def effects_frame(found: Diagnosis) -> pd.DataFrame:
+    """Return one row per parameter of each effect found; see `Diagnosis.effects_frame`."""
+    import pandas as pd
+
+    rows = [
+        (effect.name, name, estimate.value, estimate.stderr, estimate.unit, ", ".join(effect.confounded_with))
+        for effect in found.effects
+        for name, estimate in effect.parameters.items()
+    ]
+    return pd.DataFrame(rows, columns=list(_EFFECTS))
+
+
+def errors_frame(found: Diagnosis) -> pd.DataFrame:
+    """Return one row per quantity, predicted before and after; see `Diagnosis.errors_frame`."""
+    import pandas as pd
+
+    errors = found.held_out.errors if found.held_out else {}
+    rows = [(quantity, *(values.get(column) for column in _ERRORS[1:])) for quantity, values in errors.items()]
+    return pd.DataFrame(rows, columns=list(_ERRORS)).astype(dict.fromkeys(_ERRORS[1:], float))
+
+
+def diagnosis_html(found: Diagnosis) -> str:
+    """Return verdict and reason, the effects with their parameters, and the prediction errors before and after."""
+    depends = ", ".join(dict.fromkeys(d.covariate for d in found.depends_on))
+    effects, errors = effects_frame(found), errors_frame(found)
+    runs = found.held_out.runs if found.held_out else 0
+    return (
+        heading_html(str(found.verdict), found.why, f"The residual depends on {depends}." if depends else "")
+        + table_html("effects", [name.replace("_", " ") for name in _EFFECTS], effects.itertuples(index=False))
+        + table_html(f"prediction errors of {runs} test runs", _ERRORS, errors.itertuples(index=False))
+    )
