@@ -1,10 +1,14 @@
-"""Plants and sensor noise: an independent truth that shares no code with the vehicle model."""
+"""Plants and sensor noise: an independent truth that shares no code with the vehicle model.
+
+What an author of plants needs is here: the protocol, and `check_plant`, which holds a plant to it.
+"""
 
 from agvbench.simulator.camera import Camera, Tracker
 from agvbench.simulator.checked_plant import CheckedPlant
 from agvbench.simulator.plant_contract import check_plant
 from agvbench.simulator.plant_loading import CheckedFactory, load_plant
 from agvbench.simulator.plants import make_plant, random_plant, small_plant
+from agvbench.types import Plant, PlantFactory
 
 CameraNoise = Camera  # the name by which adapters know it
 
@@ -13,6 +17,8 @@ __all__ = [
     "CameraNoise",
     "CheckedFactory",
     "CheckedPlant",
+    "Plant",
+    "PlantFactory",
     "Tracker",
     "check_plant",
     "load_plant",

@@ -22,7 +22,7 @@ from agvbench.errors import PlantError
 from agvbench.simulator.hidden.base_vehicle import BaseVehicle, sample_vehicle
 from agvbench.simulator.hidden.catalogue import CATALOGUE, NOTHING, recipes
 from agvbench.simulator.hidden.plant import HiddenPlant
-from agvbench.simulator.hidden.sampling import factory, make_hidden_plant, sampled_spec
+from agvbench.simulator.hidden.sampling import factory, make_hidden_plant, sampled_spec, vehicle_of
 from agvbench.simulator.hidden.separation import Separation, SeparationStudy, indistinguishable_effects, separation
 from agvbench.simulator.hidden.truth import HiddenEffect, SealedTruth
 
@@ -40,6 +40,7 @@ __all__ = [
     "sample_vehicle",
     "sealed_truth",
     "separation",
+    "vehicle_of",
 ]
 
 
