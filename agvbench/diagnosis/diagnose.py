@@ -53,7 +53,7 @@ def diagnose(
         campaign's own runs.
     seed
         Draws which runs are for training, validation and test, where the campaign has no column ``split``.
-    tell
+    on_progress
         Called with a line whenever there is progress.
 
     Raises
