@@ -48,17 +48,18 @@ def simulate(
 
     Examples
     --------
-    Ten seconds at full speed, 0.32 m/s, and the same with a motor that takes its time:
+    Ten seconds straight ahead at 0.3 m/s, and the same with a motor that takes its time:
 
     >>> from agvbench.effects import SpeedLag
-    >>> from agvbench.model import example_vehicle
-    >>> ahead = Commands(*(np.array([value]) for value in (0.0, 900.0, 1500.0, 1500.0)))
-    >>> model = example_vehicle("thesis")
-    >>> simulate(model, ahead, (0.0, 0.0, 0.0), [0.0, 10.0]).round(2).tolist()
-    [[0.0, 0.0, 0.0], [3.2, 0.0, 0.0]]
+    >>> from agvbench.model import thesis_vehicle
+    >>> model = thesis_vehicle()
+    >>> command = model.command_for(front_rad=0.0, rear_rad=0.0, speed_mps=0.3)
+    >>> ahead = Commands(np.array([0.0]), *(np.array([channel]) for channel in command))
+    >>> simulate(model, ahead, (0.0, 0.0, 0.0), [0.0, 10.0])[:, 0].round(3).tolist()
+    [0.0, 3.0]
     >>> slow = model.with_effects(SpeedLag(accelerate_s=0.5, brake_s=0.5))
-    >>> simulate(slow, ahead, (0.0, 0.0, 0.0), [0.0, 10.0]).round(2).tolist()
-    [[0.0, 0.0, 0.0], [3.04, 0.0, 0.0]]
+    >>> simulate(slow, ahead, (0.0, 0.0, 0.0), [0.0, 10.0])[:, 0].round(3).tolist()
+    [0.0, 2.85]
     """
     start = np.asarray(initial, dtype=np.float64).reshape(1, -1)
     (poses,) = model.rollout([commands], start, [np.asarray(t_s, dtype=np.float64)], [started_h])
