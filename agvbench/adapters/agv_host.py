@@ -12,12 +12,11 @@ from agvbench.adapters.host import Host
 from agvbench.bus.clock import Clock
 from agvbench.bus.counters import LossCounter, RateLimitedCounter, Sequence
 from agvbench.bus.keys import AGV, CLAIM, RELEASE, REPLAY, RESET, Keys
+from agvbench.bus.messages.codec import encode
 from agvbench.bus.messages.command import CommandFlags, CommandMessage, decode_command
 from agvbench.bus.messages.event import COMMANDS_LATE, COMMANDS_LOST, RUNNER_SILENT, Level
-from agvbench.bus.messages.identity import encode_agv_identity
 from agvbench.bus.messages.request import decode_claim, decode_replay, decode_reset
 from agvbench.bus.messages.truth import Truth, TruthFlags
-from agvbench.bus.messages.wire import Kind, prefix
 from agvbench.errors import AdapterGoneError, LinkError, MessageError, RunStoppedError
 from agvbench.types import Command, Floats
 
@@ -27,7 +26,6 @@ _STOP_PATIENCE_S = 0.5
 _HANG_PATIENCE_S = 0.1
 _STOP, _FLUSH = CommandFlags.STOP, CommandFlags.FLUSH
 _FOREIGN_REPORTED_S = 1.0
-_COMMAND, _FLAGS, _SOURCE = prefix(Kind.COMMAND), slice(6, 8), slice(8, 12)
 
 
 class Claim:
@@ -59,7 +57,7 @@ class Claim:
         LinkError
             If another runner has it.
         """
-        source = decode_claim(payload)
+        source = decode_claim(payload).source
         with self._lock:
             if self.source not in (None, source):
                 raise LinkError(
@@ -71,7 +69,7 @@ class Claim:
 
     def release(self, payload: bytes) -> bytes:
         """Take note that the runner has left."""
-        self._end(self._keys.runner(decode_claim(payload)))
+        self._end(self._keys.runner(decode_claim(payload).source))
         return b""
 
     def _token_changed(self, sample: Any) -> None:
@@ -85,14 +83,12 @@ class Claim:
             if self.source is not None and token == self._keys.runner(self.source):
                 self.source = None
 
-    def is_foreign(self, payload: bytes) -> bool:
-        """Whether a message is a command of another source than the runner that has the vehicle."""
+    def is_foreign(self, message: CommandMessage) -> bool:
+        """Whether a command is of another source than the runner that has the vehicle."""
         source = self.source
-        if payload[: len(_COMMAND)] != _COMMAND:
-            return False
         if source is None:
-            return self._required and not int.from_bytes(payload[_FLAGS], "little") & _STOP
-        return int.from_bytes(payload[_SOURCE], "little") != source
+            return self._required and not message.flags & _STOP
+        return message.source != source
 
     def close(self) -> None:
         """Watch no more tokens."""
@@ -123,7 +119,7 @@ class AgvHost(Host):
         self.loss = LossCounter()
         self.malformed, self.reordered = RateLimitedCounter(), RateLimitedCounter(first=_REORDERED_REPORTED)
         self._heard_s: float | None = None
-        self._identity_bytes = encode_agv_identity(adapter.identity())
+        self._identity_bytes = encode(adapter.identity())
         self._lock_step = adapter.identity().lock_step
         neutral = adapter.identity().neutral
         self._neutral_drive, self._neutral = neutral, Command(neutral, neutral, neutral)
@@ -179,20 +175,17 @@ class AgvHost(Host):
         loss, watched, now, claim = self.loss, not self._lock_step, self._clock.now, self._claim
         while True:
             try:
-                payload = receive().payload.to_bytes()
+                message = self._decode(receive().payload.to_bytes())
                 if watched:
-                    payload = self._newest(payload)
+                    message = self._newest(message)
             except self._zenoh_error:
                 return
-            if claim.is_foreign(payload):
-                self._pass_over(payload)
+            if message is None:
                 continue
-            try:
-                message = decode_command(payload)
-            except MessageError as error:
-                self._fail_malformed(error)
+            if claim.is_foreign(message):
+                self._pass_over(message)
                 continue
-            sequence, _, _, _, flags, source = message
+            sequence, flags, source = message.sequence, message.flags, message.source
             try:
                 with lock:
                     if flags & _STOP or self._left or sequence <= self._outdated.get(source, 0):
@@ -228,7 +221,17 @@ class AgvHost(Host):
         if not self._holds:
             self._longest_s = 0.0
 
-    def _newest(self, payload: bytes) -> bytes:
+    def _decode(self, payload: bytes) -> CommandMessage | None:
+        """Return the command; None if that cannot be, which is told, seldom where there are many."""
+        try:
+            return decode_command(payload)
+        except MessageError as error:
+            if self.malformed.add():
+                what = error.what if self.malformed.count == 1 else f"{error.what} ({self.malformed})"
+                self.failed(MessageError(what, value=error.value, limit=error.limit, remedy=error.remedy))
+            return None
+
+    def _newest(self, message: CommandMessage | None) -> CommandMessage | None:
         """Return the last of the commands that wait, in real time: older ones are of no use to anybody, but stops are.
 
         A flood, or an adapter that is slower than its runner, therefore never holds up a stop by what waits before it.
@@ -238,19 +241,17 @@ class AgvHost(Host):
             sample = try_receive()
             if sample is None:
                 break
-            later = sample.payload.to_bytes()
-            if not self._claim.is_foreign(later):
-                payload, later = later, payload
-            self._pass_over(later)
-        return payload
+            later = self._decode(sample.payload.to_bytes())
+            if later is None:
+                continue
+            if message is None or not self._claim.is_foreign(later):
+                message, later = later, message
+            if later is not None:
+                self._pass_over(later)
+        return message
 
-    def _pass_over(self, payload: bytes) -> None:
-        try:
-            message = decode_command(payload)
-        except MessageError as error:
-            self._fail_malformed(error)
-            return
-        foreign = self._claim.is_foreign(payload)
+    def _pass_over(self, message: CommandMessage) -> None:
+        foreign = self._claim.is_foreign(message)
         if foreign:
             self._report_foreign(message)
         else:
@@ -284,12 +285,6 @@ class AgvHost(Host):
     def _note(self, source: int, sequence: int) -> None:
         if lost := self.loss.saw(source, sequence):
             self.event(Level.WARNING, COMMANDS_LOST, f"{lost} commands were lost before {sequence}")
-
-    def _fail_malformed(self, error: MessageError) -> None:
-        """Tell of a message that cannot be decoded, seldom where there are many."""
-        if self.malformed.add():
-            what = error.what if self.malformed.count == 1 else f"{error.what} ({self.malformed})"
-            self.failed(MessageError(what, value=error.value, limit=error.limit, remedy=error.remedy))
 
     def _refrain(self, message: CommandMessage) -> None:
         """Stop, unless the command came too late for that, too."""

@@ -8,14 +8,16 @@ from __future__ import annotations
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
+
+from msgspec.structs import replace
 
 from agvbench.bus.clock import Clock
 from agvbench.bus.counters import Sequence
 from agvbench.bus.keys import IDENTITY, TIME, Keys
-from agvbench.bus.messages.event import Event, Level, encode_event
-from agvbench.bus.messages.request import encode_time
+from agvbench.bus.messages.codec import ENCODING, encode
+from agvbench.bus.messages.event import Event, Level
+from agvbench.bus.messages.request import TimeMessage
 from agvbench.bus.queries import refusal
 from agvbench.errors import AgvbenchError, LinkError
 
@@ -57,7 +59,7 @@ class Host(ABC):
         )
         self._answers: dict[str, Callable[[bytes], bytes]] = {
             IDENTITY: lambda _: self._identity(),
-            TIME: lambda _: encode_time(self._clock.now()),
+            TIME: lambda _: encode(TimeMessage(self._clock.now())),
         }
 
     @abstractmethod
@@ -92,11 +94,11 @@ class Host(ABC):
             if answer is None:
                 raise LinkError("no such question", where=self._role, value=queryable, limit=" ".join(self._answers))
             payload = b"" if query.payload is None else bytes(query.payload.to_bytes())
-            query.reply(query.key_expr, answer(payload))
+            query.reply(query.key_expr, answer(payload), encoding=ENCODING)
         except self._zenoh_error:
             return
         except BaseException as error:  # noqa: BLE001  (whatever the adapter raises, the asker must hear of it)
-            query.reply_err(refusal(self._role, as_agvbench_error(error, self._role)))
+            query.reply_err(refusal(self._role, as_agvbench_error(error, self._role)), encoding=ENCODING)
 
     def event(self, level: Level, kind: str, text: str, *, acknowledged: int = 0) -> None:
         """Publish an event; also while the adapter hangs."""
@@ -111,13 +113,13 @@ class Host(ABC):
         with self._reporting:
             sequence, t_s = self._events.take(), self._clock.now()
             numbered = replace(event, sequence=sequence, t_s=t_s, source=self._events.source)
-            self._put(self._keys.report, encode_event(numbered))
+            self._put(self._keys.report, encode(numbered))
 
     def _put(self, key: str, payload: bytes) -> None:
         import zenoh
 
         try:
-            self._session.put(key, payload, congestion_control=zenoh.CongestionControl.BLOCK)
+            self._session.put(key, payload, encoding=ENCODING, congestion_control=zenoh.CongestionControl.BLOCK)
         except (self._zenoh_error, RuntimeError):
             # The session is closed, or just being closed by another thread: nobody is told any more.
             return

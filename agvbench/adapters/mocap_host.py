@@ -12,11 +12,10 @@ from agvbench.adapters.host import Host
 from agvbench.bus.clock import Clock
 from agvbench.bus.counters import LossCounter, Sequence
 from agvbench.bus.keys import MOCAP, RESET, Keys
-from agvbench.bus.messages.frames import FrameClock, FramesFlags, pack_batch, pack_single
-from agvbench.bus.messages.identity import encode_mocap_identity
-from agvbench.bus.messages.request import decode_reset, encode_sampling
+from agvbench.bus.messages.codec import ENCODING, MAX_ROWS, encode
+from agvbench.bus.messages.frames import FrameClock, FramesFlags, FramesMessage, pack_columns, pack_row
+from agvbench.bus.messages.request import decode_reset
 from agvbench.bus.messages.truth import Truth, decode_truth
-from agvbench.bus.messages.wire import MAX_ROWS
 from agvbench.errors import LinkError, MessageError
 from agvbench.types import Frames
 
@@ -45,13 +44,13 @@ class MocapHost(Host):
         super().__init__(session, keys, MOCAP, clock)
         self._adapter = adapter
         sequence = Sequence()
-        # Bound once, and `frame` calls nothing of ours: a process just woken fetches all from memory.
         self._source, self._take, self._now = sequence.source, sequence.take, clock.now
         self._truth_loss = LossCounter()
-        self._identity_bytes = encode_mocap_identity(adapter.identity())
+        self._identity_bytes = encode(adapter.identity())
         self._answers |= {RESET: self._reset}
         self._publisher = session.declare_publisher(
             keys.report,
+            encoding=ENCODING,
             congestion_control=zenoh.CongestionControl.BLOCK,
             priority=zenoh.Priority.REAL_TIME,
             express=True,
@@ -69,7 +68,7 @@ class MocapHost(Host):
 
     def _reset(self, payload: bytes) -> bytes:
         with self._lock:
-            return encode_sampling(self._adapter.reset(decode_reset(payload)))
+            return encode(self._adapter.reset(decode_reset(payload)))
 
     def _serve_truth(self) -> None:
         assert self._subscriber is not None  # noqa: S101  (for the type checker)
@@ -97,9 +96,10 @@ class MocapHost(Host):
     def frames(self, frames: Frames, *, clock: FrameClock, acknowledged: int = 0) -> None:
         """Publish frames, in as many messages as they need."""
         while len(frames.t_s) > MAX_ROWS:
-            self._publish(frames.select(_FIRST_ROWS), clock, acknowledged, FramesFlags.NONE)
+            first = frames.select(_FIRST_ROWS)
+            self._send(MAX_ROWS, pack_columns(first), clock, acknowledged, FramesFlags.NONE)
             frames = frames.select(np.arange(MAX_ROWS, len(frames)))
-        self._publish(frames, clock, acknowledged, FramesFlags.LAST)
+        self._send(len(frames), pack_columns(frames), clock, acknowledged, FramesFlags.LAST)
 
     def frame(
         self,
@@ -116,21 +116,15 @@ class MocapHost(Host):
         acknowledged: int = 0,
     ) -> None:
         """Publish one frame, from plain numbers."""
-        with self._lock:
-            message = pack_single(
-                self._source, 1, self._take(), acknowledged, clock, self._now(),
-                t_s, x_m, y_m, heading_rad, mean_error_m, received_s, frame, tracked,
-            )  # fmt: skip
-            try:
-                self._put_frames(message)
-            except self._zenoh_error:
-                return
+        columns = pack_row(t_s, x_m, y_m, heading_rad, mean_error_m, received_s, frame, tracked)
+        self._send(1, columns, clock, acknowledged, FramesFlags.LAST)
 
-    def _publish(self, frames: Frames, clock: FrameClock, acknowledged: int, flags: int) -> None:
+    def _send(self, count: int, columns: bytes, clock: FrameClock, acknowledged: int, flags: int) -> None:
         with self._lock:
-            message = pack_batch(self._take(), frames, acknowledged, clock, self._now(), flags, self._source)
+            sequence, now_s = self._take(), self._now()
+            message = FramesMessage(sequence, count, columns, acknowledged, clock, now_s, flags, self._source)
             try:
-                self._put_frames(message)
+                self._put_frames(encode(message))
             except self._zenoh_error:
                 return
 

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
+from msgspec.structs import replace
+
 from agvbench.adapters.agv_host import AgvHost
 from agvbench.adapters.contract import AdapterOptions
 from agvbench.adapters.mocap_host import MocapHost
@@ -13,8 +15,8 @@ from agvbench.adapters.registry import open_agv, open_mocap
 from agvbench.bus.clock import Clock
 from agvbench.bus.counters import Sequence
 from agvbench.bus.keys import Keys
-from agvbench.bus.messages.truth import Truth, TruthFlags, encode_truth
-from agvbench.bus.messages.wire import MAX_ROWS
+from agvbench.bus.messages.codec import ENCODING, MAX_ROWS, encode
+from agvbench.bus.messages.truth import Truth, TruthFlags
 from agvbench.errors import AdapterGoneError
 
 
@@ -70,6 +72,7 @@ class TruthPublisher:
         self._keys, self._clock, self._sequence = keys, clock, Sequence()
         self._publisher = session.declare_publisher(
             keys.truth,
+            encoding=ENCODING,
             congestion_control=zenoh.CongestionControl.BLOCK,
             priority=zenoh.Priority.REAL_TIME,
             express=True,
@@ -88,14 +91,15 @@ class TruthPublisher:
         for start in range(0, max(1, len(truth.t_s)), MAX_ROWS):
             rows = slice(start, start + MAX_ROWS)
             is_last = start + MAX_ROWS >= len(truth.t_s)
-            part = truth._replace(
+            part = replace(
+                truth,
                 sequence=self._sequence.take(),
                 source=self._sequence.source,
                 t_s=truth.t_s[rows],
                 poses=truth.poses[rows],
                 flags=truth.flags if is_last else TruthFlags.NONE,
             )
-            self._publisher.put(encode_truth(part))
+            self._publisher.put(encode(part))
 
     def _wait_for_camera(self) -> None:
         deadline_s = self._clock.now() + _CAMERA_LIMIT_S

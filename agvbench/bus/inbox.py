@@ -7,19 +7,19 @@ from __future__ import annotations
 
 import threading
 from collections import deque
+from collections.abc import Callable
 from typing import Any
 
 from agvbench.bus.counters import LossCounter, RateLimitedCounter
 from agvbench.bus.keys import AGV, MOCAP, Keys
-from agvbench.bus.messages.event import Event, Level, decode_event
-from agvbench.bus.messages.frames import FramesMessage, decode_frames
-from agvbench.bus.messages.wire import HEADER_BYTES, Kind
+from agvbench.bus.messages.codec import decoder
+from agvbench.bus.messages.event import Event, Level
+from agvbench.bus.messages.frames import FramesMessage
 from agvbench.errors import LinkError, MessageError
 
 _CAPACITY = 1024
 _EVENTS_KEPT = 1000
-_KIND_AT = 5
-_EVENT = Kind.EVENT.value
+_decode: Callable[[bytes], FramesMessage | Event] = decoder(FramesMessage, Event)
 
 
 class Inbox:
@@ -74,34 +74,24 @@ class Inbox:
             payload: bytes = self._recv().payload.to_bytes()
         except self._closed_error:
             raise LinkError("the bus was closed", where=self._keys.root) from None
+        if not payload:
+            return None  # a call to wake up
         try:
-            message = decode_frames(payload)
-        except MessageError as error:
-            return self._read_other(payload, error)
+            message = _decode(payload)
+        except MessageError as why:
+            where, value, limit, remedy = self._keys.report, why.value, why.limit, why.remedy
+            raise MessageError(why.what, where=where, value=value, limit=limit, remedy=remedy) from None
+        if isinstance(message, Event):
+            if message.role in self.event_losses:
+                self.event_losses[message.role].saw(message.source, message.sequence)
+            self.events.append(message)
+            return message
         loss = self.frames_loss
-        sequence, _, _, _, _, _, source = message
-        if sequence == loss.expected and source == loss.source:
+        if message.sequence == loss.expected and message.source == loss.source:
             loss.expected += 1
         else:
-            loss.saw(source, sequence)
+            loss.saw(message.source, message.sequence)
         return message
-
-    def _read_other(self, payload: bytes, error: MessageError) -> Event | None:
-        """Return what is no frames: nothing, which is a call to wake up, or an event; else raise what is wrong."""
-        if not payload:
-            return None
-        try:
-            if len(payload) < HEADER_BYTES or payload[_KIND_AT] != _EVENT:
-                raise error
-            event = decode_event(payload)
-        except MessageError as why:
-            raise MessageError(
-                why.what, where=self._keys.report, value=why.value, limit=why.limit, remedy=why.remedy
-            ) from None
-        if event.role in self.event_losses:
-            self.event_losses[event.role].saw(event.source, event.sequence)
-        self.events.append(event)
-        return event
 
     def note_malformed(self, error: MessageError) -> None:
         """Count a message that could not be decoded; keep an event of some."""

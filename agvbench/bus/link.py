@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import replace
 from typing import Any
+
+from msgspec.structs import replace
 
 from agvbench.bus.clock import Clock, SimulatedClock, WallClock, Watchdog
 from agvbench.bus.counters import LossCounter
@@ -12,17 +13,10 @@ from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import AGV, CLAIM, IDENTITY, MOCAP, RELEASE, REPLAY, RESET, Keys
 from agvbench.bus.liveliness import SETTLES_S, Liveliness
 from agvbench.bus.lock_step import LockStep
+from agvbench.bus.messages.codec import encode
 from agvbench.bus.messages.event import Event, Level
 from agvbench.bus.messages.identity import Identity, decode_agv_identity, decode_mocap_identity
-from agvbench.bus.messages.request import (
-    Replay,
-    Reset,
-    Sampling,
-    decode_sampling,
-    encode_claim,
-    encode_replay,
-    encode_reset,
-)
+from agvbench.bus.messages.request import ClaimMessage, Replay, Reset, Sampling, decode_sampling
 from agvbench.bus.outbox import CommandOutbox
 from agvbench.bus.queries import ask
 from agvbench.bus.real_time import RealTime
@@ -96,7 +90,7 @@ class VehicleLink:
 
     def _claim(self, queryable: str, limit_s: float) -> None:
         """Claim the vehicle for this runner, or release it: its adapter obeys one runner at a time."""
-        self._ask(AGV, queryable, encode_claim(self._outbox.source), limit_s)
+        self._ask(AGV, queryable, encode(ClaimMessage(self._outbox.source)), limit_s)
 
     def _ask(self, role: str, queryable: str, payload: bytes, limit_s: float) -> bytes:
         """Return the answer of the adapter in this role; an adapter that vanishes ends the wait."""
@@ -154,7 +148,7 @@ class VehicleLink:
         AdapterGoneError
             If an adapter vanished or does not answer.
         """
-        payload = encode_reset(self._prepare(run_key, pose))
+        payload = encode(self._prepare(run_key, pose))
         self._ask(AGV, RESET, payload, self._limit_s)
         self._driver.start()
 
@@ -201,7 +195,7 @@ class VehicleLink:
         reset = self._prepare(run_key, pose)
         if until_s is None:
             until_s = float(commands.t_s[-1]) if len(commands) else 0.0
-        payload = encode_replay(Replay(reset, commands, until_s))
+        payload = encode(Replay(reset, commands, until_s))
         self._ask(AGV, REPLAY, payload, self._limit_s)
 
     def _prepare(self, run_key: str, pose: Pose) -> Reset:
@@ -214,7 +208,7 @@ class VehicleLink:
             )
         self._check_liveliness()
         request = Reset(run_key, pose, _ANYWHERE, self._outbox.source, self._outbox.last)
-        answer = self._ask(MOCAP, RESET, encode_reset(request), self._limit_s)
+        answer = self._ask(MOCAP, RESET, encode(request), self._limit_s)
         return replace(request, sampling=decode_sampling(answer))
 
     @property

@@ -8,7 +8,8 @@ from typing import Any
 
 from agvbench.bus.counters import Sequence
 from agvbench.bus.keys import Keys
-from agvbench.bus.messages.command import CommandFlags, pack_command
+from agvbench.bus.messages.codec import ENCODING, encode
+from agvbench.bus.messages.command import CommandFlags, CommandMessage
 from agvbench.errors import LinkError
 from agvbench.types import Command
 
@@ -29,6 +30,7 @@ class CommandOutbox:
         self._error = zenoh.ZError
         self._publisher = session.declare_publisher(
             keys.command,
+            encoding=ENCODING,
             congestion_control=zenoh.CongestionControl.BLOCK,
             priority=zenoh.Priority.REAL_TIME,
             express=True,
@@ -47,7 +49,7 @@ class CommandOutbox:
         """
         self.last = sequence = self._take()
         try:
-            self._put(pack_command(sequence, t_s, command, hold_s, flags, self.source))
+            self._put(encode(CommandMessage(sequence, t_s, command, hold_s, flags, self.source)))
         except self._error:
             raise LinkError("the bus was closed", where=self._keys.root) from None
         return sequence

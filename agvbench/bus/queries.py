@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator
 from itertools import islice
 from typing import Any
 
-from agvbench.bus.messages.event import Event, decode_event, encode_event
+from agvbench.bus.messages.codec import ENCODING, encode
+from agvbench.bus.messages.event import Event, decode_event
 from agvbench.errors import AdapterGoneError, AgvbenchError, LinkError
 
 _ANSWERS_READ = 16
@@ -33,9 +34,8 @@ def ask(session: Any, key: str, payload: bytes, limit_s: float, check: Callable[
     for reply in islice(_replies(session, key, payload, limit_s, check), _ANSWERS_READ):
         if reply.ok is not None:
             return bytes(reply.ok.payload.to_bytes())
-        refusal = bytes(reply.err.payload.to_bytes())
-        if refusal.startswith(b"AGVB"):
-            raise decode_event(refusal).as_error()
+        if reply.err.encoding == ENCODING:  # else Zenoh itself says that nobody answered in time
+            raise decode_event(bytes(reply.err.payload.to_bytes())).as_error()
     waited_s = time.monotonic() - began_s
     _check_until(check, min(_NOTICED_S, limit_s - waited_s))
     raise AdapterGoneError(
@@ -52,7 +52,7 @@ def _replies(session: Any, key: str, payload: bytes, limit_s: float, check: Call
     handler = zenoh.handlers.Callback(replies.put, lambda: replies.put(None))
     block = zenoh.CongestionControl.BLOCK
     try:
-        session.get(key, handler, payload=payload, timeout=limit_s, congestion_control=block)
+        session.get(key, handler, payload=payload, encoding=ENCODING, timeout=limit_s, congestion_control=block)
     except zenoh.ZError as error:
         raise LinkError("the bus cannot be used", where=key, value=str(error).split(" at /")[0]) from None
     while True:
@@ -77,4 +77,4 @@ def _check_until(check: Callable[[], None], limit_s: float) -> None:
 
 def refusal(role: str, error: AgvbenchError) -> bytes:
     """Return the bytes of an error reply that `ask` turns into `error` again."""
-    return encode_event(Event.of_error(error, role))
+    return encode(Event.of_error(error, role))

@@ -190,7 +190,7 @@ class RealTime:
         return replace(
             frames,
             t_s=frames.t_s + (self._offset_s - start_s),
-            received_s=np.repeat(arrived_s, [message.frame_count for message in messages]) - start_s,
+            received_s=np.repeat(arrived_s, [message.count for message in messages]) - start_s,
         )
 
 
@@ -252,7 +252,7 @@ def measure_offset(session: Any, key: str, clock: Clock, round_trips: int = _ROU
     best_s, offset_s = float("inf"), 0.0
     for _ in range(round_trips):
         sent_s = clock.now()
-        there_s = decode_time(ask(session, key, b"", _LIMIT_S))
+        there_s = decode_time(ask(session, key, b"", _LIMIT_S)).now_s
         trip_s = clock.now() - sent_s
         if trip_s < best_s:
             best_s, offset_s = trip_s, sent_s + trip_s / 2.0 - there_s

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from agvbench.bus.bus_config import BusConfig
 from agvbench.bus.certificates import why_not
-from agvbench.bus.messages.wire import MAX_MESSAGE_BYTES
+from agvbench.bus.messages.codec import MAX_MESSAGE_BYTES
 from agvbench.errors import LinkError
 
 if TYPE_CHECKING:

@@ -17,8 +17,9 @@ from rig_driving import FAILING, NEUTRAL, START, TINY
 from agvbench.adapters import AdapterOptions, host_adapters, open_rig
 from agvbench.bus.bus_config import BusConfig
 from agvbench.bus.link import VehicleLink
-from agvbench.bus.messages.command import CommandMessage, decode_command, encode_command
-from agvbench.bus.messages.frames import FramesMessage, decode_frames, encode_frames, pack_columns, unpack_columns
+from agvbench.bus.messages.codec import MAX_MESSAGE_BYTES, decoder, encode
+from agvbench.bus.messages.command import CommandMessage, decode_command
+from agvbench.bus.messages.frames import FramesMessage, pack_columns, unpack_columns
 from agvbench.bus.messages.identity import AgvIdentity, Identity, MocapIdentity
 from agvbench.bus.session import open_bus_session
 from agvbench.cli import main
@@ -92,8 +93,8 @@ def a_configuration_that_listens() -> None:
         BusConfig.load(path)
 
 
-COMMAND = encode_command(CommandMessage(1, 0.0, NEUTRAL, 0.1))
-FRAMES = encode_frames(FramesMessage(1, b""))
+COMMAND = encode(CommandMessage(1, 0.0, NEUTRAL, 0.1))
+FRAMES = encode(FramesMessage(1, 0, b""))
 NAN_TIME = pack_columns(Frames(*(np.full(1, np.nan),) * 4, np.ones(1, bool), np.zeros(1, int), *(np.zeros(1),) * 2))
 
 MISTAKES: dict[str, Callable[[], object]] = {
@@ -123,12 +124,18 @@ MISTAKES: dict[str, Callable[[], object]] = {
     "time leaps ahead": control_cycle(t_s=9.0),
     "plant raises": control_cycle(Command(1700.0, 1500.0, 1500.0), plant=FAILING),
     "message of another program": damaged(b"\x00" * 64, decode_command),
-    "message of another version": damaged(COMMAND[:4] + b"\x01" + COMMAND[5:], decode_command),
-    "message of another kind": damaged(COMMAND, decode_frames),
+    "message of another version": damaged(b"AGVB\x03\x01" + bytes(58), decode_command),
+    "message of another kind": damaged(COMMAND, decoder(FramesMessage)),
     "message is cut off": damaged(COMMAND[:-1], decode_command),
-    "message is too long": damaged(COMMAND + b"\x00", decode_command),
-    "message claims too many rows": damaged(FRAMES[:12] + b"\xff" * 4 + FRAMES[16:], decode_frames),
-    "message with unknown flags": damaged(COMMAND[:6] + b"\x80\x00" + COMMAND[8:], decode_command),
+    "message is too long": damaged(bytes(MAX_MESSAGE_BYTES + 1), decode_command),
+    "bytes behind a message": damaged(COMMAND + b"\x00", decode_command),
+    "message with an unknown field": damaged(COMMAND.replace(b"hold_s", b"hold_x"), decode_command),
+    "message with a wrong type": damaged(COMMAND.replace(b"flags\x00", b"flags\xc0"), decode_command),
+    "columns do not fit their count": damaged(FRAMES.replace(b"count\x00", b"count\x01"), decoder(FramesMessage)),
+    "message claims too many rows": damaged(
+        FRAMES.replace(b"count\x00", b"count\xce" + b"\xff" * 4), decoder(FramesMessage)
+    ),
+    "message with unknown flags": damaged(COMMAND.replace(b"flags\x00", b"flags\x08"), decode_command),
     "frames without a time": lambda: unpack_columns([NAN_TIME]),
 }
 

@@ -6,11 +6,11 @@ import json
 import subprocess
 import sys
 import threading
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from rig_driving import NEUTRAL, START, TINY
 
 from agvbench.adapters import AdapterOptions
@@ -18,14 +18,10 @@ from agvbench.adapters.contract import AgvAdapter
 from agvbench.adapters.registry import agv_adapters, mocap_adapters, open_agv, open_mocap, parse_spec
 from agvbench.adapters.serial_line import conversation
 from agvbench.adapters.simavr.firmware_files import why_not_built
+from agvbench.bus.messages.codec import encode
 from agvbench.bus.messages.command import CommandFlags, CommandMessage
 from agvbench.bus.messages.event import Level
-from agvbench.bus.messages.identity import (
-    decode_agv_identity,
-    decode_mocap_identity,
-    encode_agv_identity,
-    encode_mocap_identity,
-)
+from agvbench.bus.messages.identity import decode_agv_identity, decode_mocap_identity
 from agvbench.bus.messages.request import Replay, Reset, Sampling
 from agvbench.bus.messages.truth import Truth, TruthFlags
 from agvbench.errors import AgvbenchError, LinkError
@@ -85,7 +81,7 @@ def test_adapters_are_documented_and_named_by_their_scheme(adapters: dict[str, t
 
 def test_identity_survives_the_bus_and_stays(agv: AgvAdapter) -> None:
     identity = agv.identity()
-    assert decode_agv_identity(encode_agv_identity(identity)) == identity
+    assert decode_agv_identity(encode(identity)) == identity
     agv.reset(RESET)
     agv.apply(CommandMessage(1, 0.0, NEUTRAL, 0.05))
     assert agv.identity() == identity
@@ -132,7 +128,7 @@ def test_a_simulated_camera_answers_every_exchange(scheme: str) -> None:
     camera, heard = open_mocap(scheme, OPTIONS), Heard()
     camera.start(heard)
     identity = camera.identity()
-    assert decode_mocap_identity(encode_mocap_identity(identity)) == identity
+    assert decode_mocap_identity(encode(identity)) == identity
     sampling = camera.reset(RESET)
     assert sampling.rate_hz == identity.rate_hz
     assert 0.0 <= sampling.phase_s < 1.0 / sampling.rate_hz

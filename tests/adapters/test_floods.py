@@ -16,10 +16,10 @@ from agvbench.bus.clock import WallClock
 from agvbench.bus.inbox import Inbox
 from agvbench.bus.keys import AGV, TIME, Keys
 from agvbench.bus.liveliness import Liveliness
-from agvbench.bus.messages.command import CommandFlags, CommandMessage, pack_command
-from agvbench.bus.messages.event import Event, Level, encode_event
-from agvbench.bus.messages.frames import FrameClock, FramesFlags, pack_columns, pack_frames
-from agvbench.bus.messages.wire import MAX_MESSAGE_BYTES, MAX_ROWS
+from agvbench.bus.messages.codec import MAX_MESSAGE_BYTES, MAX_ROWS, encode
+from agvbench.bus.messages.command import CommandFlags, CommandMessage, decode_command
+from agvbench.bus.messages.event import Event, Level
+from agvbench.bus.messages.frames import FrameClock, FramesFlags, FramesMessage, pack_columns
 from agvbench.bus.outbox import CommandOutbox
 from agvbench.bus.queries import ask
 from agvbench.bus.real_time import RealTime
@@ -64,8 +64,8 @@ def test_a_stop_passes_commands_that_wait() -> None:
         events = session.declare_subscriber(KEYS.report, lambda sample: told.append(sample.payload.to_bytes()))
         host = claimed_host(session, KEYS, adapter, 7)
         for number in range(1, 2001):
-            session.put(KEYS.command, pack_command(number, 0.0, MOVING, 10.0, CommandFlags.NONE, 7))
-        session.put(KEYS.command, pack_command(2001, 0.0, NEUTRAL, 0.0, CommandFlags.STOP, 7))
+            session.put(KEYS.command, encode(CommandMessage(number, 0.0, MOVING, 10.0, CommandFlags.NONE, 7)))
+        session.put(KEYS.command, encode(CommandMessage(2001, 0.0, NEUTRAL, 0.0, CommandFlags.STOP, 7)))
         assert adapter.stopped.wait(10.0)
         applied = len(adapter.applied)
         host.close()
@@ -83,7 +83,7 @@ def test_a_stop_between_commands_that_wait_is_carried_out_and_so_is_what_came_af
         host = claimed_host(session, KEYS, adapter, 7)
         flags = [CommandFlags.NONE] * 50 + [CommandFlags.STOP] + [CommandFlags.NONE] * 50
         for number, flag in enumerate(flags, start=1):
-            session.put(KEYS.command, pack_command(number, 0.0, MOVING, 10.0, flag, 7))
+            session.put(KEYS.command, encode(CommandMessage(number, 0.0, MOVING, 10.0, flag, 7)))
         assert adapter.stopped.wait(10.0)
         assert until(lambda: bool(adapter.applied) and adapter.applied[-1].sequence == 101)
         host.close()
@@ -96,7 +96,7 @@ def test_nonsense_is_counted_told_seldom_and_does_not_hold_up_a_stop() -> None:
         host = claimed_host(session, KEYS, adapter, 7)
         for _ in range(5000):
             session.put(KEYS.command, b"nonsense")
-        session.put(KEYS.command, pack_command(1, 0.0, NEUTRAL, 0.0, CommandFlags.STOP, 7))
+        session.put(KEYS.command, encode(CommandMessage(1, 0.0, NEUTRAL, 0.0, CommandFlags.STOP, 7)))
         assert adapter.stopped.wait(10.0)
         assert host.malformed.count == 5000
         host.close()
@@ -108,7 +108,7 @@ def test_what_a_runner_keeps_of_a_flood_is_bounded_and_its_stop_goes_out() -> No
     stopped = threading.Event()
 
     def heard(sample: object) -> None:
-        if sample.payload.to_bytes()[6] & CommandFlags.STOP:  # type: ignore[attr-defined]
+        if decode_command(sample.payload.to_bytes()).flags & CommandFlags.STOP:  # type: ignore[attr-defined]
             stopped.set()
 
     numbers = np.zeros(MAX_ROWS)
@@ -120,10 +120,11 @@ def test_what_a_runner_keeps_of_a_flood_is_bounded_and_its_stop_goes_out() -> No
         liveliness = Liveliness(session, KEYS, WallClock())
         runner = RealTime(inbox, outbox, liveliness, session=session, keys=KEYS, neutral=1500.0, clock=WallClock())
         for number in range(1, 101):
-            session.put(KEYS.report, pack_frames(number, columns, 0, FrameClock.ADAPTER, 0.0, FramesFlags.LAST, 5))
+            frames = FramesMessage(number, MAX_ROWS, columns, 0, FrameClock.ADAPTER, 0.0, FramesFlags.LAST, 5)
+            session.put(KEYS.report, encode(frames))
             session.put(KEYS.report, b"nonsense")
             event = Event(number, f"role-{number}", Level.INFO, "noise", "x" * 4000)
-            session.put(KEYS.report, encode_event(event))
+            session.put(KEYS.report, encode(event))
         runner.stop()
         assert stopped.wait(10.0)
         assert until(lambda: inbox.malformed.count == 100)
@@ -212,8 +213,13 @@ def test_messages_that_are_too_long_do_not_arrive_and_the_rest_does(free_endpoin
 
 
 def test_a_replay_of_endless_commands_is_refused() -> None:
-    from agvbench.bus.messages.request import decode_replay
-    from agvbench.bus.messages.wire import Kind, pack_header
+    from agvbench.bus.messages.request import Replay, Reset, Sampling, decode_replay
+    from agvbench.types import Commands, Pose
 
-    with pytest.raises(MessageError, match="too many rows"):
-        decode_replay(pack_header(Kind.REPLAY, count=MAX_ROWS + 1) + bytes(100))
+    t_s = np.arange(float(MAX_ROWS))
+    reset = Reset("run", Pose(0.0, 0.0, 0.0), Sampling(120.0, 0.0))
+    payload = encode(Replay(reset, Commands(t_s, t_s, t_s, t_s), 0.0))
+    size, more = (8 * MAX_ROWS).to_bytes(4, "big"), (8 * MAX_ROWS + 8).to_bytes(4, "big")
+    longer = payload.replace(size, more).replace(t_s.tobytes(), t_s.tobytes() + np.float64(MAX_ROWS).tobytes())
+    with pytest.raises(MessageError, match="too many commands to replay"):
+        decode_replay(longer)

@@ -17,10 +17,11 @@ from agvbench.adapters.contract import AgvAdapter
 from agvbench.bus import real_time
 from agvbench.bus.clock import SimulatedClock, WallClock
 from agvbench.bus.keys import AGV, CLAIM, Keys
-from agvbench.bus.messages.command import CommandFlags, CommandMessage, encode_command, pack_command
-from agvbench.bus.messages.event import Event, decode_event, encode_event
+from agvbench.bus.messages.codec import encode
+from agvbench.bus.messages.command import CommandFlags, CommandMessage
+from agvbench.bus.messages.event import Event, decode_event
 from agvbench.bus.messages.identity import AgvIdentity
-from agvbench.bus.messages.request import encode_claim, encode_time
+from agvbench.bus.messages.request import ClaimMessage, TimeMessage
 from agvbench.bus.queries import ask
 from agvbench.bus.real_time import Failure, measure_offset
 from agvbench.bus.session import open_bus_session
@@ -67,7 +68,7 @@ def test_a_second_run_begins_at_its_own_zero() -> None:
 def test_what_ends_a_run_does_not_replace_what_ends_the_session(order: tuple[type[AgvbenchError], ...]) -> None:
     with open_rig("live", plant=TINY) as link:
         for error in order:
-            link._session.put(link.keys.report, encode_event(Event.of_error(error(f"made up {error.__name__}"), AGV)))
+            link._session.put(link.keys.report, encode(Event.of_error(error(f"made up {error.__name__}"), AGV)))
         while len(link._inbox.events) < len(order):
             time.sleep(0.01)
         with pytest.raises(LinkError, match="made up LinkError"):
@@ -128,7 +129,7 @@ class Silent(AgvAdapter):
 def claimed_host(session: zenoh.Session, keys: Keys, adapter: AgvAdapter, source: int = 0) -> AgvHost:
     """Put a vehicle on the bus, and claim it for the runner `source`."""
     host = AgvHost(session, keys, adapter, WallClock(), show=lambda _: None)
-    ask(session, keys.queryable(AGV, CLAIM), encode_claim(source), 5.0)
+    ask(session, keys.queryable(AGV, CLAIM), encode(ClaimMessage(source)), 5.0)
     return host
 
 
@@ -137,7 +138,7 @@ def test_a_vehicle_whose_runner_falls_silent_is_stopped() -> None:
     with open_bus_session() as session:
         events = session.declare_subscriber(keys.report)
         host = claimed_host(session, keys, adapter)
-        session.put(keys.command, encode_command(CommandMessage(1, 0.0, MOVING, 10.0)))
+        session.put(keys.command, encode(CommandMessage(1, 0.0, MOVING, 10.0)))
         assert adapter.stopped.wait(10.0)
         assert b"runner_silent" in events.recv().payload.to_bytes()
         assert len(adapter.applied) == 1
@@ -151,7 +152,7 @@ def test_a_vehicle_at_rest_is_stopped_without_an_event_when_no_command_comes() -
     with open_bus_session() as session:
         events = session.declare_subscriber(keys.report, lambda sample: told.append(sample.payload.to_bytes()))
         host = claimed_host(session, keys, adapter)
-        session.put(keys.command, encode_command(CommandMessage(1, 0.0, NEUTRAL, 10.0)))
+        session.put(keys.command, encode(CommandMessage(1, 0.0, NEUTRAL, 10.0)))
         assert adapter.stopped.wait(10.0)
         host.close()
         events.undeclare()
@@ -164,16 +165,16 @@ def test_a_vehicle_that_no_runner_has_takes_stops_only_and_is_stopped_when_its_r
         events = session.declare_subscriber(keys.report)
         token = session.liveliness().declare_token(keys.runner(7))
         host = claimed_host(session, keys, adapter, 7)
-        session.put(keys.command, pack_command(1, 0.0, MOVING, 10.0, CommandFlags.NONE, 7))
+        session.put(keys.command, encode(CommandMessage(1, 0.0, MOVING, 10.0, CommandFlags.NONE, 7)))
         while not adapter.applied:
             time.sleep(0.01)
         token.undeclare()
         assert b"its runner is gone: vehicle stopped" in events.recv().payload.to_bytes()
         assert adapter.stopped.is_set()
         adapter.stopped.clear()
-        session.put(keys.command, pack_command(1, 0.0, MOVING, 10.0, CommandFlags.NONE, 666))
+        session.put(keys.command, encode(CommandMessage(1, 0.0, MOVING, 10.0, CommandFlags.NONE, 666)))
         assert b"foreign_commands" in events.recv().payload.to_bytes()
-        session.put(keys.command, pack_command(2, 0.0, NEUTRAL, 0.0, CommandFlags.STOP, 666))
+        session.put(keys.command, encode(CommandMessage(2, 0.0, NEUTRAL, 0.0, CommandFlags.STOP, 666)))
         assert adapter.stopped.wait(10.0)
         host.close()
     assert len(adapter.applied) == 1
@@ -194,7 +195,7 @@ def test_a_stop_that_fails_is_told_and_tried_again() -> None:
     with open_bus_session() as session:
         events = session.declare_subscriber(keys.report)
         host = claimed_host(session, keys, adapter)
-        session.put(keys.command, encode_command(CommandMessage(1, 0.0, NEUTRAL, 10.0)))
+        session.put(keys.command, encode(CommandMessage(1, 0.0, NEUTRAL, 10.0)))
         assert b"jammed" in events.recv().payload.to_bytes()
         assert adapter.fourth_came.wait(10.0)
         host.close()
@@ -219,7 +220,7 @@ def test_what_hangs_and_comes_back_driving_is_stopped_again() -> None:
     adapter, keys = Hanging(), Keys("lab", "agv1")
     with open_bus_session() as session:
         host = claimed_host(session, keys, adapter)
-        session.put(keys.command, encode_command(CommandMessage(1, 0.0, NEUTRAL, 10.0)))
+        session.put(keys.command, encode(CommandMessage(1, 0.0, NEUTRAL, 10.0)))
         assert adapter.stopped.wait(10.0)
         adapter.let_go.set()
         assert adapter.stops_after.wait(10.0)
@@ -241,8 +242,8 @@ def test_a_gap_is_told_to_each_runner_even_if_the_one_before_had_a_longer_one() 
         host = claimed_host(session, keys, adapter)
         for number, pause_s in enumerate((0.45, 0.1, 0.3, 0.1), start=1):
             if number == 3:
-                ask(session, keys.queryable(AGV, CLAIM), encode_claim(0), 5.0)
-            session.put(keys.command, encode_command(CommandMessage(number, 0.0, MOVING, 1.0)))
+                ask(session, keys.queryable(AGV, CLAIM), encode(ClaimMessage(0)), 5.0)
+            session.put(keys.command, encode(CommandMessage(number, 0.0, MOVING, 1.0)))
             time.sleep(pause_s)
         host.close()
         events.undeclare()
@@ -259,7 +260,7 @@ def test_commands_further_apart_than_the_watchdog_allows_are_told_with_both_figu
         host = claimed_host(session, keys, adapter)
         for number, value in enumerate((1500.0, 1500.0, 1800.0, 1500.0), start=1):
             command = NEUTRAL._replace(**{channel: value})
-            session.put(keys.command, encode_command(CommandMessage(number, 0.0, command, 1.0)))
+            session.put(keys.command, encode(CommandMessage(number, 0.0, command, 1.0)))
             while len(adapter.applied) < number:
                 time.sleep(0.01)
         host.close()
@@ -275,7 +276,7 @@ def test_a_flush_which_the_vehicle_does_not_hear_ends_no_gap() -> None:
         events = session.declare_subscriber(keys.report, lambda sample: told.append(sample.payload.to_bytes()))
         host = claimed_host(session, keys, adapter)
         for number, flags in enumerate((CommandFlags.NONE, CommandFlags.FLUSH, CommandFlags.NONE), start=1):
-            session.put(keys.command, encode_command(CommandMessage(number, 0.0, MOVING, 1.0, flags)))
+            session.put(keys.command, encode(CommandMessage(number, 0.0, MOVING, 1.0, flags)))
             time.sleep(0.2)
         host.close()
         events.undeclare()
@@ -288,9 +289,9 @@ def test_lost_commands_and_nonsense_are_told_and_do_not_stop_the_host() -> None:
         events = session.declare_subscriber(keys.report)
         host = claimed_host(session, keys, adapter)
         session.put(keys.command, b"nonsense")
-        assert b"message is cut off" in events.recv().payload.to_bytes()
+        assert b"command message cannot be decoded" in events.recv().payload.to_bytes()
         for number in (1, 4):
-            session.put(keys.command, encode_command(CommandMessage(number, 0.0, NEUTRAL, 10.0)))
+            session.put(keys.command, encode(CommandMessage(number, 0.0, NEUTRAL, 10.0)))
         assert b"2 commands were lost before 4" in events.recv().payload.to_bytes()
         assert adapter.fourth_came.wait(10.0)
         host.close()
@@ -308,7 +309,7 @@ def test_the_offset_of_another_clock_is_found() -> None:
             for _ in range(8):
                 with clock.handler.recv() as query:
                     here.sleep(0.010)  # half of the way there takes time, the way back takes none
-                    query.reply(query.key_expr, encode_time(here.now() + ahead_s))
+                    query.reply(query.key_expr, encode(TimeMessage(here.now() + ahead_s)))
 
         thread = threading.Thread(target=answer)
         thread.start()

@@ -19,8 +19,9 @@ from agvbench.adapters import open_rig
 from agvbench.bus.bus_config import BusConfig
 from agvbench.bus.keys import AGV, IDENTITY, Keys
 from agvbench.bus.link import VehicleLink
-from agvbench.bus.messages.command import CommandFlags, pack_command
-from agvbench.bus.messages.event import Event, Level, encode_event
+from agvbench.bus.messages.codec import encode
+from agvbench.bus.messages.command import CommandFlags, CommandMessage
+from agvbench.bus.messages.event import Event, Level
 from agvbench.bus.queries import ask
 from agvbench.bus.session import open_bus_session
 from agvbench.campaign import Campaign
@@ -123,7 +124,7 @@ def test_who_shows_no_certificate_or_a_strangers_is_refused(
 
 def test_who_may_only_listen_hears_everything_and_commands_nothing(machines: dict[str, Path], endpoint: str) -> None:
     heard: list[str] = []
-    made_up = encode_event(Event(1, AGV, Level.ERROR, "PlantError", "made up"))
+    made_up = encode(Event(1, AGV, Level.ERROR, "PlantError", "made up"))
     bench = BusConfig.load(machines["bench-pc"])
     with (
         process("sim", "--plant", TINY, "--listen", endpoint, "--bus-config", str(machines["vehicle-pc"])),
@@ -137,7 +138,7 @@ def test_who_may_only_listen_hears_everything_and_commands_nothing(machines: dic
         assert until(lambda: KEYS.report in heard)
         subscriber.undeclare()
         # It reaches neither the vehicle (a command that leaps in time is answered by an error) nor the bench.
-        display.put(KEYS.command, pack_command(1, 9.0, NEUTRAL, 0.1, CommandFlags.NONE, 77))
+        display.put(KEYS.command, encode(CommandMessage(1, 9.0, NEUTRAL, 0.1, CommandFlags.NONE, 77)))
         display.put(KEYS.report, made_up)
         with pytest.raises(AdapterGoneError, match="no answer"):
             ask(display, KEYS.queryable(AGV, IDENTITY), b"", 0.3)

@@ -14,8 +14,9 @@ import pytest
 
 from agvbench.adapters import AdapterOptions, agv_host, host_adapters, open_rig
 from agvbench.bus.keys import Keys
-from agvbench.bus.messages.command import CommandFlags, pack_command
-from agvbench.bus.messages.event import Event, Level, encode_event
+from agvbench.bus.messages.codec import encode
+from agvbench.bus.messages.command import CommandFlags, CommandMessage
+from agvbench.bus.messages.event import Event, Level
 from agvbench.bus.session import open_bus_session as open_bus
 from agvbench.campaign import Campaign
 from agvbench.errors import AgvbenchError
@@ -79,9 +80,9 @@ def test_events_are_told_kept_counted_and_spoil_the_runs_that_were_not_driven_as
     told: list[str] = []
     stranger = open_bus(connect=[endpoint])
     links: list[Any] = []
-    bitten = encode_event(Event(1, "agv", Level.WARNING, "vehicle_stopped_itself", "the watchdog stopped it"))
+    bitten = encode(Event(1, "agv", Level.WARNING, "vehicle_stopped_itself", "the watchdog stopped it"))
     keys = Keys("lab", "agv1")
-    wild = pack_command(1, 0.0, Command(2000.0, 1500.0, 1500.0), 1.0, CommandFlags.NONE, 666)
+    wild = encode(CommandMessage(1, 0.0, Command(2000.0, 1500.0, 1500.0), 1.0, CommandFlags.NONE, 666))
 
     def interfere() -> None:
         stranger.put(keys.report, bitten)
@@ -124,7 +125,7 @@ def test_events_are_told_kept_counted_and_spoil_the_runs_that_were_not_driven_as
 
 
 def test_events_in_lock_step_leave_no_times_of_the_wall_clock(tmp_path: Path) -> None:
-    event = encode_event(Event(1, "agv", Level.INFO, "battery_low", "7.1 V", t_s=123.4))
+    event = encode(Event(1, "agv", Level.INFO, "battery_low", "7.1 V", t_s=123.4))
     with open_session({"attempts": 1}, out=str(tmp_path / "c"), resume=False, dry_run=False) as session:
         assert session._bench is not None
         link: Any = session._bench.link

@@ -1,6 +1,6 @@
 """A vehicle in real time with a watchdog of its own, as the firmware has one, but with more patience."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from agvbench.adapters.agv.live import LiveAgv
 from agvbench.bus.messages.event import Level

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from agvbench.adapters.contract import AdapterOptions, AgvAdapter, AgvReports
 from agvbench.adapters.impairment.faults import Faults, SerialLine, vehicle_fault
@@ -58,7 +58,7 @@ class ImpairedAgv(AgvAdapter):
             for when, fault in self._faults:
                 if when.holds(self._faults.run, message.t_s):
                     fault.inject(self._line)
-                    message = message._replace(command=fault.alter(message.command, self._neutral))
+                    message = replace(message, command=fault.alter(message.command, self._neutral))
         self.vehicle.apply(message)
 
     def reset(self, request: Reset) -> None:

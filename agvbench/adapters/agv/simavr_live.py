@@ -7,7 +7,8 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from agvbench.adapters.agv.live import LiveAgv
 from agvbench.adapters.agv.serial import SerialAgv

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
+from msgspec.structs import replace
 
 from agvbench.adapters.contract import AdapterOptions, MocapAdapter, MocapReports
 from agvbench.adapters.impairment.faults import Faults, frame_fault

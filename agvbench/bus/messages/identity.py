@@ -1,51 +1,53 @@
-"""The identity messages: who answers behind a key, and what the runner can expect of it.
-
-Bodies after the header: numbers first, then texts, then pairs of texts (header's count says how many).
-"""
+"""The identity messages: who answers behind a key, and what the runner can expect of it."""
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import cast
+import math
+from dataclasses import dataclass
+from typing import Annotated
 
-from agvbench.bus.messages.wire import MAX_TEXT_BYTES, Kind, Reader, pack_header, pack_text, unpack_header
+from msgspec import Meta, field
+
+from agvbench.bus.messages.codec import Message, Text, decoder
 from agvbench.errors import LinkError, MessageError
 from agvbench.types import CommandUnit
 
-_AGV = struct.Struct("<d??")
-_MOCAP = struct.Struct("<d?")
-_MAX_EXTRA = 64
+_Extra = Annotated[dict[Text, Text], Meta(max_length=64)]
 
 
-@dataclass(frozen=True)
-class AgvIdentity:
+class AgvIdentity(Message, tag="agv_identity", frozen=True):
     """What an AGV adapter says of itself.
 
     ``neutral`` is the command at which nothing moves, in ``command_unit``; ``lock_step`` means that time passes
     only in exchanges; ``extra`` is for provenance (seed, plant, port, versions).
     """
 
-    vehicle: str
-    adapter: str
-    firmware: str
-    calibration_hash: str
+    vehicle: Text
+    adapter: Text
+    firmware: Text
+    calibration_hash: Text
     command_unit: CommandUnit
     neutral: float
     simulated: bool
     lock_step: bool
-    extra: Mapping[str, str] = field(default_factory=dict)
+    extra: _Extra = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.neutral):
+            raise MessageError("neutral is not finite", where=self.vehicle, value=self.neutral)
 
 
-@dataclass(frozen=True)
-class MocapIdentity:
+class MocapIdentity(Message, tag="mocap_identity", frozen=True):
     """What a mocap adapter says of itself; ``rate_hz`` [Hz] is how many frames it promises a second."""
 
-    adapter: str
+    adapter: Text
     rate_hz: float
     simulated: bool
-    extra: Mapping[str, str] = field(default_factory=dict)
+    extra: _Extra = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.rate_hz < math.inf:
+            raise MessageError("frame rate is out of range", value=f"{self.rate_hz} Hz", limit="above 0 Hz")
 
 
 @dataclass(frozen=True)
@@ -95,81 +97,5 @@ class Identity:
         )
 
 
-def encode_agv_identity(identity: AgvIdentity) -> bytes:
-    """Return the identity's bytes."""
-    texts = (identity.vehicle, identity.adapter, identity.firmware, identity.calibration_hash, identity.command_unit)
-    return b"".join(
-        (
-            pack_header(Kind.AGV_IDENTITY, count=len(identity.extra)),
-            _AGV.pack(identity.neutral, identity.simulated, identity.lock_step),
-            *map(pack_text, texts),
-            _pack_extra(identity.extra),
-        )
-    )
-
-
-def decode_agv_identity(payload: bytes) -> AgvIdentity:
-    """Return the identity that `payload` holds.
-
-    Raises
-    ------
-    MessageError
-        If it is not an identity of an AGV that this version writes.
-    """
-    header = unpack_header(payload, Kind.AGV_IDENTITY)
-    reader = Reader(payload)
-    neutral, simulated, lock_step = reader.fields(_AGV)
-    vehicle, adapter, firmware, calibration_hash, unit = (reader.text() for _ in range(5))
-    extra = _read_extra(reader, header.rows)
-    if unit not in ("us", "normalised"):
-        raise MessageError("unknown command unit", value=repr(unit), limit="us or normalised")
-    return AgvIdentity(
-        vehicle,
-        adapter,
-        firmware,
-        calibration_hash,
-        cast(CommandUnit, unit),
-        neutral,
-        simulated,
-        lock_step,
-        extra,
-    )
-
-
-def encode_mocap_identity(identity: MocapIdentity) -> bytes:
-    """Return the identity's bytes."""
-    header = pack_header(Kind.MOCAP_IDENTITY, count=len(identity.extra))
-    numbers = _MOCAP.pack(identity.rate_hz, identity.simulated)
-    return header + numbers + pack_text(identity.adapter) + _pack_extra(identity.extra)
-
-
-def decode_mocap_identity(payload: bytes) -> MocapIdentity:
-    """Return the identity that `payload` holds.
-
-    Raises
-    ------
-    MessageError
-        If it is not an identity of a motion capture system that this version writes.
-    """
-    header = unpack_header(payload, Kind.MOCAP_IDENTITY)
-    reader = Reader(payload)
-    rate_hz, simulated = reader.fields(_MOCAP)
-    adapter = reader.text()
-    extra = _read_extra(reader, header.rows)
-    if not 0.0 < rate_hz < float("inf"):
-        raise MessageError("frame rate is out of range", value=f"{rate_hz} Hz", limit="above 0 Hz")
-    return MocapIdentity(adapter, rate_hz, simulated, extra)
-
-
-def _pack_extra(extra: Mapping[str, str]) -> bytes:
-    if len(extra) > _MAX_EXTRA:
-        raise MessageError("identity has too many extra texts", value=len(extra), limit=f"at most {_MAX_EXTRA}")
-    return b"".join(pack_text(text[:MAX_TEXT_BYTES]) for pair in extra.items() for text in pair)
-
-
-def _read_extra(reader: Reader, count: int) -> dict[str, str]:
-    if count > _MAX_EXTRA:
-        raise MessageError("identity has too many extra texts", value=count, limit=f"at most {_MAX_EXTRA}")
-    extra = {reader.text(): reader.text() for _ in range(count)}
-    reader.finish()
-    return extra
+decode_agv_identity = decoder(AgvIdentity)
+decode_mocap_identity = decoder(MocapIdentity)

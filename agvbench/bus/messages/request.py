@@ -1,172 +1,85 @@
-"""Requests to adapters that are not commands, and their replies: claim, reset, sampling, replay, time.
-
-Bodies after the header: claim has none, its runner is the header's source; reset is a pose and a sampling (5 f64) and
-the run key; sampling is rate and phase (2 f64); replay is a reset, ``until_s`` (f64), and columns ``t_s``, ``drive``,
-``front``, ``rear``; time is one f64.
-"""
+"""Requests to adapters that are not commands, and their replies: claim, reset, sampling, replay, time."""
 
 from __future__ import annotations
 
 import math
-import struct
-from dataclasses import dataclass
 
 import numpy as np
 
-from agvbench.bus.messages.wire import (
-    FLOAT,
-    HEADER_BYTES,
-    MAX_ROWS,
-    Header,
-    Kind,
-    Reader,
-    check_length,
-    pack_column,
-    pack_header,
-    pack_text,
-    unpack_header,
-)
+from agvbench.bus.messages.codec import MAX_ROWS, Message, Number, Source, Text, decoder
 from agvbench.errors import MessageError
 from agvbench.types import Commands, Pose
 
-_RESET = struct.Struct("<5d")
-_SAMPLING = struct.Struct("<2d")
-_NUMBER = struct.Struct("<d")
+
+class ClaimMessage(Message, tag="claim", frozen=True):
+    """The runner whose commands are of ``source`` claims a vehicle, or releases it."""
+
+    source: Source
 
 
-@dataclass(frozen=True)
-class Sampling:
+class TimeMessage(Message, tag="time", frozen=True):
+    """A clock's reading."""
+
+    now_s: float
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.now_s):
+            raise MessageError("time is not finite", value=self.now_s)
+
+
+class Sampling(Message, tag="sampling", frozen=True):
     """When a camera looks: at ``phase_s + k / rate_hz`` [s] in the run's clock, for every integer k."""
 
     rate_hz: float
     phase_s: float
 
+    def __post_init__(self) -> None:
+        if not (0.0 < self.rate_hz < math.inf and math.isfinite(self.phase_s)):
+            value = f"{self.rate_hz} Hz, {self.phase_s} s"
+            raise MessageError("sampling is out of range", value=value, limit="above 0 Hz, finite")
 
-@dataclass(frozen=True)
-class Reset:
+
+class Reset(Message, tag="reset", frozen=True):
     """Place a simulated vehicle at rest at `pose`; ``run_key`` seeds all that is random in the run to come.
 
     Commands from ``source`` up to number ``after`` belong to what was before: a host that finds one still waiting
     drops it.
     """
 
-    run_key: str
+    run_key: Text
     pose: Pose
     sampling: Sampling
-    source: int = 0
-    after: int = 0
+    source: Source = 0
+    after: Number = 0
+
+    def __post_init__(self) -> None:
+        if not self.pose.is_finite:
+            raise MessageError("pose to reset to is not finite", where=self.run_key, value=tuple(self.pose))
 
 
-@dataclass(frozen=True)
-class Replay:
+class Replay(Message, tag="replay", frozen=True):
     """Drive a recorded run again, without frames, until ``until_s`` [s] in its clock."""
 
     reset: Reset
     commands: Commands
     until_s: float
 
-
-def encode_claim(source: int) -> bytes:
-    """Return the bytes by which the runner whose commands are of `source` claims a vehicle, or releases it."""
-    return pack_header(Kind.CLAIM, count=1, source=source)
-
-
-def decode_claim(payload: bytes) -> int:
-    """Return the source of the runner that claims or releases the vehicle, or raise `MessageError`."""
-    header = unpack_header(payload, Kind.CLAIM)
-    check_length(payload, HEADER_BYTES)
-    return header.source
-
-
-def encode_sampling(sampling: Sampling) -> bytes:
-    """Return the sampling's bytes."""
-    return pack_header(Kind.SAMPLING, count=1) + _SAMPLING.pack(sampling.rate_hz, sampling.phase_s)
+    def __post_init__(self) -> None:
+        key, commands = self.reset.run_key, self.commands
+        columns = (commands.t_s, commands.drive, commands.front, commands.rear)
+        counts = [column.size for column in columns]
+        if counts[0] > MAX_ROWS:
+            raise MessageError("too many commands to replay", where=key, value=counts[0], limit=f"at most {MAX_ROWS}")
+        if len(set(counts)) > 1:
+            raise MessageError("columns of commands to replay differ in length", where=key, value=counts)
+        if not (math.isfinite(self.until_s) and all(np.isfinite(column).all() for column in columns)):
+            raise MessageError("commands to replay are not finite", where=key)
+        if (np.diff(commands.t_s) <= 0.0).any():
+            raise MessageError("commands to replay go back in time", where=key)
 
 
-def decode_sampling(payload: bytes) -> Sampling:
-    """Return the sampling that `payload` holds, or raise `MessageError`."""
-    unpack_header(payload, Kind.SAMPLING)
-    reader = Reader(payload)
-    sampling = _sampling(*reader.fields(_SAMPLING))
-    reader.finish()
-    return sampling
-
-
-def encode_reset(reset: Reset) -> bytes:
-    """Return the request's bytes."""
-    return pack_header(Kind.RESET, count=1, source=reset.source, sequence=reset.after) + _pack_reset(reset)
-
-
-def decode_reset(payload: bytes) -> Reset:
-    """Return the request that `payload` holds, or raise `MessageError`."""
-    header = unpack_header(payload, Kind.RESET)
-    reader = Reader(payload)
-    reset = _read_reset(reader, header)
-    reader.finish()
-    return reset
-
-
-def encode_replay(replay: Replay) -> bytes:
-    """Return the request's bytes, or raise `MessageError` if there are more commands than fit."""
-    commands = replay.commands
-    if len(commands) > MAX_ROWS:
-        raise MessageError("too many commands to replay", value=len(commands), limit=f"at most {MAX_ROWS}")
-    columns = (commands.t_s, commands.drive, commands.front, commands.rear)
-    return b"".join(
-        (
-            pack_header(Kind.REPLAY, count=len(commands), source=replay.reset.source, sequence=replay.reset.after),
-            _pack_reset(replay.reset),
-            _NUMBER.pack(replay.until_s),
-            *(pack_column(column, FLOAT) for column in columns),
-        )
-    )
-
-
-def decode_replay(payload: bytes) -> Replay:
-    """Return the request that `payload` holds, or raise `MessageError`."""
-    header = unpack_header(payload, Kind.REPLAY)
-    reader = Reader(payload)
-    reset = _read_reset(reader, header)
-    (until_s,) = reader.fields(_NUMBER)
-    columns = reader.column(4 * header.rows, FLOAT).reshape(4, header.rows)
-    reader.finish()
-    if not (math.isfinite(until_s) and np.isfinite(columns).all()):
-        raise MessageError("commands to replay are not finite", where=reset.run_key)
-    if (np.diff(columns[0]) <= 0.0).any():
-        raise MessageError("commands to replay go back in time", where=reset.run_key)
-    return Replay(reset, Commands(*columns), until_s)
-
-
-def encode_time(now_s: float) -> bytes:
-    """Return a clock's reading as bytes."""
-    return pack_header(Kind.TIME, count=1) + _NUMBER.pack(now_s)
-
-
-def decode_time(payload: bytes) -> float:
-    """Return the clock's reading [s] that `payload` holds, or raise `MessageError`."""
-    unpack_header(payload, Kind.TIME)
-    reader = Reader(payload)
-    (now_s,) = reader.fields(_NUMBER)
-    reader.finish()
-    if not math.isfinite(now_s):
-        raise MessageError("time is not finite", value=now_s)
-    return float(now_s)
-
-
-def _pack_reset(reset: Reset) -> bytes:
-    return _RESET.pack(*reset.pose, reset.sampling.rate_hz, reset.sampling.phase_s) + pack_text(reset.run_key)
-
-
-def _read_reset(reader: Reader, header: Header) -> Reset:
-    x_m, y_m, heading_rad, rate_hz, phase_s = reader.fields(_RESET)
-    run_key = reader.text()
-    pose = Pose(x_m, y_m, heading_rad)
-    if not pose.is_finite:
-        raise MessageError("pose to reset to is not finite", where=run_key, value=tuple(pose))
-    return Reset(run_key, pose, _sampling(rate_hz, phase_s), header.source, header.sequence)
-
-
-def _sampling(rate_hz: float, phase_s: float) -> Sampling:
-    if not (0.0 < rate_hz < math.inf and math.isfinite(phase_s)):
-        raise MessageError("sampling is out of range", value=f"{rate_hz} Hz, {phase_s} s", limit="above 0 Hz, finite")
-    return Sampling(rate_hz, phase_s)
+decode_claim = decoder(ClaimMessage)
+decode_time = decoder(TimeMessage)
+decode_sampling = decoder(Sampling)
+decode_reset = decoder(Reset)
+decode_replay = decoder(Replay)

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 from scripted_vehicle import HELLO, ScriptedVehicle, with_checksum
 
 from agvbench.adapters import AdapterOptions
@@ -22,9 +23,10 @@ from agvbench.adapters.registry import open_agv
 from agvbench.adapters.serial_line import conversation
 from agvbench.adapters.serial_line.port import SerialPort
 from agvbench.bus.clock import WallClock
+from agvbench.bus.messages.codec import encode
 from agvbench.bus.messages.command import CommandMessage
 from agvbench.bus.messages.event import Level
-from agvbench.bus.messages.identity import decode_agv_identity, encode_agv_identity
+from agvbench.bus.messages.identity import decode_agv_identity
 from agvbench.errors import AgvbenchError, LinkError
 from agvbench.types import Command
 
@@ -83,7 +85,7 @@ def test_commands_are_sent_and_stop_is_neutral() -> None:
     vehicle = ScriptedVehicle()
     with connected(vehicle) as (agv, events):
         identity = agv.identity()
-        assert decode_agv_identity(encode_agv_identity(identity)) == identity
+        assert decode_agv_identity(encode(identity)) == identity
         assert (identity.firmware, identity.simulated, identity.extra["firmware_calibration"]) == (
             "agvbench 2",
             False,
@@ -259,7 +261,7 @@ def test_a_command_out_of_range_is_refused_here_and_breaks_nothing() -> None:
     vehicle = ScriptedVehicle()
     with connected(vehicle) as (agv, _):
         with pytest.raises(LinkError, match=r"front pulse is out of what the firmware takes: 2500 µs"):
-            agv.apply(FORWARD._replace(command=Command(1500.0, 2500.0, 1500.0)))
+            agv.apply(replace(FORWARD, command=Command(1500.0, 2500.0, 1500.0)))
         agv.apply(FORWARD)
         assert vehicle.wait_for("1600 1400 1500")
 
