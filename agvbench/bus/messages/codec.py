@@ -40,7 +40,7 @@ class Message(msgspec.Struct, frozen=True, tag_field="type", forbid_unknown_fiel
     """
 
 
-class _Untold(Message, tag="", frozen=True):
+class _Unknown(Message, tag="", frozen=True):
     """Stands beside one kind, since msgspec asks for the ``type`` only where there are two."""
 
     def __post_init__(self) -> None:
@@ -83,7 +83,7 @@ def encode(message: Message) -> bytes:
 
 def decoder(*kinds: type[_Message]) -> Callable[[bytes], _Message]:
     """Return the function that decodes messages of these kinds, or raises `MessageError`."""
-    layout: Any = tuple[_Version, reduce(or_, kinds, _Untold)]  # type: ignore[misc]
+    layout: Any = tuple[_Version, reduce(or_, kinds, _Unknown)]  # type: ignore[misc]
     decode: Callable[[bytes], tuple[int, _Message]] = msgspec.msgpack.Decoder(layout, dec_hook=_array).decode
     names = " or ".join(str(kind.__struct_config__.tag) for kind in kinds)
 
