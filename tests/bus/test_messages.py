@@ -385,6 +385,16 @@ def test_a_text_of_an_event_is_cut_and_made_readable_and_no_other() -> None:
         decode_mocap_identity(encode(MocapIdentity("a", 120.0, True, {str(n): "" for n in range(65)})))
 
 
+def test_numbers_of_numpy_travel_as_numbers() -> None:
+    command = Command(np.float64(1700.0), 1500.0, 1500.0)
+    sent = CommandMessage(np.int64(7), np.float64(0.5), command, np.float64(0.1))  # type: ignore[arg-type]
+    assert decode_command(encode(sent)) == CommandMessage(7, 0.5, Command(1700.0, 1500.0, 1500.0), 0.1)
+    camera = MocapIdentity("a", np.float64(120.0), np.bool_(True))  # type: ignore[arg-type]
+    assert decode_mocap_identity(encode(camera)) == MocapIdentity("a", 120.0, True)
+    with pytest.raises(MessageError, match="value cannot be sent: object"):
+        encode(MocapIdentity("a", 120.0, object()))  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
 def test_numbers_that_are_not_finite_are_refused(wrong: float) -> None:
     three, none = np.arange(3.0), np.empty(0)

@@ -59,7 +59,16 @@ class _Body(msgspec.Struct):
 _Version = Literal[4]
 _Message = TypeVar("_Message", bound=Message)
 _MALFORMED = (msgspec.MsgspecError, UnicodeDecodeError, RecursionError)
-_encode = msgspec.msgpack.Encoder(enc_hook=lambda array: np.ascontiguousarray(array, "<f8").tobytes()).encode
+
+
+def _plain(value: object) -> object:
+    """Return what msgspec can encode of Numpy's: arrays as bytes, scalars as plain numbers."""
+    if not isinstance(value, (np.ndarray, np.generic)):
+        raise MessageError("value cannot be sent", value=type(value).__name__, limit="numbers, texts and Numpy arrays")
+    return np.ascontiguousarray(value, "<f8").tobytes() if value.ndim else value.item()
+
+
+_encode = msgspec.msgpack.Encoder(enc_hook=_plain).encode
 _head = msgspec.msgpack.Decoder(_Head).decode
 _body = msgspec.msgpack.Decoder(_Body).decode
 
@@ -70,7 +79,7 @@ def encode(message: Message) -> bytes:
     Raises
     ------
     MessageError
-        If a text holds what is no character.
+        If a text holds what is no character, or a field what no message has.
     """
     try:
         return _encode((VERSION, message))
