@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -11,8 +12,12 @@ from hypothesis import HealthCheck, settings
 
 # A mistake of agvbench itself is to be seen, not told in one line.
 os.environ.setdefault("AGVBENCH_DEBUG", "1")
-# Printed tables are as wide as COLUMNS says, which a worker of pytest or a shell may have set to anything.
+# Printed tables are as wide as COLUMNS says, which a shell may have set to anything. Where readline is imported, as by
+# pdb, it sets COLUMNS for the processes that tests start, past os.environ.
+with suppress(ImportError):
+    import readline  # noqa: F401
 os.environ.pop("COLUMNS", None)
+os.unsetenv("COLUMNS")
 
 # Generous, since a shared machine may be many times slower than an idle one.
 TIMEOUT_S, SLOW_TIMEOUT_S = 300, 1200

@@ -69,8 +69,8 @@ def test_an_edited_source_is_compiled_again_in_whatever_imports_from_it(tmp_path
 
 
 TELLING = """
-from agvbench.compiled import telling_of_compilation
-with telling_of_compilation(print):
+from agvbench.compiled import announcing_compilation
+with announcing_compilation(print):
     from agvbench.calibration.measurement.circle import fit_circle
     import numpy as np
     angle = np.linspace(0.0, 1.0, 50)

@@ -13,7 +13,7 @@ from agvbench.diagnosis.design.alternatives import swapped
 from agvbench.diagnosis.design.criteria import like, simulated_readings
 from agvbench.diagnosis.design.designs import Design, designs, levels_of, mutated
 from agvbench.diagnosis.design.identifiability import unidentified
-from agvbench.diagnosis.design.next_experiment import discriminate, pin, what_it_takes
+from agvbench.diagnosis.design.next_experiment import discriminate, pin, required_measurements
 from agvbench.diagnosis.selection.candidates import candidates
 from agvbench.model import nominal_model
 from agvbench.planning import Workspace, plan, trajectory_from_table
@@ -146,6 +146,6 @@ def test_starts_keep_the_run_on_a_small_floor(diagnosed):
         assert np.hypot(frames.x_m, frames.y_m).max() < 1.2
 
 
-def test_what_it_takes_is_said_for_any_pair():
-    assert "known distance" in what_it_takes(("mocap_scale", "lateral_slip"))
-    assert what_it_takes(("a", "b"))
+def test_required_measurements_is_said_for_any_pair():
+    assert "known distance" in required_measurements(("mocap_scale", "lateral_slip"))
+    assert required_measurements(("a", "b"))

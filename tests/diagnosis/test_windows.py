@@ -69,7 +69,7 @@ def test_nothing_after_the_beginning_is_used():
     later = run.frames.t_s > cut.t0_s
     perturbed = dataclasses.replace(run.frames, x_m=run.frames.x_m + 0.01 * later * np.sin(40.0 * run.frames.t_s))
     again = next(cut_windows(dataclasses.replace(run, frames=perturbed), HORIZON, NEUTRAL))
-    for name in ("start", "speed_mps", "lately_mps", "naive"):
+    for name in ("start", "speed_mps", "recent_speed_mps", "constant_velocity"):
         np.testing.assert_allclose(getattr(again, name), getattr(cut, name), atol=1e-12)
     assert not np.allclose(again.poses, cut.poses, atol=1e-3)
 

@@ -12,7 +12,8 @@ IN_HOUSE = ("cells", "drawn vehicle", "left open", "mended", "believed", "nobody
 
 def rows():
     text = (ROOT / "docs/reference/glossary.md").read_text(encoding="utf-8")
-    return [match for match in ROW.finditer(text) if match["term"] != "term" and not match["term"].startswith("-")]
+    terms = text.partition("## Rejected words")[0]
+    return [match for match in ROW.finditer(terms) if match["term"] != "term" and not match["term"].startswith("-")]
 
 
 def trust_table():

@@ -119,7 +119,7 @@ def test_a_path_does_not_depend_on_the_frame(shortest, shift, start, goal):
 
 
 @paths
-@pytest.mark.parametrize("ahead_m", [1e-8, 3e-6, 2e-4, 0.01, 1.0])
+@pytest.mark.parametrize("forward_m", [1e-8, 3e-6, 2e-4, 0.01, 1.0])
 def test_the_way_straight_ahead_is_one_straight(shortest, forward_m):
     backward = shortest is dubins.shortest_path_backward
     (piece,) = shortest(ORIGIN, Pose(-forward_m if backward else forward_m, 0.0, 0.0), 0.5)
