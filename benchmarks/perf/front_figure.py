@@ -22,10 +22,9 @@ TRAJECTORY = "7"
 def main(directory: str, file: str) -> None:
     """Draw `file`."""
     campaign = agvbench.Campaign.open(directory)
-    runs = [run for run in campaign if run.trajectory == TRAJECTORY]
     plt.rcParams["svg.hashsalt"] = "agvbench"
     figure, (left, middle, right) = plt.subplots(1, 3, figsize=(10.0, 3.2), layout="constrained")
-    agvbench.plot.paths(left, runs)
+    agvbench.plot.paths(left, campaign.select(trajectory=TRAJECTORY))
     errors = agvbench.pose_errors(campaign)
     agvbench.plot.end_poses(middle, errors, trajectory=TRAJECTORY)
     compared = agvbench.compare(errors, errors, conditions=("uncalibrated", "calibrated"), same_campaign=True)

@@ -22,12 +22,6 @@ def minutes(line):
     return [float(cell) for cell in line.split()[-6:-3]]
 
 
-@pytest.fixture(autouse=True)
-def wide(monkeypatch):
-    """A worker of pytest may have ``COLUMNS`` set."""
-    monkeypatch.delenv("COLUMNS", raising=False)
-
-
 def test_rows_and_columns_of_times_add_up():
     drives = [planned(name) for name in "1358" * 8]
     lines = dry_run_table(drives).splitlines()
