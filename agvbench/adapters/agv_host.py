@@ -149,7 +149,7 @@ class AgvHost(Host):
         return answer
 
     def _rest(self) -> None:
-        """Take note that the vehicle stands: no gap between commands counts, and none was told."""
+        """Take note that the vehicle stands: no gap between commands counts, and none was reported."""
         self._drives = self._holds = False
         self._held_s, self._longest_s = math.nan, 0.0
 
@@ -222,7 +222,7 @@ class AgvHost(Host):
             self._longest_s = 0.0
 
     def _decode(self, payload: bytes) -> CommandMessage | None:
-        """Return the command; None if that cannot be, which is told, seldom where there are many."""
+        """Return the command; None if it is malformed, which is reported, seldom if there are many."""
         try:
             return decode_command(payload)
         except MessageError as error:
@@ -269,8 +269,8 @@ class AgvHost(Host):
     def _report_foreign(self, message: CommandMessage) -> None:
         """Tell of commands that are not the runner's, at most once a second: an error while the vehicle drives."""
         self.foreign += 1
-        (reported_while_driving, told_s), now_s = self._foreign_reported, self._clock.now()
-        if now_s - told_s < _FOREIGN_REPORTED_S and reported_while_driving >= self._drives:
+        (reported_while_driving, reported_s), now_s = self._foreign_reported, self._clock.now()
+        if now_s - reported_s < _FOREIGN_REPORTED_S and reported_while_driving >= self._drives:
             return
         self._foreign_reported = self._drives, now_s
         error = RunStoppedError(

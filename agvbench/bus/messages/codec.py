@@ -18,7 +18,7 @@ from agvbench.errors import MessageError
 
 VERSION = 4
 ENCODING = "application/msgpack"
-"""What Zenoh is told of every payload."""
+"""The encoding that Zenoh carries beside every payload."""
 MAX_ROWS = 8192
 MAX_TEXT = 4096
 MAX_MESSAGE_BYTES = 1 << 20
@@ -35,8 +35,8 @@ Number = Annotated[int, Meta(ge=0)]
 class Message(msgspec.Struct, frozen=True, tag_field="type", forbid_unknown_fields=True):
     """What travels on the bus; a subclass names its ``type`` and checks the ranges of its fields.
 
-    Numpy arrays travel as little-endian float64, row by row, in one binary field; they are received without a copy,
-    flat and read-only.
+    Numpy arrays travel as little-endian float64, row by row, in one binary field. They are received flat and read-only,
+    as views of the bytes that msgspec copied out of the payload.
     """
 
 

@@ -1,4 +1,4 @@
-"""The command message: what the vehicle is told, when, and for how long."""
+"""The command message: what the vehicle is commanded, when, and for how long."""
 
 from __future__ import annotations
 

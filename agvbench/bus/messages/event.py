@@ -21,7 +21,7 @@ NOT_AS_PLANNED = (COMMANDS_LATE, VEHICLE_STOPPED_ITSELF, RUNNER_SILENT, COMMANDS
 
 
 class Level(IntEnum):
-    """How grave an event is."""
+    """How severe an event is."""
 
     INFO = 0
     WARNING = 1
@@ -61,7 +61,7 @@ class Event(Message, tag="event", frozen=True):
         cls, error: errors.AgvbenchError, role: str, *, sequence: int = 0, acknowledged: int = 0, t_s: float = 0.0,
         source: int = 0,
     ) -> Self:  # fmt: skip
-        """Return the event that tells of `error`, with all its fields."""
+        """Return the event that reports `error`, with all its fields."""
         said = (getattr(error, name) for name in _DETAILS)
         details = (None if one is None else str(one) for one in said)
         kind = type(error).__name__
@@ -74,7 +74,7 @@ class Event(Message, tag="event", frozen=True):
         return str(what)
 
     def as_error(self) -> errors.AgvbenchError:
-        """Return the error that this event tells of, of its own class where there is one."""
+        """Return the error that this event reports, of its own class where there is one."""
         kind = _ERRORS.get(self.kind, errors.LinkError)
         where = f"{self.role} adapter" if self.where is None else f"{self.role} adapter: {self.where}"
         return kind(self.text, where=where, value=self.value, limit=self.limit, remedy=self.remedy)

@@ -1,4 +1,4 @@
-"""The truth message: true poses, from a simulated vehicle to a simulated camera. Nobody else may listen."""
+"""The truth message: true poses, from a simulated vehicle to a simulated camera. No other role may subscribe."""
 
 from __future__ import annotations
 
