@@ -98,7 +98,7 @@ def pack_columns(frames: Frames) -> bytes:
     )  # fmt: skip
     if len({column.size for column in columns}) > 1:
         raise MessageError("columns of frames differ in length", value=[column.size for column in columns])
-    return b"".join(map(np.ascontiguousarray, columns, _DTYPES))  # type: ignore[arg-type]  # (arrays are buffers)
+    return b"".join(map(np.ascontiguousarray, columns, _DTYPES))  # type: ignore[arg-type,unused-ignore]  # (arrays are buffers)
 
 
 def unpack_columns(parts: Sequence[bytes]) -> Frames:

@@ -126,7 +126,9 @@ def _solutions(goal: Complexes, heading: Floats) -> list[tuple[str, Floats]]:
             for mirror, gear in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
                 x, y = gear * seen.real, mirror * seen.imag
                 with np.errstate(invalid="ignore"):  # NaN: this word does not reach the goal
-                    lengths = gear * np.stack(word.solve(x + 1j * y, gear * mirror * heading))
+                    lengths = gear * np.stack(
+                        word.solve(np.asarray(x + 1j * y, dtype=np.complex128), gear * mirror * heading)
+                    )
                 arcs = np.array([letter != "S" for letter in word.letters])
                 lengths[arcs] = _wrap(lengths[arcs])
                 letters = word.letters if mirror == 1 else word.letters.translate(_MIRROR)
@@ -142,7 +144,8 @@ def _local(starts: Floats, goals: Floats, radius_m: float) -> tuple[Complexes, F
 def shortest_lengths(starts: Floats, goals: Floats, radius_m: float) -> Floats:
     """Return the lengths [m] of the shortest paths between poses `starts` and `goals` (n, 3), shape (n,)."""
     words = _solutions(*_local(starts, goals, radius_m))
-    return radius_m * np.asarray(np.nanmin([abs(lengths).sum(axis=0) for _, lengths in words], axis=0))
+    shortest = np.nanmin([abs(lengths).sum(axis=0) for _, lengths in words], axis=0)
+    return np.asarray(radius_m * shortest, dtype=np.float64)
 
 
 def shortest_path(start: Pose, goal: Pose, radius_m: float) -> tuple[Piece, ...]:
