@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from agvbench import plot
-    from agvbench.calibration import calibrate, identify
+    from agvbench.calibration import PoseNoise, calibrate, identify
     from agvbench.campaign import Campaign
     from agvbench.diagnosis import Diagnosis, Verdict
     from agvbench.diagnosis.diagnose import diagnose
     from agvbench.errors import AgvbenchError
-    from agvbench.model import VehicleModel, simulate
+    from agvbench.model import VehicleModel
+    from agvbench.model.rollout import simulate
+    from agvbench.model.simulation.simulation import SimulatedRun, Simulation
     from agvbench.planning import Trajectory, plan
     from agvbench.reporting import write_report
     from agvbench.statistics import compare, pose_errors
@@ -28,7 +30,10 @@ __all__ = [
     "Campaign",
     "Diagnosis",
     "Pose",
+    "PoseNoise",
     "Run",
+    "SimulatedRun",
+    "Simulation",
     "Trajectory",
     "VehicleModel",
     "Verdict",
@@ -45,11 +50,13 @@ __all__ = [
 
 if not TYPE_CHECKING:  # mypy would take any name for an attribute of a module with __getattr__
     _PACKAGES = {
-        "calibration": ("calibrate", "identify"),
+        "calibration": ("PoseNoise", "calibrate", "identify"),
         "campaign": ("Campaign",),
         "diagnosis": ("Diagnosis", "Verdict", "diagnose"),
         "errors": ("AgvbenchError",),
-        "model": ("VehicleModel", "simulate"),
+        "model": ("VehicleModel",),
+        "model.rollout": ("simulate",),
+        "model.simulation.simulation": ("SimulatedRun", "Simulation"),
         "planning": ("Trajectory", "plan"),
         "reporting": ("write_report",),
         "statistics": ("compare", "pose_errors"),

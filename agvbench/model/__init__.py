@@ -2,7 +2,6 @@
 
 from agvbench.model.examples import example_names, example_path, example_vehicle, thesis_vehicle
 from agvbench.model.nominal import nominal_model
-from agvbench.model.single_run import simulate
 from agvbench.model.vehicle_model import VehicleModel
 
 __all__ = [
@@ -11,6 +10,5 @@ __all__ = [
     "example_path",
     "example_vehicle",
     "nominal_model",
-    "simulate",
     "thesis_vehicle",
 ]

@@ -34,19 +34,22 @@ from __future__ import annotations
 import hashlib
 import json
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
 from agvbench.effects import Effect, effect_from_toml
 from agvbench.errors import FileError, VehicleError
-from agvbench.model.vehicle_model import VehicleModel
 from agvbench.text_files import read_toml
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import StaticMap, map_from_toml
 from agvbench.vehicle.tables import check_keys, from_table, number, to_table
+
+if TYPE_CHECKING:
+    from agvbench.model.vehicle_model import VehicleModel
 
 SCHEMA = 1
 _UNITS = {"front": "rad", "rear": "rad", "drive": "m/s"}
@@ -54,8 +57,8 @@ _REQUIRED = ("schema", "name", "command_unit", "neutral", "geometry", "maps")
 _OPTIONAL = ("effects", "provenance")
 
 
-def load_vehicle(path: Path) -> VehicleModel:
-    """Read a vehicle file.
+def read_vehicle(path: Path) -> dict[str, Any]:
+    """Return the fields of the `VehicleModel` that a vehicle file describes.
 
     Raises
     ------
@@ -72,14 +75,20 @@ def load_vehicle(path: Path) -> VehicleModel:
         raise FileError("the vehicle file is not UTF-8 text", where=path) from None
     except tomllib.TOMLDecodeError as error:
         raise FileError("the vehicle file is not TOML", where=path, value=error) from None
+    return vehicle_fields(content)
+
+
+@contextmanager
+def naming_file(path: Path) -> Iterator[None]:
+    """Add `path` to the place that a `VehicleError` raised inside names."""
     try:
-        return vehicle_from_toml(content)
+        yield
     except VehicleError as error:
         place = str(path) if error.where is None else f"{path}: {error.where}"
         raise VehicleError(error.what, where=place, value=error.value, limit=error.limit, remedy=error.remedy) from None
 
 
-def save_vehicle(model: VehicleModel, path: Path) -> None:
+def write_vehicle(model: VehicleModel, path: Path) -> None:
     """Write `model` as a vehicle file.
 
     Raises
@@ -110,8 +119,8 @@ def vehicle_to_toml(model: VehicleModel) -> dict[str, Any]:
     return content
 
 
-def vehicle_from_toml(content: Mapping[str, Any]) -> VehicleModel:
-    """Return the vehicle that the content of a vehicle file describes; raise `VehicleError` if it is none."""
+def vehicle_fields(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of the `VehicleModel` in the content of a vehicle file; raise `VehicleError` if it is none."""
     _check_schema(content)
     check_keys(content, (*_REQUIRED, *_OPTIONAL), where="top level")
     for key in _REQUIRED:
@@ -120,15 +129,15 @@ def vehicle_from_toml(content: Mapping[str, Any]) -> VehicleModel:
     for key in ("name", "command_unit"):
         if not isinstance(content[key], str):
             raise VehicleError("must be a text", where=key, value=repr(content[key]))
-    return VehicleModel(
-        name=content["name"],
-        geometry=from_table(Geometry, _table(content, "geometry"), where="geometry"),
-        command_unit=content["command_unit"],
-        neutral=number(content["neutral"], where="neutral"),
+    return {
+        "name": content["name"],
+        "geometry": from_table(Geometry, _table(content, "geometry"), where="geometry"),
+        "command_unit": content["command_unit"],
+        "neutral": number(content["neutral"], where="neutral"),
         **_maps_from_toml(_table(content, "maps")),
-        effects=_effects_from_toml(content.get("effects", [])),
-        provenance=_provenance_from_toml(content),
-    )
+        "effects": _effects_from_toml(content.get("effects", [])),
+        "provenance": _provenance_from_toml(content),
+    }
 
 
 def physics_digest(model: VehicleModel) -> str:

@@ -8,11 +8,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import get_args
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from agvbench.effects import Effect
 from agvbench.errors import VehicleError
+from agvbench.model.notebook import model_html
+from agvbench.model.toml import naming_file, physics_digest, read_vehicle, write_vehicle
 from agvbench.types import Command, Commands, CommandUnit, Floats
 from agvbench.vehicle.checks import coerce_float
 from agvbench.vehicle.geometry import Geometry
@@ -136,27 +137,34 @@ class VehicleModel:
     @property
     def calibration_hash(self) -> str:
         """Sixteen hexadecimal digits that change if and only if the physics does (not the name or provenance)."""
-        from agvbench.model.toml import physics_digest
-
         return physics_digest(self)
 
     def _repr_html_(self) -> str:
-        from agvbench.model.notebook import model_html
-
         return model_html(self)
 
     @classmethod
     def load(cls, path: Path | str) -> VehicleModel:
-        """Read a vehicle file; see `agvbench.model.toml.load_vehicle`."""
-        from agvbench.model.toml import load_vehicle
+        """Read a vehicle file; see `agvbench.model.toml.read_vehicle`.
 
-        return load_vehicle(Path(path))
+        Raises
+        ------
+        FileError
+            If the file is missing, unreadable or no TOML.
+        VehicleError
+            If its content is no vehicle of schema 1, naming file, key and what is wrong.
+        """
+        with naming_file(Path(path)):
+            return cls(**read_vehicle(Path(path)))
 
     def save(self, path: Path | str) -> None:
-        """Write a vehicle file that `load` reads back as an equal model."""
-        from agvbench.model.toml import save_vehicle
+        """Write a vehicle file that `load` reads back as an equal model.
 
-        save_vehicle(self, Path(path))
+        Raises
+        ------
+        FileError
+            If the file cannot be written.
+        """
+        write_vehicle(self, Path(path))
 
     def rollout(
         self,
@@ -165,14 +173,7 @@ class VehicleModel:
         t_s: Sequence[ArrayLike],
         started_h: Sequence[float] | None = None,
     ) -> list[Floats]:
-        """Simulate a batch of runs; see `agvbench.model.rollout.rollout`.
+        """Simulate a batch of runs; see `agvbench.model.rollout.rollout`."""
+        from agvbench.model.rollout import rollout  # only here: numba takes a second to import
 
-        Effects that the fast kernel does not know are simulated by `agvbench.model.simulation.rollout.general_rollout`,
-        for which `started_h` says when each run began, in hours since the session began.
-        """
-        from agvbench.model.rollout import has_fast_kernel, rollout
-        from agvbench.model.simulation.rollout import general_rollout
-
-        if has_fast_kernel(self):
-            return rollout(self, commands, initial, [np.asarray(t, dtype=np.float64) for t in t_s])
-        return general_rollout(self, commands, initial, t_s, started_h)
+        return rollout(self, commands, initial, t_s, started_h)

@@ -23,8 +23,7 @@ from scipy.optimize import least_squares
 from agvbench.calibration.identification import PoseNoise, identify
 from agvbench.effects import effect_kinds
 from agvbench.model import thesis_vehicle
-from agvbench.model.simulation.simulated_run import SimulatedRun
-from agvbench.model.simulation.simulation import Simulation
+from agvbench.model.simulation.simulation import SimulatedRun, Simulation
 from agvbench.types import Commands, Floats
 
 RUNS, SECONDS, RATE_HZ, DRAWS, ROUNDS = 100, 10.0, 120.0, 200, 3
@@ -75,17 +74,33 @@ class Campaign:
 
         By central differences of the simulation, parameters and initial poses alike.
         """
-        slopes = self.simulation.jacobian(
-            self.settled, self.parameters, self.initial, effects=NAMES, initial_state=True
-        )
-        j = np.moveaxis(slopes.parameters / self.sd, 0, -1)
-        a = np.moveaxis(slopes.initial[:3] / self.sd, 0, -1)
+        j, a = self._by_parameters() / self.sd[:, None], self._by_initial_pose() / self.sd[:, None]
         total = np.zeros((len(self.own),) * 2)
         for begin, end in zip(self.simulation.frame_starts[:-1], self.simulation.frame_starts[1:], strict=True):
             own, pose = j[begin:end].reshape(-1, len(self.own)), a[begin:end].reshape(-1, 3)
             free = own - pose @ np.linalg.lstsq(pose, own, rcond=None)[0]
             total += free.T @ free
         return total
+
+    def _by_parameters(self) -> Floats:
+        columns = []
+        for i in self.own:
+            step = np.zeros_like(self.parameters)
+            step[i] = 1e-3 * self.simulation.scales[i]
+            above, below = (
+                self.simulation.predict(self.settled, self.parameters + by, self.initial) for by in (step, -step)
+            )
+            columns.append((above - below) / (2.0 * step[i]))
+        return np.stack(columns, axis=-1)
+
+    def _by_initial_pose(self) -> Floats:
+        columns = []
+        for step in 1e-4 * np.eye(4)[:3]:
+            above, below = (
+                self.simulation.predict(self.settled, self.parameters, self.initial + by) for by in (step, -step)
+            )
+            columns.append((above - below) / 2e-4)
+        return np.stack(columns, axis=-1)
 
     def first(self) -> Floats:
         """Return where every method begins: a tenth of the parameters' scales."""

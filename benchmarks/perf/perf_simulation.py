@@ -11,8 +11,7 @@ import numpy as np
 
 from agvbench.effects import Effect, SpeedLag, SteeringLag, effect_kinds
 from agvbench.model import thesis_vehicle
-from agvbench.model.simulation.simulated_run import SimulatedRun
-from agvbench.model.simulation.simulation import Simulation
+from agvbench.model.simulation.simulation import SimulatedRun, Simulation
 from agvbench.types import Commands
 
 RUNS, SECONDS, RATE_HZ, ROUNDS = 170, 10.0, 40.0, 21

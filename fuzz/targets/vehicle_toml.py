@@ -17,9 +17,9 @@ class VehicleToml(FileTarget):
 
     def __init__(self) -> None:
         super().__init__()
-        from agvbench.model.toml import load_vehicle
+        from agvbench.model import VehicleModel
 
-        self._load = load_vehicle
+        self._load = VehicleModel.load
 
     def seeds(self) -> Iterable[bytes]:
         """Return the vehicles that ship."""

@@ -9,8 +9,7 @@ import pytest
 
 from agvbench.calibration.identification import PoseNoise, identify
 from agvbench.errors import FitError, InputError
-from agvbench.model.simulation.simulated_run import SimulatedRun
-from agvbench.model.simulation.simulation import Simulation
+from agvbench.model.simulation.simulation import SimulatedRun, Simulation
 from agvbench.types import Commands
 from agvbench.vehicle.geometry import Geometry
 

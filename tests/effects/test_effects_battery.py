@@ -18,8 +18,7 @@ import agvbench.effects as effects_package
 from agvbench.effects import Effect, effect_from_toml, effect_kinds
 from agvbench.errors import VehicleError
 from agvbench.model import VehicleModel, example_vehicle
-from agvbench.model.simulation.simulated_run import SimulatedRun
-from agvbench.model.simulation.simulation import Simulation
+from agvbench.model.simulation.simulation import SimulatedRun, Simulation
 from agvbench.reporting.console.effects import reference_page
 from agvbench.types import Commands
 from agvbench.vehicle.geometry import Geometry

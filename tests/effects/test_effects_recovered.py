@@ -14,8 +14,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from agvbench.effects import effect_kinds
-from agvbench.model.simulation.simulated_run import SimulatedRun
-from agvbench.model.simulation.simulation import Simulation
+from agvbench.model.simulation.simulation import SimulatedRun, Simulation
 from agvbench.simulator.hidden import HiddenPlant
 from agvbench.simulator.hidden.constants import BASE
 from agvbench.simulator.hidden.plant import TURNAROUND_S

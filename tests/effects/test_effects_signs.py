@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from agvbench.effects import effect_kinds
-from agvbench.model.simulation.simulated_run import SimulatedRun
-from agvbench.model.simulation.simulation import Simulation
+from agvbench.model.simulation.simulation import SimulatedRun, Simulation
 from agvbench.types import Commands
 from agvbench.vehicle.geometry import Geometry
 

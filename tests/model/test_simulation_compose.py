@@ -11,8 +11,7 @@ import pytest
 from agvbench.effects import effect_kinds
 from agvbench.errors import FileError
 from agvbench.model.simulation import compose as simulation_compose
-from agvbench.model.simulation.simulated_run import SimulatedRun
-from agvbench.model.simulation.simulation import Simulation
+from agvbench.model.simulation.simulation import SimulatedRun, Simulation
 from agvbench.types import Commands
 from agvbench.vehicle.geometry import Geometry
 
@@ -39,7 +38,7 @@ class SlowPatch(Effect):
 PROGRAM = """
 import numpy as np
 from slow_patch import SlowPatch
-from agvbench.model.simulation.simulated_run import SimulatedRun
+from agvbench.model.simulation.simulation import SimulatedRun
 from agvbench.model.simulation.simulation import Simulation
 from agvbench.types import Commands
 from agvbench.vehicle.geometry import Geometry

@@ -12,8 +12,7 @@ from simulation_variants_truth import aims, drive, servo_path, true_form, with_p
 from agvbench.effects import effect_kinds
 from agvbench.effects.variants import effect_variants
 from agvbench.model.simulation.compose import kernel_text
-from agvbench.model.simulation.simulated_run import SimulatedRun
-from agvbench.model.simulation.simulation import Simulation
+from agvbench.model.simulation.simulation import SimulatedRun, Simulation
 from agvbench.types import Commands
 from agvbench.vehicle.geometry import Geometry
 

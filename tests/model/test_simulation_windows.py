@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from agvbench.model.simulation.simulated_run import SimulatedRun
-from agvbench.model.simulation.simulation import Simulation
+from agvbench.model.simulation.simulation import SimulatedRun, Simulation
 from agvbench.types import Commands
 from agvbench.vehicle.geometry import Geometry
 

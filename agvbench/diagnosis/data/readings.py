@@ -14,7 +14,7 @@ from agvbench.diagnosis.data.initial_pose import between_rows, frame_noise, moti
 from agvbench.diagnosis.data.splits import at_common_levels, group_runs
 from agvbench.diagnosis.data.windows import Horizon, InitialStates, blocks, cut_windows, recording_of
 from agvbench.errors import FitError
-from agvbench.model.simulation.simulated_run import SimulatedRun
+from agvbench.model.simulation.simulation import SimulatedRun
 from agvbench.types import Commands, Floats, Frames, Run
 
 SAMPLES = 24

@@ -14,8 +14,7 @@ from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.effects import Effect
 from agvbench.model import VehicleModel
-from agvbench.model.simulation.simulated_run import SimulatedRun
-from agvbench.model.simulation.simulation import Simulation
+from agvbench.model.simulation.simulation import SimulatedRun, Simulation
 from agvbench.signals import robust_std
 from agvbench.types import Floats
 

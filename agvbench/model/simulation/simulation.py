@@ -1,4 +1,4 @@
-"""The general simulation: many runs at once, with any effects, and its derivatives.
+"""The simulation of many runs at once, with any effects.
 
 ::
 
@@ -6,7 +6,6 @@
     settled = simulation.settled(front_map, rear_map, drive_map)           # (rows, 3), any maps
     p = simulation.parameters([SteeringLag(0.1)])                          # (p,), all else at null
     poses = simulation.predict(settled, p, initial)                        # (frames, 3)
-    slopes = simulation.jacobian(settled, p, initial, effects=["steering_lag"], initial_state=True)
 
 A *row* is a command of a run; the first row of each run is the command, usually neutral, at which it stood before. All
 runs' rows lie one after another (``row_starts``), and so do their frames (``frame_starts``).
@@ -24,28 +23,45 @@ from numpy.typing import ArrayLike, NDArray
 from agvbench.effects import Effect, effect_kinds
 from agvbench.errors import InputError, VehicleError
 from agvbench.model.simulation.compose import kernel
-from agvbench.model.simulation.simulated_run import SimulatedRun, check_runs
-from agvbench.types import Floats
+from agvbench.types import Commands, Floats
 from agvbench.vehicle.geometry import Geometry
 
 Integers = NDArray[np.int64]
 Map = Callable[[Floats], ArrayLike]
 
 STEP_S = 0.025
+_CHANNELS = ("drive", "front", "rear")
 
 
 @dataclass(frozen=True)
-class Slopes:
-    """Derivatives of poses (x, y, heading), each of shape (columns, frames, 3).
+class SimulatedRun:
+    """What is to be simulated of one run.
 
-    ``settled`` has a column per direction asked for, ``parameters`` one per parameter asked for
-    (``parameter_names``), ``initial`` one each for x, y, heading and speed at the start of the frame's own run.
+    Parameters
+    ----------
+    commands
+        Its commands, in the vehicle's unit.
+    t_s
+        Stamps of the frames to predict [s], ascending, on the commands' clock.
+    started_h
+        When it began, in hours since the session began.
+    begins_s
+        Stamp of the initial pose, for a window of free driving: commands before it only set the actuators in motion.
+        None for a run from rest, where the vehicle stands at the initial pose until its first command takes effect.
+    preset
+        Front and rear command at which the axles had settled before the first command; by default neutral.
     """
 
-    settled: Floats
-    parameters: Floats
-    parameter_names: tuple[str, ...]
-    initial: Floats
+    commands: Commands
+    t_s: Floats
+    started_h: float = 0.0
+    begins_s: float | None = None
+    preset: tuple[float, float] | None = None
+
+    def before(self, neutral: float) -> dict[str, float]:
+        """Return the command that held before the first one, by channel."""
+        front, rear = self.preset or (neutral, neutral)
+        return {"drive": neutral, "front": front, "rear": rear}
 
 
 class Simulation:
@@ -100,7 +116,7 @@ class Simulation:
         step_s: float = STEP_S,
         kinds: Sequence[type[Effect]] = (),
     ) -> None:
-        check_runs(runs)
+        _check_lengths(runs)
         if not step_s > 0.0:
             raise InputError("must be greater than zero", where="step_s", value=f"{step_s:g} s")
         self.geometry, self.neutral, self.step_s = geometry, neutral, step_s
@@ -110,17 +126,23 @@ class Simulation:
         self.nulls, self.lower, self.upper, self.scales = (
             np.array([getattr(p, what) for _, p in declared]) for what in ("null", "low", "high", "scale")
         )
-        self.row_starts = _starts([len(run.commands) + 1 for run in runs])
+        starts = _starts([len(run.commands) for run in runs])
+        self.row_starts = starts + np.arange(len(starts))
         self.frame_starts = _starts([len(run.t_s) for run in runs])
         self.row_runs = np.repeat(np.arange(len(runs)), np.diff(self.row_starts))
         self.frame_runs = np.repeat(np.arange(len(runs)), np.diff(self.frame_starts))
         self.drive, self.front, self.rear = (
-            np.concatenate([[run.before(neutral)[channel], *getattr(run.commands, channel)] for run in runs])
-            for channel in ("drive", "front", "rear")
+            np.insert(
+                _joined([getattr(run.commands, channel) for run in runs], starts, f"commands.{channel}"),
+                starts[:-1],
+                [run.before(neutral)[channel] for run in runs],
+            )
+            for channel in _CHANNELS
         )
-        self.t_s = np.concatenate([np.asarray(run.t_s, dtype=np.float64) for run in runs])
+        self.t_s = _joined([run.t_s for run in runs], self.frame_starts, "t_s", ascending=True)
+        command_t_s = _joined([run.commands.t_s for run in runs], starts, "commands.t_s", ascending=True)
+        self._command_t_s = np.insert(command_t_s, starts[:-1], -np.inf)
         self._from_neutral = np.column_stack([self.drive, self.front, self.rear]) - neutral
-        self._command_t_s = np.concatenate([[-np.inf, *run.commands.t_s] for run in runs])
         self._started_h = np.array([run.started_h for run in runs], dtype=np.float64)
         self._begins_s = np.array([np.nan if run.begins_s is None else run.begins_s for run in runs])
         self._local = np.array([kind.local for kind in self.kinds for _ in kind.parameters()])
@@ -183,18 +205,18 @@ class Simulation:
         parameters
             (p,); see `parameters`. Nothing checks that they are within bounds.
         initial
-            (runs, 4): what the camera reports at the start (x, y, heading), and the speed of the centroid ahead (0 for
-            a run from rest; NaN in a window: what the commands before it have made it). Effects of the camera change
-            what follows, not the start itself. With a fifth column: the speed ahead lately (averaged with weights that
-            fall by e every 0.5 s), from which the drive's level is read.
+            (runs, 4): the pose that the camera reports at the start (x, y, heading), and the longitudinal speed of the
+            centroid (0 for a run from rest; NaN in a window: the speed that the commands before it result in). Effects
+            of the camera change the following poses, not the initial one. With a fifth column: the recent longitudinal
+            speed (averaged with weights that fall by e every 0.5 s), from which the drive's level is estimated.
         runs
             Indices of the runs to simulate; all by default. Other runs' frames are left as they are in `out`.
         out
             (frames, 3), written to if given.
-        level_scatter
-            How far, as a logarithm, the speed lately may be from what the commands before it have made it by mere
-            scatter. Where it is farther, the drive is taken to run at another level (battery, floor, temperature),
-            and whenever it is told to go its speed is faster or slower by the same amount. By default it never is.
+        nodal_deviation
+            Standard deviation of the logarithm of the recent speed over the speed that the commands before it result
+            in. Beyond it, the drive is assumed to run at another level (battery, floor, temperature): every speed that
+            is commanded then differs by the same amount. By default it never does.
 
         Returns
         -------
@@ -235,36 +257,6 @@ class Simulation:
         )
         return poses
 
-    def jacobian(
-        self,
-        settled: Floats,
-        parameters: Floats,
-        initial: Floats,
-        *,
-        directions: Floats | None = None,
-        effects: Sequence[str] = (),
-        initial_state: bool = False,
-    ) -> Slopes:
-        """Return derivatives by central differences, one-sided (second order) where a bound is near.
-
-        Each column takes two simulations of the runs that it touches.
-
-        Parameters
-        ----------
-        settled, parameters, initial
-            Where; as for `predict`.
-        directions
-            (q, rows, 3): directions in `settled`, say the derivatives of the maps with respect to their own
-            parameters, or ones in a column for an offset in every run.
-        effects
-            Names of effects whose parameters are varied.
-        initial_state
-            Whether x, y, heading and speed at the start are varied.
-        """
-        from agvbench.model.simulation.slopes import slopes
-
-        return slopes(self, settled, parameters, initial, directions, self.indices(*effects), initial_state)
-
     def _longest_step(self, parameters: Floats) -> float:
         return self.step_s if np.any(parameters[self._local] != self.nulls[self._local]) else np.inf
 
@@ -275,3 +267,38 @@ class Simulation:
 
 def _starts(counts: Sequence[int]) -> Integers:
     return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+
+
+def _check_lengths(runs: Sequence[SimulatedRun]) -> None:
+    if not runs:
+        raise InputError("a simulation needs a run")
+    for i, run in enumerate(runs):
+        if len(run.commands) == 0:
+            raise InputError("a run needs a command", where=f"run {i}", remedy="give at least one row")
+        if np.ndim(run.t_s) != 1:
+            raise InputError("must have one dimension", where=f"run {i}: t_s", value=np.shape(run.t_s))
+        for channel in _CHANNELS:
+            length, limit = len(getattr(run.commands, channel)), len(run.commands.t_s)
+            if length != limit:
+                where = f"run {i}: commands.{channel}"
+                raise InputError("has another length than t_s", where=where, value=length, limit=limit)
+
+
+def _joined(arrays: Sequence[Floats], starts: Integers, what: str, *, ascending: bool = False) -> Floats:
+    """Return the arrays of all runs one after another; raise `InputError` where one is not finite or descends."""
+    values = np.concatenate(arrays, dtype=np.float64)
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        raise InputError("is not finite", where=_place(starts, bad[0], what), value=values[bad[0]])
+    if ascending:
+        back = 1 + np.flatnonzero(np.diff(values) < 0.0)
+        back = back[~np.isin(back, starts)]
+        if back.size:
+            value = f"{values[back[0]]:.6g} s after {values[back[0] - 1]:.6g} s"
+            raise InputError("time goes back", where=_place(starts, back[0], what), value=value, remedy="sort by time")
+    return values
+
+
+def _place(starts: Integers, index: int, what: str) -> str:
+    run = int(np.searchsorted(starts, index, side="right")) - 1
+    return f"run {run}: {what}[{index - starts[run]}]"
