@@ -12,7 +12,6 @@ from functools import cache
 from pathlib import Path
 from typing import TypeVar
 
-from agvbench.adapters import agv, mocap
 from agvbench.adapters.contract import AdapterOptions, AgvAdapter, MocapAdapter
 from agvbench.errors import AgvbenchError, LinkError
 from agvbench.registry import classes_by_file, own_classes
@@ -25,13 +24,13 @@ _Adapter = TypeVar("_Adapter", AgvAdapter, MocapAdapter)
 @cache
 def agv_adapters() -> dict[str, type[AgvAdapter]]:
     """Return the AGV adapters by scheme."""
-    return _by_scheme(classes_by_file(agv, AgvAdapter))  # type: ignore[type-abstract]
+    return _by_scheme(classes_by_file("agvbench.adapters.agv", AgvAdapter))  # type: ignore[type-abstract]
 
 
 @cache
 def mocap_adapters() -> dict[str, type[MocapAdapter]]:
     """Return the mocap adapters by scheme."""
-    return _by_scheme(classes_by_file(mocap, MocapAdapter))  # type: ignore[type-abstract]
+    return _by_scheme(classes_by_file("agvbench.adapters.mocap", MocapAdapter))  # type: ignore[type-abstract]
 
 
 def _by_scheme(found: list[type[_Adapter]]) -> dict[str, type[_Adapter]]:

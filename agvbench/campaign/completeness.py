@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 
 from agvbench.campaign.campaign import Campaign
-from agvbench.campaign.tables.schema import PLANNED_TABLE
+from agvbench.campaign.manifest import PLANNED_TABLE
 from agvbench.types import RUN_OK
 
 _ATTEMPT = re.compile(r"(-attempt\d+)?(-aborted\d+)?$")

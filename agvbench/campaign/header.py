@@ -11,10 +11,10 @@ from typing import Annotated, Any
 import msgspec
 
 from agvbench.campaign.manifest import record
-from agvbench.campaign.toml_errors import validation_message
 from agvbench.errors import CampaignError, FileError
 from agvbench.text_files import read_toml
 from agvbench.types import CommandUnit
+from agvbench.validation import convert
 
 SCHEMA = 1
 FILE_NAME = "campaign.toml"
@@ -78,14 +78,8 @@ class CampaignHeader:
         path = Path(path)
         table = _read_toml(path)
         _check_schema(table.get("schema"), path)
-        try:
-            file = msgspec.convert(table, _File)
-        except msgspec.ValidationError as error:
-            raise CampaignError(
-                validation_message(error, (_File, _Vehicle, _Mocap, _Prediction)),
-                where=path,
-                remedy="correct campaign.toml (docs/reference/campaign-directory.md)",
-            ) from None
+        remedy = "correct campaign.toml (docs/reference/campaign-directory.md)"
+        file = convert(table, _File, where=str(path), error=CampaignError, remedy=remedy)
         vehicle, prediction = file.vehicle, file.prediction or _Prediction()
         return cls.made_for(
             path,

@@ -15,10 +15,10 @@ from contextlib import suppress
 from pathlib import Path
 
 from agvbench.campaign.atomic_files import write_all, write_atomically
-from agvbench.campaign.tables.schema import PLANNED_TABLE
 from agvbench.errors import CampaignError
 from agvbench.text_files import require_regular
 
+PLANNED_TABLE = "planned"
 MANIFEST_FILE = "SHA256SUMS"
 _LINE = re.compile(r"([0-9a-f]{64}) [ *](.+)")
 _IN_PLACE = re.compile(r"# files above that are in place: ([1-9]\d{0,8})")

@@ -14,11 +14,11 @@ import pyarrow as pa
 from agvbench.campaign.atomic_files import TEMPORARY_PREFIX, is_temporary
 from agvbench.campaign.header import FILE_NAME, CampaignHeader
 from agvbench.campaign.lock import LOCK_FILE
-from agvbench.campaign.manifest import MANIFEST_FILE, Manifest, record
+from agvbench.campaign.manifest import MANIFEST_FILE, PLANNED_TABLE, Manifest, record
 from agvbench.campaign.tables.consistency import check_commands, check_poses, check_runs
 from agvbench.campaign.tables.parquet import to_parquet
 from agvbench.campaign.tables.parts import part_name, parts_of, run_id_of
-from agvbench.campaign.tables.schema import PLANNED_TABLE, TABLES
+from agvbench.campaign.tables.schema import TABLES
 from agvbench.campaign.tables.source import parts
 from agvbench.campaign.tables.timed_table import TimedTable, blank_untracked
 from agvbench.errors import CampaignError, RecordingError

@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     from rich.console import Console
 
     from agvbench.reporting.console.diagnosis import print_diagnosis
-    from agvbench.reporting.console.progress import searching
+    from agvbench.reporting.progress import searching
     from agvbench.workflows.diagnose import run_diagnose
 
     console = Console()

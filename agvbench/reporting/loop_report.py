@@ -19,7 +19,6 @@ from agvbench.loop.before_after import (
     root_mean_square_bias,
 )
 from agvbench.loop.loop import Loop
-from agvbench.reporting.console.progress import track
 from agvbench.reporting.console.tables import console_table
 from agvbench.reporting.content import (
     Block,
@@ -32,6 +31,7 @@ from agvbench.reporting.content import (
     plain,
     plain_sentences,
 )
+from agvbench.reporting.progress import track
 from agvbench.reporting.sections import all_sections
 from agvbench.reporting.sections.diagnosis import diagnosis_blocks
 from agvbench.reporting.write import TABLES, page_texts

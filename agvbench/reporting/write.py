@@ -9,9 +9,9 @@ from pathlib import Path
 
 from agvbench.campaign.atomic_files import made_folder, replace_whole
 from agvbench.errors import FileError
-from agvbench.reporting.console.progress import track
 from agvbench.reporting.content import Content, plain
 from agvbench.reporting.pages import to_html, to_markdown
+from agvbench.reporting.progress import track
 from agvbench.reporting.recording import write_recording
 from agvbench.reporting.sections import all_sections
 from agvbench.reporting.table_files import frame_to_csv, to_csv, to_latex

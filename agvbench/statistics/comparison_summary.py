@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from agvbench.statistics.bootstrap import CONFIDENCE
-from agvbench.statistics.comparison import Comparison
 from agvbench.statistics.differences import ALL, ComparisonVerdict, Difference, EndShift, SampleSummary
 from agvbench.statistics.hypothesis_tests import required_sample_size
 from agvbench.statistics.quantities import DISTANCE, POSITION
+
+if TYPE_CHECKING:
+    from agvbench.statistics.comparison import Comparison
 
 
 def describe(difference: Difference, comparison: Comparison) -> str:

@@ -11,6 +11,7 @@ from agvbench.errors import InputError
 from agvbench.types import Floats, wrap_angle
 
 Up = Literal["y", "z"]
+Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
 
 # Within this of vertical (as the sine of the angle between the forward axis and the vertical) the forward axis has no
 # direction on the floor left that float32 noise (6e-8) would not turn by a degree or more.
@@ -59,17 +60,56 @@ def quaternion_to_heading(
     """
     if up not in ("y", "z"):
         raise InputError("unknown vertical axis", where="up", value=repr(up), limit="'y' or 'z'")
-    x, y, z, w = (np.asarray(q, dtype=np.float64) for q in (qx, qy, qz, qw))
-    forward = x * x + w * w - y * y - z * z  # the form that needs no unit norm
-    if up == "y":
-        left, rise = 2.0 * (y * w - x * z), 2.0 * (x * y + z * w)
-    else:
-        left, rise = 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)
-    norm = x * x + y * y + z * z + w * w
-    at_pole = np.hypot(forward, left) <= _POLE_SINE * norm
-    pitched = np.copysign(2.0, rise) * np.arctan2(x, w)  # eq. 6.3 nose up, eq. 6.4 nose down
-    heading = np.where(at_pole, pitched, np.arctan2(left, forward))
-    wrapped = wrap_angle(heading)
+    x, y, z, w = np.broadcast_arrays(*(np.asarray(q, dtype=np.float64) for q in (qx, qy, qz, qw)))
+    quaternion = np.stack([x, y, z, w], axis=-1)
+    heading = heading_of(quaternion, "x", "x", "-z" if up == "y" else "y", least_sine=_POLE_SINE)
+    rise = x * y + z * w if up == "y" else x * z - y * w
+    pitched = wrap_angle(np.copysign(2.0, rise) * np.arctan2(x, w))  # eq. 6.3 nose up, eq. 6.4 nose down
+    norm = (quaternion**2).sum(axis=-1)
     usable = np.isfinite(norm) & (norm > 0.0)
-    result: Floats = np.where(usable, wrapped, np.nan)
+    result: Floats = np.where(usable, np.where(np.isnan(heading), pitched, heading), np.nan)
     return result[()]
+
+
+def heading_of(quaternion: Floats, forward: Axis, floor_x: Axis, floor_y: Axis, *, least_sine: float = 1e-3) -> Floats:
+    """Return the heading [rad] of body axis `forward` on the floor, shape (…,): its projection.
+
+    Parameters
+    ----------
+    quaternion
+        Rotation from body to tracker axes, shape (…, 4), in the order x, y, z, w; any positive length.
+    forward
+        The body axis that points ahead.
+    floor_x, floor_y
+        The tracker axes that are the floor's x and y: (``"x"``, ``"-z"``) for a tracker with y up.
+    least_sine
+        Sine of the least angle between the axis and the vertical.
+
+    Returns
+    -------
+    Floats
+        NaN where the axis is nearer to the vertical, or the quaternion is zero or not finite.
+
+    Examples
+    --------
+    >>> quarter_turn_about_y = np.array([[0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5)]])
+    >>> np.degrees(heading_of(quarter_turn_about_y, "x", "x", "-z")).round(6)
+    array([90.])
+    """
+    vector, scalar = quaternion[..., :3], quaternion[..., 3:]
+    axis = _unit(forward)
+    # Rotation of a vector by a quaternion that need not have length one: q a q* = |q|² R a.
+    turned = (
+        (scalar**2 - (vector**2).sum(axis=-1, keepdims=True)) * axis
+        + 2.0 * (vector @ axis)[..., None] * vector
+        + 2.0 * scalar * np.cross(vector, axis)
+    )
+    ahead, left = turned @ _unit(floor_x), turned @ _unit(floor_y)
+    defined = np.hypot(ahead, left) > least_sine * (quaternion**2).sum(axis=-1)
+    return np.where(defined, wrap_angle(np.arctan2(left, ahead)), np.nan)
+
+
+def _unit(axis: Axis) -> Floats:
+    unit = np.zeros(3)
+    unit["xyz".index(axis[-1])] = -1.0 if axis.startswith("-") else 1.0
+    return unit

@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agvbench.campaign import Campaign, import_recordings
-from agvbench.campaign.recordings.recording import heading_of
 from agvbench.cli import main
 from agvbench.errors import RecordingError
+from agvbench.vehicle.quaternion import heading_of
 
 
 def _imported(directory: Path, mapping: str = MAPPING, **recordings: dict[str, list[object]]) -> Campaign:

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.adapters.contract import AdapterOptions, MocapAdapter, MocapReports
-from agvbench.adapters.mocap.sim import SimMocap
 from agvbench.adapters.natnet.axes import bodies_of, to_floor
 from agvbench.adapters.natnet.channel import Connection
 from agvbench.adapters.natnet.client import Client, Seen
@@ -25,6 +24,7 @@ from agvbench.adapters.natnet.network_faults import PacketFaults
 from agvbench.adapters.natnet.protocol.bitstream import BODY, MARKER, TRACKED, Version
 from agvbench.adapters.natnet.protocol.encode import Model
 from agvbench.adapters.natnet.protocol.frame import FrameOfData
+from agvbench.adapters.registry import check_mocap, open_mocap
 from agvbench.bus.clock import SimulatedClock, WallClock
 from agvbench.bus.messages.event import Level
 from agvbench.bus.messages.frames import FrameClock
@@ -48,7 +48,7 @@ class EmulatedNatNet(MocapAdapter):
 
     def __init__(self, options: AdapterOptions) -> None:
         faults, version, simulated = self._split(options)
-        self._camera = SimMocap.open("", simulated)
+        self._camera = open_mocap("sim", simulated)
         self._rate_hz = self._camera.identity().rate_hz
         self._clock, self._base_s, self._last_s = SimulatedClock(), 0.0, 0.0
         self._seen: list[Seen] = []
@@ -89,7 +89,7 @@ class EmulatedNatNet(MocapAdapter):
     @classmethod
     def check(cls, address: str, options: AdapterOptions) -> None:
         """Refuse an option that neither the network, the stream nor the camera has."""
-        SimMocap.check("", cls._split(options)[2])
+        check_mocap("sim", cls._split(options)[2])
 
     @staticmethod
     def _split(options: AdapterOptions) -> tuple[PacketFaults, Version, AdapterOptions]:

@@ -8,13 +8,11 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
-import msgspec
-
 from agvbench.campaign.header import SCHEMA
-from agvbench.campaign.recordings.mapping_schema import ISO_8601, TABLES, Mapping, QuantityColumn
-from agvbench.campaign.toml_errors import validation_message
+from agvbench.campaign.recordings.mapping_schema import ISO_8601, Mapping, QuantityColumn
 from agvbench.errors import FileError, InputError
 from agvbench.text_files import read_toml
+from agvbench.validation import convert
 
 _DELIMITERS = ",;\t|: /#&!~^*%$"
 _SHIPPED = Path(__file__).parent / "mappings"
@@ -51,15 +49,12 @@ def load_mapping(name: str | Path) -> Mapping:
     """
     path = find_mapping(name)
     try:
-        mapping = msgspec.convert(read_toml(path), Mapping)
+        table = read_toml(path)
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise FileError(f"is not TOML ({error})", where=path, remedy="correct the line") from None
     except OSError as error:
         raise FileError(f"cannot be read ({error.strerror})", where=path, remedy="check its permissions") from None
-    except msgspec.ValidationError as error:
-        raise FileError(
-            validation_message(error, TABLES), where=path, remedy="see docs/how-to/import-your-csv.md"
-        ) from None
+    mapping = convert(table, Mapping, where=str(path), remedy="see docs/how-to/import-your-csv.md")
     _check(mapping, path)
     return mapping
 

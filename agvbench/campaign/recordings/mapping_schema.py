@@ -9,8 +9,8 @@ import msgspec
 
 from agvbench.campaign.header import SCHEMA, CampaignHeader, FrameRate
 from agvbench.types import CommandUnit
+from agvbench.vehicle.quaternion import Axis
 
-Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
 ISO_8601 = "iso8601"
 
 # Bounded, so that no product of them overflows; NaN is within no bound.
@@ -188,21 +188,3 @@ class Mapping(_Strict, frozen=True):
             prediction_horizon_s=prediction.horizon_s if prediction else None,
             prediction_stride_s=prediction.stride_s or prediction.horizon_s if prediction else None,
         )
-
-
-TABLES = (
-    Mapping,
-    Vehicle,
-    Mocap,
-    PredictionSettings,
-    Csv,
-    Time,
-    QuantityColumn,
-    Signal,
-    Quaternion,
-    Flag,
-    Columns,
-    Gate,
-    Runs,
-    FileRule,
-)

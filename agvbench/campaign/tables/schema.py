@@ -42,7 +42,6 @@ POSES = (
     *_columns("number", "mean_error_m received_s", required=False),
 )
 TABLES: dict[str, tuple[ColumnSpec, ...]] = {"runs": RUNS, "commands": COMMANDS, "poses": POSES}
-PLANNED_TABLE = "planned"
 SPLITS = ("fit", "validation", "held_out")
 
 

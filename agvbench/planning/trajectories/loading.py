@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from agvbench.errors import FileError
-from agvbench.planning.trajectories.toml_errors import convert, suggest
 from agvbench.planning.trajectories.trajectory import Trajectory
 from agvbench.resources import resource_directory
 from agvbench.text_files import read_toml
+from agvbench.validation import convert, suggest
 
 THE_EIGHT = tuple(str(number) for number in range(1, 9))
 """The test trajectories of the thesis (section 8.2)."""

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from agvbench.campaign import Campaign, CampaignWriter
-from agvbench.campaign.tables.schema import PLANNED_TABLE
+from agvbench.campaign.manifest import PLANNED_TABLE
 from agvbench.errors import AgvbenchError, FitError, VehicleError
 from agvbench.model import VehicleModel
 from agvbench.running.configuration.provenance import recorded_rows

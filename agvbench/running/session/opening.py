@@ -18,7 +18,7 @@ from agvbench.bus.link import VehicleLink
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
 from agvbench.campaign.header import FILE_NAME
 from agvbench.campaign.lock import locked
-from agvbench.campaign.tables.schema import PLANNED_TABLE
+from agvbench.campaign.manifest import PLANNED_TABLE
 from agvbench.campaign.writer import refuse_occupied
 from agvbench.errors import CampaignError, RecordingError
 from agvbench.model import VehicleModel

@@ -1,4 +1,4 @@
-"""Validation errors of trajectories: one line that says which key, what value, and what would be allowed."""
+"""Tables of TOML and JSON files as typed structures; errors say in one line which key, what value, what is allowed."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TypeVar
 import msgspec
 from msgspec import inspect
 
-from agvbench.errors import FileError
+from agvbench.errors import CampaignError, FileError
 
 T = TypeVar("T")
 
@@ -24,37 +24,55 @@ _PLAIN = {"float": "a number", "int": "a whole number", "str": "text", "bool": "
 _PLAIN |= {"array": "a list", "object": "a table"}
 
 
-def convert(table: object, kind: type[T], *, where: str) -> T:
+def convert(
+    table: object,
+    kind: type[T],
+    *,
+    where: str,
+    error: type[FileError | CampaignError] = FileError,
+    remedy: str | None = None,
+) -> T:
     """Return `table`, as read from TOML or JSON, as a `kind`.
+
+    Parameters
+    ----------
+    table, kind
+        What was read, and the `msgspec.Struct` that it should be.
+    where
+        The file, for errors.
+    error, remedy
+        The class of errors, and what they advise.
 
     Raises
     ------
-    FileError
+    FileError, or `error`
         In one line: the file, the key, its value and what is allowed.
     """
     try:
         return msgspec.convert(table, kind)
-    except msgspec.ValidationError as error:
-        raise _explained(str(error), table, kind, where) from None
+    except msgspec.ValidationError as failure:
+        fields = _fields(str(failure), table, kind, where)
+        advice = "; ".join(part for part in (fields.pop("remedy", None), remedy) if part)
+        raise error(fields.pop("what"), **fields, remedy=advice or None) from None
 
 
-def _explained(message: str, table: object, kind: type, where: str) -> FileError:
+def _fields(message: str, table: object, kind: type, where: str) -> dict[str, str]:
+    """Return the fields of the error for a message of msgspec."""
     match = _AT.fullmatch(message)
     what, path = (match["what"], match["path"] or "") if match else (message, "")
     steps: list[str | int] = [step["key"] or int(step["index"]) for step in _STEP.finditer(path)]
     place = ": ".join(part for part in (where, path.removeprefix(".")) if part)
     value, types = _descend(table, inspect.type_info(kind), steps)
     if found := _UNKNOWN.fullmatch(what):
-        return FileError(f"unknown key '{found[1]}'", where=place, remedy=suggest(found[1], _keys(types)))
+        return {"what": f"unknown key '{found[1]}'", "where": place, "remedy": suggest(found[1], _keys(types))}
     if found := _MISSING.fullmatch(what):
-        return FileError(f"key '{found[1]}' is missing", where=place)
+        return {"what": f"key '{found[1]}' is missing", "where": place}
     if found := _VALUE.fullmatch(what):
-        return FileError("value is not known", where=place, value=found[1], limit=_either(_values(types, steps)))
+        return {"what": "value is not known", "where": place, "value": found[1], "limit": _either(_values(types))}
     if found := _EXPECTED.fullmatch(what):
-        return FileError(
-            "value cannot be used", where=place, value=_shown(value), limit=_expected(found["type"], found["rest"])
-        )
-    return FileError(what, where=place)
+        limit = _expected(found["type"], found["rest"])
+        return {"what": "value cannot be used", "where": place, "value": _shown(value), "limit": limit}
+    return {"what": what, "where": place}
 
 
 def _descend(value: object, kind: inspect.Type, steps: Sequence[str | int]) -> tuple[object, list[inspect.Type]]:
@@ -83,7 +101,8 @@ def _choices(kind: inspect.Type, value: object) -> list[inspect.Type]:
 
 def _inside(kind: inspect.Type, step: str | int) -> Iterable[inspect.Type]:
     if isinstance(kind, inspect.StructType):
-        return [field.type for field in kind.fields if field.encode_name == step]
+        tag = [inspect.LiteralType((kind.tag,))] if kind.tag is not None and kind.tag_field == step else []
+        return [*tag, *(field.type for field in kind.fields if field.encode_name == step)]
     if isinstance(kind, inspect.VarTupleType | inspect.ListType):
         return [kind.item_type]
     return []
@@ -95,10 +114,8 @@ def _keys(types: Iterable[inspect.Type]) -> list[str]:
     return list(dict.fromkeys(tags + [field.encode_name for kind in structs for field in kind.fields]))
 
 
-def _values(types: Iterable[inspect.Type], steps: Sequence[str | int]) -> list[str]:
-    values = [str(value) for kind in types if isinstance(kind, inspect.LiteralType) for value in kind.values]
-    # A wrong tag has no type of its own; there is one tagged union in a trajectory.
-    return values or (["straight", "arc", "pause"] if steps and steps[-1] == "kind" else [])
+def _values(types: Iterable[inspect.Type]) -> list[str]:
+    return [str(value) for kind in types if isinstance(kind, inspect.LiteralType) for value in kind.values]
 
 
 def suggest(key: str, known: list[str]) -> str:
