@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Literal, NamedTuple, Protocol, TypeVar, runtime_checkable
+from enum import StrEnum
+from typing import Literal, NamedTuple, Protocol, Self, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,42 @@ Floats = NDArray[np.float64]
 CommandUnit = Literal["us", "normalised"]
 
 RUN_OK = "ok"
+
+
+class Outcome(StrEnum):
+    """What became of a run: it counts, its quality or its course was refused, or it ended early."""
+
+    OK = RUN_OK
+    REJECTED = "rejected"
+    ABORTED = "aborted"
+
+
+@dataclass(frozen=True)
+class RunStatus:
+    """The column ``status`` of the runs table: an outcome, and the reason of one that does not count.
+
+    >>> str(RunStatus(Outcome.REJECTED, "12 frames lost"))
+    'rejected: 12 frames lost'
+    >>> RunStatus.parse("aborted: interrupted").outcome is Outcome.ABORTED
+    True
+    """
+
+    outcome: Outcome
+    reason: str = ""
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Return the status that a column holds; raise `ValueError` if it holds none."""
+        outcome, separator, reason = text.partition(": ")
+        if (outcome == Outcome.OK) is bool(separator):
+            raise ValueError(text)
+        return cls(Outcome(outcome), reason)
+
+    def __str__(self) -> str:
+        """Return what the column holds."""
+        return f"{self.outcome}: {self.reason}" if self.reason else str(self.outcome)
+
+
 CONDITIONS = ("uncalibrated", "calibrated", "corrected")
 
 
@@ -166,6 +203,11 @@ class Run:
     def is_ok(self) -> bool:
         """Whether the run counts."""
         return self.status == RUN_OK
+
+    @property
+    def outcome(self) -> Outcome:
+        """What became of the run."""
+        return RunStatus.parse(self.status).outcome
 
 
 @runtime_checkable

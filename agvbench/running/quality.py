@@ -10,7 +10,7 @@ import numpy as np
 
 from agvbench.bus.messages.event import NOT_AS_PLANNED, Event, Level
 from agvbench.running.rest_detection import is_at_rest, pose_before
-from agvbench.types import RUN_OK, Frames, Pose, wrap_angle
+from agvbench.types import RUN_OK, Frames, Outcome, Pose, RunStatus, wrap_angle
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Quality:
 
     def status(self, limits: QualityLimits = DEFAULT_LIMITS) -> str:
         """Return ``"ok"``, or ``"rejected: WHY"`` with the first limit that is broken."""
-        return next((f"rejected: {complaint}" for complaint in self._complaints(limits)), RUN_OK)
+        return next((str(RunStatus(Outcome.REJECTED, complaint)) for complaint in self._complaints(limits)), RUN_OK)
 
     def _complaints(self, limits: QualityLimits) -> Iterator[str]:
         # Written as "not within" so that NaN, nothing seen, is a complaint too.

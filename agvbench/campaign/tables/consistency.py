@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from agvbench.campaign.tables.schema import SPLITS
 from agvbench.campaign.tables.timed_table import TimedTable
 from agvbench.errors import CampaignError
-from agvbench.types import RUN_OK, CommandUnit, Floats
+from agvbench.types import RUN_OK, CommandUnit, Floats, RunStatus
 
 FIRST_COMMAND_TOLERANCE_S = 60.0
 CLOCK_TOLERANCE_S = 600.0
@@ -66,7 +66,7 @@ def _has_whole_target(row: Mapping[str, Any]) -> bool:
 _RUN_RULES: tuple[tuple[str, Callable[[Mapping[str, Any]], bool], str, str], ...] = (
     (
         "status",
-        lambda row: row["status"] == RUN_OK or row["status"].startswith(("rejected: ", "aborted: ")),
+        lambda row: _is_status(row["status"]),
         '"ok", "rejected: WHY" or "aborted: WHY"',
         "correct it",
     ),
@@ -98,6 +98,14 @@ def _refuse_doubles(ids: list[str], where: object) -> None:
             value=double,
             remedy="give each run its own run_id",
         )
+
+
+def _is_status(text: str) -> bool:
+    try:
+        RunStatus.parse(text)
+    except ValueError:
+        return False
+    return True
 
 
 def check_commands(commands: TimedTable, status: list[str], unit: CommandUnit) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from agvbench.reporting.content import Block, Bullets, Column, Paragraph, Table, Value, plain
 from agvbench.reporting.sections.base import Section
+from agvbench.types import Outcome
 from agvbench.workflows.report import ReportData
 
 _COLUMNS = (
@@ -35,7 +36,7 @@ class QualitySection(Section):
         rows: list[list[Value]] = []
         for (experiment, condition), group in groups:
             ok = group["status"] == "ok"
-            rejected = group["status"].str.startswith("rejected")
+            rejected = group["status"].str.startswith(Outcome.REJECTED)
             rows.append(
                 [
                     *(str(experiment), str(condition), len(group), int(ok.sum()), int(rejected.sum())),

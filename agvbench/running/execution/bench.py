@@ -38,7 +38,7 @@ from agvbench.running.positioning.placers import Rig, make_placer
 from agvbench.running.positioning.start_pose import notify_operator
 from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess, not_as_planned
 from agvbench.running.supervision import DEFAULT_SAFETY, Supervisor
-from agvbench.types import Command, Frames, Run
+from agvbench.types import Command, Frames, Outcome, Run, RunStatus
 
 _UNNAMED = SessionBegan()
 _MOST_UNSEEN = 3
@@ -134,7 +134,7 @@ class Bench:
         """Return in words what is left to drive of these runs, and which of them were rejected before."""
         attempts, done = attempts_by_run(self._recorded.values()), self.done(run_ids)
         left = [run_id for run_id in run_ids if run_id not in done]
-        again = [run_id for run_id in left if any(r.status.startswith("rejected") for r in attempts.get(run_id, []))]
+        again = [run_id for run_id in left if any(r.outcome is Outcome.REJECTED for r in attempts.get(run_id, []))]
         words = f"resumed: {len(done)} runs done, {len(left)} to drive"
         return f"{words}; rejected before and tried again: {', '.join(again)}" if again else words
 
@@ -207,7 +207,7 @@ class Bench:
         if (count := len(before) + len(events)) and not self._identity.lock_step:
             request = replace(request, extra={**request.extra, "events": count})
         if not stopped and (event := not_as_planned(events)) is not None:
-            status = f"rejected: {event.line}"
+            status = str(RunStatus(Outcome.REJECTED, event.line))
         run = recorded_run(request, run_id, started_s, status, driven, self._identity.firmware)
         self.writer.append(run)
         self.log.save()
@@ -220,7 +220,8 @@ class Bench:
         self._placer.was_moved()
         rest_s = self._timing.rest_before_s
         driven = stopped_drive(request.commands, seen, max(self._supervisor.commanded_until_s, -rest_s), rest_s)
-        return driven, f"rejected: {RunStoppedError(stop.what, value=stop.value, limit=stop.limit)}"
+        reason = RunStoppedError(stop.what, value=stop.value, limit=stop.limit)
+        return driven, str(RunStatus(Outcome.REJECTED, str(reason)))
 
     def _check_seen(self, run: Run) -> None:
         """Drive no more where the vehicle is never seen.

@@ -13,7 +13,7 @@ from agvbench.errors import AgvbenchError, FitError, VehicleError
 from agvbench.model import VehicleModel
 from agvbench.running.configuration.provenance import recorded_rows
 from agvbench.running.execution.run_records import attempts_by_run
-from agvbench.types import Run
+from agvbench.types import Outcome, Run
 
 VEHICLE_FILE = "vehicle.toml"
 MEASUREMENTS_TABLE = "calibration"
@@ -83,7 +83,7 @@ def unfinished_calibration(directory: Path, recorded: Mapping[str, Run], attempt
     return {
         run_id
         for run_id, runs in tried.items()
-        if not any(run.is_ok for run in runs) and sum(run.status.startswith("rejected") for run in runs) < attempts
+        if not any(run.is_ok for run in runs) and sum(run.outcome is Outcome.REJECTED for run in runs) < attempts
     }
 
 

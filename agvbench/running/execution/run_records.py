@@ -10,12 +10,13 @@ import numpy as np
 
 from agvbench.campaign import CampaignWriter
 from agvbench.campaign.completeness import planned_id
-from agvbench.errors import CampaignError
+from agvbench.errors import CampaignError, SafetyStopError
 from agvbench.running.execution.drive import Drive
-from agvbench.running.supervision import STOPPED
-from agvbench.types import Commands, Frames, Pose, Run
+from agvbench.types import Commands, Frames, Outcome, Pose, Run, RunStatus
 
 _ABORTED = "-aborted"
+# Column of the runs table: whether a safety rule stopped the run.
+_SAFETY_STOP = "safety_stop"
 
 
 @dataclass(frozen=True)
@@ -48,12 +49,18 @@ def stopped_drive(commands: Commands, seen: list[Frames], until_s: float, rest_b
     return Drive(commands, Frames.concatenate(seen), rest_before_s + until_s)
 
 
-def aborted_run(request: RunRequest, run_id: str, started_s: float, status: str, frames: Frames, firmware: str) -> Run:
-    """Return what is left of a run that was stopped: its frames, and the commands sent until the last of them."""
+def aborted_run(
+    request: RunRequest, run_id: str, started_s: float, error: BaseException, frames: Frames, firmware: str
+) -> Run:
+    """Return what is left of a run that `error` ended: its frames, and the commands sent until the last of them."""
+    why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error) or type(error).__name__
     last_s = float(np.max(frames.t_s))
     sent = np.asarray(request.commands.t_s <= max(last_s, 0.0))
     commands = Commands(*(column[sent] for column in vars(request.commands).values()))
-    extra = {**request.extra, "duration_s": last_s - float(np.min(frames.t_s))}
+    extra: dict[str, object] = {**request.extra, "duration_s": last_s - float(np.min(frames.t_s))}
+    if isinstance(error, SafetyStopError):
+        extra[_SAFETY_STOP] = True
+    status = str(RunStatus(Outcome.ABORTED, why))
     return _run(request, run_id, started_s, status, commands, frames, firmware, extra)
 
 
@@ -67,18 +74,19 @@ def record_aborted(
     firmware: str,
 ) -> None:
     """Keep what was `seen` of a run that `error` ended; nothing where nothing was seen."""
-    why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error) or type(error).__name__
     frames = Frames.concatenate(seen)
     if not len(frames):
         return
     name = free_name(run_id + _ABORTED, writer.finished_ids)
     with suppress(CampaignError):  # what ended the run has to be told, not that it could not be recorded
-        writer.append(aborted_run(request, name, started_s, f"aborted: {why}", frames, firmware))
+        writer.append(aborted_run(request, name, started_s, error, frames, firmware))
 
 
 def times_stopped(run_id: str, recorded: Mapping[str, Run]) -> int:
     """Return how often the supervisor has stopped the run `run_id`, going by what was `recorded`."""
-    return sum(name.startswith(run_id + _ABORTED) and STOPPED in run.status for name, run in recorded.items())
+    return sum(
+        name.startswith(run_id + _ABORTED) and bool(run.extra.get(_SAFETY_STOP)) for name, run in recorded.items()
+    )
 
 
 def attempts_by_run(recorded: Iterable[Run]) -> dict[str, list[Run]]:

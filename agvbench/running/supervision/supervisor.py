@@ -17,9 +17,6 @@ from agvbench.running.supervision.limits import DEFAULT_SAFETY, SafetyLimits
 from agvbench.running.supervision.rule import Rule, Slice, WatchWindow
 from agvbench.types import Command, Frames
 
-STOPPED = " s into the run: "
-"""What every such error says, and so the status of every run that ended with one."""
-
 
 def safety_stop(
     at_s: float, why: str, *, where: str, value: str, limit: str | None = None, ends_session: bool = True
@@ -29,9 +26,9 @@ def safety_stop(
     Where the stop does not end the session it is a `RunStoppedError`.
     """
     if not ends_session:
-        return RunStoppedError(f"stopped {at_s:.1f}{STOPPED}{why}", where=where, value=value, limit=limit)
+        return RunStoppedError(f"stopped {at_s:.1f} s into the run: {why}", where=where, value=value, limit=limit)
     return SafetyStopError(
-        f"stopped {at_s:.1f}{STOPPED}{why}", where=where, value=value, limit=limit,
+        f"stopped {at_s:.1f} s into the run: {why}", where=where, value=value, limit=limit,
         remedy="look at vehicle and camera, then go on with --resume",
     )  # fmt: skip
 
