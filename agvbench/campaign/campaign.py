@@ -20,7 +20,8 @@ from agvbench.campaign.tables.schema import COMMANDS, POSES, RUNS, TABLES
 from agvbench.campaign.tables.source import SUFFIXES, Source
 from agvbench.campaign.tables.timed_table import TimedTable, blank_untracked
 from agvbench.errors import CampaignError
-from agvbench.types import Commands, Frames, Pose, Run
+from agvbench.notebook_html import heading_html, table_html
+from agvbench.types import CONDITIONS, RUN_OK, Commands, Frames, Pose, Run
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -149,8 +150,6 @@ class Campaign:
         return {run_id: index for index, run_id in enumerate(self.run_ids)}
 
     def _repr_html_(self) -> str:
-        from agvbench.campaign.notebook import campaign_html
-
         return campaign_html(self)
 
     def run(self, run_id: str) -> Run:
@@ -222,3 +221,26 @@ def session_starts(runs: Iterable[Run]) -> dict[str | None, float]:
     for run in runs:
         began[run.session] = min(run.started_s, began.get(run.session, math.inf))
     return began
+
+
+def campaign_html(campaign: Campaign) -> str:
+    """Return its name and vehicle, and how many runs count by experiment, trajectory and condition."""
+    header, runs = campaign.header, campaign.runs
+    counts = int((runs["status"] == RUN_OK).sum())
+    line = f"vehicle {header.vehicle_name}, {len(runs)} runs, {counts} of them count"
+    conditions = _in_order(runs["condition"])
+    columns = ["experiment", "trajectory", *conditions]
+    return heading_html(header.name, line) + table_html("runs that count", columns, _rows(runs, conditions))
+
+
+def _rows(runs: pd.DataFrame, conditions: list[str]) -> list[list[str | float | None]]:
+    rows: list[list[str | float | None]] = []
+    for (experiment, trajectory), group in runs.groupby(["experiment", "trajectory"]):
+        own = group["condition"][group["status"] == RUN_OK]
+        rows.append([str(experiment), str(trajectory), *(int((own == condition).sum()) for condition in conditions)])
+    return rows
+
+
+def _in_order(conditions: pd.Series) -> list[str]:
+    found = [str(condition) for condition in conditions.unique()]
+    return [c for c in CONDITIONS if c in found] + sorted(c for c in found if c not in CONDITIONS)

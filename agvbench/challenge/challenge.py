@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 import os
 import subprocess
 import sys
@@ -10,19 +12,20 @@ import time
 import traceback
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
-from dataclasses import replace
+from dataclasses import asdict, replace
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from agvbench.challenge.result_file import known_trials, write_trials
-from agvbench.challenge.scores import Scores, score
+from agvbench.challenge.scores import Scores, plain, score
 from agvbench.challenge.trial import Trial
-from agvbench.errors import AgvbenchError, FlagError, PlantError
+from agvbench.errors import AgvbenchError, FileError, FlagError, PlantError
 from agvbench.running.configuration.benchmark_files import EXCITATION_RUNS
 from agvbench.simulator.hidden import SealedTruth, indistinguishable_effects, sealed_truth
 from agvbench.simulator.hidden.catalogue import CATALOGUE, NOTHING, recipes
 from agvbench.simulator.hidden.sampling import vehicle_of
+from agvbench.text_files import read_json
+from agvbench.workflows.output_files import write_file
 
 if TYPE_CHECKING:
     from agvbench.diagnosis import Diagnosis
@@ -195,3 +198,58 @@ def _as_they_end(wanted: Sequence[tuple[str, int]], repeats: int, jobs: int) -> 
             held |= {pool.submit(hold_trial, *one, repeats) for one in islice(coming, len(ended))}
             for future in ended:
                 yield future.result()
+
+
+SCHEMA = 1
+
+
+def write_trials(path: Path, repeats: int, trials: Sequence[Trial]) -> None:
+    """Write scores and trials, in the order of what was hidden; the file is replaced at once or not at all.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written.
+    """
+    ordered = sorted(trials, key=lambda trial: (trial.spec, trial.seed))
+    scores = _without_empty(score(ordered).to_json(), "errors")
+    content: dict[str, Any] = {"schema": SCHEMA, "repeats": repeats, **scores}
+    content["each"] = [_without_empty(plain(asdict(trial)), "error") for trial in ordered]
+    text = json.dumps(content, indent=1) + "\n"
+    write_file("--json", path, lambda file: file.write_text(text, encoding="utf-8"))
+
+
+def known_trials(path: Path, repeats: int) -> dict[tuple[str, int], Trial]:
+    """Return the trials that a file holds, by what was hidden and seed.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read, is no such file, or was made with other `repeats`.
+    """
+    import msgspec
+
+    try:
+        content = read_json(path)
+        found = msgspec.convert(_with_nan(content["each"]), list[Trial])
+        was = content["repeats"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise FileError(
+            "holds no challenge to go on with", where=path, value=str(error).splitlines()[0],
+            remedy="leave out --resume to begin anew",
+        ) from None  # fmt: skip
+    if was != repeats:
+        raise FileError("has trials with other repeats", where=path, value=was, limit=f"--repeats {repeats}")
+    return {(trial.spec, trial.seed): trial for trial in found}
+
+
+def _without_empty(content: dict[str, Any], key: str) -> dict[str, Any]:
+    return {name: value for name, value in content.items() if name != key or value}
+
+
+def _with_nan(content: Any) -> Any:
+    if isinstance(content, dict):
+        return {key: _with_nan(value) for key, value in content.items()}
+    if isinstance(content, list):
+        return [_with_nan(value) for value in content]
+    return math.nan if content is None else content

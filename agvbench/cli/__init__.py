@@ -17,7 +17,7 @@ from types import ModuleType
 from typing import NoReturn
 
 from agvbench import __version__
-from agvbench.cli._interrupts import EXIT_CODE, Interrupts
+from agvbench.cli._failures import EXIT_CODE, Interrupts
 from agvbench.errors import AgvbenchError, FlagError
 
 _EPILOG = """\
@@ -139,7 +139,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             return 0
         except Exception as error:  # noqa: BLE001 - whatever it is, who runs a lab should not have to read a traceback
             if not interrupts.pressed:
-                from agvbench.cli._internal_error import report_internal_error
+                from agvbench.cli._failures import report_internal_error
 
                 return report_internal_error(given[0], error)
         print(f"{who}: interrupted", file=sys.stderr)

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from agvbench.effects import Effect
 from agvbench.errors import VehicleError
-from agvbench.model.notebook import model_html
 from agvbench.model.toml import naming_file, physics_digest, read_vehicle, write_vehicle
+from agvbench.notebook_html import heading_html, table_html
 from agvbench.types import Command, Commands, CommandUnit, Floats
 from agvbench.vehicle.checks import coerce_float
 from agvbench.vehicle.geometry import Geometry
@@ -177,3 +177,31 @@ class VehicleModel:
         from agvbench.model.rollout import rollout  # only here: numba takes a second to import
 
         return rollout(self, commands, initial, t_s, started_h)
+
+
+_UNITS = {"front": ("°", math.degrees(1.0)), "rear": ("°", math.degrees(1.0)), "drive": ("m/s", 1.0)}
+
+
+def model_html(model: VehicleModel) -> str:
+    """Return its geometry, its static maps with the range of their outputs, and its effects with their parameters."""
+    geometry = model.geometry
+    line = (
+        f"front axle {geometry.front_axle_m:g} m ahead of the marker centroid, rear axle {geometry.rear_axle_m:g} m "
+        f"behind it; commands in {model.command_unit}, neutral {model.neutral:g}"
+    )
+    maps = [_map_row(model, role) for role in _UNITS]
+    effects = [
+        (effect.name, p.name, effect.values[p.name], p.unit) for effect in model.effects for p in effect.parameters()
+    ]
+    return (
+        heading_html(model.name, line)
+        + table_html("static maps", ["channel", "kind", "lowest", "highest", "unit"], maps)
+        + table_html("effects", ["effect", "parameter", "value", "unit"], effects)
+    )
+
+
+def _map_row(model: VehicleModel, role: str) -> tuple[str, str, float, float, str]:
+    static_map = getattr(model, role)
+    unit, scale = _UNITS[role]
+    low, high = static_map.output_range
+    return role, static_map.kind.replace("_", " "), scale * low, scale * high, unit

@@ -110,12 +110,12 @@ class Comparison:
         ``median_b``; ``difference`` of medians, b minus a, with its 95 % interval ``low`` … ``high``; ``margin``;
         ``verdict`` and whether it ``decides``; ``p_worse``, ``p_better`` (corrected) and ``cliffs_delta``.
         """
-        from agvbench.statistics.notebook import differences_frame
+        from agvbench.statistics.comparison_summary import differences_frame
 
         return differences_frame(self)
 
     def _repr_html_(self) -> str:
-        from agvbench.statistics.notebook import comparison_html
+        from agvbench.statistics.comparison_summary import comparison_html
 
         return comparison_html(self)
 

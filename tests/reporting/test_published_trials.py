@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from agvbench.challenge.result_file import known_trials, write_trials
+from agvbench.challenge.challenge import known_trials, write_trials
 from agvbench.challenge.scores import score
 from agvbench.reporting.console.challenge import scores_markdown
 

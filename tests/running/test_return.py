@@ -17,7 +17,7 @@ from agvbench.model import VehicleModel, nominal_model, thesis_vehicle
 from agvbench.planning import Workspace
 from agvbench.planning.shortest_paths.return_path import GearLeg
 from agvbench.running.links import ContinuousLink
-from agvbench.running.positioning.automatic_return.path_following import Follower
+from agvbench.running.positioning.automatic_return.leg_drive import Follower
 from agvbench.running.positioning.automatic_return.returner import Returner
 from agvbench.running.supervision import Supervisor
 from agvbench.types import Command, Pose, wrap_angle

@@ -12,8 +12,7 @@ from pathlib import Path
 import pytest
 
 from agvbench.challenge import challenge
-from agvbench.challenge.challenge import hold_trial, run_challenge
-from agvbench.challenge.result_file import known_trials, write_trials
+from agvbench.challenge.challenge import hold_trial, known_trials, run_challenge, write_trials
 from agvbench.challenge.trial import Trial
 from agvbench.cli import main
 from agvbench.errors import FileError, FitError, FlagError, PlantError

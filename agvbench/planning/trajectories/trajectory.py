@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, cast
 import msgspec
 from msgspec import Meta, Struct
 
+from agvbench.notebook_html import heading_html, table_html
 from agvbench.planning.trajectories.segments import Segment, Speed, Steering, check_speed
 from agvbench.planning.trajectories.shapes import (
     CommandTable,
@@ -116,8 +117,6 @@ class Trajectory(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, 
         return f"{self.name}: {self.shape}[{index}]"
 
     def _repr_html_(self) -> str:
-        from agvbench.planning.notebook import trajectory_html
-
         return trajectory_html(self)
 
     def with_steering(self, steering: Steering) -> Trajectory:
@@ -156,3 +155,30 @@ def _without_none(value: object) -> object:
     if isinstance(value, (list, tuple)):
         return [_without_none(item) for item in value]
     return value
+
+
+_MOST = 12
+
+
+def trajectory_html(trajectory: Trajectory) -> str:
+    """Return what it says of itself, how it is driven, and its segments with what each of them sets."""
+    line = (
+        f"{trajectory.shape.replace('_', ' ')}; speed {trajectory.speed}, steering {trajectory.steering}, "
+        f"conditions {', '.join(trajectory.conditions)}"
+    )
+    segments = trajectory.expand()
+    rows = [(str(index), *_row(segment)) for index, segment in enumerate(segments[:_MOST])]
+    rows += [("…", f"{len(segments) - _MOST} more", "")] if len(segments) > _MOST else []
+    return heading_html(trajectory.name, trajectory.description, line) + table_html(
+        "segments", ["", "kind", "sets"], rows
+    )
+
+
+def _row(segment: msgspec.Struct) -> tuple[str, str]:
+    table = msgspec.to_builtins(segment)
+    kind = str(table.pop("kind", type(segment).__name__))
+    return kind, ", ".join(f"{name} = {_short(value)}" for name, value in table.items() if value is not None)
+
+
+def _short(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)

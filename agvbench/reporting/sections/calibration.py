@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from agvbench.plot.calibration_curves import draw_measured
 from agvbench.reporting.content import Block, Column, FigureBlock, Panel, Paragraph, Table, Value
-from agvbench.reporting.figures.curves import draw_curve
+from agvbench.reporting.figures.style import INK, ON_PAGE, dress, new_figure, to_svg
 from agvbench.reporting.sections.base import Section
 from agvbench.workflows.calibration_curves import AXLES, Curve
 from agvbench.workflows.report import ReportData
@@ -62,3 +63,21 @@ def _row(curve: Curve, kind: str) -> list[Value]:
         float(np.std(residuals)) if len(residuals) else None,
         float(np.abs(residuals).max()) if len(residuals) else None,
     ]
+
+
+def draw_curve(curve: Curve, name: str, *, command_label: str) -> str:
+    """Return an SVG of one axle's curve over its residuals (only the points where there is no fitted map)."""
+    fitted = len(curve.fitted) > 0
+    figure = new_figure(3.3, 3.4 if fitted else 2.5)
+    top, *below = figure.subplots(
+        2 if fitted else 1, 1, sharex=True, squeeze=False, height_ratios=[3, 1.3][: 1 + fitted]
+    )[:, 0]
+    dress(top, x="" if fitted else command_label, y=f"measured [{curve.unit}]")
+    if fitted:
+        top.plot(curve.map_command, curve.map_value, color=INK, linewidth=1.2)
+        dress(below[0], x=command_label, y=f"residual [{curve.unit}]")
+        below[0].axhline(0.0, color=INK, linewidth=1.0)
+        residual = curve.value - curve.fitted
+        draw_measured(below[0], curve.command, residual, curve.stderr, curve.left_out, ON_PAGE)
+    draw_measured(top, curve.command, curve.value, curve.stderr, curve.left_out, ON_PAGE)
+    return to_svg(figure, name)

@@ -1,4 +1,14 @@
-"""Drive one leg of a return: steer, go, keep to the path, and come to rest at its end."""
+"""Drive one leg of a return: steer, go, keep to the path, and come to rest at its end.
+
+With y the distance to the left of the path, e the course's error and d the gear (±1), travel along the path gives
+y' = d sin e and e' = d (κ − κ_path). The law κ = κ_path − y/ℓ² − (2/ℓ) d sin e makes y'' + (2/ℓ) y' + y/ℓ² = 0:
+errors die off over the length ℓ without overshoot, whichever way the vehicle drives.
+
+References
+----------
+C. Samson, "Control of chained systems: application to path following and time-varying point-stabilization of mobile
+robots", IEEE Transactions on Automatic Control 40 (1995), 64-77.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +17,11 @@ from collections import deque
 from dataclasses import dataclass
 
 from agvbench.errors import PlacingError
-from agvbench.planning.shortest_paths.return_path import GearLeg, Guided
+from agvbench.planning.shortest_paths.return_path import STEP_M, GearLeg, Guided
 from agvbench.running.positioning.automatic_return.command_mapping import CommandMapping
 from agvbench.running.positioning.automatic_return.motion_interface import MotionInterface
-from agvbench.running.positioning.automatic_return.online_adaptation import OnlineAdaptation
-from agvbench.running.positioning.automatic_return.path_following import Follower, Guidance
-from agvbench.running.positioning.automatic_return.speed_controller import SpeedController
+from agvbench.running.positioning.automatic_return.online_adaptation import DriveAdaptation, OnlineAdaptation
+from agvbench.types import Pose, wrap_angle
 
 
 @dataclass(frozen=True)
@@ -174,3 +183,116 @@ class LegDrive:
             self._motion_interface.hold(self._command_mapping.command(0.0, self._commanded), TICK_S)
             rested = rested + 1 if abs(self._speed_seen) < _REST_MPS else 0
         self._drive.record_coasting(left_m - self._guide().left_m, speed_mps)
+
+
+_AHEAD_M = 0.3
+_LARGEST_OFFSET = 0.7
+"""Of ℓ: an offset beyond counts as this, so that a vehicle far off meets its path at some 45° at most."""
+
+
+@dataclass(frozen=True)
+class Guidance:
+    """Where a vehicle is on its path: what is left of it, how far left of it [m], and the curvature to drive [1/m]."""
+
+    left_m: float
+    offset_m: float
+    curvature_per_m: float
+
+
+class Follower:
+    """Follows one leg; `goal_crab_rad` is the crab angle for which its end was planned, if it ends at the goal."""
+
+    def __init__(self, leg: GearLeg, length_m: float, *, goal_crab_rad: float | None = None) -> None:
+        self._leg, self._length_m, self._planned = leg, length_m, goal_crab_rad
+        self._index = 0
+
+    def guide(self, at: Pose, crab_rad: float) -> Guidance:
+        """Return the guidance for a guided point at `at`, course included, of a vehicle that crabs at `crab_rad`."""
+        if self._planned is not None:
+            at = self._as_planned(at, crab_rad - self._planned)
+        points, sign = self._leg.points, -1.0 if self._leg.backward else 1.0
+        window = points[self._index : self._index + round(_AHEAD_M / STEP_M)]
+        self._index += int(((window[:, 0] - at.x_m) ** 2 + (window[:, 1] - at.y_m) ** 2).argmin())
+        x, y, course = points[self._index].tolist()
+        c, s = math.cos(course), math.sin(course)
+        along = sign * (c * (at.x_m - x) + s * (at.y_m - y))
+        offset = c * (at.y_m - y) - s * (at.x_m - x)
+        error = wrap_angle(at.heading_rad - course)
+        left = self._leg.length_m - float(self._leg.along_m[self._index]) - along
+        return Guidance(left, offset, self._curvature(offset, error, sign))
+
+    def _curvature(self, offset_m: float, error_rad: float, sign: float) -> float:
+        length = self._length_m
+        bounded = min(_LARGEST_OFFSET * length, max(-_LARGEST_OFFSET * length, offset_m))
+        path = float(self._leg.curvature_per_m[self._index])
+        return path - bounded / length**2 - 2.0 * sign * math.sin(error_rad) / length
+
+    def _as_planned(self, at: Pose, turned_rad: float) -> Pose:
+        """Turn about the goal by what was learned of the crab angle since the leg was planned.
+
+        A vehicle that crabs comes to its goal with the right heading on a line that is turned by the crab angle.
+        """
+        x, y, _ = self._leg.points[-1].tolist()
+        c, s = math.cos(turned_rad), -math.sin(turned_rad)
+        dx, dy = at.x_m - x, at.y_m - y
+        return Pose(x + c * dx - s * dy, y + s * dx + c * dy, at.heading_rad - turned_rad)
+
+
+_MOVING_MPS = 0.012
+_RAMP_PER_S = 0.12
+_PATIENCE_S = 0.5
+_BANDWIDTH_PER_S = 1.5
+_MOST_CHANGE = 0.04
+
+
+class SpeedController:
+    """A ramp until the vehicle moves, then an integral controller whose gain follows from what the share does.
+
+    A drive's slope is not known: speed over the share beyond the one at which it began to move is near enough, and
+    errs to the safe side where the drive is steeper further up.
+    """
+
+    def __init__(self, adaptation: DriveAdaptation, speed_mps: float) -> None:
+        self._adaptation, self._setpoint_mps = adaptation, speed_mps
+        self.share = adaptation.initial_share(speed_mps)
+        self._moved = False
+        self._ramped = False
+        self._waited_s = 0.0
+        self._steady = 0
+
+    def set_setpoint(self, speed_mps: float) -> None:
+        """Change the speed wanted, [m/s] without sign."""
+        if speed_mps == self._setpoint_mps:
+            return
+        onset = min(self._adaptation.onset, self.share)
+        prior = onset + (self.share - onset) * speed_mps / self._setpoint_mps
+        known = self._adaptation.initial_share(speed_mps)
+        self.share = known if known > self._adaptation.onset else prior
+        self._setpoint_mps, self._steady = speed_mps, 0
+
+    def step(self, speed_mps: float, dt_s: float) -> float:
+        """Return the share to hold next, `speed_mps` [m/s] along the way being what was seen."""
+        if speed_mps < _MOVING_MPS:
+            self._wait(dt_s)
+        else:
+            self._regulate(speed_mps, dt_s)
+        self.share = min(1.0, max(0.0, self.share))
+        return self.share
+
+    def _wait(self, dt_s: float) -> None:
+        self._waited_s += dt_s
+        if self._waited_s > _PATIENCE_S or self.share == 0.0:
+            self.share += _RAMP_PER_S * dt_s
+            self._ramped = not self._moved
+
+    def _regulate(self, speed_mps: float, dt_s: float) -> None:
+        if not self._moved and self._ramped:
+            self._adaptation.onset = max(0.0, self.share - 0.3 * _RAMP_PER_S)
+        self._moved, self._waited_s = True, 0.0
+        slope = speed_mps / max(self.share - self._adaptation.onset, 0.03)
+        change = _BANDWIDTH_PER_S * dt_s * (self._setpoint_mps - speed_mps) / max(slope, 0.1)
+        self.share += min(_MOST_CHANGE, max(-_MOST_CHANGE, change))
+        near = abs(speed_mps - self._setpoint_mps) < 0.15 * self._setpoint_mps
+        self._steady = self._steady + 1 if near else 0
+        if self._steady >= 4:
+            self._adaptation.record_share(self._setpoint_mps, self.share)
