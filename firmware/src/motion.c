@@ -13,7 +13,7 @@ void motion_hold(const uint16_t ticks[CHANNELS]) {
         ATOMIC_BLOCK(ATOMIC_RESTORESTATE) wanted_ticks[channel] = ticks[channel];
 }
 
-void motion_frame(void) {}
+void servo_on_frame(void) {}
 
 #else
 
@@ -82,7 +82,7 @@ static void drive_segments(void) {
     }
 }
 
-void motion_frame(void) {
+void servo_on_frame(void) {
     if (state != HOLDING && state != SEGMENTS)
         return;
     silent_ticks += FRAME_TICKS;

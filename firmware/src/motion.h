@@ -23,9 +23,6 @@ void motion_hold(const uint16_t ticks[CHANNELS]);
 /* Drive this after what is queued already; false if the queue is full. */
 bool motion_append(const struct segment *segment);
 
-/* Called in the interrupt that begins a frame. */
-void motion_frame(void);
-
 /* The host lives: it said something that made sense. */
 void motion_heard(void);
 

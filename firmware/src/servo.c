@@ -7,7 +7,6 @@
 #include <avr/io.h>
 
 #include "config.h"
-#include "motion.h"
 
 #define EARLY_TICKS 36 /* 18 us: two serial interrupts and the way in take 12 */
 #define ALL_PINS (_BV(PORTB0) | _BV(PORTB1) | _BV(PORTB2))
@@ -34,7 +33,7 @@ uint16_t servo_frame_age(void) { return TCNT1 - frame_began; }
 
 static void begin_frame(void) {
     frame_began = edge;
-    motion_frame();
+    servo_on_frame();
 #if LATCHED
     for (uint8_t channel = 0; channel < CHANNELS; channel++)
         latched_ticks[channel] = wanted_ticks[channel];

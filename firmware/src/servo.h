@@ -16,6 +16,9 @@ extern volatile uint16_t wanted_ticks[CHANNELS];
 
 void servo_begin(void);
 
+/* Called in the interrupt that begins a frame, before pulses are latched. The user of this module defines it. */
+void servo_on_frame(void);
+
 /* Ticks since the frame began; interrupts must be off. */
 uint16_t servo_frame_age(void);
 
