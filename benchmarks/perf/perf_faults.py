@@ -60,7 +60,7 @@ def line(fault: Fault, reactions: Reactions) -> str:
 
 def table(measured: dict[str, Reactions]) -> str:
     """Return the table of the document."""
-    head = ["stage", "injected", "the vehicle", "stopped within", *RIGS, "the message says"]
+    head = ["stage", "injected", "the vehicle", "stopped within", *RIGS, "message contains"]
     lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
     return "\n".join([*lines, *(line(fault, measured.get(fault.name, {})) for fault in all_faults())])
 

@@ -20,13 +20,13 @@ _LATCHED = "the bench drives no more after the first failure: "
 class Then(StrEnum):
     """What comes of a fault."""
 
-    STOPS = "stopped; the session drives no more"
+    STOPS = "stopped; the session ends"
     ENDS = "stopped; the program ends"
-    REJECTS = "driven to its end, rejected, driven again"
-    RETRIES = "stopped, rejected, driven again"
-    FAILS = "stopped; its run fails, the session goes on"
-    GOES_ON = "driven to its end, and counts"
-    REFUSES = "never moves: the session does not begin"
+    REJECTS = "not stopped; the run is rejected and repeated"
+    RETRIES = "stopped; the run is rejected and repeated"
+    FAILS = "stopped; the run fails, the session continues"
+    GOES_ON = "not stopped; the run counts"
+    REFUSES = "does not move; the session does not begin"
 
 
 @dataclass(frozen=True)

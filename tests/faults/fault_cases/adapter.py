@@ -7,7 +7,7 @@ FAULTS = (
     Fault(
         "adapter raises",
         "adapter",
-        "the vehicle's adapter raises what nobody thought of",
+        "the vehicle's adapter raises an unexpected exception",
         Then.STOPS,
         Campaign(agv="fails"),
         "the agv adapter failed: RuntimeError",

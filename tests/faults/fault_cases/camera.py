@@ -6,11 +6,11 @@ from fault_record import Fault, Then
 _LOST = "tracking was lost: not seen for 0.5"
 
 FAULTS = (
-    Fault("camera silent", "camera", "no frame comes any more", Then.RETRIES, Campaign(mocap="silent"), _LOST, 0.65),
+    Fault("camera silent", "camera", "no further frame arrives", Then.RETRIES, Campaign(mocap="silent"), _LOST, 0.65),
     Fault(
         "camera untracked",
         "camera",
-        "the vehicle is in no frame",
+        "no frame contains the vehicle",
         Then.RETRIES,
         Campaign(mocap="untracked"),
         _LOST,
@@ -19,7 +19,7 @@ FAULTS = (
     Fault(
         "camera guessed",
         "camera",
-        "frames say untracked, and show a plausible pose",
+        "frames are marked untracked but contain a plausible pose",
         Then.RETRIES,
         Campaign(mocap="guessed"),
         _LOST,
@@ -28,7 +28,7 @@ FAULTS = (
     Fault(
         "camera frozen",
         "camera",
-        "the same pose again and again",
+        "every frame repeats the same pose",
         Then.STOPS,
         Campaign(mocap="frozen"),
         "tracking is frozen",
@@ -37,7 +37,7 @@ FAULTS = (
     Fault(
         "bodies swapped",
         "camera",
-        "another body's pose, 0.8 m away",
+        "frames contain the pose of another body, 0.8 m away",
         Then.STOPS,
         Campaign(mocap="swapped"),
         "pose jumped",
@@ -46,7 +46,7 @@ FAULTS = (
     Fault(
         "camera clock ahead",
         "camera",
-        "capture times leap ahead by 2 s",
+        "capture times jump forward by 2 s",
         Then.STOPS,
         Campaign(mocap="clock_step=2"),
         "camera's clock is ahead",
@@ -55,7 +55,7 @@ FAULTS = (
     Fault(
         "camera clock back",
         "camera",
-        "capture times go back by 0.3 s",
+        "capture times jump back by 0.3 s",
         Then.STOPS,
         Campaign(mocap="clock_step=-0.3"),
         "camera's clock was set back",
@@ -83,7 +83,7 @@ FAULTS = (
     Fault(
         "leaves the volume",
         "camera",
-        "the vehicle goes faster than its commands say, towards the edge of the floor",
+        "the vehicle is faster than commanded and drives towards the edge of the floor",
         Then.RETRIES,
         Campaign(agv="faster=4", workspace="circle:1.6", hold_s=4.0, share=0.15),
         "vehicle is leaving the capture volume",

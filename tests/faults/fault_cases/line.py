@@ -19,7 +19,7 @@ FAULTS = (
     Fault(
         "bytes corrupt 0.2 %",
         "serial line",
-        "0.2 % of the bytes have a wrong bit: said again",
+        "0.2 % of the bytes have a wrong bit; commands are sent again",
         Then.GOES_ON,
         Campaign(agv="corrupt=0.002"),
         rigs=_FIRMWARE,
@@ -37,7 +37,7 @@ FAULTS = (
     Fault(
         "half lines",
         "serial line",
-        "half of the lines lose their second half",
+        "half of the lines arrive without their second half",
         Then.STOPS,
         Campaign(agv="halved=0.5"),
         "see the cable",
@@ -47,7 +47,7 @@ FAULTS = (
     Fault(
         "port gone",
         "serial line",
-        "the simulated board and its port vanish",
+        "the simulated board and its port disappear",
         Then.STOPS,
         Campaign(agv="unplugged"),
         "has ended",

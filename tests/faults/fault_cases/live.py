@@ -25,7 +25,7 @@ FAULTS = (
     Fault(
         "wrong id",
         "NatNet",
-        "frames show another body's id",
+        "frames contain the id of another body",
         Then.RETRIES,
         Live(_rename),
         "tracking was lost",
@@ -36,7 +36,7 @@ FAULTS = (
     Fault(
         "stream stopped",
         "NatNet",
-        "the server sends no frame any more",
+        "the server stops sending frames",
         Then.RETRIES,
         Live(_switch_off),
         "tracking was lost",
@@ -47,7 +47,7 @@ FAULTS = (
     Fault(
         "late description",
         "NatNet",
-        "the server does not say which bodies there are",
+        "the server does not describe its rigid bodies",
         Then.REFUSES,
         Live(described=False, rest_s=2.0),
         "no rigid body is called",
@@ -80,7 +80,7 @@ FAULTS = (
     Fault(
         "adapter hangs",
         "adapter",
-        "the vehicle's adapter does not come back from a command",
+        "the vehicle's adapter does not return from a command",
         Then.STOPS,
         Live(open=partial(in_process, faults="hangs"), limits=PATIENT),
         "does not come back from a command",

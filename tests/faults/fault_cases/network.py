@@ -30,12 +30,12 @@ FAULTS = (
     Fault(
         "packets reordered",
         "NatNet",
-        "5 % of the packets are overtaken",
+        "5 % of the packets are reordered",
         Then.GOES_ON,
         _network("packet_reordered=0.05"),
     ),
     Fault(
         "packets doubled", "NatNet", "half of the packets arrive twice", Then.GOES_ON, _network("packet_doubled=0.5")
     ),
-    Fault("packets cut", "NatNet", "5 % of the packets are cut short", Then.GOES_ON, _network("packet_cut=0.05")),
+    Fault("packets cut", "NatNet", "5 % of the packets are truncated", Then.GOES_ON, _network("packet_cut=0.05")),
 )

@@ -26,7 +26,7 @@ FAULTS = (
     Fault(
         "slow consumer",
         "bus",
-        "somebody listens to all messages, and never takes one",
+        "a subscriber receives all messages and reads none",
         Then.GOES_ON,
         Live(open=beside_a_slow_consumer, limits=PATIENT),
         rigs=_LIVE,
@@ -78,7 +78,7 @@ FAULTS = (
     Fault(
         "runner killed",
         "runner",
-        "SIGKILL of the program that drives",
+        "the driving program receives SIGKILL",
         Then.ENDS,
         Orphaned(signal.SIGKILL),
         "",
@@ -88,7 +88,7 @@ FAULTS = (
     Fault(
         "runner suspended",
         "runner",
-        "the program that drives is suspended",
+        "the driving program is suspended",
         Then.ENDS,
         Orphaned(signal.SIGSTOP),
         "",

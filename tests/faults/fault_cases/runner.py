@@ -19,7 +19,7 @@ FAULTS = (
     Fault(
         "exception",
         "runner",
-        "an exception in the middle of a run",
+        "an exception during a run",
         Then.FAILS,
         Campaign(do=_raise),
         "a mistake in the bench",
@@ -30,7 +30,7 @@ FAULTS = (
     Fault(
         "SIGHUP",
         "runner",
-        "SIGHUP: the terminal was closed",
+        "SIGHUP (a closed terminal)",
         Then.ENDS,
         _signal(signal.SIGHUP),
         "Terminated SIGHUP",
