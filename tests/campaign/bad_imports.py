@@ -61,7 +61,7 @@ _GATE = "[gate]\nmax_speed_m_per_s = 1.0\nmax_yaw_rate_rad_per_s = -5.0\n"
 
 CASES: Cases = {
     "mapping-absent": (
-        "a mapping that is neither a file nor shipped",
+        "a mapping that is neither a file nor built in",
         lambda: import_recordings("drat", ["r.csv"], "c"),
     ),
     "mapping-not-toml": ("a mapping that is not TOML", lambda: _import("schema: 1")),
@@ -79,7 +79,7 @@ CASES: Cases = {
         "a floor whose x and y are one axis",
         _mapping('heading = { column = "yaw", unit = "deg" }', _QUATERNION),
     ),
-    "mapping-wheelbase": ("a wheelbase of nothing", _mapping("front_axle_m = 0.1", "front_axle_m = -0.1")),
+    "mapping-wheelbase": ("a wheelbase of 0 m", _mapping("front_axle_m = 0.1", "front_axle_m = -0.1")),
     "recording-absent": ("a recording that does not exist", lambda: _import(files=("s.csv",))),
     "recording-none": ("no recordings", lambda: _import(files=())),
     "recording-twice": ("two recordings of one name", _one_name_twice),
@@ -93,7 +93,7 @@ CASES: Cases = {
     "recording-day": ("sessions by day in a clock that starts at 0", _mapping("[runs]", '[runs]\nsession = "day"')),
     "recording-semicolons": ("semicolons that the mapping does not declare", _text(lambda b: b.replace(b",", b";"))),
     "recording-latin-1": ("Latin-1 where UTF-8 is declared", _text(lambda b: b.replace(b"yaw", b"gier\xe4"))),
-    "recording-encoding": ("an encoding that there is not", lambda: _import(MAPPING + '\n[csv]\nencoding = "utf-9"\n')),
+    "recording-encoding": ("an unknown encoding", lambda: _import(MAPPING + '\n[csv]\nencoding = "utf-9"\n')),
     "recording-encoding-nul": (
         "an encoding whose name has a NUL",
         lambda: _import(MAPPING + '\n[csv]\nencoding = "utf\\u0000-8"\n'),
@@ -101,21 +101,24 @@ CASES: Cases = {
     "mapping-delimiter": ("a delimiter that is not ASCII", lambda: _import(MAPPING + '\n[csv]\ndelimiter = "é"\n')),
     "mapping-delimiter-digit": ("a digit as delimiter", lambda: _import(MAPPING + '\n[csv]\ndelimiter = "0"\n')),
     "mapping-skip-rows": (
-        "more lines before the header than any file has",
+        "more than 10000 lines before the header (`skip_rows`)",
         lambda: _import(MAPPING + "\n[csv]\nskip_rows = 99999999999\n"),
     ),
     "recording-cell-long": (
-        "a quoted cell that holds the rest of the file",
+        "a quoted cell that contains the rest of the file",
         _cell("X", 6, '"' + 500 * "abcdefghi " + '"'),
     ),
     "recording-not-driven": ("no row that was driven", lambda: _import(armed=[0] * 60)),
-    "recording-too-short": ("nothing long enough for a run", _mapping("shortest_s = 0.2", "shortest_s = 5.0")),
+    "recording-too-short": (
+        "recordings shorter than the shortest run",
+        _mapping("shortest_s = 0.2", "shortest_s = 5.0"),
+    ),
     "recording-pieces": (
-        "runs that are to be shorter than the time from one pose to the next",
+        "a longest run shorter than the interval between poses",
         _mapping("shortest_s = 0.2", "shortest_s = 0.2\nlongest_s = 1e-9"),
     ),
-    "recording-no-rows": ("a header and nothing else", _text(lambda b: b.splitlines()[0] + b"\n")),
-    "recording-no-end": ("a header without even the end of its line", _text(lambda b: b.splitlines()[0])),
+    "recording-no-rows": ("a header without rows", _text(lambda b: b.splitlines()[0] + b"\n")),
+    "recording-no-end": ("a header without the end of its line", _text(lambda b: b.splitlines()[0])),
     "recording-unit": ("commands of −1…1 where µs are declared", lambda: _import(throttle=[0.5] * 60)),
-    "out-not-empty": ("an output directory with something in it", _over_something),
+    "out-not-empty": ("an output directory that is not empty", _over_something),
 }

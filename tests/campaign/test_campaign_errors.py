@@ -22,8 +22,9 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "errors-camp
 _INTRODUCTION = """\
 # Bad input: campaigns and recordings
 
-What cannot be read, recorded or imported, and the one line that says so. `c` is the campaign's directory, `r.csv` a
-recording and `lab.toml` its mapping; rows are counted from 1, without the header. Every case is a test.
+The table lists data that agvbench cannot read, record or import, each with its error message of one line. `c` is the
+directory of the campaign, `r.csv` a recording and `lab.toml` its mapping. Rows are counted from 1, without the header.
+Every case is a test.
 
 | case | input | message |
 |---|---|---|

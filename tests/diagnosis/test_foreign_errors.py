@@ -22,8 +22,9 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "errors-diag
 _INTRODUCTION = """\
 # Bad input: campaigns that cannot be diagnosed
 
-Tables that are whole and of the right schema ([else](errors-campaign.md) they are refused when they are opened), but
-that no vehicle can have written. `agvbench diagnose` says so in one line and exits with code 2. Every case is a test.
+The tables of these campaigns are complete and have the right schema ([other tables](errors-campaign.md) are rejected
+when they are opened), but no vehicle can produce their contents. `agvbench diagnose` prints an error of one line and
+exits with code 2. Every case is a test.
 
 | case | input | message |
 |---|---|---|
@@ -67,7 +68,7 @@ CASES: dict[str, tuple[str, Callable[[list[Run]], list[Run]]]] = {
     "frames-of-others": ("frames that belong to other runs", _mixed),
     "two-vehicles": ("half of the runs of a vehicle that is 10 % faster", _frames(_longer, every=2)),
     "split-all-fit": (
-        "a column split that sets nothing aside",
+        "a column split without held-out runs",
         lambda runs: [dataclasses.replace(run, split="fit") for run in runs],
     ),
 }

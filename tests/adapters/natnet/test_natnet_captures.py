@@ -135,16 +135,16 @@ def test_what_can_be_decoded_is_told_before_the_damage(tmp_path: Path, capsys: p
 
 CONTENTS = {
     "no handshake in the file": session()[4],
-    "some other file": bytes(70_000),
+    "file of another kind": bytes(70_000),
     "empty file": b"",
     "datagram of another protocol": b"\x63\x00\x00\x00",
-    "capture of something else": struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 65535, 101),
+    "capture without NatNet packets": struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 65535, 101),
     "capture that was cut off": b"\xd4\xc3\xb2\xa1\x02",
 }
 OPTIONS = {
     "not a version": ["--natnet-version", "four"],
-    "version that nobody knows": ["--natnet-version", "9.9"],
-    "nothing to do": None,
+    "unsupported version": ["--natnet-version", "9.9"],
+    "no action requested": None,
 }
 PAGE = Path(__file__).parents[3] / "docs" / "reference" / "errors-natnet.md"
 LINES = dict(re.findall(r"^\| ([^|]+) \| `(.+)` \|$", PAGE.read_text(), re.MULTILINE))
