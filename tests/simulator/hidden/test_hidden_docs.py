@@ -23,8 +23,8 @@ def test_covariates_of_what_lies_outside_are_those_of_the_recipes():
             assert tuple(re.findall(r"`([a-z_]+)`", rows[name])) == recipe.covariates
 
 
-def test_what_free_maps_absorb_is_listed():
-    listed = re.search(r"((?:`[a-z_]+`(?:,| and)?\s+)+)are\s+absorbed\s+by\s+free\s+maps", TEXT)
+def test_effects_that_nodal_maps_absorb_are_listed():
+    listed = re.search(r"((?:`[a-z_]+`(?:,| and)?\s+)+)are\s+absorbed\s+by\s+nodal\s+maps", TEXT)
     assert listed is not None
     assert set(re.findall(r"`([a-z_]+)`", listed[1])) == {r.name for r in CATALOGUE.values() if r.absorbed}
 
