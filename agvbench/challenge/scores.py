@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from agvbench.challenge.trial import Trial
-from agvbench.statistics.proportion import Proportion
+from agvbench.statistics.intervals import Proportion
 
 _Z = 1.959963984540054
 _THREE_FLOORS = 9.0

@@ -41,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     from rich.console import Console
 
     from agvbench.reporting.console.calibration import print_calibration
-    from agvbench.workflows.calibrate import calibrated, save, write_firmware_header
+    from agvbench.workflows.calibration import calibrated, save, write_firmware_header
 
     console, out, firmware = Console(), arguments.out, arguments.firmware
     calibration = calibrated(arguments.directory, maps=arguments.maps, session=arguments.session)

@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
     if arguments.emulate:
         from agvbench.adapters.contract import AdapterOptions, camera_options
-        from agvbench.workflows.natnet_emulation import emulate
+        from agvbench.workflows.adapter_process import emulate
 
         camera = camera_options(arguments.camera)
         options = AdapterOptions(

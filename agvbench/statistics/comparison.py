@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from agvbench.errors import FlagError
-from agvbench.statistics.bootstrap import RESAMPLES
 from agvbench.statistics.differences import (
     ALPHA,
     ComparisonVerdict,
@@ -27,6 +26,7 @@ from agvbench.statistics.differences import (
     of_cell,
     overall,
 )
+from agvbench.statistics.intervals import RESAMPLES
 from agvbench.statistics.matching import Cell, Side, match_cells
 from agvbench.statistics.quantities import END_POSE, QUANTITIES, Quantity
 from agvbench.types import Floats

@@ -6,9 +6,9 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from agvbench.notebook_html import heading_html, table_html
-from agvbench.statistics.bootstrap import CONFIDENCE
 from agvbench.statistics.differences import ALL, ComparisonVerdict, Difference, EndShift, SampleSummary
 from agvbench.statistics.hypothesis_tests import required_sample_size
+from agvbench.statistics.intervals import CONFIDENCE
 from agvbench.statistics.quantities import DISTANCE, POSITION
 
 if TYPE_CHECKING:

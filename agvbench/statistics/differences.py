@@ -13,7 +13,6 @@ from enum import StrEnum
 
 import numpy as np
 
-from agvbench.statistics.bootstrap import CONFIDENCE, Interval, average_difference_interval, median_difference_interval
 from agvbench.statistics.descriptive import classify_outliers
 from agvbench.statistics.hypothesis_tests import (
     holm_tarone,
@@ -21,6 +20,7 @@ from agvbench.statistics.hypothesis_tests import (
     rank_test,
     tarone_testable,
 )
+from agvbench.statistics.intervals import CONFIDENCE, Interval, average_difference_interval, median_difference_interval
 from agvbench.statistics.matching import Cell, Strata
 from agvbench.statistics.quantities import DISTANCE, Quantity
 from agvbench.types import Floats

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from agvbench.signals import robust_std
-from agvbench.statistics.bootstrap import Interval, median_interval
 from agvbench.statistics.end_poses import in_order
+from agvbench.statistics.intervals import Interval, median_interval
 from agvbench.statistics.run_errors import valid
 from agvbench.types import Floats
 

@@ -17,7 +17,7 @@ from agvbench.statistics import Comparison, bias_and_spread, compare, end_pose_t
 from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM, checked_margins
 from agvbench.statistics.end_poses import in_order
 from agvbench.types import Frames, Run
-from agvbench.workflows.calibration_curves import CalibrationCurves, read_calibration_curves
+from agvbench.workflows.calibration import CalibrationCurves, read_calibration_curves
 from agvbench.workflows.diagnosis_files import ShownDiagnosis, read_diagnosis
 
 if TYPE_CHECKING:

@@ -23,8 +23,8 @@ from scipy import stats
 
 from agvbench.campaign import CampaignHeader, CampaignWriter
 from agvbench.reporting import write_report
-from agvbench.statistics.bootstrap import median_difference_interval
 from agvbench.statistics.hypothesis_tests import rank_test
+from agvbench.statistics.intervals import median_difference_interval
 from agvbench.types import Commands, Floats, Frames, Pose, Run
 
 ROUNDS, RUNS, POSES, REPORT_BOUND_S = 7, 300, 1200, 15.0

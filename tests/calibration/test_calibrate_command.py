@@ -76,7 +76,7 @@ def test_what_cannot_be_calibrated_is_one_line_and_exit_code_2(runs, campaign, t
 def test_measurements_reach_the_report(campaign):
     from agvbench.calibration import calibrate
     from agvbench.campaign import Campaign
-    from agvbench.workflows.calibration_curves import read_calibration_curves
+    from agvbench.workflows.calibration import read_calibration_curves
 
     calibration = calibrate(Campaign.open(campaign))
     calibration.model.save(campaign / "vehicle.toml")

@@ -10,7 +10,7 @@ import pytest
 
 from agvbench.errors import FileError
 from agvbench.model import thesis_vehicle
-from agvbench.workflows.calibrate import firmware_header, write_firmware_header
+from agvbench.workflows.calibration import firmware_header, write_firmware_header
 
 
 def test_a_name_cannot_break_out_of_the_comment() -> None:

@@ -10,7 +10,6 @@ from scipy import stats
 from statistics_samples import error_table
 
 from agvbench.statistics import bias_and_spread
-from agvbench.statistics.bootstrap import average_difference_interval, median_difference_interval, median_interval
 from agvbench.statistics.hypothesis_tests import (
     holm,
     holm_tarone,
@@ -19,6 +18,7 @@ from agvbench.statistics.hypothesis_tests import (
     required_sample_size,
     tarone_testable,
 )
+from agvbench.statistics.intervals import average_difference_interval, median_difference_interval, median_interval
 from agvbench.statistics.repeatability import spread
 
 NOISES = {

@@ -12,7 +12,7 @@ from agvbench.challenge.challenge import run_challenge
 from agvbench.challenge.scores import CRITERIA, coverings, score
 from agvbench.challenge.trial import Trial
 from agvbench.errors import FlagError
-from agvbench.statistics.proportion import Proportion
+from agvbench.statistics.intervals import Proportion
 
 
 def trial(hidden=(), library=None, verdict="ADEQUATE", named=(), **more):

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from agvbench.reporting.write import WrittenReport
     from agvbench.statistics import Comparison, Difference
-    from agvbench.statistics.bootstrap import Interval
+    from agvbench.statistics.intervals import Interval
     from agvbench.workflows.report import ReportData
 
 _VERDICT_STYLES = {"better": "green", "worse": "bold red", "same": "cyan", "cannot": "dim"}

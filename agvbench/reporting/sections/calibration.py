@@ -10,7 +10,7 @@ from agvbench.plot.calibration_curves import draw_measured
 from agvbench.reporting.content import Block, Column, FigureBlock, Panel, Paragraph, Table, Value
 from agvbench.reporting.figures.style import INK, ON_PAGE, dress, new_figure, to_svg
 from agvbench.reporting.sections.base import Section
-from agvbench.workflows.calibration_curves import AXLES, Curve
+from agvbench.workflows.calibration import AXLES, Curve
 from agvbench.workflows.report import ReportData
 
 _COLUMNS = (

@@ -1,21 +1,74 @@
-"""Calibration curves of a campaign: what was measured, and the maps that were fitted to it."""
+"""``agvbench calibrate``: measure the calibration runs, fit both ways, write vehicle and firmware header."""
 
 from __future__ import annotations
 
 import math
+from contextlib import nullcontext
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from rich.console import Console
 
 from agvbench.campaign import Campaign
 from agvbench.errors import AgvbenchError
+from agvbench.model import VehicleModel
 from agvbench.types import Floats
+from agvbench.workflows.output_files import write_file
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from agvbench.model import VehicleModel
+    from agvbench.calibration import Calibration
+
+
+def calibrated(directory: str, *, maps: str = "default", session: str | None = None) -> Calibration:
+    """Return the calibration from the campaign in `directory`; a terminal shows that something goes on.
+
+    Raises
+    ------
+    CampaignError, FitError, VehicleError
+        If the campaign cannot be read or does not determine the maps.
+    """
+    from agvbench.calibration import calibrate  # only here: reports read curves, and numba takes seconds to import
+
+    errors = Console(stderr=True)
+    with errors.status("measuring runs and fitting maps") if errors.is_terminal else nullcontext():
+        return calibrate(Campaign.open(directory), maps=maps, session=session)
+
+
+def save(calibration: Calibration, path: Path) -> None:
+    """Write the calibrated vehicle.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be written.
+    """
+    write_file("--out", path, calibration.model.save)
+
+
+def firmware_header(model: VehicleModel) -> str:
+    """Return a C header with the calibration hash of `model`, for ``make CALIBRATION=FILE.h`` in ``firmware/``."""
+    name = "".join(letter if letter.isalnum() or letter in " _-" else "_" for letter in model.name)
+    return (
+        f"/* Calibration of {name}; made by `agvbench calibrate --firmware`. */\n"
+        f'#define CALIBRATION_HASH "{model.calibration_hash}"\n'
+    )
+
+
+def write_firmware_header(model: VehicleModel, path: Path) -> None:
+    """Write the header of `model`.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be written.
+    """
+    text = firmware_header(model)
+    write_file("--firmware", path, lambda header: header.write_text(text, encoding="ascii", errors="replace"))
+
 
 TABLE, VEHICLE = "calibration", "vehicle.toml"
 AXLES = {"front": ("front axle", "deg"), "rear": ("rear axle", "deg"), "drive": ("drive", "m/s")}
