@@ -12,15 +12,13 @@ from agvbench.types import Floats
 
 @dataclass(frozen=True)
 class AxleCoupling(Effect):
-    """Both axles pull at each other: ``δf ← δf + front_from_rear · δr`` and ``δr ← δr + rear_from_front · δf``."""
+    """The axles are coupled: ``δf ← δf + front_from_rear · δr`` and ``δr ← δr + rear_from_front · δf``."""
 
     name: ClassVar[str] = "axle_coupling"
     stage: ClassVar[Stage] = Stage.WHEELS
     relaxes: ClassVar[str] = "parts are tight (3.2)"
     reference: ClassVar[str] = "Bentvelsen 2015, table 7.1 (the rear angle drifts while the front turns)"
-    limits: ClassVar[str] = (
-        "the same drift comes from markers off the centre line (marker_offset) where only one axle turns"
-    )
+    limits: ClassVar[str] = "markers off the centre line (marker_offset) cause the same drift where only one axle turns"
 
     front_from_rear: float = parameter(unit="–", low=-0.5, high=0.5, scale=0.05)
     rear_from_front: float = parameter(unit="–", low=-0.5, high=0.5, scale=0.05)

@@ -12,7 +12,7 @@ from agvbench.types import Floats
 
 @dataclass(frozen=True)
 class AxleOverrun(Effect):
-    """The axle that the body overruns holds it back more stiffly than the other pulls.
+    """The axle that is slower than the body brakes it more stiffly than the other axle pulls it.
 
     Each axle pulls towards its own ``w cos δ``; the slower one counts ``1 + excess`` times:
     ``v cos β = ((1 + excess) slower + faster) / (2 + excess)``. At 0 that is equation 5.6.
@@ -21,8 +21,8 @@ class AxleOverrun(Effect):
     name: ClassVar[str] = "axle_overrun"
     stage: ClassVar[Stage] = Stage.BODY
     relaxes: ClassVar[str] = "speed does not depend on steering (7.4)"
-    reference: ClassVar[str] = "Bentvelsen 2015, equation 5.6 and appendix B; the law is our own"
-    limits: ClassVar[str] = "nothing shows where both axles steer alike: cornering_speed_loss does"
+    reference: ClassVar[str] = "Bentvelsen 2015, equation 5.6 and appendix B; the equation is agvbench's own"
+    limits: ClassVar[str] = "no influence where both axles steer by the same angle; cornering_speed_loss has one"
 
     excess: float = parameter(unit="–", low=0.0, high=20.0, scale=1.0)
 

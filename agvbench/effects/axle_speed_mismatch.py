@@ -12,14 +12,14 @@ from agvbench.types import Floats
 
 @dataclass(frozen=True)
 class AxleSpeedMismatch(Effect):
-    """Both axles are driven, not equally: ``v_r = (1 + ratio) v_f`` in equation 5.6."""
+    """The driven axles have different speeds: ``v_r = (1 + ratio) v_f`` in equation 5.6."""
 
     name: ClassVar[str] = "axle_speed_mismatch"
     stage: ClassVar[Stage] = Stage.WHEELS
     relaxes: ClassVar[str] = "the front axle's speed equals the rear's (9.2)"
     reference: ClassVar[str] = "Bentvelsen 2015, equation 5.6 and section 9.2"
     limits: ClassVar[str] = (
-        "with equal angles of both axles it is a scale of speed, which the drive's map absorbs; 5 % hardly shows"
+        "with equal angles of both axles it is a scale of speed, which the drive's map absorbs; 5 % changes little"
     )
 
     ratio: float = parameter(unit="–", low=-0.5, high=0.5, scale=0.05)

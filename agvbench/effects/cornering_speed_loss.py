@@ -18,7 +18,7 @@ class CorneringSpeedLoss(Effect):
     stage: ClassVar[Stage] = Stage.WHEELS
     relaxes: ClassVar[str] = "speed does not depend on steering (7.4)"
     reference: ClassVar[str] = "Bentvelsen 2015, appendix B (cornering speed)"
-    limits: ClassVar[str] = "other laws (in the square of the angle, in curvature) differ at large angles"
+    limits: ClassVar[str] = "other equations (in the square of the angle, in curvature) differ at large angles"
 
     loss: float = parameter(unit="–", low=-0.5, high=0.7, scale=0.1)
 

@@ -15,7 +15,7 @@ _MOVING_MPS = 0.003
 
 @dataclass(frozen=True)
 class FloorTilt(Effect):
-    """A moving vehicle drifts down the slope: a constant velocity in the floor frame, wherever it heads.
+    """A moving vehicle drifts down the slope: a constant velocity in the floor frame, at any heading.
 
     Moving means faster than some 3 mm/s, with a smooth share ``1 − exp(−(v / 0.003)²)``, so that a vehicle that comes
     to rest stops drifting.
@@ -24,9 +24,9 @@ class FloorTilt(Effect):
     name: ClassVar[str] = "floor_tilt"
     stage: ClassVar[Stage] = Stage.FLOOR
     relaxes: ClassVar[str] = "the floor is level (3.2)"
-    reference: ClassVar[str] = "a form of our own: the simplest that a slope of the floor can have"
+    reference: ClassVar[str] = "agvbench's own: the simplest equation for a slope of the floor"
     limits: ClassVar[str] = (
-        "one slope for the whole floor, no part that goes with speed; only runs in several directions show it"
+        "one slope for the whole floor, no part proportional to speed; only runs in several directions show it"
     )
 
     drift_mps: float = parameter(unit="m/s", low=0.0, high=0.2, scale=0.005)

@@ -12,7 +12,7 @@ from agvbench.types import Floats
 
 @dataclass(frozen=True)
 class HeadingMisalignment(Effect):
-    """Measured heading = heading + angle: the rigid body was defined while the vehicle stood askew."""
+    """Measured heading = heading + angle: the rigid body was defined with the vehicle at an angle."""
 
     name: ClassVar[str] = "heading_misalignment"
     stage: ClassVar[Stage] = Stage.CAMERA

@@ -13,7 +13,7 @@ from agvbench.types import Floats
 
 @dataclass(frozen=True)
 class MarkerOffset(Effect):
-    """The markers' centroid lies `forward_m` ahead and `left_m` to the left of where the vehicle file says it is."""
+    """The marker centroid lies `forward_m` in front and `left_m` to the left of its position in the vehicle file."""
 
     name: ClassVar[str] = "marker_offset"
     stage: ClassVar[Stage] = Stage.CAMERA

@@ -12,7 +12,7 @@ from agvbench.types import Floats
 
 @dataclass(frozen=True)
 class ReverseSteeringGain(Effect):
-    """Compliance gives way to the wheels, which push from the other side in reverse: ``δ ← (1 + gain) δ`` there."""
+    """In reverse the wheel forces change sign, and compliance changes the angle: ``δ ← (1 + gain) δ``."""
 
     name: ClassVar[str] = "reverse_steering_gain"
     stage: ClassVar[Stage] = Stage.WHEELS

@@ -14,9 +14,9 @@ from agvbench.types import Floats
 
 @dataclass(frozen=True)
 class SteeringBacklash(Effect):
-    """Play between servo and axle: δ stays until its servo is half a width away, then follows at that distance.
+    """Free play between servo and axle: δ rests until its servo is half a width away, then follows at that distance.
 
-    Where an axle stands depends on where it came from, so a run begins with both axles in the middle of their play.
+    The position of an axle depends on its previous positions. A run begins with both axles in the middle of the play.
     """
 
     name: ClassVar[str] = "steering_backlash"
@@ -26,7 +26,7 @@ class SteeringBacklash(Effect):
         "Tao and Kokotović 1996, Adaptive Control of Systems with Actuator and Sensor Nonlinearities (play)"
     )
     limits: ClassVar[str] = (
-        "shows only where the same command is reached from both sides; else it is an offset, which a static map absorbs"
+        "visible only where a command is reached from both sides; otherwise it is an offset, which a static map absorbs"
     )
 
     width_rad: float = parameter(unit="rad", low=0.0, high=0.5, scale=0.03)

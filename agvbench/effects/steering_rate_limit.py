@@ -15,14 +15,14 @@ from agvbench.types import Floats
 class SteeringRateLimit(Effect):
     """Servos turn at no more than a fixed rate: ``|δ̇| ≤ rate``.
 
-    With `steering_lag`, the rate that the lag asks for is what is limited.
+    With `steering_lag`, the limit applies to the rate that the lag requests.
     """
 
     name: ClassVar[str] = "steering_rate_limit"
     stage: ClassVar[Stage] = Stage.SERVO
     relaxes: ClassVar[str] = "axles rotate instantaneously (7.3)"
     reference: ClassVar[str] = "slew rate of hobby servos, stated as seconds per 60°; Bentvelsen 2015, section 7.3"
-    limits: ClassVar[str] = "one rate for both axles and both directions; small steps of steering hardly show it"
+    limits: ClassVar[str] = "one rate for both axles and both directions; small steps of steering hardly depend on it"
 
     rate_rad_per_s: float = parameter(unit="rad/s", low=0.01, high=100.0, scale=2.0, null=math.inf)
 

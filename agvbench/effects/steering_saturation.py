@@ -13,13 +13,13 @@ from agvbench.types import Floats
 
 @dataclass(frozen=True)
 class SteeringSaturation(Effect):
-    """No axle turns further than its end stops: ``|δ| ≤ limit``, in what the servo aims at."""
+    """No axle turns further than its end stops: ``|δ| ≤ limit`` for the commanded angle."""
 
     name: ClassVar[str] = "steering_saturation"
     stage: ClassVar[Stage] = Stage.SERVO
     relaxes: ClassVar[str] = "a line describes the servo (7.3)"
     reference: ClassVar[str] = "Bentvelsen 2015, tables 7.1 and 7.2 (outermost points)"
-    limits: ClassVar[str] = "a static map with end stops has it already: use it only where the map is a line"
+    limits: ClassVar[str] = "a static map with end stops contains it: use it only beside a linear map"
 
     front_rad: float = parameter(unit="rad", low=0.01, high=1.5, scale=0.6, null=math.inf)
     rear_rad: float = parameter(unit="rad", low=0.01, high=1.5, scale=0.6, null=math.inf)

@@ -14,7 +14,7 @@ from agvbench.types import Floats
 
 @dataclass(frozen=True)
 class ActuationDelayServos(Variant):
-    """Both servos obey at t the command given at t − steering_s, the drive the one given at t − drive_s."""
+    """At t both servos carry out the command given at t − steering_s, and the drive the one given at t − drive_s."""
 
     name: ClassVar[str] = "actuation_delay_servos"
     variant_of: ClassVar[str] = "actuation_delay"

@@ -14,7 +14,7 @@ from agvbench.types import Floats
 
 @dataclass(frozen=True)
 class ActuationDelayUneven(Variant):
-    """Each channel obeys at t the command given at t − its delay: front servo, rear servo and drive."""
+    """At t each channel (front servo, rear servo, drive) carries out the command given at t − its delay."""
 
     name: ClassVar[str] = "actuation_delay_uneven"
     variant_of: ClassVar[str] = "actuation_delay"

@@ -15,14 +15,14 @@ from agvbench.types import Floats
 
 @dataclass(frozen=True)
 class BatteryDroopExponential(Variant):
-    """Speed settles at a share of itself: ``v ← v (1 − share (1 − exp(−hours / time_constant)))``."""
+    """Speed falls exponentially to a share of itself: ``v ← v (1 − share (1 − exp(−hours / time_constant)))``."""
 
     name: ClassVar[str] = "battery_droop_exponential"
     variant_of: ClassVar[str] = "battery_droop"
     stage: ClassVar[Stage] = Stage.WHEELS
     relaxes: ClassVar[str] = "the battery is negligible (9.2)"
     reference: ClassVar[str] = "Bentvelsen 2015, section 8.2 (the steep end of a full battery)"
-    limits: ClassVar[str] = "a session much shorter than the time constant shows a line only"
+    limits: ClassVar[str] = "in a session much shorter than the time constant it cannot be distinguished from a line"
 
     share: float = parameter(unit="–", low=-0.5, high=0.9, scale=0.05)
     time_constant_h: float = parameter(unit="h", low=0.05, high=20.0, scale=0.5, null=0.5)

@@ -14,13 +14,13 @@ from agvbench.types import Floats
 
 @dataclass(frozen=True)
 class CorneringSpeedLossPower(Variant):
-    """Speed falls with a power of the angle: ``v ← v (1 − loss (|tan δf|ᵖ + |tan δr|ᵖ))``; p = 1 is the library's."""
+    """Speed falls with a power of the angle: ``v ← v (1 − loss (|tan δf|ᵖ + |tan δr|ᵖ))``; the library has p = 1."""
 
     name: ClassVar[str] = "cornering_speed_loss_power"
     variant_of: ClassVar[str] = "cornering_speed_loss"
     stage: ClassVar[Stage] = Stage.WHEELS
     relaxes: ClassVar[str] = "speed does not depend on steering (7.4)"
-    reference: ClassVar[str] = "Bentvelsen 2015, appendix B; the power is our own"
+    reference: ClassVar[str] = "Bentvelsen 2015, appendix B; the power is agvbench's own"
     limits: ClassVar[str] = "the same power for both axles"
 
     loss: float = parameter(unit="–", low=-0.5, high=0.9, scale=0.1)

@@ -17,13 +17,13 @@ _TYPICAL_MPS = 0.3
 
 @dataclass(frozen=True)
 class FloorTiltPower(Variant):
-    """The drift grows with the speed: ``drift (v / 0.3 m/s)ᵖ`` in one direction; p near 0 is the library's."""
+    """The drift grows with the speed: ``drift (v / 0.3 m/s)ᵖ`` in one direction; as floor_tilt for p near 0."""
 
     name: ClassVar[str] = "floor_tilt_power"
     variant_of: ClassVar[str] = "floor_tilt"
     stage: ClassVar[Stage] = Stage.FLOOR
     relaxes: ClassVar[str] = "the floor is level (3.2)"
-    reference: ClassVar[str] = "a form of our own"
+    reference: ClassVar[str] = "agvbench's own"
     limits: ClassVar[str] = "one slope for the whole floor; several speeds and directions are needed"
 
     drift_mps: float = parameter(unit="m/s", low=0.0, high=0.2, scale=0.005)

@@ -16,13 +16,13 @@ _TYPICAL_MPS = 0.3
 
 @dataclass(frozen=True)
 class LateralSlipPower(Variant):
-    """Turning falls short with a power of the speed: ``κ ← κ / (1 + loss (v / 0.3 m/s)ᵖ)``; p = 2 is the library's."""
+    """Curvature falls with a power of the speed: ``κ ← κ / (1 + loss (v / 0.3 m/s)ᵖ)``; the library has p = 2."""
 
     name: ClassVar[str] = "lateral_slip_power"
     variant_of: ClassVar[str] = "lateral_slip"
     stage: ClassVar[Stage] = Stage.BODY
     relaxes: ClassVar[str] = "slip is negligible (3.2)"
-    reference: ClassVar[str] = "Gillespie 1992, ch. 6, for p = 2; the power is our own"
+    reference: ClassVar[str] = "Gillespie 1992, ch. 6, for p = 2; the power is agvbench's own"
     limits: ClassVar[str] = "several speeds are needed: at one speed it is a scale of the steering"
 
     loss: float = parameter(unit="–", low=-0.3, high=3.0, scale=0.1)

@@ -14,9 +14,9 @@ from agvbench.types import Floats
 
 @dataclass(frozen=True)
 class MocapLatencySmoothing(Variant):
-    """The pose m stamped t is what a filter made of poses q seen up to t − latency: ``ṁ = (q − m) / time_constant_s``.
+    """The pose m stamped t is a filter's output for the poses q up to t − latency: ``ṁ = (q − m) / time_constant_s``.
 
-    A window of free driving begins with a pose that is behind as in a steady motion.
+    A window of free driving begins with the lag of a steady motion.
     """
 
     name: ClassVar[str] = "mocap_latency_smoothing"

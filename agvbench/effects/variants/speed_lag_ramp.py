@@ -18,7 +18,7 @@ _SHORTEST_S = 0.01
 
 @dataclass(frozen=True)
 class SpeedLagRamp(Variant):
-    """Speed ramps to where it settles: ``|v̇| ≤ acceleration`` while |v| grows, ``|v̇| ≤ braking`` while it falls.
+    """Speed ramps to its final value: ``|v̇| ≤ acceleration`` while |v| grows, ``|v̇| ≤ braking`` while it falls.
 
     From forward to backward the vehicle brakes to rest first and accelerates then.
     """
@@ -28,7 +28,7 @@ class SpeedLagRamp(Variant):
     stage: ClassVar[Stage] = Stage.SERVO
     relaxes: ClassVar[str] = "acceleration and deceleration are negligible (3.2, assumption 5)"
     reference: ClassVar[str] = "Bentvelsen 2015, section 8.1: distances of acceleration and braking"
-    limits: ClassVar[str] = "at one speed alone a ramp and a lag of half its time go equally far"
+    limits: ClassVar[str] = "at one speed alone a ramp and a lag of half its time give the same distance"
 
     acceleration_mps2: float = parameter(unit="m/s²", low=0.02, high=100.0, scale=1.0, null=math.inf)
     braking_mps2: float = parameter(unit="m/s²", low=0.02, high=100.0, scale=1.0, null=math.inf)

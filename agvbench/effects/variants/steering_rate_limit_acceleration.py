@@ -15,7 +15,7 @@ from agvbench.types import Floats
 
 @dataclass(frozen=True)
 class SteeringRateLimitAcceleration(Variant):
-    """Servos go to their aim as fast as ``|δ̇| ≤ rate`` and ``|δ̈| ≤ acceleration`` allow, and stop there."""
+    """Servos approach their command as fast as ``|δ̇| ≤ rate`` and ``|δ̈| ≤ acceleration`` allow, and stop there."""
 
     name: ClassVar[str] = "steering_rate_limit_acceleration"
     variant_of: ClassVar[str] = "steering_rate_limit"

@@ -12,7 +12,8 @@ from agvbench.effects.variants import Variant, effect_variants
 _PREFACE = """\
 # Effects
 
-What a vehicle model may have beyond static maps and kinematics. In a vehicle file an effect is a table:
+An effect is one physical cause that a vehicle model may have beyond static maps and kinematics. In a vehicle file an
+effect is a table:
 
 ```toml
 [[effects]]
@@ -21,14 +22,15 @@ time_constant_s = 0.12
 ```
 
 The chain is command → transport → servo and drive → wheels → body → floor → camera. Angles are counter-clockwise
-positive. At its null value an effect does nothing. `agvbench effects` lists all of them; `agvbench effects new NAME`
-writes the file of a new one, which is then simulated, tested, listed and fitted without another line elsewhere.
+positive. An effect whose parameters have their null values does not change the motion. `agvbench effects` lists all
+effects. `agvbench effects new NAME` writes the file of a new one; agvbench then simulates, tests, lists and fits it
+without further registration.
 """
-_LAWS = """\
-# Other laws
+_VARIANTS = """\
+# Model variants
 
-The same causes in laws of their own. A diagnosis tries them in place of what it has chosen, and calls them by their
-causes; a vehicle file has them under their own names.
+A variant describes the cause of an effect by another equation. A diagnosis tries the variants of a selected effect in
+its place, and names the effect. A vehicle file names the variant.
 """
 
 
@@ -52,7 +54,9 @@ def effects_table() -> Table:
 
 def reference_page() -> str:
     """Return ``docs/reference/effects.md``."""
-    return "\n".join([_PREFACE, *map(_section, ordered_effects()), _LAWS, *map(_section, effect_variants().values())])
+    return "\n".join(
+        [_PREFACE, *map(_section, ordered_effects()), _VARIANTS, *map(_section, effect_variants().values())]
+    )
 
 
 def _section(kind: type[Effect]) -> str:
@@ -60,7 +64,7 @@ def _section(kind: type[Effect]) -> str:
     lines += ["| parameter | unit | null | bounds | typical size |", "|---|---|---|---|---|"]
     for p in kind.parameters():
         lines.append(f"| `{p.name}` | {p.unit} | {_number(p.null)} | {_bounds(p)} | {_number(p.scale)} |")
-    lines += ["", *([f"- Law of: {kind.variant_of}"] if issubclass(kind, Variant) else [])]
+    lines += ["", *([f"- Variant of: {kind.variant_of}"] if issubclass(kind, Variant) else [])]
     lines += [f"- Stage: {kind.stage.value}", f"- Relaxes: {kind.relaxes}", f"- Reference: {kind.reference}"]
     return "\n".join([*lines, f"- Limits: {kind.limits}", ""])
 
