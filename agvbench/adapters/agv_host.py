@@ -1,4 +1,4 @@
-"""The host of an AGV adapter: commands in, and a vehicle that stops when nobody commands it any more."""
+"""The host of an AGV adapter: commands in, and a vehicle that stops when commands cease."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Claim:
     Attributes
     ----------
     source
-        That of the runner's commands; None while nobody has the vehicle.
+        That of the runner's commands; None while no runner has the vehicle.
     """
 
     def __init__(self, session: Any, keys: Keys, *, required: bool) -> None:
@@ -206,7 +206,7 @@ class AgvHost(Host):
                 self._check_gap()
 
     def _check_gap(self) -> None:
-        """Tell of commands that were carried out further apart than the vehicle's watchdog allows.
+        """Report commands that were carried out further apart than the vehicle's watchdog allows.
 
         It watches while any channel is away from neutral: wheels that were turned before the vehicle drives go straight
         where it bites.
@@ -263,11 +263,11 @@ class AgvHost(Host):
             except BaseException as error:  # noqa: BLE001  (as for every command)
                 self.failed(error, acknowledged=message.sequence)
         elif not foreign and self.reordered.add():
-            text = f"commands that were overtaken by newer ones: {self.reordered}"
+            text = f"commands superseded by newer ones: {self.reordered}"
             self.event(Level.WARNING, "commands_overtaken", text)
 
     def _report_foreign(self, message: CommandMessage) -> None:
-        """Tell of commands that are not the runner's, at most once a second: an error while the vehicle drives."""
+        """Report commands that are not the runner's, at most once a second: an error while the vehicle drives."""
         self.foreign += 1
         (reported_while_driving, reported_s), now_s = self._foreign_reported, self._clock.now()
         if now_s - reported_s < _FOREIGN_REPORTED_S and reported_while_driving >= self._drives:
@@ -301,7 +301,7 @@ class AgvHost(Host):
                 continue
             try:
                 self._stop_unheard()
-            except Exception as error:  # noqa: BLE001  (whoever watches must go on watching, whatever a stop raises)
+            except Exception as error:  # noqa: BLE001  (the watchdog's thread must go on, whatever a stop raises)
                 self.failed(error)
 
     def _is_silent(self) -> bool:

@@ -47,7 +47,7 @@ class AdapterOptions:
         What the vehicle understands, where the adapter cannot know: a plant does not say. ``neutral`` defaults to
         1500 µs or 0.
     calibration_hash
-        Of the vehicle model that the bench believes, for provenance.
+        Of the vehicle model that the bench uses, for provenance.
     camera
         Options of a simulated camera by name (`agvbench.simulator.Camera.from_options`).
     clock
@@ -72,7 +72,7 @@ class AdapterOptions:
 
 
 class AgvReports(Protocol):
-    """What an AGV adapter can tell the bus. All methods may be called in any thread."""
+    """What an AGV adapter can report to the bus. All methods may be called in any thread."""
 
     def truth(
         self, t_s: Floats, poses: Floats, *, end_s: float, acknowledged: int = 0, flags: int = TruthFlags.LAST
@@ -80,14 +80,14 @@ class AgvReports(Protocol):
         """Show a simulated camera where the vehicle truly was: poses (n, 3) [m, m, rad] at `t_s` (n,) [s]."""
 
     def event(self, level: Level, kind: str, text: str, *, acknowledged: int = 0) -> None:
-        """Say something to whoever listens: one word for programs and a line for people."""
+        """Report an event: one word for programs and a line for people."""
 
     def failed(self, error: Exception, *, acknowledged: int = 0) -> None:
         """Stop the run under way with `error`: the runner raises it with its fields and its remedy."""
 
 
 class MocapReports(Protocol):
-    """What a mocap adapter can tell the bus. All methods may be called in any thread."""
+    """What a mocap adapter can report to the bus. All methods may be called in any thread."""
 
     def frames(self, frames: Frames, *, clock: FrameClock, acknowledged: int = 0) -> None:
         """Publish frames whose times are in `clock`; `acknowledged` is the command they complete (lock step)."""
@@ -109,7 +109,7 @@ class MocapReports(Protocol):
         """Publish one frame from plain numbers, see `agvbench.types.Frames`: the quick way in real time."""
 
     def event(self, level: Level, kind: str, text: str, *, acknowledged: int = 0) -> None:
-        """Say something to whoever listens: one word for programs and a line for people."""
+        """Report an event: one word for programs and a line for people."""
 
     def failed(self, error: Exception, *, acknowledged: int = 0) -> None:
         """Stop the run under way with `error`: the runner raises it with its fields and its remedy."""
@@ -137,7 +137,7 @@ class AgvAdapter(ABC):
 
     @abstractmethod
     def identity(self) -> AgvIdentity:
-        """Return who this is; it does not change while the adapter is open."""
+        """Return the identity; it does not change while the adapter is open."""
 
     def start(self, reports: AgvReports) -> None:  # noqa: B027  (many adapters have nothing to report)
         """Keep `reports` for later; called once, before anything else."""
@@ -183,7 +183,7 @@ class MocapAdapter(ABC):
 
     @abstractmethod
     def identity(self) -> MocapIdentity:
-        """Return who this is; it does not change while the adapter is open."""
+        """Return the identity; it does not change while the adapter is open."""
 
     @abstractmethod
     def start(self, reports: MocapReports) -> None:

@@ -67,7 +67,7 @@ class Host(ABC):
         """Return the identity message."""
 
     def _announce(self) -> None:
-        """Answer questions, then declare the token: who sees it may rely on everything declared before."""
+        """Answer queries, then declare the token: a peer that sees it may rely on everything declared before."""
         self._run("questions", self._serve_queries)
         self._token = self._session.liveliness().declare_token(self._keys.alive(self._role))
 
@@ -105,9 +105,9 @@ class Host(ABC):
         self._publish_event(Event(0, self._role, level, kind, text, acknowledged))
 
     def failed(self, error: BaseException, *, acknowledged: int = 0) -> None:
-        """Tell the runner of `error`, with all its fields; `acknowledged` is the command that was not carried out."""
-        told = as_agvbench_error(error, self._role)
-        self._publish_event(Event.of_error(told, self._role, acknowledged=acknowledged))
+        """Report `error` to the runner with all its fields; `acknowledged` is the command that was not carried out."""
+        known = as_agvbench_error(error, self._role)
+        self._publish_event(Event.of_error(known, self._role, acknowledged=acknowledged))
 
     def _publish_event(self, event: Event) -> None:
         with self._reporting:
@@ -121,7 +121,7 @@ class Host(ABC):
         try:
             self._session.put(key, payload, encoding=ENCODING, congestion_control=zenoh.CongestionControl.BLOCK)
         except (self._zenoh_error, RuntimeError):
-            # The session is closed, or just being closed by another thread: nobody is told any more.
+            # The session is closed, or just being closed by another thread: there is no receiver any more.
             return
 
     def _close_adapter(self, close: Callable[[], None]) -> None:

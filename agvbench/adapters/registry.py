@@ -121,7 +121,7 @@ def plug_in_adapter(path: str, base: type[_Adapter]) -> type[_Adapter]:
     try:
         module = import_file(Path(path))
     except AgvbenchError as error:
-        raise _told(error, path) from error
+        raise _adapter_error(error, path) from error
     own = own_classes(module, base)
     whole = [cls for cls in own if not inspect.isabstract(cls)]
     if len(whole) != 1:
@@ -145,7 +145,7 @@ def open_plug_in(adapter: type[_Adapter], path: str, address: str, options: Adap
     except AgvbenchError:
         raise
     except (Exception, SystemExit) as error:
-        raise _told(error, path) from error
+        raise _adapter_error(error, path) from error
     if not isinstance(opened, adapter):
         remedy = f"return an instance of {adapter.__name__}"
         raise LinkError("open returned something else", where=path, value=repr(opened), remedy=remedy)
@@ -162,6 +162,6 @@ def _not_one(path: str, own: list[type], whole: list[type], base: type) -> LinkE
     return LinkError(f"no {base.__name__}", where=path, remedy=f"derive a class from agvbench.adapters.{base.__name__}")
 
 
-def _told(error: BaseException, path: str) -> LinkError:
+def _adapter_error(error: BaseException, path: str) -> LinkError:
     said = error if isinstance(error, AgvbenchError) else as_plant_error(error, path)
     return LinkError(said.what, where=said.where, value=said.value, limit=said.limit, remedy=said.remedy)

@@ -1,4 +1,4 @@
-"""What AGV adapters in front of a plant share: making it, saying who it is, placing it."""
+"""What AGV adapters in front of a plant share: making it, identifying it, placing it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class SimulatedAgv(AgvAdapter):
         return cls(load_plant(options.plant)(options.seed), options)
 
     def identity(self) -> AgvIdentity:
-        """Return who this is."""
+        """Return the plant's identity."""
         return AgvIdentity(
             vehicle=self._options.vehicle,
             adapter=self.scheme,

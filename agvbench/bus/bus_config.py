@@ -1,6 +1,6 @@
-"""A lab's own Zenoh configuration: certificates, who may do what, limits; in Zenoh's own words (JSON5).
+"""A lab's own Zenoh configuration: certificates, access rights, limits; in Zenoh's own words (JSON5).
 
-Where to listen and whom to call stays with the command line: a file must not open the vehicle to a network unasked.
+The endpoints to listen on and to connect to stay with the command line: no file opens the vehicle to a network unasked.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _OURS = {
     "listen": "--listen",
     "connect": "--connect",
     "mode": "--listen and --connect",
-    "scouting": "--listen and --connect: nobody is looked for",
+    "scouting": "--listen and --connect: there is no scouting",
 }
 _PLACE = re.compile(r"--> (\d+):(\d+)")
 
@@ -40,14 +40,14 @@ _PLACE = re.compile(r"--> (\d+):(\d+)")
 class BusConfig:
     """What a configuration file says.
 
-    ``certificates`` are its TLS files, made absolute: relative ones lie beside the file. ``asks_who`` says whether
-    endpoints of TLS and QUIC take only those who show a certificate of the lab's own authority.
+    ``certificates`` are its TLS files, made absolute: relative ones lie beside the file. ``requires_certificate`` says
+    whether endpoints of TLS and QUIC take only peers that show a certificate of the lab's own authority.
     """
 
     path: Path
     text: str
     certificates: Certificates
-    asks_who: bool
+    requires_certificate: bool
 
     @classmethod
     def load(cls, path: str | Path) -> BusConfig:
@@ -72,7 +72,7 @@ class BusConfig:
         named = {name: (path.parent / tls[name]).absolute() for name in _PATHS if tls.get(name)}
         certificates = Certificates(path, **named)
         check_certificates(certificates)
-        return cls(path, text, certificates, asks_who=bool(tls.get("enable_mtls")))
+        return cls(path, text, certificates, requires_certificate=bool(tls.get("enable_mtls")))
 
     def settings(self) -> zenoh.Config:
         """Return the configuration, as Zenoh has it, to be added to."""

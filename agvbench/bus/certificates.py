@@ -30,7 +30,7 @@ class Certificates:
 
 
 def trusting(authority: Path | None) -> ssl.SSLContext:
-    """Return what trusts the authority with this certificate, and nobody else.
+    """Return a TLS context that trusts the authority with this certificate, and no other.
 
     Raises
     ------

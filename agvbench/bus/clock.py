@@ -10,7 +10,7 @@ from typing import Protocol, runtime_checkable
 
 @runtime_checkable
 class Clock(Protocol):
-    """Tells the time in seconds since some fixed moment, and waits in it."""
+    """Gives the time in seconds since some fixed moment, and waits in it."""
 
     def now(self) -> float:
         """Return the time [s]; it never goes back."""
@@ -53,7 +53,7 @@ class WallClock:
 
 
 class SimulatedClock:
-    """A clock that only moves when somebody waits for it: waiting takes no time.
+    """A clock that only moves when it is waited for: waiting takes no time.
 
     >>> clock = SimulatedClock()
     >>> clock.sleep(3600.0)

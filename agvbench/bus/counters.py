@@ -8,7 +8,7 @@ from itertools import count
 
 
 class Sequence:
-    """Numbers what one sender publishes on one key: 1, 2, 3, …; `source` tells this life of the sender from others."""
+    """Numbers what one sender publishes on one key: 1, 2, 3, …; `source` differs after each start of the sender."""
 
     def __init__(self) -> None:
         self.source = secrets.randbits(32)
@@ -18,7 +18,7 @@ class Sequence:
 
 @dataclass(slots=True)
 class LossCounter:
-    """Counts what a receiver missed of one sender.
+    """Counts the messages of one sender that a receiver lost.
 
     A new source (the sender was started again) begins anew. What came before the first message cannot be known
     to be lost.
@@ -64,9 +64,9 @@ class LossCounter:
 
 
 class RateLimitedCounter:
-    """Counts, and says when it is time to tell: at the `first`, and whenever there are ten times as many.
+    """Counts, and says when a report is due: at the `first`, and whenever there are ten times as many.
 
-    However fast something comes, telling of it takes next to nothing, and the last number told is never off by more
+    However fast something comes, reports of it take next to nothing, and the last number reported is never off by more
     than a factor of ten.
 
     >>> counter = RateLimitedCounter()
@@ -80,7 +80,7 @@ class RateLimitedCounter:
         self.count, self._next = 0, first
 
     def add(self, more: int = 1) -> bool:
-        """Count; return whether to tell."""
+        """Count; return whether a report is due."""
         self.count += more
         if self.count < self._next:
             return False

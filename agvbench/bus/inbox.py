@@ -1,6 +1,6 @@
 """What arrives for a runner: frames and events of one vehicle, in order, by `recv()`.
 
-`recv()` beats callbacks by a thread switch, but has no time limit: whoever must end a wait calls `Inbox.wake`.
+`recv()` beats callbacks by a thread switch, but has no time limit: a thread that must end a wait calls `Inbox.wake`.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Inbox:
                 self._waker.put(b"")
 
     def receive(self) -> FramesMessage | Event | None:
-        """Wait for the next report; None if somebody called `wake`.
+        """Wait for the next report; None after a call of `wake`.
 
         Raises
         ------

@@ -76,7 +76,7 @@ class Keys:
 
     @property
     def report(self) -> str:
-        """Everything that travels to the runner: frames and events, told apart by their type."""
+        """Everything that travels to the runner: frames and events, distinguished by their type."""
         return f"{self.root}/report"
 
     @property

@@ -53,7 +53,7 @@ class VehicleLink:
     Raises
     ------
     AdapterGoneError
-        If an adapter does not turn up or does not say who it is.
+        If an adapter does not turn up or does not identify itself.
     LinkError
         If another runner drives this vehicle.
     """
@@ -135,7 +135,7 @@ class VehicleLink:
         )
 
     def identity(self) -> Identity:
-        """Return who drives and who sees."""
+        """Return the identities of vehicle and camera."""
         return self._identity
 
     def reset(self, pose: Pose, *, run_key: str) -> None:
@@ -173,7 +173,7 @@ class VehicleLink:
         return self._driver.flush()
 
     def stop(self) -> None:
-        """Command neutral at once; safe after any failure: on a bus that is closed nobody hears it."""
+        """Command neutral at once; safe after any failure: on a closed bus it does nothing."""
         if not self._closed:
             with suppress(LinkError):
                 self._driver.stop()
@@ -199,7 +199,7 @@ class VehicleLink:
         self._ask(AGV, REPLAY, payload, self._limit_s)
 
     def _prepare(self, run_key: str, pose: Pose) -> Reset:
-        """Let the camera begin a run; return what the vehicle is to be told."""
+        """Let the camera begin a run; return the reset that the vehicle is to be sent."""
         if not self._identity.simulated:
             raise LinkError(
                 "a real vehicle cannot be placed by software",

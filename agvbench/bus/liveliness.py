@@ -78,8 +78,8 @@ class Liveliness:
     def check(self, *roles: str, settles_s: float = 0.0) -> None:
         """Raise `AdapterGoneError`, with its name and since when, if an adapter in one of these roles vanished.
 
-        With a process, the tokens of those that are connected through it vanish, too, in any order: whoever can wait
-        for `settles_s` [s] is told of the first of `roles`.
+        With a process, the tokens of those that are connected through it vanish, too, in any order: a caller that can
+        wait for `settles_s` [s] gets the first of `roles`.
         """
         if not self._gone_since_s:
             return

@@ -23,7 +23,7 @@ class CommandOutbox:
         sequence = Sequence()
         self._take = sequence.take
         self.source = sequence.source
-        """What tells this sender from others."""
+        """What distinguishes this sender from others."""
         self.last = 0
         """The sequence number of the last command (0: none)."""
         self._keys = keys

@@ -34,7 +34,7 @@ def ask(session: Any, key: str, payload: bytes, limit_s: float, check: Callable[
     for reply in islice(_replies(session, key, payload, limit_s, check), _ANSWERS_READ):
         if reply.ok is not None:
             return bytes(reply.ok.payload.to_bytes())
-        if reply.err.encoding == ENCODING:  # else Zenoh itself says that nobody answered in time
+        if reply.err.encoding == ENCODING:  # else Zenoh itself says that there was no answer in time
             raise decode_event(bytes(reply.err.payload.to_bytes())).as_error()
     waited_s = time.monotonic() - began_s
     _check_until(check, min(_NOTICED_S, limit_s - waited_s))

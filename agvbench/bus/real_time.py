@@ -118,13 +118,13 @@ class RealTime:
             self._failure.note(event.as_error())
 
     def _keep(self, message: FramesMessage) -> None:
-        """Keep frames until they are taken; where nobody takes them for long, what comes then is dropped."""
+        """Keep frames until they are taken; where the runner takes none for long, what comes then is dropped."""
         size = len(message.columns) + _BYTES_EACH
         if self._came - self._gone + size <= _BYTES_KEPT:
             self._came += size
             self._arrived.append((self._clock.now(), message))
         elif self.dropped.add():
-            text = f"frames that nobody took were dropped: {self.dropped}"
+            text = f"frames that the runner did not take were dropped: {self.dropped}"
             self._inbox.events.append(Event(0, "runner", Level.WARNING, "frames_dropped", text))
 
     def start(self) -> None:
@@ -199,7 +199,7 @@ ANSWER_LIMIT_S = 1.0
 
 
 class Heartbeat:
-    """Asks the question `key` again and again, in a thread; calls `on_silent` when nobody answers.
+    """Queries `key` again and again, in a thread; calls `on_silent` when no answer comes.
 
     A vehicle has stopped itself by then: this is for the runner, which would else drive on without one.
     """

@@ -1,4 +1,4 @@
-"""Zenoh sessions that find nobody by themselves: endpoints are named, scouting is off, loopback is the default.
+"""Zenoh sessions without discovery: endpoints are named, scouting is off, loopback is the default.
 
 A session that only connects to one endpoint is a Zenoh client, so that the session it connects to passes messages
 on between all its clients; every other session is a peer.
@@ -67,14 +67,14 @@ def is_loopback(host: str) -> bool:
         return False
 
 
-def is_open_to_anybody(endpoint: str, config: BusConfig | None = None, where: str = "listen") -> bool:
-    """Whether other machines reach an endpoint that is listened on, and nobody is asked who they are.
+def is_open_to_all(endpoint: str, config: BusConfig | None = None, where: str = "listen") -> bool:
+    """Whether other machines reach an endpoint that is listened on, and need no certificate.
 
-    >>> is_open_to_anybody("tcp/0.0.0.0:7447"), is_open_to_anybody("tcp/127.0.0.1:7447")
+    >>> is_open_to_all("tcp/0.0.0.0:7447"), is_open_to_all("tcp/127.0.0.1:7447")
     (True, False)
     """
     protocol, host, _ = parse_endpoint(endpoint, where)
-    return not (is_loopback(host) or (protocol in _SECURED and config is not None and config.asks_who))
+    return not (is_loopback(host) or (protocol in _SECURED and config is not None and config.requires_certificate))
 
 
 def open_bus_session(
@@ -92,7 +92,7 @@ def open_bus_session(
     listen, connect
         Endpoints to wait on and to call, as ``tcp/127.0.0.1:7447``.
     allow_remote
-        Whether other machines may reach endpoints that ask nobody who they are: whoever does can drive the vehicle.
+        Whether other machines may reach endpoints that require no certificate: each of them can then drive the vehicle.
     timeout_s
         How long [s] to try to connect.
     config
@@ -109,7 +109,7 @@ def open_bus_session(
             raise LinkError(
                 "needs certificates", where=f"{where} {endpoint}", remedy="name them with --bus-config FILE"
             )
-        if where == "listen" and not allow_remote and is_open_to_anybody(endpoint, config):
+        if where == "listen" and not allow_remote and is_open_to_all(endpoint, config):
             raise LinkError(
                 "would let other machines drive the vehicle",
                 where=f"listen {endpoint}",
@@ -170,7 +170,7 @@ def _settings(listen: Sequence[str], connect: Sequence[str], timeout_s: float) -
         "transport/link/tx/lease": 3000,
         # How long a flooded receiver may hold up a sender before its connection is given up.
         "transport/link/tx/queue/congestion_control/block/wait_before_close": 60_000_000,
-        # Connections that never say who they are must not lock out those that do: as many as wait, each for this long.
+        # Connections that never identify themselves must not lock out those that do: as many as wait, each for so long.
         "transport/unicast/accept_pending": 1000,
         "transport/unicast/accept_timeout": 1000,
         "transport/link/rx/max_message_size": MAX_MESSAGE_BYTES + _ENVELOPE_BYTES,
@@ -191,12 +191,12 @@ def _open(
     except zenoh.ZError as error:
         reason = _reason(str(error))
         if connect and "connect" in reason.lower():
-            raise _nobody(connect, timeout_s, config) from None
+            raise _no_answer(connect, timeout_s, config) from None
         where = " ".join([*(f"listen {e}" for e in listen), *(f"connect {e}" for e in connect)])
         raise LinkError("endpoint cannot be used", where=where, value=reason) from None
 
 
-def _nobody(connect: Sequence[str], timeout_s: float, config: BusConfig | None) -> LinkError:
+def _no_answer(connect: Sequence[str], timeout_s: float, config: BusConfig | None) -> LinkError:
     """Return why a session could not connect, as far as that can be found out."""
     for endpoint in connect:
         protocol, host, port = parse_endpoint(endpoint, "connect")
@@ -206,7 +206,7 @@ def _nobody(connect: Sequence[str], timeout_s: float, config: BusConfig | None) 
                 remedy=f"see the certificates of both ends; here {config.path}",
             )  # fmt: skip
     return LinkError(
-        "nobody answers",
+        "no answer",
         where=f"connect {' '.join(connect)}",
         value=f"tried for {timeout_s:g} s",
         remedy="start the adapter there first, or correct the endpoint",

@@ -22,7 +22,7 @@ from agvbench.adapters.natnet.protocol.frame import FrameOfData
 from agvbench.adapters.node import host_adapters
 from agvbench.bus.bus_config import BusConfig
 from agvbench.bus.clock import WallClock, wait_until
-from agvbench.bus.session import bus_session, is_open_to_anybody
+from agvbench.bus.session import bus_session, is_open_to_all
 from agvbench.simulator import Camera, load_plant
 from agvbench.types import Command, Frames
 
@@ -65,15 +65,15 @@ def run_adapters(
 
 def _warn_of_remote_access(listen: Sequence[str], config: BusConfig | None) -> None:
     for endpoint in listen:
-        if is_open_to_anybody(endpoint, config, "--listen"):
+        if is_open_to_all(endpoint, config, "--listen"):
             print(
-                f"warning: whoever reaches {endpoint} can drive the vehicle; nobody is asked who they are",
+                f"warning: every peer that reaches {endpoint} can drive the vehicle; no certificate is required",
                 file=sys.stderr,
             )
 
 
 def say_stopped() -> None:
-    """Say that everything is stopped, unless the terminal that would be told is what was closed."""
+    """Say that everything is stopped, unless the terminal itself was closed."""
     with suppress(OSError):
         print("stopped", flush=True)
 

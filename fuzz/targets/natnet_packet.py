@@ -33,7 +33,7 @@ class NatNetPacket(Target):
     def feed(self, data: bytes) -> None:
         """Decode a packet to JSON, and with its markers."""
         version, packet = self._versions[data[0] % len(self._versions) if data else 0], data[1:]
-        json.dumps(self._transcript(version).told(packet), allow_nan=False)
+        json.dumps(self._transcript(version).decode(packet), allow_nan=False)
         message, payload = self._split(packet)
         if message == self._frame:
             self._decode(payload, version, markers=True)

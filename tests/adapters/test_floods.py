@@ -135,7 +135,7 @@ def test_what_a_runner_keeps_of_a_flood_is_bounded_and_its_stop_goes_out() -> No
         assert set(inbox.event_losses) == {"agv", "mocap"}
         texts = [event.text for event in inbox.events if event.role == "runner"]
         assert sum("100 so far" in text for text in texts) == 1
-        assert any("frames that nobody took were dropped" in text for text in texts)
+        assert any("frames that the runner did not take were dropped" in text for text in texts)
         for closed in (liveliness, outbox, inbox):
             closed.close()
         runner.close()

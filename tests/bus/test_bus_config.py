@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from agvbench.bus.bus_config import MAX_BYTES, BusConfig
-from agvbench.bus.session import is_open_to_anybody, open_bus_session
+from agvbench.bus.session import is_open_to_all, open_bus_session
 from agvbench.errors import FileError, LinkError
 
 
@@ -61,8 +61,8 @@ def test_a_key_that_is_another_certificates(tmp_path: Path) -> None:
     with pytest.raises(FileError, match="certificate and key cannot be used: key values mismatch"):
         BusConfig.load(written(tmp_path, mixed))
     right = BusConfig.load(written(tmp_path, mixed.replace("b.key", "a.key")))
-    assert not right.asks_who
-    assert is_open_to_anybody("tls/0.0.0.0:7447", right)
+    assert not right.requires_certificate
+    assert is_open_to_all("tls/0.0.0.0:7447", right)
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
@@ -78,9 +78,9 @@ def test_secured_endpoints_need_a_configuration() -> None:
 
 def test_who_is_asked_is_what_the_configuration_says(tmp_path: Path) -> None:
     asking = BusConfig.load(written(tmp_path, "{transport: {link: {tls: {enable_mtls: true}}}}"))
-    assert not is_open_to_anybody("tls/0.0.0.0:7447", asking)
-    assert is_open_to_anybody("tcp/0.0.0.0:7447", asking)
-    assert is_open_to_anybody("tls/0.0.0.0:7447", None)
+    assert not is_open_to_all("tls/0.0.0.0:7447", asking)
+    assert is_open_to_all("tcp/0.0.0.0:7447", asking)
+    assert is_open_to_all("tls/0.0.0.0:7447", None)
     with pytest.raises(LinkError, match="let other machines drive the vehicle"):
         open_bus_session(listen=["tcp/0.0.0.0:7447"], config=asking)
 

@@ -47,7 +47,7 @@ def test_a_session_without_endpoints_opens_no_socket() -> None:
 
 def test_nobody_answers() -> None:
     port = free_port()
-    with pytest.raises(LinkError, match=f"connect tcp/127.0.0.1:{port}: nobody answers"):
+    with pytest.raises(LinkError, match=f"connect tcp/127.0.0.1:{port}: no answer"):
         open_bus_session(connect=[f"tcp/127.0.0.1:{port}"], timeout_s=0.2)
 
 

@@ -15,7 +15,7 @@ from agvbench.errors import LinkError
 
 
 class ImpairedAgv(AgvAdapter):
-    """A vehicle with faults, which befall it before its commands.
+    """A vehicle with faults, which are injected before its commands.
 
     Runs of a simulated vehicle are counted; a real one's are all the first.
     """
@@ -44,7 +44,7 @@ class ImpairedAgv(AgvAdapter):
             raise
 
     def identity(self) -> AgvIdentity:
-        """Return who the vehicle is, and that it is impaired."""
+        """Return the vehicle's identity, marked as impaired."""
         identity = self.vehicle.identity()
         return replace(identity, extra={**identity.extra, "impaired": self._faults.names})
 

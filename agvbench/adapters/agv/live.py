@@ -18,7 +18,7 @@ from agvbench.types import Command, Plant
 
 
 class LiveAgv(SimulatedAgv):
-    """A plant behind the bus that nobody waits for.
+    """A plant behind the bus that runs in real time, without lock step.
 
     A thread advances the plant from one of the camera's instants to the next, as they come in `AdapterOptions.clock`;
     a command takes effect when it arrives. Runs are not reproducible, as with hardware.

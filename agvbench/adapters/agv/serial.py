@@ -50,11 +50,11 @@ class SerialAgv(AgvAdapter):
         self.hello = self._conversation.begin()
         self.watchdog_s = self._conversation.watchdog_s or SILENCE_LIMIT_S
         self._counters = (RateLimitedCounter(), RateLimitedCounter())
-        self._told = self._counts()  # half a line of a banner, heard while greeting, is nothing to tell
+        self._reported = self._counts()  # half a line of a banner, heard while greeting, is no error
         self._thread = threading.Thread(target=self._listen, name="agvbench-serial", daemon=True)
 
     def _greet(self) -> None:
-        """Ask who is there until somebody says so and is quiet after that."""
+        """Request the vehicle's identity until it answers and is quiet after that."""
         clock, conversation = self._clock, self._conversation
         began_s = heard_s = clock.now()
         attempts = 0
@@ -87,7 +87,7 @@ class SerialAgv(AgvAdapter):
             raise
 
     def identity(self) -> AgvIdentity:
-        """Return who this is."""
+        """Return the vehicle's identity, with its firmware's."""
         hello, options = self.hello, self._options
         return AgvIdentity(
             vehicle=options.vehicle,
@@ -125,7 +125,7 @@ class SerialAgv(AgvAdapter):
                 raise
 
     def stop(self) -> None:
-        """Send neutral, even where everything has failed before: nobody knows what the vehicle still hears."""
+        """Send neutral, even where everything has failed before: the vehicle may still hear it."""
         with self._lock:
             try:
                 self._port.write(self._conversation.command(self._neutral, self._clock.now()))
@@ -168,20 +168,22 @@ class SerialAgv(AgvAdapter):
     def _report(self) -> None:
         """Report what went wrong and was made good, seldom where there is much of it."""
         now = self._counts()
-        if now == self._told or self._reports is None:
+        if now == self._reported or self._reports is None:
             return
         kinds = (
             ("line_garbled", "the vehicle said something garbled"),
             ("command_resent", "the vehicle heard something garbled; the command was sent again"),
         )
-        for (kind, text), counter, count, before in zip(kinds, self._counters, now[:2], self._told[:2], strict=True):
+        for (kind, text), counter, count, before in zip(
+            kinds, self._counters, now[:2], self._reported[:2], strict=True
+        ):
             if count > before and counter.add(count - before):
                 self._reports.event(Level.WARNING, kind, f"{text} ({counter})")
-        if now[2] > self._told[2]:  # each of them spoils a run: all are reported
+        if now[2] > self._reported[2]:  # each of them spoils a run: all are reported
             gap_s, limit_s = self._conversation.bitten_after_s, self.watchdog_s
             text = f"the vehicle's watchdog stopped it: {gap_s:.2f} s between two commands (limit: {limit_s:g} s)"
             self._reports.event(Level.WARNING, VEHICLE_STOPPED_ITSELF, text)
-        self._told = now
+        self._reported = now
 
     def _counts(self) -> tuple[int, int, int]:
         conversation = self._conversation

@@ -68,7 +68,7 @@ class SimavrAgv(SimAgv):
         return cls(load_plant(options.plant)(options.seed), options, firmware)
 
     def identity(self) -> AgvIdentity:
-        """Return who this is."""
+        """Return the vehicle's identity, with its firmware's."""
         sim, hello = super().identity(), self._controller.hello
         extra = {**sim.extra, "firmware_calibration": hello.calibration_hash, "firmware_unit": hello.unit}
         firmware = f"agvbench {hello.firmware_version} in simavr"

@@ -30,7 +30,7 @@ _FRAMES_TO_OBEY = 3
 class SimavrLiveAgv(LiveAgv):
     """A plant whose servos are moved by the firmware's pulses as they come; the firmware is talked to as a vehicle is.
 
-    Nothing makes up for a host that is gone: the firmware's watchdog stops the pulses, or nothing does.
+    Only the firmware's watchdog stops the pulses when the host is gone.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class SimavrLiveAgv(LiveAgv):
         return cls(load_plant(options.plant)(options.seed), options, firmware.version)
 
     def identity(self) -> AgvIdentity:
-        """Return who this is."""
+        """Return the plant's identity, with the firmware's."""
         plant, vehicle = super().identity(), self._serial.identity()
         return replace(plant, firmware=f"{vehicle.firmware} in simavr", extra={**plant.extra, **vehicle.extra})
 

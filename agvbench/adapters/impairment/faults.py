@@ -20,7 +20,7 @@ _FRAMES, _VEHICLE = "agvbench.adapters.impairment.frames", "agvbench.adapters.im
 
 
 class Fault(ABC):
-    """A fault that is as grave as `value` says; made once, begun anew for every run."""
+    """A fault of severity `value`; made once, begun anew for every run."""
 
     name: ClassVar[str]
     default: ClassVar[float] = 1.0
@@ -32,7 +32,7 @@ class Fault(ABC):
         self.value = self.default if value is None else value
         if not self.lowest <= self.value <= self.highest:
             limit = f"{self.lowest:g} to {self.highest:g}"
-            raise LinkError("fault cannot be so grave", where=f"{SCHEME}:{self.name}", value=self.value, limit=limit)
+            raise LinkError("fault value out of range", where=f"{SCHEME}:{self.name}", value=self.value, limit=limit)
         self.begin(np.random.default_rng(0))
 
     def begin(self, rng: np.random.Generator) -> None:
@@ -41,7 +41,7 @@ class Fault(ABC):
 
 
 class FrameFault(Fault):
-    """Befalls what a camera publishes."""
+    """A fault of the frames that a camera publishes."""
 
     @abstractmethod
     def change(self, frames: Frames) -> Frames:
@@ -63,7 +63,7 @@ class SerialLine(Protocol):
 
 
 class VehicleFault(Fault):
-    """Befalls a vehicle before it gets a command."""
+    """A fault that is injected before the vehicle gets a command."""
 
     needs_line: ClassVar[bool] = False
 
@@ -71,15 +71,15 @@ class VehicleFault(Fault):
         """Do it; called before every command from when the fault begins. `line` is None where there is none."""
 
     def alter(self, command: Command, neutral: float) -> Command:
-        """Return what the vehicle is told in place of `command`; `neutral` is what moves nothing."""
+        """Return what the vehicle is commanded in place of `command`; `neutral` is what moves nothing."""
         return command
 
     def release(self) -> None:
-        """Let go of whoever is held; the adapter is closed."""
+        """Release every thread that the fault holds; the adapter is closed."""
 
 
 class LineFault(VehicleFault):
-    """Befalls the bytes on their way to a vehicle with a serial line."""
+    """A fault of the bytes on their way to a vehicle with a serial line."""
 
     needs_line = True
 

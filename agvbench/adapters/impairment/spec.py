@@ -1,4 +1,4 @@
-"""Which faults, how grave and when: ``impaired:NAME[=VALUE][@[RUN/]TIME]+…:ADAPTER``."""
+"""Which faults, how severe and when: ``impaired:NAME[=VALUE][@[RUN/]TIME]+…:ADAPTER``."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _REMEDY = f"write {SCHEME}:NAME[=VALUE][@[RUN/]TIME]:ADAPTER, several faults wit
 
 @dataclass(frozen=True)
 class Impairment:
-    """One fault: its name, how grave it is (None: as usual), and when it begins.
+    """One fault: its name, its severity (None: the default), and when it begins.
 
     ``run`` counts the runs of an adapter from 1, None is every run; ``from_s`` [s] is in the run's clock.
     """
@@ -54,7 +54,7 @@ class Impairment:
 
 
 def parse_address(address: str) -> tuple[list[Impairment], str]:
-    """Return the faults and the adapter that they befall.
+    """Return the faults and the adapter that they are injected into.
 
     >>> [fault.name for fault in parse_address("lost=0.1+late:natnet:emulated")[0]]
     ['lost', 'late']

@@ -20,7 +20,7 @@ from agvbench.types import Frames
 
 
 class ImpairedMocap(MocapAdapter):
-    """A camera with faults, which befall its frames by their capture times.
+    """A camera with faults, which are injected into its frames by their capture times.
 
     A simulated camera's times are those of its run; a real one's count from its first frame, and are all one run.
     """
@@ -50,7 +50,7 @@ class ImpairedMocap(MocapAdapter):
         return impairments, spec
 
     def identity(self) -> MocapIdentity:
-        """Return who the camera is, and that it is impaired."""
+        """Return the camera's identity, marked as impaired."""
         identity = self._camera.identity()
         return replace(identity, extra={**identity.extra, "impaired": self._faults.names})
 

@@ -31,7 +31,7 @@ class NatNetMocap(MocapAdapter):
 
     def __init__(self, options: NatNetOptions, adapter: AdapterOptions) -> None:
         self._options, self._clock = options, adapter.clock
-        self._told_s, self._told = -math.inf, (0, 0, 0)
+        self._reported_s, self._reported = -math.inf, (0, 0, 0)
         self._client = Client(options.connection, adapter.clock, self._see, self._report_problems)
         self._every, self._rate_hz = self._decimation(self._client.rate_hz)
         self._body: int | None = None
@@ -66,7 +66,7 @@ class NatNetMocap(MocapAdapter):
             NatNetOptions.parse(address, options.camera, options.vehicle)
 
     def identity(self) -> MocapIdentity:
-        """Return who this is."""
+        """Return the server's identity, with its versions."""
         info = self._client.info
         extra = {
             "server": f"{info.application} {info.application_version}", "natnet": str(self._client.version),
@@ -105,8 +105,8 @@ class NatNetMocap(MocapAdapter):
             return names[name]
         if name.isascii() and name.isdigit():
             return int(name)
-        if now_s - self._began_s > _PATIENCE_S and now_s - self._told_s > _QUIET_S:
-            self._told_s = now_s
+        if now_s - self._began_s > _PATIENCE_S and now_s - self._reported_s > _QUIET_S:
+            self._reported_s = now_s
             known = " ".join(sorted(names)) or "none"
             error = LinkError(
                 f"no rigid body is called {name!r} (there are: {known})",
@@ -118,9 +118,9 @@ class NatNetMocap(MocapAdapter):
     def _report_problems(self, now_s: float) -> None:
         counters = self._client.counters
         now = (counters.lost, counters.malformed, counters.foreign)
-        if now != self._told and now_s - self._told_s > _QUIET_S:
-            lost, malformed, foreign = (new - old for new, old in zip(now, self._told, strict=True))
-            self._told, self._told_s = now, now_s
+        if now != self._reported and now_s - self._reported_s > _QUIET_S:
+            lost, malformed, foreign = (new - old for new, old in zip(now, self._reported, strict=True))
+            self._reported, self._reported_s = now, now_s
             text = f"{lost} camera frames were lost"
             if malformed:
                 text += f", {malformed} packets could not be decoded: {counters.first_malformed}"

@@ -44,7 +44,7 @@ class SimMocap(MocapAdapter):
         return Camera.from_options(options.camera)
 
     def identity(self) -> MocapIdentity:
-        """Return who this is."""
+        """Return the simulated camera's identity."""
         extra = {"seed": str(self._options.seed), "camera": str(self._camera)}
         return MocapIdentity(self.scheme, self._camera.rate_hz, simulated=True, extra=extra)
 

@@ -70,7 +70,7 @@ class Counters:
 
 
 class Channel:
-    """Sockets that hear the server only; ``told`` counts the packets that were sent to it.
+    """Sockets that hear the server only; ``packets_sent`` counts the packets that were sent to it.
 
     The server sends from its command port and from its data port; in unicast nothing else is taken. No document says
     which port a multicast server's frames come from: once none have come from those two for a while, frames from one
@@ -91,7 +91,7 @@ class Channel:
         # Networks are waited for in real time, even where everything else is simulated.
         self._connection, self._clock, self._counters = connection, WallClock(), counters
         self._selector = selectors.DefaultSelector()
-        self.told = 0
+        self.packets_sent = 0
         self.ports = {connection.port, connection.data_port or DATA_PORT}
         self._joined = False
         self._frames_port: int | None = None
@@ -142,7 +142,7 @@ class Channel:
             self._command.sendto(join(message, payload), self._server)
         except OSError:
             return
-        self.told += 1
+        self.packets_sent += 1
 
     def ask(self, message: Message, payload: bytes, wanted: Message) -> bytes:
         """Return the payload of the answer; what else arrives meanwhile is left out.
@@ -173,11 +173,11 @@ class Channel:
             opened: socket.socket = key.fileobj  # type: ignore[assignment]
             for _ in range(_MOST_AT_ONCE):
                 try:
-                    datagram, who = opened.recvfrom(MAX_DATAGRAM_BYTES)
+                    datagram, sender = opened.recvfrom(MAX_DATAGRAM_BYTES)
                 except (BlockingIOError, ConnectionError):
                     break
-                if not self._is_of_server(datagram, *who):
-                    self._note_foreign(datagram, *who)
+                if not self._is_of_server(datagram, *sender):
+                    self._note_foreign(datagram, *sender)
                     continue
                 try:
                     packets.append(split(datagram))

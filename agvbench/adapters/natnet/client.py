@@ -23,7 +23,7 @@ from agvbench.errors import AdapterGoneError, LinkError, MessageError
 
 KEEP_ALIVE_S, ECHO_S, FAST_ECHO_S, MODELS_S = 4.0, 1.0, 0.05, 0.5
 MAX_RATE_HZ = 10_000.0
-"""No camera is as fast; a server that says more is not believed."""
+"""No camera is as fast; a higher rate from a server is rejected."""
 _FAST_ECHOES = 8
 _RESTART_FRAMES = 1000  # a number lower by more than this is that of a server that began anew, not a late frame
 _NEVER_S = math.inf
@@ -55,7 +55,7 @@ class Client:
     Attributes
     ----------
     info
-        Who answered.
+        Of the server that answered.
     version
         Of the bit stream that arrives.
     rate_hz
@@ -68,7 +68,7 @@ class Client:
     Raises
     ------
     AdapterGoneError
-        If nobody answers.
+        If no server answers.
     LinkError
         If an address cannot be used, or the server does not stream in the version asked for.
     """
@@ -137,9 +137,9 @@ class Client:
                 self._ready.set()
 
     @property
-    def told(self) -> int:
+    def packets_sent(self) -> int:
         """How many packets the server was sent."""
-        return self._channel.told
+        return self._channel.packets_sent
 
     @property
     def ready(self) -> bool:
@@ -206,7 +206,7 @@ class Client:
         return self.sync.host_time(frame.exposed_ticks / self.info.clock_hz)
 
     def close(self) -> None:
-        """Tell the server, and receive no more."""
+        """Disconnect from the server, and receive no more."""
         self._closed.set()
         if self._thread.is_alive():
             self._thread.join(timeout=2.0)

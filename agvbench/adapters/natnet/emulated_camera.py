@@ -99,7 +99,7 @@ class EmulatedNatNet(MocapAdapter):
         return faults, Version.parse(str(options.camera.get("version", "4.1"))), replace(options, camera=camera)
 
     def identity(self) -> MocapIdentity:
-        """Return who this is."""
+        """Return the emulated camera's identity, with the version of its bit stream."""
         extra = {**self._camera.identity().extra, "natnet": str(self._client.version)}
         return MocapIdentity(self.scheme, self._rate_hz, simulated=True, extra=extra)
 
@@ -144,7 +144,7 @@ class EmulatedNatNet(MocapAdapter):
         self._last_s = now_s
         self._client.step(0.0)
         # A busy kernel may take its time even on loopback; what was said at this instant is answered at this instant.
-        while self._server.heard < self._client.told and self._server.step(_PATIENCE_S):
+        while self._server.heard < self._client.packets_sent and self._server.step(_PATIENCE_S):
             pass
         handled = self._handled()
         sent = self._server.send(self._as_sent(frames, index, body))

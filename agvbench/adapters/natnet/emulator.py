@@ -1,7 +1,7 @@
 """A server that speaks NatNet as Motive does: for tests, rehearsals and demonstrations without cameras.
 
 It answers on a command socket, and sends frames to every client that connected (unicast) or to a group (multicast),
-on loopback unless told otherwise.
+on loopback by default.
 """
 
 from __future__ import annotations
@@ -106,10 +106,12 @@ class Emulator:
         return int((host_s * (1.0 + self.settings.drift) + self.settings.offset_s) * self.settings.clock_hz)
 
     def clients(self) -> list[Address]:
-        """Return who has connected and was heard of lately."""
+        """Return the addresses of the clients that have connected and were heard of recently."""
         oldest_s = self._clock.now() - CLIENT_LIMIT_S
         with self._lock:
-            self._clients = {who: client for who, client in self._clients.items() if client.heard_s >= oldest_s}
+            self._clients = {
+                client_address: client for client_address, client in self._clients.items() if client.heard_s >= oldest_s
+            }
             return list(self._clients)
 
     def describe(self, models: Sequence[Model]) -> None:
@@ -124,19 +126,23 @@ class Emulator:
         else:
             self.clients()
             with self._lock:
-                targets = [(who, client.version) for who, client in self._clients.items()]
+                targets = [(client_address, client.version) for client_address, client in self._clients.items()]
         packets = {version: join(Message.FRAMEOFDATA, self._encoded(frame, version)) for _, version in targets}
-        sent = [(packet, who) for who, version in targets for packet in self._network.carry(packets[version])]
-        for packet, who in sent:
-            self._send(packet, who)
+        sent = [
+            (packet, client_address)
+            for client_address, version in targets
+            for packet in self._network.carry(packets[version])
+        ]
+        for packet, client_address in sent:
+            self._send(packet, client_address)
         return len(sent)
 
     def _encoded(self, frame: FrameOfData, version: Version) -> bytes:
         return encode_frame(frame, version, self._models)
 
-    def _send(self, packet: bytes, who: Address) -> None:
+    def _send(self, packet: bytes, client_address: Address) -> None:
         try:
-            self._socket.sendto(packet, who)
+            self._socket.sendto(packet, client_address)
         except OSError:
             # A client that went away is refused by its own machine: no reason for the others to see nothing.
             return
@@ -149,7 +155,7 @@ class Emulator:
         """Answer the next packet, waiting up to `limit_s` [s]; return whether there was one."""
         self._socket.settimeout(limit_s)
         try:
-            datagram, who = self._socket.recvfrom(MAX_DATAGRAM_BYTES)
+            datagram, client_address = self._socket.recvfrom(MAX_DATAGRAM_BYTES)
         except OSError:
             return False
         self.heard += 1
@@ -158,41 +164,41 @@ class Emulator:
             message, payload = split(datagram)
         except MessageError:
             return True
-        if (answer := self._answer(message, payload, who, received_ticks)) is not None:
-            self._send(answer, who)
+        if (answer := self._answer(message, payload, client_address, received_ticks)) is not None:
+            self._send(answer, client_address)
         return True
 
-    def _answer(self, message: int, payload: bytes, who: Address, ticks: int) -> bytes | None:
-        self._heard_of(who, connects=message == Message.CONNECT)
+    def _answer(self, message: int, payload: bytes, client_address: Address, ticks: int) -> bytes | None:
+        self._heard_of(client_address, connects=message == Message.CONNECT)
         if message == Message.CONNECT:
             group, rate = self.settings.multicast, self.settings.clock_hz
             info = ServerInfo("agvbench", "1.0.0.0", self.settings.version, rate, self.settings.data_port, group)
             return join(Message.SERVERINFO, encode_server_info(info))
         if message == Message.REQUEST_MODELDEF:
-            return join(Message.MODELDEF, encode_descriptions(self._models, self._version_of(who)))
+            return join(Message.MODELDEF, encode_descriptions(self._models, self._version_of(client_address)))
         if message == Message.REQUEST:
-            return self._requested(payload.split(b"\0")[0].decode("utf-8", "replace"), who)
+            return self._requested(payload.split(b"\0")[0].decode("utf-8", "replace"), client_address)
         if message == Message.ECHO_REQUEST and len(payload) == _TICKS.size:
             return join(Message.ECHO_RESPONSE, payload + _TICKS.pack(ticks))
         if message == Message.DISCONNECT:
             with self._lock:
-                self._clients.pop(who, None)
+                self._clients.pop(client_address, None)
         return None if message in {Message.KEEPALIVE, Message.DISCONNECT} else join(Message.UNRECOGNIZED)
 
-    def _heard_of(self, who: Address, *, connects: bool) -> None:
+    def _heard_of(self, client_address: Address, *, connects: bool) -> None:
         with self._lock:
-            client = self._clients.get(who)
+            client = self._clients.get(client_address)
             if client is not None:
-                self._clients[who] = client._replace(heard_s=self._clock.now())
+                self._clients[client_address] = client._replace(heard_s=self._clock.now())
             elif connects and len(self._clients) < MAX_CLIENTS:
-                self._clients[who] = _Client(self._clock.now(), self.settings.version)
+                self._clients[client_address] = _Client(self._clock.now(), self.settings.version)
 
-    def _version_of(self, who: Address) -> Version:
+    def _version_of(self, client_address: Address) -> Version:
         with self._lock:
-            client = self._clients.get(who)
+            client = self._clients.get(client_address)
         return self.settings.version if client is None else client.version
 
-    def _requested(self, text: str, who: Address) -> bytes:
+    def _requested(self, text: str, client_address: Address) -> bytes:
         if text == "FrameRate":
             return join(Message.RESPONSE, _FLOAT.pack(self.settings.rate_hz))
         if text.startswith(_BITSTREAM) and self.settings.version >= (4, 0) and self.settings.multicast is None:
@@ -201,8 +207,8 @@ class Emulator:
             except MessageError:
                 return join(Message.UNRECOGNIZED)
             with self._lock:
-                if who in self._clients:
-                    self._clients[who] = self._clients[who]._replace(version=version)
+                if client_address in self._clients:
+                    self._clients[client_address] = self._clients[client_address]._replace(version=version)
             return join(Message.RESPONSE, f"{text}\0".encode())
         return join(Message.UNRECOGNIZED)
 

@@ -38,7 +38,7 @@ class Transcript:
         self._version = version
         self._names: dict[int, str] = {}
 
-    def told(self, datagram: bytes) -> dict[str, Any]:
+    def decode(self, datagram: bytes) -> dict[str, Any]:
         """Return what a packet says: ``message``, and more by kind.
 
         Raises
@@ -135,7 +135,7 @@ def print_packets(path: Path, version: str | None = None, out: TextIO | None = N
         if not _may_be_natnet(datagram):
             continue
         try:
-            line = transcript.told(datagram.data)
+            line = transcript.decode(datagram.data)
         except MessageError as error:
             failed, first = failed + 1, first or error
             continue

@@ -51,26 +51,26 @@ class Conversation:
 
     @property
     def is_greeted(self) -> bool:
-        """Whether it is known who is there, and both ends use checksums if both know them."""
+        """Whether the vehicle has identified itself, and both ends use checksums if both know them."""
         if self.hello is None:
             return False
         dialect = DIALECTS.get(self.hello.firmware_version)
         return self._checked or dialect is None or not dialect.checksums
 
     def greeting(self, attempt: int) -> bytes:
-        """Return the question who is there: with a checksum, then without, for a firmware that knows none.
+        """Return the query of the vehicle's identity: with a checksum, then without, for a firmware that knows none.
 
         The newline before ends whatever half line the vehicle has kept from before.
         """
         return b"\n" + encode_line("V", checksum=self.hello is not None or attempt % 2 == 0)
 
     def begin(self) -> Hello:
-        """End the greeting; return who is there.
+        """End the greeting; return the vehicle's identity.
 
         Raises
         ------
         LinkError
-            If nobody answered, somebody else did, or a firmware that agvbench does not know.
+            If there was no answer, or that of another device or of a firmware that agvbench does not know.
         """
         if self.hello is not None:
             self._dialect = dialect_of(self.hello, where=self._where)
@@ -94,7 +94,7 @@ class Conversation:
     def command(self, command: Command, now_s: float) -> bytes:
         """Return the line that makes the vehicle hold `command` [µs], said at `now_s` [s]."""
         if self._dialect is None:
-            raise LinkError("nobody was greeted", where=self._where)
+            raise LinkError("no vehicle was greeted", where=self._where)
         numbers = self._dialect.numbers(command, where=self._where)
         self._sequence = self._sequence % _NUMBERS + 1
         self._last = command
@@ -166,7 +166,7 @@ class Conversation:
         return b""
 
     def _accept(self, sequence: int) -> None:
-        """Count everything up to `sequence` as answered: a command that was overtaken needs no answer of its own."""
+        """Count everything up to `sequence` as answered: a superseded command needs no answer of its own."""
         self._failures = 0
         if self._waiting is not None and (sequence - self._waiting[0]) % _NUMBERS < _NUMBERS // 2:
             self._waiting = None

@@ -24,12 +24,12 @@ class SerialPort:
     Raises
     ------
     LinkError
-        If there is no such port, it may not be opened, or somebody else has it.
+        If there is no such port, it may not be opened, or another process has it.
 
     Attributes
     ----------
     wire
-        What becomes of bytes on their way to the vehicle: nothing, unless somebody rehearses a bad line.
+        What becomes of bytes on their way to the vehicle: nothing, unless a fault of the line is injected.
     """
 
     def __init__(self, path: str) -> None:

@@ -40,7 +40,7 @@ _MEANINGS = {
 
 
 class Hello(NamedTuple):
-    """Who it is: after a reset, and when asked with ``V``."""
+    """The vehicle's identity: sent after a reset, and in answer to ``V``."""
 
     firmware_version: int
     protocol_version: int

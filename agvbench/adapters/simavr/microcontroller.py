@@ -30,7 +30,7 @@ class Microcontroller:
     Attributes
     ----------
     wire
-        What becomes of bytes on their way to the firmware: nothing, unless somebody rehearses a bad line.
+        What becomes of bytes on their way to the firmware: nothing, unless a fault of the line is injected.
     """
 
     def __init__(self, version: str = "2") -> None:

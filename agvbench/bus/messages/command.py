@@ -20,7 +20,7 @@ class CommandFlags:
 
     NONE: Final = 0
     STOP: Final = 1
-    """Neutral at once, whatever the numbers say; in lock step, nobody waits for frames."""
+    """Neutral at once, whatever the numbers say; in lock step, the runner does not wait for frames."""
     FLUSH: Final = 2
     """Send the frames that are still under way; no time passes."""
     KEEP_ALIVE: Final = 4

@@ -1,4 +1,4 @@
-"""The identity messages: who answers behind a key, and what the runner can expect of it."""
+"""The identity messages: which adapter answers behind a key, and what the runner can expect of it."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class AgvIdentity(Message, tag="agv_identity", frozen=True):
 
 
 class MocapIdentity(Message, tag="mocap_identity", frozen=True):
-    """What a mocap adapter says of itself; ``rate_hz`` [Hz] is how many frames it promises a second."""
+    """What a mocap adapter says of itself; ``rate_hz`` [Hz] is its nominal frame rate."""
 
     adapter: Text
     rate_hz: float

@@ -11,7 +11,7 @@ from agvbench.types import Frames
 
 
 class Extrapolated(FrameFault):
-    """Motion capture software that extrapolates: the pose is as good as ever, only nobody saw it."""
+    """Motion capture software that extrapolates: the pose looks as good as ever, but it was not measured."""
 
     name = "guessed"
 

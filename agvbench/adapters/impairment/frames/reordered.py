@@ -1,4 +1,4 @@
-"""``reordered=SHARE``: that share of the frames is overtaken by the next."""
+"""``reordered=SHARE``: that share of the frames arrives after the next."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Reordered(FrameFault):
     default = 0.1
 
     def change(self, frames: Frames) -> Frames:
-        """Let frames be overtaken."""
+        """Swap frames with the next."""
         order = np.arange(len(frames))
         for index in np.flatnonzero(self.rng.random(max(0, len(frames) - 1)) < self.value):
             order[[index, index + 1]] = order[[index + 1, index]]

@@ -1,4 +1,4 @@
-"""``fails``: the adapter raises what nobody thought of."""
+"""``fails``: the adapter raises an unexpected exception."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``faster=FACTOR``: the drive is told that much more than it should be."""
+"""``faster=FACTOR``: the drive is commanded that much more than it should be."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ class Hangs(VehicleFault):
         self._ceased = threading.Event()
 
     def inject(self, line: SerialLine | None) -> None:
-        """Wait, in real time: whoever waits for an adapter does."""
+        """Wait, in real time, for an adapter hangs in real time."""
         self._ceased.wait(self.value)
 
     def release(self) -> None:

@@ -8,7 +8,7 @@ from agvbench.adapters.impairment.faults import SerialLine, VehicleFault
 
 
 class MicrocontrollerReset(VehicleFault):
-    """A drop in voltage when the motor starts, or somebody at the button."""
+    """A drop in voltage when the motor starts, or a press of the reset button."""
 
     name = "reset"
     needs_line = True

@@ -1,4 +1,4 @@
-"""SERVERINFO: who answers a CONNECT, in which version it streams, and how fast its clock ticks."""
+"""SERVERINFO: which server answers a CONNECT, in which version it streams, and how fast its clock ticks."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ class CertificatesCheck(Check):
         if not lab.settings.bus_config:
             return Finding(FindingState.IDLE, "the bus is not secured", "give --bus-config FILE where it is to be")
         config = BusConfig.load(lab.settings.bus_config)
-        who = "takes those with a certificate of the lab's" if config.asks_who else "does not ask who calls"
+        access = "requires a certificate of the lab" if config.requires_certificate else "requires no certificate"
         if (authority := config.certificates.root_ca_certificate) is None:
             return Finding(
                 FindingState.DOUBTFUL,
@@ -35,7 +35,7 @@ class CertificatesCheck(Check):
         if not ends_s:
             return Finding(FindingState.DOUBTFUL, f"{authority} is no authority's", "see docs/how-to/secure-the-bus.md")
         days = (min(ends_s) - time.time()) / _DAY_S
-        said = f"{lab.settings.bus_config} {who}; its authority ends in {days:.0f} days"
+        said = f"{lab.settings.bus_config} {access}; its authority ends in {days:.0f} days"
         if days < _SOON_DAYS:
             state = FindingState.BAD if days < 0.0 else FindingState.DOUBTFUL
             return Finding(state, f"{said} (limit: {_SOON_DAYS:g})", "make new certificates")
