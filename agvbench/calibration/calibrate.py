@@ -58,8 +58,8 @@ def calibrate(campaign: CampaignLike, *, maps: Maps | str = "default", session: 
 
     Runs of the experiments ``steering_front``, ``steering_rear``, ``steering_opposite`` and ``drive`` hold one
     command each and are measured one by one (`measure_run`). A campaign without any, such as an imported recording
-    of free driving, is read by windows instead (`read_free_driving`). Runs that are not ``ok`` or set aside
-    (``split`` = ``held_out`` or ``validation``) are left alone.
+    of free driving, is read by windows instead (`read_free_driving`). Runs that are not ``ok`` are excluded, and so are
+    validation and test runs (``split`` = ``validation`` or ``held_out``).
 
     Parameters
     ----------

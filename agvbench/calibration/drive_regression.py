@@ -44,7 +44,7 @@ class DriveRegression:
 
     ``map`` of the drive in the session with the most windows; ``lag_s``; ``loss`` in turns; ``session_scale``;
     ``r_squared`` of the windows' speeds; ``settled_mps`` of each window, with lag, turn and session taken out;
-    ``stderr`` of lag and loss; ``words`` to tell.
+    ``stderr`` of lag and loss; ``words`` for people.
     """
 
     map: StaticMap
@@ -182,8 +182,8 @@ class _RegressionProblem:
         ]
         best = min(solutions, key=lambda solution: float(solution.cost))
         p, jacobian = np.asarray(best.x, dtype=np.float64), np.asarray(best.jac, dtype=np.float64)
-        scatter = robust_std(misfit(p))
-        errors = scatter * np.sqrt(np.diag(np.linalg.pinv(jacobian.T @ jacobian)))
+        sd = robust_std(misfit(p))
+        errors = sd * np.sqrt(np.diag(np.linalg.pinv(jacobian.T @ jacobian)))
         return p, np.asarray(errors, dtype=np.float64)
 
     def _bounds(self) -> tuple[list[float], list[float]]:

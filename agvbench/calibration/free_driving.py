@@ -48,8 +48,8 @@ def read_free_driving(runs: Sequence[Run], geometry: Geometry, header: HeaderLik
     delay, 0 to 0.6 s, is the one under which the angle is most nearly a function of the command. Windows in which the
     command of `delay` ago had changed by more than 5 % of its range within 0.3 s are not steady and left out.
 
-    *Drive.* Speed settles slowly, falls in turns, differs between sessions (battery, floor), and a driver who holds
-    the speed gives more command where less comes of it. One regression takes these apart (`regress_drive`).
+    *Drive.* Speed settles slowly, falls in turns, and differs between sessions (battery, floor). A driver that holds
+    the speed gives more command where the vehicle is slower. One regression separates these (`regress_drive`).
 
     Commands are gathered into at most 40 levels over their range; each window is a sample at its level's median.
 
@@ -103,14 +103,14 @@ def _delay(drives: list[_Drive], role: str, angle: Floats, spread: float) -> flo
     changing = _spread_before(drives, role, 0.0, float(_DELAYS_S[-1]) + WINDOW_S / 2.0) > _STEADY_SHARE * spread
     if np.count_nonzero(changing) < _MIN_WINDOWS:
         return 0.0
-    scatters = []
+    dispersions = []
     for delay in _DELAYS_S:
         level, kept = _levels(_delayed(drives, role, delay), None, spread)
         _, index = np.unique(level[kept], return_inverse=True)
         middle = np.array([np.median(angle[kept][index == k]) for k in range(index.max() + 1)])
         off = np.abs(angle[kept] - middle[index])[changing[kept]]
-        scatters.append(float(np.mean(np.minimum(off, 3.0 * np.median(off)))))
-    return float(_DELAYS_S[int(np.argmin(scatters))])
+        dispersions.append(float(np.mean(np.minimum(off, 3.0 * np.median(off)))))
+    return float(_DELAYS_S[int(np.argmin(dispersions))])
 
 
 def _spread_before(drives: list[_Drive], role: str, delay_s: float, before_s: float) -> Floats:

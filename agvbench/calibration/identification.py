@@ -250,5 +250,5 @@ def _solved(matrix: Floats, pull: Floats) -> Floats:
         raise FitError("a parameter changes nothing in these runs", value=f"number {int(np.argmin(scale))}")
     even = matrix / scale[:, None] / scale[None, :]
     if np.linalg.cond(even) > 1.0 / _WEAK:
-        raise FitError("the frames do not tell the parameters apart", value=f"condition {np.linalg.cond(even):.1e}")
+        raise FitError("the frames do not identify the parameters", value=f"condition {np.linalg.cond(even):.1e}")
     return np.asarray(np.linalg.solve(even, pull / scale) / scale)

@@ -16,8 +16,8 @@ from agvbench.types import Floats
 class CurvePoints:
     """One point per command, by ascending command: arrays of shape (k,).
 
-    ``value`` is the median of the repeats (as in tables 7.1–7.4), ``stderr`` its standard error from their scatter (NaN
-    for a single measurement), ``repeats`` how many there are.
+    ``value`` is the median of the repeats (as in tables 7.1–7.4), ``stderr`` its standard error from their dispersion
+    (NaN for a single measurement), ``repeats`` how many there are.
     """
 
     command: Floats

@@ -22,7 +22,7 @@ _MAX_BYTES = 1 << 20
 
 _Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 FrameRate = Annotated[float, msgspec.Meta(gt=0.0, le=1e6)]
-"""Of a camera [Hz]; above, times of frames cannot be told apart in nanoseconds."""
+"""Of a camera [Hz]; above, times of frames cannot be distinguished in nanoseconds."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class CampaignHeader:
 
     @classmethod
     def made_for(cls, where: object, **values: Any) -> CampaignHeader:
-        """Return a header; an impossible value is told as one of file `where`.
+        """Return a header; an impossible value is reported as one of file `where`.
 
         Raises
         ------

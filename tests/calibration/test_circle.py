@@ -118,8 +118,8 @@ BAD = {
     "five degrees": (arcs(RNG, 1, (5, 5))[0][0], "straight within its noise"),
     "five clean degrees": (arcs(RNG, 1, (5, 5), noise=0)[0][0], "5.0° of a circle"),
     "one place": (np.ones((300, 2)), "all in one place"),
-    "resting, with noise": (NOISE * RNG.standard_normal((300, 2)), "scatter"),
-    "a cloud": (RNG.uniform(-1, 1, (300, 2)), "scatter"),
+    "resting, with noise": (NOISE * RNG.standard_normal((300, 2)), "mm noise"),
+    "a cloud": (RNG.uniform(-1, 1, (300, 2)), "mm noise"),
 }
 
 

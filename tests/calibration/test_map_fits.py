@@ -95,7 +95,7 @@ def test_better_maps_predict_left_out_commands_better_than_the_thesis_forms():
         assert fits[name].cross_validated_rms < 0.4 * fits["cubic"].cross_validated_rms
 
 
-def test_standard_errors_of_a_line_are_those_of_its_scatter():
+def test_standard_errors_of_a_line_are_those_of_its_residuals():
     rng = np.random.default_rng(1)
     slopes, errors = [], []
     for _ in range(300):

@@ -28,9 +28,9 @@ def fit_line_with_end_stops(points: CurvePoints) -> MapFit:
 
     Each way of calling some outermost points saturated is tried: least squares through the rest, the mean of the
     saturated as the stop. It is admitted if the line really passes beyond the stop at every saturated command, and
-    not before. Among the admitted the Bayesian information criterion decides, so that a stop has to earn
-    its parameter. A stop that was never reached is put where the line is at the outermost command: what lies beyond was
-    not measured. A point that no such map comes near (a spoilt run) is left out, and said.
+    not before. Among the admitted the Bayesian information criterion decides, so that each stop pays for its
+    parameter. A stop that was never reached is put where the line is at the outermost command: what lies beyond was
+    not measured. A point that no such map comes near (a spoilt run) is left out, and reported.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def fit_line_with_end_stops(points: CurvePoints) -> MapFit:
         worst = int(np.argmax(np.abs(residual)))
         if abs(residual[worst]) <= limit or len(reasons) + 1 > _MOST_OUTLIERS * len(points):
             break
-        reasons[float(kept.command[worst])] = "off the map by more than the scatter of the others explains"
+        reasons[float(kept.command[worst])] = "off the map by more than the dispersion of the others explains"
     static_map = LineWithEndStops(rounded(best.slope), rounded(best.intercept), rounded(best.low), rounded(best.high))
     return assess_map(
         "line_with_end_stops",

@@ -41,7 +41,7 @@ def fit_refined(points: CurvePoints, base: Callable[[CurvePoints], MapFit]) -> M
     """Fit the map of `base`, add its residuals, interpolated, and make the sum monotone: a table.
 
     A parametric map knows where a dead band or an end stop begins between two measured commands, which a table alone
-    rounds off; but it misses every measurement by a little. The residuals are small and smooth, so
+    rounds off; but it leaves a residual at every measurement. The residuals are small and smooth, so
     interpolating them is far more accurate than interpolating the measurements. Knots lie at the measured commands,
     half way between them, and at the kinks of the base. A dead band stays zero: a vehicle at neutral stands.
 

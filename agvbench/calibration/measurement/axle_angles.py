@@ -15,7 +15,7 @@ def axle_angles_from_arc(
 ) -> tuple[Floats, Floats]:
     """Return the axle angles of a vehicle that turns about `center`.
 
-    The thesis projects the centre of the circle on the vehicle's centre line and tells five cases apart: on the front
+    The thesis projects the centre of the circle on the vehicle's centre line and distinguishes five cases: on the front
     axle, on the rear axle, between them, in front of them, behind them. With ξ the distance of that
     projection ahead of the markers' centroid and η that of the centre to the left, one signed formula holds for all::
 

@@ -81,13 +81,13 @@ def fit_circle(points: ArrayLike, method: CircleMethod = "default") -> CircleFit
 
     **When are points an arc?** Three questions are put to the data, because a radius can always be computed:
 
-    - Is the scatter known? Three parameters leave n − 3 degrees of freedom; below 8 points σ itself is uncertain by
+    - Is the noise known? Three parameters leave n − 3 degrees of freedom; below 8 points σ itself is uncertain by
       more than a third, and no standard error means anything.
-    - Is the path bent? The bow of the arc, R(1 − cos(α/2)), must exceed the scatter of a single point 8 times,
+    - Is the path bent? The bow of the arc, R(1 − cos(α/2)), must exceed the noise of a single point 8 times,
       and the curvature its standard error 10 times. The bow is not divided by √n: a tracker's error is
-      shared by neighbouring frames, and averaging would promise what it does not hold. A cloud of points (full circle,
-      bow 2R) fails here, too.
-    - Is the arc long enough to tell a circle from a vehicle that is still changing its mind? At least 10°, however
+      shared by neighbouring frames, and averaging would underestimate it. A cloud of points (full circle, bow 2R) fails
+      here, too.
+    - Is the arc long enough to distinguish a circle from a path of varying curvature? At least 10°, however
       small the noise: below, anything smooth is an arc.
 
     Parameters
@@ -169,15 +169,15 @@ def _complaint(row: Floats, bow: float) -> str:
         return f"not an arc: {points} points (limit: at least {MIN_POINTS})"
     if math.isnan(row[kernel.CURVATURE]):
         return f"not an arc: {points} points, not all of them finite, or all in one place"
-    scatter = f"{1e3 * rms:.3g} mm scatter"
+    noise = f"{1e3 * rms:.3g} mm noise"
     if not bow >= MIN_BOW_SIGMAS * rms:
-        limit = f"(limit: {MIN_BOW_SIGMAS:g} times the scatter)"
-        return f"not an arc: straight within its noise, a bow of {1e3 * bow:.3g} mm in {scatter} {limit}"
+        limit = f"(limit: {MIN_BOW_SIGMAS:g} times the noise)"
+        return f"not an arc: straight within its noise, a bow of {1e3 * bow:.3g} mm in {noise} {limit}"
     if not abs(row[kernel.CURVATURE]) >= MIN_CURVATURE_SIGMAS * row[kernel.SE_CURVATURE]:
         measured = f"{row[kernel.CURVATURE]:.3g} ± {row[kernel.SE_CURVATURE]:.2g} 1/m"
         return f"not an arc: curvature {measured} (limit: {MIN_CURVATURE_SIGMAS:g} standard errors)"
     limit = f"(limit: at least {math.degrees(MIN_ARC_RAD):.0f}°)"
-    return f"not an arc: {math.degrees(arc):.1f}° of a circle, {scatter} {limit}"
+    return f"not an arc: {math.degrees(arc):.1f}° of a circle, {noise} {limit}"
 
 
 def _as_points(points: ArrayLike, where: str) -> Floats:

@@ -12,7 +12,7 @@ from agvbench.types import Floats, Frames, wrap_angle
 
 # A frame that arrives this much behind later ones is late; further behind, its time stamp is wrong.
 _LATEST_S = 1.0
-# The path may be this many times as fast as the vehicle usually is, and wander this many standard deviations of noise.
+# The path may be this many times as fast as the vehicle usually is, and deviate by this many standard deviations.
 _SPEED_MARGIN = 3.0
 _NOISE_MARGIN = 8.0
 _SLOWEST_LIMIT_MPS = 0.5
@@ -52,8 +52,8 @@ def clean_frames(frames: Frames, *, max_speed_mps: float | None = None) -> Frame
     """Return the frames that show the vehicle, in order of capture, each once.
 
     Untracked and doubled frames and those with an impossible time go; late frames go where they belong. Wildly
-    wrong poses (a tracker that jumps metres for a frame or for many, or takes the body the wrong way round) are told
-    from right ones by what the vehicle can do: the kept poses are the longest chain in which each follows from the one
+    wrong poses (a tracker that jumps metres for a frame or for many, or takes the body the wrong way round) are
+    recognised by what the vehicle can do: the kept poses are the longest chain in which each follows from the one
     before at no more than `max_speed_mps`, give or take noise, and with a turn to match. A small step after which the
     path goes on from there, such as a seam of the floor makes, is no jump.
 
@@ -62,7 +62,7 @@ def clean_frames(frames: Frames, *, max_speed_mps: float | None = None) -> Frame
     frames
         In order of arrival.
     max_speed_mps
-        Fastest motion that is believed. By default three times the highest speed that the frames themselves show for
+        Fastest plausible motion. By default three times the highest speed that the frames themselves show for
         0.4 s (in the median, so that wrong frames do not count), and at least 0.5 m/s.
     """
     return inspect_frames(frames, max_speed_mps=max_speed_mps)[0]
@@ -176,7 +176,7 @@ def _longest_chain(frames: Frames, max_speed_mps: float | None) -> NDArray[np.in
         return np.arange(len(frames))
     positions = np.column_stack([frames.x_m, frames.y_m])
     headings = np.unwrap(frames.heading_rad)
-    speed, wander = _limits(frames.t_s, positions, max_speed_mps, _SLOWEST_LIMIT_MPS)
+    speed, noise_m = _limits(frames.t_s, positions, max_speed_mps, _SLOWEST_LIMIT_MPS)
     yaw, turn = _limits(frames.t_s, headings[:, None], None, _SLOWEST_LIMIT_RADPS)
 
     def follows(
@@ -186,7 +186,7 @@ def _longest_chain(frames: Frames, max_speed_mps: float | None) -> NDArray[np.in
         moved = np.hypot(*(positions[later] - positions[earlier]).T) - np.where(kicked, _KICK_M, 0.0)
         turned = np.abs(wrap_angle(headings[later] - headings[earlier]))
         turned -= np.where(kicked, _KICK_RAD, 0.0)
-        return np.asarray((moved <= speed * dt + wander) & (turned <= yaw * dt + turn))
+        return np.asarray((moved <= speed * dt + noise_m) & (turned <= yaw * dt + turn))
 
     every = np.arange(len(frames))
     breaks = np.flatnonzero(~follows(every[:-1], every[1:])) + 1
@@ -211,7 +211,7 @@ def _longest_chain(frames: Frames, max_speed_mps: float | None) -> NDArray[np.in
 
 
 def _limits(t_s: Floats, values: Floats, fastest: float | None, at_least: float) -> tuple[float, float]:
-    """Return the fastest change believed [per s] and the distance that noise may add, read from the values."""
+    """Return the fastest plausible change [per s] and the distance that noise may add, read from the values."""
     bend = np.linalg.norm(np.diff(values, n=2, axis=0), axis=1)
     noise = float(np.median(bend)) / np.sqrt(6.0) if len(bend) else 0.0
     return fastest if fastest is not None else max(at_least, _SPEED_MARGIN * _sustained(t_s, values)), (

@@ -49,8 +49,8 @@ def fit_path(t_s: Floats, points: Floats, *, where: str) -> Path:
         if not math.isfinite(row[kernel.CURVATURE]):
             raise FitError("the path is neither an arc nor a line", where=where, value=f"{len(points)} frames")
         along, distance = _coordinates(points, row)
-        scatter = robust_std(distance)
-        keep = np.abs(distance) <= _OUTLIER_SIGMAS * max(scatter, 1e-9)
+        sd = robust_std(distance)
+        keep = np.abs(distance) <= _OUTLIER_SIGMAS * max(sd, 1e-9)
         if np.array_equal(keep, used):
             break
         used = keep
@@ -93,12 +93,12 @@ def robust_slope(t_s: Floats, values: Floats) -> float:
 
 
 def slope_stderr(t_s: Floats, values: Floats, slope: float) -> float:
-    """Return the standard error of `robust_slope`, from the scatter about the line and its correlation in time."""
+    """Return the standard error of `robust_slope`, from the noise about the line and its correlation in time."""
     residual = values - slope * t_s
     residual = residual - np.median(residual)
-    scatter = robust_std(residual)
+    sd = robust_std(residual)
     spread = float(np.sqrt(np.sum((t_s - t_s.mean()) ** 2)))
-    return 1.3 * scatter / spread * correlation_factor(residual)  # a median of pairs has 1.3 times the error of a line
+    return 1.3 * sd / spread * correlation_factor(residual)  # a median of pairs has 1.3 times the error of a line
 
 
 def correlation_factor(residual: Floats) -> float:
@@ -107,5 +107,5 @@ def correlation_factor(residual: Floats) -> float:
     if size < 2:
         return 1.0
     blocks = residual[: size * _BLOCKS].reshape(_BLOCKS, size).mean(axis=1)
-    scatter = float(np.std(residual))
-    return max(1.0, float(np.std(blocks, ddof=1)) * math.sqrt(size) / scatter) if scatter > 0.0 else 1.0
+    sd = float(np.std(residual))
+    return max(1.0, float(np.std(blocks, ddof=1)) * math.sqrt(size) / sd) if sd > 0.0 else 1.0

@@ -151,7 +151,7 @@ def _moves(run_id: str, segment: Segment, frames: Frames, geometry: Geometry, qu
     sideslip, sideslip_stderr = _robust_mean_angle((path.tangent_rad - frames.heading_rad)[path.used])
     speed = robust_slope(frames.t_s[path.used], path.along_m[path.used])
     curvature = path.curvature_per_m
-    # Over a full turn a wrong radius is a wrong way; over a short arc its angle makes up for it.
+    # Over a full turn a wrong radius is a wrong distance; over a short arc its angle compensates for it.
     share = min(1.0, path.arc_rad**2 / 12.0) * path.curvature_stderr_per_m / max(abs(curvature), 1e-9)
     speed_stderr = math.hypot(slope_stderr(frames.t_s[path.used], path.along_m[path.used], speed), speed * share)
     if math.cos(sideslip) < 0.0:  # it looks away from where it goes: it drives backward
@@ -211,7 +211,7 @@ class Segment:
 
 
 def driven_segment(commands: Commands, last_frame_s: float, neutral: float | None = None) -> Segment:
-    """Return the longest stretch of one command in which the vehicle was told to drive.
+    """Return the longest stretch of one command in which the vehicle was commanded to drive.
 
     The last row is the stop, and `neutral` (by default its drive command) says which rows stand still: steering
     is set before the vehicle drives. A run that never leaves neutral, as in the middle of the drive
@@ -233,7 +233,7 @@ def steady_frames(frames: Frames, segment: Segment, *, where: str) -> Frames:
     """Return the clean frames of `segment` after speed and yaw rate have settled.
 
     Both are taken over 0.2 s. The level is the median over the second half of the segment; the vehicle has settled
-    when it was last outside 2 % (or four standard deviations of the scatter, if that is more) of the level in the first
+    when it was last outside 2 % (or four standard deviations, if that is more) of the level in the first
     half, and not before `MIN_SETTLE_S` after the command. What is still settling at half time is not waited for.
 
     Raises
@@ -278,6 +278,6 @@ def _last_off_level(rate: Floats, t_s: Floats, middle_s: float) -> float:
     if not len(second):
         return -np.inf
     level = float(np.median(second))
-    scatter = robust_std(second - level)
-    off = (np.abs(rate - level) > max(_TOLERANCE * abs(level), 4.0 * scatter)) & (t_s < middle_s)
+    sd = robust_std(second - level)
+    off = (np.abs(rate - level) > max(_TOLERANCE * abs(level), 4.0 * sd)) & (t_s < middle_s)
     return float(t_s[off][-1]) + _STRIDE_S / 2.0 if off.any() else -np.inf

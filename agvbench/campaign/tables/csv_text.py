@@ -1,4 +1,4 @@
-"""CSV in, every cell as text: the wrong delimiter or encoding is told in one line."""
+"""CSV in, every cell as text: the wrong delimiter or encoding is reported in one line."""
 
 from __future__ import annotations
 

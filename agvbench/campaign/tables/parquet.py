@@ -1,4 +1,4 @@
-"""Parquet in and out: deterministic bytes, and damage told in one line."""
+"""Parquet in and out: deterministic bytes, and damage reported in one line."""
 
 from __future__ import annotations
 
