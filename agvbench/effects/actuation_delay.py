@@ -20,7 +20,7 @@ class ActuationDelay(Effect):
     stage: ClassVar[Stage] = Stage.TRANSPORT
     relaxes: ClassVar[str] = "no variable delay in the controller (9.2)"
     reference: ClassVar[str] = "Bentvelsen 2015, section 9.2"
-    limits: ClassVar[str] = "where runs start and end at rest it cannot be told from mocap_latency"
+    limits: ClassVar[str] = "where runs start and end at rest it cannot be distinguished from mocap_latency"
 
     delay_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.05)
 

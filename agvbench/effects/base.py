@@ -97,7 +97,7 @@ class Effect:
     reference
         Where the equation comes from.
     limits
-        Where the equation stops to hold, or what cannot be told apart from it.
+        Where the equation stops to hold, or what cannot be distinguished from it.
     local
         Whether its hooks change over short times or ways, when the actuators rest (with place, time, distance): the
         simulation then keeps its steps short.
@@ -142,8 +142,8 @@ class Effect:
     def beside(outputs: Floats, at_neutral: float, *parameters: float) -> Floats:
         """Return a steering map's outputs (n,) [rad] beside this effect, of a map that was fitted without it.
 
-        Runs begin at neutral, where the map is `at_neutral`. A map that took up a cause may lie where the cause hides
-        its values, and a fit that began there would never learn them. By default nothing changes.
+        Runs begin at neutral, where the map is `at_neutral`. A map that absorbed a cause may lie where the cause hides
+        its values, and a fit that began there would never identify them. By default nothing changes.
         """
         del at_neutral, parameters
         return outputs

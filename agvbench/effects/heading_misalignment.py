@@ -19,7 +19,7 @@ class HeadingMisalignment(Effect):
     relaxes: ClassVar[str] = "the motion capture system is exact (3.2)"
     reference: ClassVar[str] = "definition of a rigid body's axes in motion capture"
     limits: ClassVar[str] = (
-        "equal offsets of both axles' maps make the same paths: only what the vehicle file says of neutral tells"
+        "equal offsets of both axles' maps make the same paths: only the neutral of the vehicle file distinguishes them"
     )
 
     angle_rad: float = parameter(unit="rad", low=-0.5, high=0.5, scale=0.02)

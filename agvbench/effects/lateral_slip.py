@@ -12,7 +12,7 @@ from agvbench.types import Floats
 
 @dataclass(frozen=True)
 class LateralSlip(Effect):
-    """Tyres slip sideways under lateral force: ``κ ← κ / (1 + gradient v²)``, v the speed of the centroid."""
+    """Tyres slip laterally under lateral force: ``κ ← κ / (1 + gradient v²)``, v the speed of the centroid."""
 
     name: ClassVar[str] = "lateral_slip"
     stage: ClassVar[Stage] = Stage.BODY

@@ -20,7 +20,7 @@ class MarkerOffset(Effect):
     relaxes: ClassVar[str] = "the motion capture system is exact (3.2)"
     reference: ClassVar[str] = "Bentvelsen 2015, table 7.1 (lever arm of the rear angle)"
     limits: ClassVar[str] = (
-        "one circle does not tell it from heading_misalignment, left_m hardly from wheel_diameter_mismatch"
+        "one circle does not distinguish it from heading_misalignment, left_m hardly from wheel_diameter_mismatch"
     )
 
     forward_m: float = parameter(unit="m", low=-0.5, high=0.5, scale=0.01)

@@ -18,7 +18,8 @@ class MocapLatency(Effect):
     relaxes: ClassVar[str] = "the motion capture system is exact (3.2)"
     reference: ClassVar[str] = "clock offset between camera and command computer"
     limits: ClassVar[str] = (
-        "where runs start and end at rest it cannot be told from actuation_delay: that needs a common reference of time"
+        "where runs start and end at rest it cannot be distinguished from actuation_delay: "
+        "that needs a common reference of time"
     )
 
     latency_s: float = parameter(unit="s", low=-0.5, high=2.0, scale=0.05)

@@ -19,7 +19,7 @@ class MocapScale(Effect):
     relaxes: ClassVar[str] = "the motion capture system does not drift (9.2)"
     reference: ClassVar[str] = "calibration wand length of motion capture systems"
     limits: ClassVar[str] = (
-        "a scale of all speeds and of the vehicle's own lengths: only turning tells it from the drive's map"
+        "a scale of all speeds and of the vehicle's own lengths: only turning distinguishes it from the drive's map"
     )
 
     scale: float = parameter(unit="–", low=-0.2, high=0.2, scale=0.02)

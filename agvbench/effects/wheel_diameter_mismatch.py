@@ -22,7 +22,8 @@ class WheelDiameterMismatch(Effect):
         "Borenstein and Feng 1996, IEEE Trans. Robotics and Automation 12(6) (UMBmark, unequal wheel diameters)"
     )
     limits: ClassVar[str] = (
-        "nearly the same as an offset of both maps or as markers off the centre line: tight circles both ways tell"
+        "nearly the same as an offset of both maps or as markers off the centre line: "
+        "tight circles both ways distinguish them"
     )
 
     curvature_per_m: float = parameter(unit="1/m", low=-1.0, high=1.0, scale=0.02)

@@ -23,7 +23,9 @@ class ActuationDelayServos(Variant):
     reference: ClassVar[str] = (
         "Bentvelsen 2015, section 9.2; servos of one make have the same delay, a motor controller its own"
     )
-    limits: ClassVar[str] = "what all delays have in common cannot be told from mocap_latency where runs begin at rest"
+    limits: ClassVar[str] = (
+        "what all delays have in common cannot be distinguished from mocap_latency where runs begin at rest"
+    )
 
     steering_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.05)
     drive_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.05)

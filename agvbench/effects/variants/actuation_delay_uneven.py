@@ -23,7 +23,9 @@ class ActuationDelayUneven(Variant):
     reference: ClassVar[str] = (
         "Bentvelsen 2015, section 9.2; servo pulses and motor controllers have frames of their own"
     )
-    limits: ClassVar[str] = "what all delays have in common cannot be told from mocap_latency where runs begin at rest"
+    limits: ClassVar[str] = (
+        "what all delays have in common cannot be distinguished from mocap_latency where runs begin at rest"
+    )
 
     front_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.05)
     rear_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.05)

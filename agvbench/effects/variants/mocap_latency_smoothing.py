@@ -24,7 +24,9 @@ class MocapLatencySmoothing(Variant):
     stage: ClassVar[Stage] = Stage.CAMERA
     relaxes: ClassVar[str] = "the motion capture system is exact (3.2)"
     reference: ClassVar[str] = "first-order low-pass filter, as trackers offer against jitter"
-    limits: ClassVar[str] = "at a constant speed it cannot be told from mocap_latency; a moving average looks like both"
+    limits: ClassVar[str] = (
+        "at a constant speed it cannot be distinguished from mocap_latency; a moving average looks like both"
+    )
 
     latency_s: float = parameter(unit="s", low=-0.5, high=2.0, scale=0.05)
     time_constant_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.05)

@@ -16,7 +16,7 @@ from agvbench.types import Floats
 class SteeringLagInertia(Variant):
     """Lag of second order: ``inertia_s² δ̈ + time_constant_s δ̇ = δ_map − δ``; without inertia it is steering_lag.
 
-    Its natural frequency is 1 / inertia_s, its damping time_constant_s / (2 inertia_s): below 1 the axle swings.
+    Its natural frequency is 1 / inertia_s, its damping time_constant_s / (2 inertia_s): below 1 the axle oscillates.
     """
 
     name: ClassVar[str] = "steering_lag_inertia"
