@@ -19,7 +19,7 @@ from agvbench.types import Floats, Frames
 
 FIVE_MARKERS = ((0.150, 0.040), (0.110, -0.055), (0.010, 0.070), (-0.115, 0.030), (-0.155, -0.085))
 """Where the markers sit on the vehicle, forward and left of their centroid [m]: at unequal distances, so that a
-tracker can tell them apart (thesis 6.1); the places themselves are free."""
+tracker can distinguish them (thesis 6.1); the places themselves are free."""
 
 _SHARES = ("lost", "untracked", "doubled", "late", "wrong")
 _OPTIONS = (  # in the order of `_camera_kernel`

@@ -1,4 +1,4 @@
-"""`CheckedPlant`: somebody's plant with every answer checked, and input validation for the plants that ship."""
+"""`CheckedPlant`: a plug-in plant with every answer checked, and input validation for the plants that ship."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Answer = TypeVar("Answer")
 
 
 class CheckedPlant:
-    """A plant whose exceptions and bad answers become `PlantError`, told in one line with the plant's name.
+    """A plant whose exceptions and bad answers become `PlantError`, reported in one line with the plant's name.
 
     Parameters
     ----------
@@ -57,10 +57,10 @@ class CheckedPlant:
 
     def true_state(self) -> Mapping[str, float]:
         """Return what the plant says of itself, for figures; nothing if it says nothing."""
-        tell = getattr(self._plant, "true_state", None)
-        if not callable(tell):
+        true_state = getattr(self._plant, "true_state", None)
+        if not callable(true_state):
             return {}
-        state = self._guard("true_state", tell)
+        state = self._guard("true_state", true_state)
         if not isinstance(state, Mapping):
             raise PlantError(
                 f"true_state returned {_kind(state)}", where=self.name, remedy="return a mapping of names to numbers"

@@ -2,7 +2,7 @@
 """The integrator: one compiled step of a simulated vehicle, on a fixed grid of 1/1200 s.
 
 Unknowns are the body's speed U along its axis and the two servos; the wheels' constraints (no axle moves
-sideways) give the rest: with the axles at lf and −lr, ``V + lf r = U tan δf`` and ``V − lr r = U tan δr``.
+laterally) give the rest: with the axles at lf and −lr, ``V + lf r = U tan δf`` and ``V − lr r = U tan δr``.
 
 The grid does not depend on how `advance` is called: a call that ends inside a cell returns a partial step from the
 cell's start, and the next call takes the cell from its start again. So grid states are the same bit for bit however
@@ -48,7 +48,7 @@ FRONT_AXLE, REAR_AXLE, MARKER_LEFT, RELIEF, UNDERSTEER = range(39, 44)
 CAPACITY, RUNNING, DROOP, SHAPE = range(44, 48)
 NEUTRAL, COMMAND_LOW, COMMAND_HIGH, DELAY_FRAMES = range(51, 55)
 
-_RELIEF_SPEED = 0.02  # m/s: reversing wheels have taken up the linkage's play above it
+_RELIEF_SPEED = 0.02  # m/s: reversing wheels have closed the linkage's play above it
 _CREEP = 0.004  # m/s: dry friction is smooth below it
 _SECONDS_PER_HOUR = 3600.0
 _SLACK_OPENS = 0.05  # s: without power the drive train comes off its flanks within this
@@ -121,9 +121,9 @@ def _derivative(p: Floats, run_variation: Floats, state: Floats, at: Floats, out
     spring = -p[WINDUP_RATE] * at[WINDUP]
     out[WINDUP] = -at[WINDUP] / p[WINDUP_RELAXES]
     if wheel != 0.0:
-        taken_up = min(1.0, at[SLACK] / p[DRIVE_BACKLASH]) if p[DRIVE_BACKLASH] > 0.0 else 1.0
-        out[SLACK] = abs(wheel) if taken_up < 1.0 else 0.0
-        out[SPEED] = taken_up**3 * _powered(p, wheel, tan_front, tan_rear, speed) + spring
+        closed = min(1.0, at[SLACK] / p[DRIVE_BACKLASH]) if p[DRIVE_BACKLASH] > 0.0 else 1.0
+        out[SLACK] = abs(wheel) if closed < 1.0 else 0.0
+        out[SPEED] = closed**3 * _powered(p, wheel, tan_front, tan_rear, speed) + spring
     else:
         out[SLACK] = -at[SLACK] / _SLACK_OPENS
         out[WINDUP] += speed
@@ -132,7 +132,7 @@ def _derivative(p: Floats, run_variation: Floats, state: Floats, at: Floats, out
     out[FRONT_RATE] = _servo_acceleration(p, FRONT, state[AIMS + 1], at[FRONT_ANGLE], at[FRONT_RATE])
     out[REAR_RATE] = _servo_acceleration(p, REAR, state[AIMS + 2], at[REAR_ANGLE], at[REAR_RATE])
     out[CHARGE] = p[RUNNING] * abs(wheel) / p[(FORWARD if wheel > 0.0 else BACKWARD) + FULL] / _SECONDS_PER_HOUR
-    # No axle moves sideways, save for what understeer lets go.
+    # No axle moves laterally, save for what understeer lets go.
     base = (p[FRONT_AXLE] + p[REAR_AXLE]) * (1.0 + p[UNDERSTEER] * speed * speed)
     yaw_rate = speed * (tan_front - tan_rear) / base
     ahead, left = speed - p[MARKER_LEFT] * yaw_rate, speed * tan_rear + p[REAR_AXLE] * yaw_rate

@@ -90,7 +90,7 @@ THESIS_VEHICLE = SimulatedVehicle(
         running_a=0.5,  # free: only its ratio to the capacity counts
         droop=0.078, shape=1.5,
     ),
-    # Table 7.1 scatters by up to 0.46°, quartiles 0.05…0.15° from the median; the calibrated straights' headings
+    # Table 7.1 varies by up to 0.46°, quartiles 0.05…0.15° from the median; the calibrated straights' headings
     # (tables 8.3–8.6) by about 1°, their lengths by about 8 mm of 2 m.
     run_variation=RunVariation(front_rad=0.12 * _DEG, rear_rad=0.12 * _DEG, speed=0.003),
     neutral=1500.0, command_low=900.0, command_high=2100.0,  # table 5.2

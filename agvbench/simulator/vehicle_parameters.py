@@ -1,4 +1,4 @@
-"""What a simulated vehicle is made of: the constants of its servos, drive, body, battery and scatter.
+"""What a simulated vehicle is made of: the constants of its servos, drive, body, battery and run-to-run variation.
 
 The constants are those of mechanisms (a servo's bandwidth, a motor's dead band, the force that brakes),
 not those of the maps and effects by which the bench describes a vehicle: the two must not share a form.
@@ -77,7 +77,7 @@ class Drivetrain:
     windup_per_s2: float
     windup_relaxes_s: float
     backlash_m: float
-    """Slack of the drive train, taken up at every start before the wheels pull."""
+    """Slack of the drive train, closed at every start before the wheels pull."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +104,7 @@ class Battery:
 
 @dataclass(frozen=True, slots=True)
 class RunVariation:
-    """Run-to-run scatter, drawn at every reset: standard deviations of axle angle and of speed."""
+    """Run-to-run variation, drawn at every reset: standard deviations of axle angle and of speed."""
 
     front_rad: float
     rear_rad: float

@@ -207,7 +207,7 @@ def _margin(value: float, quantity: Quantity) -> float:
     return value
 
 
-_WITHIN = "the intervals cover the scatter between runs of a session, not what changes from one session to the next"
+_WITHIN = "the intervals cover the variation within a session, not what changes from one session to the next"
 _CAUSES = "re-mounted markers, battery, floor, a new calibration of the cameras"
 
 
@@ -215,13 +215,13 @@ def session_note(cells: Sequence[Cell], *, same_campaign: bool) -> str:
     """Return, in plain words, what the intervals of a comparison of these cells cover and what they do not."""
     if same_campaign:
         return f"Both sides were driven in the same campaign: {_WITHIN}."
-    scatter = [between_sessions_sd(cells, quantity) for quantity in QUANTITIES]
-    if all(map(math.isnan, scatter)):
+    deviations = [between_sessions_sd(cells, quantity) for quantity in QUANTITIES]
+    if all(map(math.isnan, deviations)):
         return (
             f"Each side is one session: {_WITHIN}. Whatever else changed between the two ({_CAUSES}) is part of the "
-            "difference; only more sessions of each could tell it apart."
+            "difference; only more sessions of each could separate it."
         )
-    said = ", ".join(f"{sd:.{q.digits}f} {q.unit} ({q.name})" for sd, q in zip(scatter, QUANTITIES, strict=True))
+    said = ", ".join(f"{sd:.{q.digits}f} {q.unit} ({q.name})" for sd, q in zip(deviations, QUANTITIES, strict=True))
     return (
         f"Medians of sessions of one and the same side have a standard deviation of {said}: a difference "
         f"of that size between the sides may be a session's ({_CAUSES}), because {_WITHIN}."

@@ -80,7 +80,7 @@ def _undecided(difference: Difference, alpha: float) -> str:
         way = ComparisonVerdict.WORSE if difference.p_worse <= alpha else ComparisonVerdict.BETTER
         return f"{way}, but perhaps by no more than the margin of {_amount(difference, difference.margin)}"
     if not math.isfinite(difference.minimum_detectable):
-        return "no scatter to judge by"
+        return "no repeats to judge by"
     fewest = min(difference.a.repeats, difference.b.repeats)
     amount = _amount(difference, difference.minimum_detectable)
     return f"{fewest} repeats cannot show a difference smaller than about {amount}"

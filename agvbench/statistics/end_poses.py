@@ -109,7 +109,7 @@ def thesis_case(trajectory: str, target: Pose) -> int | None:
     """Return which of the thesis' eight trajectories `trajectory` is, or None.
 
     It is case n if n is the first number from 1 to 8 in its name and its target is that of case n within 20 mm and 1°:
-    the target alone cannot tell full from half speed.
+    the target alone cannot distinguish full from half speed.
 
     >>> thesis_case("case_5_forward_left", Pose(1.0, 1.0, math.pi / 2)), thesis_case("slalom_5", Pose(3.0, 0.0, 0.0))
     (5, None)

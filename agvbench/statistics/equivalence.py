@@ -1,4 +1,4 @@
-"""Is a bias small against the scatter between repeats? An equivalence test, not a test that fails to find one."""
+"""Is a bias small against the repeatability? An equivalence test, not a test that fails to find one."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Bias(StrEnum):
 
 @dataclass(frozen=True)
 class Equivalence:
-    """A bias beside the scatter between repeats.
+    """A bias beside the repeatability.
 
     ``bias`` is the mean with its ``stderr``, ``sd`` the standard deviation of one repeat. ``p_within`` is the chance to
     see so small a bias if the true one were ``margin_sds`` standard deviations, ``p_beyond`` to see so large a one.

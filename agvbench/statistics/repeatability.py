@@ -29,20 +29,20 @@ COMPONENTS = {
 
 @dataclass(frozen=True)
 class Spread:
-    """Scatter between repeats: standard deviation with its interval, and the robust one from the MAD."""
+    """Dispersion of repeats: standard deviation with its interval, and the robust one from the MAD."""
 
     sd: Interval
     robust_sd: float
 
 
 def spread(values: Floats, *, confidence: float = 0.95) -> Spread:
-    """Return the scatter of `values`, shape (n,), with Bonett's (2006) interval of the standard deviation.
+    """Return the dispersion of `values`, shape (n,), with Bonett's (2006) interval of the standard deviation.
 
     Bonett's interval uses the sample's own kurtosis where the chi-square interval assumes a normal distribution.
     Fewer than five values give NaN bounds.
 
-    >>> scatter = spread(np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0]))
-    >>> round(scatter.sd.estimate, 3), round(scatter.robust_sd, 3)
+    >>> dispersion = spread(np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0]))
+    >>> round(dispersion.sd.estimate, 3), round(dispersion.robust_sd, 3)
     (1.871, 2.224)
     """
     sd = float(np.std(values, ddof=1)) if len(values) > 1 else math.nan
@@ -72,13 +72,13 @@ def bias_and_spread(errors: pd.DataFrame) -> pd.DataFrame:
 
 def _component(group: pd.DataFrame, column: str) -> dict[str, object]:
     values = group[column].to_numpy(dtype=float)
-    bias, scatter = median_interval(values), spread(values)
+    bias, dispersion = median_interval(values), spread(values)
     return {
         "component": COMPONENTS[column],
         "repeats": len(values),
         **dict(zip(("bias", "bias_low", "bias_high"), bias, strict=True)),
-        **dict(zip(("sd", "sd_low", "sd_high"), scatter.sd, strict=True)),
-        "robust_sd": scatter.robust_sd,
+        **dict(zip(("sd", "sd_low", "sd_high"), dispersion.sd, strict=True)),
+        "robust_sd": dispersion.robust_sd,
     }
 
 

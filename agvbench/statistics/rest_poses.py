@@ -2,7 +2,7 @@
 
 Frames may be untracked, doubled, late or wildly wrong. Both poses are means over a window at rest after
 outlying frames have been left out, with the standard error of that mean. The standard errors assume that the
-noise of one frame tells nothing about the next; where a camera's noise wanders slowly they are lower bounds.
+noise of one frame says nothing about the next; where a camera's noise drifts slowly they are lower bounds.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ SPEED_LIMIT_MPS = 0.02
 """Of a recorded vehicle; twice the limit while driving (`agvbench.running.rest_detection`), which admits runs."""
 _FEWEST_FRAMES = 8
 _WILD_SCALES = 6.0
-# The least scatter that is believed: cameras quantise, and a scatter of zero would make every frame but one wild.
+# The least plausible noise: cameras quantise, and a noise of zero would make every frame but one an outlier.
 _LEAST_M, _LEAST_RAD = 1e-4, 2e-4
 
 
@@ -104,7 +104,7 @@ def _drift(window: Frames) -> tuple[float, float, float]:
     older, newer = np.arange(half), np.arange(half, len(window))
     moved = math.hypot(*(float(np.median(v[newer]) - np.median(v[older])) for v in (window.x_m, window.y_m)))
     apart_s = float(np.median(window.t_s[newer]) - np.median(window.t_s[older]))
-    # The scatter is read from second differences, which steady motion does not change.
+    # The noise is read from second differences, which steady motion does not change.
     bends = np.concatenate([np.diff(window.x_m, 2), np.diff(window.y_m, 2)])
     noise = MAD_TO_STD * float(np.median(np.abs(bends))) / math.sqrt(6.0)
     tolerance = _LEAST_M + 4.0 * 1.2533 * noise * math.sqrt(2.0 / half)

@@ -87,9 +87,9 @@ class PoseError:
 
     ``position_m`` is the distance of the end position from the target's, ``along_m`` and ``across_m`` are its
     components along x and y of the start frame. ``delta_s_m`` is ``|end − start| − target distance``, which cannot see
-    sideways drift, and ``delta_heading_rad`` the heading change minus the target's, wrapped; both are signed (the
+    lateral drift, and ``delta_heading_rad`` the heading change minus the target's, wrapped; both are signed (the
     thesis, section 8.2, reports them without sign). ``end`` is the end pose in the start frame. Standard errors come
-    from the frames at rest and say nothing about the scatter between runs.
+    from the frames at rest and say nothing about the dispersion between runs.
     """
 
     end: Pose

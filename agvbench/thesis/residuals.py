@@ -127,7 +127,7 @@ def _cornering() -> Traced:
 
 
 def kinematics_alone() -> float:
-    """Return what eq. 5.6 without a loss misses of appendix B [mm/s]."""
+    """Return the rms residual of eq. 5.6 without a loss in appendix B [mm/s]."""
     return 1000.0 * rms(residual_of(steering_measure, 0.0))
 
 

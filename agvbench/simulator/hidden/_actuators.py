@@ -121,7 +121,7 @@ def servo(p: Floats, aim: float, angle: float, rate: float, dt: float) -> tuple[
 
 @cached_njit()
 def linked(p: Floats, angle: float, before: float) -> float:
-    """Return the axle's angle behind a play that the servo has to take up first."""
+    """Return the axle's angle behind backlash that the servo has to close first."""
     return clip(before, angle - 0.5 * p[BACKLASH], angle + 0.5 * p[BACKLASH])
 
 

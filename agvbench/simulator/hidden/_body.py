@@ -79,7 +79,7 @@ def motion(
 ) -> tuple[float, float, float, float]:
     """Return the time derivatives of x, y, heading and of the distance that the wheels have rolled.
 
-    No axle moves sideways: ``V + lf r = U tan δf`` and ``V − lr r = U tan δr`` with U ahead, V to the left, r the yaw
+    No axle moves laterally: ``V + lf r = U tan δf`` and ``V − lr r = U tan δr`` with U ahead, V to the left, r the yaw
     rate; U is the mean of what both axles' wheels give along the body.
     """
     lf, lr = p[FRONT_AXLE], p[REAR_AXLE]

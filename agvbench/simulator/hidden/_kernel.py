@@ -205,7 +205,7 @@ def _cross_seam(p: Floats, state: Floats, out: Floats) -> None:
 
 @cached_njit()
 def _notice_start(state: Floats) -> None:
-    """Note when the vehicle was last told to move from rest."""
+    """Note when the vehicle was last commanded to move from rest."""
     moving = abs(state[AIM_WHEEL]) > 0.0
     if moving and state[MOVING] == 0.0:
         state[STARTED] = state[CLOCK]

@@ -156,7 +156,7 @@ OUTSIDE = (
         "floor_nap", ("heading_rad",), {"share": Size(0.02, 0.06), "direction_rad": _TURN},
         nap="share", nap_direction="direction_rad",
     ),
-    _outside(  # an eccentric left wheel: speed and course swing once per turn
+    _outside(  # an eccentric left wheel: speed and course oscillate once per turn
         "wheel_runout", ("distance_modulo_period_m",),
         {"share": Size(0.04, 0.10), "period_m": Size(0.25, 0.60, grows=0), "phase_rad": _TURN}, True,
         runout="share", runout_period="period_m", runout_phase="phase_rad",
@@ -178,7 +178,7 @@ OUTSIDE = (
     _outside(  # a servo stops short of where it is sent, by a share of the way
         "servo_hysteresis", ("history", "curvature_per_m"), {"share": Size(0.05, 0.12)}, shortfall="share",
     ),
-    _outside(  # the drive's torque turns the front wheels one way ahead, the other way back
+    _outside(  # the drive's torque turns the front wheels one way forward, the other way backward
         "torque_steer", ("direction",), {"angle_rad": Size(0.6 * _DEG, 2.0 * _DEG, signed=True)},
         torque_steer="angle_rad",
     ),

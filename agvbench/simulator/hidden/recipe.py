@@ -19,7 +19,7 @@ class Size:
     """One number of an effect: drawn uniformly from [low, high], of either sign if `signed`.
 
     ``grows`` says how a stronger effect looks: +1 by a larger number, −1 by a smaller one (a rate limit), 0 not at all
-    (a place, a direction, a time constant of a form). ``most`` is what nobody would overlook without instruments.
+    (a place, a direction, a time constant of a form). ``most`` is visible without instruments.
     """
 
     low: float

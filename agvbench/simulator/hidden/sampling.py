@@ -117,5 +117,5 @@ def _large_enough(bench: SeparationStudy | None, recipe: Recipe, seed: int, floo
 
 
 def _counts(found: Separation, recipe: Recipe) -> float:
-    """Return the separation that counts: what free maps take up by construction is judged with the maps held."""
+    """Return the separation that counts: what nodal maps absorb by construction is judged with the maps held."""
     return found.held if recipe.absorbed else found.refitted

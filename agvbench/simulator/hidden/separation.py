@@ -133,14 +133,14 @@ class SeparationStudy:
         return sorted(level for level in found if level != (0, neutral))
 
     def _floor_m(self) -> float:
-        """Return the rms scatter of the drives between runs, with the camera's noise."""
+        """Return the rms variation of the drives between runs, with the camera's noise."""
         plant = self.plant({}, run_variation=True)
         repeats = [
             np.concatenate([_scaled(path(plant, d, seed=1 + 100 * k + i)) for i, d in enumerate(self.drives)])
             for k in range(REPEATS)
         ]
-        scatter = np.sum(np.var(repeats, axis=0, ddof=1), axis=1).mean()
-        return float(math.sqrt(scatter + 2.0 * CAMERA_NOISE_M**2))
+        variance = np.sum(np.var(repeats, axis=0, ddof=1), axis=1).mean()
+        return float(math.sqrt(variance + 2.0 * CAMERA_NOISE_M**2))
 
 
 def _moved(drive: ReferenceDrive, levels: Levels) -> ReferenceDrive:
@@ -209,7 +209,8 @@ def _left(
 
 
 INDISTINGUISHABLE = 1.0
-"""A rival leaves less than this [floors] of what an effect leaves when static maps alone are refitted."""
+"""An indistinguishable alternative leaves less than this [floors] of what an effect leaves when static maps alone are
+refitted."""
 
 
 def indistinguishable_effects(
@@ -226,7 +227,7 @@ def indistinguishable_effects(
     truth
         What it hides.
     limit
-        What a rival may leave [floors].
+        What an indistinguishable alternative may leave [floors].
 
     Returns
     -------

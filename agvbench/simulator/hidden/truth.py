@@ -54,9 +54,9 @@ class SealedTruth:
     separation_unfitted
         The same when the maps are held.
     floor_m
-        Rms run-to-run scatter of the reference drives with the camera's noise [m].
+        Rms run-to-run variation of the reference drives with the camera's noise [m].
     absorbed
-        Whether free static maps take the effect up by construction: it shows only against maps known otherwise.
+        Whether nodal static maps absorb the effect by construction: it shows only against maps known otherwise.
     """
 
     kind: Kind

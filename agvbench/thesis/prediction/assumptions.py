@@ -1,4 +1,4 @@
-"""What the thesis leaves open about its drives of chapter 8, and the set that is assumed before looking.
+"""What the thesis does not state about its drives of chapter 8, and the set that is assumed before looking.
 
 The default set follows one rule, written down before the predictor existed (docs/decisions/0001-thesis-assumptions.md):
 
@@ -34,7 +34,7 @@ CalibratedSteering = Literal["published", "unrounded"]
 
 @dataclass(frozen=True)
 class Assumptions:
-    """One answer to every question that the thesis leaves open; the defaults follow the rule of this module."""
+    """One answer to every question that the thesis does not answer; the defaults follow the rule of this module."""
 
     steering: Steering = "abeam"
     ramps: Ramps = "none"

@@ -36,7 +36,7 @@ class CommandedDrive(NamedTuple):
 
 
 def commanded(trajectory: ThesisTrajectory, condition: str, assumed: Assumptions) -> CommandedDrive:
-    """Return what the vehicle was told on `trajectory` under `condition`."""
+    """Return what the vehicle was commanded on `trajectory` under `condition`."""
     angles = wanted_angles(trajectory.side, assumed.steering, GEOMETRY)
     if condition == "uncalibrated":
         drive_us, speed = _uncalibrated_drive(trajectory.drive, assumed.nominal_speed)
@@ -58,7 +58,7 @@ def _duration(trajectory: ThesisTrajectory, angles: tuple[float, float], speed_m
 
 
 def _uncalibrated_drive(direction: int, nominal_speed: str) -> tuple[float, float]:
-    """Return full command and the speed that is believed: ±0.32 m/s (table 6.2), or table 7.4's."""
+    """Return full command and its nominal speed: ±0.32 m/s (table 6.2), or table 7.4's."""
     drive_us = NEUTRAL_US - direction * 600.0
     return drive_us, FULL_SPEED_MPS if nominal_speed == "0.32" else true_speed(drive_us)
 

@@ -62,7 +62,7 @@ def score_row(measured: MeasuredRow, prediction: EndPosePrediction) -> ScoredRow
     if measured.quantity == "delta_s_mm":
         return ScoredRow(measured, prediction.delta_s_mm, 0.0, has_sign=False)
     if prediction.trajectory.is_turn:
-        # Nobody confuses a left quarter turn with a right one: only its amount is open.
+        # A left quarter turn cannot be mistaken for a right one: only its amount is open.
         amount = prediction.turned_deg * math.copysign(1.0, prediction.trajectory.heading_rad)
         return ScoredRow(measured, amount, 90.0, has_sign=True)
     return ScoredRow(measured, prediction.turned_deg, 0.0, has_sign=False)
@@ -121,7 +121,7 @@ def describe(group: Group) -> str:
 
 
 def verdict(ours: float, null: float) -> str:
-    """Return who is closer to the measured rows.
+    """Return which of the two is closer to the measured rows.
 
     >>> verdict(5.0, 10.0), verdict(9.5, 10.0), verdict(12.0, 10.0)
     ('prediction', 'even', 'null')
@@ -233,8 +233,8 @@ def _by_cause(rows: list[ScoredRow]) -> tuple[str, ...]:
             f"{_numbers(measured, straight)}°): saturated points tilt eq. 7.1 and 7.2, so 'straight ahead' is not."
         ),
         (
-            f"Contradicted: timed by its cubic, the half speed drives 3 and 4 would miss by {_numbers(amount, half)} "
-            f"mm; they missed by {_numbers(measured, half)}. The thesis timed them otherwise, or something cancels."
+            f"Contradicted: timed by its cubic, the half speed drives 3 and 4 would be off by {_numbers(amount, half)} "
+            f"mm; they were off by {_numbers(measured, half)}. The thesis timed them otherwise, or something cancels."
         ),
         (
             f"Unexplained: the uncalibrated backward turns turned {_numbers(measured, back)}° where the tables say "

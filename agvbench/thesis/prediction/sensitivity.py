@@ -111,19 +111,19 @@ def _group_rows(condition: Condition) -> list[tuple[Cell, ...]]:
 def _ranges_table() -> tuple[ThesisTable, list[str]]:
     """Return the range of every row over all combinations, and the rows that none of them reaches."""
     rows: list[tuple[Cell, ...]] = []
-    missed: list[str] = []
+    unreached: list[str] = []
     for condition in CONDITIONS:
         for scored in zip(*(c.rows for c in combinations(condition)), strict=True):
             m, low, high = scored[0].measured, *_extent(scored)
             reached = low <= m.q3 and high >= m.q1
             rows.append((m.trajectory, condition, QUANTITY[m.quantity], m.median, m.q1, m.q3, low, high, reached))
             if not reached:
-                missed.append(f"{m.trajectory} {condition} {QUANTITY[m.quantity].partition(' ')[0]}")
+                unreached.append(f"{m.trajectory} {condition} {QUANTITY[m.quantity].partition(' ')[0]}")
     columns = ("trajectory", "condition", "quantity", "measured", "Q1", "Q3", "lowest", "highest", "reached")
     note = "Magnitudes; 'reached': the range of predictions meets the quartiles of the ten drives."
     return ThesisTable(
         "sensitivity_ranges", "Every row's range over all combinations", columns, tuple(rows), note
-    ), missed
+    ), unreached
 
 
 def _extent(scored: tuple[ScoredRow, ...]) -> tuple[float, float]:
@@ -174,7 +174,7 @@ def _differences(assumed: Assumptions) -> str:
     return ", ".join(f"{f.name} = {getattr(assumed, f.name)}" for f in changed) or "as assumed"
 
 
-def _findings(post_hoc: ThesisTable, missed: list[str]) -> tuple[str, ...]:
+def _findings(post_hoc: ThesisTable, unreached: list[str]) -> tuple[str, ...]:
     every = {c: [x.against_null for x in combinations(c)] for c in CONDITIONS}
     counts = " and ".join(
         f"{sum(x < 1.0 for x in scores)} of {len(scores)} beat the null on the {c} rows (median {median(scores):.2f} "
@@ -186,9 +186,9 @@ def _findings(post_hoc: ThesisTable, missed: list[str]) -> tuple[str, ...]:
         for row in post_hoc.rows
     )
     return (
-        f"Of every combination of assumptions, {counts}: over what the thesis leaves open, the null is hard to beat.",
+        f"Of every combination of assumptions, {counts}: whatever is assumed, the null is hard to beat.",
         f"Post hoc, checked on the other condition: {checked}.",
-        f"Rows whose quartiles no combination reaches: {', '.join(missed) or 'none'}.",
+        f"Rows whose quartiles no combination reaches: {', '.join(unreached) or 'none'}.",
         _about_ramps(),
     )
 
@@ -216,13 +216,13 @@ def _is_full_speed_straight(row: ScoredRow) -> bool:
 def sensitivity_section() -> ThesisSection:
     """Return the sensitivity of the 28 predictions."""
     post_hoc = _post_hoc_table()
-    ranges, missed = _ranges_table()
+    ranges, unreached = _ranges_table()
     choices = tuple((name, choice, meaning) for (name, choice), meaning in MEANING.items())
     meanings = ThesisTable("sensitivity_choices", "What the choices mean", ("assumption", "choice", "meaning"), choices)
     tables = (_one_at_a_time_table(), _groups_table(), ranges, post_hoc, meanings)
     values: dict[str, Cell] = {f"{c}_combinations": len(combinations(c)) for c in CONDITIONS}
     values |= {f"{c}_better_than_null": sum(x.against_null < 1.0 for x in combinations(c)) for c in CONDITIONS}
-    return ThesisSection("sensitivity", "What the prediction hangs on", _findings(post_hoc, missed), tables, values)
+    return ThesisSection("sensitivity", "What the prediction hangs on", _findings(post_hoc, unreached), tables, values)
 
 
 __all__ = ["Combination", "Group", "best", "combinations", "sensitivity_section", "shared_only"]

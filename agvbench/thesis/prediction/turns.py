@@ -108,22 +108,22 @@ def _findings(ratios: dict[tuple[int, str], float], factors: dict[str, float]) -
     return (
         (
             "Chapter 8 calls case 6 'backward movement'; it is the forward right turn. What stands out is not the "
-            f"direction but the side: calibrated right turns (6, 8) miss by {_missed(6, 8)} mm, left turns (5, 7) by "
-            f"{_missed(5, 7)} mm, forward and backward alike."
+            f"direction but the side: calibrated right turns (6, 8) miss by {_errors(6, 8)} mm, left turns (5, 7) by "
+            f"{_errors(5, 7)} mm, forward and backward alike."
         ),
         (
             "Δs has two readings per turn. If + a right turn's arc is wider and longer than asked, if − tighter and "
-            "shorter; the medians alone do not tell which."
+            "shorter; the medians alone do not show which."
         ),
         (
             f"Headings turned, measured over predicted: forward {forward['uncalibrated']:.2f} uncalibrated and "
             f"{forward['calibrated']:.2f} calibrated, backward {factors['uncalibrated']:.2f} and "
             f"{factors['calibrated']:.2f}. No single factor for driving backward serves both conditions; lag, gain "
-            "and play cannot be told apart here."
+            "and backlash cannot be distinguished here."
         ),
     )
 
 
-def _missed(*numbers: int) -> str:
+def _errors(*numbers: int) -> str:
     found = {t.number: t.delta_s_mm for t in measured_turns() if t.condition == "calibrated"}
     return " and ".join(f"{found[n]:.1f}" for n in numbers)

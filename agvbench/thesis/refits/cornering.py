@@ -4,7 +4,7 @@ Held-out errors leave out one mirrored pair of steering pulses, in all modes and
 two halves of a pair are one measurement (see `mirror`).
 
 "Straight" speeds, here and in table 7.4, were driven at 1500 µs, where neither axle is straight. Everything is
-therefore relative to that: a vehicle told 1500 µs drives the printed straight speed exactly.
+therefore relative to that: a vehicle commanded 1500 µs drives the printed straight speed exactly.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def identical_blocks(table: CorneringTable | None = None) -> list[tuple[float, f
 Form = Callable[[Floats, Floats], Floats]
 
 NEUTRAL_US = 1500.0
-#: Scatter of table 7.4 where it is flat (900…1150 µs) is 0.8 mm/s: about what one more median would add.
+#: Table 7.4 varies by 0.8 mm/s where it is flat (900…1150 µs): about what one more median would add.
 REPEAT_NOISE_MPS = 0.001
 
 
@@ -133,7 +133,7 @@ def _angles(mode: str, steering_us: Floats) -> tuple[Floats, Floats]:
 
 @cache
 def samples() -> Samples:
-    """Return the samples that can tell a loss: steered, and moving straight ahead at all."""
+    """Return the samples that identify a loss: steered, and moving straight ahead at all."""
     table = cornering_table()
     parts: list[tuple[Floats, ...]] = []
     for index, (mode, grid) in enumerate(table.speed_mps.items()):
@@ -265,9 +265,9 @@ def cornering_section() -> ThesisSection:
             "cells: 336 printed medians are at most 160 different measurements."
         ),
         (
-            f"Eq. 5.6 misses appendix B by {rows[0][3]:.1f} mm/s rms; a loss of {fitted_loss():.4f} per |tan δf| + "
-            f"|tan δr| leaves {rows[1][3]:.1f} held out (the printed step of 10 mm/s alone gives 2.9). Forms in "
-            "curvature do worse: crab, which does not turn, loses speed too."
+            f"The residual of eq. 5.6 in appendix B is {rows[0][3]:.1f} mm/s rms; a loss of {fitted_loss():.4f} per "
+            f"|tan δf| + |tan δr| leaves {rows[1][3]:.1f} held out (the printed step of 10 mm/s alone gives 2.9). "
+            "Forms in curvature do worse: crab, which does not turn, loses speed too."
         ),
     )
     figures = [

@@ -81,7 +81,7 @@ def _rounding_rows() -> tuple[tuple[float, float, float, float], ...]:
 
 
 def half_speed_errors() -> dict[float, float]:
-    """Return by how much the cubic misses table 7.4 [%] at the pulses about half the full speed."""
+    """Return the error of the cubic against table 7.4 [%] at the pulses about half the full speed."""
     cubic = refit_drive(3, PARTIAL_US)
     return {p: 100.0 * (float(cubic(p)) / table_speed(p) - 1.0) for p in (1350.0, 1400.0, 1650.0)}
 
