@@ -110,7 +110,7 @@ def perf(session: nox.Session) -> None:
 
 @nox.session
 def fuzz(session: nox.Session) -> None:
-    """Feed every decoder inputs that nobody would write, for half an hour of processor time."""
+    """Feed every decoder malformed inputs, for half an hour of processor time."""
     install(session, "fuzz")
     session.run("python", "-m", "fuzz", *session.posargs)
 

@@ -58,15 +58,15 @@ def announcing_compilation(on_progress: Callable[[str], None]) -> Iterator[None]
 
 
 class _FirstCompilation(event.Listener):  # type: ignore[misc] # numba is not typed
-    """Tells of the first function of agvbench that is compiled; one that is loaded from disk is no event."""
+    """Reports the first function of agvbench that is compiled; one that is loaded from disk is no event."""
 
     def __init__(self, on_progress: Callable[[str], None]) -> None:
-        self._on_progress, self._told = on_progress, False
+        self._on_progress, self._reported = on_progress, False
 
     def on_start(self, event: Any) -> None:
         module = event.data["dispatcher"].py_func.__module__
-        if not self._told and module.startswith("agvbench."):
-            self._told = True
+        if not self._reported and module.startswith("agvbench."):
+            self._reported = True
             self._on_progress(COMPILING)
 
     def on_end(self, event: Any) -> None:

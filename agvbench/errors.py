@@ -39,7 +39,7 @@ def visible(text: str) -> str:
 
 
 class AgvbenchError(Exception):
-    """Bad input or set-up, told in one line.
+    """Bad input or set-up, reported in one line.
 
     Parameters
     ----------

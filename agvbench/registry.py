@@ -1,4 +1,4 @@
-"""Find classes by file: whoever adds an effect, a kind of map or an adapter adds one module, and nothing else."""
+"""Find classes by file: a new effect, kind of map or adapter is one new module, and nothing else."""
 
 from __future__ import annotations
 

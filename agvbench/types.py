@@ -107,7 +107,7 @@ NO_TARGET = Pose(math.nan, math.nan, math.nan)
 
 
 class Command(NamedTuple):
-    """What the vehicle is told at one moment, in its own command unit."""
+    """What the vehicle is commanded at one moment, in its own command unit."""
 
     drive: float
     front: float

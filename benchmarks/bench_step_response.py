@@ -1,6 +1,6 @@
 """Step response (agvbench): how fast the vehicle starts, stops and steers (thesis section 8.1, fig. 8.2).
 
-Steering that changes while the vehicle drives is what tells the lag of the steering servos from all else.
+Steering that changes while the vehicle drives distinguishes the lag of the steering servos from all else.
 """
 
 import pytest

@@ -1,7 +1,7 @@
-"""Corrected plans of the trajectories, before they are compared (agvbench): what they still miss is learned.
+"""Corrected plans of the trajectories, before they are compared (agvbench): their end-pose bias is learned.
 
-`agvbench loop` drives these between its two sessions. They are runs of their own, so that the scatter of the runs that
-are compared is not learned.
+`agvbench loop` drives these between its two sessions. They are runs of their own, so that the random errors of the
+runs that are compared are not learned.
 """
 
 import pytest
@@ -12,5 +12,5 @@ import pytest
 @pytest.mark.experiment("trial")
 @pytest.mark.parametrize("condition", ["corrected"])
 def bench_trial(drive, trajectory, condition):
-    """Drive one trajectory corrected; where it ends says what the model still misses."""
+    """Drive one trajectory corrected; its end pose shows the bias of the model."""
     drive.trajectory(trajectory, condition=condition)

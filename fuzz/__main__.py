@@ -2,7 +2,7 @@
 
 ``python -m fuzz`` takes 30 minutes of processor time, ``python -m fuzz --minutes 1 bus_message`` one for a target. What
 is found goes to ``.fuzz/TARGET`` and is gone on with; an input that does harm to ``.fuzz/TARGET-crash-…``, and the exit
-code is 1. Such an input belongs into ``fuzz/corpus/TARGET`` once what it found is mended.
+code is 1. Such an input belongs into ``fuzz/corpus/TARGET`` once what it found is fixed.
 """
 
 from __future__ import annotations

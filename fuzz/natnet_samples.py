@@ -11,7 +11,7 @@ VERSIONS = ((2, 5), (2, 6), (2, 7), (2, 9), (2, 11), (3, 0), (3, 1), (4, 0), (4,
 
 
 def packets(version: tuple[int, int]) -> Iterator[bytes]:
-    """Give a server's packets: who it is, what bodies are called, a frame with markers, an echo, a text."""
+    """Give a server's packets: its identity, what bodies are called, a frame with markers, an echo, a text."""
     from agvbench.adapters.natnet.protocol.bitstream import BODY, MARKER, Version
     from agvbench.adapters.natnet.protocol.encode import Model, encode_descriptions, encode_frame
     from agvbench.adapters.natnet.protocol.frame import FrameOfData

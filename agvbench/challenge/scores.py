@@ -13,8 +13,8 @@ from agvbench.statistics.intervals import Proportion
 
 _Z = 1.959963984540054
 _THREE_FLOORS = 9.0
-"""Squares at which free maps leave three floors, the least that sizes are drawn for: below it a share of the excess
-tells the scatter of the floor as much as what the model removes."""
+"""Squares at which refitted maps leave three times the repeatability, the least that sizes are drawn for: below it a
+share of the excess depends on the dispersion of repeats as much as on what the model removes."""
 
 
 def _one(trial: Trial) -> bool:
@@ -67,8 +67,8 @@ class Scores:
 
     ``shares`` by question; ``confusion`` by what was hidden, then by answer; ``list_length`` the mean number of
     effects in an AMBIGUOUS answer; ``coverage`` of 95 % intervals where the forms agree; ``removed`` quantiles of the
-    share of excess held-out error removed (0, 0.5), by group, where free maps leave an excess; ``worse_on`` trials with
-    something predicted worse; ``errors`` the trials without an answer, each with its cause.
+    share of excess held-out error removed (0, 0.5), by group, where nodal maps leave an excess; ``worse_on`` trials
+    with something predicted worse; ``errors`` the trials without an answer, each with its cause.
     """
 
     trials: int

@@ -17,7 +17,7 @@ class Trial:
         Which plant it was.
     kind, hidden, library_names, covariates, absorbed, random_phase
         The sealed truth: its kind; the names hidden; those of the library that should be found; what an unexplained
-        rest depends on; whether free maps take it up; whether its phase is drawn anew for each run.
+        rest depends on; whether nodal maps absorb it; whether its phase is drawn anew for each run.
     true_parameters
         Of effects with the library's own equation: name to parameter to value.
     verdict, named, alternatives, depends_on
@@ -68,7 +68,7 @@ class Trial:
 
     @property
     def is_right(self) -> bool:
-        """Whether every hidden effect of the library was named, or left open among its true rivals, and no other."""
+        """Whether every hidden effect of the library was named, or listed as AMBIGUOUS with its true rivals only."""
         if any(name not in {*self.library_names, *self.rivals} for name in (*self.named, *self.alternatives)):
             return False
         return set(self.library_names) <= {*self.named, *self.alternatives}

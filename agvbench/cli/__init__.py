@@ -64,7 +64,7 @@ def build_parser() -> argparse.ArgumentParser:
     """Return the parser of ``agvbench`` with every command of this package."""
     parser = _Parser(
         prog="agvbench",
-        description="Does the vehicle do what it is told, what does calibration buy, and what does the model not know?",
+        description="Does the vehicle do what is commanded, what does calibration buy, and what does the model lack?",
         epilog=_EPILOG,
         formatter_class=_CommandList,
     )
@@ -119,7 +119,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for name in _ONE_THREAD:
         os.environ.setdefault(name, "1")  # read when numpy is imported, which no command has done yet
     given = sys.argv[1:] if argv is None else argv
-    who = f"agvbench {given[0]}" if given and given[0] in _command_names() else "agvbench"
+    program = f"agvbench {given[0]}" if given and given[0] in _command_names() else "agvbench"
     with Interrupts() as interrupts:
         try:
             code = _run(given)
@@ -127,22 +127,22 @@ def main(argv: Sequence[str] | None = None) -> int:
                 return code
         except AgvbenchError as error:
             if not interrupts.pressed:
-                print(f"{who}: {error}", file=sys.stderr)
+                print(f"{program}: {error}", file=sys.stderr)
                 return error.exit_code
         except KeyboardInterrupt as interrupt:
             why = f": {interrupt}" if str(interrupt) else ""
-            print(f"{who}: interrupted{why}", file=sys.stderr)
+            print(f"{program}: interrupted{why}", file=sys.stderr)
             return int(getattr(interrupt, "exit_code", EXIT_CODE))  # another signal than Ctrl-C brings its own
         except BrokenPipeError:
-            # The reader (head, less) has gone: nothing is left to say, and nobody to say it to.
+            # The reader (head, less) has gone: no output is needed any more.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 0
-        except Exception as error:  # noqa: BLE001 - whatever it is, who runs a lab should not have to read a traceback
+        except Exception as error:  # noqa: BLE001 - whatever it is, users should not have to read a traceback
             if not interrupts.pressed:
                 from agvbench.cli._failures import report_internal_error
 
                 return report_internal_error(given[0], error)
-        print(f"{who}: interrupted", file=sys.stderr)
+        print(f"{program}: interrupted", file=sys.stderr)
         return EXIT_CODE
 
 

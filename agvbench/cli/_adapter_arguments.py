@@ -19,8 +19,8 @@ def add_bus_arguments(parser: argparse.ArgumentParser, default_listen: str) -> N
         action="append",
         metavar="ENDPOINT",
         help=f"wait for others here (default: {default_listen} unless --connect is given); "
-        "tcp/0.0.0.0:PORT lets other machines in, and nobody asks them who they are; tls/0.0.0.0:PORT with "
-        "--bus-config does ask",
+        "tcp/0.0.0.0:PORT lets other machines in without any authentication; tls/0.0.0.0:PORT with "
+        "--bus-config requires certificates",
     )
     group.add_argument("--connect", action="append", metavar="ENDPOINT", help="connect to a process that listens there")
     group.add_argument(

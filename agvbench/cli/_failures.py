@@ -1,4 +1,4 @@
-"""An internal error of agvbench is one line, too; its traceback, for those who fix it, is in a file."""
+"""An internal error of agvbench is one line, too; its traceback, for developers, is in a file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ DEBUG = "AGVBENCH_DEBUG"
 
 
 def report_internal_error(command: str, error: Exception) -> int:
-    """Print one line about an exception that nobody expected, keep its traceback in a file, and return the exit code.
+    """Print one line about an unexpected exception, keep its traceback in a file, and return the exit code.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """Run one AGV adapter as its own process on the bus.
 
-The vehicle is stopped when the process ends, and when nobody has commanded it for half a second.
+The vehicle is stopped when the process ends, and when no command has arrived for half a second.
 
 examples:
   agvbench agv sim                                     a simulated vehicle, on tcp/127.0.0.1:7447

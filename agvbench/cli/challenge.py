@@ -10,7 +10,7 @@ examples:
   agvbench challenge --seeds 10 --json challenge.json --resume   go on after an interruption
   agvbench challenge --seeds 300 --only nothing               how often a name is given where nothing is hidden
   agvbench challenge --seeds 10 --json challenge.json --resume --markdown   what a whole file says, as tables
-  agvbench challenge --first-seed 5000                        vehicles that nobody has looked at
+  agvbench challenge --first-seed 5000                        unseen vehicles
 """
 
 from __future__ import annotations

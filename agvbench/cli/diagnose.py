@@ -1,21 +1,21 @@
 """Say whether the vehicle model is adequate, and if not which physical effect it lacks.
 
-A part of the runs is set aside. On the others the static maps are fitted again, together with one effect after another
-of the library; an effect is named if it predicts groups of runs that it was not fitted to better than chance allows.
-What is then left is held against the floor, the scatter between repeats.
+The runs are split into training, validation and test runs. On the training runs the static maps are fitted again,
+together with one effect after another of the library. An effect is named if it improves the prediction of groups of
+runs that it was not fitted to by more than chance. The residual is then compared with the repeatability.
 
-  ADEQUATE          what is left is scatter
+  ADEQUATE          the residual is within repeatability
   NAMED             the effects named explain the rest
   AMBIGUOUS         several effects explain it equally well
   UNKNOWN           something is left that no effect of the library explains, and on what it depends
-  NOT_IDENTIFIABLE  this campaign cannot tell, and why
+  NOT_IDENTIFIABLE  this campaign cannot answer the question, and why
 
 examples:
   agvbench diagnose campaigns/tonight                         the answer and the errors before and after
   agvbench diagnose campaigns/tonight --out corrected.toml    keep the vehicle with maps refitted and effects added
   agvbench diagnose campaigns/tonight --json d.json --check   for scripts: exit code 1 unless ADEQUATE
   agvbench diagnose campaigns/tonight --report d.html         pictures of the residuals, before and after
-  agvbench diagnose campaigns/tonight --next next.toml        write the run that would tell rivals apart
+  agvbench diagnose campaigns/tonight --next next.toml        write the run that would discriminate the alternatives
   agvbench diagnose campaigns/tonight --run-next              drive it, and decide: a copy of the campaign with the new
                                                               runs is diagnosed again, the old one is left as it is
 """
@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--vehicle", metavar="FILE", help="the model before (default: vehicle.toml in DIR, else maps fitted to DIR)"
     )
     parser.add_argument("--check", action="store_true", help="exit with 1 unless the answer is ADEQUATE")
-    parser.add_argument("--seed", type=whole_number, default=0, help="draws which runs are set aside (default 0)")
+    parser.add_argument("--seed", type=whole_number, default=0, help="draws the validation and test runs (default 0)")
     parser.add_argument(
         "--next", metavar="FILE.toml", dest="next_file", help="write the trajectory to drive next there"
     )

@@ -4,20 +4,20 @@ Five stages, each with its result in the loop's directory:
 
   before/          a bench session that excites the vehicle: calibration, the trajectories, step responses, free driving
   diagnosis.json   what the calibrated model lacks (agvbench diagnose), and vehicle.toml, the model with the effects
-  trial/           corrected plans of the trajectories, for what they still miss (remainders.json)
-  plans.json       what plans with that model make up for, and what they cannot
+  trial/           corrected plans of the trajectories, for the end-pose bias that they leave (remainders.json)
+  plans.json       what plans with that model compensate, and what they cannot
   after/           the trajectories uncalibrated, calibrated and corrected, driven in turns
   report.html      before and after, trajectory by trajectory, with an equivalence test of the bias
 
 The trajectories are those of agvbench bench: the eight and your own, or --trajectories.
 
-The corrected model may still miss where a trajectory ends, where an effect is in no library or of another form. What
-stood out of the scatter in before/ and in trial/ is taken off the aim; --no-trial learns from before/ alone, and
---model-only leaves the aim where it is.
+The corrected model may leave a bias of the end pose, where an effect is in no library or of another form. What
+is significant of this bias in before/ and in trial/ is subtracted from the goal; --no-trial uses before/ alone, and
+--model-only keeps the goal.
 
-Corrected plans change steering and durations as little as brings the model to rest on the target. Scatter from run to
-run cannot be corrected, nor what the diagnosis could not name. Simulated by default: a vehicle like the thesis', which
-has effects that its calibration does not know.
+Corrected plans change steering and durations as little as brings the model to rest on the target. Variation from run
+to run cannot be corrected, nor what the diagnosis could not name. Simulated by default: a vehicle like the thesis',
+which has effects that its calibration does not know.
 
 examples:
   agvbench loop                                      the default vehicle, 10 repeats, in some minutes
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     less.add_argument(
         "--model-only",
         action="store_true",
-        help="correct with the model alone, not what it missed of these trajectories",
+        help="correct with the model alone, without the measured bias of these trajectories",
     )
     less.add_argument("--no-trial", action="store_true", help="do not try corrected plans before they are compared")
     parser.add_argument("--out", metavar="DIR", help="the loop's directory (default: a new one under campaigns/)")

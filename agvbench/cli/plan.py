@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
         repeats=args.repeats,
     )
     _print(made, args)
-    # Of all trajectories nobody asked for those that this kind of vehicle cannot drive anywhere.
+    # Without a selection, trajectories that this kind of vehicle cannot drive anywhere are no failure.
     skipped = [] if args.trajectories or not made.plans else made.unsuited
     failed = [problem for problem in made.problems if problem not in skipped]
     for word, problems in (("skipped: ", skipped), ("", failed)):

@@ -10,7 +10,7 @@ examples:
 sections: steering, drive, maps, cornering, battery, lever_arm, errata, prediction, sensitivity, turns, residuals
 
 Each refit stands beside the printed figure; where they differ, the errata say why. The prediction uses chapters
-6, 7, 8.1 and appendix B only; what the thesis leaves open is assumed by a rule fixed beforehand, and the section
+6, 7, 8.1 and appendix B only; what the thesis does not state is assumed by a rule fixed beforehand, and the section
 'sensitivity' shows what the other answers would change.
 """
 

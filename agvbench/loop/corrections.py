@@ -1,8 +1,8 @@
-"""Corrections of trajectories: end-pose bias of earlier sessions, and what corrected plans make up for.
+"""Corrections of trajectories: end-pose bias of earlier sessions, and what corrected plans compensate.
 
 An effect that is not in the library, or has another form than the library's, leaves a bias on each trajectory that was
-measured. What of it stands out of the scatter is taken off the aim of the corrected plan. That is
-learning, not understanding: it holds for this trajectory, driven from this place, and says nothing about any other.
+measured. Its significant part is subtracted from the goal of the corrected plan. This correction explains nothing: it
+holds for this trajectory, driven from this place, and says nothing about any other.
 """
 
 from __future__ import annotations
@@ -34,28 +34,33 @@ from agvbench.statistics.rest_poses import end_pose, start_pose
 from agvbench.types import Floats, Pose, Run
 
 FEWEST = 3
-"""Fewer runs than this do not tell a bias from scatter."""
+"""Fewer runs than this do not distinguish a bias from random error."""
 
 
 def bias_corrections(campaign: Campaign, model: VehicleModel, condition: str) -> dict[str, dict[str, float]]:
-    """Return, by trajectory, what `model` missed in the mean: the measured end pose in the frame of the predicted one.
+    """Return the bias of `model` by trajectory: the mean measured end pose in the frame of the predicted one.
 
     Learned from the runs of one condition: those with commands nearest to what will be driven. Each component is shrunk
-    by the share of its square that its standard error explains, so that scatter is not learned.
+    by the share of its square that its standard error explains, so that random errors are not learned.
     """
     runs = [run for run in campaign.select(condition=condition) if run.target.is_finite]
     began, out = session_starts(campaign), {}
     for name in dict.fromkeys(run.trajectory for run in runs):
         driven = ((run, run.started_s - began[run.session]) for run in runs if run.trajectory == name)
-        missed = np.array(list(_missed(driven, model))).reshape(-1, 3)
-        if len(missed) >= FEWEST:
-            x, y, heading = shrunken_mean(missed).tolist()
-            out[name] = {"x_m": round(x, 6), "y_m": round(y, 6), "heading_rad": round(heading, 6), "runs": len(missed)}
+        residuals = np.array(list(_end_pose_residuals(driven, model))).reshape(-1, 3)
+        if len(residuals) >= FEWEST:
+            x, y, heading = shrunken_mean(residuals).tolist()
+            out[name] = {
+                "x_m": round(x, 6),
+                "y_m": round(y, 6),
+                "heading_rad": round(heading, 6),
+                "runs": len(residuals),
+            }
     return out
 
 
 def shrunken_mean(values: Floats) -> Floats:
-    """Return the mean of `values` (n, k), shape (k,), each shrunk towards zero by what scatter makes of it.
+    """Return the mean of `values` (n, k), shape (k,), each shrunk towards zero by its random error.
 
     >>> shrunken_mean(np.array([[3.0, 1.0], [3.0, -1.0], [3.0, 0.5]])).tolist()
     [3.0, 0.0]
@@ -65,7 +70,7 @@ def shrunken_mean(values: Floats) -> Floats:
     return np.asarray(mean * np.maximum(0.0, 1.0 - share**2))
 
 
-def _missed(runs: Iterable[tuple[Run, float]], model: VehicleModel) -> Iterable[Pose]:
+def _end_pose_residuals(runs: Iterable[tuple[Run, float]], model: VehicleModel) -> Iterable[Pose]:
     for run, since_s in runs:
         try:
             start, end = start_pose(run).pose, end_pose(run).pose
@@ -89,9 +94,8 @@ def plans_of(
     """Return, by trajectory, where the model would end uncorrected and ends corrected, and what to say about it.
 
     Keys: ``uncorrected``, ``remaining`` and, if the model has effects of the camera, ``beyond_camera``, each with
-    ``position_mm``, ``along_mm``, ``across_mm``, ``delta_s_mm``, ``delta_heading_deg``; ``remainder``, what the model
-    missed before, in the frame of its end pose; ``said``, sentences; or ``problem`` where it
-    cannot be driven.
+    ``position_mm``, ``along_mm``, ``across_mm``, ``delta_s_mm``, ``delta_heading_deg``; ``remainder``, the bias of the
+    model so far, in the frame of its end pose; ``said``, sentences; or ``problem`` where it cannot be driven.
     """
     floor = Workspace.parse(workspace)
     out: dict[str, dict[str, Any]] = {}
@@ -140,7 +144,7 @@ def _said(correction: Correction) -> list[str]:
     said = []
     if _noticeable(correction.remaining):
         why = f": {' and '.join(correction.at_limits)} at the limit" if correction.at_limits else ""
-        said.append(f"cannot be made up for: {_in_words(correction.remaining)} remain{why}")
+        said.append(f"cannot be compensated: {_in_words(correction.remaining)} remain{why}")
     if correction.beyond_camera is not None and _noticeable(correction.beyond_camera):
         off = _in_words(correction.beyond_camera)
         said.append(f"on target as the camera sees it; if the camera errs as the model says, truly {off} off")

@@ -34,7 +34,7 @@ class Loop:
     diagnosis
         The content of ``diagnosis.json``.
     plans
-        The content of ``plans.json``: what corrected plans make up for, by trajectory.
+        The content of ``plans.json``: what corrected plans compensate, by trajectory.
     """
 
     directory: Path

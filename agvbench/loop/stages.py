@@ -90,7 +90,7 @@ def _in_words(found: Diagnosis) -> list[str]:
 
 
 def learned(directory: Path, settings: BenchSettings, on_progress: OnProgress) -> str:
-    """Return the file of what the corrected model missed so far, after learning it unless it is there; "" for nothing.
+    """Return the file of the corrected model's end-pose bias, after learning it unless it is there; "" for nothing.
 
     First from the calibrated runs of the first session; then corrected plans are tried, for an effect that the model
     lacks does something else on another way.
@@ -123,12 +123,12 @@ def _write_bias_corrections(path: Path, known: Mapping[str, Mapping[str, float]]
 
 
 def planned(directory: Path, settings: BenchSettings, learned: str, on_progress: OnProgress) -> dict[str, Any]:
-    """Return what corrected plans make up for, after writing it, unless it is there already."""
+    """Return what corrected plans compensate, after writing it, unless it is there already."""
     path = directory / PLANS
     if not path.exists():
-        model, missed = VehicleModel.load(directory / VEHICLE), read_bias_corrections(learned)
+        model, bias = VehicleModel.load(directory / VEHICLE), read_bias_corrections(learned)
         names = driven_trajectories(settings.trajectories)
-        content = plans_of(model, settings.workspace, missed, names, settings.steering)
+        content = plans_of(model, settings.workspace, bias, names, settings.steering)
         write(path, json.dumps({"schema": 1, "plans": content}, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
     plans: dict[str, Any] = _read(path)["plans"]
     for name, entry in plans.items():

@@ -23,7 +23,7 @@ NO_BIAS = Pose(0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Correction:
-    """What a corrected plan makes up for, by the model that it was made with.
+    """What a corrected plan compensates, by the model that it was made with.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class Correction:
 
 @dataclass(frozen=True)
 class CorrectedPlan(Plan):
-    """A `Plan` whose ``expected`` path has the model's effects and ends at rest; ``correction`` tells what they cost.
+    """A `Plan` whose ``expected`` path has the model's effects and ends at rest; ``correction`` says what they cost.
 
     It is None where there is nothing to correct: commands of the trajectory's own, or no target.
     """

@@ -111,7 +111,7 @@ def dry_run(
 def _row(
     trajectory: Trajectory, condition: str, model: VehicleModel, workspace: Workspace | None, start: Pose | None
 ) -> DryRunRow:
-    # A corrected plan makes up for the model's effects, and is what a bench would drive.
+    # A corrected plan compensates for the model's effects, and is what a bench would drive.
     made = corrected_plan if condition == "corrected" else plan
     try:
         return DryRunRow(trajectory, condition, made(trajectory, model, workspace=workspace, start=start), None)

@@ -79,7 +79,7 @@ def plan(
     trajectory
         What to drive.
     model
-        What is believed of the vehicle: nominal maps under the condition ``uncalibrated``, measured ones otherwise.
+        Of the vehicle: nominal maps under the condition ``uncalibrated``, measured ones otherwise.
     workspace
         The floor to stay on; not checked if not given.
     start

@@ -6,7 +6,7 @@
     agvbench.plot.end_poses(axes, agvbench.pose_errors(campaign), trajectory="5")
 
 Nothing here makes a figure, shows one, or changes matplotlib's settings. Colours and markers of conditions are those
-of the report, and tell each other apart for colour-blind readers.
+of the report, and colour-blind readers can distinguish them.
 """
 
 from agvbench.plot.calibration_curves import calibration_curve

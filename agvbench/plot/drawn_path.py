@@ -1,4 +1,4 @@
-"""Frames into paths that are worth drawing: in order, without jumps, no more points than an eye can tell apart."""
+"""Frames into paths that are worth drawing: in order, without jumps, no more points than an eye can resolve."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ def _repeat(metafunc: pytest.Metafunc) -> None:
 
 
 def _settings(config: pytest.Config) -> BenchSettings:
-    """Return the session's settings, or the usual ones: what is wrong is told once everything is collected."""
+    """Return the session's settings, or the usual ones: what is wrong is reported once everything is collected."""
     if _SETTINGS not in config.stash:
         from agvbench.running.configuration.settings import BenchSettings
 

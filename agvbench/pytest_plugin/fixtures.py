@@ -33,7 +33,7 @@ def agvbench_repeat(request: pytest.FixtureRequest) -> int:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, object]:
-    """Open the bench session before the first benchmark; what cannot be set up is told in one line, as bad usage."""
+    """Open the bench session before the first benchmark; what cannot be set up is one line, as bad usage."""
     config = session.config
     parallel = hasattr(config, "workerinput") or getattr(config.option, "dist", "no") != "no"
     if config.option.collectonly or parallel or not any(is_bench(item) for item in session.items):
@@ -78,7 +78,7 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
 
 
 def _progress_printer(config: pytest.Config) -> Callable[[str], None]:
-    """Return what tells the operator something while a benchmark is driven, whose output pytest captures."""
+    """Return what prints to the operator while a benchmark is driven, whose output pytest captures."""
     from agvbench.running.positioning.start_pose import notify_operator
 
     capture = config.pluginmanager.get_plugin("capturemanager")

@@ -31,18 +31,18 @@ class Progress:
 
     def __init__(self, reporter: pytest.TerminalReporter, left: Collection[str], what: str = "") -> None:
         self._reporter, self._left, self._what = reporter, frozenset(left), what
-        self._total, self._done, self._told = len(self._left), 0, 0
+        self._total, self._done, self._reported = len(self._left), 0, 0
         self._began: float | None = None
 
     def begin(self, run_id: str, name: str) -> None:
-        """Tell what is driven now."""
+        """Print what is driven now."""
         if run_id not in self._left:
             return
         line = self._line(name)
         if self._reporter.isatty:
             self._reporter.rewrite(line, erase=True)
-        elif self._done * 10 // self._total > self._told:
-            self._told = self._done * 10 // self._total
+        elif self._done * 10 // self._total > self._reported:
+            self._reported = self._done * 10 // self._total
             self._reporter.write_line(line)
         self._done += 1
 
@@ -131,7 +131,7 @@ def _leave_out_undrivable(item: pytest.Function) -> None:
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Tell a user's error in one line instead of a traceback; mark reports of benchmarks."""
+    """Report a user's error in one line instead of a traceback; mark reports of benchmarks."""
     report = yield
     if is_bench(item):
         report.user_properties.append(("agvbench", item.name))
@@ -139,11 +139,11 @@ def pytest_runtest_makereport(
             item.config.stash[SESSION].concluded(run_name(item))
         if call.excinfo is not None and isinstance(call.excinfo.value, AgvbenchError):
             report.longrepr = f"{item.name}: {worded(item.config, call.excinfo.value)}"
-        _tell_stop(item, report)
+        _report_stop(item, report)
     return report
 
 
-def _tell_stop(item: pytest.Item, report: pytest.TestReport) -> None:
+def _report_stop(item: pytest.Item, report: pytest.TestReport) -> None:
     """Say at once what ended the driving, and in which run; its report is counted, and not printed again."""
     stash = item.config.stash
     if SESSION not in stash or stash[SESSION].failure is None or STOPPED_IN in stash:

@@ -108,7 +108,7 @@ def print_loop(console: Console, report: LoopReport) -> None:
 
 
 def before_after_table(rows: Sequence[BeforeAfter]) -> Table:
-    """Return the table of biases under each condition, and whether the corrected one is within the scatter."""
+    """Return the table of biases under each condition, and whether the corrected one is within repeatability."""
     shown = _conditions(row.by_condition for row in rows)
     columns = [Column("trajectory", "trajectory"), Column("error", "error")]
     for condition in shown:
@@ -176,7 +176,7 @@ def _sections(loop: Loop, rows: Sequence[BeforeAfter], ends: Sequence[EndPositio
     return [
         Content("before-after", "Before and after", [*blocks, *tables]),
         Content("diagnosis", "What the calibrated model lacks", _diagnosis(loop)),
-        Content("plans", "What corrected plans make up for", [_plans(loop.plans), *([Bullets(said)] if said else [])]),
+        Content("plans", "What corrected plans compensate", [_plans(loop.plans), *([Bullets(said)] if said else [])]),
     ]
 
 
@@ -199,8 +199,8 @@ def _headline(loop: Loop, rows: Sequence[BeforeAfter], ends: Sequence[EndPositio
         farthest = max(math.hypot(left["along_mm"], left["across_mm"]) for left in moved)
         turned = max(abs(left["heading_deg"]) for left in moved)
         yield (
-            f"Not all of it is the model's merit: on {len(moved)} trajectories the aim was moved, by up to "
-            f"{farthest:.1f} mm and {turned:.2f} deg, by what the model missed there before "
+            f"Not all of it is the model's merit: on {len(moved)} trajectories the goal was moved, by up to "
+            f"{farthest:.1f} mm and {turned:.2f} deg, by the bias that the model had there before "
             "(--model-only leaves that out)."
         )
     verdict = str(loop.diagnosis.get("verdict"))
@@ -212,7 +212,7 @@ def _diagnosis(loop: Loop) -> list[Block]:
     shown = read_diagnosis(loop.directory) or ShownDiagnosis(loop.diagnosis)
     blocks = diagnosis_blocks(shown)
     if items(mapping(shown.content.get("unexplained")).get("depends_on")):
-        blocks.insert(1, Paragraph("What is left unexplained is not corrected, but where it was missed before."))
+        blocks.insert(1, Paragraph("What is left unexplained is corrected only where its bias was measured before."))
     return blocks
 
 
@@ -221,7 +221,7 @@ def _plans(plans: Mapping[str, Any]) -> Table:
     columns = [Column("trajectory", "trajectory")]
     for key, group in groups.items():
         columns += [Column(f"{key}_{field}", title, digits, group=group) for field, (title, digits) in _PLANNED.items()]
-    columns += [Column(f"learned_{c.split()[0]}_{c.split()[1]}", c, 2, group="missed before") for c in _LEARNED]
+    columns += [Column(f"learned_{c.split()[0]}_{c.split()[1]}", c, 2, group="bias before") for c in _LEARNED]
     learned = ("along_mm", "across_mm", "heading_deg")
     rows: list[list[Value]] = [
         [name, *(entry[key][field] for key in groups for field in _PLANNED), *(entry["remainder"][f] for f in learned)]
@@ -233,7 +233,7 @@ def _plans(plans: Mapping[str, Any]) -> Table:
         "Where the vehicle should end, driven by the corrected model's static maps alone and by corrected plans.",
         columns,
         rows,
-        note="Missed before: what the corrected model missed when it was tried, taken off the aim.",
+        note="Bias before: that of the corrected model when it was tried, subtracted from the goal.",
     )
 
 

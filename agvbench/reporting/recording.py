@@ -143,9 +143,9 @@ def _send_plan(recording: rr.RecordingStream, entity: str, path: Floats | None, 
 
 def _steps(commands: Commands, until_s: float) -> tuple[Floats, Floats]:
     """Return times and commands with the corners of steps: each command again when the next one replaces it."""
-    told = np.column_stack([commands.drive, commands.front, commands.rear])
+    levels = np.column_stack([commands.drive, commands.front, commands.rear])
     end = max(until_s, float(commands.t_s[-1]))
-    return np.append(np.repeat(commands.t_s, 2)[1:], end), np.repeat(told, 2, axis=0)
+    return np.append(np.repeat(commands.t_s, 2)[1:], end), np.repeat(levels, 2, axis=0)
 
 
 def _place(run: Run) -> tuple[str, str, str]:

@@ -19,7 +19,7 @@ class RunnerLink(Protocol):
     keys: Keys
 
     def identity(self) -> Identity:
-        """Return who drives and who sees."""
+        """Return the identities of vehicle and camera."""
         ...
 
     def reset(self, pose: Pose, *, run_key: str) -> None:
@@ -55,7 +55,7 @@ class ContinuousLink:
     """A link on which a run's clock may begin anew without a reset, as it may with a real vehicle.
 
     A simulator in lock step knows one clock since its last reset; here every exchange that goes back in time begins
-    another, whose frames are told in it. Frames that were captured before it began have negative times.
+    another, in which its frames are timed. Frames that were captured before it began have negative times.
     """
 
     def __init__(self, link: VehicleLink) -> None:
@@ -64,7 +64,7 @@ class ContinuousLink:
         self._end_s = math.inf
 
     def identity(self) -> Identity:
-        """Return who drives and who sees."""
+        """Return the identities of vehicle and camera."""
         return self._link.identity()
 
     @property

@@ -38,7 +38,7 @@ class Comparability:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """All sentences, the gravest first."""
+        """All sentences, the most severe first."""
         return (*self.incomparable, *self.incomplete, *self.notes)
 
 

@@ -1,4 +1,4 @@
-"""What ``agvbench diagnose`` does: read the campaign, diagnose it, tell, and write JSON and vehicle."""
+"""What ``agvbench diagnose`` does: read the campaign, diagnose it, print the answer, and write JSON and vehicle."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from agvbench.workflows.output_files import write_file
 
 _RUNS_COUNTED = 5
 Progress = Callable[[int, int], AbstractContextManager[Callable[[str], None]]]
-"""Given the numbers of runs and frames, shows the lines told while the context lasts."""
+"""Given the numbers of runs and frames, shows the lines that it gets while the context lasts."""
 
 
 def _silent(runs: int, frames: int) -> AbstractContextManager[Callable[[str], None]]:
@@ -45,7 +45,7 @@ def run_diagnose(
     """Diagnose the campaign in `directory`, `show` the answer, and write JSON and the corrected vehicle if asked for.
 
     With `drive_next` the run that the diagnosis proposes is driven with the `rig`, added to a copy of the campaign, and
-    that is diagnosed and told: what is written and returned is the second answer. ``next_file`` takes the trajectory
+    that is diagnosed: what is written and returned is the second answer. ``next_file`` takes the trajectory
     proposed. `progress` is given the numbers of runs and frames, and `wrote` each file that was written.
 
     Raises
@@ -83,8 +83,8 @@ def run_diagnose(
 
 
 def _diagnosed(campaign: Campaign, model: VehicleModel | None, seed: int, progress: Progress) -> Diagnosis:
-    with progress(len(campaign), _frames(campaign)) as told:
-        return with_first_experiment(diagnose(campaign, vehicle=model, seed=seed, on_progress=told))
+    with progress(len(campaign), _frames(campaign)) as on_progress:
+        return with_first_experiment(diagnose(campaign, vehicle=model, seed=seed, on_progress=on_progress))
 
 
 def _frames(campaign: Campaign) -> int:

@@ -112,7 +112,7 @@ DEFINITIONS = (
 
 
 def effect_in_words(effect: NamedEffect) -> str:
-    """Return one line on an effect: its parameters, and what cannot be told from it."""
+    """Return one line on an effect: its parameters, and what cannot be distinguished from it."""
     parts = []
     for name, e in effect.parameters.items():
         unit = "" if e.unit == "–" else f" {e.unit}"
@@ -133,23 +133,23 @@ def left_in_words(content: Mapping[str, Any]) -> Iterator[str]:
 
 
 def fit_in_words(content: Mapping[str, Any]) -> Iterator[str]:
-    """Yield which runs the lack of fit is of, against whose scatter, and its p-value."""
+    """Yield which runs the lack of fit is of, the repeatability of which runs it is compared with, and its p-value."""
     provenance = mapping(content.get("provenance"))
     runs, p_value = mapping(provenance.get("lack_of_fit_runs")), number(provenance.get("lack_of_fit_p_value"))
     tested, repeats = number(runs.get("tested")), number(runs.get("repeats"))
     if not any(map(math.isnan, (tested, repeats, p_value))):
-        among = f"against the scatter of repeats in {repeats:.0f} validation and test runs"
+        among = f"against the repeatability in {repeats:.0f} validation and test runs"
         yield f"Lack of fit of the {tested:.0f} test runs, {among}: p = {p_value:.2g}."
 
 
 def next_in_words(content: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what to drive next, what no run can tell apart, and which parameters these runs do not pin."""
+    """Yield what to drive next, what no run can discriminate, and which parameters these runs do not identify."""
     if following := mapping(content.get("next_experiment")):
         yield f"Next run, {mapping(following.get('trajectory')).get('name')}: {following.get('why')}."
     provenance = mapping(content.get("provenance"))
     for item in map(mapping, items(provenance.get("inseparable"))):
         between = " from ".join(map(str, items(item.get("between"))))
-        yield f"No run from rest to rest tells {between}; it takes {item.get('needs')}."
+        yield f"No run from rest to rest distinguishes {between}; required: {item.get('needs')}."
     for name, why in mapping(provenance.get("not_identifiable")).items():
         yield f"{name} is not identifiable from these runs ({why})."
 

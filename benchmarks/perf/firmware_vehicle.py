@@ -1,4 +1,4 @@
-"""A vehicle without scatter whose static maps are known: what its runs differ in, firmware and line have done.
+"""A vehicle without variation between runs whose static maps are known: only firmware and line make runs differ.
 
 `make_plant` is the vehicle for ``--plant benchmarks/perf/firmware_vehicle.py:make_plant``, `nominal_vehicle` the
 model that equals it. Its pulses take effect at once: it adds no servo frame of its own to that of the firmware.
@@ -23,7 +23,7 @@ def make_plant(seed: int) -> HiddenPlant:
 
 
 def make_scattering_plant(seed: int) -> HiddenPlant:
-    """Return it with a scatter between runs like that of the thesis' vehicle."""
+    """Return it with a variation between runs like that of the thesis' vehicle."""
     return _plant(seed, THESIS_PLAY)
 
 

@@ -92,7 +92,7 @@ class EchoAgv(AgvAdapter):
         raise NotImplementedError
 
     def identity(self) -> AgvIdentity:
-        """Return who this is."""
+        """Return the identity."""
         return AgvIdentity("agv1", "echo", "", "", "us", 0.0, simulated=True, lock_step=True)
 
     def apply(self, message: CommandMessage) -> None:
@@ -123,7 +123,7 @@ class EchoMocap(MocapAdapter):
         return cls()
 
     def identity(self) -> MocapIdentity:
-        """Return who this is."""
+        """Return the identity."""
         return MocapIdentity("echo", 120.0, simulated=True)
 
     def start(self, reports: Any) -> None:
@@ -217,7 +217,7 @@ class Table:
         blocks = self._rows.setdefault((what, bound), [])
         blocks += [(median_s(ours, plan), median_s(bare, plan)) for _ in range(plan.blocks)]
 
-    def tell(self) -> None:
+    def report(self) -> None:
         """Print the medians and the median ratio of every row, and forget them."""
         for (what, bound), blocks in self._rows.items():
             mine, peer = (statistics.median(column) * 1e6 for column in zip(*blocks, strict=True))
@@ -407,7 +407,7 @@ def load(endpoint: str, rate_hz: float, duration_s: float) -> None:
 
 
 def free_endpoint() -> str:
-    """Return a loopback endpoint that nobody uses."""
+    """Return a free loopback endpoint."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
@@ -443,7 +443,7 @@ def main() -> None:
     with open_bus_session() as session, echo_node(session):
         round_trips(table, session, "one session", plans)
         lock_steps(table, session, "one session", plans)
-    table.tell()
+    table.report()
     for launch in range(4 * more):
         endpoint = free_endpoint()
         process = child("--echo", endpoint, *(["--bare-first"] if launch % 2 else []))
@@ -451,7 +451,7 @@ def main() -> None:
             round_trips(table, session, "two processes", few)
             lock_steps(table, session, "two processes", few)
         process.communicate("\n")
-    table.tell()
+    table.report()
     duration_s = 60.0 if arguments.full else 1.0 if arguments.quick else 5.0
     load(free_endpoint(), 240.0, duration_s)
     load(free_endpoint(), 2400.0, duration_s)

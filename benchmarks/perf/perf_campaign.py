@@ -1,8 +1,8 @@
 """How much faster than real time the default simulated campaign is driven: in process, and over TCP between processes.
 
-The peer is real time: the simulated seconds of every run, at rest and driving, without the way back to the start. Wall
+The peer is real time: the simulated seconds of every run, at rest and driving, without the return path. Wall
 time is from the first recorded run to the last, with planning, bus, plant, camera, quality, calibration and recording
-(forced to disk); imports and compilation are told apart.
+(forced to disk); imports and compilation are given apart.
 """
 
 from __future__ import annotations

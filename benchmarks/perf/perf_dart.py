@@ -55,7 +55,7 @@ def smaller_days(campaign: Campaign) -> list[str]:
     return sorted(frames, key=lambda name: frames[name])[:-1]
 
 
-def told(console: Console, held: Sequence[str], found: Diagnosis, seconds: float) -> list[dict[str, Any]]:
+def report(console: Console, held: Sequence[str], found: Diagnosis, seconds: float) -> list[dict[str, Any]]:
     console.print(f"\nheld out: {', '.join(held)} ({seconds:.0f} s): {found.verdict}")
     for effect in found.effects:
         values = ", ".join(f"{name} {e.value:.3g} ± {e.stderr:.2g} {e.unit}" for name, e in effect.parameters.items())
@@ -125,7 +125,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for held in [*([day] for day in days), days]:
             begin = time.perf_counter()
             found = diagnose(Split(campaign, held))
-            rows = told(console, held, found, time.perf_counter() - begin)
+            rows = report(console, held, found, time.perf_counter() - begin)
             drawn += rows if len(held) == 1 else []
     if wanted.figure:
         draw(drawn, wanted.figure)

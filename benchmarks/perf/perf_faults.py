@@ -1,7 +1,7 @@
 """What comes of every fault, and how soon the vehicle stops: in simulation, and with the firmware in simavr.
 
-Plays each fault of ``tests/faults/`` on every rig that it can befall. The reaction is how long the vehicle was told to
-drive after the fault began: by commands to the plant in simulation, by the last pulse on the microcontroller's pin that
+Plays each fault of ``tests/faults/`` on every rig that it applies to. The reaction is how long the vehicle was driven
+after the fault began: by commands to the plant in simulation, by the last pulse on the microcontroller's pin that
 drives in simavr. ``--only TEXT`` plays those whose names contain TEXT; ``--keep FILE`` keeps what was
 measured, and leaves out what is in it already; ``--write`` writes the table of ``docs/reference/faults.md``.
 """
@@ -31,7 +31,7 @@ Reactions = dict[str, float | None]
 
 
 def play(fault: Fault, rigs: list[str]) -> tuple[Reactions, list[str]]:
-    """Return how soon the vehicle stopped, and which promises were broken."""
+    """Return how soon the vehicle stopped, and which requirements were violated."""
     reactions: Reactions = {}
     broken = []
     for rig in rigs:
@@ -39,7 +39,7 @@ def play(fault: Fault, rigs: list[str]) -> tuple[Reactions, list[str]]:
             with tempfile.TemporaryDirectory() as folder:
                 outcome = fault.play(Path(folder), rig)
             reactions[rig] = outcome.reaction_s
-            broken += [f"{rig}: {promise}" for promise in outcome.breaks(fault)]
+            broken += [f"{rig}: {requirement}" for requirement in outcome.breaks(fault)]
     return reactions, broken
 
 
@@ -73,7 +73,7 @@ def write(measured: dict[str, Reactions]) -> None:
 
 
 def main() -> int:
-    """Play, print and write; return 1 where a promise was not kept."""
+    """Play, print and write; return 1 where a requirement was violated."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--only", default="", metavar="TEXT")
     parser.add_argument("--keep", type=Path, metavar="FILE")

@@ -1,6 +1,6 @@
 """Firmware 1 against firmware 2, and what the servo frame's variable delay makes of the spread of end poses.
 
-The same campaign (the eight trajectories, the same seed, a vehicle without scatter whose maps are known) is driven
+The same campaign (the eight trajectories, the same seed, a vehicle without variation whose maps are known) is driven
 through the whole loop: without firmware, with either version, and with version 2 always at the same phase of its frame.
 Version 1 is then compared with version 2 by ``agvbench compare``. Single rides add what no campaign has: the worst
 duration there is, and version 2 timing the segments on board.
@@ -99,7 +99,7 @@ def worst(commands: Commands) -> Commands:
 
 
 def rides(version: str) -> dict[int, dict[str, dict[str, Floats]]]:
-    """Return the errors of rides at evenly spread phases, by trajectory and by who timed them."""
+    """Return the errors of rides at evenly spread phases, by trajectory and by the clock that timed them."""
     rig, model, found = Rides(version), nominal_vehicle(), {}
     for case, target in CASES.items():
         commands = plan(load_trajectory(str(case)), model, workspace=None).commands

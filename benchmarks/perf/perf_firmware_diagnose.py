@@ -2,8 +2,8 @@
 
 `firmware_vehicle` equals what static maps can say, so that nothing but the firmware (and the camera's noise) is left
 to find. It is driven through the whole loop: with either version, with the benchmarks that a session drives by itself
-and with more, without scatter and with a scatter like that of the thesis' vehicle. Beside what is found stands what was
-measured of the same firmware: the delay from a command's first bit to the end of the first pulse it made.
+and with more, without variation between runs and with one like that of the thesis' vehicle. Beside what is found stands
+what was measured of the same firmware: the delay from a command's first bit to the end of the first pulse it made.
 
 ``--only WORD`` takes the campaigns whose name has the word; needs ``nox -s firmware``.
 """
@@ -49,7 +49,7 @@ CASES = (
     Case("firmware 1", "1"),
     Case("firmware 2", "2"),
     Case("firmware 2, calibration and the eight only", "2", SESSION),
-    Case("firmware 2, scatter as the thesis' vehicle", "2", MORE, SCATTERING),
+    Case("firmware 2, variation as the thesis' vehicle", "2", MORE, SCATTERING),
 )
 
 
@@ -76,13 +76,13 @@ def measured_ms() -> dict[str, list[float]]:
     return found
 
 
-def tell(case: Case, found: Diagnosis) -> None:
+def report(case: Case, found: Diagnosis) -> None:
     """Print the answer."""
     print(f"{case.name}: {found.verdict}", flush=True)
     for effect in found.effects:
         sizes = ", ".join(f"{n} {p.value:.5f} ± {p.stderr:.5f}" for n, p in effect.parameters.items())
-        rivals = f"; or instead {', '.join(effect.confounded_with)}" if effect.confounded_with else ""
-        print(f"    {effect.name}: {sizes}{rivals}")
+        alternatives = f"; or instead {', '.join(effect.confounded_with)}" if effect.confounded_with else ""
+        print(f"    {effect.name}: {sizes}{alternatives}")
     for name, errors in (found.held_out.errors if found.held_out else {}).items():
         before, after, floor = (errors.get(key, float("nan")) for key in ("before", "after", "floor"))
         print(f"    {name:20s} before {before:6.2f}, after {after:6.2f}, floor {floor:6.2f}")
@@ -100,7 +100,7 @@ def main() -> int:
         measured_ms()
         for case in (case for case in CASES if arguments.only in case.name):
             with tempfile.TemporaryDirectory(prefix="agvbench-firmware-") as folder:
-                tell(case, diagnose(driven(case, Path(folder) / "campaign")))
+                report(case, diagnose(driven(case, Path(folder) / "campaign")))
 
     return exit_code(measure)
 

@@ -144,7 +144,7 @@ class Campaign:
 
 
 def aligned_miss(path: Floats, observed: Floats, sd: Floats) -> Floats:
-    """Return what paths (R, K, 3) miss once each is turned and moved to where it misses least."""
+    """Return the residuals of paths (R, K, 3), each turned and moved to where they are least."""
     middle_p, middle_o = path[..., :2].mean(axis=1, keepdims=True), observed[..., :2].mean(axis=1, keepdims=True)
     p, o = path[..., :2] - middle_p, observed[..., :2] - middle_o
     cross = np.sum(p[..., 0] * o[..., 1] - p[..., 1] * o[..., 0], axis=1) / sd[0] ** 2

@@ -103,7 +103,7 @@ def _counted(rows: list[BeforeAfter]) -> str:
     return f"{found[Bias.WITHIN]} of {len(rows)} within, {found[Bias.BEYOND]} beyond"
 
 
-def _tell_cells(driven: Driven) -> None:
+def _report_cells(driven: Driven) -> None:
     for row in (*driven.rows, *(row for row in driven.thesis if row.quantity == DISTANCE)):
         biases = "  ".join(f"{c} {e.bias:8.2f} ± {e.sd:5.2f}" for c, e in row.by_condition.items())
         verdict = row.corrected.verdict if row.corrected else "not driven"
@@ -142,7 +142,7 @@ def main() -> None:
             loops.append(driven)
             _report(driven)
             if given.cells:
-                _tell_cells(driven)
+                _report_cells(driven)
     if any(loop.rows for loop in loops):
         print(f"\n{'corrected bias within ± 1 sd':40s} | ours              | asked | 95 % bounds     | bound met?")
         _print_total(CELLS, [row for loop in loops for row in loop.rows])

@@ -27,7 +27,7 @@ JITTERS_S = (0.0001, 0.001, 0.01)
 
 
 def connected(server: Emulator, clock: SimulatedClock, seen: list[Seen]) -> Client:
-    """Return a client that has shaken hands; the server answers in a thread for as long as that takes."""
+    """Return a client after its handshake; the server answers in a thread for as long as that takes."""
     done = threading.Event()
     thread = threading.Thread(target=lambda: [server.step(0.01) for _ in iter(done.is_set, True)])
     thread.start()

@@ -1,6 +1,6 @@
-"""Repeats that need nobody: the vehicle drives itself back to its start, again and again.
+"""Repeats without an operator: the vehicle drives itself back to its start, again and again.
 
-The default plant, the small front-steered one, and drawn ones with hidden effects, each believed to be nominal, drive
+The default plant, the small front-steered one, and random ones with hidden effects, each with the nominal model, drive
 ``--returns 100`` consecutive repeats with ``--place auto``'s placer. A start is judged by the plant's own pose, not by
 the camera: within 5 mm and 1°? Asked for are all of them, and a vehicle that never leaves the workspace.
 ``--plants 20 --first-seed 3000`` draws more plants; ``--only NAME …`` chooses what is hidden. Plant and camera are

@@ -73,7 +73,7 @@ class ShortCircuit:
         self.keys, self._seen = Keys("lab", options.vehicle), [Frames.empty()]
 
     def identity(self) -> Identity:
-        """Return who drives and who sees."""
+        """Return the identities of vehicle and camera."""
         return Identity.of(self._agv.identity(), self._mocap.identity())
 
     def reset(self, pose: Pose, *, run_key: str) -> None:

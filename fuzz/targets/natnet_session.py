@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from fuzz.natnet_samples import VERSIONS, packets
 from fuzz.target import Target
 
-_WHO = ("127.0.0.1", 50_000)
+_CLIENT = ("127.0.0.1", 50_000)
 _PORTS = 64
 
 
@@ -60,7 +60,7 @@ class NatNetSession(Target):
             return
         version = self._client.version = self._versions[data[0] % len(self._versions)]
         message, payload = self._split(data[1:])
-        self._server._answer(message, payload, (_WHO[0], _WHO[1] + len(data) % _PORTS), 0)
+        self._server._answer(message, payload, (_CLIENT[0], _CLIENT[1] + len(data) % _PORTS), 0)
         assert len(self._server.clients()) <= _PORTS
         self._client.version = version
         self._client._take(message, payload)

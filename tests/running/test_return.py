@@ -79,7 +79,7 @@ def test_a_vehicle_that_stands_there_does_not_move() -> None:
     ("plant", "error", "said"),
     [
         ("Dead", PlacingError, r"the vehicle does not move: full drive for 2 s; see to its battery"),
-        ("Contrary", PlacingError, r"the vehicle drives the other way than it is told; give the right file"),
+        ("Contrary", PlacingError, r"the vehicle drives the other way than commanded; give the right file"),
         ("Swapped", SafetyStopError, r"pose jumped: 0.8\d m from where the vehicle was going"),
     ],
 )

@@ -77,7 +77,7 @@ def test_cameras_are_told_what_is_wanted_of_them(tmp_path, monkeypatch):
 
 def test_a_camera_that_cannot_tell_a_vehicle_at_rest_is_refused(tmp_path):
     with (
-        pytest.raises(FlagError, match=r"--mocap: the camera looks too seldom .*: 15 Hz \(limit: at least 25 Hz\)"),
+        pytest.raises(FlagError, match=r"--mocap: camera frame rate too low .*: 15 Hz \(limit: at least 25 Hz\)"),
         open_session({"camera": "rate_hz=15"}, out=str(tmp_path / "c"), resume=False, dry_run=False),
     ):
         pass

@@ -55,7 +55,7 @@ class GearLeg:
 
 @dataclass(frozen=True)
 class Guided:
-    """The point of the vehicle that keeps to a path: `forward_m` of the marker centroid, where nothing slips sideways.
+    """The point of the vehicle that keeps to a path: `forward_m` of the marker centroid, where nothing slips laterally.
 
     Its course is the vehicle's heading plus `crab_rad`, at which the vehicle is seen to move.
     """

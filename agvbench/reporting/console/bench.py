@@ -88,7 +88,7 @@ def _caption(planned: Sequence[tuple[RunRequest, Plan]]) -> str:
     total_s = sum(plan.duration_s + _BETWEEN_S for _, plan in planned)
     return (
         f"{len(planned)} runs, {total_s / 3600.0:.1f} h: driving, and {_BETWEEN_S:g} s between two runs "
-        f"({_AT_REST_S:g} s at rest, about {TURNAROUND_S:g} s for the way back to the start); "
+        f"({_AT_REST_S:g} s at rest, about {TURNAROUND_S:g} s for the return path to the start); "
         f"the vehicle stays within {radius_m:.2f} m of the floor's origin, "
         f"with {DEFAULT_MARGIN_M:.2f} m around its axles"
     )

@@ -80,5 +80,5 @@ def _numbers(fit: MapFit | FitError, scale: float, digits: int) -> list[str]:
     if isinstance(fit, FitError):
         return ["–"] * 6
     spread = [fit.residual_sd, fit.rms_all, fit.cross_validated_rms]
-    told = ["–" if math.isnan(value) else f"{scale * value:.{digits}f}" for value in spread]
-    return [str(len(fit.points)), str(len(fit.left_out) or "–"), f"{fit.r_squared:.4f}", *told]
+    shown = ["–" if math.isnan(value) else f"{scale * value:.{digits}f}" for value in spread]
+    return [str(len(fit.points)), str(len(fit.left_out) or "–"), f"{fit.r_squared:.4f}", *shown]

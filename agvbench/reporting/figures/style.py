@@ -1,4 +1,4 @@
-"""How figures look: colours that follow the page from light to dark, and that colour-blind readers tell apart."""
+"""How figures look: colours that follow the page from light to dark, and that colour-blind readers distinguish."""
 
 from __future__ import annotations
 

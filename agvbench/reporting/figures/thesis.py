@@ -38,12 +38,12 @@ def _write(item: Traced, path: Path) -> Path:
     axes.axhline(0.0, color=_INK, linewidth=0.8)
     # Before a little to the left, after to the right, where both have the same place.
     shift = 0.004 * float(np.ptp(item.at))
-    for side, missed, words in ((-1, item.residual_before, item.before), (1, item.residual_after, item.after)):
+    for side, residual, words in ((-1, item.residual_before, item.before), (1, item.residual_after, item.after)):
         index = (side + 1) // 2
         root = item.rms_after if index else item.rms_before
         label = f"{words}: rms {root:.3g} {item.unit}"
         axes.plot(
-            item.at + side * shift, missed, linestyle="none", marker=MARKERS[index], markersize=3.5,
+            item.at + side * shift, residual, linestyle="none", marker=MARKERS[index], markersize=3.5,
             color=CONDITION_COLOURS[index], alpha=0.8, markeredgewidth=0.0, label=label,
         )  # fmt: skip
     axes.set_xlabel(item.axis, color=_INK, fontsize=9)

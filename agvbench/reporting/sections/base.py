@@ -1,4 +1,4 @@
-"""What every report section promises."""
+"""The interface of every report section."""
 
 from __future__ import annotations
 

@@ -43,9 +43,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _FEATURES = {
-    "speed": ("Distance missed along the way", "missed [%]", 100.0),
-    "sideways": ("Distance missed to the left", "missed [%]", 100.0),
-    "turning": ("Turn missed", "missed [°/m]", 180.0 / math.pi),
+    "speed": ("Residual along the way", "residual [%]", 100.0),
+    "sideways": ("Residual to the left", "residual [%]", 100.0),
+    "turning": ("Residual turn", "residual [°/m]", 180.0 / math.pi),
 }
 _AGAINST = {
     "time_in_run_s": "time in the run [s]",
@@ -55,10 +55,9 @@ _AGAINST = {
     "campaign_time_h": "time since the session began [h]",
 }
 _CAPTION = (
-    "What each step between two samples misses, per metre driven, in the vehicle's own frame: medians with quartiles "
-    "of steps of all runs, with static maps (before) and with what was found (after). In the maps of the floor the "
-    "area of a mark is the size of the median; discs miss to the plus side, squares to the minus side; each pair has "
-    "one scale."
+    "The residual of each step between two samples, per metre driven, in the vehicle's own frame: medians with "
+    "quartiles of steps of all runs, with static maps (before) and with what was found (after). In the maps of the "
+    "floor the area of a mark is the size of the median; discs are positive, squares negative; each pair has one scale."
 )
 
 

@@ -54,7 +54,9 @@ def _lead(data: ReportData) -> list[str]:
 
 
 def _bought(comparison: Comparison) -> str:
-    who = _BOUGHT.get((comparison.name_a, comparison.name_b), f"Going from {comparison.name_a} to {comparison.name_b}")
+    subject = _BOUGHT.get(
+        (comparison.name_a, comparison.name_b), f"Going from {comparison.name_a} to {comparison.name_b}"
+    )
     counted = [d for d in comparison.deciding if d.trajectory != ALL]
     trajectories = len({d.trajectory for d in counted})
     where = f"on average over {trajectories} trajectories" if trajectories > 1 else f"on {counted[0].trajectory}"
@@ -65,7 +67,7 @@ def _bought(comparison: Comparison) -> str:
         f"Of {len(counted)} medians of end position and heading error {better or 'none'} improved beyond doubt, "
         f"{worse or 'none'} got worse"
     )
-    return plain_sentences(f"{who} changed {moved}, {where}. {score}.")
+    return plain_sentences(f"{subject} changed {moved}, {where}. {score}.")
 
 
 def _summary(comparison: Comparison) -> list[Difference]:

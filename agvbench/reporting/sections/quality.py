@@ -55,7 +55,7 @@ class QualitySection(Section):
 
 
 def _reasons(data: ReportData) -> Iterator[str]:
-    # Numbers differ from run to run: what stands before them tells reasons apart.
+    # Numbers differ from run to run: what stands before them distinguishes the reasons.
     bad = [status for status in data.quality["status"] if status != "ok"]
     bad += [f"no error: {problem}" for problem in data.errors["problem"][data.errors["status"] == "ok"] if problem]
     counts = Counter(plain(reason) for reason in bad)

@@ -41,4 +41,4 @@ def _file(folder: Path, name: str) -> Path:
 
 
 EXCITATION_RUNS = ("calibration", "trajectories", "step_response", "free_driving")
-"""Benchmarks that excite every effect: the last two tell lags, which steady driving hides."""
+"""Benchmarks that excite every effect: the last two identify lags, which steady driving hides."""

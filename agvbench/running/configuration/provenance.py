@@ -47,9 +47,9 @@ def git_revision(directory: Path) -> str:
 
 
 def provenance(directory: Path, *, simulated: bool) -> dict[str, str]:
-    """Return what is worth knowing about this session, for the report and for whoever asks in a year.
+    """Return what is worth knowing about this session, for the report and for readers in a year.
 
-    ``time`` says whose clock the campaign's times are of.
+    ``time`` names the clock of the campaign's times.
     """
     facts = {
         "began": datetime.now(UTC).isoformat(timespec="seconds"),

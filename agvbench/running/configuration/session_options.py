@@ -43,7 +43,7 @@ def number(text: str) -> float:
     return float(text)
 
 
-# Not given is None everywhere, so that a resumed session can tell what was asked from what is usual.
+# Not given is None everywhere, so that a resumed session can distinguish given options from defaults.
 _FLAG: dict[str, Any] = {"action": "store_true", "default": None}
 OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
     (
@@ -76,7 +76,7 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
         {"choices": ("abeam", "front", "rear", "opposite", "crab")},
         "steer every trajectory in this mode (default: as each says, or with the one axle that steers)",
     ),
-    ("--vehicle", {"metavar": "FILE"}, "vehicle.toml believed before calibration (default: nominal maps)"),
+    ("--vehicle", {"metavar": "FILE"}, "vehicle.toml before calibration (default: nominal maps)"),
     ("--calibration", {"metavar": "FILE"}, "calibrated vehicle.toml (default: calibrate in this session)"),
     (
         "--corrected",
@@ -86,7 +86,7 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
     (
         "--remainders",
         {"metavar": "FILE"},
-        "what the corrected model still misses, by trajectory (agvbench loop writes it)",
+        "end-pose bias of the corrected model, by trajectory (agvbench loop writes it)",
     ),
     ("--maps", {"choices": ("default", "thesis")}, "maps to calibrate: default, or the thesis' line and cubic"),
     ("--repeats", {"type": whole_number, "metavar": "N"}, "repeats of each trajectory and condition (default: 10)"),
@@ -101,7 +101,7 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
     (
         "--place",
         {"choices": ("auto", "operator", "teleport")},
-        "who brings it to its start: auto (itself), operator (real: default) or teleport (simulated: default)",
+        "how it gets to its start: auto (drives itself), operator (real: default), teleport (simulated: default)",
     ),
     (
         "--workspace",
@@ -121,7 +121,7 @@ OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
     (
         "--exchange",
         {"type": number, "metavar": "S"},
-        "tell a simulated vehicle for S seconds at a time: sooner driven, later stopped (default: 0.1, as a real one)",
+        "control cycle of a simulated vehicle: longer is sooner driven, later stopped (default: 0.1, as a real one)",
     ),
     (
         "--session",

@@ -36,11 +36,11 @@ class BenchSettings:
     ``agv``, ``mocap`` and ``plant`` name adapters and the simulated plant, ``camera`` its options; ``vehicle`` and
     ``calibration`` are vehicle files ("" for the shipped nominal vehicle, and for calibrating in this session),
     ``corrected`` the one with the effects that a diagnosis found ("" for none: the condition is not driven) and
-    ``remainders`` what that model still misses; ``trajectories`` are names or files with commas between ("" for the
+    ``remainders`` its end-pose bias; ``trajectories`` are names or files with commas between ("" for the
     eight and the lab's own); ``repeats`` 0 means what each benchmark declares; ``order`` is one of
     `ORDERS`; ``steering`` is the mode in which all trajectories are steered ("" for each its own); ``place``, one of
     `PLACES`, is how the vehicle comes to its starts ("" for the usual way); ``full`` drives every pulse of the thesis;
-    ``exchange`` [s] is for how long a vehicle is told what to do at a time. ``vehicle_name`` is what the bus calls the
+    ``exchange`` [s] is the control cycle of a simulated vehicle. ``vehicle_name`` is what the bus calls the
     vehicle, and ``session`` what the runs from now on belong to ("" for what the last belonged to); ``benchmarks`` are
     names or files, and ``only`` chooses among their runs by pytest's ``-k``.
     """

@@ -42,7 +42,7 @@ from agvbench.types import Command, Frames, Outcome, Run, RunStatus
 
 _UNNAMED = SessionBegan()
 _MOST_UNSEEN = 3
-"""Runs in which the vehicle is not seen at all, one after another: then somebody has to look at the camera."""
+"""Runs in which the vehicle is not seen at all, one after another: then the camera needs the operator."""
 
 
 class Bench:
@@ -51,7 +51,7 @@ class Bench:
     ``calibrate`` is called once, with the calibration runs that are still `awaited`, when the first order asks for the
     calibrated model; ``corrected`` is the model of the
     condition of that name, if there is one.
-    ``on_progress`` tells the operator.
+    ``on_progress`` prints to the operator.
     """
 
     def __init__(
@@ -168,7 +168,7 @@ class Bench:
     def close(self) -> None:
         """Keep what was reported since the last run."""
         self.log.take(self.link, "", self._time.now_s())
-        with suppress(CampaignError):  # what ended the session has to be told, not that this could not be recorded
+        with suppress(CampaignError):  # what ended the session is reported, not that this could not be recorded
             self.log.save()
 
     def _attempts(self, request: RunRequest) -> int:

@@ -15,7 +15,7 @@ TURNAROUND_S = 15.0
 
 
 class CampaignTime(Protocol):
-    """Tells when runs start and end [s since the campaign began]."""
+    """Gives the times at which runs start and end [s since the campaign began]."""
 
     def now_s(self) -> float:
         """Return the time since the campaign began [s]."""
@@ -73,7 +73,7 @@ class WallCampaignTime:
         return self._before_s + self._steady() - self._opened_s
 
     def has_run(self, started_s: float, duration_s: float) -> None:
-        """Wall time needs no telling."""
+        """Do nothing: wall time passes by itself."""
 
     def has_placed(self, duration_s: float) -> None:
         """Nor this."""

@@ -57,7 +57,7 @@ def drive(
 
     The last row of `commands` stops the vehicle. `run_key` names a simulated run, whose randomness follows from it;
     None is for real vehicles, which stand at `start` already. `supervisor` stops the vehicle when something is wrong.
-    `seen` is filled batch by batch, for a caller who wants to keep what was seen of a run that failed.
+    `seen` is filled batch by batch, for a caller that keeps the frames of a failed run.
     `at_rest` is called after the rest, before the first of `commands`.
 
     Raises
@@ -65,7 +65,7 @@ def drive(
     SafetyStopError
         If the supervisor stopped the vehicle.
     LinkError
-        If the bus or an adapter fails; the vehicle has been told to stop.
+        If the bus or an adapter fails; the vehicle has been commanded to stop.
     """
     batches = [] if seen is None else seen
     watched = partial(supervisor.control_cycle, link, seen=batches)
@@ -90,7 +90,7 @@ def drive(
 
 
 def _check_seen(batches: list[Frames], timing: Timing, *, where: str) -> None:
-    """Refuse to drive a vehicle that was never seen at rest: nobody would know where it goes."""
+    """Refuse to drive a vehicle that was never seen at rest: its path could not be supervised."""
     if not any(frames.tracked.any() for frames in batches):
         value = f"not seen for {timing.rest_before_s:.2f} s, at rest"
         raise safety_stop(0.0, "tracking was lost", where=where, value=value, ends_session=False)

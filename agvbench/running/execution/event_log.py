@@ -22,8 +22,8 @@ class EventLog:
     ----------
     writer
         Of the campaign; what an earlier session kept is continued.
-    tell
-        Tells the operator, of each kind of event the first.
+    on_progress
+        Progress callback: gets the first event of each kind.
     """
 
     def __init__(self, writer: CampaignWriter, on_progress: Callable[[str], None]) -> None:

@@ -1,6 +1,6 @@
 """Pause between runs, with the vehicle at neutral, and go on: by a file in the campaign directory, or Ctrl-Z.
 
-The file is the one state there is: whoever can write the directory can pause, over ssh, in tmux, from a script. Ctrl-Z
+The file is the only state: any process that can write the directory can pause, over ssh, in tmux, from a script. Ctrl-Z
 writes and removes it; it does not suspend the program, which has to keep listening to vehicle and camera.
 """
 
@@ -36,18 +36,18 @@ def holding_neutral(link: RunnerLink, neutral: Command) -> Callable[[], None]:
 
 
 class PauseRequest:
-    """Whether the campaign in `directory` is to pause; `on_progress` tells the operator."""
+    """Whether the campaign in `directory` is to pause; `on_progress` prints to the operator."""
 
     def __init__(self, directory: Path, on_progress: Callable[[str], None]) -> None:
         self._file, self._on_progress = directory / PAUSE_FILE, on_progress
         self._by_signal = False
 
     def is_requested(self) -> bool:
-        """Whether somebody asked for a pause."""
+        """Whether a pause is requested."""
         return self._file.exists()
 
     def wait(self, before: str, stand: Callable[[], None]) -> None:
-        """Return at once, or when nobody asks for a pause any more; the run `before` is next.
+        """Return at once, or when a pause is no longer requested; the run `before` is next.
 
         `stand` lets the vehicle stand at neutral for a moment; what it raises ends the pause.
         """

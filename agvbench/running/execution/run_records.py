@@ -78,7 +78,7 @@ def record_aborted(
     if not len(frames):
         return
     name = free_name(run_id + _ABORTED, writer.finished_ids)
-    with suppress(CampaignError):  # what ended the run has to be told, not that it could not be recorded
+    with suppress(CampaignError):  # what ended the run is reported, not that it could not be recorded
         writer.append(aborted_run(request, name, started_s, error, frames, firmware))
 
 

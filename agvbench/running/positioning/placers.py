@@ -20,7 +20,7 @@ from agvbench.types import Command, Pose
 
 @dataclass(frozen=True)
 class Rig:
-    """What vehicles are placed with: link, nominal model, who watches where, and what tells the operator."""
+    """What vehicles are placed with: link, nominal model, supervision, workspace, and the progress callback."""
 
     link: RunnerLink
     model: VehicleModel
@@ -46,7 +46,7 @@ class Placer(ABC):
 
     @abstractmethod
     def place(self, start: Pose, run_id: str) -> ReturnResult | None:
-        """Bring the vehicle to `start` (floor frame) for the run `run_id`; None if there is nothing to tell of it.
+        """Bring the vehicle to `start` (floor frame) for the run `run_id`; None if there is nothing to report of it.
 
         Raises
         ------
@@ -61,7 +61,7 @@ class Placer(ABC):
         return None
 
     def was_moved(self) -> None:  # noqa: B027  (most need not know)
-        """Take note that a simulated vehicle was stopped, or drove a recorded run unseen: nobody knows where it is."""
+        """Take note that a simulated vehicle was stopped, or drove a recorded run unseen: its pose is unknown."""
 
 
 class Teleport(Placer):

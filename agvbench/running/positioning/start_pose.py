@@ -28,7 +28,7 @@ class _StartCheck:
 
 
 def notify_operator(text: str) -> None:
-    """Tell the operator, over a line of progress that may be there."""
+    """Print to the operator, over a line of progress that may be there."""
     to = sys.__stderr__
     print(f"\r\x1b[K{text}" if to is not None and to.isatty() else text, file=to, flush=True)
 
@@ -88,7 +88,7 @@ def _wait(
     patience_s: float,
     on_progress: Callable[[str], None],
 ) -> _StartCheck:
-    """Let the vehicle stand until `check` finds its place good, and tell every `PROGRESS_S`; return its last place."""
+    """Let the vehicle stand until `check` accepts its place; report every `PROGRESS_S`; return its last place."""
     waited_s, reported_s, place = 0.0, -math.inf, _StartCheck("", False)
     while waited_s < patience_s:
         # The run's clock begins anew at its first exchange, which is before any of these.

@@ -73,7 +73,7 @@ def open_session(
 ) -> Iterator[BenchSession]:
     """Open the session that the options `given` ask for, and close it whatever happens.
 
-    ``plan`` lists the runs that it is to drive, as rows of the campaign's table ``planned``; `on_progress` tells it.
+    ``plan`` lists the runs that it is to drive, as rows of the campaign's table ``planned``; `on_progress` prints it.
 
     Raises
     ------

@@ -20,7 +20,7 @@ _OPTIONS = {"uncalibrated": "--vehicle", "calibrated": "--calibration", "correct
 
 
 def adapter_options(settings: BenchSettings, models: Mapping[str, VehicleModel]) -> AdapterOptions:
-    """Return what the adapters of a session are told."""
+    """Return the options of a session's adapters."""
     nominal = models["uncalibrated"]
     return AdapterOptions(
         vehicle=settings.vehicle_name,
@@ -116,9 +116,9 @@ def _check_rate(link: VehicleLink) -> None:
     rate_hz = link.identity().mocap_rate_hz
     if rate_hz < LEAST_RATE_HZ:
         raise FlagError(
-            "the camera looks too seldom to tell whether a vehicle is at rest",
+            "camera frame rate too low to detect standstill",
             where="--mocap",
             value=f"{rate_hz:g} Hz",
             limit=f"at least {LEAST_RATE_HZ:g} Hz",
-            remedy="ask it for more frames, or wish for more with --camera rate_hz=",
+            remedy="raise it in the camera's software, or of a simulated camera with --camera rate_hz=",
         )

@@ -114,7 +114,7 @@ class BenchSession:
     def plan(self, trajectory: Trajectory, condition: str) -> Plan:
         """Return the plan of `trajectory` under `condition`: made once, driven in every repeat.
 
-        Under ``"corrected"`` it makes up for the model's effects, and is made anew for every run if one of them
+        Under ``"corrected"`` it compensates for the model's effects, and is made anew for every run if one of them
         depends on how long the session lasts.
 
         Raises
@@ -146,8 +146,8 @@ class BenchSession:
         if condition != "corrected":
             return plan(trajectory, model, workspace=self.workspace)
         departure = Departure() if self._bench is None else self._bench.departure
-        missed = self._bias_corrections.get(trajectory.name, NO_BIAS)
-        made = corrected_plan(trajectory, model, workspace=self.workspace, departure=departure, end_pose_bias=missed)
+        bias = self._bias_corrections.get(trajectory.name, NO_BIAS)
+        made = corrected_plan(trajectory, model, workspace=self.workspace, departure=departure, end_pose_bias=bias)
         if depends_on_time(made, model, departure):
             self._hourly.add((trajectory, condition))
         return made

@@ -43,10 +43,10 @@ def _last_of(frames: Frames) -> Frames:
 
 @dataclass(frozen=True)
 class Slice:
-    """What was seen lately: times (n,) [s] and poses (n, 3) [m, m, rad] of the tracked frames, in order of capture.
+    """What was seen recently: times (n,) [s] and poses (n, 3) [m, m, rad] of the tracked frames, in order of capture.
 
     ``now_s`` [s] is when the slice should have ended in the run's clock, ``driving_s`` [s] for how long the vehicle has
-    been told to drive, ``ahead_s`` [s] by how much the middle frame was captured later than it arrived.
+    been commanded to drive, ``ahead_s`` [s] by how much the middle frame was captured later than it arrived.
     """
 
     t_s: Floats

@@ -1,4 +1,4 @@
-"""What every static map promises."""
+"""The interface of every static map."""
 
 from __future__ import annotations
 

@@ -45,4 +45,4 @@ class Check(ABC):
 
     @abstractmethod
     def examine(self, lab: Lab) -> Finding:
-        """Return what is found; an `agvbench.errors.AgvbenchError` is told as what fails."""
+        """Return what is found; an `agvbench.errors.AgvbenchError` is reported as what fails."""

@@ -16,11 +16,11 @@ from agvbench.vehicle.maps import StaticMap
 
 _LARGEST_RAD = math.radians(40.0)
 _PLANNED, _STEERED = 0.4, 0.95
-"""Of the angle at which an axle stops: what a way back is planned with, and what keeping to it may take."""
+"""Of the angle at which an axle stops: what a return path is planned with, and what following it may take."""
 
 
 class CommandMapping:
-    """Steers a believed vehicle about a centre abeam of its guided point, with every axle that it steers.
+    """Steers a vehicle, by its nominal model, about a centre abeam of its guided point, with every steered axle.
 
     ``forward_m`` is how far the guided point lies ahead of the markers' centroid.
     """

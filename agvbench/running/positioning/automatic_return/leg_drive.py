@@ -129,7 +129,7 @@ class LegDrive:
 
     def _guide(self) -> Guidance:
         pose = self._motion_interface.pose_estimator.pose
-        assert pose is not None  # noqa: S101  (a way back begins where the vehicle was seen)
+        assert pose is not None  # noqa: S101  (a return path begins where the vehicle was seen)
         crab_rad = self._steering.crab_rad
         return self._follower.guide(
             Guided(self._command_mapping.model.geometry, self._command_mapping.forward_m, crab_rad).pose(pose), crab_rad
@@ -171,7 +171,7 @@ class LegDrive:
             )  # fmt: skip
         if self._speed_seen < _WRONG_WAY_MPS:
             raise PlacingError(
-                "the vehicle drives the other way than it is told", where=self._motion_interface.where,
+                "the vehicle drives the other way than commanded", where=self._motion_interface.where,
                 remedy="give the right file with --vehicle",
             )  # fmt: skip
 

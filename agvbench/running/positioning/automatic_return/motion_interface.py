@@ -15,7 +15,7 @@ _WINDOW_S = 0.1
 _FEWEST_FRAMES = 3
 _SMOOTHING = 0.6
 _FARTHEST_S = 0.5
-"""Nobody is believed to go on as seen for longer."""
+"""A pose is extrapolated no further than this."""
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,7 @@ class Step:
 class PoseEstimator:
     """Medians of the last tenth of a second, carried on to the present at the speed seen.
 
-    Single wrong frames, metres off, move no median; a camera that says nothing for a while is believed to see what it
-    saw before.
+    Single wrong frames, metres off, move no median; while a camera says nothing, its last pose is carried on.
     """
 
     def __init__(self) -> None:

@@ -1,8 +1,8 @@
 """Online adaptation: how a returning vehicle answers to its commands, estimated while it drives.
 
-A believed model may be wrong in every number, or know nothing but full speed. What following a path needs is little:
-how much a vehicle turns for a curvature asked of it, at which angle to its heading it moves, which share of full
-command moves it how fast, and how far it rolls on after a stop.
+A nominal model may be wrong in every number, or know nothing but full speed. Path following needs little of it: how
+much the vehicle turns for a curvature commanded, at which angle to its heading it moves, which share of full command
+moves it how fast, and how far it rolls on after a stop.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ import numpy as np
 from agvbench.running.positioning.automatic_return.motion_interface import Step
 
 _GAINS = (0.4, 2.0)
-"""What is believed of a gain: beyond, it was learned from too little."""
+"""Plausible gains: beyond, a gain was learned from too little."""
 _BLOCK_M = 0.08
 """Steps are taken together until they are so long: delays and noise matter less."""
 _TURN_NOISE_RAD, _SIDE_NOISE_M = 0.004, 0.0008
 _GAIN_SD, _OFFSET_SD_PER_M, _CRAB_SD_RAD = 0.15, 0.4, 0.06
-"""Standard deviations of what is believed of a vehicle that has not driven yet."""
+"""Prior standard deviations, of a vehicle that has not driven yet."""
 _GAIN_RANDOM_WALK, _OFFSET_RANDOM_WALK, _CRAB_RANDOM_WALK = 0.02, 0.2, 0.06
 """How far each may change per square root of a metre driven: (–), [1/m], [rad]."""
 
@@ -91,7 +91,7 @@ class DriveAdaptation:
         self._shares[speed_mps] = share
 
     def record_coasting(self, distance_m: float, speed_mps: float) -> None:
-        """Remember how far the vehicle rolled after it was told to stop."""
+        """Remember how far the vehicle rolled after it was commanded to stop."""
         if speed_mps > 0.02:
             self.coast_s += 0.5 * (float(np.clip(distance_m / speed_mps, 0.0, 1.5)) - self.coast_s)
 

@@ -35,16 +35,16 @@ class ReturnResult:
 
 _SHARE = 0.5
 _FARTHEST_M, _FARTHEST_RAD = 0.03, 0.06
-"""What was missed by more says nothing of the next attempt."""
+"""A larger residual says nothing of the next attempt."""
 _MOST_IN_A_GEAR = 4
 
 
 class GoalOffset:
     """The pose to aim at for a start, learned over the attempts of one return.
 
-    What a vehicle misses again and again in one place (a slope, a camera's distortion, a drive that pulls to one side)
-    is made up for, whatever its cause; so attempts come in one gear. Where that does not help (a seam in the floor just
-    before the start), they come in the other.
+    A bias that repeats in one place (a slope, a camera's distortion, a drive that pulls to one side) is compensated,
+    whatever its cause; so attempts come in one gear. Where that does not help (a seam in the floor just before the
+    start), they come in the other.
     """
 
     def __init__(self, start: Pose) -> None:
@@ -71,17 +71,17 @@ class GoalOffset:
         self._backward, self._attempts = backward, self._attempts + 1
 
     def update(self, seen: Pose) -> None:
-        """Aim off by a share of what was missed; after some attempts, from the other side."""
+        """Offset the goal by a share of the residual; after some attempts, come from the other side."""
         if self._backward is None:
             return
         if self._attempts >= _MOST_IN_A_GEAR:
             self.pose, self._backward, self._attempts = self._start, not self._backward, 0
             return
-        missed = seen.relative_to(self._start)
-        if max(abs(missed.x_m), abs(missed.y_m)) > _FARTHEST_M or abs(missed.heading_rad) > _FARTHEST_RAD:
+        residual = seen.relative_to(self._start)
+        if max(abs(residual.x_m), abs(residual.y_m)) > _FARTHEST_M or abs(residual.heading_rad) > _FARTHEST_RAD:
             return
         off = self.pose.relative_to(self._start)
-        x_m, y_m, heading_rad = (was - _SHARE * now for was, now in zip(off, missed, strict=True))
+        x_m, y_m, heading_rad = (was - _SHARE * now for was, now in zip(off, residual, strict=True))
         self.pose = self._start.compose(Pose(x_m, y_m, wrap_angle(heading_rad)))
 
 
@@ -99,7 +99,7 @@ class Returner:
     link, supervisor
         What to drive with; the supervisor's rules hold here as they do in runs.
     model
-        What is believed of the vehicle; it may be wrong in every number, but not in the sense of its commands.
+        The nominal model; it may be wrong in every number, but not in the sense of its commands.
     workspace
         Where to stay.
     """
@@ -124,8 +124,8 @@ class Returner:
         SafetyStopError
             If the supervisor stopped the vehicle.
         PlacingError
-            If there is no way inside the workspace, or the vehicle is not there after all attempts, or does not do what
-            it is told.
+            If there is no way inside the workspace, or the vehicle is not there after all attempts, or does not follow
+            its commands.
         LinkError
             If the bus or an adapter fails.
         """

@@ -1,4 +1,4 @@
-"""The camera's clock was set, or is not understood: what was seen cannot be told from what will be."""
+"""The camera's clock was set, or is not understood: past frames cannot be distinguished from future ones."""
 
 from __future__ import annotations
 

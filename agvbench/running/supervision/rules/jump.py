@@ -17,7 +17,7 @@ class JumpRule(Rule):
     _velocity: Floats = np.zeros(2)
 
     def complaint(self, seen: Slice) -> tuple[str, str, str] | None:
-        """Compare the median place with the one that the last two promise."""
+        """Compare the median place with the one that the last two predict."""
         if not len(seen):
             return None
         t_s, place = seen.place

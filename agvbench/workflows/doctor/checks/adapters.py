@@ -23,7 +23,7 @@ class AdaptersCheck(Check):
     name = "adapters"
 
     def examine(self, lab: Lab) -> Finding:
-        """Say who answers, and in which unit."""
+        """Say which adapters answer, and in which unit."""
         settings = lab.settings
         models = known_models(settings)
         if not settings.connect and (settings.agv == _SIM) != (settings.mocap == _SIM):

@@ -7,7 +7,7 @@ from agvbench.workflows.doctor.finding import Check, Finding, FindingState, Lab
 
 
 class BusCheck(Check):
-    """Opens a session that nobody else can reach."""
+    """Opens a session that no other process can reach."""
 
     name = "bus"
 

@@ -34,7 +34,7 @@ class CalibrationCheck(Check):
 
 
 def _is_calibrated(file: Path) -> bool:
-    """Whether a campaign has measured the vehicle: a lab folder begins with one that nobody has."""
+    """Whether a campaign has measured the vehicle: a lab folder begins with a nominal one."""
     return file.parent.parent.name == "campaigns" or "campaign" in VehicleModel.load(file).provenance
 
 
