@@ -54,13 +54,13 @@ def conclude(
     selection = term_selection.selection if term_selection else library
     fit = selection.chosen.fit
     every = predicts(library, term_selection, readings)
-    batch, reformed = every.batch, bool(effect_variants().keys() & set(selection.chosen.names))
+    batch, has_variants = every.batch, bool(effect_variants().keys() & set(selection.chosen.names))
     poses, before = every.predict(fit.parameters), _poses_before(context.vehicle, batch, selection)
     spread = end_spread(every, fit)
-    # Validation runs decided what is kept, and are not tested; how repeats scatter depends on no choice.
+    # Validation runs decided what is kept, and are not tested; the repeatability depends on no choice.
     tested = assess(readings, split.test, before, poses, spread, repeats=~split.training)
     if tested is None:
-        return context.cannot_tell(readings, "there are no repeats among the runs, and so no floor")
+        return context.not_identifiable(readings, "there are no repeats among the runs, and so no repeatability")
     rest, likely = _what_is_left(batch, poses, term_selection, context.seed)
     effects = named_effects(selection, bounds_of(selection.chosen.names)) + map_effects(fit, context.vehicle)
     significant = term_selection is not None or tested.lacks or bool(rest)
@@ -85,13 +85,13 @@ def conclude(
         | ({"empirical_term": described(term_selection)} if term_selection else {}),
     )
     found = with_residuals(found, readings, split.test, before, poses)
-    if term_selection or reformed:
+    if term_selection or has_variants:
         return found
     return with_next_experiment(found, selection, readings, context.header, context.seed)
 
 
 def _poses_before(vehicle: VehicleModel | None, batch: Batch, selection: Selection) -> Floats:
-    """Return what the vehicle that was believed predicts; without one, what static maps do."""
+    """Return what the nominal vehicle predicts; without one, what static maps do."""
     if vehicle is None:
         return Predictor(batch, selection.base.names).predict(selection.base.fit.parameters)
     readings = batch.readings
@@ -112,7 +112,7 @@ def _what_is_left(
     rates = residual_rates(readings, unexplained)
     likely = dependences(rates, readings.group, seed, readings.start, alpha=LIKELY)
     rest = [d for d in likely if d.p_value < ALPHA]
-    # A place passed through in every run can look like a swing: it is looked for in what the term leaves.
+    # A place passed through in every run can look periodic: a period is looked for in what the term leaves.
     if (periodic := periodic_disturbance(residual_rates(readings, poses), readings.group, seed)) is not None:
         rest = [periodic, *(d for d in rest if d.covariate != RANDOM_PHASE)]
     return (rest if term_selection is None else with_term_first(rest, term_selection)), likely
@@ -149,7 +149,9 @@ def _verdict(
 
 
 def _held_out(kept: Readings, assessment: Assessment) -> HeldOut:
-    before, after = ({MEDIAN: missed.median_mm()} | missed.rms() for missed in (assessment.before, assessment.after))
+    before, after = (
+        {MEDIAN: residuals.median_mm()} | residuals.rms() for residuals in (assessment.before, assessment.after)
+    )
     errors = {
         name: {"before": before[name], "after": after[name], "floor": assessment.repeatability[name]} for name in before
     }

@@ -42,8 +42,8 @@ class DiagnosisContext:
     vehicle: VehicleModel | None
     seed: int
 
-    def cannot_tell(self, readings: Readings, why: str) -> Diagnosis:
-        """Return the answer that the campaign cannot tell, and why."""
+    def not_identifiable(self, readings: Readings, why: str) -> Diagnosis:
+        """Return the verdict NOT_IDENTIFIABLE, and why."""
         return Diagnosis(Verdict.NOT_IDENTIFIABLE, why, provenance=self.provenance(readings))
 
     def provenance(self, readings: Readings) -> dict[str, object]:

@@ -9,7 +9,7 @@ import numpy as np
 from agvbench.calibration import RunMeasurement, measure_run
 from agvbench.calibration.campaign_protocol import CampaignLike
 from agvbench.diagnosis.checks.consistency import require_consistent_repeats, require_plausible_units
-from agvbench.diagnosis.checks.sufficiency import cannot_tell
+from agvbench.diagnosis.checks.sufficiency import insufficient_data
 from agvbench.diagnosis.conclusion import conclude
 from agvbench.diagnosis.context import DiagnosisContext
 from agvbench.diagnosis.data.readings import Readings, read_runs
@@ -68,13 +68,13 @@ def diagnose(
     if (horizon := horizon_of(header, runs)) is not None:
         return diagnose_windows(context, runs, horizon, on_progress)
     readings = read_runs(runs, header.neutral)
-    if reason := cannot_tell(readings, header):
-        return context.cannot_tell(readings, reason)
+    if reason := insufficient_data(readings, header):
+        return context.not_identifiable(readings, reason)
     require_consistent_repeats(readings, where=f"campaign {header.name}")
     split = split_runs(readings.runs, readings.group, seed)
     if not split.test.any():
         why = "no run can be spared for the test: drive repeats, or commands in more combinations"
-        return context.cannot_tell(readings, why)
+        return context.not_identifiable(readings, why)
     fitted = readings.select(split.training)
     on_progress(f"{len(fitted)} training runs, {split.validation.sum()} validation runs, {split.test.sum()} test runs")
     selector = _selector(context, fitted.select(some_repeats(fitted.group, MOST_RUNS)), on_progress)

@@ -14,7 +14,7 @@ from agvbench.types import Pose
 
 @dataclass(frozen=True)
 class Discrimination:
-    """What the proposed run does for one pair of rivals.
+    """What the proposed run does for one pair of alternatives.
 
     ``between`` their names; ``evidence`` expected in minus two log likelihood for all repeats; ``apart_mm`` and
     ``apart_deg``: the farthest that their predictions differ along it, before either is fitted again.
@@ -30,7 +30,7 @@ class Discrimination:
 class NextExperiment:
     """The run to drive: ``why`` in words, ``trajectory``, how many ``repeats`` and from which ``starts`` in turn.
 
-    ``separates`` tells for each pair of rivals how well; ``pins`` which parameters it would pin.
+    ``separates`` says for each pair of alternatives how well; ``pins`` which parameters it would identify.
     """
 
     why: str
@@ -71,7 +71,7 @@ class NextExperiment:
 class Proposal:
     """What may be driven next, if anything can decide, and what no run can.
 
-    ``inseparable`` pairs of rivals with what it would take to tell them apart.
+    ``inseparable`` pairs of alternatives, with the measurement that would distinguish them.
     """
 
     experiment: NextExperiment | None = None

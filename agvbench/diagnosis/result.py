@@ -43,10 +43,10 @@ class Estimate:
 
 @dataclass(frozen=True)
 class NamedEffect:
-    """An effect that earned its place.
+    """An effect that meets the selection criterion.
 
     ``parameters`` by name; ``confounded_with`` the effects that predict as well in its place; ``evidence``: what
-    leaving it out costs in cross-validated minus two log likelihood, and how much worse each rival is.
+    leaving it out costs in cross-validated minus two log likelihood, and how much worse each alternative is.
     """
 
     name: str
@@ -57,7 +57,7 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Errors on the runs set aside: by quantity (``end_position_mm`` …) ``before``, ``after`` and ``repeatability``.
+    """Errors on the test runs: by quantity (``end_position_mm`` …) ``before``, ``after`` and ``repeatability``.
 
     ``repeatability`` is the repeatability.
     """
@@ -73,8 +73,8 @@ class Diagnosis:
 
     ``verdict`` and ``why`` in words; ``effects``; ``depends_on`` what the rest depends on, ``significant`` whether that
     matters; ``held_out`` (None if nothing could be predicted); ``model`` with refitted maps and the effects found;
-    ``rejected`` the gain of each effect that did not earn its place; ``provenance``; ``next_experiment``: the run that
-    would tell rivals apart or pin what the data leave open, None where there is none; ``residuals`` as
+    ``rejected`` the gain of each effect that did not meet the criterion; ``provenance``; ``next_experiment``: the run
+    that would discriminate alternatives or identify parameters, None where there is none; ``residuals`` as
     `agvbench.diagnosis.findings.residual_table` returns them, for pictures.
     """
 

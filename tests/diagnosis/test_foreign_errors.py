@@ -108,11 +108,11 @@ def test_the_command_prints_one_line(tmp_path, tiny_campaign, write_campaign, ca
 @pytest.mark.parametrize(
     ("change", "why"),
     [
-        ({"drive": 1500.0}, "the drive was never told anything but neutral"),
+        ({"drive": 1500.0}, "the drive was never commanded anything but neutral"),
         ({"front": 1500.0, "rear": 1500.0}, "steering was never excited"),
     ],
 )
-def test_what_was_never_told_cannot_be_told(tiny_campaign, change, why):
+def test_what_was_never_commanded_is_not_identifiable(tiny_campaign, change, why):
     runs = []
     for run in tiny_campaign(Tiny()).runs[:30]:
         told = {name: np.full(len(run.commands), value) for name, value in change.items()}

@@ -64,7 +64,7 @@ def test_everything_that_was_found_is_said_and_drawn():
     assert effects.rows == [["steering_lag", "time_constant_s", "0.2 ± 0.01", "s", "axle_coupling"]]
     assert held_out.rows == [["position along the way [mm]", 20.0, 2.0, 1.9]]
     sentences = " ".join(next(b for b in blocks if isinstance(b, Bullets)).items)
-    for words in ("x_m through speed (40 %", "next_one: it parts them", "a from b; it takes a clock"):
+    for words in ("x_m through speed (40 %", "next_one: it parts them", "a from b; required: a clock"):
         assert words in sentences
     figures = [b for b in blocks if isinstance(b, FigureBlock)]
     assert len(figures) == 3
@@ -116,5 +116,5 @@ def test_what_the_lack_of_fit_is_of_is_said():
     runs = {"lack_of_fit_p_value": 0.6712, "lack_of_fit_runs": {"tested": 35, "repeats": 67}}
     blocks = diagnosis_blocks(ShownDiagnosis({**content(), "provenance": runs}, None, ()))
     said = next(block for block in blocks if isinstance(block, Bullets)).items
-    among = "against the scatter of repeats in 67 validation and test runs"
+    among = "against the repeatability in 67 validation and test runs"
     assert f"Lack of fit of the 35 test runs, {among}: p = 0.67." in said

@@ -22,7 +22,7 @@ _SAME_TURN = (0.5, 2.0)
 
 
 def require_ordered_clocks(refused: Mapping[str, str], runs: int, *, where: str) -> None:
-    """Raise an error if in many of so many `runs` time goes back; `refused` tells by run why it cannot be used.
+    """Raise an error if in many of so many `runs` time goes back; `refused` says by run why it cannot be used.
 
     Raises
     ------
@@ -161,8 +161,8 @@ def _as_long(readings: Readings, runs: NDArray[np.int64], others: NDArray[np.int
 def _require_one_kind(readings: Readings, path: Floats, where: str) -> None:
     """Raise an error if repeats agree closely or are off by one and the same amount, with nothing between.
 
-    Scatter, wear and places on the floor fill the gap between; two vehicles under one name, or two calibrations, do
-    not.
+    Random errors, wear and places on the floor fill the gap between; two vehicles under one name, or two calibrations,
+    do not.
     """
     pairs = np.array(
         [

@@ -1,4 +1,4 @@
-"""Whether a campaign of runs from rest can tell anything at all: enough runs, repeats, motion and steering."""
+"""Whether a campaign of runs from rest is sufficient for a diagnosis: enough runs, repeats, motion and steering."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FEWEST_REPEATED = 3
 _LEAST_TURN_RAD = 0.05
 
 
-def cannot_tell(readings: Readings, header: HeaderLike) -> str:
+def insufficient_data(readings: Readings, header: HeaderLike) -> str:
     """Return why this campaign cannot be diagnosed, or nothing.
 
     Raises
@@ -35,7 +35,7 @@ def cannot_tell(readings: Readings, header: HeaderLike) -> str:
         )
     commands = [run.commands for run in readings.runs]
     if all(np.all(c.drive == header.neutral) for c in commands):
-        return "the drive was never told anything but neutral"
+        return "the drive was never commanded anything but neutral"
     if len({(f, r) for c in commands for f, r in zip(c.front.tolist(), c.rear.tolist(), strict=True)}) == 1:
         return "steering was never excited: its commands are the same in all runs"
     _, sizes = np.unique(readings.group, return_counts=True)

@@ -46,8 +46,8 @@ def goes_s(run: Run, neutral: float) -> float:
 def rests(run: Run, neutral: float) -> bool:
     """Return whether the vehicle stood still in the last frames before it was first driven.
 
-    Where there are no such frames, a run of few commands was told so from rest; one whose command changes all the time
-    is a piece of free driving.
+    Where there are no such frames, a run of few commands is taken to start from rest; one whose command changes all the
+    time is a piece of free driving.
     """
     usable = run.frames.select(run.frames.tracked.astype(np.bool_))
     for until in dict.fromkeys((0.0, goes_s(run, neutral))):

@@ -35,9 +35,9 @@ class Readings:
 
     ``t_s`` (R, K) and ``poses`` (R, K, 3) [m, m, rad], of single frames, with the heading continuous from the
     start pose; NaN where none was kept. ``start`` (R, 3) with ``start_stderr`` (R, 3), from the frames at
-    rest; ``started_h`` (R,) [h] since the run's session began; ``group`` (R,): runs told the same
-    have the same number, and so have windows of one stretch. ``refused`` tells for each run that cannot be used why,
-    by its id. ``initial_states`` says when and how fast windows begin; None for runs from rest. ``preset``: whether the
+    rest; ``started_h`` (R,) [h] since the run's session began; ``group`` (R,): runs with the same commands have the
+    same number, and so have windows of one stretch. ``refused`` gives the reason for each run that cannot be used, by
+    its id. ``initial_states`` says when and how fast windows begin; None for runs from rest. ``preset``: whether the
     axles had settled at each run's first steering command before it was given; else they stood at neutral.
     """
 

@@ -24,28 +24,28 @@ def at_common_levels(runs: Sequence[Run]) -> Sequence[Run]:
     be two free values of a map, of which one may be driven in no run that is fitted.
     """
     levels = {role: _common([getattr(run.commands, role) for run in runs]) for role in _ROLES}
-    if not any(len(told) for told, _ in levels.values()):
+    if not any(len(commanded) for commanded, _ in levels.values()):
         return runs
     out = []
     for run in runs:
         snapped = {}
-        for role, (told, common) in levels.items():
+        for role, (commanded, common) in levels.items():
             values = getattr(run.commands, role)
-            snapped[role] = common[np.searchsorted(told, values)] if len(told) and len(values) else values
+            snapped[role] = common[np.searchsorted(commanded, values)] if len(commanded) and len(values) else values
         out.append(replace(run, commands=replace(run.commands, **snapped)))
     return out
 
 
 def _common(commands: list[Floats]) -> tuple[Floats, Floats]:
     """Return all levels, ascending, and for each the level that stands for it; nothing where none are near."""
-    told = np.unique(np.concatenate([np.empty(0), *commands]))
-    if len(told) < 2:
-        return told[:0], told[:0]
-    near = np.diff(told) <= _SAME_LEVEL * (told[-1] - told[0])
+    commanded = np.unique(np.concatenate([np.empty(0), *commands]))
+    if len(commanded) < 2:
+        return commanded[:0], commanded[:0]
+    near = np.diff(commanded) <= _SAME_LEVEL * (commanded[-1] - commanded[0])
     if not near.any():
-        return told[:0], told[:0]
+        return commanded[:0], commanded[:0]
     first = np.flatnonzero(np.r_[True, ~near])
-    return told, told[first[np.cumsum(np.r_[True, ~near]) - 1]]
+    return commanded, commanded[first[np.cumsum(np.r_[True, ~near]) - 1]]
 
 
 def group_runs(runs: Sequence[Run]) -> NDArray[np.int64]:
@@ -92,7 +92,7 @@ def split_runs(runs: Sequence[Run], group: NDArray[np.int64], seed: int) -> Spli
     drawn. Else whole groups are drawn, about a quarter of the runs, half of them for validation and half for test, such
     that every level of every command in them was also driven in a group that stays: what is judged is how known
     commands combine, not how a map is interpolated. Of runs that steer while they drive at most a third is drawn: they
-    are few, and nothing else tells what depends on the way by which an angle was reached. Of a single run that can be
+    are few, and only they show what depends on the way by which an angle was reached. Of a single run that can be
     spared the test is made, and there is no validation.
 
     Raises

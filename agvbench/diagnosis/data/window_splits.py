@@ -1,4 +1,4 @@
-"""Which windows are set aside, and which are fitted to."""
+"""Split of windows into test windows and windows to fit."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from agvbench.diagnosis.data.windows import InitialStates
 from agvbench.errors import FitError
 
 MOST_FITTED = 300
-"""Fits use at most so many windows, evenly spaced: neighbours tell much the same."""
+"""Fits use at most so many windows, evenly spaced: neighbours are correlated."""
 
 MOST_JUDGED = 1500
 _MOST_SHARE = 1.0 / 3.0
@@ -20,7 +20,7 @@ _FEWEST_FOLDS = 4
 
 
 def held_out_windows(readings: Readings, seed: int) -> NDArray[np.bool_]:
-    """Return which windows are set aside, (W,).
+    """Return which windows are test windows, (W,).
 
     The campaign's own ``split`` decides where it has one. Else whole sessions are drawn, since another day is what a
     model has to stand: about a quarter of the windows, a third at most, and two sessions stay to be fitted to where

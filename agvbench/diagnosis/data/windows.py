@@ -59,7 +59,7 @@ class InitialStates:
     """The state at the beginning of W windows; arrays of shape (W,) unless said otherwise.
 
     ``t_s`` on the run's clock; ``speed_mps`` of the markers' centroid ahead, ``speed_stderr``, and
-    lately (``recent_speed_mps``); ``constant_velocity`` (W, 3): its
+    recently (``recent_speed_mps``); ``constant_velocity`` (W, 3): its
     velocity ahead and to the left [m/s] and yaw rate [rad/s] over the last `CONSTANT_VELOCITY_S`; ``noise`` (W, 2):
     standard deviation of one frame in position [m] and heading [rad]; ``recording`` and ``session`` by name.
     """
@@ -152,7 +152,7 @@ def _state(t: Floats, motion: Floats, noise: Floats) -> _State | None:
     recent[-3:] = True
     line = np.column_stack([np.ones(int(recent.sum())), u[recent]])
     vx, vy, yaw = np.linalg.lstsq(line, m[recent], rcond=None)[0][1]
-    # Over the last 0.1 s the vehicle turned: its velocity belongs to the heading half way back.
+    # Over the last 0.1 s the vehicle turned: its velocity belongs to the heading in the middle of them.
     middle = value[2] + yaw * float(u[recent].mean())
     cm, sm = np.cos(middle), np.sin(middle)
     return _State(
@@ -192,9 +192,9 @@ def _window(
     if not near[-1] or np.count_nonzero(near) < SAMPLES // 2:
         return None
     poses[~near] = np.nan
-    commands = _told(run, t0, t0 + horizon.horizon_s)
+    commands = _commands_of(run, t0, t0 + horizon.horizon_s)
     if abs(state.speed_mps) < SPEED_LIMIT_MPS and np.all(commands.drive[commands.t_s > t0 - SUPPORT_S] == neutral):
-        return None  # it stands, and is told to
+        return None  # it stands, as commanded
     piece = replace(run, run_id=f"{run.run_id}@{t0:.2f}", commands=commands, frames=Frames.empty())
     return Window(
         piece,
@@ -211,7 +211,7 @@ def _window(
     )
 
 
-def _told(run: Run, t0: float, end_s: float) -> Commands:
+def _commands_of(run: Run, t0: float, end_s: float) -> Commands:
     """Return the commands of a window and of its history.
 
     What was in force before counts as given long ago, unless the run began at rest within the history.

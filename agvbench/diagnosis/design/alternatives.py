@@ -1,4 +1,4 @@
-"""Rival models, each fitted again so that it agrees with the data at hand as well as it can."""
+"""Alternative models, each fitted again so that it agrees with the data at hand as well as it can."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ class Alternative:
 def alternative_models(
     chosen: Fit, alternatives: Mapping[str, Mapping[str, float]], candidates: Mapping[str, Candidate]
 ) -> list[tuple[Alternative, Alternative]]:
-    """Return the pairs of models to be told apart: each named effect against its rivals, and rivals against each other.
+    """Return the pairs of models to discriminate: named effect and alternative, and alternatives among themselves.
 
     Parameters
     ----------
     chosen
         The model with every named effect.
-    rivals
+    alternatives
         By named effect, the effects that would do in its place.
     candidates
         Bounds and starts of effects, by name.
@@ -44,7 +44,7 @@ def alternative_models(
     for name, others in alternatives.items():
         group = [Alternative(name, name, chosen)]
         group += [Alternative(other, name, swapped(chosen, name, other, candidates)) for other in others]
-        # Of many rivals, those against the named one come first: what remains is for the run after the next.
+        # Of many alternatives, those to the named one come first: what remains is for the run after the next.
         pairs += list(combinations(group, 2))[: max(_MOST_PAIRS, len(others))]
     return pairs
 

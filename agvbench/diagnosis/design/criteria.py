@@ -1,4 +1,4 @@
-"""How well runs not driven yet would tell models apart, or pin a parameter, beside what the data say already."""
+"""How well runs not driven yet would discriminate models, or identify a parameter, beside the data at hand."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def starts_within(path: Floats, workspace: Workspace, geometry: Geometry) -> lis
 def information(
     fitted: Fit, predictor: Predictor, parameters: Floats, difference: Floats | None = None
 ) -> DesignInformation:
-    """Return what the runs of `predictor` would say about `parameters`, with the noise and scatter of `fitted`.
+    """Return the information of the runs of `predictor` on `parameters`, with the variance components of `fitted`.
 
     ``difference`` (R, K, 3), if given, is what another model predicts otherwise.
     """
@@ -119,7 +119,7 @@ def information(
 class Weighted:
     """Runs' samples over noise, with what differs from run to run integrated out.
 
-    The noise and scatter are those of `fitted`, the offsets' priors too.
+    The variance components are those of `fitted`, the priors of the random effects too.
     """
 
     def __init__(self, readings: Readings, seen: NDArray[np.bool_], by_random_effects: Floats, fitted: Fit) -> None:

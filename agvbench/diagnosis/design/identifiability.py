@@ -91,7 +91,7 @@ def _why(share: float, partner: str) -> str:
         return f"flat: {partner} does the same in these runs"
     if share < 1.0:
         return "never excited: at its usual size it would not show in any of these runs"
-    return "flat: the maps, the other effects and the scatter between runs can do the same"
+    return "flat: the maps, the other effects and the variation between runs can do the same"
 
 
 def pin_scores(chosen: Fit, flat: Sequence[Unidentified], predictors: Sequence[Predictor], repeats: float) -> Floats:

@@ -1,10 +1,11 @@
 """The run to drive next: where alternatives differ most, or where a parameter becomes identifiable.
 
-Rivals agree on the data at hand. How far a run not driven yet would part them is the quadratic form of the difference
-of their predictions in noise and scatter, after the wrong one was fitted again (the criterion of Box and Hill, 1967,
-with the parameters' uncertainty); the unit is that of the losses which rivals are judged by. The design that
-maximises it for the pair that is hardest to part is searched for among some hundred patterns and then by small changes
-of the best. A parameter is pinned by the design with the least expected standard error, relative to its scale.
+Indistinguishable alternatives agree on the data at hand. How well a run not driven yet would discriminate them is the
+quadratic form of the difference of their predictions in noise and variance components, after the wrong one was fitted
+again (the criterion of Box and Hill, 1967, with the parameters' uncertainty). Its unit is that of the losses by which
+alternatives are compared. The design that maximises it for the pair that is hardest to discriminate is searched for
+among some hundred patterns and then by small changes of the best. A parameter is identified by the design with the
+least expected standard error, relative to its scale.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ _BY_STAGE = {
 
 
 def required_measurements(names: tuple[str, ...]) -> str:
-    """Return what would tell the effects called `names` apart, in words.
+    """Return, in words, the measurement that would distinguish the effects called `names`.
 
     >>> required_measurements(("mocap_latency", "actuation_delay")).partition(":")[0]
     'a time that vehicle and cameras share'
@@ -66,7 +67,7 @@ def required_measurements(names: tuple[str, ...]) -> str:
 
 
 DECISIVE = 40.0
-"""Expected difference in minus two log likelihood that decides: it exceeds a rival's margin in 99 of 100 draws."""
+"""Decisive expected difference in minus two log likelihood: beyond the margin of alternatives in 99 of 100 draws."""
 
 HOPELESS = 10.0
 """What even `MOST_REPEATS` would not bring beyond this is not worth driving."""
@@ -89,13 +90,13 @@ def discriminate(
     workspace: Workspace | None = None,
     seed: int = 0,
 ) -> Proposal:
-    """Return the run that tells rivals apart, and which of them no run does.
+    """Return the run that discriminates alternatives, and the pairs that no run discriminates.
 
     Parameters
     ----------
     chosen
         The model with every named effect.
-    rivals
+    alternatives
         By named effect, the effects that predict as well in its place, with how much worse they are.
     candidates
         Effects that were tried, by name.
@@ -125,12 +126,12 @@ def discriminate(
     separations = search.separations(parted, best, each * repeats)
     hardest = min(separations, key=lambda s: s.evidence)
     why = (
-        f"tells {' from '.join(hardest.between)}, whose predictions differ by up to {hardest.apart_mm:.1f} mm and "
+        f"distinguishes {' from '.join(hardest.between)}: predictions differ by up to {hardest.apart_mm:.1f} mm and "
         f"{hardest.apart_deg:.2f}° along it; {repeats} repeats should decide (expected {hardest.evidence:.0f}, "
         f"{DECISIVE:.0f} is decisive)"
     )
     names = "_or_".join(dict.fromkeys(name for s in separations for name in s.between))
-    trajectory = as_trajectory(best, unit, f"next_{names}"[:60].rstrip("_"), "tells rivals apart")
+    trajectory = as_trajectory(best, unit, f"next_{names}"[:60].rstrip("_"), "discriminates alternatives")
     starts = search.starts(best)
     return Proposal(NextExperiment(why, trajectory, repeats, tuple(starts), separations), hopeless)
 
@@ -143,7 +144,7 @@ def pin(
     workspace: Workspace | None = None,
     seed: int = 0,
 ) -> NextExperiment | None:
-    """Return the run that pins most of the parameters that the data leave open, or None where none does.
+    """Return the run that identifies most of the parameters that the data do not, or None where none does.
 
     Those that one of the effects found does the same as are left out: `discriminate` is for them.
 
@@ -175,7 +176,7 @@ def pin(
     best = search.best(score)
     reached = search.pin_scores(wanted, [best], LEAST_REPEATS)[:, 0]
     pins = tuple(item.name for item, value in zip(wanted, reached, strict=True) if value < PINNED)
-    told = ", ".join(
+    reductions = ", ".join(
         f"{item.name} to ± {value * item.scale:.2g} ({_now(item)} now)"
         for item, value in zip(wanted, reached, strict=True)
         if value < PINNED
@@ -184,7 +185,12 @@ def pin(
         return None
     trajectory = as_trajectory(best, unit, "next_excitation", "excites what nothing driven so far excites")
     return NextExperiment(
-        f"{LEAST_REPEATS} repeats would pin {told}", trajectory, LEAST_REPEATS, tuple(search.starts(best)), (), pins
+        f"{LEAST_REPEATS} repeats would reduce the standard error of {reductions}",
+        trajectory,
+        LEAST_REPEATS,
+        tuple(search.starts(best)),
+        (),
+        pins,
     )
 
 

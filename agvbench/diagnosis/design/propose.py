@@ -24,10 +24,10 @@ from agvbench.vehicle.geometry import Geometry
 def with_next_experiment(
     found: Diagnosis, selection: Selection, readings: Readings, header: HeaderLike, seed: int
 ) -> Diagnosis:
-    """Return `found` with the run that parts its rivals or, where there are none, pins what the data leave open.
+    """Return `found` with the run that discriminates its alternatives or, without any, identifies parameters.
 
-    What no run can tell apart, and what it would take, is said in ``provenance["inseparable"]``; parameters that these
-    data do not pin in ``provenance["not_identifiable"]``.
+    ``provenance["inseparable"]`` lists the pairs that no run can discriminate, with the required measurement;
+    ``provenance["not_identifiable"]`` the parameters that these data do not identify.
     """
     tried = candidates()
     chosen = selection.chosen.fit
@@ -51,7 +51,7 @@ def with_next_experiment(
 
 
 def with_first_experiment(found: Diagnosis) -> Diagnosis:
-    """Return a diagnosis that could tell nothing with the drive that it lacks: repeated, turning, at speed."""
+    """Return a diagnosis NOT_IDENTIFIABLE with the drive that it lacks: repeated, turning, at speed."""
     if found.verdict is not Verdict.NOT_IDENTIFIABLE or found.next_experiment is not None:
         return found
     slalom = Trajectory(
@@ -62,14 +62,16 @@ def with_first_experiment(found: Diagnosis) -> Diagnosis:
         steering="front",
         slalom=Slalom(turn="left", radius_m=1.0, angle_deg=60.0, arcs=4),
     )
-    why = f"this campaign cannot tell ({found.why}); {LEAST_REPEATS} repeats of a slalom move, turn and repeat"
+    why = (
+        f"not identifiable from this campaign ({found.why}); {LEAST_REPEATS} repeats of a slalom move, turn and repeat"
+    )
     return dataclasses.replace(found, next_experiment=NextExperiment(why, slalom, LEAST_REPEATS))
 
 
 def floor_covered(readings: Readings, geometry: Geometry) -> Workspace | None:
     """Return the floor that the axles have covered so far, or None if that is no area.
 
-    Nobody told the diagnosis how large the floor is: where the vehicle has been, it may be again.
+    The size of the floor is not known to the diagnosis: where the vehicle has been, it may be again.
     """
     from scipy.spatial import ConvexHull, QhullError
 

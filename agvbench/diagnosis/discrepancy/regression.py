@@ -1,4 +1,4 @@
-"""Residual rates ready for regression on shapes, with what the maps' own levels can take up removed.
+"""Residual rates ready for regression on shapes, with what the maps' own levels can absorb removed.
 
 Residuals are weighted by the misfit itself: by the cameras' noise everything would look certain.
 """
@@ -21,7 +21,7 @@ _LEAST = 1e-9
 _OUTLIER, _NEARLY_ALL = 3.0, 0.99
 
 Columns = dict[int, Floats]
-"""Regressors (n, q) by feature: 0 along, 1 sideways, 2 turning."""
+"""Regressors (n, q) by feature: 0 longitudinal, 1 lateral, 2 turning."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def steering(batch: Batch, parameters: Floats, rates: Rates) -> SteeringTangents
 
 
 class GroupedRegression:
-    """Residual rates ready for regression: what maps take up removed, each feature in units of its misfit."""
+    """Residual rates ready for regression: what maps absorb removed, each feature in units of its misfit."""
 
     def __init__(self, rates: Rates, stands: SteeringTangents, fold: NDArray[np.int64]) -> None:
         self.folds, self.root = [np.flatnonzero(fold == f) for f in range(FOLDS)], np.sqrt(rates.weight)

@@ -87,7 +87,7 @@ def options(
 
 
 def _axles(front: Floats, rear: Floats, stands: SteeringTangents, geometry: Geometry) -> Columns:
-    """Return what turning each axle by these angles [rad] does, sideways and turning: a column per axle."""
+    """Return what turning each axle by these angles [rad] does, lateral and turning: a column per axle."""
     slope = 1.0 + stands.tangent**2
     f, r = front * slope[:, 0], rear * slope[:, 1]
     lf, lr, base = geometry.front_axle_m, geometry.rear_axle_m, geometry.wheelbase_m
@@ -225,7 +225,7 @@ class Start:
 def screen(
     rates: Rates, stands: SteeringTangents, geometry: Geometry, group: NDArray[np.int64], seed: int
 ) -> list[Start]:
-    """Return for each term its best start, the most promising term first; terms without promise are left out."""
+    """Return for each term its best start, the largest predicted gain first; terms without any are left out."""
     assess = GroupedRegression(rates, stands, folds(group, FOLDS, seed)[rates.run])
     found = []
     for term, shapes in options(rates, stands, geometry, assess):

@@ -25,7 +25,7 @@ from agvbench.diagnosis.selection.with_term import TermSelection, gain_p_value
 from agvbench.diagnosis.terms import TERMS, DiscrepancyTerm
 
 Settled = tuple[ScoredModel, type[DiscrepancyTerm], dict[str, float], dict[str, dict[str, float]]]
-"""A model with a term, the term, the gains of the effects beside it, and their rivals."""
+"""A model with a term, the term, the gains of the effects beside it, and their alternatives."""
 
 _MOST_RETRIED = 3
 _MOST_NAMES = 5
@@ -33,9 +33,9 @@ _TERM_NAMES = frozenset(term.name for term in TERMS)
 
 
 def settled(wide: Selector, selection: Selection, current: ScoredModel, term: type[DiscrepancyTerm]) -> Settled:
-    """Return the model with the library's effects that earn their place beside the term, their gains and rivals.
+    """Return the model with the term and the effects that meet the criterion beside it, their gains and alternatives.
 
-    What was chosen without the term may only have been a rival of what is right beside it.
+    What was chosen without the term may only have been an alternative of what is right beside it.
     """
     base = selection.base
     alternatives: dict[str, dict[str, float]] = {}
@@ -58,10 +58,10 @@ def settled(wide: Selector, selection: Selection, current: ScoredModel, term: ty
 
 
 def _unmasked(wide: Selector, current: ScoredModel) -> ScoredModel:
-    """Return the model with the effects that the unknown cause had hidden, as long as it misses more than scatter.
+    """Return the model with the effects that the unknown cause had masked, as long as its residuals show lack of fit.
 
-    An effect that gained nothing beside what was chosen first may stand out as soon as the term is there. All are asked
-    for what they promise, and only the best are fitted.
+    An effect that gained nothing beside what was chosen first may become significant as soon as the term is there. The
+    gain of each is predicted, and only the best are fitted.
     """
     while len(current.names) < _MOST_NAMES and lacks(current):
         names = [name for name in wide.candidates if name not in current.names and name not in _TERM_NAMES]
@@ -76,15 +76,15 @@ def _unmasked(wide: Selector, current: ScoredModel) -> ScoredModel:
 
 
 def lacks(model: ScoredModel) -> bool:
-    """Whether what the model misses is above the scatter of repeats, and differs between groups beyond it."""
+    """Whether the residuals are above repeatability, and differ between groups beyond it."""
     predictor = model.fit.predictor
-    missed = pose_residuals(predictor.readings, predictor.predict(model.fit.parameters))
-    least, group = repeatability(missed, predictor.readings.group), predictor.readings.group
-    p_value = lack_of_fit(missed, group)
+    residuals = pose_residuals(predictor.readings, predictor.predict(model.fit.parameters))
+    least, group = repeatability(residuals, predictor.readings.group), predictor.readings.group
+    p_value = lack_of_fit(residuals, group)
     if least is None or p_value is None or p_value >= LACK_OF_FIT:
         return False
     return any(
-        missed.rms()[name] > WITHIN_REPEATABILITY * least[name] for name in ("position_rms_mm", "heading_rms_deg")
+        residuals.rms()[name] > WITHIN_REPEATABILITY * least[name] for name in ("position_rms_mm", "heading_rms_deg")
     )
 
 
@@ -95,26 +95,26 @@ _FEW = 0.1
 
 
 def add_term(selection: Selection, selector: Selector) -> TermSelection | None:
-    """Return the best empirical term, with the effects that earn their place beside it; None if no term earns its own.
+    """Return the best empirical term, with the effects that meet the criterion beside it; None if no term meets it.
 
     Terms are tried beside the effects chosen, and where none helps there beside none: an effect that only mimics the
-    unknown cause loses its place as soon as the term is there. Where they promise more beside none than beside what was
-    chosen, they are tried so first, and what was chosen is tried again beside them.
+    unknown cause is removed as soon as the term is there. Where their predicted gain is larger beside none than beside
+    what was chosen, they are tried so first, and what was chosen is tried again beside them.
 
     Parameters
     ----------
     selection
         What was chosen from the library.
     selector
-        Who chose it.
+        That chose it.
     """
     wide = wider(selector)
     starts = promising(wide, selection.chosen)
     found: list[tuple[ScoredModel, type[DiscrepancyTerm]] | None] = []
     if starts or lacks(selection.chosen):
         alone = promising(wide, selection.base) if selection.gains else []
-        promises_more = bool(alone) and alone[0].gain > max((start.gain for start in starts), default=0.0)
-        first = _best_term(wide, selection.base, alone) if promises_more else None
+        gains_more = bool(alone) and alone[0].gain > max((start.gain for start in starts), default=0.0)
+        first = _best_term(wide, selection.base, alone) if gains_more else None
         if first is not None and first[0].total < selection.chosen.total:
             found.append(first)
         else:
@@ -130,8 +130,8 @@ def add_term(selection: Selection, selector: Selector) -> TermSelection | None:
 def term_in_place(selection: Selection, selector: Selector) -> TermSelection | None:
     """Return the term that predicts better in the place of an effect that was chosen; None if none does.
 
-    Asked where the runs set aside contradict what was chosen although nothing was missed of those it was chosen from: a
-    cause that is told by few of these is mimicked there.
+    For models that fail in validation although the training runs show no lack of fit: another effect mimics there a
+    cause that few training runs excite.
     """
     wide = wider(selector)
     found = _in_place(wide, selection)
@@ -139,7 +139,7 @@ def term_in_place(selection: Selection, selector: Selector) -> TermSelection | N
 
 
 def _explained(wide: Selector, selection: Selection, selector: Selector, models: list[Settled]) -> TermSelection | None:
-    """Return the best of the models with a term, if that earns its place."""
+    """Return the best of the models with a term, if that meets the criterion."""
     models = [model for model in models if model[0].total < selection.chosen.total - selector.least_gain]
     if not models:
         return None
@@ -163,9 +163,9 @@ def _explained(wide: Selector, selection: Selection, selector: Selector, models:
 def add_term_and_reconsider(
     selection: Selection, selector: Selector
 ) -> tuple[Selection, TermSelection | None, Selector]:
-    """Do as `add_term` does, and all again under the other belief of where the steering stood if that is better now.
+    """Do as `add_term` does, and all again under the other initial steering if that is better now.
 
-    While an unknown cause is missed nobody can tell where a slow servo stood before a run.
+    While a cause is missing from the model, the runs do not show where a slow servo stood before them.
     """
     term_selection = add_term(selection, selector)
     if term_selection is None:
@@ -181,8 +181,8 @@ def add_term_and_reconsider(
 def _afresh(selection: Selection, term_selection: TermSelection, selector: Selector) -> TermSelection:
     """Return what comes of the term beside none of the effects that were chosen before it, where that is better.
 
-    What was chosen while the unknown cause was missed may only look like what is right beside its term; where nothing
-    more than scatter is missed it is not asked.
+    What was chosen without the unknown cause may only look like what is right beside its term. It is not refitted where
+    the residuals show no lack of fit.
     """
     if not selection.gains or not lacks(term_selection.selection.chosen):
         return term_selection
@@ -201,7 +201,7 @@ def _afresh(selection: Selection, term_selection: TermSelection, selector: Selec
 
 
 def promising(wide: Selector, root: ScoredModel) -> list[Start]:
-    """Return the terms that promise to describe what `root` misses, the best first."""
+    """Return the terms that are predicted to describe the residuals of `root`, the best first."""
     batch = wide.batch
     poses = root.fit.predictor.predict(root.fit.parameters)
     rates = residual_rates(batch.readings, poses)

@@ -20,9 +20,9 @@ def cross_validated(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Flo
     About the optimum the loss is quadratic, run by run, so that leaving a fold out is a solution of the normal
     equations without its share: one Newton step from the parameters of all runs, exact as far as the loss is quadratic.
     A parameter at its bound stays there. What only the fold itself determines is fitted to the fold: a level driven
-    nowhere else is calibration, and a play that one group alone goes through both ways, which everywhere else
-    any levels make up for, cannot be foretold from there either. That is a matter of directions and not of single
-    parameters: those of which the other folds hold less than a hundredth of the information.
+    nowhere else is calibration. Nor can the other folds predict backlash that one group alone goes through both ways:
+    everywhere else levels of the maps compensate it. That is a matter of directions and not of single parameters: those
+    of which the other folds hold less than a hundredth of the information.
     """
     if fitted.predictor.readings.initial_states is not None:
         return _cross_validated_windows(fitted, fold, bounds)

@@ -1,8 +1,8 @@
-"""Free maps and effects fitted together, with what differs from run to run integrated out.
+"""Nodal maps and effects fitted together, with what differs from run to run integrated out.
 
-Each run has its own start pose, an offset of each axle and a factor on its speed, drawn about zero with a scatter that
-is estimated, too. Without them a run's frames would pass for as many pieces of evidence, and the smallest play in a
-servo for an effect.
+Each run has its own start pose, an offset of each axle and a factor on its speed: random effects about zero, whose
+variance is estimated, too. Without them a run's frames would pass for as many pieces of evidence, and the smallest play
+in a servo for an effect.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Fit:
 
     @cached_property
     def linearisation_point(self) -> LinearisationPoint:
-        """What every promise of a larger model starts from."""
+        """What every predicted gain of a larger model starts from."""
         return LinearisationPoint.of(self)
 
     def effect_values(self) -> dict[str, float]:
@@ -72,7 +72,7 @@ def fit(
     patient: bool = False,
     near: Linearised | None = None,
 ) -> Fit:
-    """Fit by Gauss–Newton with safe steps, the scatter by expectation maximisation between steps.
+    """Fit by Gauss–Newton with safe steps, the variance components by expectation maximisation between steps.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def fit(
         (P,) where to start.
     bounds
         (effects' parameters, 2): lowest and highest value of each.
-    offsets, scatter
+    random_effects, variance_components
         Where to start; by default none and generous.
     iterations
         At most this many steps.
@@ -101,7 +101,7 @@ def fit(
     )
     solver = LevenbergMarquardt(predictor, bounds)
     state, convergence = solver.go(FitState(parameters.copy(), random_effects, variance_components), iterations, near)
-    # Only a fit that is to be believed is worth the way to its end.
+    # Only a final fit is worth the iterations to convergence.
     prior_model = iterations > _ITERATIONS
     state, evaluation = solver.converge(
         state, convergence if prior_model else Convergence.CONVERGED, iterations, patient=patient
@@ -116,7 +116,7 @@ def fit(
 
 
 def loss_at(fitted: Fit, parameters: Floats) -> Floats:
-    """Return each run's loss (R,) at other parameters, by simulation, with the scatter of `fitted`."""
+    """Return each run's loss (R,) at other parameters, by simulation, with the variance components of `fitted`."""
     predictor = fitted.predictor
     residual = residual_of(predictor, predictor.predict(parameters, fitted.random_effects))
     return terms_of(

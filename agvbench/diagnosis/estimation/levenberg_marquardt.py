@@ -27,7 +27,7 @@ class Point:
 
 @dataclass(frozen=True)
 class StepSolver:
-    """What stays the same during a step: derivatives, scatter, and the ``bounds`` of the effects' parameters."""
+    """Constants of a step: derivatives, variance components, and the ``bounds`` of the effects' parameters."""
 
     predictor: Predictor
     linear: Linearised
@@ -98,7 +98,7 @@ _CLOSE = 1.0
 
 @dataclass(frozen=True)
 class FitState:
-    """What a fit has found so far: ``parameters`` (P,), ``random_effects`` (R, 6) of each run, and their scatter."""
+    """What a fit has found so far: ``parameters`` (P,), ``random_effects`` (R, 6) of each run, and their variance."""
 
     parameters: Floats
     random_effects: Floats
@@ -180,14 +180,14 @@ class LevenbergMarquardt:
     def leave_plateaus(
         self, state: FitState, evaluation: Evaluation, iterations: int, *, patient: bool
     ) -> tuple[FitState, Evaluation]:
-        """Return a better end of the way where values of the maps have come to lie where no run tells them; else this.
+        """Return a better optimum where values of the maps came to lie where no run observes them; else this one.
 
-        Play has plateaus: a command that ends within it moves nothing, and has no slope that led out again, be it that
-        the axle did move. So such values are laid between their neighbours, and the way goes on from there.
+        Backlash makes the likelihood flat: a command inside the gap has zero gradient, so the optimiser cannot leave
+        it, even where the axle did move. So such values are interpolated, and the fit goes on from there.
         """
         maps = self.predictor.maps
-        told, doubt = evaluation.terms.information.total, ridge(self.predictor)
-        unobserved = np.diagonal(told)[: maps.size] < np.diagonal(doubt)[: maps.size]
+        information, prior = evaluation.terms.information.total, ridge(self.predictor)
+        unobserved = np.diagonal(information)[: maps.size] < np.diagonal(prior)[: maps.size]
         if not unobserved.any():
             return state, evaluation
         parameters = np.r_[maps.interpolated(state.parameters[: maps.size], unobserved), state.parameters[maps.size :]]
@@ -198,10 +198,10 @@ class LevenbergMarquardt:
     def non_monotone_steps(self, state: FitState, evaluation: Evaluation) -> FitState | None:
         """Return a better state that lies across a bend, or None; `evaluation` is what is seen from `state`.
 
-        Maps that took up a cause give it back along a curved and narrow valley: every whole step leaves it, and short
-        ones creep. So whole steps are taken for a while, however much worse they are at first; the scatter grows with
-        the residual, which widens the valley (the watchdog technique of Chamberlain and others, Mathematical
-        Programming Study 16, 1982).
+        Maps that absorbed a cause give it back along a curved and narrow valley: every whole step leaves it, and short
+        ones converge slowly. So whole steps are taken for a while, however much worse they are at first; the variance
+        grows with the residual, which widens the valley (the watchdog technique of Chamberlain and others,
+        Mathematical Programming Study 16, 1982).
         """
         start, near = evaluation.loss, evaluation.linear
         point = self._step_solver(state, evaluation).whole(self._point(state, evaluation), evaluation.terms)
@@ -214,7 +214,7 @@ class LevenbergMarquardt:
         return None
 
     def _follow(self, state: FitState, evaluation: Evaluation) -> tuple[FitState, bool]:
-        """Return a state that is no worse for the scatter at hand, and whether a whole step led there."""
+        """Return a state that is no worse for the variance components at hand, and whether a whole step led there."""
         point, whole = self._step_solver(state, evaluation).step(self._point(state, evaluation), evaluation.terms)
         return self._reach(point, state, evaluation), whole
 

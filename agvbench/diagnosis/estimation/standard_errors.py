@@ -22,7 +22,7 @@ def standard_errors(fitted: Fit, group: NDArray[np.int64]) -> Floats:
     many times (MacKinnon, Nielsen and Webb, Journal of Applied Econometrics 38, 2023, CV3), and by runs, since few
     groups may agree by chance (Angrist and Pischke, Mostly Harmless Econometrics, 2009, section 8.2). Leaving out is
     one Newton step, exact as far as the loss is quadratic. So that ± 1.96 of it are a 95 % interval though few groups
-    tell it, it is wider by Student's t. Of a parameter that fewer than four groups tell, the spread between them tells
+    determine it, it is wider by Student's t. Where fewer than four groups determine a parameter, their dispersion shows
     nothing: then it is the larger of the likelihood's own standard error and that of the jackknife by runs. Windows of
     free driving, which come in few sessions, have those of `clustered_covariance`.
 
@@ -40,15 +40,15 @@ def standard_errors(fitted: Fit, group: NDArray[np.int64]) -> Floats:
     own = np.sqrt(np.diagonal(fitted.covariance))
     # Normal draws of n groups with the same variance have a fourth moment that makes them count as n/3.
     wider = special.stdtrit(3.0 * counts, _LEVEL) / special.ndtri(_LEVEL)
-    told = np.maximum(of_groups, of_runs) * wider
-    return np.asarray(np.where(counts >= _FEWEST, told, np.maximum(own, of_runs)))
+    jackknifed = np.maximum(of_groups, of_runs) * wider
+    return np.asarray(np.where(counts >= _FEWEST, jackknifed, np.maximum(own, of_runs)))
 
 
 def _jackknife(fitted: Fit, group: NDArray[np.int64]) -> tuple[Floats, Floats]:
-    """Return the jackknife's standard errors (P,), and how many groups, in effect, tell each parameter (P,)."""
-    pulls, told = by_group(fitted.gradient, group), by_group(fitted.information.dense(), group)
+    """Return the jackknife's standard errors (P,), and how many groups, in effect, determine each parameter (P,)."""
+    pulls, information = by_group(fitted.gradient, group), by_group(fitted.information.dense(), group)
     groups = len(pulls)
-    rest = told.sum(axis=0) + ridge(fitted.predictor) - told
+    rest = information.sum(axis=0) + ridge(fitted.predictor) - information
     squares = np.array([np.linalg.lstsq(rest[g], pulls[g], rcond=1e-12)[0] for g in range(groups)]) ** 2
     counts = squares.sum(axis=0) ** 2 / np.maximum((squares**2).sum(axis=0), 1e-300)
     return np.sqrt((groups - 1) / groups * squares.sum(axis=0)), counts

@@ -1,6 +1,6 @@
 """Variance components of measurements and runs: weights, priors, and how they are estimated.
 
-Windows of free driving have no offsets but those of their start pose: what one window misses its neighbours miss, too,
+Windows of free driving have no random effects but those of their start pose: residuals of neighbours are correlated,
 so that an offset for each would explain a cause away. Their errors grow with time and have heavy tails, another day's
 driving being many times as far off as this one's: the likelihood is Student's, of a window and not of its samples.
 """
@@ -16,7 +16,7 @@ from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.types import Floats
 
 EVIDENCE_POSES = 4.0
-"""A run's samples count as this many independent poses: what a model misses at one time it misses at the next."""
+"""A run's samples count as this many independent poses: successive residuals are correlated."""
 
 _LEAST_M, _LEAST_RAD = 1e-4, 2e-4
 _START_EXTRA_M = 2e-4
@@ -39,12 +39,12 @@ class VarianceComponents:
 
 
 def initial_variance_components() -> VarianceComponents:
-    """Return a generous scatter to start from."""
+    """Return generous variance components to start from."""
     return VarianceComponents(0.05, 0.05, np.array([0.01, 0.01, 0.01, 0.02]))
 
 
 def window_variance_components(readings: Readings) -> VarianceComponents:
-    """Return a scatter to start from: errors that grow with time, and hardly an offset."""
+    """Return variance components to start from: errors that grow with time, and hardly an offset."""
     ahead_s = np.nanmean(readings.t_s - readings.begins_s[:, None], axis=0)
     return VarianceComponents(0.1, 0.1, _LEAST_DEVIATION.copy(), ahead_s / ahead_s[-1])
 
@@ -69,7 +69,7 @@ def scale_of(variance_components: VarianceComponents) -> Floats:
 def student(predictor: Predictor, squares: Floats) -> tuple[Floats, Floats]:
     """Return each window's loss and weight by Student's law for three numbers, given its squared errors.
 
-    The squares are those of a part of a window where windows tell the same again; so is the loss.
+    The squares are those of a part of a window where windows are correlated; so is the loss.
     """
     part = 1.0 / predictor.batch.autocorrelation_time
     return part * (_TAIL + 3.0) * np.log1p(squares / part / _TAIL), (_TAIL + 3.0) / (_TAIL + squares / part)
@@ -100,7 +100,7 @@ def update_variance_components(
     inner_inverse: Floats,
     variance_components: VarianceComponents,
 ) -> VarianceComponents:
-    """Return the scatter that residuals (R, K, 3), offsets (R, 6) and their covariances (R, 6, 6) show."""
+    """Estimate the components from residuals (R, K, 3), random effects (R, 6) and their covariances (R, 6, 6)."""
     seen = predictor.readings.seen
     if predictor.readings.initial_states is not None:
         return _update_window_variance_components(predictor, residual, variance_components)

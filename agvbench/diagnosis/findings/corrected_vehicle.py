@@ -18,7 +18,7 @@ _DIGITS = 9
 
 
 def corrected_vehicle(header: HeaderLike, geometry: Geometry, fitted: Fit, maps: NodalMaps, seed: int) -> VehicleModel:
-    """Return the vehicle that `fitted` describes; its maps are tables, made monotone where scatter made them turn."""
+    """Return the vehicle that `fitted` describes; its maps are tables, made monotone where noise made them turn."""
     where = maps.slices()
     weight = np.maximum(np.diagonal(fitted.information.total), 1e-6)
     values = {role: fitted.parameters[own] for role, own in where.items()}

@@ -82,7 +82,7 @@ class EndStops:
 def end_stops(refitted: RefittedMap, prior_model: StaticMap) -> EndStops | None:
     """Return where a steering map stops turning; None where a line, or a smooth curve, describes it as well.
 
-    Between its stops the map is the believed one, stretched and shifted.
+    Between its stops the map is the nominal one, stretched and shifted.
     """
     known = np.flatnonzero(np.sqrt(np.diagonal(refitted.covariance)) < _UNKNOWN_RAD)
     own = refitted.select(known)
@@ -189,15 +189,15 @@ def _edge(own: RefittedMap, prior_model: StaticMap, neutral: float, sign: float)
     side = own.select(chosen)
     away = np.abs(side.commands - neutral)
     error = np.sqrt(np.diagonal(side.covariance)) + _MODEL_ERROR * own.size
-    told = np.abs(np.asarray(prior_model(side.commands)))
-    still = (np.abs(side.values) < _CLEAR * error) & (told > 2.0 * _CLEAR * error)
+    nominal = np.abs(np.asarray(prior_model(side.commands)))
+    still = (np.abs(side.values) < _CLEAR * error) & (nominal > 2.0 * _CLEAR * error)
     moving = ~still
     if still.any():
         nearest = float(away[moving].min()) if moving.any() else math.inf
         farthest_still = float(away[still].max())
         if nearest < farthest_still or not math.isfinite(nearest):
             return None
-        gain = float(np.sum((told[still] / error[still]) ** 2))
+        gain = float(np.sum((nominal[still] / error[still]) ** 2))
         edge, stderr = _between(side.select(np.flatnonzero(moving)), neutral, farthest_still, nearest)
         return _Edge(edge, stderr, gain, stopped=True)
     return _extrapolated(side, neutral)

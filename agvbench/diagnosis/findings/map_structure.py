@@ -1,8 +1,8 @@
-"""End stops and dead bands that the believed map lacks: read off the refitted one.
+"""End stops and dead bands that the nominal map lacks: read off the refitted one.
 
-Free maps take up an end stop or a dead band without a word, so no effect has to be fitted for them; but the vehicle
-file that was believed lacks them, and a planner that believes it asks for angles and speeds that there are not. Both
-are looked for in the refitted values: shapes with and without them are fitted to the values under their covariance.
+Nodal maps absorb an end stop or a dead band, so no effect has to be fitted for them; but the nominal vehicle file lacks
+them, and a planner that uses it asks for angles and speeds that cannot be reached. Both are looked for in the refitted
+values: shapes with and without them are fitted to the values under their covariance.
 A map that is merely of another slope, offset or smooth shape has neither.
 """
 
@@ -22,7 +22,7 @@ from agvbench.model import VehicleModel
 from agvbench.types import Floats
 from agvbench.vehicle.maps import DeadBandWithSaturation, Fixed, FullSpeedOrStop, LineWithEndStops, StaticMap
 
-_SOURCE = "read off the refitted map against the believed one"
+_SOURCE = "read off the refitted map against the nominal one"
 _FLAT = 0.05
 _GRID = 400
 _STILL, _LEAST_BAND = 0.01, 0.02
@@ -39,7 +39,7 @@ class _Known:
 def map_effects(fitted: Fit, vehicle: VehicleModel | None) -> tuple[NamedEffect, ...]:
     """Return ``steering_saturation`` and ``drive_dead_band`` where runs went beyond what `vehicle` knows of them.
 
-    Without a vehicle nothing was believed that they could contradict.
+    Without a vehicle there is no nominal map that they could contradict.
     """
     if vehicle is None:
         return ()
@@ -82,9 +82,9 @@ def _saturation(axles: dict[str, _Known]) -> Iterator[NamedEffect]:
         yield NamedEffect("steering_saturation", estimates, (), {"loss_without_it": gain, "source": _SOURCE})
 
 
-def _side(stops: EndStops, side: str, is_believed: bool) -> Iterator[tuple[float, float]]:
+def _side(stops: EndStops, side: str, is_nominal: bool) -> Iterator[tuple[float, float]]:
     value, stderr = getattr(stops, side)
-    if not is_believed and math.isfinite(value):
+    if not is_nominal and math.isfinite(value):
         yield abs(value), stderr
 
 

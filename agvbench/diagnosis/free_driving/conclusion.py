@@ -1,4 +1,4 @@
-"""What is concluded from windows of free driving: judged on the windows set aside, and put into a verdict."""
+"""What is concluded from windows of free driving: judged on the test windows, and put into a verdict."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ from agvbench.types import Floats
 
 WITHIN_REPEATABILITY = 1.25
 FAR_ABOVE = 5.0
-"""The floor of windows is a lower bound, for the vehicle's own scatter cannot be seen without repeats: so many times it
-is more than scatter."""
+"""The repeatability of windows is a lower bound, for the vehicle's own variation cannot be seen without repeats: beyond
+so many times it, residuals are significant."""
 
 
 @dataclasses.dataclass
 class WindowConclusion:
-    """Judges what was chosen on the windows set aside.
+    """Judges what was chosen on the test windows.
 
-    ``readings`` are all windows and ``assessment`` those that are predicted here, of which ``held`` were set aside;
-    ``static`` are the maps without effects, fitted to the others.
+    ``readings`` are all windows and ``assessment`` those that are predicted here, of which ``held`` are the test
+    windows; ``static`` are the maps without effects, fitted to the others.
     """
 
     context: DiagnosisContext
@@ -128,7 +128,7 @@ class WindowConclusion:
     def _each(self, poses: Floats) -> dict[str, dict[str, object]]:
         """Return for each effect whether it was kept, and the held-out position error with and without it.
 
-        An effect that promised nothing was not fitted: its gain is zero, and there is no error with it.
+        An effect without predicted gain was not fitted: its gain is zero, and there is no error with it.
         """
         chosen = self.selection.chosen
         out: dict[str, dict[str, object]] = {}
@@ -172,8 +172,8 @@ def _verdict(effects: tuple[NamedEffect, ...], rest: list[Dependence], far: bool
         return Verdict.UNKNOWN, f"structure remains that no effect explains: it depends on {rest[0].covariate}"
     if far:
         return Verdict.UNKNOWN, (
-            f"what is missed is more than {FAR_ABOVE:g} times what noise explains, "
-            "but depends on none of the covariates looked at"
+            f"the residuals are more than {FAR_ABOVE:g} times what noise explains, "
+            "but depend on none of the covariates tested"
         )
     if not effects:
         return Verdict.ADEQUATE, "nothing that was looked at predicts better than static maps, fitted again"

@@ -41,11 +41,11 @@ def diagnose_windows(
     the beginning of a window, where there are several sessions.
     """
     readings = read_windows(runs, horizon, context.header.neutral)
-    if reason := _cannot_tell(readings, context.header, horizon):
-        return context.cannot_tell(readings, reason)
+    if reason := _insufficient_data(readings, context.header, horizon):
+        return context.not_identifiable(readings, reason)
     held = held_out_windows(readings, context.seed)
     if not held.any():
-        return context.cannot_tell(readings, "no stretch of driving can be set aside to judge on: drive for longer")
+        return context.not_identifiable(readings, "no stretch of driving can be spared for the test: drive for longer")
     fitted = readings.select(thinned(np.flatnonzero(~held), MOST_FITTED))
     on_progress(f"{len(fitted)} windows to fit, {np.count_nonzero(held)} held out")
     static = _static(fitted, context.geometry, context.header.neutral)
@@ -75,7 +75,7 @@ def _selector(
     return WindowSelector(batch, tried, level.parameters, context.seed, on_progress, names, values, elsewhere=elsewhere)
 
 
-def _cannot_tell(readings: Readings, header: HeaderLike, horizon: Horizon) -> str:
+def _insufficient_data(readings: Readings, header: HeaderLike, horizon: Horizon) -> str:
     require_runs(readings, header)
     if len(readings) < FEWEST_WINDOWS:
         raise CampaignError(

@@ -19,7 +19,7 @@ QUANTITIES = {
     "delta_heading_deg": 180.0 / np.pi,
 }
 AHEAD = (SAMPLES // 2 - 1, SAMPLES - 1)
-"""Samples at which errors are told by recording: half the horizon ahead, and all of it."""
+"""Samples at which errors are reported by recording: half the horizon ahead, and all of it."""
 
 _RESAMPLES = 2000
 _CONFIDENCE = 0.95
@@ -31,15 +31,15 @@ def squares(readings: Readings, poses: Floats, sample: int = -1) -> dict[str, Fl
 
     Distance is that from the start to the pose, as for runs from rest.
     """
-    missed = readings.poses[:, sample] - poses[:, sample]
+    residual = readings.poses[:, sample] - poses[:, sample]
     start = readings.start[:, :2]
     went = np.hypot(*(readings.poses[:, sample, :2] - start).T)
-    told = np.hypot(*(poses[:, sample, :2] - start).T)
+    predicted = np.hypot(*(poses[:, sample, :2] - start).T)
     return {
-        "position_rms_mm": missed[:, 0] ** 2 + missed[:, 1] ** 2,
-        "heading_rms_deg": missed[:, 2] ** 2,
-        "delta_s_mm": (went - told) ** 2,
-        "delta_heading_deg": missed[:, 2] ** 2,
+        "position_rms_mm": residual[:, 0] ** 2 + residual[:, 1] ** 2,
+        "heading_rms_deg": residual[:, 2] ** 2,
+        "delta_s_mm": (went - predicted) ** 2,
+        "delta_heading_deg": residual[:, 2] ** 2,
     }
 
 
@@ -48,8 +48,8 @@ def repeatability_squares(readings: Readings, perturbed: Floats, sample: int = -
 
     The pose to start from is uncertain, so is the pose that is judged, and so is the speed to start from: `perturbed`
     (W, K, 3) is by how much the prediction changes with a standard error of it. What the vehicle does differently
-    without a cause in its commands comes on top: without repeats it cannot be told from what a model lacks, so this
-    is the least that the floor can be.
+    without a cause in its commands comes on top: without repeats it cannot be separated from what a model lacks, so
+    this is a lower bound of the repeatability.
     """
     initial_states = _initial_states(readings)
     went = np.hypot(*(readings.poses[:, sample, :2] - readings.start[:, :2]).T)
@@ -95,8 +95,8 @@ def by_recording(
             repeatability = repeatability_squares(readings, perturbed, sample)["position_rms_mm"][rows]
             entry: dict[str, object] = {"floor_mm": rms(repeatability, "position_rms_mm")}
             for name, poses in predicted.items():
-                missed = squares(readings, poses, sample)["position_rms_mm"][rows]
-                entry[f"{name}_mm"] = interval(missed, readings.group[rows], seed)
+                squared_mm2 = squares(readings, poses, sample)["position_rms_mm"][rows]
+                entry[f"{name}_mm"] = interval(squared_mm2, readings.group[rows], seed)
             row[f"ahead_{ahead:.2g}_s"] = entry
         table.append(row)
     return table

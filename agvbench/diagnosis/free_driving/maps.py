@@ -23,33 +23,33 @@ _SLOWEST_MPS = 0.05
 
 
 def smooth_maps(runs: Sequence[Run], neutral: float, steering: int, drive: int) -> NodalMaps:
-    """Return free maps with a node for every level, or so many evenly spaced nodes where there are many levels.
+    """Return nodal maps with a node for every level, or so many evenly spaced nodes where there are many levels.
 
     Even spacing, not quantiles: another day's driving may dwell where this one only passed.
     """
     nodes = dict(nodal_maps(runs, neutral).nodes)
     for role in ROLES:
-        told = np.concatenate([getattr(run.commands, role) for run in runs])
+        commanded = np.concatenate([getattr(run.commands, role) for run in runs])
         if role == "drive":
-            told = told[told != neutral]
-        if len(np.unique(told)) > _MANY_LEVELS:
-            nodes[role] = _even(told, drive if role == "drive" else steering, neutral, role)
+            commanded = commanded[commanded != neutral]
+        if len(np.unique(commanded)) > _MANY_LEVELS:
+            nodes[role] = _even(commanded, drive if role == "drive" else steering, neutral, role)
     return NodalMaps(nodes, neutral)
 
 
-def _even(told: Floats, count: int, neutral: float, role: str) -> Floats:
+def _even(commanded: Floats, count: int, neutral: float, role: str) -> Floats:
     if role != "drive":
-        return np.linspace(told.min(), told.max(), count)
+        return np.linspace(commanded.min(), commanded.max(), count)
     # Each direction has nodes of its own: between them lies neutral, where the drive stands.
-    sides = [told[told < neutral], told[told > neutral]]
+    sides = [commanded[commanded < neutral], commanded[commanded > neutral]]
     return np.concatenate([_side(side, count, neutral) for side in sides if len(side)])
 
 
-def _side(told: Floats, count: int, neutral: float) -> Floats:
+def _side(commanded: Floats, count: int, neutral: float) -> Floats:
     """Return nodes from the command that is passed on the way to driving to the largest."""
-    away = np.abs(told - neutral)
+    away = np.abs(commanded - neutral)
     low, high = np.quantile(away, 0.02), away.max()
-    return np.sort(neutral + np.sign(told[0] - neutral) * np.linspace(low, high, count))
+    return np.sort(neutral + np.sign(commanded[0] - neutral) * np.linspace(low, high, count))
 
 
 def start_values_of_windows(maps: NodalMaps, readings: Readings, geometry: Geometry) -> Floats:
@@ -72,9 +72,9 @@ def start_values_of_windows(maps: NodalMaps, readings: Readings, geometry: Geome
     moving = np.isfinite(front + rear) & (np.abs(forward) > _SLOWEST_MPS)
     out = []
     for role in ROLES:
-        told = np.array([held_command(run.commands, role, t) for run, t in zip(readings.runs, when, strict=True)])
-        use = moving & ((told != maps.neutral) if role == "drive" else True)
-        out.append(_stiff(maps.nodes[role], maps.weights(role, told[use]), value[role][use]))
+        commanded = np.array([held_command(run.commands, role, t) for run, t in zip(readings.runs, when, strict=True)])
+        use = moving & ((commanded != maps.neutral) if role == "drive" else True)
+        out.append(_stiff(maps.nodes[role], maps.weights(role, commanded[use]), value[role][use]))
     return np.concatenate(out)
 
 

@@ -69,7 +69,7 @@ def prior_model(vehicle: VehicleModel, readings: Readings, kinds: Sequence[type[
 
 
 def nodal_deviation(predictor: Predictor, parameters: Floats) -> float:
-    """Return how far the logarithm of speed scatters within a session from what commands have made it.
+    """Return the deviation of the logarithm of speed, within a session, from what commands have made it.
 
     Beyond twice that, the speed at the beginning of a window says that the drive runs at another level.
     """
@@ -82,13 +82,13 @@ def nodal_deviation(predictor: Predictor, parameters: Floats) -> float:
     initial[:, 3] = np.nan
     simulation = Simulation(batch.geometry, batch.maps.neutral, shortly, kinds=batch.kinds)
     moved = simulation.predict(settled, predictor.all_parameters(parameters), initial) - initial[:, :3]
-    told = (np.cos(initial[:, 2]) * moved[:, 0] + np.sin(initial[:, 2]) * moved[:, 1]) / _SHORTLY_S
+    predicted = (np.cos(initial[:, 2]) * moved[:, 0] + np.sin(initial[:, 2]) * moved[:, 1]) / _SHORTLY_S
     use = (
-        (np.abs(told) > _SLOW_MPS)
-        & (told * initial_states.speed_mps > 0.0)
+        (np.abs(predicted) > _SLOW_MPS)
+        & (predicted * initial_states.speed_mps > 0.0)
         & (np.abs(initial_states.speed_mps) > _SLOW_MPS)
     )
-    off = np.log(np.abs(initial_states.speed_mps[use]) / np.abs(told[use]))
+    off = np.log(np.abs(initial_states.speed_mps[use]) / np.abs(predicted[use]))
     session = initial_states.session[use]
     for name in np.unique(session):
         off[session == name] -= np.median(off[session == name])
@@ -96,10 +96,10 @@ def nodal_deviation(predictor: Predictor, parameters: Floats) -> float:
 
 
 def autocorrelation_time(fitted: Fit) -> float:
-    """Return how many windows tell as much as one, from how alike neighbours miss.
+    """Return how many windows count as one, from the correlation of their neighbours' residuals.
 
-    One, and twice the correlation of what a window misses with what the next ones in its stretch do, as far as
-    that is positive (the variance of a mean of a stationary sequence).
+    One, and twice the correlation of a window's residuals with those of the next ones in its stretch, as far as that is
+    positive (the variance of a mean of a stationary sequence).
     """
     group = fitted.predictor.readings.group
     e = np.nan_to_num(fitted.residual[:, -1])

@@ -20,14 +20,14 @@ _SEEN_QUANTILE = 0.98
 class WindowSelector(Selector):
     """Tries effects on windows; see `Selector`.
 
-    ``elsewhere`` holds the windows set aside. Only their commands and their states at the beginning are used, to see
-    how far an effect would reach: one that moves the usual window there by more than nearly every window that it was
-    learnt from extrapolates, and does not earn its place. ``extrapolating`` names those that were refused for that.
+    ``elsewhere`` holds the test windows. Only their commands and initial states are used, to see how far an effect
+    would reach: one that moves the usual window there by more than nearly every window that it was fitted to
+    extrapolates, and is rejected. ``extrapolating`` names those that were rejected for that.
     """
 
-    # Those who drive fast may be few: only the single best stretch is left out to see whether others gain, too.
+    # Fast stretches may be few: only the single best stretch is left out to see whether others gain, too.
     best_share: ClassVar[float] = 0.0
-    # What windows miss is mostly not scatter, so that a small part of it is no cause of its own.
+    # Residuals of windows are mostly systematic, so that a small part of them is no cause of its own.
     noticeable: ClassVar[float] = 0.3
     elsewhere: Batch | None = None
     extrapolating: set[str] = field(default_factory=set)

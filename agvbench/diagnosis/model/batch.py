@@ -49,12 +49,12 @@ class GroupedSums:
 class PerturbationBatch:
     """The variants of runs in which one level (or one free value) of one command is changed, n of them.
 
-    ``lane`` (n,): which lanes these are; ``run`` (n,): of which run; ``row`` (n,): a row that has the level, or the
-    number of the value. ``term`` (t,) and ``weight`` (t,): whose change counts how much for each derivative by a free
-    value. ``by_run`` gathers lanes, ``by_value`` terms by run and column.
+    ``number`` (n,): which perturbations these are; ``run`` (n,): of which run; ``row`` (n,): a row that has the level,
+    or the number of the value. ``term`` (t,) and ``weight`` (t,): which change counts how much for each derivative by a
+    free value. ``by_run`` sums perturbations, ``by_value`` terms by run and column.
     """
 
-    lane: Integers
+    number: Integers
     run: Integers
     row: Integers
     term: Integers
@@ -63,15 +63,15 @@ class PerturbationBatch:
     by_value: GroupedSums
 
     @classmethod
-    def of(cls, lane: Integers, run: Integers, row: Integers, weights: Floats, column: Integers) -> PerturbationBatch:
-        """Return lanes whose changes count by `weights` (n, values) in the columns (runs, values) of their runs."""
+    def of(cls, number: Integers, run: Integers, row: Integers, weights: Floats, column: Integers) -> PerturbationBatch:
+        """Return perturbations that count by `weights` (n, values) in the columns (runs, values) of their runs."""
         term, value = np.nonzero(weights)
         by_value = GroupedSums.of(run[term], column[run[term], value])
-        return cls(lane, run, row, term, weights[term, value], GroupedSums.of(run), by_value)
+        return cls(number, run, row, term, weights[term, value], GroupedSums.of(run), by_value)
 
 
 class Batch:
-    """Runs packed for simulation: as they are, and as lanes, each of which differs in one level or in heading.
+    """Runs packed for simulation: as they are, and perturbed, each time in one level or in heading.
 
     A run's own levels of command are varied one by one, which gives the derivatives by the maps' values and by the
     run's offsets alike. Where commands change so often that a run has more levels than free values, the values are
@@ -111,7 +111,7 @@ class Batch:
                 kind.append(role)
                 row.append(first)
                 changed.append(change)
-        self.lane_run = np.array(run)
+        self.perturbation_run = np.array(run)
         self.perturbations = Simulation(geometry, maps.neutral, [runs[i] for i in run], kinds=kinds)
         self.touched = self._touched(owns)
         self.turned = np.array(kind) == "heading"
@@ -127,15 +127,17 @@ class Batch:
         return np.argsort(~used, axis=1, kind="stable")[:, : max(1, int(used.sum(axis=1).max()))]
 
     def _varied(self, kind: NDArray[np.str_], row: NDArray[np.int64]) -> dict[str, PerturbationBatch]:
-        """Return by role the lanes of that `kind` (lanes,): each varies a level that `row` has, or the node `row`."""
+        """Return by role the perturbations of that `kind` (n,): each varies a level of row `row`, or the node `row`."""
         # In which column of `touched` each run has each of the values.
         column = np.full((len(self.touched), self.maps.size), -1)
         np.put_along_axis(column, self.touched, np.arange(self.touched.shape[1])[None, :], axis=1)
         varied = {}
         for role, own in self.maps.slices().items():
-            lane = np.flatnonzero(kind == role)
+            number = np.flatnonzero(kind == role)
             values = np.eye(len(self.maps.nodes[role])) if self.by_node else self.weights[role]
-            varied[role] = PerturbationBatch.of(lane, self.lane_run[lane], row[lane], values[row[lane]], column[:, own])
+            varied[role] = PerturbationBatch.of(
+                number, self.perturbation_run[number], row[number], values[row[number]], column[:, own]
+            )
         return varied
 
     def _count_levels(self, own: NDArray[np.int64]) -> int:

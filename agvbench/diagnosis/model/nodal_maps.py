@@ -70,12 +70,12 @@ class NodalMaps:
         laid = values.copy()
         for role, own in self.slices().items():
             nodes, heard = self.nodes[role], ~unobserved[own]
-            at, told = nodes[heard], values[own][heard]
+            at, known = nodes[heard], values[own][heard]
             if role == "drive":
                 place = int(np.searchsorted(at, self.neutral))
-                at, told = np.insert(at, place, self.neutral), np.insert(told, place, 0.0)
+                at, known = np.insert(at, place, self.neutral), np.insert(known, place, 0.0)
             if len(at):
-                laid[own] = np.where(heard, values[own], np.interp(nodes, at, told))
+                laid[own] = np.where(heard, values[own], np.interp(nodes, at, known))
         return laid
 
 
@@ -83,8 +83,8 @@ def nodal_maps(runs: Sequence[Run], neutral: float) -> NodalMaps:
     """Return a node for every level at which the vehicle drove; where there are too many, for `chosen_levels`."""
     nodes = {}
     for role in ROLES:
-        told, held_s = _told(runs, role, neutral)
-        levels, which = np.unique(told, return_inverse=True)
+        commanded, held_s = _driven_commands(runs, role, neutral)
+        levels, which = np.unique(commanded, return_inverse=True)
         if len(levels) > _MOST_NODES:
             longest_s = np.zeros(len(levels))
             np.maximum.at(longest_s, which, held_s)
@@ -96,8 +96,8 @@ def nodal_maps(runs: Sequence[Run], neutral: float) -> NodalMaps:
 def chosen_levels(levels: Floats, longest_s: Floats) -> Floats:
     """Return some of very many levels (n,), ascending: those that were held, and of the others what fills gaps.
 
-    A steering that swings passes many levels, a twentieth of a second each. Were nodes laid by how many levels there
-    are, they would crowd where it swings, and leave an end stop elsewhere between two of them.
+    Oscillating steering passes many levels, a twentieth of a second each. Were nodes laid by how many levels there are,
+    they would crowd where it oscillates, and leave an end stop elsewhere between two of them.
 
     Parameters
     ----------
@@ -122,17 +122,17 @@ def _spread(nodes: Floats, levels: Floats, near: float, most: int) -> Floats:
     return np.sort(nodes)
 
 
-def _told(runs: Sequence[Run], role: str, neutral: float) -> tuple[Floats, Floats]:
+def _driven_commands(runs: Sequence[Run], role: str, neutral: float) -> tuple[Floats, Floats]:
     """Return every command (n,) with which the vehicle drove, and for how long each was held [s]."""
-    told, held_s = [], []
+    commanded, held_s = [], []
     for run in runs:
         values, t_s, driven = getattr(run.commands, role), run.commands.t_s, _driven_rows(run.commands, neutral)
         # A row begins where any command changes: this one may be held over many.
         initial_states = np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
         ends_s = np.append(t_s[initial_states[1:]], max(float(np.max(run.frames.t_s, initial=-np.inf)), t_s[-1]))
-        told.append(values[driven])
+        commanded.append(values[driven])
         held_s.append(np.repeat(ends_s - t_s[initial_states], np.diff(np.append(initial_states, len(values))))[driven])
-    return np.concatenate(told), np.concatenate(held_s)
+    return np.concatenate(commanded), np.concatenate(held_s)
 
 
 def _driven_rows(commands: Commands, neutral: float) -> NDArray[np.bool_]:

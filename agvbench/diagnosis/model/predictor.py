@@ -58,7 +58,7 @@ _FARTHEST_RAD = 1.4
 
 
 class Predictor:
-    """Runs under free maps and some effects; the parameters are the maps' values, then the effects' parameters.
+    """Runs under nodal maps and some effects; the parameters are the maps' values, then the effects' parameters.
 
     A derivative is a difference between two simulations.
     """
@@ -125,17 +125,17 @@ class Predictor:
         """
         base, inputs = self.predict(parameters, random_effects), self._inputs(parameters, random_effects)
         if near is None:
-            by_maps = self._by_lanes(parameters, random_effects, base, *inputs)
+            by_maps = self._by_perturbations(parameters, random_effects, base, *inputs)
         else:
             by_maps = replace(near.by_first(self.maps.size), poses=base)
         return by_maps.with_last(self._slopes(parameters, base, *inputs, len(parameters) - self.maps.size))
 
-    def _by_lanes(
+    def _by_perturbations(
         self, parameters: Floats, random_effects: Floats, base: Floats, settled: Floats, initial: Floats
     ) -> Linearised:
         """Return poses `base` with their derivatives by the maps' values and by offsets."""
         batch = self.batch
-        perturbations = self._simulate_lanes(settled, initial, parameters[self.maps.size :])
+        perturbations = self._simulate_perturbed(settled, initial, parameters[self.maps.size :])
         by_own = np.zeros((*base.shape, batch.touched.shape[1]))
         columns = by_own.transpose(0, 3, 1, 2)
         by_random_effects = np.zeros((*base.shape, len(RANDOM_EFFECTS)))
@@ -143,7 +143,7 @@ class Predictor:
         by_random_effects[..., 2] = (perturbations[batch.turned] - base) / _STEP
         for k, role in enumerate(ROLES):
             varied = batch.varied[role]
-            change = (perturbations[varied.lane] - base[varied.run]) / _STEP
+            change = (perturbations[varied.number] - base[varied.run]) / _STEP
             by_offset, by_level = self._shares(role, parameters, random_effects, settled)
             gathered = varied.by_run
             by_random_effects[gathered.place[:, 0], :, :, 3 + k] = gathered.sums(change * by_offset[:, None, None])
@@ -153,7 +153,7 @@ class Predictor:
         return Linearised(base, batch.touched, by_own, by_random_effects, self.maps.size)
 
     def _shares(self, role: str, parameters: Floats, random_effects: Floats, settled: Floats) -> tuple[Floats, Floats]:
-        """Return how much each lane of `role` changes (n,) with its run's offset, and with the level that it varies."""
+        """Return how much each perturbation of `role` changes (n,) with its run's offset, and with its own level."""
         varied = self.batch.varied[role]
         if role != "drive":
             return np.ones(len(varied.run)), np.ones(len(varied.run))
@@ -177,11 +177,11 @@ class Predictor:
             slopes[..., column] = (self._simulate(settled, moved, initial) - base) / self._steps[k]
         return slopes
 
-    def _simulate_lanes(self, settled: Floats, initial: Floats, own: Floats) -> Floats:
+    def _simulate_perturbed(self, settled: Floats, initial: Floats, own: Floats) -> Floats:
         batch = self.batch
         varied = settled[batch.rows] + _STEP * batch.row_change
-        first = initial[batch.lane_run]
+        first = initial[batch.perturbation_run]
         first[:, 2] += _STEP * batch.turned
         return batch.perturbations.predict(
             varied, self._all(own), first, nodal_deviation=batch.nodal_deviation
-        ).reshape(len(batch.lane_run), -1, 3)
+        ).reshape(len(batch.perturbation_run), -1, 3)

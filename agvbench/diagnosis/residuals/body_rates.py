@@ -1,4 +1,4 @@
-"""The residual as rates: what each step between two samples misses per metre, with what it may depend on."""
+"""The residual as rates: that of each step between two samples per metre, with what it may depend on."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ _STILL_M = 0.01
 class Rates:
     """The residual per metre driven, between successive samples.
 
-    ``run`` (n,) its run; ``value`` (n, 3): share of the distance that is missed along and to the left, and curvature
-    missed [1/m]; ``weight`` (n,) metres; ``covariates`` by name (n,); ``begin`` and ``end`` (n, 3) measured poses;
+    ``run`` (n,) its run; ``value`` (n, 3): residual along and to the left as a share of the distance, and of curvature
+    [1/m]; ``weight`` (n,) metres; ``covariates`` by name (n,); ``begin`` and ``end`` (n, 3) measured poses;
     ``step`` (n,) the number of the sample at its end, the same in repeats.
     """
 
@@ -38,7 +38,7 @@ class Rates:
 
     @property
     def drift(self) -> Floats:
-        """What is missed on the way, as a drift over the floor (n, 2), in metres per metre driven."""
+        """The residual on the way, as a drift over the floor (n, 2), in metres per metre driven."""
         heading = 0.5 * (self.begin + self.end)[:, 2]
         along, aside = (self.value[:, :2] * self.covariates["direction"][:, None]).T
         cos, sin = np.cos(heading), np.sin(heading)

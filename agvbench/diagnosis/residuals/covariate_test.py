@@ -61,7 +61,7 @@ def dependences(
     seed
         Draws signs and folds.
     starts
-        (R, 3): where runs began. Repeats that began elsewhere tell of the place each by itself.
+        (R, 3): where runs began. Repeats that began elsewhere are each evidence of an effect of the place.
     alpha
         Level of significance.
     """

@@ -1,4 +1,4 @@
-"""Swings with a phase of their own in each run, as an eccentric wheel makes them."""
+"""Periodic disturbances with a phase of their own in each run, as an eccentric wheel makes them."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ _PERIODIC_ALPHA = 5e-3  # as many shuffles resolve
 def periodic_disturbance(rates: Rates, group: NDArray[np.int64], seed: int) -> Dependence | None:
     """Return the dependence on the distance modulo a period whose phase differs from run to run, if there is one.
 
-    An eccentric wheel swings speed and course once per turn, from wherever it happens to stand. In each run a wave
+    An eccentric wheel varies speed and course once per turn, from wherever it happens to stand. In each run a wave
     with a phase of its own is fitted to what a straight line leaves; what waves explain of all runs together shows the
-    period, and shuffled samples how much of it is chance. Differences of noisy poses swing a little by themselves (a
-    tenth), so the share has to be large. What repeats (of one ``group``, (R,)) have in common has no phase of its own,
+    period, and shuffled samples how much of it is chance. Differences of noisy poses oscillate by themselves (a tenth),
+        so the share has to be large. What repeats (of one ``group``, (R,)) have in common has no phase of its own,
     whatever its shape, and is taken off before.
     """
     rng = np.random.default_rng([0x5F15, seed])
@@ -70,7 +70,7 @@ def _contrasts(rates: Rates, feature: str, group: NDArray[np.int64]) -> Iterator
 
 
 def _winsorised(rests: list[tuple[Floats, Floats]]) -> list[tuple[Floats, Floats]]:
-    """Return what is left of the runs, the loudest turned down: a wheel swings in all of them, and not in a few."""
+    """Return what is left of the runs, winsorised: an eccentric wheel shows in all of them, and not in a few."""
     size = np.array([float(rest @ rest) for rest, _ in rests])
     most = _WINSOR_LIMIT * float(np.median(size)) if len(size) else 0.0
     return [

@@ -1,7 +1,7 @@
 """Prediction residuals, their repeatability, and the lack-of-fit test.
 
-A long slalom ends ten times as far off as a short straight by the same scatter of the axles: what groups of repeats
-miss can only be compared in units of what each of them may miss.
+A long slalom ends ten times as far off as a short straight by the same variation of the axles: residuals of groups of
+repeats can only be compared in units of their own standard deviations.
 """
 
 from __future__ import annotations
@@ -64,15 +64,15 @@ QUANTITIES = (
 """Errors of the end pose first (along and across in the start frame), then those along the way."""
 MEDIAN = "end_position_median_mm"
 WITHIN_REPEATABILITY = 1.25
-"""A residual is within repeatability up to this factor, or where repeats cannot distinguish it from their scatter."""
+"""A residual is within repeatability up to this factor, or where repeats cannot distinguish it from their variation."""
 
 LACK_OF_FIT = 0.01
-"""Groups of repeats differ beyond their scatter below this p-value."""
+"""Groups of repeats differ beyond repeatability below this p-value."""
 
 _FEWEST_WITHIN_DOF = 9
-"""Fewer degrees of freedom do not tell how repeats scatter."""
+"""Fewer degrees of freedom do not determine the dispersion of repeats."""
 
-_LEAST = 1e-6  # m, rad: less scatter than any camera shows
+_LEAST = 1e-6  # m, rad: less noise than any camera has
 
 _UNITS = {name: 1e3 if name.endswith("_mm") else 180.0 / np.pi for name in QUANTITIES}
 
@@ -92,7 +92,7 @@ class PoseResiduals:
 
     @property
     def ends(self) -> Floats:
-        """Return what is missed at the last sample of each run: along, across [m] and heading [rad], shape (R, 3)."""
+        """Return the residual at the last sample of each run: along, across [m] and heading [rad], shape (R, 3)."""
         last = self.seen.shape[1] - 1 - np.argmax(self.seen[:, ::-1], axis=1)
         return np.asarray(self.path[np.arange(len(self.path)), last])
 
@@ -135,27 +135,27 @@ def pose_residuals(readings: Readings, poses: Floats) -> PoseResiduals:
     rows = np.arange(len(readings))
     last = seen.shape[1] - 1 - np.argmax(seen[:, ::-1], axis=1)
     went = np.hypot(*(readings.poses[rows, last, :2] - readings.start[:, :2]).T)
-    told = np.hypot(*(poses[rows, last, :2] - readings.start[:, :2]).T)
-    return PoseResiduals(path, seen, went - told, path[rows, last, 2])
+    predicted = np.hypot(*(poses[rows, last, :2] - readings.start[:, :2]).T)
+    return PoseResiduals(path, seen, went - predicted, path[rows, last, 2])
 
 
-def repeatability(missed: PoseResiduals, group: NDArray[np.int64]) -> dict[str, float] | None:
+def repeatability(residuals: PoseResiduals, group: NDArray[np.int64]) -> dict[str, float] | None:
     """Return the root mean square between repeats, to compare with `PoseResiduals.rms`; None without repeats.
 
     What repeats of one command have in common is the model's to predict; what differs between them is not. Taken
-    from what the *final* model misses, so that a cause that depends on place or time does not pass for scatter. Groups
-    whose scatter is beyond four times the median's (one bad run) count as that. `MEDIAN` is the median over runs of the
-    distance between end positions and their group's mean.
+    from the residuals of the *final* model, so that a cause that depends on place or time does not pass for noise.
+    Groups whose dispersion is beyond four times the median's (one bad run) count as that. `MEDIAN` is the median over
+    runs of the distance between end positions and their group's mean.
     """
     per_group: dict[str, list[tuple[float, float]]] = {name: [] for name in QUANTITIES}
     apart_mm: list[float] = []
-    ends = missed.ends
+    ends = residuals.ends
     for g in np.unique(group):
         own = np.flatnonzero(group == g)
         if len(own) < 2:
             continue
-        both = missed.seen[own].all(axis=0)
-        path = missed.path[own][:, both]
+        both = residuals.seen[own].all(axis=0)
+        path = residuals.path[own][:, both]
         off = path - path.mean(axis=0)
         dof = len(own) - 1.0
         # Distances from a mean of n are too short by √(1 − 1/n).
@@ -168,8 +168,8 @@ def repeatability(missed: PoseResiduals, group: NDArray[np.int64]) -> dict[str, 
             "across_mm": across,
             "position_rms_mm": float(np.sum(off[..., :2] ** 2)) / dof / max(int(both.sum()), 1),
             "heading_rms_deg": float(np.sum(off[..., 2] ** 2)) / dof / max(int(both.sum()), 1),
-            "delta_s_mm": float(np.var(missed.delta_s_m[own], ddof=1)),
-            "delta_heading_deg": float(np.var(missed.delta_heading_rad[own], ddof=1)),
+            "delta_s_mm": float(np.var(residuals.delta_s_m[own], ddof=1)),
+            "delta_heading_deg": float(np.var(residuals.delta_heading_rad[own], ddof=1)),
         }
         for name, value in values.items():
             per_group[name].append((value, len(own)))
@@ -184,21 +184,21 @@ def repeatability(missed: PoseResiduals, group: NDArray[np.int64]) -> dict[str, 
 
 
 def lack_of_fit(
-    missed: PoseResiduals,
+    residuals: PoseResiduals,
     group: NDArray[np.int64],
     spread: EndSpread | None = None,
     tested: NDArray[np.bool_] | None = None,
 ) -> float | None:
-    """Return a p-value that what is missed is the same for all groups of repeats: lack of fit against pure error.
+    """Return a p-value that residuals are the same for all groups of repeats: lack of fit against pure error.
 
     The unit is the run. From each run come three numbers (where it ended: along, across, heading), in units of how far
-    it may end from its prediction by the scatter that was fitted, which is not the same for a straight and a slalom.
+    it may end from its prediction by the fitted variance, which is not the same for a straight and a slalom.
     The means of groups may also be off, and together, by what the parameters may be: two commands with a level in
     common share its error, and are not two pieces of evidence. Between and within groups they are compared by F, so
-    that the size of the scatter itself does not matter. Without `spread` all runs scatter alike. None without repeats.
+    that the variance itself does not matter. Without `spread` all runs have the same. None without repeats.
 
-    Means are those of the runs `tested` (R,), all by default; how repeats scatter about their own mean is known from
-    all runs: it does not depend on what their prediction was chosen by.
+    Means are those of the runs `tested` (R,), all by default; the dispersion of repeats about their own mean is known
+    from all runs: it does not depend on what their prediction was chosen by.
     """
     from scipy import special
 
@@ -209,17 +209,17 @@ def lack_of_fit(
     within_dof, between_dof = 3 * (len(group) - len(names)), 3 * len(asked)
     if within_dof < _FEWEST_WITHIN_DOF or not between_dof:
         return None
-    apart = missed.ends - _by_group(missed.ends, index)[index]
+    apart = residuals.ends - _by_group(residuals.ends, index)[index]
     spread = spread or _alike(apart, within_dof // 3)
     within = _within(apart, index, spread)
     if within <= 0.0:
         return 1.0
-    between = _between(missed.ends[tested], asked_index, spread.select(tested))
+    between = _between(residuals.ends[tested], asked_index, spread.select(tested))
     return float(special.fdtrc(between_dof, within_dof, between / between_dof / (within / within_dof)))
 
 
 def _alike(apart: Floats, dof: int) -> EndSpread:
-    """Return the spread of runs that all scatter as those do that are `apart` (R, 3) from their groups' means."""
+    """Return the spread of runs with the same dispersion as those `apart` (R, 3) from their groups' means."""
     runs, covariance = len(apart), apart.T @ apart / dof + np.eye(3) * _LEAST**2
     return EndSpread(np.broadcast_to(covariance, (runs, 3, 3)), np.zeros((runs, 3, 0)), np.zeros((0, 0)))
 

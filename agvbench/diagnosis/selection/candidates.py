@@ -17,7 +17,7 @@ from agvbench.model import VehicleModel
 from agvbench.types import Floats
 
 IN_THE_MAPS = frozenset({"steering_saturation", "drive_dead_band"})
-"""What free maps describe by themselves: end stops and dead bands are read off the maps."""
+"""What nodal maps describe by themselves: end stops and dead bands are read off the maps."""
 
 _UNBOUNDED = 1e3
 _STARTS = (0.1, 1.0)
@@ -29,7 +29,7 @@ class Candidate:
     """An effect to try: its ``bounds`` (p, 2), ``scale`` (p,) of its parameters and ``starts`` (n, p) of fits.
 
     ``screened`` says that a regression chose the starts: one of them is near if there is anything to find. ``foremost``
-    says that it promises more than others do: its fit is given all the steps that it takes.
+    says that its predicted gain is larger than that of others: its fit is given all the steps that it takes.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Candidate:
 
 
 def candidates(exclude: Iterable[str] = ()) -> dict[str, Candidate]:
-    """Return every effect of the library that free maps do not describe anyway, by name."""
+    """Return every effect of the library that nodal maps do not describe anyway, by name."""
     out = {*exclude, *IN_THE_MAPS}
     return {name: candidate(kind) for name, kind in effect_kinds().items() if name not in out}
 

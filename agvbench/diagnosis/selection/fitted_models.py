@@ -21,11 +21,11 @@ from agvbench.types import Floats
 OnProgress = Callable[[str], None]
 
 _SHORT, _LONG = 3, 10
-_HOPELESS = 3.0  # what promises less, to first order, is not fitted
-_LIKELY = 40.0  # what promises more is fitted to the end
+_HOPELESS = 3.0  # an effect with a smaller predicted gain is not fitted
+_LIKELY = 40.0  # an effect with a larger one is fitted to convergence
 _MOST_STARTS = 2
 _WORSE = 20.0  # a fit that has not ended yet may still be so much worse than without the effect
-_KEPT = 0.5  # of what is promised: a fit that gains less has lost its way
+_KEPT = 0.5  # of the predicted gain: a fit that gains less has lost its way
 
 
 Starts = frozenset[tuple[str, bytes]]
@@ -70,8 +70,8 @@ class ScoredModel:
     def gain_over(self, other: ScoredModel) -> float:
         """Return by how much this model predicts better, and fits better: the lesser of the two.
 
-        Where few runs tell a value of the maps, predicting without them is a gamble, and wins or loses a hundred.
-        What the runs themselves do not speak for is no gain.
+        Where few runs determine a value of the maps, predicting without them is unreliable, and gains or loses a
+        hundred. What does not fit better is no gain.
         """
         return min(other.total - self.total, float(other.fit.loss.sum() - self.fit.loss.sum()))
 
@@ -139,7 +139,7 @@ class FittedModels:
             return replace(current, names=names)
 
     def predicted_gain(self, current: ScoredModel, name: str) -> float:
-        """Return what the effect called `name` promises beside `current`, to first order, from its best start."""
+        """Return the predicted gain of the effect `name` beside `current`, to first order, from its best start."""
         return max(self._predicted_gains(current, self._predictor((*current.names, name)), usual(name)))
 
     @staticmethod
@@ -158,7 +158,7 @@ class FittedModels:
         ordered = [candidate.starts[k] for k in np.argsort(predicted_gains)[::-1]]
         prior_model = candidate.screened and predicted_gain > _LIKELY
         short = self._begun(current, predictor, ordered, bounds, _KEPT * predicted_gain if prior_model else None)
-        # What promises much may have to climb first: maps that took up a cause must give it back before it shows.
+        # A large predicted gain may need a worse fit first: maps that absorbed a cause must give it back.
         if predicted_gain < _LIKELY and float(now.loss.sum() - short.loss.sum()) < _HOPELESS:
             self.tried += 1
             tried = ScoredModel(names, short, cross_validated(short, self._fold, bounds), starts)
@@ -170,7 +170,7 @@ class FittedModels:
     ) -> Fit:
         """Return a fit of some steps from the first of `starts`, or the best of them where it gains less than `least`.
 
-        A start is far from the valley, for the maps have taken up what it adds, and the way down may end anywhere: then
+        A start is far from the valley, for the maps have absorbed what it adds, and the descent may end anywhere: then
         the maps are first fitted beside it, held where it starts. Where nothing can be expected (`least` is None), that
         is done if the fit ends worse than without, and for a few steps only.
         """

@@ -1,8 +1,8 @@
 """Where the steering stood before a run's first command: at neutral, or at that command already.
 
 Some benches leave the axles at neutral between runs, others set them long before the clock starts, and no
-campaign says which. It matters only to what moves the axles with a delay, and there a wrong belief is another effect: a
-servo that had no way to go looks infinitely fast. So the runs decide, between the two.
+campaign says which. It matters only to what moves the axles with a delay, and there a wrong assumption looks like
+another effect: a servo that had no way to go looks infinitely fast. So the runs decide, between the two.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def choose_initial_steering(selector: Selector) -> Selector:
 
 
 def reconsider_initial_steering(selection: Selection, selector: Selector) -> tuple[Selection, Selector]:
-    """Select again under the other belief where what was chosen predicts better by far under it."""
+    """Select again under the other hypothesis where what was chosen predicts better by far under it."""
     chosen = selection.chosen
     if not set(SLOW_STEERING) & {cause_of(name) for name in chosen.names}:
         return selection, selector
@@ -50,7 +50,7 @@ def reconsider_initial_steering(selection: Selection, selector: Selector) -> tup
 
 
 def under_other_initial_steering(selector: Selector) -> Selector:
-    """Return a selector of the same runs under the other belief."""
+    """Return a selector of the same runs under the other hypothesis."""
     batch = selector.batch
     readings = replace(batch.readings, preset=not batch.readings.preset)
     return selector.over(Batch(readings, batch.maps, batch.geometry, kinds=batch.kinds))

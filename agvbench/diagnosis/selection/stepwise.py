@@ -15,16 +15,16 @@ from agvbench.diagnosis.residuals.residuals import pose_residuals
 from agvbench.diagnosis.selection.fitted_models import FittedModels, ScoredModel
 
 LEAST_GAIN = 12.0
-"""Least cross-validated gain in minus two log likelihood that earns an effect its place, before the correction for
-having tried many: each effect tried adds as if its gain came from one of so many."""
+"""Selection criterion: the least cross-validated gain in minus two log likelihood, before the correction for having
+tried many: each effect tried adds as if its gain came from one of so many."""
 
 ALTERNATIVE_MARGIN = 10.0
-"""An effect that predicts this much worse, or less, in place of a named one is its rival."""
+"""An effect that predicts this much worse, or less, in place of a named one is an indistinguishable alternative."""
 
 NOTICEABLE = 0.15
 """An effect has to move the prediction by this part of what remains unpredicted, be it ever so certain."""
 
-_NEARLY_ALTERNATIVE = 100.0  # a rival may look so much worse because its fit ended sooner
+_NEARLY_ALTERNATIVE = 100.0  # an alternative may look so much worse because its fit ended sooner
 _MOST_EFFECTS = 4
 
 
@@ -48,7 +48,7 @@ class Selection:
 
 @dataclass
 class Selector(FittedModels):
-    """Tries effects on the runs to be fitted, and decides which earn their place.
+    """Tries effects on the runs to be fitted, and decides which meet the selection criterion.
 
     ``wide`` keeps a batch with more than the library, once one was needed.
     """
@@ -102,15 +102,15 @@ class Selector(FittedModels):
         )
 
     def _noticeable(self, without: ScoredModel, with_it: ScoredModel) -> bool:
-        """Whether the prediction moves by a noticeable part of what the larger model misses anyway."""
+        """Whether the prediction moves by a noticeable part of the larger model's residuals."""
         readings = self.batch.readings
         small, large = (model.fit.predictor.predict(model.fit.parameters) for model in (without, with_it))
-        missed = pose_residuals(readings, large).squares()
+        residuals = pose_residuals(readings, large).squares()
         moved = pose_residuals(
             replace(readings, poses=np.where(readings.seen[..., None], small, np.nan)), large
         ).squares()
         return any(
-            float(np.mean(moved[name])) > self.noticeable**2 * float(np.mean(missed[name]))
+            float(np.mean(moved[name])) > self.noticeable**2 * float(np.mean(residuals[name]))
             for name in ("position_rms_mm", "heading_rms_deg")
         )
 
@@ -118,7 +118,7 @@ class Selector(FittedModels):
         return tuple(name for name in current.names if name not in self.given)
 
     def backward_elimination(self, base: ScoredModel, current: ScoredModel) -> tuple[ScoredModel, dict[str, float]]:
-        """Return the model with only the effects that earn their place, and what the loss of each would cost."""
+        """Return the model with only the effects that meet the criterion, and what the loss of each would cost."""
         while found := self._found(current):
             smaller = {name: self.without_effect(base, current, name) for name in found}
             gains = {name: model.total - current.total for name, model in smaller.items()}
@@ -131,7 +131,7 @@ class Selector(FittedModels):
     def with_swaps(
         self, base: ScoredModel, current: ScoredModel, among: Mapping[str, Iterable[str]] | None = None
     ) -> tuple[ScoredModel, dict[str, dict[str, float]]]:
-        """Return the model with any effect replaced by another that predicts better in its place, and the rivals left.
+        """Return the model with effects replaced by others that predict better, and the alternatives left.
 
         What was chosen first was chosen in the place of all the others, too, and may only look like one of them.
 

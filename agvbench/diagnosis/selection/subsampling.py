@@ -48,14 +48,14 @@ def some_repeats(group: NDArray[np.int64], most: int) -> NDArray[np.bool_]:
 def measured_in_all(
     selection: Selection, term_selection: TermSelection | None, selector: Selector, readings: Readings
 ) -> tuple[Selection, TermSelection | None]:
-    """Return what was found with its models fitted to all runs to be fitted; gains and rivals stay as they were found.
+    """Return what was found with its models fitted to all training runs; gains and alternatives stay as found.
 
     Parameters
     ----------
     selection, explained
         What was found in some of the runs.
     selector
-        Who found it.
+        That found it.
     readings
         All runs to be fitted.
     """

@@ -40,7 +40,7 @@ class Assessment:
 
     @property
     def lacks(self) -> bool:
-        """Whether more is missed than repeats scatter, and other than by chance."""
+        """Whether the residuals are above repeatability, and significantly so."""
         after = self.after.rms()
         above = any(
             after[name] > WITHIN_REPEATABILITY * self.repeatability[name]
@@ -57,32 +57,32 @@ def assess(
     spread: EndSpread,
     repeats: NDArray[np.bool_] | None = None,
 ) -> Assessment | None:
-    """Return how poses (R, K, 3) predicted ``before`` and ``after`` miss the runs `held` (R,); None without repeats.
+    """Return the residuals of the runs `held` (R,) from poses (R, K, 3) ``before`` and ``after``; None without repeats.
 
-    The lack of fit is held against the scatter of the runs `repeats` (R,), those `held` among them; by default these.
+    The lack of fit is tested against the runs `repeats` (R,), those `held` among them; by default these.
     """
     kept = readings.select(held)
-    missed = pose_residuals(kept, after[held])
-    least = repeatability(missed, kept.group) or repeatability(pose_residuals(readings, after), readings.group)
+    residuals = pose_residuals(kept, after[held])
+    least = repeatability(residuals, kept.group) or repeatability(pose_residuals(readings, after), readings.group)
     if least is None:
         return None
     among = held if repeats is None else repeats
     several = readings.select(among)
     p_value = lack_of_fit(pose_residuals(several, after[among]), several.group, spread.select(among), held[among])
-    return Assessment(pose_residuals(kept, before[held]), missed, least, p_value)
+    return Assessment(pose_residuals(kept, before[held]), residuals, least, p_value)
 
 
 def predicts(selection: Selection, term_selection: TermSelection | None, readings: Readings) -> Predictor:
     """Return what predicts `readings` with the effects that were chosen, and the term if there is one."""
     chosen = (term_selection.selection if term_selection else selection).chosen
     fitted = chosen.fit.predictor.batch
-    reformed = bool(effect_variants().keys() & set(chosen.names))
-    batch = Batch(readings, fitted.maps, fitted.geometry, kinds=BEYOND if term_selection or reformed else ())
+    has_variants = bool(effect_variants().keys() & set(chosen.names))
+    batch = Batch(readings, fitted.maps, fitted.geometry, kinds=BEYOND if term_selection or has_variants else ())
     return Predictor(batch, chosen.names)
 
 
 def fails_validation(selection: Selection, readings: Readings, held: NDArray[np.bool_]) -> bool:
-    """Whether the runs `held` (R,) miss what was chosen by more than their scatter; no runs do not."""
+    """Whether the residuals of the runs `held` (R,) show lack of fit of what was chosen; without runs they do not."""
     if not held.any():
         return False
     kept = readings.select(held)
@@ -102,8 +102,8 @@ def validated(
 ) -> tuple[Selection, TermSelection | None]:
     """Return what was found, or the maps alone where they predict the validation runs better.
 
-    Cross-validation asks the runs that were fitted, and may be led astray by all of them together. A cause at work
-    improves what nobody looked at, too.
+    Cross-validation uses the runs that were fitted, and a bias that they share may mislead it. A real cause improves
+    unseen runs, too.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def validated(
         What was found.
     kept
         The validation runs; without any, what was found is kept.
-    tell
+    on_progress
         Called with a line if it is rejected.
     """
     chosen = term_selection.selection.chosen if term_selection else selection.chosen
@@ -119,14 +119,14 @@ def validated(
         return selection, term_selection
     fitted = chosen.fit.predictor.batch
     batch = Batch(kept, fitted.maps, fitted.geometry, kinds=fitted.kinds)
-    if _missed(chosen, batch) <= _missed(selection.base, batch):
+    if _mean_square(chosen, batch) <= _mean_square(selection.base, batch):
         return selection, term_selection
     on_progress(f"{' + '.join(chosen.names)}: rejected in validation: the validation runs are predicted better without")
     rejected = selection.rejected | selection.gains
     return replace(selection, chosen=selection.base, alternatives={}, gains={}, rejected=rejected), None
 
 
-def _missed(model: ScoredModel, batch: Batch) -> float:
-    """Return the mean square of the position that a model misses of the runs of `batch` [m²]."""
+def _mean_square(model: ScoredModel, batch: Batch) -> float:
+    """Return the mean square of a model's position residuals in the runs of `batch` [m²]."""
     poses = Predictor(batch, model.fit.predictor.effects).predict(model.fit.parameters)
     return float(np.mean(pose_residuals(batch.readings, poses).squares()["position_rms_mm"]))

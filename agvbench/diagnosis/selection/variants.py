@@ -67,7 +67,7 @@ class _Law:
 def select_variants(selection: Selection, selector: Selector) -> Selection:
     """Return the selection with laws that predict better in place of the library's, where they do.
 
-    An effect beside it that only made up for the wrong law loses its place. The names of laws are their own; a
+    An effect beside it that only compensated for the wrong law is removed. The names of laws are their own; a
     diagnosis calls them by what they are forms of.
     """
     found = [name for name in selection.chosen.names if name not in selector.given]
@@ -131,15 +131,15 @@ def select_variants_and_reconsider(selection: Selection, selector: Selector) -> 
 
     In the wrong law a slow servo may look as if it had stood elsewhere.
     """
-    reformed = select_variants(selection, selector)
-    if reformed is selection or not under_other_start(reformed.chosen, selector):
-        return reformed, selector
+    varied = select_variants(selection, selector)
+    if varied is selection or not under_other_start(varied.chosen, selector):
+        return varied, selector
     again, other = selected_under_other_start(selector)
-    return (again, other) if again.chosen.total < reformed.chosen.total else (reformed, selector)
+    return (again, other) if again.chosen.total < varied.chosen.total else (varied, selector)
 
 
 def under_other_start(chosen: ScoredModel, selector: Selector) -> bool:
-    """Whether a model with slow steering predicts better by far under the other belief of where that stood."""
+    """Whether a model with slow steering predicts better by far under the other initial steering."""
     if not {*SLOW_STEERING} & {cause_of(name) for name in chosen.names}:
         return False
     there = under_other_initial_steering(wider(selector))
@@ -147,14 +147,14 @@ def under_other_start(chosen: ScoredModel, selector: Selector) -> bool:
 
 
 def selected_under_other_start(selector: Selector) -> tuple[Selection, Selector]:
-    """Return what is selected under the other belief of where the steering stood, and who selected it."""
+    """Return what is selected under the other initial steering, and its selector."""
     other = under_other_initial_steering(selector)
     other.candidates = {n: c for n, c in other.candidates.items() if n not in effect_variants() or n in selector.given}
     return select_variants(other.select(), other), other
 
 
 def _laws(selection: Selection, selector: Selector, wide: Selector, name: str) -> Iterator[_Law]:
-    """Yield other laws of the cause `name`, and of others that do half as well in its place or promise to."""
+    """Yield other laws of the cause `name`, and of others with half its gain, or half of it predicted."""
     chosen = selection.chosen
     rest = selector.without_effect(selection.base, chosen, name)
     models = {name: chosen} | {
@@ -197,7 +197,7 @@ def _values(model: ScoredModel, name: str) -> dict[str, float]:
 def _offers(wide: Selector, current: ScoredModel, law: _Law) -> list[ScoredModel]:
     """Return `current` with a law in its place, and with it in place of one effect more each."""
     variant = replace(candidate(law.variant), starts=law.starts)
-    # What stands beside a wrong law may only make up for it.
+    # What stands beside a wrong law may only compensate for it.
     others = [other for other in current.names if other != law.out and other not in wide.given]
     return [_swapped(wide, current, {law.out, *more}, variant) for more in ([], *([other] for other in others))]
 
@@ -220,7 +220,7 @@ def _does(offer: ScoredModel, current: ScoredModel) -> bool:
 
 
 def _swapped(wide: Selector, current: ScoredModel, out: set[str], variant: Candidate) -> ScoredModel:
-    """Return `current` with a law in place of the effects `out`, fitted from the scatter and offsets that it has."""
+    """Return `current` with a law in place of the effects `out`, fitted from its variance components and offsets."""
     own = current.fit.effect_values()
     kept = [value for key, value in own.items() if key.partition(".")[0] not in out]
     names = (*(name for name in current.names if name not in out), variant.name)
@@ -239,7 +239,7 @@ def _swapped(wide: Selector, current: ScoredModel, out: set[str], variant: Candi
 
 
 def _alternatives(selection: Selection, name: str, better: float) -> dict[str, float]:
-    """Return who would still do in the place of the cause `name`, now that its law predicts better."""
+    """Return the effects that still do in the place of the cause `name`, now that its law predicts better."""
     known = selection.alternatives.get(cause_of(name), {})
     return {other: worse + better for other, worse in known.items() if worse + better < ALTERNATIVE_MARGIN}
 

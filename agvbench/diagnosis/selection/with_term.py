@@ -55,13 +55,13 @@ def described(term_selection: TermSelection) -> dict[str, object]:
 def with_term_first(rest: list[Dependence], term_selection: TermSelection) -> list[Dependence]:
     """Return the dependences with what the term depends on first.
 
-    Of covariates that the term leaves open (along x or along y) it is the one that smooth curves find stronger.
+    Where the term does not decide between covariates (x or y) it is the one that smooth curves find stronger.
     """
     own = [d for d in rest if d.covariate in term_selection.term.covariates]
     if own:
         first = replace(own[0], p_value=min(own[0].p_value, term_selection.p_value))
         return [first, *(d for d in rest if d is not own[0])]
-    with_term, without = (_missed(model) for model in (term_selection.selection.chosen, term_selection.without))
+    with_term, without = (_sum_of_squares(model) for model in (term_selection.selection.chosen, term_selection.without))
     share = 1.0 - with_term / max(without, 1e-300)
     return [
         Dependence(term_selection.term.covariates[0], term_selection.term.through, term_selection.p_value, share),
@@ -69,8 +69,8 @@ def with_term_first(rest: list[Dependence], term_selection: TermSelection) -> li
     ]
 
 
-def _missed(model: ScoredModel) -> float:
-    """Return the sum of squares that a model misses, no run's own offsets helping."""
+def _sum_of_squares(model: ScoredModel) -> float:
+    """Return the sum of squares of a model's residuals without random effects."""
     predictor = model.fit.predictor
     return float(np.nansum(residual_of(predictor, predictor.predict(model.fit.parameters)) ** 2))
 

@@ -19,7 +19,7 @@ _PER_ROOT = 1.0 / math.sqrt(math.tau)
 
 @dataclass(frozen=True)
 class TurnAtLine(DiscrepancyTerm):
-    """A line on the floor turns what crosses it, one way across and the other way back."""
+    """A line on the floor turns what crosses it, one way across and the other way on the return."""
 
     name: ClassVar[str] = "turn_at_line"
     stage: ClassVar[Stage] = Stage.FLOOR
@@ -92,7 +92,7 @@ class TwistAtStart(DiscrepancyTerm):
 
 @dataclass(frozen=True)
 class WaveByDistance(DiscrepancyTerm):
-    """Speed and course swing with the way driven in the run, once per period."""
+    """Speed and course vary with the distance driven in the run, once per period."""
 
     name: ClassVar[str] = "wave_by_distance"
     stage: ClassVar[Stage] = Stage.BODY
@@ -110,7 +110,7 @@ class WaveByDistance(DiscrepancyTerm):
     def move(
         state: Floats, period_m: float, speed_cosine: float, speed_sine: float, turn_cosine: float, turn_sine: float
     ) -> None:
-        """Swing."""
+        """Oscillate."""
         if period_m > 0.0:
             angle = math.tau * state[DISTANCE] / period_m
             c, s = math.cos(angle), math.sin(angle)
