@@ -26,7 +26,7 @@ from agvbench.running.configuration.vehicles import uncalibrated_vehicle
 from agvbench.running.execution.drive import drive
 from agvbench.running.positioning.placers import Auto, Rig
 from agvbench.running.quality import DEFAULT_LIMITS
-from agvbench.running.supervision import Supervisor
+from agvbench.running.supervision.supervisor import Supervisor
 from agvbench.simulator.hidden import sampled_spec
 from agvbench.types import Command, Commands, Pose, wrap_angle
 from agvbench.vehicle.geometry import Geometry

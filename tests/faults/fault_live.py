@@ -21,7 +21,8 @@ from agvbench.bus.link import VehicleLink
 from agvbench.errors import AgvbenchError
 from agvbench.planning import Workspace
 from agvbench.running.execution.drive import Timing, drive
-from agvbench.running.supervision import DEFAULT_SAFETY, SafetyLimits, Supervisor
+from agvbench.running.supervision.limits import DEFAULT_SAFETY, SafetyLimits
+from agvbench.running.supervision.supervisor import Supervisor
 from agvbench.types import Command, Commands, Pose
 
 NEUTRAL = Command(1500.0, 1500.0, 1500.0)

@@ -21,7 +21,7 @@ from agvbench.running.links import ContinuousLink
 from agvbench.running.positioning.placers import PLACERS, Auto, Rig, choose_placer
 from agvbench.running.quality import DEFAULT_LIMITS
 from agvbench.running.session.opening import open_session
-from agvbench.running.supervision import Supervisor
+from agvbench.running.supervision.supervisor import Supervisor
 from agvbench.types import Pose
 from agvbench.vehicle.geometry import Geometry
 

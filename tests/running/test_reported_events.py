@@ -24,7 +24,7 @@ from agvbench.reporting.sections import all_sections
 from agvbench.running.execution import bench, drive
 from agvbench.running.quality import Quality, not_as_planned
 from agvbench.running.session.opening import open_session
-from agvbench.running.supervision import SafetyLimits
+from agvbench.running.supervision.limits import SafetyLimits
 from agvbench.types import RUN_OK, Command
 from agvbench.workflows.report import gather
 

@@ -19,7 +19,7 @@ from agvbench.planning.shortest_paths.return_path import GearLeg
 from agvbench.running.links import ContinuousLink
 from agvbench.running.positioning.automatic_return.leg_drive import Follower
 from agvbench.running.positioning.automatic_return.returner import Returner
-from agvbench.running.supervision import Supervisor
+from agvbench.running.supervision.supervisor import Supervisor
 from agvbench.types import Command, Pose, wrap_angle
 from agvbench.vehicle.geometry import Geometry
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
+from typing import get_args
 
 import pytest
 
 from agvbench.errors import AgvbenchError, FileError, FlagError
 from agvbench.model import thesis_vehicle
-from agvbench.running.configuration.settings import SETTINGS_FILE, BenchSettings, settings_for_resume
+from agvbench.planning.trajectories.segments import Steering
+from agvbench.running.configuration.session_options import OPTIONS
+from agvbench.running.configuration.settings import SETTINGS_FILE, STEERINGS, BenchSettings, settings_for_resume
 from agvbench.running.session.opening import open_session
 from agvbench.vehicle.geometry import Geometry
 
@@ -108,3 +111,15 @@ def test_a_campaign_may_be_renamed_between_sessions_and_lie_where_one_stands(tmp
     (tmp_path / "tonight").rename(tmp_path / "monday")
     with open_session({}, out=str(tmp_path / "monday"), resume=True, dry_run=False) as session:
         assert session._bench.writer.header.name == "tonight"
+
+
+def test_the_modes_of_steering_are_those_of_trajectories():
+    assert get_args(Steering) == STEERINGS
+
+
+def test_every_option_is_a_field_with_help():
+    flags = [flag for flag, _, _ in OPTIONS]
+    assert flags == [
+        f"--{f.name.replace('_', '-')}" for f in fields(BenchSettings) if f.name not in {"benchmarks", "only"}
+    ]
+    assert all(text for _, _, text in OPTIONS)

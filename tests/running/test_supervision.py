@@ -14,12 +14,13 @@ from agvbench.bus.keys import Keys
 from agvbench.errors import SafetyStopError
 from agvbench.planning import Workspace
 from agvbench.running.execution.drive import drive
-from agvbench.running.supervision import DEFAULT_SAFETY, SafetyLimits, Supervisor
+from agvbench.running.supervision.limits import DEFAULT_SAFETY, SafetyLimits
 from agvbench.running.supervision.rule import Slice
 from agvbench.running.supervision.rules.frozen import FrozenRule
 from agvbench.running.supervision.rules.jump import JumpRule
 from agvbench.running.supervision.rules.lost import LostRule
 from agvbench.running.supervision.rules.volume import VolumeRule
+from agvbench.running.supervision.supervisor import Supervisor
 from agvbench.types import Command, Commands, Frames, Pose
 
 PLANTS = Path(__file__).with_name("runaway_plants.py")

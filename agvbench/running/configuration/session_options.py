@@ -5,7 +5,10 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Callable
+from dataclasses import Field, fields
 from typing import Any
+
+from agvbench.running.configuration.settings import BenchSettings
 
 PYTEST_PREFIX = "--agvbench-"
 SHORT_NAMES = "--agvbench-short-names"
@@ -45,92 +48,22 @@ def number(text: str) -> float:
 
 # Not given is None everywhere, so that a resumed session can distinguish given options from defaults.
 _FLAG: dict[str, Any] = {"action": "store_true", "default": None}
-OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
-    (
-        "--agv",
-        {"metavar": "ADAPTER"},
-        "vehicle adapter: sim (default); live, in real time; serial:PORT; simavr, its firmware; FILE.py:ADDRESS",
-    ),
-    (
-        "--mocap",
-        {"metavar": "ADAPTER"},
-        "motion capture adapter: sim (default); natnet:HOST; natnet:emulated; FILE.py:ADDRESS",
-    ),
-    (
-        "--camera",
-        {"metavar": "NAME=VALUE", "action": Joined},
-        "an option of the camera, such as body=blue or rate_hz=240; several with commas, or one after another",
-    ),
-    (
-        "--plant",
-        {"metavar": "PLANT"},
-        "simulated plant, MODULE_OR_FILE:FACTORY (default: a vehicle like the thesis')",
-    ),
-    (
-        "--trajectories",
-        {"metavar": "NAME", "action": Joined},
-        "names or .toml files, with commas or one after another (default: the eight, and your own in trajectories/)",
-    ),
-    (
-        "--steering",
-        {"choices": ("abeam", "front", "rear", "opposite", "crab")},
-        "steer every trajectory in this mode (default: as each says, or with the one axle that steers)",
-    ),
-    ("--vehicle", {"metavar": "FILE"}, "vehicle.toml before calibration (default: nominal maps)"),
-    ("--calibration", {"metavar": "FILE"}, "calibrated vehicle.toml (default: calibrate in this session)"),
-    (
-        "--corrected",
-        {"metavar": "FILE"},
-        "vehicle.toml with effects, for the condition corrected (default: not driven)",
-    ),
-    (
-        "--remainders",
-        {"metavar": "FILE"},
-        "end-pose bias of the corrected model, by trajectory (agvbench loop writes it)",
-    ),
-    ("--maps", {"choices": ("default", "thesis")}, "maps to calibrate: default, or the thesis' line and cubic"),
-    ("--repeats", {"type": whole_number, "metavar": "N"}, "repeats of each trajectory and condition (default: 10)"),
-    (
-        "--order",
-        {"choices": ("interleaved", "blocked", "shuffled")},
-        "order of runs (default: interleaved; the thesis drove blocked)",
-    ),
-    ("--seed", {"type": whole_number, "metavar": "N"}, "seed of everything random (default: 0)"),
-    ("--full", _FLAG, "every pulse, configuration and repeat of the thesis' calibration"),
-    ("--attempts", {"type": whole_number, "metavar": "N"}, "attempts at a run that is rejected (default: 3)"),
-    (
-        "--place",
-        {"choices": ("auto", "operator", "teleport")},
-        "how it gets to its start: auto (drives itself), operator (real: default), teleport (simulated: default)",
-    ),
-    (
-        "--workspace",
-        {"metavar": "SHAPE"},
-        "floor that the cameras see [m], such as circle:6.1 (default) or rectangle:7x5",
-    ),
-    (
-        "--connect",
-        {"metavar": "ENDPOINT"},
-        "where the adapters run, such as tcp/127.0.0.1:7447 (default: in process)",
-    ),
-    (
-        "--bus-config",
-        {"metavar": "FILE"},
-        "certificates and rules of a secured bus, as Zenoh writes them (default: none)",
-    ),
-    (
-        "--exchange",
-        {"type": number, "metavar": "S"},
-        "control cycle of a simulated vehicle: longer is sooner driven, later stopped (default: 0.1, as a real one)",
-    ),
-    (
-        "--session",
-        {"metavar": "NAME"},
-        "resumed after the vehicle was charged, re-mounted or trimmed: a new name for the runs from now on",
-    ),
-    ("--lab", {"metavar": "NAME"}, "name of the lab on the bus (default: lab)"),
-    ("--vehicle-name", {"metavar": "NAME"}, "name of the vehicle on the bus, and of its body (default: agv1)"),
-)
+_BY_TYPE: dict[str, dict[str, Any]] = {
+    "str": {},
+    "bool": _FLAG,
+    "int": {"type": whole_number},
+    "float": {"type": number},
+}
+
+
+def _declared(option: Field[Any]) -> tuple[str, dict[str, Any], str]:
+    """Return flag, keywords and help of a field of the settings."""
+    joined = {"action": Joined} if option.metadata["joined"] else {}
+    keywords = _BY_TYPE[str(option.type)] | joined | option.metadata["keywords"]
+    return f"--{option.name.replace('_', '-')}", keywords, option.metadata["help"]
+
+
+OPTIONS = tuple(_declared(option) for option in fields(BenchSettings) if option.metadata)
 SESSION_OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
     ("--out", {"metavar": "DIR"}, "campaign directory (default: a new one under campaigns/)"),
     ("--resume", _FLAG, "go on with an interrupted session: the one in --out, or the last"),

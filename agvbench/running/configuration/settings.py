@@ -1,18 +1,17 @@
-"""The settings of a bench session, kept beside its campaign so that it can be resumed."""
+"""The settings of a bench session, kept beside its campaign so that it can be resumed. Imports nothing heavy."""
 
 from __future__ import annotations
 
 import math
 import tomllib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import tomli_w
 
 from agvbench.errors import FileError, FlagError
-from agvbench.planning.trajectories.segments import Steering
 from agvbench.running.supervision.limits import DEFAULT_SAFETY
 from agvbench.text_files import read_toml
 
@@ -20,6 +19,8 @@ SETTINGS_FILE = "bench.toml"
 ORDERS = ("interleaved", "blocked", "shuffled")
 PLACES = ("auto", "operator", "teleport")
 MAPS = ("default", "thesis")
+STEERINGS = ("abeam", "front", "rear", "opposite", "crab")
+"""Those of `agvbench.planning.trajectories.segments.Steering`, which takes longer to import."""
 _MOST_REPEATS = 1000
 """A thousand repeats of the shipped benchmarks take days; all runs are planned before the first is driven."""
 _LARGEST_SEED = 2**63 - 1
@@ -29,46 +30,94 @@ _FREE_ON_RESUME = frozenset({"benchmarks", "only", "connect", "bus_config", "lab
 _MAY_HAVE_FAULTS = ("agv", "mocap", "camera")
 
 
+def _option(default: Any, text: str, *, joined: bool = False, **keywords: Any) -> Any:
+    """Return a field that is an option: its help, and what argparse and pytest declare it with."""
+    return field(default=default, metadata={"help": text, "joined": joined, "keywords": keywords})
+
+
 @dataclass(frozen=True)
 class BenchSettings:
     """The options that decide what is driven.
 
-    ``agv``, ``mocap`` and ``plant`` name adapters and the simulated plant, ``camera`` its options; ``vehicle`` and
-    ``calibration`` are vehicle files ("" for the shipped nominal vehicle, and for calibrating in this session),
-    ``corrected`` the one with the effects that a diagnosis found ("" for none: the condition is not driven) and
-    ``remainders`` its end-pose bias; ``trajectories`` are names or files with commas between ("" for the
-    eight and the lab's own); ``repeats`` 0 means what each benchmark declares; ``order`` is one of
-    `ORDERS`; ``steering`` is the mode in which all trajectories are steered ("" for each its own); ``place``, one of
-    `PLACES`, is how the vehicle comes to its starts ("" for the usual way); ``full`` drives every pulse of the thesis;
-    ``exchange`` [s] is the control cycle of a simulated vehicle. ``vehicle_name`` is what the bus calls the
-    vehicle, and ``session`` what the runs from now on belong to ("" for what the last belonged to); ``benchmarks`` are
-    names or files, and ``only`` chooses among their runs by pytest's ``-k``.
+    Every field but the last two is an option of ``agvbench bench``, and with the prefix ``--agvbench-`` one of pytest.
+    An empty text is the usual value that the option's help names; ``repeats`` 0 is the number that each benchmark
+    declares. ``benchmarks`` are names or files, and ``only`` selects runs of them by pytest's ``-k``.
     """
 
-    agv: str = "sim"
-    mocap: str = "sim"
-    camera: str = ""
-    plant: str = "agvbench.simulator:make_plant"
-    steering: str = ""
-    vehicle: str = ""
-    calibration: str = ""
-    corrected: str = ""
-    remainders: str = ""
-    trajectories: str = ""
-    maps: str = "default"
-    repeats: int = 0
-    order: str = "interleaved"
-    seed: int = 0
-    full: bool = False
-    attempts: int = 3
-    place: str = ""
-    workspace: str = "circle:6.1"
-    connect: str = ""
-    bus_config: str = ""
-    lab: str = "lab"
-    vehicle_name: str = "agv1"
-    session: str = ""
-    exchange: float = DEFAULT_SAFETY.control_cycle_s
+    agv: str = _option(
+        "sim",
+        "vehicle adapter: sim (default); live, in real time; serial:PORT; simavr, its firmware; FILE.py:ADDRESS",
+        metavar="ADAPTER",
+    )
+    mocap: str = _option(
+        "sim", "motion capture adapter: sim (default); natnet:HOST; natnet:emulated; FILE.py:ADDRESS", metavar="ADAPTER"
+    )
+    camera: str = _option(
+        "",
+        "an option of the camera, such as body=blue or rate_hz=240; several with commas, or one after another",
+        metavar="NAME=VALUE",
+        joined=True,
+    )
+    plant: str = _option(
+        "agvbench.simulator:make_plant",
+        "simulated plant, MODULE_OR_FILE:FACTORY (default: a vehicle like the thesis')",
+        metavar="PLANT",
+    )
+    trajectories: str = _option(
+        "",
+        "names or .toml files, with commas or one after another (default: the eight, and your own in trajectories/)",
+        metavar="NAME",
+        joined=True,
+    )
+    steering: str = _option(
+        "",
+        "steer every trajectory in this mode (default: as each says, or with the one axle that steers)",
+        choices=STEERINGS,
+    )
+    vehicle: str = _option("", "vehicle.toml before calibration (default: nominal maps)", metavar="FILE")
+    calibration: str = _option("", "calibrated vehicle.toml (default: calibrate in this session)", metavar="FILE")
+    corrected: str = _option(
+        "", "vehicle.toml with effects, for the condition corrected (default: not driven)", metavar="FILE"
+    )
+    remainders: str = _option(
+        "", "end-pose bias of the corrected model, by trajectory (agvbench loop writes it)", metavar="FILE"
+    )
+    maps: str = _option("default", "maps to calibrate: default, or the thesis' line and cubic", choices=MAPS)
+    repeats: int = _option(0, "repeats of each trajectory and condition (default: 10)", metavar="N")
+    order: str = _option(
+        "interleaved", "order of runs (default: interleaved; the thesis drove blocked)", choices=ORDERS
+    )
+    seed: int = _option(0, "seed of everything random (default: 0)", metavar="N")
+    full: bool = _option(False, "every pulse, configuration and repeat of the thesis' calibration")
+    attempts: int = _option(3, "attempts at a run that is rejected (default: 3)", metavar="N")
+    place: str = _option(
+        "",
+        "how it gets to its start: auto (drives itself), operator (real: default), teleport (simulated: default)",
+        choices=PLACES,
+    )
+    workspace: str = _option(
+        "circle:6.1", "floor that the cameras see [m], such as circle:6.1 (default) or rectangle:7x5", metavar="SHAPE"
+    )
+    connect: str = _option(
+        "", "where the adapters run, such as tcp/127.0.0.1:7447 (default: in process)", metavar="ENDPOINT"
+    )
+    bus_config: str = _option(
+        "", "certificates and rules of a secured bus, as Zenoh writes them (default: none)", metavar="FILE"
+    )
+    exchange: float = _option(
+        DEFAULT_SAFETY.control_cycle_s,
+        "control cycle of a simulated vehicle: longer is sooner driven, later stopped (default: 0.1, as a real one)",
+        metavar="S",
+    )
+    session: str = _option(
+        "",
+        "resumed after the vehicle was charged, re-mounted or trimmed: a new name for the runs from now on",
+        metavar="NAME",
+    )
+    lab: str = _option("lab", "name of the lab on the bus (default: lab)", metavar="NAME")
+    vehicle_name: str = _option(
+        "agv1", "name of the vehicle on the bus, and of its body (default: agv1)", metavar="NAME"
+    )
     benchmarks: tuple[str, ...] = ()
     only: str = ""
 
@@ -77,8 +126,6 @@ class BenchSettings:
         _check(0 <= self.repeats <= _MOST_REPEATS, "--repeats", self.repeats, repeats, "give a whole number of repeats")
         _check(self.attempts >= 1, "--attempts", self.attempts, "at least 1", "give a whole number of attempts")
         _check(0 <= self.seed <= _LARGEST_SEED, "--seed", self.seed, f"0 to {_LARGEST_SEED}", "choose another seed")
-        _check(self.order in ORDERS, "--order", self.order, ", ".join(ORDERS), "choose one of these")
-        _check(self.place in ("", *PLACES), "--place", self.place, ", ".join(PLACES), "choose one of these")
         least = DEFAULT_SAFETY.watch_s
         _check(
             least <= self.exchange < math.inf,
@@ -87,9 +134,11 @@ class BenchSettings:
             f"from {least:g} s",
             "leave it out",
         )
-        modes = get_args(Steering)
-        _check(self.steering in ("", *modes), "--steering", self.steering, ", ".join(modes), "choose one of these")
-        _check(self.maps in MAPS, "--maps", self.maps, ", ".join(MAPS), "choose one of these")
+        for option in fields(self):
+            choices = option.metadata.get("keywords", {}).get("choices")
+            if choices:
+                value, allowed = getattr(self, option.name), (option.default, *choices)
+                _check(value in allowed, f"--{option.name}", value, ", ".join(choices), "choose one of these")
 
     @classmethod
     def given(cls, options: Mapping[str, Any]) -> BenchSettings:

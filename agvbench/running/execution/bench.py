@@ -37,7 +37,8 @@ from agvbench.running.links import RunnerLink
 from agvbench.running.positioning.placers import Rig, make_placer
 from agvbench.running.positioning.start_pose import notify_operator
 from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess, not_as_planned
-from agvbench.running.supervision import DEFAULT_SAFETY, Supervisor
+from agvbench.running.supervision.limits import DEFAULT_SAFETY
+from agvbench.running.supervision.supervisor import Supervisor
 from agvbench.types import Command, Frames, Outcome, Run, RunStatus
 
 _UNNAMED = SessionBegan()

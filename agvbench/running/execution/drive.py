@@ -10,7 +10,7 @@ import numpy as np
 
 from agvbench.running.links import RunnerLink
 from agvbench.running.rest_detection import is_at_rest
-from agvbench.running.supervision import Supervisor, safety_stop
+from agvbench.running.supervision.supervisor import Supervisor, safety_stop
 from agvbench.types import Command, Commands, Frames, Pose
 
 

@@ -14,7 +14,7 @@ from agvbench.running.links import RunnerLink
 from agvbench.running.positioning.automatic_return.returner import Returner, ReturnResult
 from agvbench.running.positioning.start_pose import notify_operator, wait_for_start, wait_until_seen
 from agvbench.running.quality import QualityLimits
-from agvbench.running.supervision import Supervisor
+from agvbench.running.supervision.supervisor import Supervisor
 from agvbench.types import Command, Pose
 
 

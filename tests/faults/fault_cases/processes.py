@@ -8,7 +8,7 @@ from fault_live import PATIENT, Live, Orphaned, beside_a_slow_consumer, in_proce
 from fault_record import Fault, Then
 from lab_processes import Processes
 
-from agvbench.running.supervision import DEFAULT_SAFETY
+from agvbench.running.supervision.limits import DEFAULT_SAFETY
 
 _LIVE = ("live",)
 

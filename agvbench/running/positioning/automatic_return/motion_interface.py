@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from agvbench.running.links import RunnerLink
-from agvbench.running.supervision import Supervisor
+from agvbench.running.supervision.supervisor import Supervisor
 from agvbench.types import Command, Floats, Frames, Pose, wrap_angle
 
 _WINDOW_S = 0.1

@@ -15,7 +15,7 @@ from agvbench.running.positioning.automatic_return.leg_drive import DEFAULT_RETU
 from agvbench.running.positioning.automatic_return.motion_interface import MotionInterface
 from agvbench.running.positioning.automatic_return.online_adaptation import OnlineAdaptation
 from agvbench.running.rest_detection import is_at_rest, pose_before
-from agvbench.running.supervision import Supervisor
+from agvbench.running.supervision.supervisor import Supervisor
 from agvbench.types import Pose, wrap_angle
 
 
