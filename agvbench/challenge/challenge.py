@@ -155,7 +155,7 @@ def unsealed(spec: str, seed: int, truth: SealedTruth, found: Diagnosis, seconds
 
 
 def _indistinguishable(seed: int, truth: SealedTruth) -> tuple[str, ...]:
-    """Return the true rivals of every hidden effect of the library, each as if it were hidden alone."""
+    """Return the indistinguishable alternatives of every hidden effect of the library, each as if hidden alone."""
     alone = [effect.name for effect in truth.effects if effect.library_name]
     return tuple(
         dict.fromkeys(

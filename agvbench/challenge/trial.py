@@ -29,7 +29,7 @@ class Trial:
     worse_on
         What the corrected model predicts worse.
     rivals
-        True rivals of the hidden effects of the library, where they were asked for.
+        Indistinguishable alternatives of the hidden effects of the library, where they were asked for.
     seconds
         What the diagnosis took.
     error
@@ -63,12 +63,12 @@ class Trial:
 
     @property
     def false_names(self) -> tuple[str, ...]:
-        """Names given for which neither the truth nor a true rival of it stands."""
+        """Names given that are neither the truth nor an indistinguishable alternative of it."""
         return tuple(name for name in self.named if name not in {*self.library_names, *self.rivals})
 
     @property
     def is_right(self) -> bool:
-        """Whether every hidden effect of the library was named, or listed as AMBIGUOUS with its true rivals only."""
+        """Whether every hidden effect was named, or listed as AMBIGUOUS with indistinguishable alternatives only."""
         if any(name not in {*self.library_names, *self.rivals} for name in (*self.named, *self.alternatives)):
             return False
         return set(self.library_names) <= {*self.named, *self.alternatives}

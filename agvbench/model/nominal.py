@@ -1,4 +1,4 @@
-"""What is believed of a vehicle before anything is measured."""
+"""The nominal model of a vehicle: what is assumed before anything is measured."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the bench believes about a vehicle: static maps, kinematics, and the effects it has been given."""
+"""The vehicle model of the bench: static maps, kinematics, and the effects it has been given."""
 
 from __future__ import annotations
 

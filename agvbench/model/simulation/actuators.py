@@ -64,7 +64,7 @@ _EVENT_COUNT = 11
 PLAN_SIZE = _EVENTS + _EVENT_COUNT
 
 # Servos and drive between commands: positions of the servos and of their axles, the drive's speed and that which
-# commands have made it lately, the servos' rates.
+# commands have made it recently, the servos' rates.
 SERVOS_SIZE = 8
 
 # What is left of a gap [rad, m/s] when it counts as settled.
@@ -77,7 +77,7 @@ _RAMP_STEP_S, _TOGETHER = 0.05, 1e-12
 _BACKLASH_STEP_S = 0.005
 # Numbers that ask for shorter steps are nonsense, but must not hang the loop [s].
 _SHORTEST_S = 1e-6
-# Less swings faster than any camera sees, undamped for ever, and would be simulated swing by swing.
+# Less inertia oscillates faster than any camera sees, undamped, and each oscillation would be simulated.
 _LEAST_INERTIA_S = 1e-3
 
 

@@ -1,4 +1,4 @@
-"""Where a simulation begins in mid-drive: the speed that was measured there, and the level of the drive that it tells.
+"""Where a simulation begins in mid-drive: the speed that was measured there, and the level of the drive from it.
 
 A part of the kernel; see `agvbench.model.simulation.compose`.
 """
@@ -42,7 +42,7 @@ def drive_speed(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: floa
 def level_lift(
     s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, recent_speed: float, speed: float
 ) -> float:
-    """Return by how much the drive has lately been faster than its commands made it, so far as it is not scatter."""
+    """Return by how much the drive has recently been faster than its commands made it, beyond random deviation."""
     deviation = vehicle[NODAL_DEVIATION]
     if deviation == math.inf:
         return 0.0

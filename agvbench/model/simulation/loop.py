@@ -58,7 +58,7 @@ _FIRST_STEP_S, _TURN_PER_STEP = 0.05, 0.15
 # No vehicle turns faster [rad/s]: numbers that say so are nonsense, but must not hang the loop.
 _FASTEST_TURN = 150.0
 _TOGETHER = 1e-12
-# Lately: averaged with weights that fall with this time constant [s].
+# Recent speed: averaged with weights that fall with this time constant [s].
 RECENT_SPEED_S = 0.5
 _STATE = 4
 
@@ -67,7 +67,7 @@ _STATE = 4
 def _obey(
     s: Floats, p: Floats, commands: Floats, settled: Floats, driven: int, front: int, rear: int, lift: float
 ) -> None:
-    """Put the command and what it aims at into `s`; a drive that is told to go goes faster by `lift`.
+    """Put the command and what it aims at into `s`; a drive that is commanded to go goes faster by `lift`.
 
     The drive obeys the row `driven`, the servos `front` and `rear`.
     """
@@ -209,13 +209,13 @@ def simulate(
     ----------
     vehicle
         (5,): distances of front and rear axle from the marker centroid, longest step; the fourth is for the loop; and
-        how far, as a logarithm, the speed at the start may be from what the commands before it made it by mere scatter:
+        how far, as a logarithm, the speed at the start may deviate by chance from what the commands before it made it:
         beyond that the drive runs at another level (∞: never).
     p
         Every effect's parameters.
     initial
         (runs, 4): the measured pose at the start, and the speed ahead there (NaN: what the commands before made it); or
-        (runs, 5) with the speed ahead lately, which tells the drive's level.
+        (runs, 5) with the recent speed ahead, which determines the drive's level.
     begins_s
         (runs,): stamp of the measured pose at the start; NaN where the vehicle stands until its first command.
     started_h

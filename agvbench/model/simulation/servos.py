@@ -3,7 +3,7 @@
 
 A servo with inertia obeys τ² δ̈ + lag δ̇ = aim − δ, a linear equation. One with limited acceleration goes to its aim as
 fast as its rate and acceleration allow and stops there: three parabolas. Either may come in turning, and so go the
-wrong way at first; one with inertia may also swing about its aim. Where they turn back is known.
+wrong way at first; one with inertia may also oscillate about its aim. Where they turn back is known.
 """
 
 from __future__ import annotations
