@@ -69,8 +69,8 @@ def errors_table(held: HeldOut) -> Table:
 _PREDICTORS = {
     "static": "static maps",
     "speed_held": "speed held",
-    "naive": "naive",
-    "believed": "believed",
+    "naive": "constant velocity",
+    "believed": "nominal",
     "after": "after",
 }
 _MOST_ROWS = 24
