@@ -17,7 +17,7 @@ from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.residuals.body_rates import residual_rates
 from agvbench.diagnosis.residuals.covariate_test import ALPHA, LIKELY, RANDOM_PHASE, Dependence, dependences
 from agvbench.diagnosis.residuals.periodic import periodic_disturbance
-from agvbench.diagnosis.residuals.residuals import MEDIAN, end_spread
+from agvbench.diagnosis.residuals.residuals import MEDIAN, end_covariance
 from agvbench.diagnosis.result import Diagnosis, HeldOut, NamedEffect, Verdict
 from agvbench.diagnosis.selection.candidates import bounds_of
 from agvbench.diagnosis.selection.stepwise import Selection
@@ -56,7 +56,7 @@ def conclude(
     every = predicts(library, term_selection, readings)
     batch, has_variants = every.batch, bool(effect_variants().keys() & set(selection.chosen.names))
     poses, before = every.predict(fit.parameters), _poses_before(context.vehicle, batch, selection)
-    spread = end_spread(every, fit)
+    spread = end_covariance(every, fit)
     # Validation runs decided what is kept, and are not tested; the repeatability depends on no choice.
     tested = assess(readings, split.test, before, poses, spread, repeats=~split.training)
     if tested is None:

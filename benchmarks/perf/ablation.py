@@ -111,11 +111,11 @@ PARTS: dict[str, Part] = {
     ),
     "a gain without the best groups of runs": Part(
         f"{_SELECTION}stepwise",
-        "without_best",
+        "without_best_groups",
         lambda gain, *_: float(np.sum(gain)),
         lambda found, gain, *_: found <= 0.0 < float(np.sum(gain)),
     ),
-    "Wald's test of the parameters": Part(f"{_SELECTION}stepwise", "differs_from_nothing", lambda *_: True, _is_false),
+    "Wald's test of the parameters": Part(f"{_SELECTION}stepwise", "differs_from_null", lambda *_: True, _is_false),
     "a gain of fit as well": Part(
         f"{_SELECTION}fitted_models",
         "ScoredModel.gain_over",

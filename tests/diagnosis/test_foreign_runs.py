@@ -8,9 +8,9 @@ from tiny_vehicle import HEADER, InMemory, Tiny, campaign_runs
 
 from agvbench.campaign import Campaign
 from agvbench.diagnosis import diagnose
-from agvbench.diagnosis.data.initial_pose import between_rows, rests
+from agvbench.diagnosis.data.initial_pose import shift_commands_half_a_row, starts_at_rest
 from agvbench.diagnosis.data.readings import read_runs
-from agvbench.diagnosis.data.splits import at_common_levels
+from agvbench.diagnosis.data.splits import with_common_levels
 from agvbench.diagnosis.data.windows import horizon_of
 
 
@@ -42,7 +42,7 @@ def test_runs_that_are_seen_from_their_first_command_on_are_runs_from_rest(tiny_
     runs = tiny_campaign(Tiny()).runs[:30]
     seen = [dataclasses.replace(run, frames=run.frames.select(run.frames.t_s >= 0.0)) for run in runs]
     assert horizon_of(HEADER, seen) is None
-    assert all(rests(run, HEADER.neutral) for run in seen)
+    assert all(starts_at_rest(run, HEADER.neutral) for run in seen)
     whole, part = read_runs(runs, HEADER.neutral), read_runs(seen, HEADER.neutral)
     assert np.abs(part.start - whole.start).max() < 1e-3
     # Driven at once, it is the first frame that counts, and it is as uncertain as a frame.
@@ -77,8 +77,8 @@ def test_clocks_that_begin_elsewhere_are_set_to_the_first_command(tmp_path, tiny
 def test_imported_commands_changed_between_two_rows(tiny_campaign):
     run = tiny_campaign(Tiny()).runs[0]
     imported = dataclasses.replace(run, extra={"source_row": 1})
-    assert between_rows(run) is run
-    moved = between_rows(imported).commands.t_s - run.commands.t_s
+    assert shift_commands_half_a_row(run) is run
+    moved = shift_commands_half_a_row(imported).commands.t_s - run.commands.t_s
     np.testing.assert_allclose(moved, [0.0, *([-1.0 / 120.0] * (len(moved) - 1))], atol=1e-9)
 
 
@@ -92,6 +92,6 @@ def test_levels_that_differ_by_rounding_are_one(tiny_campaign):
     ]
     count = [
         len(np.unique(np.concatenate([run.commands.front for run in told])))
-        for told in (runs, at_common_levels(rounded))
+        for told in (runs, with_common_levels(rounded))
     ]
     assert count[0] == count[1]

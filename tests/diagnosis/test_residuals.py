@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from agvbench.diagnosis.residuals.residuals import EndSpread, PoseResiduals, lack_of_fit, repeatability
+from agvbench.diagnosis.residuals.residuals import EndCovariance, PoseResiduals, lack_of_fit, repeatability
 
 GROUP = np.repeat(np.arange(40), 4)
 
@@ -84,7 +84,7 @@ def test_commands_that_share_a_value_of_the_maps_share_its_error():
     group = np.repeat(np.arange(30), 2)
     slopes = np.zeros((60, 3, 3))
     slopes[np.arange(60), 2, group // 10] = 1.0
-    spread = EndSpread(np.broadcast_to(np.diag([1e-6, 1e-6, 4e-4]), (60, 3, 3)), slopes, np.eye(3) * 2e-4)
+    spread = EndCovariance(np.broadcast_to(np.diag([1e-6, 1e-6, 4e-4]), (60, 3, 3)), slopes, np.eye(3) * 2e-4)
     p_values = []
     for seed in range(200):
         rng = np.random.default_rng(seed)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tiny_vehicle import NEUTRAL, InMemory, Tiny, campaign_runs, drive
 
 from agvbench.diagnosis import Verdict, diagnose
-from agvbench.diagnosis.model.nodal_maps import chosen_levels, nodal_maps
+from agvbench.diagnosis.model.nodal_maps import nodal_maps, select_levels
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.types import NO_TARGET, Commands, Pose, Run
 
@@ -88,7 +88,7 @@ def test_a_value_lies_at_every_level_that_was_held():
 def test_some_of_many_levels_reach_from_end_to_end_without_wide_gaps(levels, seed):
     levels = np.array(levels, dtype=np.float64)
     held_s = np.where(np.random.default_rng(seed).random(len(levels)) < 0.1, 1.0, 0.05)
-    nodes = chosen_levels(levels, held_s)
+    nodes = select_levels(levels, held_s)
     assert np.all(np.diff(nodes) > 0.0)
     assert set(nodes) <= set(levels)
     assert (nodes[0], nodes[-1]) == (levels[0], levels[-1])

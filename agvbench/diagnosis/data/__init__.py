@@ -1,1 +1,1 @@
-"""What a diagnosis reads: runs from rest or windows of free driving, checked and split into three sets."""
+"""Data of a diagnosis: runs from rest or windows of free driving, checked and split into three sets."""

@@ -1,4 +1,4 @@
-"""A campaign as the diagnosis sees it: runs from rest or windows of free driving, sampled alike, in groups."""
+"""The runs of a campaign for the diagnosis: from rest, or cut into windows; cleaned, sampled and grouped."""
 
 from __future__ import annotations
 
@@ -10,35 +10,35 @@ from numpy.typing import NDArray
 
 from agvbench.calibration import inspect_frames
 from agvbench.campaign.campaign import session_starts
-from agvbench.diagnosis.data.initial_pose import between_rows, frame_noise, motion_of, start_of
-from agvbench.diagnosis.data.splits import at_common_levels, group_runs
+from agvbench.diagnosis.data.initial_pose import frame_noise, initial_pose, shift_commands_half_a_row, unwrapped_poses
+from agvbench.diagnosis.data.splits import group_runs, with_common_levels
 from agvbench.diagnosis.data.windows import Horizon, InitialStates, blocks, cut_windows, recording_of
 from agvbench.errors import FitError
 from agvbench.model.simulation.simulation import SimulatedRun
 from agvbench.types import Commands, Floats, Frames, Run
 
 SAMPLES = 24
-"""Poses per run: as many for a short run as for a long one, since a run is one piece of evidence."""
+"""Poses per run, the same number for short and long runs, because the run is the unit of observation."""
 
 BACK_IN_TIME = "frames go back in time"
-"""Why a run is refused in which frames are out of order and make no path when put in order."""
+"""Reason to exclude a run whose frames are out of order and form no path when sorted by time."""
 
 _NEAR_S = 0.04
-_FEW, _MANY, _ROUGHER = 0.05, 0.25, 3.0
-_FEWEST_FRAMES = 20
-_FEWEST_SAMPLES = SAMPLES // 2
+_LOW_SHARE, _HIGH_SHARE, _ROUGHNESS_RATIO = 0.05, 0.25, 3.0
+_MIN_FRAMES = 20
+_MIN_SAMPLES = SAMPLES // 2
 
 
 @dataclass(frozen=True)
 class Readings:
     """Runs that begin at rest, or windows of free driving; R of them, K samples each.
 
-    ``t_s`` (R, K) and ``poses`` (R, K, 3) [m, m, rad], of single frames, with the heading continuous from the
-    start pose; NaN where none was kept. ``start`` (R, 3) with ``start_stderr`` (R, 3), from the frames at
-    rest; ``started_h`` (R,) [h] since the run's session began; ``group`` (R,): runs with the same commands have the
-    same number, and so have windows of one stretch. ``refused`` gives the reason for each run that cannot be used, by
-    its id. ``initial_states`` says when and how fast windows begin; None for runs from rest. ``preset``: whether the
-    axles had settled at each run's first steering command before it was given; else they stood at neutral.
+    ``t_s`` (R, K) and ``poses`` (R, K, 3) [m, m, rad] are those of single frames. The heading is continuous from the
+    start pose on. Poses are NaN where there is no frame. ``start`` (R, 3) with ``start_stderr`` (R, 3) comes from the
+    frames at rest. ``started_h`` (R,) [h] is the time since the session began. ``group`` (R,) is the same number for
+    runs with the same commands, and for windows of one block. ``refused`` maps the id of each excluded run to the
+    reason. ``initial_states`` are those of windows; None for runs from rest. ``preset`` is True if the axles had
+    settled at each run's first steering command before it was given, and False if they were at neutral.
     """
 
     runs: tuple[Run, ...]
@@ -61,7 +61,7 @@ class Readings:
         return np.isfinite(self.poses[:, :, 0])
 
     def select(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> Readings:
-        """Return the runs that a mask or an index array chooses."""
+        """Return the runs that a mask or an index array selects."""
         chosen = np.arange(len(self))[index]
         return Readings(
             tuple(self.runs[i] for i in chosen),
@@ -77,7 +77,7 @@ class Readings:
         )
 
     def simulated(self) -> list[SimulatedRun]:
-        """Return the runs as they are simulated, at the samples' times."""
+        """Return the runs for simulation, at the times of the samples."""
         initial_states = [None] * len(self) if self.initial_states is None else self.initial_states.t_s.tolist()
         return [
             SimulatedRun(run.commands, t, float(h), b, self._preset(run.commands))
@@ -89,16 +89,17 @@ class Readings:
 
     @property
     def begins_s(self) -> Floats:
-        """When prediction begins, on each run's clock (R,)."""
+        """The time at which the prediction begins (R,) [s], on each run's clock."""
         return np.zeros(len(self)) if self.initial_states is None else self.initial_states.t_s
 
 
 def read_runs(runs: Iterable[Run], neutral: float | None = None) -> Readings:
-    """Clean, sample and group the runs that count; a run that cannot be used is named in ``refused``.
+    """Clean, sample and group runs; ``refused`` lists the runs that cannot be used.
 
-    Where `neutral` is given, a vehicle is taken to rest while its drive is there, for runs not seen before they began.
+    If `neutral` is given, a vehicle counts as at rest while its drive command is neutral. This supplies the initial
+    pose of runs without frames before their first command.
     """
-    every = [between_rows(run) for run in at_common_levels(list(runs))]
+    every = [shift_commands_half_a_row(run) for run in with_common_levels(list(runs))]
     began = session_starts(every)
     kept: list[Run] = []
     rows: list[tuple[Floats, Floats, Floats, Floats]] = []
@@ -116,8 +117,8 @@ def read_runs(runs: Iterable[Run], neutral: float | None = None) -> Readings:
 
 
 def read_windows(runs: Iterable[Run], horizon: Horizon, neutral: float) -> Readings:
-    """Cut runs into windows; a run that has none is named in ``refused``."""
-    every = list(at_common_levels(list(runs)))
+    """Cut runs into windows; ``refused`` lists the runs without any window."""
+    every = list(with_common_levels(list(runs)))
     began = session_starts(every)
     refused: dict[str, str] = {}
     windows = []
@@ -148,11 +149,11 @@ def _read(run: Run, neutral: float | None) -> tuple[Floats, Floats, Floats, Floa
     if not run.is_ok:
         raise FitError(run.status)
     frames = _in_order(run)
-    if len(frames) < _FEWEST_FRAMES or not len(run.commands):
-        raise FitError("too few frames", value=len(frames), limit=f"at least {_FEWEST_FRAMES}")
-    start, stderr = start_of(run, frames, neutral)
+    if len(frames) < _MIN_FRAMES or not len(run.commands):
+        raise FitError("too few frames", value=len(frames), limit=f"at least {_MIN_FRAMES}")
+    start, stderr = initial_pose(run, frames, neutral)
     t_s, poses = _sampled(frames, np.linspace(0.0, float(frames.t_s[-1]), SAMPLES + 1)[1:])
-    if np.count_nonzero(np.isfinite(poses[:, 0])) < _FEWEST_SAMPLES:
+    if np.count_nonzero(np.isfinite(poses[:, 0])) < _MIN_SAMPLES:
         raise FitError("too much of the run was not seen")
     turn = np.round((_heading_near_start(frames) - start[2]) / (2.0 * np.pi)) * 2.0 * np.pi
     poses[:, 2] -= turn
@@ -160,23 +161,24 @@ def _read(run: Run, neutral: float | None) -> tuple[Floats, Floats, Floats, Floa
 
 
 def _in_order(run: Run) -> Frames:
-    """Return the frames that show the vehicle, also where a table lists them in another order than that of time."""
+    """Return the usable frames, sorted by time if the table is not."""
     frames, quality = inspect_frames(run.frames)
     out_of_order = quality.bad_time + quality.late
-    if quality.bad_time <= _FEW * quality.frames and out_of_order <= _MANY * quality.frames:
+    if quality.bad_time <= _LOW_SHARE * quality.frames and out_of_order <= _HIGH_SHARE * quality.frames:
         return frames
-    ordered, put = inspect_frames(run.frames.select(np.argsort(run.frames.t_s, kind="stable")))
-    if put.jumps + put.doubled <= _FEW * put.frames and _as_smooth(ordered, frames):
+    ordered, ordered_quality = inspect_frames(run.frames.select(np.argsort(run.frames.t_s, kind="stable")))
+    jumps = ordered_quality.jumps + ordered_quality.doubled
+    if jumps <= _LOW_SHARE * ordered_quality.frames and _as_smooth(ordered, frames):
         return ordered
-    if out_of_order + quality.jumps > _MANY * quality.frames:
+    if out_of_order + quality.jumps > _HIGH_SHARE * quality.frames:
         raise FitError(BACK_IN_TIME)
     return frames
 
 
 def _as_smooth(ordered: Frames, arrived: Frames) -> bool:
-    """Whether frames in order of time make a path like those in order of arrival, and not two paths in turn."""
-    roughness = [float(frame_noise(motion_of(frames))[0]) for frames in (ordered, arrived)]
-    return roughness[0] <= _ROUGHER * roughness[1]
+    """Whether frames in order of time form a path as smooth as in order of arrival, and not two interleaved ones."""
+    roughness = [float(frame_noise(unwrapped_poses(frames))[0]) for frames in (ordered, arrived)]
+    return roughness[0] <= _ROUGHNESS_RATIO * roughness[1]
 
 
 def _heading_near_start(frames: Frames) -> float:
@@ -184,10 +186,10 @@ def _heading_near_start(frames: Frames) -> float:
 
 
 def _sampled(frames: Frames, t_s: Floats) -> tuple[Floats, Floats]:
-    """Return the times and poses of the frames nearest to `t_s`; a pose is NaN where none is near.
+    """Return times (K,) and poses (K, 3) of the frames nearest to `t_s` (K,); poses are NaN where none is near.
 
-    Single frames and no means: a mean rounds the corners at which a vehicle starts, stops and turns, which would
-    look like a lag.
+    Poses are single frames and not averages. Averaging smooths the path where a vehicle starts, stops and turns, which
+    would mimic a lag.
     """
     nearest = np.clip(np.searchsorted(0.5 * (frames.t_s[1:] + frames.t_s[:-1]), t_s), 0, len(frames) - 1)
     poses = np.column_stack([frames.x_m, frames.y_m, np.unwrap(frames.heading_rad)])[nearest]

@@ -1,4 +1,4 @@
-"""Which runs have the same commands, and which are for training, validation and test."""
+"""Groups of runs with the same commands, and the split into training, validation and test runs."""
 
 from __future__ import annotations
 
@@ -17,39 +17,39 @@ _SAME_LEVEL = 1e-5
 _ROLES = ("drive", "front", "rear")
 
 
-def at_common_levels(runs: Sequence[Run]) -> Sequence[Run]:
-    """Return the runs with commands that differ by rounding alone made the same.
+def with_common_levels(runs: Sequence[Run]) -> Sequence[Run]:
+    """Return the runs with command levels merged that differ by rounding only.
 
-    A level that one run computed as 0.15 and another as 0.15000000000000002 is one level: as two, it would
-    be two free values of a map, of which one may be driven in no run that is fitted.
+    For example, 0.15 and 0.15000000000000002 are one level. As two levels they would be two nodes of a map, and one of
+    them might not occur in any training run.
     """
     levels = {role: _common([getattr(run.commands, role) for run in runs]) for role in _ROLES}
-    if not any(len(commanded) for commanded, _ in levels.values()):
+    if not any(len(values) for values, _ in levels.values()):
         return runs
     out = []
     for run in runs:
         snapped = {}
-        for role, (commanded, common) in levels.items():
+        for role, (known, common) in levels.items():
             values = getattr(run.commands, role)
-            snapped[role] = common[np.searchsorted(commanded, values)] if len(commanded) and len(values) else values
+            snapped[role] = common[np.searchsorted(known, values)] if len(known) and len(values) else values
         out.append(replace(run, commands=replace(run.commands, **snapped)))
     return out
 
 
 def _common(commands: list[Floats]) -> tuple[Floats, Floats]:
-    """Return all levels, ascending, and for each the level that stands for it; nothing where none are near."""
-    commanded = np.unique(np.concatenate([np.empty(0), *commands]))
-    if len(commanded) < 2:
-        return commanded[:0], commanded[:0]
-    near = np.diff(commanded) <= _SAME_LEVEL * (commanded[-1] - commanded[0])
+    """Return all levels, ascending, and the common level that replaces each; both empty if no levels are close."""
+    levels = np.unique(np.concatenate([np.empty(0), *commands]))
+    if len(levels) < 2:
+        return levels[:0], levels[:0]
+    near = np.diff(levels) <= _SAME_LEVEL * (levels[-1] - levels[0])
     if not near.any():
-        return commanded[:0], commanded[:0]
+        return levels[:0], levels[:0]
     first = np.flatnonzero(np.r_[True, ~near])
-    return commanded, commanded[first[np.cumsum(np.r_[True, ~near]) - 1]]
+    return levels, levels[first[np.cumsum(np.r_[True, ~near]) - 1]]
 
 
 def group_runs(runs: Sequence[Run]) -> NDArray[np.int64]:
-    """Return a number for each run, (R,); runs whose commands are the same within 50 ms share it."""
+    """Return the group number of each run, (R,): runs with the same commands, within 50 ms, form a group."""
     groups: list[tuple[Commands, int]] = []
     by_rows: dict[bytes, list[tuple[Commands, int]]] = {}
     numbers = np.empty(len(runs), dtype=np.int64)
@@ -67,10 +67,10 @@ def group_runs(runs: Sequence[Run]) -> NDArray[np.int64]:
 
 @dataclass(frozen=True)
 class Split:
-    """What each run is for, (R,) each.
+    """Masks of the training, validation and test runs, (R,) each.
 
-    ``training`` runs are fitted, ``validation`` runs decide whether what was found is kept, and ``test`` runs are
-    opened once, at the end, for what is published.
+    Models are fitted to ``training`` runs. ``validation`` runs accept or reject the selected model. The published
+    errors come from the ``test`` runs, which are opened once, at the end.
     """
 
     training: NDArray[np.bool_]
@@ -79,21 +79,23 @@ class Split:
 
     @property
     def names(self) -> list[str]:
-        """What the column ``split`` of a campaign says of each run."""
+        """The values of a campaign's column ``split`` for each run."""
         return [
             "held_out" if t else "validation" if v else "fit" for t, v in zip(self.test, self.validation, strict=True)
         ]
 
 
 def split_runs(runs: Sequence[Run], group: NDArray[np.int64], seed: int) -> Split:
-    """Return which runs are for training, validation and test.
+    """Split runs into training, validation and test runs.
 
-    The campaign's own ``split`` decides where it has one; where it names no validation runs, an eighth of the others is
-    drawn. Else whole groups are drawn, about a quarter of the runs, half of them for validation and half for test, such
-    that every level of every command in them was also driven in a group that stays: what is judged is how known
-    commands combine, not how a map is interpolated. Of runs that steer while they drive at most a third is drawn: they
-    are few, and only they show what depends on the way by which an angle was reached. Of a single run that can be
-    spared the test is made, and there is no validation.
+    A campaign's own ``split`` column takes precedence. If it names no validation runs, an eighth of its training runs
+    is drawn at random for validation.
+
+    Otherwise whole groups are drawn at random, about a quarter of all runs: half of them for validation and half for
+    test. A group is drawn only if every level of every command in it also occurs in a remaining group. The test then
+    evaluates new combinations of known commands and not the interpolation of a map. At most a third of the runs that
+    steer while they drive is drawn: they are few, and no other run shows a dependence on the steering history. If only
+    a single run can be spared, it is the test run, and there is no validation.
 
     Raises
     ------
@@ -117,12 +119,12 @@ def split_runs(runs: Sequence[Run], group: NDArray[np.int64], seed: int) -> Spli
 
 
 def _for_test(runs: Sequence[Run], group: NDArray[np.int64], held: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which of the runs `held` (R,) are for test: every other group, or every other run of a single one."""
+    """Return which of the drawn runs `held` (R,) are test runs: every other group, or every other run of one group."""
     test, validation = np.zeros_like(held), np.zeros_like(held)
     parts = [np.flatnonzero(held & (group == g)) for g in np.unique(group[held])]
     if len(parts) == 1:
         parts = list(parts[0][:, None])
-    # Runs that steer while they drive come first: both halves need some.
+    # Runs that steer while they drive come first, so that both halves contain some.
     for own in sorted(parts, key=lambda own: not _steers_while_driving(runs[own[0]].commands)):
         (test if np.count_nonzero(test) <= np.count_nonzero(validation) else validation)[own] = True
     return test
@@ -150,7 +152,7 @@ def _drawn(runs: Sequence[Run], group: NDArray[np.int64], rng: np.random.Generat
 
 
 def _some_repeats(group: NDArray[np.int64], rng: np.random.Generator) -> NDArray[np.bool_]:
-    """Return one in four of the repeats of each group: where no group can be spared as a whole."""
+    """Return a quarter of the repeats of each group, for campaigns that cannot spare a whole group."""
     held = np.zeros(len(group), dtype=np.bool_)
     for g in np.unique(group):
         own = np.flatnonzero(group == g)
@@ -160,7 +162,7 @@ def _some_repeats(group: NDArray[np.int64], rng: np.random.Generator) -> NDArray
 
 
 def _steers_while_driving(commands: Commands) -> bool:
-    """Whether the steering changes between rows of one and the same drive."""
+    """Whether a steering command changes while the drive command does not."""
     driven = np.flatnonzero(np.diff(commands.drive) == 0.0)
     return bool(np.any(np.diff(commands.front)[driven] != 0.0) or np.any(np.diff(commands.rear)[driven] != 0.0))
 
@@ -170,7 +172,7 @@ def _levels(commands: Commands) -> set[tuple[str, float]]:
 
 
 def folds(group: NDArray[np.int64], count: int, seed: int) -> NDArray[np.int64]:
-    """Return the fold of each run, (R,): all runs of a group are in one fold; folds are about equally large."""
+    """Return the fold of each run, (R,): a group is in one fold, and the folds are of about equal size."""
     names, sizes = np.unique(group, return_counts=True)
     order = np.random.default_rng([0xF01D, seed]).permutation(len(names))
     order = order[np.argsort(-sizes[order], kind="stable")]

@@ -1,4 +1,4 @@
-"""Split of windows into test windows and windows to fit."""
+"""The split of windows into training and test windows, and their cross-validation groups."""
 
 from __future__ import annotations
 
@@ -11,25 +11,26 @@ from agvbench.diagnosis.data.windows import InitialStates
 from agvbench.errors import FitError
 
 MOST_FITTED = 300
-"""Fits use at most so many windows, evenly spaced: neighbours are correlated."""
+"""Largest number of windows in a fit, evenly spaced: adjacent windows are strongly correlated."""
 
 MOST_JUDGED = 1500
-_MOST_SHARE = 1.0 / 3.0
-_KEPT_SESSIONS = 2
-_FEWEST_FOLDS = 4
+"""Largest number of training windows for which errors are reported."""
+_MAX_SHARE = 1.0 / 3.0
+_MIN_TRAINING_SESSIONS = 2
+_MIN_FOLDS = 4
 
 
 def held_out_windows(readings: Readings, seed: int) -> NDArray[np.bool_]:
     """Return which windows are test windows, (W,).
 
-    The campaign's own ``split`` decides where it has one. Else whole sessions are drawn, since another day is what a
-    model has to stand: about a quarter of the windows, a third at most, and two sessions stay to be fitted to where
-    there are three. With one session, whole recordings are drawn, and with one recording stretches of it.
+    A campaign's own ``split`` column takes precedence. Otherwise whole sessions are drawn at random, because a model
+    has to predict other days: about a quarter of the windows, and at most a third. Of three or more sessions at least
+    two remain for training. With one session, whole recordings are drawn, and with one recording blocks of it.
 
     Raises
     ------
     FitError
-        If the campaign sets all or none of its windows aside.
+        If the campaign's column ``split`` names all or none of its windows for test.
     """
     split = [run.split for run in readings.runs]
     if any(split):
@@ -40,7 +41,7 @@ def held_out_windows(readings: Readings, seed: int) -> NDArray[np.bool_]:
     rng = np.random.default_rng([0xD1A7, seed])
     initial_states = _initial_states(readings)
     for names, kept in (
-        (initial_states.session, _KEPT_SESSIONS),
+        (initial_states.session, _MIN_TRAINING_SESSIONS),
         (initial_states.recording, 1),
         (readings.group.astype(np.str_), 1),
     ):
@@ -51,16 +52,16 @@ def held_out_windows(readings: Readings, seed: int) -> NDArray[np.bool_]:
 
 
 def fold_groups(readings: Readings) -> NDArray[np.int64]:
-    """Return what cross-validation leaves out together, (R,): groups of runs, or sessions or recordings of windows.
+    """Return the groups that cross-validation leaves out as a whole, (R,).
 
-    Whole sessions where there are enough of them, else recordings, else stretches: what is learnt has to hold
-    elsewhere.
+    They are groups of runs with the same commands. For windows they are sessions if there are enough of them, otherwise
+    recordings, otherwise blocks: the model has to predict driving that it was not fitted to.
     """
     if readings.initial_states is None:
         return readings.group
     for names in (readings.initial_states.session, readings.initial_states.recording):
         known, number = np.unique(names, return_inverse=True)
-        if len(known) >= _FEWEST_FOLDS:
+        if len(known) >= _MIN_FOLDS:
             return number.astype(np.int64)
     return readings.group
 
@@ -71,14 +72,14 @@ def _initial_states(readings: Readings) -> InitialStates:
 
 
 def _drawn(names: NDArray[np.str_], kept: int, rng: np.random.Generator) -> NDArray[np.bool_]:
-    """Return which rows belong to the names drawn: about a quarter of the rows."""
+    """Return which rows have the names drawn at random: about a quarter of the rows."""
     known = np.unique(names)
     held = np.zeros(len(names), dtype=np.bool_)
     spare = len(known) - min(kept, len(known) - 1)
     for name in rng.permutation(known).tolist():
         own = names == name
         share = (np.count_nonzero(held) + np.count_nonzero(own)) / len(names)
-        if spare and share <= _MOST_SHARE and np.count_nonzero(held) < HELD_OUT_SHARE * len(names):
+        if spare and share <= _MAX_SHARE and np.count_nonzero(held) < HELD_OUT_SHARE * len(names):
             held |= own
             spare -= 1
     return held

@@ -1,8 +1,8 @@
-"""Windows of free driving: from where, and how fast, each prediction begins.
+"""Windows of free driving, with the initial state of each prediction.
 
-A run that does not begin at rest, or that a campaign asks to be predicted by windows, is cut into windows of a
-`Horizon`. Pose and speed at the beginning of a window are estimated from frames up to then and never from later ones;
-commands before it set the actuators in motion.
+Runs are cut into windows of a `Horizon` if they do not begin at rest, or if the campaign requests it. The initial pose
+and speed of a window are estimated from earlier frames only. Commands before the window determine the state of the
+actuators at its beginning.
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ from numpy.typing import NDArray
 
 from agvbench.calibration import inspect_frames
 from agvbench.calibration.campaign_protocol import HeaderLike
-from agvbench.diagnosis.data.initial_pose import frame_noise, rests
+from agvbench.diagnosis.data.initial_pose import frame_noise, starts_at_rest
 from agvbench.model.simulation.loop import RECENT_SPEED_S
 from agvbench.statistics.rest_poses import SPEED_LIMIT_MPS
 from agvbench.types import Commands, Floats, Frames, Run
 
 SUPPORT_S = 0.2
-"""Pose and speed at the beginning come from parabolas through the frames of so long before it."""
+"""Duration of the frames before a window whose parabolas give its initial pose and speed [s]."""
 
 SAMPLES = 8
 """Poses per window, evenly spaced; the last one at the horizon."""
 
 HISTORY_S = 2.0
-"""Commands of so long before a window set its actuators in motion."""
+"""Duration of the commands before a window that are simulated for the state of its actuators [s]."""
 
 CONSTANT_VELOCITY_S = 0.1
-"""The naive predictor keeps the speed and yaw rate of so long before the beginning."""
+"""Duration before a window over which the constant-velocity baseline averages velocity and yaw rate [s]."""
 
 _DEFAULT_HORIZON_S, _DEFAULT_STRIDE_S = 2.0, 1.0
 _NEAR_S = 0.04
 _RECENT_SPANS = 4.0
-_FEWEST_FRAMES = 6
+_MIN_FRAMES = 6
 _HELD_S = 1e3
 _BLOCK_S = 10.0
 _BLOCK_HORIZONS = 4.0
@@ -43,25 +43,25 @@ _BLOCK_HORIZONS = 4.0
 
 @dataclass(frozen=True)
 class Horizon:
-    """How far ahead to predict, and how far apart predictions begin [s]."""
+    """Duration of a prediction, and interval between the starts of successive predictions [s]."""
 
     horizon_s: float = _DEFAULT_HORIZON_S
     stride_s: float = _DEFAULT_STRIDE_S
 
     @property
     def block_s(self) -> float:
-        """How long a stretch of a recording counts as one piece of evidence [s]."""
+        """The duration of a block: a part of a recording that is treated as one independent observation [s]."""
         return max(_BLOCK_S, _BLOCK_HORIZONS * self.horizon_s)
 
 
 @dataclass(frozen=True)
 class InitialStates:
-    """The state at the beginning of W windows; arrays of shape (W,) unless said otherwise.
+    """The initial states of W windows; arrays of shape (W,) unless stated otherwise.
 
-    ``t_s`` on the run's clock; ``speed_mps`` of the markers' centroid ahead, ``speed_stderr``, and
-    recently (``recent_speed_mps``); ``constant_velocity`` (W, 3): its
-    velocity ahead and to the left [m/s] and yaw rate [rad/s] over the last `CONSTANT_VELOCITY_S`; ``noise`` (W, 2):
-    standard deviation of one frame in position [m] and heading [rad]; ``recording`` and ``session`` by name.
+    ``t_s``: time on the run's clock. ``speed_mps`` and ``speed_stderr``: longitudinal speed of the marker centroid and
+    its standard error. ``recent_speed_mps``: its weighted mean over the recent past. ``constant_velocity`` (W, 3):
+    longitudinal and lateral velocity [m/s] and yaw rate [rad/s] over the last `CONSTANT_VELOCITY_S`. ``noise`` (W, 2):
+    standard deviation of one frame in position [m] and heading [rad]. ``recording`` and ``session``: names.
     """
 
     t_s: Floats
@@ -74,16 +74,16 @@ class InitialStates:
     session: NDArray[np.str_]
 
     def select(self, chosen: NDArray[np.int64]) -> InitialStates:
-        """Return the windows with these indices."""
+        """Return the initial states of the `chosen` windows (indices)."""
         return InitialStates(*(getattr(self, f.name)[chosen] for f in fields(self)))
 
 
 @dataclass(frozen=True)
 class Window:
-    """One window: a piece of a ``run`` with its state at the beginning ``t0_s``.
+    """One window: a part of a ``run`` from ``t0_s`` on.
 
-    ``start`` (3,) with ``start_stderr`` (3,); ``t_s`` (K,) and ``poses`` (K, 3) of single frames, NaN where none was
-    near; the rest as in `InitialStates`.
+    ``start`` (3,) with ``start_stderr`` (3,) is the initial pose. ``t_s`` (K,) and ``poses`` (K, 3) are those of single
+    frames, NaN where none is near. The other fields are those of `InitialStates`.
     """
 
     run: Run
@@ -100,27 +100,27 @@ class Window:
 
 
 def horizon_of(header: HeaderLike, runs: Iterable[Run]) -> Horizon | None:
-    """Return how to cut the campaign into windows; None if it says nothing and its runs begin at rest."""
+    """Return the horizon of the windows; None if the campaign declares none and most of its runs begin at rest."""
     if header.prediction_horizon_s is not None:
         return Horizon(header.prediction_horizon_s, header.prediction_stride_s or header.prediction_horizon_s)
     usable = [run for run in runs if run.is_ok and len(run.frames)]
-    resting = sum(rests(run, header.neutral) for run in usable)
+    resting = sum(starts_at_rest(run, header.neutral) for run in usable)
     return Horizon() if usable and resting < 0.5 * len(usable) else None
 
 
 def cut_windows(run: Run, horizon: Horizon, neutral: float) -> Iterator[Window]:
-    """Yield the windows of `run` in which the vehicle drives and is seen."""
+    """Yield the windows of `run` in which the vehicle drives and is tracked."""
     frames, _ = inspect_frames(run.frames)
-    if len(frames) < _FEWEST_FRAMES or not len(run.commands):
+    if len(frames) < _MIN_FRAMES or not len(run.commands):
         return
     t = frames.t_s
     motion = np.column_stack([frames.x_m, frames.y_m, np.unwrap(frames.heading_rad)])
     noise = frame_noise(motion)
     first = max(float(t[0]) + SUPPORT_S, 0.0 if run.frames.t_s[0] < 0.0 else SUPPORT_S)
-    for wanted in np.arange(first, float(t[-1]) - horizon.horizon_s + _NEAR_S, horizon.stride_s):
-        last = int(np.searchsorted(t, wanted + 1e-9, side="right"))
+    for begin_s in np.arange(first, float(t[-1]) - horizon.horizon_s + _NEAR_S, horizon.stride_s):
+        last = int(np.searchsorted(t, begin_s + 1e-9, side="right"))
         state = _state(t[:last], motion[:last], noise)
-        if state is None or wanted - t[last - 1] > _NEAR_S:
+        if state is None or begin_s - t[last - 1] > _NEAR_S:
             continue
         window = _window(run, horizon, neutral, t, motion, last, state, noise)
         if window is not None:
@@ -138,41 +138,41 @@ class _State:
 
 
 def _state(t: Floats, motion: Floats, noise: Floats) -> _State | None:
-    """Return the state at the last of the frames; None where they have a hole or are too few."""
+    """Return the state at the last frame; None if the frames before it have a gap or are too few."""
     own = t > t[-1] - SUPPORT_S if len(t) else np.empty(0, dtype=np.bool_)
     u, m = t[own] - t[-1] if len(t) else t, motion[own]
-    if len(u) < _FEWEST_FRAMES or -u[0] < 0.7 * SUPPORT_S or np.max(np.diff(u)) > SUPPORT_S / 3.0:
+    if len(u) < _MIN_FRAMES or -u[0] < 0.7 * SUPPORT_S or np.max(np.diff(u)) > SUPPORT_S / 3.0:
         return None
     design = np.column_stack([np.ones_like(u), u, u * u])
     unscaled = np.linalg.inv(design.T @ design)
     value, slope, _ = unscaled @ design.T @ m
-    at, rising = np.sqrt(unscaled[0, 0]), np.sqrt(unscaled[1, 1])
+    value_scale, slope_scale = np.sqrt(unscaled[0, 0]), np.sqrt(unscaled[1, 1])
     c, s = np.cos(value[2]), np.sin(value[2])
     recent = u > -CONSTANT_VELOCITY_S
     recent[-3:] = True
     line = np.column_stack([np.ones(int(recent.sum())), u[recent]])
     vx, vy, yaw = np.linalg.lstsq(line, m[recent], rcond=None)[0][1]
-    # Over the last 0.1 s the vehicle turned: its velocity belongs to the heading in the middle of them.
+    # The vehicle turns during the last 0.1 s: the mean velocity belongs to the heading in the middle.
     middle = value[2] + yaw * float(u[recent].mean())
     cm, sm = np.cos(middle), np.sin(middle)
     return _State(
         value,
-        at * noise[[0, 0, 1]],
+        value_scale * noise[[0, 0, 1]],
         float(c * slope[0] + s * slope[1]),
-        float(rising * noise[0]),
+        float(slope_scale * noise[0]),
         _recent_speed(t, motion),
         np.array([cm * vx + sm * vy, cm * vy - sm * vx, yaw]),
     )
 
 
 def _recent_speed(t: Floats, motion: Floats) -> float:
-    """Return the speed ahead, averaged with weights that fall by e every `RECENT_SPEED_S` before the last frame."""
+    """Return the longitudinal speed, averaged with weights exp(−age / `RECENT_SPEED_S`)."""
     own = t > t[-1] - _RECENT_SPANS * RECENT_SPEED_S
     dt, step = np.diff(t[own]), np.diff(motion[own], axis=0)
     heading = motion[own][1:, 2] - 0.5 * step[:, 2]
     weight = np.exp((t[own][1:] - t[-1]) / RECENT_SPEED_S)
-    ahead = np.cos(heading) * step[:, 0] + np.sin(heading) * step[:, 1]
-    return float(np.sum(weight * ahead) / np.sum(weight * dt))
+    longitudinal = np.cos(heading) * step[:, 0] + np.sin(heading) * step[:, 1]
+    return float(np.sum(weight * longitudinal) / np.sum(weight * dt))
 
 
 def _window(
@@ -186,22 +186,22 @@ def _window(
     noise: Floats,
 ) -> Window | None:
     t0 = float(t[last - 1])
-    wanted = t0 + horizon.horizon_s * np.arange(1, SAMPLES + 1) / SAMPLES
-    nearest = np.clip(np.searchsorted(0.5 * (t[1:] + t[:-1]), wanted), 0, len(t) - 1)
-    poses, near = motion[nearest].copy(), np.abs(t[nearest] - wanted) <= _NEAR_S
+    sample_s = t0 + horizon.horizon_s * np.arange(1, SAMPLES + 1) / SAMPLES
+    nearest = np.clip(np.searchsorted(0.5 * (t[1:] + t[:-1]), sample_s), 0, len(t) - 1)
+    poses, near = motion[nearest].copy(), np.abs(t[nearest] - sample_s) <= _NEAR_S
     if not near[-1] or np.count_nonzero(near) < SAMPLES // 2:
         return None
     poses[~near] = np.nan
-    commands = _commands_of(run, t0, t0 + horizon.horizon_s)
+    commands = _commands_of_window(run, t0, t0 + horizon.horizon_s)
     if abs(state.speed_mps) < SPEED_LIMIT_MPS and np.all(commands.drive[commands.t_s > t0 - SUPPORT_S] == neutral):
-        return None  # it stands, as commanded
+        return None  # at rest, as commanded
     piece = replace(run, run_id=f"{run.run_id}@{t0:.2f}", commands=commands, frames=Frames.empty())
     return Window(
         piece,
         t0,
         state.pose,
         state.pose_stderr,
-        np.where(near, t[nearest], wanted),
+        np.where(near, t[nearest], sample_s),
         poses,
         state.speed_mps,
         state.speed_stderr,
@@ -211,10 +211,10 @@ def _window(
     )
 
 
-def _commands_of(run: Run, t0: float, end_s: float) -> Commands:
+def _commands_of_window(run: Run, t0: float, end_s: float) -> Commands:
     """Return the commands of a window and of its history.
 
-    What was in force before counts as given long ago, unless the run began at rest within the history.
+    The first of them counts as given long before, unless the run began at rest within the history.
     """
     c = run.commands
     first = max(int(np.searchsorted(c.t_s, t0 - HISTORY_S, side="right")) - 1, 0)
@@ -226,13 +226,13 @@ def _commands_of(run: Run, t0: float, end_s: float) -> Commands:
 
 
 def recording_of(run: Run) -> str:
-    """Return the name of the recording that a run is a piece of; a run by itself else."""
+    """Return the name of the recording that contains `run`, or the run's own id."""
     source = run.extra.get("source")
     return str(source) if source else run.run_id.rpartition("@")[0] or run.run_id
 
 
 def blocks(windows: list[Window], horizon: Horizon) -> NDArray[np.int64]:
-    """Return a number for each window, (W,): neighbours in one stretch of one run share it."""
+    """Return the block number of each window, (W,): a block is a part of one run of about `Horizon.block_s`."""
     names: dict[tuple[str, int], int] = {}
     ends: dict[str, float] = {}
     for w in windows:
@@ -240,7 +240,7 @@ def blocks(windows: list[Window], horizon: Horizon) -> NDArray[np.int64]:
     out = []
     for w in windows:
         run_id = w.run.run_id.rpartition("@")[0]
-        # Blocks of equal length, so that no run ends in a block of one window.
+        # Blocks of a run have equal length, so that none consists of a single window at its end.
         count = max(1, round(ends[run_id] / horizon.block_s))
         block = min(int(w.t0_s / (ends[run_id] + 1e-9) * count), count - 1)
         out.append(names.setdefault((run_id, block), len(names)))

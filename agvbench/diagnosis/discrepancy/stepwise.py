@@ -8,7 +8,7 @@ import numpy as np
 
 from agvbench.diagnosis.discrepancy.regression import steering
 from agvbench.diagnosis.discrepancy.screening import Start, screen
-from agvbench.diagnosis.estimation.cross_validation import without_best
+from agvbench.diagnosis.estimation.cross_validation import without_best_groups
 from agvbench.diagnosis.residuals.body_rates import residual_rates
 from agvbench.diagnosis.residuals.residuals import (
     LACK_OF_FIT,
@@ -233,7 +233,7 @@ def _rests_on_few(selector: Selector, selection: Selection, name: str) -> bool:
     if without is None:
         return False
     gain = without.loss - chosen.loss
-    return without_best(gain, selector.batch.readings.group, _FEW) < 0.5 * float(gain.sum())
+    return without_best_groups(gain, selector.batch.readings.group, _FEW) < 0.5 * float(gain.sum())
 
 
 def _in_place(wide: Selector, selection: Selection) -> tuple[ScoredModel, type[DiscrepancyTerm]] | None:

@@ -1,4 +1,4 @@
-"""How well a fitted model predicts groups of runs that it was not fitted to."""
+"""Cross-validation over groups of runs, and covariances and tests clustered by group."""
 
 from __future__ import annotations
 
@@ -10,19 +10,20 @@ from agvbench.types import Floats
 
 FOLDS = 5
 _BEST_SHARE = 0.05
-_CLEAR = 1e-4
-_OWN_SHARE = 0.01
+_WALD_ALPHA = 1e-4
+_MIN_SHARE = 0.01  # of the information about a direction
 
 
 def cross_validated(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Floats:
-    """Return each run's loss (R,) under the parameters that the other folds determine.
+    """Return each run's loss (R,) at the parameters that are estimated from the other folds.
 
-    About the optimum the loss is quadratic, run by run, so that leaving a fold out is a solution of the normal
-    equations without its share: one Newton step from the parameters of all runs, exact as far as the loss is quadratic.
-    A parameter at its bound stays there. What only the fold itself determines is fitted to the fold: a level driven
-    nowhere else is calibration. Nor can the other folds predict backlash that one group alone goes through both ways:
-    everywhere else levels of the maps compensate it. That is a matter of directions and not of single parameters: those
-    of which the other folds hold less than a hundredth of the information.
+    Leaving a fold out is one Newton step from the parameters of all runs: the normal equations are solved without the
+    fold's contribution. The step is exact if the loss of each run is quadratic. Parameters at a bound stay there.
+
+    Directions in parameter space for which the other folds hold less than 1 % of the information are fitted to the
+    fold itself, because the other folds cannot predict them. One example is a command level that is driven in no other
+    fold, which is calibration. Another is a backlash that a single group traverses in both directions, while the nodal
+    values compensate for it in all other groups.
     """
     if fitted.predictor.readings.initial_states is not None:
         return _cross_validated_windows(fitted, fold, bounds)
@@ -38,24 +39,26 @@ def cross_validated(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Flo
     loss = fitted.loss.copy()
     for k in np.unique(fold):
         out = fold == k
-        # Where all runs together know each direction equally well, the fold knows what the others lack.
+        # In coordinates in which the total information is the identity, the fold holds what the others lack.
         share, turn = np.linalg.eigh(whiten.T @ (fitted.information.total_of(~out)[among] + weak) @ whiten)
         turn = whiten @ turn
         others, own = (turn.T @ gradient[chosen].sum(axis=0) for chosen in (~out, out))
-        known = share > _OWN_SHARE
+        known = share > _MIN_SHARE
         move = np.zeros(len(free))
         move[free] = turn @ np.where(
-            known, others / np.maximum(share, _OWN_SHARE), own / np.maximum(1.0 - share, _OWN_SHARE)
+            known,
+            others / np.maximum(share, _MIN_SHARE),
+            own / np.maximum(1.0 - share, _MIN_SHARE),
         )
         loss[out] += (fitted.information.along(move) - 2.0 * fitted.gradient @ move)[out]
     return loss
 
 
 def _cross_validated_windows(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Floats:
-    """Return each window's loss (W,) under the effects that the other folds determine.
+    """Return each window's loss (W,) with the effects that are estimated from the other folds.
 
-    A fold is another session or recording, with levels of its own: maps are calibrated on all of them, for what is
-    asked is whether effects found elsewhere hold here. The loss is far from quadratic, so it is simulated anew.
+    A fold is a session or a recording with its own drive level. The maps are therefore calibrated on all folds, and
+    only the effects are cross-validated. The loss is far from quadratic, so it is evaluated by a new simulation.
     """
     maps, count = fitted.predictor.maps.size, len(fitted.parameters)
     loss = fitted.loss.copy()
@@ -74,10 +77,11 @@ def _cross_validated_windows(fitted: Fit, fold: NDArray[np.int64], bounds: Float
     return loss
 
 
-def without_best(gain: Floats, group: NDArray[np.int64], share: float = _BEST_SHARE) -> float:
-    """Return what is left of the total `gain` (R,) without the best `share` of groups, at least one of them.
+def without_best_groups(gain: Floats, group: NDArray[np.int64], share: float = _BEST_SHARE) -> float:
+    """Return the total of `gain` (R,) without the `share` of groups with the largest gain, at least one group.
 
-    A true cause helps wherever it acts; a gain that sits in one group of runs is that group's own trouble.
+    A true cause improves the prediction of all groups on which it acts. A gain in a single group is an artefact of
+    that group.
     """
     gains = by_group(gain, group)
     best = np.sort(gains)[::-1][: max(1, round(share * len(gains)))]
@@ -85,15 +89,15 @@ def without_best(gain: Floats, group: NDArray[np.int64], share: float = _BEST_SH
 
 
 def clustered_covariance(fitted: Fit, group: NDArray[np.int64]) -> Floats:
-    """Return the covariance of the parameters (P, P), with the pull of each group of runs taken as one draw.
+    """Return the cluster-robust covariance of the parameters (P, P), with groups of runs as clusters.
 
-    What a run's samples share, and what repeats of a command share, is then not counted many times (the sandwich of
-    Liang and Zeger, 1986). Where it is the smaller, the likelihood's own covariance is kept.
+    It allows for correlation between the samples of a run and between repeats of a command (sandwich estimator, Liang
+    and Zeger 1986). No standard error is smaller than that of the likelihood.
     """
-    pulls, own = by_group(fitted.gradient, group), fitted.covariance
+    scores, own = by_group(fitted.gradient, group), fitted.covariance
     maps = fitted.predictor.maps.size
     spare = max(len(group) - maps, 1)
-    robust = own @ (pulls.T @ pulls * len(group) / spare) @ own
+    robust = own @ (scores.T @ scores * len(group) / spare) @ own
     widen = np.sqrt(np.maximum(np.diagonal(robust) / np.maximum(np.diagonal(own), 1e-300), 1.0))
     return np.asarray(own * widen[:, None] * widen[None, :])
 
@@ -106,10 +110,10 @@ def by_group(values: Floats, group: NDArray[np.int64]) -> Floats:
     return sums
 
 
-def differs_from_nothing(fitted: Fit, name: str, group: NDArray[np.int64]) -> bool:
-    """Return whether the parameters of the effect called `name` are clear of what does nothing (Wald's test).
+def differs_from_null(fitted: Fit, name: str, group: NDArray[np.int64]) -> bool:
+    """Return whether the parameters of the effect called `name` differ significantly from null (Wald's test).
 
-    Limits, whose null is infinite, are judged by their gain alone.
+    An effect with an infinite null value (a limit) always passes: its gain alone decides.
     """
     from scipy import special
 
@@ -122,4 +126,4 @@ def differs_from_nothing(fitted: Fit, name: str, group: NDArray[np.int64]) -> bo
     off = fitted.parameters[at] - nulls
     covariance = clustered_covariance(fitted, group)[np.ix_(at, at)]
     statistic = float(off @ np.linalg.pinv(covariance, hermitian=True) @ off)
-    return bool(special.chdtrc(len(at), statistic) < _CLEAR)
+    return bool(special.chdtrc(len(at), statistic) < _WALD_ALPHA)

@@ -1,8 +1,8 @@
-"""Nodal maps and effects fitted together, with what differs from run to run integrated out.
+"""Maximum likelihood fit of nodal maps and effects, with each run's random effects integrated out.
 
-Each run has its own start pose, an offset of each axle and a factor on its speed: random effects about zero, whose
-variance is estimated, too. Without them a run's frames would pass for as many pieces of evidence, and the smallest play
-in a servo for an effect.
+The random effects of a run are its start pose, an offset of each axle and a factor on speed. They have mean zero, and
+their standard deviations (variance components) are estimated in the same fit. Without random effects, all frames of a
+run would count as independent observations, and a small backlash of a servo would be taken for an effect.
 """
 
 from __future__ import annotations
@@ -30,9 +30,10 @@ _ITERATIONS = 8
 class Fit:
     """A fitted model.
 
-    ``parameters`` (P,), the maps' values first; ``random_effects`` (R, 6) of each run; ``variance_components``;
-    ``loss`` (R,): minus two log likelihood of each run; ``information`` and ``gradient`` (R, P): its quadratic form
-    about them; ``residual`` (R, K, 3): measured minus predicted with the random effects.
+    ``parameters`` (P,), the nodal values first; ``random_effects`` (R, 6) of each run; ``variance_components``;
+    ``loss`` (R,): minus two log likelihood of each run; ``information`` and ``gradient`` (R, P): the quadratic
+    approximation of the loss at the parameters; ``residual`` (R, K, 3): measured minus predicted poses, with the random
+    effects; ``linear``: the derivatives at the parameters.
     """
 
     predictor: Predictor
@@ -52,7 +53,7 @@ class Fit:
 
     @cached_property
     def linearisation_point(self) -> LinearisationPoint:
-        """What every predicted gain of a larger model starts from."""
+        """The point at which the predicted gain of every larger model is linearised."""
         return LinearisationPoint.of(self)
 
     def effect_values(self) -> dict[str, float]:
@@ -72,25 +73,25 @@ def fit(
     patient: bool = False,
     near: Linearised | None = None,
 ) -> Fit:
-    """Fit by Gauss–Newton with safe steps, the variance components by expectation maximisation between steps.
+    """Fit by damped Gauss–Newton steps; between steps, expectation maximisation updates the variance components.
 
     Parameters
     ----------
     predictor
         Runs, maps and effects.
     parameters
-        (P,) where to start.
+        (P,): initial values.
     bounds
         (effects' parameters, 2): lowest and highest value of each.
     random_effects, variance_components
-        Where to start; by default none and generous.
+        Initial values; by default zero, and large standard deviations.
     iterations
-        At most this many steps.
+        The largest number of steps per round.
     patient
-        Whether to go on for some rounds of as many steps while they are worth it.
+        Whether further rounds follow as long as each reduces the loss enough.
     near
-        Derivatives of the same maps at parameters close by. By far the most time goes into those by the maps' values,
-        and they change little: the first steps are taken with these, the last ones and the result with one's own.
+        Derivatives of the same maps at similar parameters. The derivatives by the nodal values take most of the time
+        and change little: the first steps use those of `near`, the last steps and the result are linearised anew.
     """
     readings = predictor.readings
     random_effects = np.zeros((len(readings), 6)) if random_effects is None else random_effects.copy()
@@ -100,13 +101,15 @@ def fit(
         else window_variance_components(readings)
     )
     solver = LevenbergMarquardt(predictor, bounds)
-    state, convergence = solver.go(FitState(parameters.copy(), random_effects, variance_components), iterations, near)
-    # Only a final fit is worth the iterations to convergence.
-    prior_model = iterations > _ITERATIONS
-    state, evaluation = solver.converge(
-        state, convergence if prior_model else Convergence.CONVERGED, iterations, patient=patient
+    state, convergence = solver.iterate(
+        FitState(parameters.copy(), random_effects, variance_components), iterations, near
     )
-    if prior_model:
+    # A fit with few steps is a preliminary one, which need not converge.
+    to_convergence = iterations > _ITERATIONS
+    state, evaluation = solver.converge(
+        state, convergence if to_convergence else Convergence.CONVERGED, iterations, patient=patient
+    )
+    if to_convergence:
         state, evaluation = solver.leave_plateaus(state, evaluation, iterations, patient=patient)
     terms = evaluation.terms
     return Fit(

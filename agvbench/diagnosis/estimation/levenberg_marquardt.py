@@ -1,4 +1,4 @@
-"""How a fit converges: damped Gauss–Newton steps, in turn with the variance components."""
+"""Levenberg–Marquardt: damped Gauss–Newton steps, in turn with updates of the variance components."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from agvbench.diagnosis.estimation.variance import VarianceComponents, update_va
 from agvbench.diagnosis.model.predictor import Linearised, Predictor
 from agvbench.types import Floats
 
-_SHARES = (1.0, 0.4, 0.16, 0.064)
+_STEP_LENGTHS = (1.0, 0.4, 0.16, 0.064)
 _DAMPINGS = (0.0, 0.1, 3.0)
 
 
 @dataclass(frozen=True)
 class Point:
-    """Where a fit stands: ``parameters`` (P,), each run's ``random_effects`` (R, 6) and ``residual`` (R, K, 3)."""
+    """An iterate: ``parameters`` (P,), each run's ``random_effects`` (R, 6) and ``residual`` (R, K, 3)."""
 
     parameters: Floats
     random_effects: Floats
@@ -27,7 +27,7 @@ class Point:
 
 @dataclass(frozen=True)
 class StepSolver:
-    """Constants of a step: derivatives, variance components, and the ``bounds`` of the effects' parameters."""
+    """Solves for one step at fixed derivatives, variance components and ``bounds`` (effects' parameters, 2)."""
 
     predictor: Predictor
     linear: Linearised
@@ -35,23 +35,24 @@ class StepSolver:
     bounds: Floats
 
     def step(self, point: Point, terms: Terms) -> tuple[Point, bool]:
-        """Return a point that is no worse, or the same; and whether a whole step led there.
+        """Return a point whose objective is no larger, and whether a full undamped step reached it.
 
-        Where no part of a step does, it is damped (Levenberg and Marquardt): a value that the runs hardly depend on
-        must not carry all others away.
+        If no fraction of the Gauss–Newton step qualifies, the step is damped (Levenberg and Marquardt). Damping keeps
+        poorly determined parameters from making the whole step fail. If no damped step qualifies, the point is returned
+        unchanged.
         """
         now, (matrix, gradient) = self._objective(point), self._normal_equations(terms)
         for damping in _DAMPINGS:
             damped = matrix + damping * np.diag(np.diagonal(matrix))
             move, move_random_effects = self._move(point, terms, damped, gradient)
-            for share in _SHARES:
-                tried = self._at(point, share * move, share * move_random_effects)
+            for length in _STEP_LENGTHS:
+                tried = self._at(point, length * move, length * move_random_effects)
                 if self._objective(tried) <= now:
-                    return tried, not damping and share == 1.0
+                    return tried, not damping and length == 1.0
         return point, False
 
-    def whole(self, point: Point, terms: Terms) -> Point:
-        """Return the point after a whole step, be it worse."""
+    def full(self, point: Point, terms: Terms) -> Point:
+        """Return the point after a full step, even if its objective is larger."""
         return self._at(point, *self._move(point, terms, *self._normal_equations(terms)))
 
     def _at(self, point: Point, move: Floats, move_random_effects: Floats) -> Point:
@@ -73,32 +74,32 @@ class StepSolver:
         return move, np.einsum("rij,rj->ri", terms.inner_inverse, terms.pull - terms.mixed @ move)
 
     def _bounded(self, matrix: Floats, gradient: Floats, parameters: Floats) -> Floats:
-        """Return the step that `matrix` and `gradient` ask for; effects' parameters that are stuck at a bound stay."""
+        """Return the step of the normal equations; effects' parameters at an active bound are fixed."""
         maps = self.predictor.maps.size
         free = np.ones(len(parameters), dtype=np.bool_)
         for _ in range(3):
             move = np.zeros(len(parameters))
             move[free] = np.linalg.lstsq(matrix[np.ix_(free, free)], gradient[free], rcond=1e-12)[0]
-            wanted = parameters[maps:] + move[maps:]
-            kept = np.clip(wanted, self.bounds[:, 0], self.bounds[:, 1])
-            held = np.flatnonzero(kept != wanted)
-            # What meets its bound goes there; the others are solved for again without it.
-            stuck = held[parameters[maps + held] == kept[held]]
-            if not len(stuck):
+            unbounded = parameters[maps:] + move[maps:]
+            clipped = np.clip(unbounded, self.bounds[:, 0], self.bounds[:, 1])
+            outside = np.flatnonzero(clipped != unbounded)
+            # Parameters already at their bound are fixed, and the others are solved for again.
+            fixed = outside[parameters[maps + outside] == clipped[outside]]
+            if not len(fixed):
                 break
-            free[maps + stuck] = False
+            free[maps + fixed] = False
         return move
 
 
 _NON_MONOTONE_STEPS, _ROUNDS = 6, 4
-_WORTH = 10.0
-_ENOUGH = 0.05
-_CLOSE = 1.0
+_MIN_REDUCTION = 10.0
+_CONVERGED = 0.05
+_NEARLY_CONVERGED = 1.0
 
 
 @dataclass(frozen=True)
 class FitState:
-    """What a fit has found so far: ``parameters`` (P,), ``random_effects`` (R, 6) of each run, and their variance."""
+    """The estimates of a fit: ``parameters`` (P,), each run's ``random_effects`` (R, 6), ``variance_components``."""
 
     parameters: Floats
     random_effects: Floats
@@ -107,7 +108,7 @@ class FitState:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What is seen from a state: derivatives, ``residual`` (R, K, 3), and the likelihood about it."""
+    """The model evaluated at a state: derivatives, ``residual`` (R, K, 3), and the terms of the likelihood."""
 
     linear: Linearised
     residual: Floats
@@ -120,7 +121,7 @@ class Evaluation:
 
 
 class Convergence(Enum):
-    """How a way goes when its steps are used up: it has come to a stand, or goes on by parts of steps or whole ones."""
+    """State of the iteration after its steps: converged, or ending with shortened (slow) or full (fast) steps."""
 
     CONVERGED = auto()
     SLOW = auto()
@@ -129,61 +130,61 @@ class Convergence(Enum):
 
 @dataclass(frozen=True)
 class LevenbergMarquardt:
-    """Goes down for one model; ``bounds`` (effects' parameters, 2)."""
+    """Minimises the loss of one model; ``bounds`` (effects' parameters, 2)."""
 
     predictor: Predictor
     bounds: Floats
 
     def evaluate(self, state: FitState, near: Linearised | None = None) -> Evaluation:
-        """Return what is seen from `state`, with the maps' derivatives from `near` where given."""
+        """Evaluate the model at `state`; `near` supplies the derivatives by the nodal values if given."""
         linear = self.predictor.linearise(state.parameters, state.random_effects, near)
         residual = residual_of(self.predictor, linear.poses)
         terms = terms_of(self.predictor, residual, linear, state.random_effects, state.variance_components)
         return Evaluation(linear, residual, terms)
 
-    def go(self, state: FitState, iterations: int, near: Linearised | None = None) -> tuple[FitState, Convergence]:
-        """Return the state after at most so many steps, and how it went at the end.
+    def iterate(self, state: FitState, iterations: int, near: Linearised | None = None) -> tuple[FitState, Convergence]:
+        """Return the state after at most `iterations` steps, and the state of convergence.
 
-        With `near` the first steps are taken with the maps' derivatives from there.
+        The first steps use the derivatives by the nodal values from `near` if given.
         """
-        before, whole = np.inf, True
+        before, full_step = np.inf, True
         for step in range(iterations):
             evaluation = self.evaluate(state, near)
-            state, whole = self._follow(state, evaluation)
-            if near is not None and (before - evaluation.loss < _CLOSE or step >= iterations // 2):
+            state, full_step = self._step(state, evaluation)
+            if near is not None and (before - evaluation.loss < _NEARLY_CONVERGED or step >= iterations // 2):
                 near = None
-            elif abs(before - evaluation.loss) < _ENOUGH:
+            elif abs(before - evaluation.loss) < _CONVERGED:
                 return state, Convergence.CONVERGED
             before = evaluation.loss
-        return state, Convergence.FAST if whole else Convergence.SLOW
+        return state, Convergence.FAST if full_step else Convergence.SLOW
 
     def converge(
         self, state: FitState, convergence: Convergence, iterations: int, *, patient: bool
     ) -> tuple[FitState, Evaluation]:
-        """Return the end of the way, and what is seen from there.
+        """Iterate further, and return the final state with its evaluation.
 
-        A fit that converges slowly tries non-monotone steps. One that is `patient` goes on also where that leads
-        nowhere, and round after
-        round as long as they are worth their steps.
+        A fit that converges slowly tries non-monotone steps. A `patient` fit continues even if they fail, and adds
+        rounds of `iterations` steps as long as each round reduces the loss enough.
         """
         evaluation = self.evaluate(state)
         for _ in range(_ROUNDS if patient else 1):
             beyond = self.non_monotone_steps(state, evaluation) if convergence is Convergence.SLOW else None
             if convergence is Convergence.CONVERGED or (beyond is None and not patient):
                 break
-            state, convergence = self.go(state if beyond is None else beyond, iterations)
+            state, convergence = self.iterate(state if beyond is None else beyond, iterations)
             before, evaluation = evaluation.loss, self.evaluate(state)
-            if before - evaluation.loss < _WORTH:
+            if before - evaluation.loss < _MIN_REDUCTION:
                 break
         return state, evaluation
 
     def leave_plateaus(
         self, state: FitState, evaluation: Evaluation, iterations: int, *, patient: bool
     ) -> tuple[FitState, Evaluation]:
-        """Return a better optimum where values of the maps came to lie where no run observes them; else this one.
+        """Return a state with a smaller loss outside a plateau of the likelihood, or the given one if there is none.
 
-        Backlash makes the likelihood flat: a command inside the gap has zero gradient, so the optimiser cannot leave
-        it, even where the axle did move. So such values are interpolated, and the fit goes on from there.
+        Backlash makes the likelihood flat: a command inside the gap has zero gradient, so the iteration cannot leave
+        it, although the axle did move. Such nodal values are unobserved. They are interpolated between their
+        neighbours, and the iteration starts again from there.
         """
         maps = self.predictor.maps
         information, prior = evaluation.terms.information.total, ridge(self.predictor)
@@ -191,32 +192,32 @@ class LevenbergMarquardt:
         if not unobserved.any():
             return state, evaluation
         parameters = np.r_[maps.interpolated(state.parameters[: maps.size], unobserved), state.parameters[maps.size :]]
-        begun, convergence = self.go(replace(state, parameters=parameters), iterations)
-        end, seen = self.converge(begun, convergence, iterations, patient=patient)
-        return (end, seen) if seen.loss < evaluation.loss else (state, evaluation)
+        first, convergence = self.iterate(replace(state, parameters=parameters), iterations)
+        final, evaluated = self.converge(first, convergence, iterations, patient=patient)
+        return (final, evaluated) if evaluated.loss < evaluation.loss else (state, evaluation)
 
     def non_monotone_steps(self, state: FitState, evaluation: Evaluation) -> FitState | None:
-        """Return a better state that lies across a bend, or None; `evaluation` is what is seen from `state`.
+        """Return a state with a clearly smaller loss, reached by full steps, or None; `evaluation` is that of `state`.
 
-        Maps that absorbed a cause give it back along a curved and narrow valley: every whole step leaves it, and short
-        ones converge slowly. So whole steps are taken for a while, however much worse they are at first; the variance
-        grows with the residual, which widens the valley (the watchdog technique of Chamberlain and others,
-        Mathematical Programming Study 16, 1982).
+        Maps that have absorbed an effect release it along a curved, narrow valley of the loss: every full step leaves
+        the valley, and short steps make little progress. A limited number of full steps is therefore accepted although
+        the loss increases at first (watchdog technique: Chamberlain et al., Mathematical Programming Study 16, 1982).
+        The variance components grow with the residual, which widens the valley.
         """
         start, near = evaluation.loss, evaluation.linear
-        point = self._step_solver(state, evaluation).whole(self._point(state, evaluation), evaluation.terms)
-        now = self._reach(point, state, evaluation)
+        point = self._step_solver(state, evaluation).full(self._point(state, evaluation), evaluation.terms)
+        now = self._updated(point, state, evaluation)
         for _ in range(_NON_MONOTONE_STEPS):
             evaluation = self.evaluate(now, near)
-            if evaluation.loss < start - _WORTH:
+            if evaluation.loss < start - _MIN_REDUCTION:
                 return now
-            now, _ = self._follow(now, evaluation)
+            now, _ = self._step(now, evaluation)
         return None
 
-    def _follow(self, state: FitState, evaluation: Evaluation) -> tuple[FitState, bool]:
-        """Return a state that is no worse for the variance components at hand, and whether a whole step led there."""
-        point, whole = self._step_solver(state, evaluation).step(self._point(state, evaluation), evaluation.terms)
-        return self._reach(point, state, evaluation), whole
+    def _step(self, state: FitState, evaluation: Evaluation) -> tuple[FitState, bool]:
+        """Return the state after a step that does not increase the objective, and whether the step was a full one."""
+        point, full_step = self._step_solver(state, evaluation).step(self._point(state, evaluation), evaluation.terms)
+        return self._updated(point, state, evaluation), full_step
 
     def _step_solver(self, state: FitState, evaluation: Evaluation) -> StepSolver:
         return StepSolver(self.predictor, evaluation.linear, state.variance_components, self.bounds)
@@ -225,7 +226,7 @@ class LevenbergMarquardt:
     def _point(state: FitState, evaluation: Evaluation) -> Point:
         return Point(state.parameters, state.random_effects, evaluation.residual)
 
-    def _reach(self, point: Point, state: FitState, evaluation: Evaluation) -> FitState:
+    def _updated(self, point: Point, state: FitState, evaluation: Evaluation) -> FitState:
         variance_components = update_variance_components(
             self.predictor,
             point.residual,

@@ -1,7 +1,7 @@
-"""The likelihood of runs with their random effects integrated out, and the information in each run.
+"""The marginal likelihood of runs, with their random effects integrated out, and the information of each run.
 
-Each run's offsets (start pose, both axles, log of speed) are found anew about every prediction, not once about zero,
-and enter by Laplace's approximation.
+Laplace's approximation is taken about the best random effects of each run (start pose, both axles, logarithm of speed)
+at the current prediction, not about zero.
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ from agvbench.types import Floats
 
 @dataclass(frozen=True)
 class Information:
-    """Quadratic forms of R runs in P parameters, of which each run depends on m at most.
+    """Information matrices of R runs about P parameters, stored for each run's m active parameters only.
 
-    ``own`` (R, m): the numbers of these; ``blocks`` (R, m, m): the forms in them; ``count`` is P.
+    ``own`` (R, m): indices of each run's active parameters; ``blocks`` (R, m, m): information about these; ``count`` is
+    P.
     """
 
     own: NDArray[np.int64]
@@ -31,44 +32,44 @@ class Information:
     @cached_property
     def total(self) -> Floats:
         """The sum over all runs (P, P)."""
-        return self._sum(self._places, self.blocks)
+        return self._sum(self._flat_indices, self.blocks)
 
     def total_of(self, runs: NDArray[np.bool_]) -> Floats:
         """Return the sum over some `runs` (R,), shape (P, P)."""
-        return self._sum(self._places[runs], self.blocks[runs])
+        return self._sum(self._flat_indices[runs], self.blocks[runs])
 
     def dense(self) -> Floats:
-        """Return every run's form (R, P, P), zeros and all."""
+        """Return the information of every run as a dense array (R, P, P)."""
         out = np.zeros((len(self.own), self.count * self.count))
-        np.put_along_axis(out, self._places.reshape(len(out), -1), self.blocks.reshape(len(out), -1), axis=1)
+        np.put_along_axis(out, self._flat_indices.reshape(len(out), -1), self.blocks.reshape(len(out), -1), axis=1)
         return out.reshape(-1, self.count, self.count)
 
     def along(self, move: Floats) -> Floats:
-        """Return what each run's form (R,) makes of a `move` (P,)."""
+        """Return the quadratic form of each run's information (R,) along a `move` (P,)."""
         own = move[self.own]
         return np.asarray(np.einsum("rij,ri,rj->r", self.blocks, own, own))
 
     @cached_property
-    def _places(self) -> NDArray[np.int64]:
+    def _flat_indices(self) -> NDArray[np.int64]:
         return self.own[:, :, None] * self.count + self.own[:, None, :]
 
-    def _sum(self, places: NDArray[np.int64], blocks: Floats) -> Floats:
+    def _sum(self, indices: NDArray[np.int64], blocks: Floats) -> Floats:
         size = self.count * self.count
-        summed = np.bincount(places.ravel(), blocks.ravel(), size)
+        summed = np.bincount(indices.ravel(), blocks.ravel(), size)
         return np.asarray(summed, dtype=np.float64).reshape(self.count, self.count)
 
 
 WEAK = 1e-4
-"""How little (as an inverse variance) is taken for granted of an effect's parameter."""
+"""Inverse variance of the weak prior on each of the effects' parameters."""
 
 
 @dataclass(frozen=True)
 class Terms:
-    """A likelihood about some parameters.
+    """The likelihood and its derivatives at some parameters.
 
-    ``loss`` (R,): minus two log likelihood of each run; ``information`` and ``gradient`` (R, P): its quadratic form;
-    ``inner_inverse`` (R, 6, 6): the offsets' covariance; ``mixed`` (R, 6, P) and ``pull`` (R, 6): how
-    they follow the parameters, and where they are drawn.
+    ``loss`` (R,): minus two log likelihood of each run; ``information`` and ``gradient`` (R, P): its quadratic
+    approximation; ``inner_inverse`` (R, 6, 6): covariance of the random effects; ``mixed`` (R, 6, P): mixed information
+    about random effects and parameters; ``pull`` (R, 6): gradient by the random effects.
     """
 
     loss: Floats
@@ -86,7 +87,7 @@ def terms_of(
     random_effects: Floats,
     variance_components: VarianceComponents,
 ) -> Terms:
-    """Return the likelihood of residuals (R, K, 3) of predictions with these derivatives."""
+    """Return the likelihood of residuals (R, K, 3), with its derivatives from those of the prediction (`linear`)."""
     runs = len(residual)
     temper, count = tempering(predictor)
     weight = weights(predictor, variance_components)
@@ -98,16 +99,16 @@ def terms_of(
     at, jt = a.transpose(0, 2, 1), j.transpose(0, 2, 1)
     inner, inverse = inner_inverse(a, prior)
     pull = (at @ e[..., None])[..., 0] - random_effects / prior**2
-    short = at @ j
+    cross = at @ j
     rows = np.arange(runs)[:, None]
     mixed = np.zeros((runs, 6, linear.count))
-    mixed[rows, :, own] = short.transpose(0, 2, 1)
-    blocks = jt @ j - short.transpose(0, 2, 1) @ inverse @ short
+    mixed[rows, :, own] = cross.transpose(0, 2, 1)
+    blocks = jt @ j - cross.transpose(0, 2, 1) @ inverse @ cross
     gradient = np.zeros((runs, mixed.shape[2]))
-    steep = (jt @ e[..., None])[..., 0] - (short.transpose(0, 2, 1) @ (inverse @ pull[..., None]))[..., 0]
-    gradient[rows, own] = steep
+    marginal = (jt @ e[..., None])[..., 0] - (cross.transpose(0, 2, 1) @ (inverse @ pull[..., None]))[..., 0]
+    gradient[rows, own] = marginal
     squares = np.sum(e * e, axis=1) + np.sum((random_effects / prior) ** 2, axis=1)
-    # The offsets are a step away from their best values: what that step gains belongs to the loss.
+    # The random effects are one step from their best values: the gain of that step belongs to the loss.
     squares -= np.einsum("ri,rij,rj->r", pull, inverse, pull)
     logs = np.linalg.slogdet(inner)[1] + 2.0 * np.sum(np.log(prior), axis=1)
     logs += (
@@ -115,25 +116,25 @@ def terms_of(
     )
     if predictor.readings.initial_states is not None:
         logs += 6.0 * temper * (predictor.readings.seen * np.log(variance_components.growth)).sum(axis=1)
-        squares, trust = student(predictor, squares)
-        blocks *= trust[:, None, None]
-        gradient = np.asarray(gradient * trust[:, None])
+        squares, robust_weight = student(predictor, squares)
+        blocks *= robust_weight[:, None, None]
+        gradient = np.asarray(gradient * robust_weight[:, None])
     information = Information(own, blocks, linear.count)
     return Terms(squares + logs, information, gradient, inverse, mixed, pull)
 
 
 def inner_inverse(a: Floats, prior: Floats) -> tuple[Floats, Floats]:
-    """Return the information on each run's offsets (R, 6, 6), with its inverse."""
+    """Return the information about each run's random effects (R, 6, 6), with its inverse."""
     inner = a.transpose(0, 2, 1) @ a
     inner[:, range(6), range(6)] += prior**-2.0
     return inner, np.asarray(np.linalg.inv(inner))
 
 
-@np.errstate(over="ignore")  # what a step too far predicts may be beyond all numbers: infinitely bad, and not taken
+@np.errstate(over="ignore")  # after too long a step the prediction may overflow: the objective is ∞, the step rejected
 def objective(
     predictor: Predictor, residual: Floats, random_effects: Floats, variance_components: VarianceComponents
 ) -> float:
-    """Return the weighted squares of residuals and offsets: what a step must not make larger."""
+    """Return the weighted sum of squares of residuals and random effects: the objective that no step may increase."""
     temper, _ = tempering(predictor)
     seen = predictor.readings.seen[:, :, None]
     e = residual * seen / scale_of(variance_components)
@@ -146,14 +147,17 @@ def objective(
 
 
 def residual_of(predictor: Predictor, poses: Floats) -> Floats:
-    """Return measured minus predicted poses (R, K, 3): 0 where nothing was measured, huge where none is predicted."""
+    """Return measured minus predicted poses (R, K, 3): 0 if not measured, the largest float if not predicted."""
     residual = np.asarray(predictor.readings.poses - poses)
     residual[np.isnan(poses) & predictor.readings.seen[:, :, None]] = np.inf
     return np.asarray(np.nan_to_num(residual))
 
 
 def ridge(predictor: Predictor) -> Floats:
-    """Return a prior so weak that it only speaks where the data say nothing: 1 rad, 1 m/s, 100 for effects."""
+    """Return the inverse covariance (P, P) of a weak prior: standard deviations 1 rad, 1 m/s, and 100 for effects.
+
+    It matters only for parameters that the data do not determine.
+    """
     strength = np.full(predictor.maps.size + len(predictor.parameter_names), 1.0)
     strength[predictor.maps.size :] = WEAK
     return np.diag(strength)

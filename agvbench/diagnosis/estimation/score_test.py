@@ -1,4 +1,4 @@
-"""The predicted gain of a larger model, to first order: some simulations in place of a fit."""
+"""Score test: the predicted gain of a larger model, to first order, from some simulations in place of a fit."""
 
 from __future__ import annotations
 
@@ -21,18 +21,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class LinearisationPoint:
-    """A fitted model of runs as larger ones are linearised about it, with the runs' offsets projected out.
+    """A fitted model about which larger models are linearised, with the random effects projected out.
 
-    ``weight`` (R, K, 3) of residuals; ``a`` (R, 3K, 6) derivatives by the offsets, ``inverse`` (R, 6, 6) of their
-    information, ``drawn`` (R, 6) what their prior pulls; ``own`` (R, m) the numbers of the parameters that each run
-    depends on at most, ``j`` (R, 3K, m) derivatives by these, projected; ``covariance`` (P, P); ``pull`` (P,) of the
-    offsets' prior on the parameters; ``residual`` (R, 3K), weighted.
+    ``weight`` (R, K, 3): weights of the residuals; ``a`` (R, 3K, 6): derivatives by the random effects; ``inverse``
+    (R, 6, 6): the inverse of their information; ``prior_gradient`` (R, 6): gradient of their prior; ``own`` (R, m):
+    indices of each run's active parameters; ``j`` (R, 3K, m): projected derivatives by these; ``covariance`` (P, P) of
+    the parameters; ``pull`` (P,): gradient of the prior of the random effects by the parameters; ``residual`` (R, 3K),
+    weighted.
     """
 
     weight: Floats
     a: Floats
     inverse: Floats
-    drawn: Floats
+    prior_gradient: Floats
     own: NDArray[np.int64]
     j: Floats
     covariance: Floats
@@ -41,7 +42,7 @@ class LinearisationPoint:
 
     @classmethod
     def of(cls, fitted: Fit) -> LinearisationPoint:
-        """Return the ground of a fit."""
+        """Return the linearisation point of a fit."""
         predictor, variance_components, linear = fitted.predictor, fitted.variance_components, fitted.linear
         weight = weights(predictor, variance_components)
         residual = (fitted.residual * weight).reshape(len(weight), -1)
@@ -50,56 +51,61 @@ class LinearisationPoint:
         prior = priors(predictor, variance_components)
         inverse = inner_inverse(a, prior)[1]
         mixed = inverse @ (a.transpose(0, 2, 1) @ j)
-        drawn = fitted.random_effects / prior**2
+        prior_gradient = fitted.random_effects / prior**2
         matrix = fitted.information.total + ridge(predictor)
         pull = np.zeros(len(matrix))
-        np.add.at(pull, linear.own, np.einsum("rij,ri->rj", mixed, drawn))
+        np.add.at(pull, linear.own, np.einsum("rij,ri->rj", mixed, prior_gradient))
         covariance = np.asarray(np.linalg.inv(matrix))
-        return cls(weight, a, inverse, drawn, linear.own, j - a @ mixed, covariance, pull, residual)
+        return cls(weight, a, inverse, prior_gradient, linear.own, j - a @ mixed, covariance, pull, residual)
 
     @cached_property
     def squares(self) -> float:
-        """The weighted squares of the fit's own residuals."""
+        """The weighted sum of squares of the fit's residuals."""
         return self._squares(self.residual)
 
     def _squares(self, e: Floats) -> float:
-        """Return the weighted squares of residuals `e` (R, 3K), their offsets found anew."""
-        pull = (self.a.transpose(0, 2, 1) @ e[..., None])[..., 0] - self.drawn
+        """Return the weighted sum of squares of residuals `e` (R, 3K), minimised over the random effects."""
+        pull = (self.a.transpose(0, 2, 1) @ e[..., None])[..., 0] - self.prior_gradient
         return float(np.sum(e * e) - np.sum(pull * (self.inverse @ pull[..., None])[..., 0]))
 
     def predicted_gain(self, residual: Floats, slopes: Floats, start: Floats, bounds: Floats) -> float:
-        """Return by how much the loss falls, to first order, by `residual` (R, K, 3) and its `slopes`."""
+        """Return the predicted reduction of the loss, to first order, from the larger model's linearisation.
+
+        `residual` (R, K, 3) is that of the larger model at `start` (q,). `slopes` (R, K, 3, q) are the derivatives by
+        its new parameters, and `bounds` (q, 2) their bounds.
+        """
         e = (residual * self.weight).reshape(len(residual), -1)
         new = (slopes * self.weight[..., None]).reshape(*e.shape, -1)
-        fixed = new - self.a @ (self.inverse @ (self.a.transpose(0, 2, 1) @ new))
-        # What the offsets' prior pulls comes in by the same way.
-        pull = np.einsum("rnq,rn->q", fixed, e) + np.einsum("rnq,rn->q", new, self._drawn_along)
-        onto = self._onto(np.concatenate([e[..., None], new], axis=-1))
-        old_pull, shared = onto[:, 0] + self.pull, onto[:, 1:]
-        own = np.einsum("rnp,rnq->pq", new, fixed) + WEAK * np.eye(len(start))
-        # The maps and effects that there are move along; what is left is a question of the new parameters alone.
+        projected = new - self.a @ (self.inverse @ (self.a.transpose(0, 2, 1) @ new))
+        # The prior of the random effects contributes to the gradient, too.
+        pull = np.einsum("rnq,rn->q", projected, e) + np.einsum("rnq,rn->q", new, self._prior_change)
+        products = self._products(np.concatenate([e[..., None], new], axis=-1))
+        old_pull, shared = products[:, 0] + self.pull, products[:, 1:]
+        own = np.einsum("rnp,rnq->pq", new, projected) + WEAK * np.eye(len(start))
+        # The existing parameters are eliminated (Schur complement): the new parameters remain.
         along = self.covariance @ shared
         matrix, rest = own - shared.T @ along, pull - along.T @ old_pull
-        wanted = start + np.linalg.lstsq(matrix, rest, rcond=1e-12)[0]
-        move = np.clip(wanted, bounds[:, 0], bounds[:, 1]) - start
+        unbounded = start + np.linalg.lstsq(matrix, rest, rcond=1e-12)[0]
+        move = np.clip(unbounded, bounds[:, 0], bounds[:, 1]) - start
         saved = old_pull @ self.covariance @ old_pull + 2.0 * rest @ move - move @ matrix @ move
         return float(self.squares - self._squares(e) + saved)
 
     @cached_property
-    def _drawn_along(self) -> Floats:
-        return np.asarray((self.a @ (self.inverse @ self.drawn[..., None]))[..., 0])
+    def _prior_change(self) -> Floats:
+        return np.asarray((self.a @ (self.inverse @ self.prior_gradient[..., None]))[..., 0])
 
-    def _onto(self, columns: Floats) -> Floats:
+    def _products(self, columns: Floats) -> Floats:
         """Return the products of columns (R, 3K, q) with the derivatives by all parameters, (P, q)."""
         out = np.zeros((len(self.pull), columns.shape[-1]))
         np.add.at(out, self.own, self.j.transpose(0, 2, 1) @ columns)
         return out
 
 
-def begun(fitted: Fit, larger: Predictor, start: Floats) -> Floats:
-    """Return the parameters at which a fit of `larger` begins, whose last effect is at `start`: maps lie beside it.
+def initial_parameters(fitted: Fit, larger: Predictor, start: Floats) -> Floats:
+    """Return the parameters (P,) at which a fit of `larger` starts, with its last effect at `start` (q,).
 
-    They do where runs begin at neutral; elsewhere they stay.
+    If all runs begin with both axles at neutral, the nodal values are converted for the added effect. Otherwise they
+    are those of `fitted`.
     """
     values, maps = fitted.parameters, larger.maps.size
     if larger.readings.initial_states is None and not larger.readings.preset:
@@ -110,12 +116,12 @@ def begun(fitted: Fit, larger: Predictor, start: Floats) -> Floats:
 
 
 def first_order_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floats) -> float:
-    """Return by how much the loss would fall with one effect more, its parameters near `start`, to first order.
+    """Return the predicted reduction of the loss by one more effect, to first order, its parameters near `start` (q,).
 
-    `larger` has the effects of `fitted` and then the other. It is linearised at `start`, with the derivatives by what
-    was fitted before left as they are: some simulations in place of a fit.
+    `larger` has the effects of `fitted` and then the new one. It is linearised at `start`. The derivatives by the
+    existing parameters are those of `fitted`, so that a few simulations replace a fit.
     """
-    parameters = begun(fitted, larger, start)
+    parameters = initial_parameters(fitted, larger, start)
     poses, slopes = larger.by_last(parameters, fitted.random_effects, len(start))
     residual = residual_of(larger, poses)
     if larger.readings.initial_states is None:
@@ -125,12 +131,12 @@ def first_order_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floa
     )
     gradient, matrix = terms.gradient.sum(axis=0), terms.information.total + ridge(larger)
     move = np.linalg.lstsq(matrix, gradient, rcond=1e-12)[0]
-    # What would go beyond its bound stops there, and the rest is solved for again.
+    # Parameters beyond a bound are set to it, and the others are solved for again.
     known = len(fitted.parameters)
-    ends = np.clip(start + move[known:], bounds[:, 0], bounds[:, 1])
-    if np.any(ends != start + move[known:]):
-        held = np.r_[np.zeros(known), ends - start]
-        rest = np.linalg.lstsq(matrix[:known, :known], (gradient - matrix @ held)[:known], rcond=1e-12)[0]
-        move = np.r_[rest, ends - start]
+    clipped = np.clip(start + move[known:], bounds[:, 0], bounds[:, 1])
+    if np.any(clipped != start + move[known:]):
+        fixed = np.r_[np.zeros(known), clipped - start]
+        rest = np.linalg.lstsq(matrix[:known, :known], (gradient - matrix @ fixed)[:known], rcond=1e-12)[0]
+        move = np.r_[rest, clipped - start]
     saved = 2.0 * gradient @ move - move @ matrix @ move
     return float(fitted.loss.sum() - terms.loss.sum() + saved)

@@ -1,4 +1,4 @@
-"""Standard errors of parameters: by how much they move when groups of runs are left out, one after another."""
+"""Standard errors of parameters, from jackknives over groups of runs and over runs."""
 
 from __future__ import annotations
 
@@ -11,44 +11,47 @@ from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.estimation.likelihood import ridge
 from agvbench.types import Floats
 
-_FEWEST = 4.0
+_MIN_GROUPS = 4.0
 _LEVEL = 0.975
 
 
 def standard_errors(fitted: Fit, group: NDArray[np.int64]) -> Floats:
     """Return the standard errors of all parameters (P,).
 
-    The larger of two jackknifes: by groups of runs that share a command, since what repeats share is not to be counted
-    many times (MacKinnon, Nielsen and Webb, Journal of Applied Econometrics 38, 2023, CV3), and by runs, since few
-    groups may agree by chance (Angrist and Pischke, Mostly Harmless Econometrics, 2009, section 8.2). Leaving out is
-    one Newton step, exact as far as the loss is quadratic. So that ± 1.96 of it are a 95 % interval though few groups
-    determine it, it is wider by Student's t. Where fewer than four groups determine a parameter, their dispersion shows
-    nothing: then it is the larger of the likelihood's own standard error and that of the jackknife by runs. Windows of
-    free driving, which come in few sessions, have those of `clustered_covariance`.
+    The standard error is the larger of two jackknife estimates. The first leaves out groups of runs with the same
+    commands, because errors that repeats share must not count once per repeat (CV3: MacKinnon, Nielsen and Webb,
+    Journal of Applied Econometrics 38, 2023). The second leaves out single runs, because a few groups may agree by
+    chance (Angrist and Pischke, Mostly Harmless Econometrics, 2009, section 8.2). Leaving out is one Newton step, which
+    is exact for a quadratic loss.
+
+    Student's t for the effective number of groups widens the standard error, so that ± 1.96 standard errors are a 95 %
+    interval. If fewer than four groups determine a parameter, their standard deviation is not informative. Its standard
+    error is then the larger of those of the likelihood and of the jackknife over runs. Windows of free driving come in
+    few sessions; their standard errors are those of `clustered_covariance`.
 
     Parameters
     ----------
     fitted
         The fit.
     group
-        (R,): which runs belong together.
+        (R,): the group of each run.
     """
     if fitted.predictor.readings.initial_states is not None:
         return np.asarray(np.sqrt(np.diagonal(clustered_covariance(fitted, group))))
     of_groups, counts = _jackknife(fitted, group)
     of_runs, _ = _jackknife(fitted, np.arange(len(group)))
     own = np.sqrt(np.diagonal(fitted.covariance))
-    # Normal draws of n groups with the same variance have a fourth moment that makes them count as n/3.
-    wider = special.stdtrit(3.0 * counts, _LEVEL) / special.ndtri(_LEVEL)
-    jackknifed = np.maximum(of_groups, of_runs) * wider
-    return np.asarray(np.where(counts >= _FEWEST, jackknifed, np.maximum(own, of_runs)))
+    # For normal deviations of n groups with equal variance the effective number is n/3.
+    widening = special.stdtrit(3.0 * counts, _LEVEL) / special.ndtri(_LEVEL)
+    widened = np.maximum(of_groups, of_runs) * widening
+    return np.asarray(np.where(counts >= _MIN_GROUPS, widened, np.maximum(own, of_runs)))
 
 
 def _jackknife(fitted: Fit, group: NDArray[np.int64]) -> tuple[Floats, Floats]:
-    """Return the jackknife's standard errors (P,), and how many groups, in effect, determine each parameter (P,)."""
-    pulls, information = by_group(fitted.gradient, group), by_group(fitted.information.dense(), group)
-    groups = len(pulls)
+    """Return the jackknife standard errors (P,), and the effective number of groups behind each of them (P,)."""
+    scores, information = by_group(fitted.gradient, group), by_group(fitted.information.dense(), group)
+    groups = len(scores)
     rest = information.sum(axis=0) + ridge(fitted.predictor) - information
-    squares = np.array([np.linalg.lstsq(rest[g], pulls[g], rcond=1e-12)[0] for g in range(groups)]) ** 2
+    squares = np.array([np.linalg.lstsq(rest[g], scores[g], rcond=1e-12)[0] for g in range(groups)]) ** 2
     counts = squares.sum(axis=0) ** 2 / np.maximum((squares**2).sum(axis=0), 1e-300)
     return np.sqrt((groups - 1) / groups * squares.sum(axis=0)), counts

@@ -1,8 +1,9 @@
-"""Variance components of measurements and runs: weights, priors, and how they are estimated.
+"""Variance components of measurements and runs: initial values, updates, and the weights and priors that follow.
 
-Windows of free driving have no random effects but those of their start pose: residuals of neighbours are correlated,
-so that an offset for each would explain a cause away. Their errors grow with time and have heavy tails, another day's
-driving being many times as far off as this one's: the likelihood is Student's, of a window and not of its samples.
+Windows of free driving have no random effects except those of their start pose. The errors of adjacent windows are
+correlated, so that random effects of each window would absorb a cause. The errors grow with time and have heavy tails:
+on another day they may be many times as large. The likelihood of a window is therefore Student's t, with the window and
+not the sample as unit.
 """
 
 from __future__ import annotations
@@ -16,20 +17,21 @@ from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.types import Floats
 
 EVIDENCE_POSES = 4.0
-"""A run's samples count as this many independent poses: successive residuals are correlated."""
+"""Number of independent poses that a run's samples are worth: residuals within a run are strongly correlated."""
 
-_LEAST_M, _LEAST_RAD = 1e-4, 2e-4
+_MIN_M, _MIN_RAD = 1e-4, 2e-4
 _START_EXTRA_M = 2e-4
-_LEAST_DEVIATION = np.array([2e-4, 2e-4, 2e-4, 2e-4])
-_TAIL = 4.0  # degrees of freedom of a window's errors
+_MIN_DEVIATION = np.array([2e-4, 2e-4, 2e-4, 2e-4])
+_STUDENT_DOF = 4.0  # of the errors of windows
 
 
 @dataclass(frozen=True)
 class VarianceComponents:
     """Standard deviations.
 
-    Within a run ``position_m`` and ``heading_rad``; from run to run ``random_effects`` (4,): start heading [rad],
-    front and rear axle [rad], log of speed. ``growth`` (K,) or (1,): how large errors of each sample are beside those.
+    ``position_m`` and ``heading_rad`` are those of samples within a run. ``random_effects`` (4,) are those between
+    runs: start heading [rad], front and rear axle [rad], logarithm of speed. ``growth`` (K,) or (1,) is the factor on
+    the standard deviations of each sample.
     """
 
     position_m: float
@@ -39,23 +41,23 @@ class VarianceComponents:
 
 
 def initial_variance_components() -> VarianceComponents:
-    """Return generous variance components to start from."""
+    """Return large initial values."""
     return VarianceComponents(0.05, 0.05, np.array([0.01, 0.01, 0.01, 0.02]))
 
 
 def window_variance_components(readings: Readings) -> VarianceComponents:
-    """Return variance components to start from: errors that grow with time, and hardly an offset."""
-    ahead_s = np.nanmean(readings.t_s - readings.begins_s[:, None], axis=0)
-    return VarianceComponents(0.1, 0.1, _LEAST_DEVIATION.copy(), ahead_s / ahead_s[-1])
+    """Return initial values for windows: errors that grow with time, and almost no random effects."""
+    elapsed_s = np.nanmean(readings.t_s - readings.begins_s[:, None], axis=0)
+    return VarianceComponents(0.1, 0.1, _MIN_DEVIATION.copy(), elapsed_s / elapsed_s[-1])
 
 
 def tempering(predictor: Predictor) -> tuple[Floats, Floats]:
-    """Return what each run's samples count as, as a share of so many independent poses (R,), and how many (R,)."""
+    """Return the weight of one sample of each run (R,), and each run's number of samples (R,)."""
     count = predictor.readings.seen.sum(axis=1).astype(np.float64)
-    evidence = (
+    independent = (
         EVIDENCE_POSES if predictor.readings.initial_states is None else 1.0 / predictor.batch.autocorrelation_time
     )
-    return np.minimum(1.0, evidence / np.maximum(count, 1.0)), count
+    return np.minimum(1.0, independent / np.maximum(count, 1.0)), count
 
 
 def scale_of(variance_components: VarianceComponents) -> Floats:
@@ -67,16 +69,20 @@ def scale_of(variance_components: VarianceComponents) -> Floats:
 
 
 def student(predictor: Predictor, squares: Floats) -> tuple[Floats, Floats]:
-    """Return each window's loss and weight by Student's law for three numbers, given its squared errors.
+    """Return each window's loss and weight (W,) under Student's t in three dimensions, given its squared errors (W,).
 
-    The squares are those of a part of a window where windows are correlated; so is the loss.
+    If windows are correlated, each counts as the share 1/autocorrelation time of an independent window. Squared errors
+    and losses are those of this share.
     """
     part = 1.0 / predictor.batch.autocorrelation_time
-    return part * (_TAIL + 3.0) * np.log1p(squares / part / _TAIL), (_TAIL + 3.0) / (_TAIL + squares / part)
+    return (
+        part * (_STUDENT_DOF + 3.0) * np.log1p(squares / part / _STUDENT_DOF),
+        (_STUDENT_DOF + 3.0) / (_STUDENT_DOF + squares / part),
+    )
 
 
 def weights(predictor: Predictor, variance_components: VarianceComponents) -> Floats:
-    """Return what residuals are multiplied by (R, K, 3)."""
+    """Return the weights of the residuals (R, K, 3): the inverse of their standard deviation, times the tempering."""
     temper, _ = tempering(predictor)
     return np.asarray(
         np.sqrt(temper)[:, None, None] * predictor.readings.seen[:, :, None] / scale_of(variance_components)
@@ -84,7 +90,7 @@ def weights(predictor: Predictor, variance_components: VarianceComponents) -> Fl
 
 
 def priors(predictor: Predictor, variance_components: VarianceComponents) -> Floats:
-    """Return how far each run's offsets may be from none, (R, 6)."""
+    """Return the prior standard deviations of each run's random effects, (R, 6)."""
     start = np.hypot(predictor.readings.start_stderr, _START_EXTRA_M)
     out = np.empty((len(predictor.readings), 6))
     out[:, :2] = start[:, :2]
@@ -100,7 +106,7 @@ def update_variance_components(
     inner_inverse: Floats,
     variance_components: VarianceComponents,
 ) -> VarianceComponents:
-    """Estimate the components from residuals (R, K, 3), random effects (R, 6) and their covariances (R, 6, 6)."""
+    """Return the estimate from residuals (R, K, 3), random effects (R, 6) and their covariances (R, 6, 6)."""
     seen = predictor.readings.seen
     if predictor.readings.initial_states is not None:
         return _update_window_variance_components(predictor, residual, variance_components)
@@ -109,9 +115,9 @@ def update_variance_components(
     heading = np.sqrt(np.sum(residual[..., 2] ** 2 * seen) / count)
     variance = random_effects[:, 2:] ** 2 + np.diagonal(inner_inverse, axis1=1, axis2=2)[:, 2:]
     return VarianceComponents(
-        max(float(position), _LEAST_M),
-        max(float(heading), _LEAST_RAD),
-        np.maximum(np.sqrt(variance.mean(axis=0)), _LEAST_DEVIATION),
+        max(float(position), _MIN_M),
+        max(float(heading), _MIN_RAD),
+        np.maximum(np.sqrt(variance.mean(axis=0)), _MIN_DEVIATION),
     )
 
 
@@ -121,16 +127,16 @@ def _update_window_variance_components(
     seen = predictor.readings.seen
     temper, _ = tempering(predictor)
     e = residual * seen[..., None] / scale_of(variance_components)
-    _, trust = student(predictor, temper * np.sum(e * e, axis=(1, 2)))
-    weight = seen * trust[:, None]
+    _, robust_weight = student(predictor, temper * np.sum(e * e, axis=(1, 2)))
+    weight = seen * robust_weight[:, None]
     total = np.maximum(seen.sum(axis=0), 1.0)
     position = np.sqrt(np.sum(residual[..., :2] ** 2 * weight[..., None], axis=(0, 2)) / (2.0 * total))
     heading = np.sqrt(np.sum(residual[..., 2] ** 2 * weight, axis=0) / total)
-    # One growth for both, that of position, which is what is asked for in the end.
-    growth = np.maximum(position, _LEAST_M) / max(float(position[-1]), _LEAST_M)
+    # Position and heading share the growth of position, which is the quantity to be predicted.
+    growth = np.maximum(position, _MIN_M) / max(float(position[-1]), _MIN_M)
     return VarianceComponents(
-        max(float(position[-1]), _LEAST_M),
-        max(float(np.sqrt(np.mean((heading / growth) ** 2))), _LEAST_RAD),
+        max(float(position[-1]), _MIN_M),
+        max(float(np.sqrt(np.mean((heading / growth) ** 2))), _MIN_RAD),
         variance_components.random_effects,
         growth,
     )

@@ -1,4 +1,4 @@
-"""Runs packed for simulation, with slightly different variants of them whose differences are derivatives."""
+"""Runs packed for simulation, nominal and perturbed: finite differences between both give derivatives."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class GroupedSums:
-    """Which of n terms add up to each of u sums.
+    """Grouping of n terms into u sums.
 
-    ``order`` (n,): the terms as they are added; ``first`` (u,): where each sum begins in that order; ``place`` (u, q):
-    the numbers that stand for each sum.
+    ``order`` (n,): indices of the terms in the order of addition; ``first`` (u,): position of each sum's first term in
+    that order; ``key`` (u, q): the key of each sum.
     """
 
     order: Integers
     first: Integers
-    place: Integers
+    key: Integers
 
     @classmethod
-    def of(cls, *place: Integers) -> GroupedSums:
-        """Return what gathers terms by their numbers, q arrays (n,); within a sum they keep their order."""
-        order = np.lexsort(place[::-1])
-        ordered = np.column_stack(place)[order]
+    def of(cls, *key: Integers) -> GroupedSums:
+        """Return the grouping of terms by their keys, q arrays (n,); terms of a sum keep their order."""
+        order = np.lexsort(key[::-1])
+        ordered = np.column_stack(key)[order]
         first = np.flatnonzero(np.any(np.diff(ordered, axis=0, prepend=-1) != 0, axis=1))
         return cls(order, first, ordered[first])
 
@@ -47,14 +47,15 @@ class GroupedSums:
 
 @dataclass(frozen=True)
 class PerturbationBatch:
-    """The variants of runs in which one level (or one free value) of one command is changed, n of them.
+    """The n perturbations of one command: each changes one level (or one nodal value) in one run.
 
-    ``number`` (n,): which perturbations these are; ``run`` (n,): of which run; ``row`` (n,): a row that has the level,
-    or the number of the value. ``term`` (t,) and ``weight`` (t,): which change counts how much for each derivative by a
-    free value. ``by_run`` sums perturbations, ``by_value`` terms by run and column.
+    ``index`` (n,): position among all perturbations; ``run`` (n,): the perturbed run; ``row`` (n,): a row with that
+    level, or the index of the nodal value. ``term`` (t,) and ``weight`` (t,): index and weight of the perturbation in
+    each term of a derivative by a nodal value. ``by_run`` groups perturbations by run. ``by_value`` groups terms by run
+    and column.
     """
 
-    number: Integers
+    index: Integers
     run: Integers
     row: Integers
     term: Integers
@@ -63,21 +64,21 @@ class PerturbationBatch:
     by_value: GroupedSums
 
     @classmethod
-    def of(cls, number: Integers, run: Integers, row: Integers, weights: Floats, column: Integers) -> PerturbationBatch:
-        """Return perturbations that count by `weights` (n, values) in the columns (runs, values) of their runs."""
+    def of(cls, index: Integers, run: Integers, row: Integers, weights: Floats, column: Integers) -> PerturbationBatch:
+        """Return perturbations with `weights` (n, values) in the columns (runs, values) of the derivatives."""
         term, value = np.nonzero(weights)
         by_value = GroupedSums.of(run[term], column[run[term], value])
-        return cls(number, run, row, term, weights[term, value], GroupedSums.of(run), by_value)
+        return cls(index, run, row, term, weights[term, value], GroupedSums.of(run), by_value)
 
 
 class Batch:
-    """Runs packed for simulation: as they are, and perturbed, each time in one level or in heading.
+    """Runs packed for simulation, with a perturbation batch: copies of runs that differ in one level or in heading.
 
-    A run's own levels of command are varied one by one, which gives the derivatives by the maps' values and by the
-    run's offsets alike. Where commands change so often that a run has more levels than free values, the values are
-    varied instead (``by_node``). Packed once, it serves every set of effects, also ``kinds``
-    beyond those of the library. ``nodal_deviation`` as for
-    `Simulation.predict`; ``autocorrelation_time``: so many windows are as much evidence as one.
+    Each command level of a run is perturbed by itself. This gives the derivatives by the nodal values and by the run's
+    random effects. If the runs have more command levels than nodal values, the nodal values are perturbed instead
+    (``by_node``). One batch serves every set of effects, including ``kinds`` outside the library.
+    ``nodal_deviation`` is that of `Simulation.predict`. ``autocorrelation_time`` is the number of windows that are
+    worth one independent window.
     """
 
     def __init__(
@@ -99,72 +100,72 @@ class Batch:
         self.base = Simulation(geometry, maps.neutral, runs, kinds=kinds)
         self.commands: dict[str, Floats] = {role: getattr(self.base, role) for role in ROLES}
         self.weights = {role: maps.weights(role, self.commands[role]) for role in ROLES}
-        self.drives = self.commands["drive"] != maps.neutral
-        owns = [np.arange(a, b) for a, b in pairwise(self.base.row_starts.tolist())]
-        self.by_node = sum(map(self._count_nodes, owns)) < sum(map(self._count_levels, owns))
-        changes = [list(self._nodes(own) if self.by_node else self._levels(own)) for own in owns]
+        self.driven = self.commands["drive"] != maps.neutral
+        rows_of_run = [np.arange(a, b) for a, b in pairwise(self.base.row_starts.tolist())]
+        self.by_node = sum(map(self._count_nodes, rows_of_run)) < sum(map(self._count_levels, rows_of_run))
+        changes = [list(self._nodes(own) if self.by_node else self._levels(own)) for own in rows_of_run]
         run, kind, row, changed = [], [], [], []
-        for i, own in enumerate(owns):
-            still = np.zeros((len(own), len(ROLES)))
-            for role, first, change in [("heading", -1, still), *changes[i]]:
+        for i, own in enumerate(rows_of_run):
+            unchanged = np.zeros((len(own), len(ROLES)))
+            for role, first, change in [("heading", -1, unchanged), *changes[i]]:
                 run.append(i)
                 kind.append(role)
                 row.append(first)
                 changed.append(change)
-        self.perturbation_run = np.array(run)
+        self.perturbed_run = np.array(run)
         self.perturbations = Simulation(geometry, maps.neutral, [runs[i] for i in run], kinds=kinds)
-        self.touched = self._touched(owns)
-        self.turned = np.array(kind) == "heading"
-        self.varied = self._varied(np.array(kind), np.array(row))
-        self.rows = np.concatenate([owns[i] for i in run])
+        self.active = self._active(rows_of_run)
+        self.heading_perturbed = np.array(kind) == "heading"
+        self.perturbed = self._grouped(np.array(kind), np.array(row))
+        self.rows = np.concatenate([rows_of_run[i] for i in run])
         self.row_change = np.concatenate(changed)
 
-    def _touched(self, owns: list[NDArray[np.int64]]) -> NDArray[np.int64]:
-        """Return which of the maps' values each run depends on (R, m), and others where it depends on fewer than m."""
+    def _active(self, rows_of_run: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+        """Return the indices of each run's active nodal values (R, m), padded with inactive ones."""
         used = np.array(
-            [np.concatenate([(self.weights[role][own] != 0.0).any(axis=0) for role in ROLES]) for own in owns]
+            [np.concatenate([(self.weights[role][own] != 0.0).any(axis=0) for role in ROLES]) for own in rows_of_run]
         )
         return np.argsort(~used, axis=1, kind="stable")[:, : max(1, int(used.sum(axis=1).max()))]
 
-    def _varied(self, kind: NDArray[np.str_], row: NDArray[np.int64]) -> dict[str, PerturbationBatch]:
-        """Return by role the perturbations of that `kind` (n,): each varies a level of row `row`, or the node `row`."""
-        # In which column of `touched` each run has each of the values.
-        column = np.full((len(self.touched), self.maps.size), -1)
-        np.put_along_axis(column, self.touched, np.arange(self.touched.shape[1])[None, :], axis=1)
-        varied = {}
+    def _grouped(self, kind: NDArray[np.str_], row: NDArray[np.int64]) -> dict[str, PerturbationBatch]:
+        """Return the perturbations by role; `kind` (n,) is their role, `row` (n,) a row with the level or the node."""
+        # The column of `active` for each nodal value of each run.
+        column = np.full((len(self.active), self.maps.size), -1)
+        np.put_along_axis(column, self.active, np.arange(self.active.shape[1])[None, :], axis=1)
+        grouped = {}
         for role, own in self.maps.slices().items():
-            number = np.flatnonzero(kind == role)
+            index = np.flatnonzero(kind == role)
             values = np.eye(len(self.maps.nodes[role])) if self.by_node else self.weights[role]
-            varied[role] = PerturbationBatch.of(
-                number, self.perturbation_run[number], row[number], values[row[number]], column[:, own]
+            grouped[role] = PerturbationBatch.of(
+                index, self.perturbed_run[index], row[index], values[row[index]], column[:, own]
             )
-        return varied
+        return grouped
 
     def _count_levels(self, own: NDArray[np.int64]) -> int:
-        drives = self.drives[own]
+        driven = self.driven[own]
         return sum(
-            len(np.unique(self.commands[r][own][drives] if r == "drive" else self.commands[r][own])) for r in ROLES
+            len(np.unique(self.commands[r][own][driven] if r == "drive" else self.commands[r][own])) for r in ROLES
         )
 
     def _count_nodes(self, own: NDArray[np.int64]) -> int:
-        drives = self.drives[own]
+        driven = self.driven[own]
         return sum(
-            int(np.count_nonzero((self.weights[r][own][drives] if r == "drive" else self.weights[r][own]).any(axis=0)))
+            int(np.count_nonzero((self.weights[r][own][driven] if r == "drive" else self.weights[r][own]).any(axis=0)))
             for r in ROLES
         )
 
     def _levels(self, own: NDArray[np.int64]) -> Iterator[tuple[str, int, Floats]]:
-        """Yield each level of each command of one run: a row that has it, and by how much each row changes with it."""
+        """Yield role, a row with it, and the derivative of each row's commands (rows, 3) for each level of one run."""
         for k, role in enumerate(ROLES):
-            rows = self.drives[own] if role == "drive" else np.ones(len(own), dtype=np.bool_)
+            rows = self.driven[own] if role == "drive" else np.ones(len(own), dtype=np.bool_)
             values = self.commands[role][own]
             for level in np.unique(values[rows]):
                 moves = rows & (values == level)
                 yield role, int(own[np.argmax(moves)]), np.outer(moves, np.arange(len(ROLES)) == k).astype(np.float64)
 
     def _nodes(self, own: NDArray[np.int64]) -> Iterator[tuple[str, int, Floats]]:
-        """Yield each free value that one run depends on: its number, and by how much each row changes with it."""
+        """Yield role, index, and the derivative of each row's commands (rows, 3) for each nodal value of one run."""
         for k, role in enumerate(ROLES):
-            weights = self.weights[role][own] * (self.drives[own][:, None] if role == "drive" else 1.0)
+            weights = self.weights[role][own] * (self.driven[own][:, None] if role == "drive" else 1.0)
             for node in np.flatnonzero(weights.any(axis=0)):
                 yield role, int(node), np.outer(weights[:, node], np.arange(len(ROLES)) == k)

@@ -1,4 +1,4 @@
-"""Free static maps: one value at each level that a command had, straight lines between."""
+"""Nodal maps: static maps with one free value at each driven command level, linear in between."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from agvbench.effects import Effect
 from agvbench.types import Commands, Floats, Run
 
 ROLES = ("front", "rear", "drive")
-_MOST_NODES = 40
-_FEW_NODES = 16
+_MAX_NODES = 40
+_UNIFORM_NODES = 16
 _HELD_S = 0.25
-_SLOWEST_MPS = 0.02
+_MIN_SPEED_MPS = 0.02
 
 
 @dataclass(frozen=True)
 class NodalMaps:
-    """Commands at which the maps' values are free: ``nodes[role]`` ascending, neutral left out of the drive's.
+    """The nodes of the static maps: ``nodes[role]`` are commands, ascending; the drive has no node at neutral.
 
-    Their values stand one after another (front, rear, drive) in one vector. At neutral the drive stands still.
+    One vector holds all nodal values, in the order front, rear, drive. The drive's speed at neutral is zero.
     """
 
     nodes: dict[str, Floats]
@@ -31,108 +31,108 @@ class NodalMaps:
 
     @property
     def size(self) -> int:
-        """How many free values there are."""
+        """The number of nodal values."""
         return sum(map(len, self.nodes.values()))
 
     @property
     def names(self) -> list[str]:
-        """The values' names, such as ``front(1500)``."""
+        """The names of the nodal values, such as ``front(1500)``."""
         return [f"{role}({c:g})" for role in ROLES for c in self.nodes[role]]
 
     def slices(self) -> dict[str, slice]:
-        """Where each role's values are."""
+        """Return the slice of each role in the vector of nodal values."""
         ends = np.cumsum([len(self.nodes[role]) for role in ROLES])
         return {role: slice(int(e) - len(self.nodes[role]), int(e)) for role, e in zip(ROLES, ends, strict=True)}
 
     def weights(self, role: str, command: Floats) -> Floats:
-        """Return how the values at `command` (n,) follow from the free ones of `role`: (n, nodes)."""
+        """Return the interpolation weights (n, nodes) of the nodal values of `role` at `command` (n,)."""
         nodes = self.nodes[role]
         if role != "drive":
             return _interpolation(nodes, command)
-        # Standing still at neutral is no parameter: it takes part in the interpolation with a value of zero.
+        # Neutral is a node of the drive with a fixed value of zero, not a parameter.
         place = int(np.searchsorted(nodes, self.neutral))
         return np.delete(_interpolation(np.insert(nodes, place, self.neutral), command), place, axis=1)
 
     def beside(self, values: Floats, kind: type[Effect], parameters: Floats) -> Floats:
-        """Return what `values` (size,) that were fitted without an effect of this kind are beside it."""
-        laid = values.copy()
+        """Return `values` (size,), fitted without an effect of this kind, converted for a model with it."""
+        converted = values.copy()
         for role in ("front", "rear"):
             own = self.slices()[role]
             at_neutral = float((self.weights(role, np.array([self.neutral])) @ values[own])[0])
-            laid[own] = kind.beside(values[own], at_neutral, *parameters.tolist())
-        return laid
+            converted[own] = kind.beside(values[own], at_neutral, *parameters.tolist())
+        return converted
 
     def interpolated(self, values: Floats, unobserved: NDArray[np.bool_]) -> Floats:
-        """Return `values` (size,) with those that are `unobserved` interpolated between the others of their role.
+        """Return `values` (size,) with the `unobserved` ones interpolated between the observed ones of their role.
 
-        Where a role has no other, its values stay.
+        A role without observed values is left unchanged.
         """
-        laid = values.copy()
+        filled = values.copy()
         for role, own in self.slices().items():
-            nodes, heard = self.nodes[role], ~unobserved[own]
-            at, known = nodes[heard], values[own][heard]
+            nodes, observed = self.nodes[role], ~unobserved[own]
+            at, known = nodes[observed], values[own][observed]
             if role == "drive":
                 place = int(np.searchsorted(at, self.neutral))
                 at, known = np.insert(at, place, self.neutral), np.insert(known, place, 0.0)
             if len(at):
-                laid[own] = np.where(heard, values[own], np.interp(nodes, at, known))
-        return laid
+                filled[own] = np.where(observed, values[own], np.interp(nodes, at, known))
+        return filled
 
 
 def nodal_maps(runs: Sequence[Run], neutral: float) -> NodalMaps:
-    """Return a node for every level at which the vehicle drove; where there are too many, for `chosen_levels`."""
+    """Return maps with a node at every driven command level, or at `select_levels` of them if there are too many."""
     nodes = {}
     for role in ROLES:
-        commanded, held_s = _driven_commands(runs, role, neutral)
-        levels, which = np.unique(commanded, return_inverse=True)
-        if len(levels) > _MOST_NODES:
+        driven, held_s = _driven_commands(runs, role, neutral)
+        levels, which = np.unique(driven, return_inverse=True)
+        if len(levels) > _MAX_NODES:
             longest_s = np.zeros(len(levels))
             np.maximum.at(longest_s, which, held_s)
-            levels = chosen_levels(levels, longest_s)
+            levels = select_levels(levels, longest_s)
         nodes[role] = levels[levels != neutral] if role == "drive" else levels
     return NodalMaps(nodes, neutral)
 
 
-def chosen_levels(levels: Floats, longest_s: Floats) -> Floats:
-    """Return some of very many levels (n,), ascending: those that were held, and of the others what fills gaps.
+def select_levels(levels: Floats, longest_s: Floats) -> Floats:
+    """Return the levels that were held, and others that fill the gaps between these, ascending.
 
-    Oscillating steering passes many levels, a twentieth of a second each. Were nodes laid by how many levels there are,
-    they would crowd where it oscillates, and leave an end stop elsewhere between two of them.
+    A steering oscillation passes many levels, each for about 0.05 s. Nodes at quantiles of the levels would crowd in
+    the range of the oscillation, and an end stop outside of it would lie between two nodes.
 
     Parameters
     ----------
     levels
         (n,): ascending.
     longest_s
-        (n,): for how long each was held at most [s].
+        (n,): the longest time for which each level was held [s].
     """
     ends = np.isin(np.arange(len(levels)), (0, len(levels) - 1))
     held = (longest_s >= _HELD_S) | ends
-    nodes = _spread(levels[ends], levels[held], 0.0, _MOST_NODES)
-    return _spread(nodes, levels, float(np.ptp(levels)) / (_FEW_NODES - 1), _MOST_NODES)
+    nodes = _add_farthest(levels[ends], levels[held], 0.0, _MAX_NODES)
+    return _add_farthest(nodes, levels, float(np.ptp(levels)) / (_UNIFORM_NODES - 1), _MAX_NODES)
 
 
-def _spread(nodes: Floats, levels: Floats, near: float, most: int) -> Floats:
-    """Return `nodes` and, one after another, the level farthest from all, until none is farther than `near`."""
+def _add_farthest(nodes: Floats, levels: Floats, near: float, most: int) -> Floats:
+    """Add the level farthest from all nodes, one at a time, until all are within `near` or there are `most` nodes."""
     while len(nodes) < most:
-        away = np.abs(levels[:, None] - nodes).min(axis=1)
-        if away.max() <= near:
+        distance = np.abs(levels[:, None] - nodes).min(axis=1)
+        if distance.max() <= near:
             break
-        nodes = np.append(nodes, levels[np.argmax(away)])
+        nodes = np.append(nodes, levels[np.argmax(distance)])
     return np.sort(nodes)
 
 
 def _driven_commands(runs: Sequence[Run], role: str, neutral: float) -> tuple[Floats, Floats]:
-    """Return every command (n,) with which the vehicle drove, and for how long each was held [s]."""
-    commanded, held_s = [], []
+    """Return every command (n,) under which the vehicle was driven, and the time for which each was held [s]."""
+    commands, held_s = [], []
     for run in runs:
         values, t_s, driven = getattr(run.commands, role), run.commands.t_s, _driven_rows(run.commands, neutral)
-        # A row begins where any command changes: this one may be held over many.
-        initial_states = np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
-        ends_s = np.append(t_s[initial_states[1:]], max(float(np.max(run.frames.t_s, initial=-np.inf)), t_s[-1]))
-        commanded.append(values[driven])
-        held_s.append(np.repeat(ends_s - t_s[initial_states], np.diff(np.append(initial_states, len(values))))[driven])
-    return np.concatenate(commanded), np.concatenate(held_s)
+        # A row begins where any command changes, so that one command may be held over many rows.
+        changes = np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
+        ends_s = np.append(t_s[changes[1:]], max(float(np.max(run.frames.t_s, initial=-np.inf)), t_s[-1]))
+        commands.append(values[driven])
+        held_s.append(np.repeat(ends_s - t_s[changes], np.diff(np.append(changes, len(values))))[driven])
+    return np.concatenate(commands), np.concatenate(held_s)
 
 
 def _driven_rows(commands: Commands, neutral: float) -> NDArray[np.bool_]:
@@ -140,30 +140,30 @@ def _driven_rows(commands: Commands, neutral: float) -> NDArray[np.bool_]:
 
 
 def start_values(maps: NodalMaps, measured: Sequence[RunMeasurement], prior_model: dict[str, Floats]) -> Floats:
-    """Return values to start a fit from: what steady drives imply by inverted kinematics, at their commands.
+    """Return the nodal values at which a fit starts: those of steady drives, by inverted kinematics.
 
-    Where no steady drive had the command, it is `believed[role]` (values at the nodes), moved by what measured nodes
-    nearby were off by. A fit that starts far off may end anywhere.
+    At nodes without a steady drive they are those of the prior model (`prior_model[role]`, values at the nodes), plus
+    its error interpolated from the measured nodes. A fit from a distant start may end in another local minimum.
     """
     values = []
     for role in ROLES:
         nodes = maps.nodes[role]
         known = np.full(len(nodes), np.nan)
         for k, node in enumerate(nodes):
-            seen = [_implied(role, m) for m in measured if getattr(m.command, role) == node]
-            seen = [v for v in seen if np.isfinite(v)]
-            if seen:
-                known[k] = float(np.median(seen))
+            implied = [_implied(role, m) for m in measured if getattr(m.command, role) == node]
+            implied = [v for v in implied if np.isfinite(v)]
+            if implied:
+                known[k] = float(np.median(implied))
         measured_here = np.isfinite(known)
-        off = (known - prior_model[role])[measured_here]
-        moved = prior_model[role] + (np.interp(nodes, nodes[measured_here], off) if len(off) else 0.0)
+        error = (known - prior_model[role])[measured_here]
+        moved = prior_model[role] + (np.interp(nodes, nodes[measured_here], error) if len(error) else 0.0)
         values.append(np.where(measured_here, known, moved))
     return np.concatenate(values)
 
 
 def _implied(role: str, m: RunMeasurement) -> float:
     if role != "drive":
-        return float(getattr(m, f"{role}_rad")) if abs(m.speed_mps) > _SLOWEST_MPS else np.nan
+        return float(getattr(m, f"{role}_rad")) if abs(m.speed_mps) > _MIN_SPEED_MPS else np.nan
     if not m.moves:
         return 0.0
     return float(m.speed_mps * 2.0 * np.cos(m.sideslip_rad) / (np.cos(m.front_rad) + np.cos(m.rear_rad)))

@@ -1,4 +1,4 @@
-"""Predicted poses of all runs and their derivatives, by simulation of slightly different runs."""
+"""Predicted poses of all runs and their derivatives, by finite differences of simulations."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from agvbench.types import Floats
 
 @dataclass(frozen=True)
 class Linearised:
-    """Predicted poses and their derivatives, of which only those are kept that may differ from zero.
+    """Predicted poses and their derivatives, stored for each run's active parameters only.
 
-    ``poses`` (R, K, 3); ``own`` (R, m): the numbers of the parameters that each run depends on at most, of ``count``
-    (P); ``by_own`` (R, K, 3, m): derivatives by these; ``by_random_effects`` (R, K, 3, 6).
+    ``poses`` (R, K, 3); ``own`` (R, m): indices of each run's active parameters, out of ``count`` (P); ``by_own``
+    (R, K, 3, m): derivatives by these; ``by_random_effects`` (R, K, 3, 6).
     """
 
     poses: Floats
@@ -28,39 +28,39 @@ class Linearised:
 
     @property
     def by_parameters(self) -> Floats:
-        """The derivatives by all parameters (R, K, 3, P), zeros and all."""
+        """The derivatives by all parameters (R, K, 3, P), as a dense array."""
         out = np.zeros((*self.poses.shape, self.count))
         np.put_along_axis(out, self.own[:, None, None, :], self.by_own, axis=-1)
         return out
 
     def with_last(self, slopes: Floats) -> Linearised:
-        """Return these and derivatives (R, K, 3, q) by further parameters, which come last."""
+        """Return this linearisation with derivatives (R, K, 3, q) by further parameters, which come last."""
         more = np.arange(self.count, self.count + slopes.shape[-1])
         own = np.concatenate([self.own, np.broadcast_to(more, (len(self.own), len(more)))], axis=1)
         by_own = np.concatenate([self.by_own, slopes], axis=-1)
         return replace(self, own=own, by_own=by_own, count=self.count + len(more))
 
     def by_first(self, count: int) -> Linearised:
-        """Return these without the derivatives by the last parameters: by the maps' values alone, or by none.
+        """Return this linearisation with derivatives by the first `count` parameters only: the nodal values, or none.
 
-        In ``own`` the effects come last, and every run depends on each.
+        In ``own`` the effects' parameters come last, and all of them are active in every run.
         """
         kept = self.own.shape[1] - (self.count - count) if count else 0
         return replace(self, own=self.own[:, :kept], by_own=self.by_own[..., :kept], count=count)
 
 
 RANDOM_EFFECTS = ("x_m", "y_m", "heading_rad", "front_rad", "rear_rad", "log_speed")
-"""What may differ from run to run: the start pose, an offset of each axle, and a factor on speed."""
+"""The random effects of a run: its start pose, an offset of each axle, and the logarithm of a factor on speed."""
 
 _STEP = 1e-4  # rad, m/s
 _STEP_SHARE = 1e-3
-_FARTHEST_RAD = 1.4
+_MAX_ANGLE_RAD = 1.4
 
 
 class Predictor:
-    """Runs under nodal maps and some effects; the parameters are the maps' values, then the effects' parameters.
+    """Predicts runs with nodal maps and some effects; the parameters are the nodal values, then those of the effects.
 
-    A derivative is a difference between two simulations.
+    Each derivative is a forward difference of two simulations.
     """
 
     def __init__(self, batch: Batch, effects: tuple[str, ...] = ()) -> None:
@@ -73,11 +73,11 @@ class Predictor:
         self._last: tuple[tuple[bytes, ...], Floats] = (), np.empty(0)
 
     def settled(self, parameters: Floats) -> tuple[Floats, Floats]:
-        """Return settled angles and speed of every row (rows, 3), and initial states (R, 5)."""
+        """Return steady-state angles and speed of every row (rows, 3), and initial states (R, 5)."""
         return self._inputs(parameters, np.zeros((len(self.readings), len(RANDOM_EFFECTS))))
 
     def all_parameters(self, parameters: Floats) -> Floats:
-        """Return the simulation's whole parameter vector for the predictor's own."""
+        """Return the simulation's parameter vector (p,) for the predictor's `parameters` (P,)."""
         return self._all(parameters[self.maps.size :])
 
     def _all(self, own: Floats) -> Floats:
@@ -86,11 +86,11 @@ class Predictor:
         return values
 
     def _inputs(self, parameters: Floats, random_effects: Floats) -> tuple[Floats, Floats]:
-        """Return settled values of every row (rows, 3) and initial states (runs, 5)."""
+        """Return steady-state values of every row (rows, 3) and initial states (runs, 5)."""
         where, run = self.maps.slices(), self.batch.base.row_runs
         values = [self.batch.weights[role] @ parameters[where[role]] for role in ROLES]
-        front, rear = (np.clip(values[k] + random_effects[run, 3 + k], -_FARTHEST_RAD, _FARTHEST_RAD) for k in (0, 1))
-        speed = np.where(self.batch.drives, values[2] * np.exp(random_effects[run, 5]), 0.0)
+        front, rear = (np.clip(values[k] + random_effects[run, 3 + k], -_MAX_ANGLE_RAD, _MAX_ANGLE_RAD) for k in (0, 1))
+        speed = np.where(self.batch.driven, values[2] * np.exp(random_effects[run, 5]), 0.0)
         initial = np.zeros((len(self.readings), 5))
         initial[:, :3] = self.readings.start + random_effects[:, :3]
         if self.readings.initial_states is not None:
@@ -99,9 +99,9 @@ class Predictor:
         return np.column_stack([front, rear, speed]), initial
 
     def predict(self, parameters: Floats, random_effects: Floats | None = None) -> Floats:
-        """Return poses (R, K, 3) for parameters (P,) and offsets (R, 6), by default none.
+        """Return poses (R, K, 3) for parameters (P,) and random effects (R, 6), by default zero.
 
-        Those of the last time are kept, and so not to be written to: a fit looks around where it has just stepped.
+        The last result is cached and read-only: a fit is linearised where its last step was evaluated.
         """
         random_effects = (
             np.zeros((len(self.readings), len(RANDOM_EFFECTS))) if random_effects is None else random_effects
@@ -119,48 +119,53 @@ class Predictor:
         return poses.reshape(len(self.readings), -1, 3)
 
     def linearise(self, parameters: Floats, random_effects: Floats, near: Linearised | None = None) -> Linearised:
-        """Return poses and derivatives about parameters (P,) and offsets (R, 6).
+        """Return poses and derivatives about parameters (P,) and random effects (R, 6).
 
-        Where `near` is given, derivatives by the maps' values and by offsets are taken from there.
+        If `near` is given, it supplies the derivatives by the nodal values and by the random effects.
         """
         base, inputs = self.predict(parameters, random_effects), self._inputs(parameters, random_effects)
         if near is None:
-            by_maps = self._by_perturbations(parameters, random_effects, base, *inputs)
+            by_maps = self._by_maps(parameters, random_effects, base, *inputs)
         else:
             by_maps = replace(near.by_first(self.maps.size), poses=base)
         return by_maps.with_last(self._slopes(parameters, base, *inputs, len(parameters) - self.maps.size))
 
-    def _by_perturbations(
+    def _by_maps(
         self, parameters: Floats, random_effects: Floats, base: Floats, settled: Floats, initial: Floats
     ) -> Linearised:
-        """Return poses `base` with their derivatives by the maps' values and by offsets."""
+        """Return poses `base` with their derivatives by the nodal values and by the random effects."""
         batch = self.batch
         perturbations = self._simulate_perturbed(settled, initial, parameters[self.maps.size :])
-        by_own = np.zeros((*base.shape, batch.touched.shape[1]))
+        by_own = np.zeros((*base.shape, batch.active.shape[1]))
         columns = by_own.transpose(0, 3, 1, 2)
         by_random_effects = np.zeros((*base.shape, len(RANDOM_EFFECTS)))
         by_random_effects[:, :, 0, 0] = by_random_effects[:, :, 1, 1] = 1.0
-        by_random_effects[..., 2] = (perturbations[batch.turned] - base) / _STEP
+        by_random_effects[..., 2] = (perturbations[batch.heading_perturbed] - base) / _STEP
         for k, role in enumerate(ROLES):
-            varied = batch.varied[role]
-            change = (perturbations[varied.number] - base[varied.run]) / _STEP
-            by_offset, by_level = self._shares(role, parameters, random_effects, settled)
-            gathered = varied.by_run
-            by_random_effects[gathered.place[:, 0], :, :, 3 + k] = gathered.sums(change * by_offset[:, None, None])
-            weight = varied.weight * by_level[varied.term]
-            run, column = varied.by_value.place.T
-            columns[run, column] = varied.by_value.sums(change[varied.term] * weight[:, None, None])
-        return Linearised(base, batch.touched, by_own, by_random_effects, self.maps.size)
+            perturbed = batch.perturbed[role]
+            change = (perturbations[perturbed.index] - base[perturbed.run]) / _STEP
+            by_offset, by_level = self._chain_factors(role, parameters, random_effects, settled)
+            by_run = perturbed.by_run
+            by_random_effects[by_run.key[:, 0], :, :, 3 + k] = by_run.sums(change * by_offset[:, None, None])
+            weight = perturbed.weight * by_level[perturbed.term]
+            run, column = perturbed.by_value.key.T
+            columns[run, column] = perturbed.by_value.sums(change[perturbed.term] * weight[:, None, None])
+        return Linearised(base, batch.active, by_own, by_random_effects, self.maps.size)
 
-    def _shares(self, role: str, parameters: Floats, random_effects: Floats, settled: Floats) -> tuple[Floats, Floats]:
-        """Return how much each perturbation of `role` changes (n,) with its run's offset, and with its own level."""
-        varied = self.batch.varied[role]
+    def _chain_factors(
+        self, role: str, parameters: Floats, random_effects: Floats, settled: Floats
+    ) -> tuple[Floats, Floats]:
+        """Return derivatives (n,) of the value that each perturbation of `role` changes.
+
+        The first is by the run's random effect, the second by the level or nodal value.
+        """
+        perturbed = self.batch.perturbed[role]
         if role != "drive":
-            return np.ones(len(varied.run)), np.ones(len(varied.run))
-        faster = np.exp(random_effects[varied.run, 5])
+            return np.ones(len(perturbed.run)), np.ones(len(perturbed.run))
+        factor = np.exp(random_effects[perturbed.run, 5])
         if self.batch.by_node:
-            return faster * parameters[self.maps.slices()[role]][varied.row], faster
-        return settled[varied.row, 2], faster
+            return factor * parameters[self.maps.slices()[role]][perturbed.row], factor
+        return settled[perturbed.row, 2], factor
 
     def by_last(self, parameters: Floats, random_effects: Floats, count: int) -> tuple[Floats, Floats]:
         """Return poses (R, K, 3), and their derivatives by the last `count` parameters (R, K, 3, count)."""
@@ -168,7 +173,7 @@ class Predictor:
         return base, self._slopes(parameters, base, *self._inputs(parameters, random_effects), count)
 
     def _slopes(self, parameters: Floats, base: Floats, settled: Floats, initial: Floats, count: int) -> Floats:
-        """Return the derivatives (R, K, 3, count) of poses `base` by the last of the effects' parameters."""
+        """Return the derivatives (R, K, 3, count) of poses `base` by the last `count` of the effects' parameters."""
         own = parameters[self.maps.size :]
         slopes = np.empty((*base.shape, count))
         for column, k in enumerate(range(len(own) - count, len(own))):
@@ -179,9 +184,9 @@ class Predictor:
 
     def _simulate_perturbed(self, settled: Floats, initial: Floats, own: Floats) -> Floats:
         batch = self.batch
-        varied = settled[batch.rows] + _STEP * batch.row_change
-        first = initial[batch.perturbation_run]
-        first[:, 2] += _STEP * batch.turned
+        perturbed = settled[batch.rows] + _STEP * batch.row_change
+        first = initial[batch.perturbed_run]
+        first[:, 2] += _STEP * batch.heading_perturbed
         return batch.perturbations.predict(
-            varied, self._all(own), first, nodal_deviation=batch.nodal_deviation
-        ).reshape(len(batch.perturbation_run), -1, 3)
+            perturbed, self._all(own), first, nodal_deviation=batch.nodal_deviation
+        ).reshape(len(batch.perturbed_run), -1, 3)

@@ -1,4 +1,4 @@
-"""The residual as rates: that of each step between two samples per metre, with what it may depend on."""
+"""The residual of each step between two samples, per metre driven, with the covariates of the step."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from agvbench.diagnosis.data.readings import Readings
 from agvbench.types import Floats
 
 FEATURES = ("speed", "sideways", "turning")
-_STILL_M = 0.01
+_MIN_STEP_M = 0.01
 
 
 @dataclass(frozen=True)
 class Rates:
-    """The residual per metre driven, between successive samples.
+    """The residual per metre driven of n steps between successive samples.
 
-    ``run`` (n,) its run; ``value`` (n, 3): residual along and to the left as a share of the distance, and of curvature
-    [1/m]; ``weight`` (n,) metres; ``covariates`` by name (n,); ``begin`` and ``end`` (n, 3) measured poses;
-    ``step`` (n,) the number of the sample at its end, the same in repeats.
+    ``run`` (n,): index of the run; ``value`` (n, 3): longitudinal and lateral residual as a share of the distance, and
+    residual of curvature [1/m]; ``weight`` (n,): distance [m]; ``covariates``: (n,) by name; ``begin`` and ``end``
+    (n, 3): measured poses; ``step`` (n,): index of the sample at the end of the step, the same in repeats.
     """
 
     run: NDArray[np.int64]
@@ -33,39 +33,38 @@ class Rates:
 
     @property
     def middle(self) -> Floats:
-        """Where the vehicle was (n, 2)."""
+        """The mean position of the vehicle during each step (n, 2) [m]."""
         return np.asarray(0.5 * (self.begin + self.end)[:, :2])
 
     @property
     def drift(self) -> Floats:
-        """The residual on the way, as a drift over the floor (n, 2), in metres per metre driven."""
+        """The residual as a drift in the floor frame (n, 2), in metres per metre driven."""
         heading = 0.5 * (self.begin + self.end)[:, 2]
-        along, aside = (self.value[:, :2] * self.covariates["direction"][:, None]).T
+        longitudinal, lateral = (self.value[:, :2] * self.covariates["direction"][:, None]).T
         cos, sin = np.cos(heading), np.sin(heading)
-        return np.column_stack([cos * along - sin * aside, sin * along + cos * aside])
+        return np.column_stack([cos * longitudinal - sin * lateral, sin * longitudinal + cos * lateral])
 
 
 def residual_rates(readings: Readings, poses: Floats) -> Rates:
-    """Return how fast measured and predicted motion part, per metre, with what it may depend on.
+    """Return the residuals of steps between predicted `poses` (R, K, 3) and measured ones, per metre.
 
-    Each step of the measurement is compared in the vehicle's own frame at its beginning with the same step of the
-    prediction: what went wrong before does not enter.
+    Each measured step is compared with the predicted one in the vehicle frame. Errors before the step do not enter.
     """
     measured = np.concatenate([readings.start[:, None], readings.poses], axis=1)
     predicted = np.concatenate([readings.start[:, None], poses], axis=1)
     t_s = np.column_stack([readings.begins_s, readings.t_s])
-    # A step goes from one sample that was seen to the next, however many were not between them.
+    # A step leads from one measured sample to the next, over any number of missing samples.
     last = np.maximum.accumulate(np.where(np.isfinite(measured[..., 0]), np.arange(measured.shape[1]), 0), axis=1)
     rows = np.arange(len(measured))[:, None]
     begin, begin_s = measured[rows, last[:, :-1]], t_s[rows, last[:, :-1]]
     steps_m = _body_steps(begin, measured[:, 1:])
     steps_p = _body_steps(predicted[rows, last[:, :-1]], predicted[:, 1:])
     length = np.hypot(steps_p[..., 0], steps_p[..., 1])
-    use = np.isfinite(steps_m).all(axis=-1) & (length > _STILL_M)
+    use = np.isfinite(steps_m).all(axis=-1) & (length > _MIN_STEP_M)
     run, step = np.nonzero(use)
     size = length[use]
     direction = np.sign(steps_p[..., 0])[use]
-    # By the way driven, forward counted positive: a trim of the axles is the same backward as forward.
+    # The sign of the direction makes an offset of the axles equal in forward and backward driving.
     value = (steps_m - steps_p)[use] * (direction / size)[:, None]
     middle = 0.5 * (measured[:, 1:] + begin)[use]
     duration = (t_s[:, 1:] - begin_s)[use]
@@ -86,7 +85,7 @@ def residual_rates(readings: Readings, poses: Floats) -> Rates:
 
 
 def _body_steps(begin: Floats, end: Floats) -> Floats:
-    """Return steps (R, K, 3) in the frame half way between the headings at their ends."""
+    """Return steps (R, K, 3) in the vehicle frame at their mean heading."""
     step = end - begin
     heading = 0.5 * (begin[..., 2] + end[..., 2])
     cos, sin = np.cos(heading), np.sin(heading)

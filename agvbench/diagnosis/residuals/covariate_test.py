@@ -1,4 +1,4 @@
-"""What the remaining residual depends on, whatever the cause: smooth curves on each covariate, tested by groups."""
+"""Covariate test: whether the residual depends on a covariate, by smooth curves and a bootstrap over groups."""
 
 from __future__ import annotations
 
@@ -12,16 +12,18 @@ from agvbench.diagnosis.residuals.body_rates import FEATURES, Rates
 from agvbench.types import Floats
 
 ALPHA = 1e-3
-"""A dependence is significant below this, corrected for all that were looked at."""
+"""Level of significance of a dependence, after correction for the number of tests."""
 
 LIKELY = 0.05
-"""Below this it is worth saying where structure is known to remain."""
+"""Level below which a dependence is reported if structure is already known to remain."""
 
-LEAST_SHARE = 0.02
+MIN_SHARE = 0.02
+"""Smallest share of variance that a reported dependence predicts."""
+
 RANDOM_PHASE = "distance_modulo_period_m"
 DRIFT = "drift"
 _PLACE = ("x_m", "y_m")
-_ELSEWHERE_M = 0.3
+_SAME_START_M = 0.3
 _KNOTS = 6
 _PERIODS_M = np.geomspace(0.1, 1.0, 25)
 _FLIPS = 4999
@@ -29,9 +31,9 @@ _FLIPS = 4999
 
 @dataclass(frozen=True)
 class Dependence:
-    """A ``covariate`` that the residual depends on, through ``feature``.
+    """A ``covariate`` on which the ``feature`` of the residual depends.
 
-    ``p_value`` after correction; ``share`` of the residual's variance that it predicts in runs left out.
+    ``p_value``: after correction; ``share``: share of the residual's variance that it predicts in runs left out.
     """
 
     covariate: str
@@ -43,25 +45,26 @@ class Dependence:
 def dependences(
     rates: Rates, group: NDArray[np.int64], seed: int, starts: Floats | None = None, *, alpha: float = ALPHA
 ) -> list[Dependence]:
-    """Return what the residual significantly depends on, the largest share first.
+    """Return the significant dependences of the residual, the one with the largest share first.
 
-    For each feature and covariate (and for the drift over the floor and the place): least squares on a smooth curve,
-    its score statistic with the group of runs as unit (errors within may be correlated as they like), and the share of
-    variance predicted in groups left out. Distance enters modulo a period, the best of several. p-values count how
-    often the largest of all statistics that were looked at is as large when each group's scores have their sign by
-    chance (wild bootstrap by groups; Westfall and Young 1993 for having looked at many): asymptotic ones are too small
-    where groups are few.
+    Each feature is regressed on each covariate by a smooth curve; the drift in the floor frame is regressed on the
+    position only. The score statistic has the group of runs as unit, so that errors within a group may be correlated in
+    any way. The share is the variance predicted in groups left out. Distance enters modulo the best of several periods.
+
+    The p-value is the share of bootstrap samples in which the largest statistic of all tests is at least as large as
+    the observed one (wild bootstrap with random signs of the groups' scores; maximum statistic of Westfall and Young
+    1993 against multiple testing). Asymptotic p-values are too small if there are few groups.
 
     Parameters
     ----------
     rates
-        Of all runs.
+        The residual rates of all runs.
     group
-        (R,): of each run, the command that it repeats.
+        (R,): the group of each run: runs with the same commands.
     seed
-        Draws signs and folds.
+        Seed of the random signs and folds.
     starts
-        (R, 3): where runs began. Repeats that began elsewhere are each evidence of an effect of the place.
+        (R, 3): start poses. Repeats from different start poses are separate units in tests of the position.
     alpha
         Level of significance.
     """
@@ -80,8 +83,8 @@ def dependences(
         for feature, value in _features(rates, name):
             best, strongest = None, -np.inf
             for basis in bases:
-                strength, by_chance = _strength(basis, value, rates.weight, unit)
-                np.maximum(most, by_chance, out=most)
+                strength, bootstrapped = _strength(basis, value, rates.weight, unit)
+                np.maximum(most, bootstrapped, out=most)
                 if strength > strongest:
                     best, strongest = basis, strength
             if best is not None:
@@ -89,10 +92,10 @@ def dependences(
     significant = [
         Dependence(label, feature, p_value, share)
         for label, feature, strength, share in found
-        if share > LEAST_SHARE and (p_value := float(np.mean(np.r_[most >= strength, True]))) < alpha
+        if share > MIN_SHARE and (p_value := float(np.mean(np.r_[most >= strength, True]))) < alpha
     ]
     significant.sort(key=lambda d: -d.share)
-    # Along x and along y drifts have one name: the stronger stands for both.
+    # Drifts along x and along y have one name: the stronger one represents both.
     strongest_first: dict[tuple[str, str], Dependence] = {}
     for d in significant:
         strongest_first.setdefault((d.covariate, d.feature), d)
@@ -101,7 +104,7 @@ def dependences(
 
 @dataclass(frozen=True)
 class _Units:
-    """What is independent: ``of`` each sample (n,) its unit, and random ``signs`` of the units (flips, units)."""
+    """Independent units: ``of`` (n,) is the unit of each step, ``signs`` (flips, units) are random signs."""
 
     of: NDArray[np.int64]
     signs: Floats
@@ -114,28 +117,27 @@ class _Units:
 
 
 def _by_start(group: NDArray[np.int64], starts: Floats) -> NDArray[np.int64]:
-    """Return units (R,): the runs of a group together where they began alike, else each by itself."""
+    """Return units (R,): a group of runs if all start at the same place, otherwise each of its runs."""
     alone = np.zeros(len(group), dtype=np.bool_)
     for g in np.unique(group):
         own = group == g
-        alone[own] = np.ptp(starts[own, :2], axis=0).max() > _ELSEWHERE_M
+        alone[own] = np.ptp(starts[own, :2], axis=0).max() > _SAME_START_M
     return group if not alone.any() else np.where(alone, len(group) + int(group.max()) + np.arange(len(group)), group)
 
 
 def _features(rates: Rates, covariate: str) -> list[tuple[str, Floats]]:
-    """Return what may depend on a covariate, (n,) each, by its name."""
+    """Return the features (n,) that are tested against a covariate, with their names."""
     features = list(zip(FEATURES, rates.value.T, strict=True))
-    # What pulls a vehicle towards a place moves it aside one way and back the other: only over the floor it is the
-    # same for all.
+    # A drift towards a place has the same direction for all headings in the floor frame only.
     return features + [(DRIFT, value) for value in rates.drift.T] if covariate in _PLACE else features
 
 
 def _basis(covariate: Floats, name: str) -> Floats:
-    """Return a smooth curve's basis (n, q) without a constant: sines for an angle, else hats on quantiles."""
+    """Return a basis (n, q) without constant: sines for an angle, otherwise hat functions at quantiles."""
     if name == "heading_rad":
         return np.column_stack([np.cos(covariate), np.sin(covariate), np.cos(2 * covariate), np.sin(2 * covariate)])
     knots = np.unique(np.quantile(covariate, np.linspace(0.0, 1.0, _KNOTS)))
-    # Knots that nearly coincide would make curves out of noise.
+    # Curves between nearly coincident knots would fit noise.
     if len(knots) > 1:
         apart = np.r_[True, np.diff(knots) > 1e-3 * (knots[-1] - knots[0])]
         knots = knots[apart]
@@ -155,7 +157,7 @@ def _centred(basis: Floats, weight: Floats) -> Floats:
 
 
 def _strength(basis: Floats, value: Floats, weight: Floats, unit: _Units) -> tuple[float, Floats]:
-    """Return how strong a dependence is, −log p by χ², and the same for units' scores with signs by chance."""
+    """Return the strength of a dependence, −log p by χ², and the strengths (flips,) with random signs of units."""
     centred = value - np.average(value, weights=weight)
     scores = np.zeros((unit.signs.shape[1], basis.shape[1]))
     np.add.at(scores, unit.of, _centred(basis, weight) * (weight * centred)[:, None])
@@ -163,13 +165,13 @@ def _strength(basis: Floats, value: Floats, weight: Floats, unit: _Units) -> tup
     kept = size > 1e-9 * max(size[-1], 1e-300)
     white = scores @ (turn[:, kept] / np.sqrt(size[kept]))
     dof = int(np.count_nonzero(kept))
-    return float(_surprise(np.sum(white.sum(axis=0) ** 2), dof)), _surprise(
+    return float(_negative_log_p(np.sum(white.sum(axis=0) ** 2), dof)), _negative_log_p(
         np.sum((unit.signs @ white) ** 2, axis=1), dof
     )
 
 
-def _surprise(square: Floats, dof: int) -> Floats:
-    """Return −log p by χ²; ∞ where p is too small for a number."""
+def _negative_log_p(square: Floats, dof: int) -> Floats:
+    """Return −log p by χ²; ∞ where p underflows."""
     from scipy import special  # not scipy.stats, which takes a second to import
 
     with np.errstate(divide="ignore"):

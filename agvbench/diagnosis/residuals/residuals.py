@@ -1,7 +1,7 @@
 """Prediction residuals, their repeatability, and the lack-of-fit test.
 
-A long slalom ends ten times as far off as a short straight by the same variation of the axles: residuals of groups of
-repeats can only be compared in units of their own standard deviations.
+The same standard deviation of the axle angles causes a ten times larger end position error in a long slalom than in a
+short straight. Residuals of groups are therefore compared in units of their predicted standard deviations.
 """
 
 from __future__ import annotations
@@ -20,68 +20,68 @@ from agvbench.types import Floats
 
 
 @dataclass(frozen=True)
-class EndSpread:
-    """How far each run's last sample may be off, in its start frame [m, m, rad].
+class EndCovariance:
+    """Covariance of the prediction error at each run's last sample, in its start frame [m, m, rad].
 
-    ``own`` (R, 3, 3): covariance of run and frame, drawn anew with each repeat; ``slopes`` (R, 3, P) by the fitted
-    parameters, and ``parameters`` (P, P), what these may be off by: that is shared, by repeats of a command and by all
-    commands that meet in a parameter.
+    ``own`` (R, 3, 3): covariance from random effects and frame noise, independent in each repeat; ``slopes``
+    (R, 3, P): derivatives by the fitted parameters; ``parameters`` (P, P): covariance of these, shared by all runs that
+    depend on a parameter.
     """
 
     own: Floats
     slopes: Floats
     parameters: Floats
 
-    def select(self, chosen: NDArray[np.bool_]) -> EndSpread:
-        """Return those of the runs that a mask chooses."""
-        return EndSpread(self.own[chosen], self.slopes[chosen], self.parameters)
+    def select(self, chosen: NDArray[np.bool_]) -> EndCovariance:
+        """Return the covariances of the runs that a mask selects."""
+        return EndCovariance(self.own[chosen], self.slopes[chosen], self.parameters)
 
 
-def end_spread(every: Predictor, fitted: Fit) -> EndSpread:
-    """Return how far the runs of `every` may end from what it predicts with the parameters of `fitted`."""
+def end_covariance(every: Predictor, fitted: Fit) -> EndCovariance:
+    """Return the covariance of the end poses of the runs of `every`, with the parameters of `fitted`."""
     readings = every.readings
     linear = every.linearise(fitted.parameters, np.zeros((len(readings), 6)))
     rows = np.arange(len(readings))
     last = readings.seen.shape[1] - 1 - np.argmax(readings.seen[:, ::-1], axis=1)
-    turn = np.zeros((len(readings), 3, 3))
+    rotation = np.zeros((len(readings), 3, 3))
     cos, sin = np.cos(readings.start[:, 2]), np.sin(readings.start[:, 2])
-    turn[:, 0, 0] = turn[:, 1, 1] = cos
-    turn[:, 0, 1], turn[:, 1, 0], turn[:, 2, 2] = sin, -sin, 1.0
-    a = turn @ linear.by_random_effects[rows, last]
-    j = turn @ linear.by_parameters[rows, last]
+    rotation[:, 0, 0] = rotation[:, 1, 1] = cos
+    rotation[:, 0, 1], rotation[:, 1, 0], rotation[:, 2, 2] = sin, -sin, 1.0
+    a = rotation @ linear.by_random_effects[rows, last]
+    j = rotation @ linear.by_parameters[rows, last]
     variance_components = fitted.variance_components
     frame = np.diag(
         np.square([variance_components.position_m, variance_components.position_m, variance_components.heading_rad])
     )
     own = (a * priors(every, variance_components)[:, None, :] ** 2) @ a.transpose(0, 2, 1) + frame
-    return EndSpread(own, j, fitted.covariance)
+    return EndCovariance(own, j, fitted.covariance)
 
 
 QUANTITIES = (
     *("end_position_mm", "along_mm", "across_mm", "delta_heading_deg", "delta_s_mm"),
     *("position_rms_mm", "heading_rms_deg"),
 )
-"""Errors of the end pose first (along and across in the start frame), then those along the way."""
+"""Errors of the end pose (along and across in the start frame), then errors over the whole path."""
 MEDIAN = "end_position_median_mm"
 WITHIN_REPEATABILITY = 1.25
-"""A residual is within repeatability up to this factor, or where repeats cannot distinguish it from their variation."""
+"""A residual is within repeatability up to this factor, or if the lack-of-fit test is not significant."""
 
 LACK_OF_FIT = 0.01
-"""Groups of repeats differ beyond repeatability below this p-value."""
+"""Level of significance of the lack-of-fit test."""
 
-_FEWEST_WITHIN_DOF = 9
-"""Fewer degrees of freedom do not determine the dispersion of repeats."""
+_MIN_WITHIN_DOF = 9
+"""Smallest number of degrees of freedom for the standard deviation of repeats."""
 
-_LEAST = 1e-6  # m, rad: less noise than any camera has
+_MIN_DEVIATION = 1e-6  # m, rad: below the noise of any camera
 
 _UNITS = {name: 1e3 if name.endswith("_mm") else 180.0 / np.pi for name in QUANTITIES}
 
 
 @dataclass(frozen=True)
 class PoseResiduals:
-    """Measured minus predicted.
+    """Residuals: measured minus predicted.
 
-    ``path`` (R, K, 3) [m, m, rad] in each run's start frame, zero where nothing was ``seen`` (R, K);
+    ``path`` (R, K, 3) [m, m, rad] in each run's start frame, zero where no pose was ``seen`` (R, K);
     ``delta_s_m`` and ``delta_heading_rad`` (R,) at the end.
     """
 
@@ -106,7 +106,7 @@ class PoseResiduals:
         return {name: _UNITS[name] * float(np.sqrt(np.mean(squares[name]))) for name in QUANTITIES}
 
     def squares(self) -> Mapping[str, Floats]:
-        """Return each quantity's mean square of each run (R,): a run counts once, however long it is."""
+        """Return each quantity's mean square of each run (R,): runs have equal weights, whatever their length."""
         count, ends = np.maximum(self.seen.sum(axis=1), 1), self.ends**2
         return {
             "end_position_mm": ends[:, 0] + ends[:, 1],
@@ -120,7 +120,7 @@ class PoseResiduals:
 
 
 def pose_residuals(readings: Readings, poses: Floats) -> PoseResiduals:
-    """Return what predicted `poses` (R, K, 3) miss."""
+    """Return the residuals of predicted `poses` (R, K, 3)."""
     seen = readings.seen
     difference = np.where(seen[..., None], readings.poses - poses, 0.0)
     cos, sin = np.cos(readings.start[:, 2])[:, None], np.sin(readings.start[:, 2])[:, None]
@@ -134,21 +134,21 @@ def pose_residuals(readings: Readings, poses: Floats) -> PoseResiduals:
     )
     rows = np.arange(len(readings))
     last = seen.shape[1] - 1 - np.argmax(seen[:, ::-1], axis=1)
-    went = np.hypot(*(readings.poses[rows, last, :2] - readings.start[:, :2]).T)
+    measured = np.hypot(*(readings.poses[rows, last, :2] - readings.start[:, :2]).T)
     predicted = np.hypot(*(poses[rows, last, :2] - readings.start[:, :2]).T)
-    return PoseResiduals(path, seen, went - predicted, path[rows, last, 2])
+    return PoseResiduals(path, seen, measured - predicted, path[rows, last, 2])
 
 
 def repeatability(residuals: PoseResiduals, group: NDArray[np.int64]) -> dict[str, float] | None:
     """Return the root mean square between repeats, to compare with `PoseResiduals.rms`; None without repeats.
 
-    What repeats of one command have in common is the model's to predict; what differs between them is not. Taken
-    from the residuals of the *final* model, so that a cause that depends on place or time does not pass for noise.
-    Groups whose dispersion is beyond four times the median's (one bad run) count as that. `MEDIAN` is the median over
-    runs of the distance between end positions and their group's mean.
+    The residuals are those of the *final* model. With raw poses, the effect of a cause that depends on place or time
+    would count as a difference between repeats. Standard deviations of groups are limited to four times their median,
+    so that a single bad run has little influence. `MEDIAN` is the median over runs of the distance between end position
+    and group mean.
     """
     per_group: dict[str, list[tuple[float, float]]] = {name: [] for name in QUANTITIES}
-    apart_mm: list[float] = []
+    deviations_mm: list[float] = []
     ends = residuals.ends
     for g in np.unique(group):
         own = np.flatnonzero(group == g)
@@ -156,18 +156,18 @@ def repeatability(residuals: PoseResiduals, group: NDArray[np.int64]) -> dict[st
             continue
         both = residuals.seen[own].all(axis=0)
         path = residuals.path[own][:, both]
-        off = path - path.mean(axis=0)
+        deviation = path - path.mean(axis=0)
         dof = len(own) - 1.0
-        # Distances from a mean of n are too short by √(1 − 1/n).
-        apart = (ends[own] - ends[own].mean(axis=0)) * np.sqrt(len(own) / dof)
-        apart_mm += (1e3 * np.hypot(*apart[:, :2].T)).tolist()
+        # Distances from a mean of n are biased by the factor √(1 − 1/n).
+        end_deviation = (ends[own] - ends[own].mean(axis=0)) * np.sqrt(len(own) / dof)
+        deviations_mm += (1e3 * np.hypot(*end_deviation[:, :2].T)).tolist()
         along, across = np.var(ends[own, :2], axis=0, ddof=1).tolist()
         values = {
             "end_position_mm": along + across,
             "along_mm": along,
             "across_mm": across,
-            "position_rms_mm": float(np.sum(off[..., :2] ** 2)) / dof / max(int(both.sum()), 1),
-            "heading_rms_deg": float(np.sum(off[..., 2] ** 2)) / dof / max(int(both.sum()), 1),
+            "position_rms_mm": float(np.sum(deviation[..., :2] ** 2)) / dof / max(int(both.sum()), 1),
+            "heading_rms_deg": float(np.sum(deviation[..., 2] ** 2)) / dof / max(int(both.sum()), 1),
             "delta_s_mm": float(np.var(residuals.delta_s_m[own], ddof=1)),
             "delta_heading_deg": float(np.var(residuals.delta_heading_rad[own], ddof=1)),
         }
@@ -180,64 +180,64 @@ def repeatability(residuals: PoseResiduals, group: NDArray[np.int64]) -> dict[st
         value, runs = np.array(pairs).T
         most = 16.0 * np.median(value)
         out[name] = _UNITS[name] * float(np.sqrt(np.sum(np.minimum(value, most) * runs) / np.sum(runs)))
-    return out | {MEDIAN: float(np.median(apart_mm))}
+    return out | {MEDIAN: float(np.median(deviations_mm))}
 
 
 def lack_of_fit(
     residuals: PoseResiduals,
     group: NDArray[np.int64],
-    spread: EndSpread | None = None,
+    covariance: EndCovariance | None = None,
     tested: NDArray[np.bool_] | None = None,
 ) -> float | None:
-    """Return a p-value that residuals are the same for all groups of repeats: lack of fit against pure error.
+    """Return the p-value of the lack-of-fit test: residuals of groups against pure error between repeats.
 
-    The unit is the run. From each run come three numbers (where it ended: along, across, heading), in units of how far
-    it may end from its prediction by the fitted variance, which is not the same for a straight and a slalom.
-    The means of groups may also be off, and together, by what the parameters may be: two commands with a level in
-    common share its error, and are not two pieces of evidence. Between and within groups they are compared by F, so
-    that the variance itself does not matter. Without `spread` all runs have the same. None without repeats.
+    The unit is the run. Each run contributes three numbers, the residual of its end pose (along, across, heading), in
+    units of its predicted standard deviations, which differ between a straight and a slalom. Errors of the parameters
+    shift the means of all groups that depend on them: two commands with a common level share its error, and are not
+    independent. F compares the mean squares between and within groups, so that the size of the variance components
+    does not matter. Without `covariance` all runs have equal covariances. Return None without repeats.
 
-    Means are those of the runs `tested` (R,), all by default; the dispersion of repeats about their own mean is known
-    from all runs: it does not depend on what their prediction was chosen by.
+    The means between groups are those of the runs `tested` (R,), by default all. The deviations within groups come from
+    all runs: they do not depend on how the model was selected.
     """
     from scipy import special
 
     if tested is None:
         tested = np.ones(len(group), dtype=np.bool_)
     names, index = np.unique(group, return_inverse=True)
-    asked, asked_index = np.unique(group[tested], return_inverse=True)
-    within_dof, between_dof = 3 * (len(group) - len(names)), 3 * len(asked)
-    if within_dof < _FEWEST_WITHIN_DOF or not between_dof:
+    tested_names, tested_index = np.unique(group[tested], return_inverse=True)
+    within_dof, between_dof = 3 * (len(group) - len(names)), 3 * len(tested_names)
+    if within_dof < _MIN_WITHIN_DOF or not between_dof:
         return None
-    apart = residuals.ends - _by_group(residuals.ends, index)[index]
-    spread = spread or _alike(apart, within_dof // 3)
-    within = _within(apart, index, spread)
+    deviation = residuals.ends - _by_group(residuals.ends, index)[index]
+    covariance = covariance or _equal_covariance(deviation, within_dof // 3)
+    within = _within(deviation, index, covariance)
     if within <= 0.0:
         return 1.0
-    between = _between(residuals.ends[tested], asked_index, spread.select(tested))
+    between = _between(residuals.ends[tested], tested_index, covariance.select(tested))
     return float(special.fdtrc(between_dof, within_dof, between / between_dof / (within / within_dof)))
 
 
-def _alike(apart: Floats, dof: int) -> EndSpread:
-    """Return the spread of runs with the same dispersion as those `apart` (R, 3) from their groups' means."""
-    runs, covariance = len(apart), apart.T @ apart / dof + np.eye(3) * _LEAST**2
-    return EndSpread(np.broadcast_to(covariance, (runs, 3, 3)), np.zeros((runs, 3, 0)), np.zeros((0, 0)))
+def _equal_covariance(deviation: Floats, dof: int) -> EndCovariance:
+    """Return the pooled covariance of deviations (R, 3) from group means, the same for all runs."""
+    runs, covariance = len(deviation), deviation.T @ deviation / dof + np.eye(3) * _MIN_DEVIATION**2
+    return EndCovariance(np.broadcast_to(covariance, (runs, 3, 3)), np.zeros((runs, 3, 0)), np.zeros((0, 0)))
 
 
-def _within(apart: Floats, index: NDArray[np.int64], spread: EndSpread) -> float:
-    """Return the square of what repeats are `apart` (R, 3) from their group's mean, in units of their spread."""
-    own = _by_group(spread.own, index)
-    return sum(float(np.sum(_white(own[g], apart[index == g].T) ** 2)) for g in range(len(own)))
+def _within(deviation: Floats, index: NDArray[np.int64], covariance: EndCovariance) -> float:
+    """Return the whitened sum of squares within groups, of deviations (R, 3) from group means."""
+    own = _by_group(covariance.own, index)
+    return sum(float(np.sum(_whitened(own[g], deviation[index == g].T) ** 2)) for g in range(len(own)))
 
 
-def _between(ends: Floats, index: NDArray[np.int64], spread: EndSpread) -> float:
-    """Return the square of what groups miss in the mean, in units of what they may."""
-    means, own = _by_group(ends, index), _by_group(spread.own, index)
-    slopes = _by_group(spread.slopes, index).reshape(means.size, -1)
-    shared = slopes @ spread.parameters @ slopes.T
+def _between(ends: Floats, index: NDArray[np.int64], covariance: EndCovariance) -> float:
+    """Return the whitened sum of squares between groups, of their mean residuals."""
+    means, own = _by_group(ends, index), _by_group(covariance.own, index)
+    slopes = _by_group(covariance.slopes, index).reshape(means.size, -1)
+    shared = slopes @ covariance.parameters @ slopes.T
     for g, size in enumerate(np.bincount(index)):
         shared[3 * g : 3 * g + 3, 3 * g : 3 * g + 3] += own[g] / size
-    return float(np.sum(_white(shared, means.ravel()) ** 2))
+    return float(np.sum(_whitened(shared, means.ravel()) ** 2))
 
 
 def _by_group(values: Floats, index: NDArray[np.int64]) -> Floats:
@@ -245,5 +245,5 @@ def _by_group(values: Floats, index: NDArray[np.int64]) -> Floats:
     return np.array([values[index == g].mean(axis=0) for g in range(int(index.max()) + 1)])
 
 
-def _white(covariance: Floats, values: Floats) -> Floats:
+def _whitened(covariance: Floats, values: Floats) -> Floats:
     return np.asarray(np.linalg.solve(np.linalg.cholesky(covariance), values))

@@ -12,7 +12,7 @@ from agvbench.diagnosis.data.splits import folds
 from agvbench.diagnosis.data.window_splits import fold_groups
 from agvbench.diagnosis.estimation.cross_validation import FOLDS, cross_validated
 from agvbench.diagnosis.estimation.fit import Fit, fit
-from agvbench.diagnosis.estimation.score_test import begun, first_order_gain
+from agvbench.diagnosis.estimation.score_test import first_order_gain, initial_parameters
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.candidates import Candidate, bounds_of, usual
@@ -197,7 +197,7 @@ class FittedModels:
         now = current.fit
         return fit(
             predictor,
-            begun(now, predictor, start) if beside is None else beside.parameters,
+            initial_parameters(now, predictor, start) if beside is None else beside.parameters,
             bounds,
             random_effects=(beside or now).random_effects,
             variance_components=(beside or now).variance_components,

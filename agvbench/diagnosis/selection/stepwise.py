@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from agvbench.diagnosis.estimation.cross_validation import differs_from_nothing, without_best
+from agvbench.diagnosis.estimation.cross_validation import differs_from_null, without_best_groups
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.residuals.residuals import pose_residuals
 from agvbench.diagnosis.selection.fitted_models import FittedModels, ScoredModel
@@ -93,10 +93,10 @@ class Selector(FittedModels):
         gain = without.loss - with_it.loss
         return bool(
             with_it.gain_over(without) > self.least_gain
-            and without_best(gain, self.batch.readings.group, self.best_share) > 0.0
+            and without_best_groups(gain, self.batch.readings.group, self.best_share) > 0.0
             and self._noticeable(without, with_it)
             and all(
-                differs_from_nothing(with_it.fit, name, self.batch.readings.group)
+                differs_from_null(with_it.fit, name, self.batch.readings.group)
                 for name in set(with_it.names) - set(without.names)
             )
         )

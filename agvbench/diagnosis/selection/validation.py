@@ -14,9 +14,9 @@ from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.residuals.residuals import (
     LACK_OF_FIT,
     WITHIN_REPEATABILITY,
-    EndSpread,
+    EndCovariance,
     PoseResiduals,
-    end_spread,
+    end_covariance,
     lack_of_fit,
     pose_residuals,
     repeatability,
@@ -54,7 +54,7 @@ def assess(
     held: NDArray[np.bool_],
     before: Floats,
     after: Floats,
-    spread: EndSpread,
+    spread: EndCovariance,
     repeats: NDArray[np.bool_] | None = None,
 ) -> Assessment | None:
     """Return the residuals of the runs `held` (R,) from poses (R, K, 3) ``before`` and ``after``; None without repeats.
@@ -94,7 +94,7 @@ def _assess(selection: Selection, readings: Readings, held: NDArray[np.bool_]) -
     fit = selection.chosen.fit
     every = predicts(selection, None, readings)
     poses = every.predict(fit.parameters)
-    return assess(readings, held, poses, poses, end_spread(every, fit))
+    return assess(readings, held, poses, poses, end_covariance(every, fit))
 
 
 def validated(

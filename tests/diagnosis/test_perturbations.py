@@ -21,11 +21,11 @@ def test_terms_that_belong_together_are_summed(places):
     terms = np.random.default_rng(len(places)).normal(size=(len(places), 2, 3))
     expected = np.zeros((5, 4, 2, 3))
     np.add.at(expected, (one, other), terms)
-    gathering = GroupedSums.of(one, other)
+    grouped = GroupedSums.of(one, other)
     found = np.zeros_like(expected)
-    found[tuple(gathering.place.T)] = gathering.sums(terms)
+    found[tuple(grouped.key.T)] = grouped.sums(terms)
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12)
-    assert len(gathering.place) == len({*places})
+    assert len(grouped.key) == len({*places})
 
 
 @pytest.fixture(scope="module")
