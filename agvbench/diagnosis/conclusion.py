@@ -21,8 +21,8 @@ from agvbench.diagnosis.residuals.residuals import MEDIAN, end_covariance
 from agvbench.diagnosis.result import Diagnosis, HeldOut, NamedEffect, Verdict
 from agvbench.diagnosis.selection.candidates import bounds_of
 from agvbench.diagnosis.selection.stepwise import Selection
-from agvbench.diagnosis.selection.validation import Assessment, assess, predicts
-from agvbench.diagnosis.selection.with_term import TermSelection, described, with_term_first
+from agvbench.diagnosis.selection.validation import Assessment, assess, predictor_for
+from agvbench.diagnosis.selection.with_term import TermSelection, term_entry, with_term_first
 from agvbench.effects.variants import effect_variants
 from agvbench.model import VehicleModel
 from agvbench.types import Floats
@@ -53,7 +53,7 @@ def conclude(
     """
     selection = term_selection.selection if term_selection else library
     fit = selection.chosen.fit
-    every = predicts(library, term_selection, readings)
+    every = predictor_for(library, term_selection, readings)
     batch, has_variants = every.batch, bool(effect_variants().keys() & set(selection.chosen.names))
     poses, before = every.predict(fit.parameters), _poses_before(context.vehicle, batch, selection)
     spread = end_covariance(every, fit)
@@ -63,7 +63,7 @@ def conclude(
         return context.not_identifiable(readings, "there are no repeats among the runs, and so no repeatability")
     rest, likely = _what_is_left(batch, poses, term_selection, context.seed)
     effects = named_effects(selection, bounds_of(selection.chosen.names)) + map_effects(fit, context.vehicle)
-    significant = term_selection is not None or tested.lacks or bool(rest)
+    significant = term_selection is not None or tested.has_lack_of_fit or bool(rest)
     verdict, why = _verdict(effects, significant, rest, term_selection)
     if significant and not rest and likely:
         rest, why = likely, f"{_REMAINS}it is likely to depend on {likely[0].covariate}"
@@ -82,7 +82,7 @@ def conclude(
         | {"validation_runs": int(split.validation.sum())}
         | {"lack_of_fit_p_value": tested.lack_of_fit}
         | {"lack_of_fit_runs": {"tested": int(split.test.sum()), "repeats": int(np.sum(~split.training))}}
-        | ({"empirical_term": described(term_selection)} if term_selection else {}),
+        | ({"empirical_term": term_entry(term_selection)} if term_selection else {}),
     )
     found = with_residuals(found, readings, split.test, before, poses)
     if term_selection or has_variants:

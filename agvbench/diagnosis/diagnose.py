@@ -24,9 +24,9 @@ from agvbench.diagnosis.selection.candidates import given_effects
 from agvbench.diagnosis.selection.fitted_models import OnProgress
 from agvbench.diagnosis.selection.initial_steering import choose_initial_steering, reconsider_initial_steering
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
-from agvbench.diagnosis.selection.subsampling import MOST_RUNS, measured_in_all, some_repeats
+from agvbench.diagnosis.selection.subsampling import MAX_RUNS, refit_to_all, subsample_repeats
 from agvbench.diagnosis.selection.validation import fails_validation, validated
-from agvbench.diagnosis.selection.variants import select_variants_and_reconsider, tried_beside
+from agvbench.diagnosis.selection.variants import candidates_for, select_variants_and_reconsider
 from agvbench.diagnosis.selection.with_term import TermSelection
 from agvbench.errors import FitError
 from agvbench.model import VehicleModel, nominal_model
@@ -77,7 +77,7 @@ def diagnose(
         return context.not_identifiable(readings, why)
     fitted = readings.select(split.training)
     on_progress(f"{len(fitted)} training runs, {split.validation.sum()} validation runs, {split.test.sum()} test runs")
-    selector = _selector(context, fitted.select(some_repeats(fitted.group, MOST_RUNS)), on_progress)
+    selector = _selector(context, fitted.select(subsample_repeats(fitted.group, MAX_RUNS)), on_progress)
     chosen, selector = reconsider_initial_steering(selector.select(), selector)
     selection, selector = select_variants_and_reconsider(chosen, selector)
     selection, term_selection, selector = add_term_and_reconsider(selection, selector)
@@ -103,7 +103,7 @@ def _measured_and_kept(
 ) -> tuple[Selection, TermSelection | None]:
     """Return what was found measured in all runs `fitted`, or the maps alone where the validation runs say so."""
     if len(selector.batch.readings) < len(fitted):
-        selection, term_selection = measured_in_all(selection, term_selection, selector, fitted)
+        selection, term_selection = refit_to_all(selection, term_selection, selector, fitted)
     return validated(selection, term_selection, validation, selector.on_progress)
 
 
@@ -112,7 +112,7 @@ def _selector(context: DiagnosisContext, some: Readings, on_progress: OnProgress
     header = context.header
     maps = nodal_maps(some.runs, header.neutral)
     start = start_values(maps, _measured(some.runs, context.geometry, header.neutral), _prior_values(maps, context))
-    tried, kinds = tried_beside(context.vehicle)
+    tried, kinds = candidates_for(context.vehicle)
     batch = Batch(some, maps, context.geometry, kinds=kinds)
     return choose_initial_steering(
         Selector(batch, tried, start, context.seed, on_progress, *given_effects(context.vehicle, tried))

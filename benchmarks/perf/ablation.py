@@ -76,7 +76,7 @@ def _first_two(first: Any, second: Any, *_: Any, **__: Any) -> tuple[Any, Any]:
 
 
 def _cross_validated_gain(model: Any, other: Any) -> float:
-    return float(other.total - model.total)
+    return float(other.deviance - model.deviance)
 
 
 def _selection_alone(selection: Any, selector: Any) -> tuple[Any, None, Any]:
@@ -84,7 +84,7 @@ def _selection_alone(selection: Any, selector: Any) -> tuple[Any, None, Any]:
 
 
 def _not_swapped(selector: Any, base: Any, current: Any, among: Any = None) -> tuple[Any, Any]:
-    swapped = {name: selector._in_place_of(name, base, current, among) for name in selector._found(current)}
+    swapped = {name: selector._swaps_of(name, base, current, among) for name in selector._added_effects(current)}
     return current, selector._alternatives(swapped, current)
 
 
@@ -107,7 +107,7 @@ _OPTIMISER = "agvbench.diagnosis.estimation.levenberg_marquardt"
 
 PARTS: dict[str, Part] = {
     "a noticeable change of the prediction": Part(
-        f"{_SELECTION}stepwise", "Selector._noticeable", lambda *_: True, _is_false
+        f"{_SELECTION}stepwise", "Selector._changes_prediction", lambda *_: True, _is_false
     ),
     "a gain without the best groups of runs": Part(
         f"{_SELECTION}stepwise",
@@ -120,11 +120,11 @@ PARTS: dict[str, Part] = {
         f"{_SELECTION}fitted_models",
         "ScoredModel.gain_over",
         _cross_validated_gain,
-        lambda found, model, other: found < 20.0 and other.total - model.total > max(found, 12.0),
+        lambda found, model, other: found < 20.0 and other.deviance - model.deviance > max(found, 12.0),
     ),
     "the correction for many candidates": Part(
         f"{_SELECTION}stepwise",
-        "Selector.least_gain",
+        "Selector.min_gain",
         property(lambda _: 12.0),
         lambda found, selector, without, with_it: not found and with_it.gain_over(without) > 12.0,
         watched="Selector.meets_criterion",
@@ -136,7 +136,7 @@ PARTS: dict[str, Part] = {
         lambda found, selector, base, current, among=None: found[0] is not current,
     ),
     "a second start beside which maps are fitted": Part(
-        f"{_SELECTION}fitted_models", "FittedModels._begun", _first_start, _begun_elsewhere
+        f"{_SELECTION}fitted_models", "FittedModels._preliminary_fit", _first_start, _begun_elsewhere
     ),
     "a refit from the larger model": Part(
         f"{_SELECTION}fitted_models",
@@ -151,24 +151,27 @@ PARTS: dict[str, Part] = {
         f"{_SELECTION}initial_steering", "reconsider_initial_steering", _first_two, _is_not_first
     ),
     "the initial steering reconsidered with variants and terms": Part(
-        f"{_SELECTION}variants", "under_other_start", lambda *_: False, _is_true
+        f"{_SELECTION}variants", "prefers_other_initial_steering", lambda *_: False, _is_true
     ),
     "variants of equations": Part(f"{_SELECTION}variants", "select_variants", _first, _is_not_first),
-    "a variant alone": Part(f"{_SELECTION}variants", "_another_law_alone", _first, _is_not_first),
+    "a variant alone": Part(f"{_SELECTION}variants", "_variant_alone", _first, _is_not_first),
     "discrepancy terms": Part(
         _DISCREPANCY, "add_term_and_reconsider", _selection_alone, lambda found, *_: found[1] is not None
     ),
     "effects that a term had masked": Part(
-        _DISCREPANCY, "_unmasked", lambda wide, current: current, lambda found, wide, current: found is not current
+        _DISCREPANCY,
+        "_add_masked_effects",
+        lambda wide, current: current,
+        lambda found, wide, current: found is not current,
     ),
     "a term beside no effect, afterwards": Part(
         _DISCREPANCY,
-        "_afresh",
+        "_reselect_from_term",
         lambda selection, term_selection, selector: term_selection,
         lambda found, selection, term_selection, selector: found is not term_selection,
     ),
     "a term in place of an effect that rests on few groups": Part(
-        _DISCREPANCY, "_rests_on_few", lambda *_: False, _is_true
+        _DISCREPANCY, "_depends_on_few_groups", lambda *_: False, _is_true
     ),
     "a term in place of an effect that fails validation": Part(
         _DISCREPANCY, "term_in_place", lambda *_: None, _is_something

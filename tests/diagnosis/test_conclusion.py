@@ -49,7 +49,7 @@ def assessment(after_floors: float, lack_of_fit: float | None) -> Assessment:
     [(2.0, 1e-4, True), (2.0, 0.5, False), (2.0, None, False), (1.1, 1e-6, False)],
 )
 def test_what_lacks_is_above_the_floor_and_beyond_scatter(after_floors, lack_of_fit, lacks):
-    assert assessment(after_floors, lack_of_fit).lacks is lacks
+    assert assessment(after_floors, lack_of_fit).has_lack_of_fit is lacks
 
 
 @pytest.mark.parametrize(

@@ -16,11 +16,11 @@ from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.nodal_maps import ROLES, nodal_maps, start_values
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection import variants as forms
-from agvbench.diagnosis.selection.candidates import bounds_of, candidates, usual
+from agvbench.diagnosis.selection.candidates import bounds_of, candidates, default_candidate
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.initial_steering import under_other_initial_steering
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
-from agvbench.diagnosis.selection.variants import under_other_start, wider
+from agvbench.diagnosis.selection.variants import prefers_other_initial_steering, with_extended_library
 from agvbench.diagnosis.selection.with_term import TermSelection
 from agvbench.diagnosis.terms import SpeedInDisc
 from agvbench.vehicle.geometry import Geometry
@@ -46,14 +46,14 @@ def test_a_model_left_half_way_is_fitted_again_from_where_the_larger_one_stands(
     larger = selector.with_effect(lag, "lateral_slip")
     again = selector.refitted_from(early, larger)
     assert again.names == lag.names
-    assert again.total < early.total - 100.0
+    assert again.deviance < early.deviance - 100.0
     assert again.fit.effect_values()["steering_lag.time_constant_s"] == pytest.approx(0.15, rel=0.03)
 
 
 def test_a_model_that_is_at_its_best_stays(selector):
     lag = selector.with_effect(selector.base(), "steering_lag")
     again = selector.refitted_from(lag, selector.with_effect(lag, "lateral_slip"))
-    assert lag.total - 1.0 < again.total <= lag.total
+    assert lag.deviance - 1.0 < again.deviance <= lag.deviance
 
 
 def test_what_is_left_of_a_model_is_not_what_once_ended_elsewhere(selector):
@@ -64,7 +64,7 @@ def test_what_is_left_of_a_model_is_not_what_once_ended_elsewhere(selector):
     left, gains = selector.backward_elimination(selector.base(), larger)
     assert left.names == lag.names
     assert list(gains) == ["steering_lag"]
-    assert left.total == pytest.approx(lag.total, abs=2.0)
+    assert left.deviance == pytest.approx(lag.deviance, abs=2.0)
 
 
 def test_a_rival_is_judged_by_a_fit_that_went_as_far(selector, monkeypatch):
@@ -72,8 +72,8 @@ def test_a_rival_is_judged_by_a_fit_that_went_as_far(selector, monkeypatch):
     lag = selector.with_effect(selector.base(), "steering_lag")
     begun = fit(Predictor(selector.batch, lag.names), np.r_[selector.start, 0.1], NO_LIMIT, iterations=1)
     early = ScoredModel(lag.names, begun, begun.loss)
-    assert early.total > lag.total + 100.0
-    assert abs(selector._worse(early, lag)) < 2.0
+    assert early.deviance > lag.deviance + 100.0
+    assert abs(selector._loss_difference(early, lag)) < 2.0
 
 
 @pytest.mark.parametrize(
@@ -82,8 +82,8 @@ def test_a_rival_is_judged_by_a_fit_that_went_as_far(selector, monkeypatch):
 def test_what_another_causes_law_replaced_may_be_tried_again(selector, monkeypatch, law, again):
     base = selector.base()
     lag = selector.with_effect(base, "steering_lag")
-    monkeypatch.setattr(forms, "_laws", lambda *_: iter(()))
-    monkeypatch.setattr(forms, "_best", lambda _wide, current, _offers: replace(current, names=(law,)))
+    monkeypatch.setattr(forms, "_replacements", lambda *_: iter(()))
+    monkeypatch.setattr(forms, "_best_replacement", lambda _extended, current, _models: replace(current, names=(law,)))
     monkeypatch.setattr(Selector, "backward_elimination", lambda _self, _base, current: (current, {law: 100.0}))
     reformed = forms.select_variants(Selection(base, lag, {}, {"steering_lag": 500.0}, {}, 2), selector)
     assert reformed.chosen.names == (law,)
@@ -94,11 +94,11 @@ def test_what_runs_away_is_as_good_as_nothing(selector, monkeypatch):
     def away(*_, **__):
         raise np.linalg.LinAlgError
 
-    fresh = selector.over(selector.batch)
+    fresh = selector.for_batch(selector.batch)
     base = fresh.base()
-    monkeypatch.setattr(Selector, "_begun", away)
+    monkeypatch.setattr(Selector, "_preliminary_fit", away)
     lag = fresh.with_effect(base, "steering_lag")
-    assert (lag.names, lag.total) == (("steering_lag",), base.total)
+    assert (lag.names, lag.deviance) == (("steering_lag",), base.deviance)
     assert not fresh.meets_criterion(base, lag)
 
 
@@ -106,25 +106,25 @@ def test_where_a_slow_servo_stood_can_be_decided_again(selector):
     right = selector.with_effect(selector.base(), "steering_lag")
     wrong_belief = under_other_initial_steering(selector)
     wrong = wrong_belief.with_effect(wrong_belief.base(), "steering_lag")
-    assert under_other_start(wrong, wrong_belief)
-    assert not under_other_start(right, selector)
-    assert not under_other_start(wrong_belief.base(), wrong_belief)
+    assert prefers_other_initial_steering(wrong, wrong_belief)
+    assert not prefers_other_initial_steering(right, selector)
+    assert not prefers_other_initial_steering(wrong_belief.base(), wrong_belief)
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_a_fit_does_not_depend_on_what_was_asked_for_before(selector, order):
-    base, tried = selector.base(), usual("steering_lag")
+    base, tried = selector.base(), default_candidate("steering_lag")
     starts = [replace(tried, starts=np.array([[start]])) for start in (0.05, 0.3)]
-    fresh = selector.over(selector.batch)
+    fresh = selector.for_batch(selector.batch)
     found = {k: fresh.with_effect(fresh.base(), "steering_lag", starts[k]) for k in order}
-    alone = [selector.over(selector.batch).with_effect(base, "steering_lag", start) for start in starts]
-    assert [found[k].total for k in (0, 1)] == [model.total for model in alone]
-    assert alone[0].total != alone[1].total
+    alone = [selector.for_batch(selector.batch).with_effect(base, "steering_lag", start) for start in starts]
+    assert [found[k].deviance for k in (0, 1)] == [model.deviance for model in alone]
+    assert alone[0].deviance != alone[1].deviance
     assert fresh.with_effect(fresh.base(), "steering_lag", starts[1]) is found[1]
 
 
 def test_a_term_that_is_worth_nothing_alone_leaves_the_explanation_as_it_is(selector, monkeypatch):
-    base, wide = selector.base(), wider(selector)
+    base, wide = selector.base(), with_extended_library(selector)
     elsewhere = np.array([0.1, 40.0, 40.0, 0.2])
     with_term = wide.score((SpeedInDisc.name,), np.r_[base.fit.parameters, elsewhere], None)
     chosen = Selection(base, with_term, {}, {}, {}, 1)

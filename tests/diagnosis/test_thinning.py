@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 from tiny_vehicle import Tiny
 
 from agvbench.diagnosis import Verdict, diagnose
-from agvbench.diagnosis.selection.subsampling import some_repeats
+from agvbench.diagnosis.selection.subsampling import subsample_repeats
 
 GROUPS = st.lists(st.integers(0, 12), min_size=1, max_size=200).map(np.array)
 
 
 @given(GROUPS, st.integers(1, 250))
 def test_every_command_stays_with_a_repeat_and_no_more_runs_than_enough(group, most):
-    chosen = some_repeats(group, most)
+    chosen = subsample_repeats(group, most)
     sizes, kept = np.bincount(group), np.bincount(group[chosen], minlength=group.max() + 1)
     assert np.all(kept >= np.minimum(sizes, 2))
     assert chosen.sum() <= max(most, np.minimum(sizes, 2).sum())
@@ -28,7 +28,7 @@ def test_every_command_stays_with_a_repeat_and_no_more_runs_than_enough(group, m
 
 @given(st.integers(2, 60), st.integers(2, 40))
 def test_what_is_kept_of_a_group_is_spread_over_the_session(size, most):
-    at = np.flatnonzero(some_repeats(np.zeros(size, dtype=np.int64), most))
+    at = np.flatnonzero(subsample_repeats(np.zeros(size, dtype=np.int64), most))
     assert at[0] == 0
     assert at[-1] == size - 1
     assert np.ptp(np.diff(at)) <= 1
@@ -37,7 +37,7 @@ def test_what_is_kept_of_a_group_is_spread_over_the_session(size, most):
 def test_causes_found_in_some_runs_are_measured_in_all(tiny_campaign, monkeypatch):
     campaign = tiny_campaign(Tiny(steering_lag_s=0.15))
     whole = diagnose(campaign)
-    monkeypatch.setattr(importlib.import_module("agvbench.diagnosis.diagnose"), "MOST_RUNS", 70)
+    monkeypatch.setattr(importlib.import_module("agvbench.diagnosis.diagnose"), "MAX_RUNS", 70)
     said: list[str] = []
     found = diagnose(campaign, on_progress=said.append)
     assert found.verdict is Verdict.NAMED

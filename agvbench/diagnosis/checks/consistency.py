@@ -15,9 +15,9 @@ from agvbench.errors import CampaignError
 from agvbench.types import Floats, Run
 
 _RATE_FACTOR = 30.0
-_MOST_BACK = 0.25
+_MAX_UNORDERED = 0.25
 _EVERY_S = 0.3
-_LEAST_TURN_RAD, _FEWEST_STEPS, _FEWEST_TURNING = 0.15, 5, 5
+_MIN_TURN_RAD, _MIN_STEPS, _MIN_TURNING = 0.15, 5, 5
 _SAME_TURN = (0.5, 2.0)
 
 
@@ -30,7 +30,7 @@ def require_ordered_clocks(refused: Mapping[str, str], runs: int, *, where: str)
         If in more than a quarter.
     """
     back = [run_id for run_id, why in refused.items() if why.startswith(BACK_IN_TIME)]
-    if len(back) > _MOST_BACK * runs:
+    if len(back) > _MAX_UNORDERED * runs:
         raise CampaignError(
             BACK_IN_TIME,
             where=f"{where}: poses",
@@ -102,15 +102,15 @@ def _turn_ratio(tracks: list[tuple[Floats, Floats]]) -> float | None:
         # Modulo half a turn: a vehicle that reverses goes the other way along the same line.
         course = np.unwrap(np.arctan2(step[moves, 1], step[moves, 0]), period=np.pi)
         heading = (0.5 * (poses[1:, 2] + poses[:-1, 2]))[moves]
-        if len(course) >= _FEWEST_STEPS and np.std(course) > _LEAST_TURN_RAD:
+        if len(course) >= _MIN_STEPS and np.std(course) > _MIN_TURN_RAD:
             ratios.append(float(np.polyfit(course, heading, 1)[0]))
-    return float(np.median(ratios)) if len(ratios) >= _FEWEST_TURNING else None
+    return float(np.median(ratios)) if len(ratios) >= _MIN_TURNING else None
 
 
 _FAR_SHARE, _FAR_M = 0.3, 0.15
 _AS_LONG = 0.05
-_MOST_GROUPS = 0.25
-_LEAST_WAY_M, _LEAST_SHARE, _FEWEST_PAIRS = 0.3, 0.15, 6
+_MAX_GROUPS = 0.25
+_MIN_DISTANCE_M, _MIN_SHARE, _MIN_PAIRS = 0.3, 0.15, 6
 _GAP, _FAR_APART, _TIMES_AS_FAR = 1.5, 0.02, 6.0
 
 
@@ -141,7 +141,7 @@ def require_consistent_repeats(readings: Readings, *, where: str) -> None:
         if off > max(_FAR_SHARE * way, _FAR_M):
             far += 1
             example = example or f"{readings.runs[own[0]].run_id} and its repeats end {off:.2f} m from their mean"
-    if far <= _MOST_GROUPS * repeated:
+    if far <= _MAX_GROUPS * repeated:
         _require_one_kind(readings, path, where)
     else:
         raise CampaignError(
@@ -177,10 +177,10 @@ def _require_one_kind(readings: Readings, path: Floats, where: str) -> None:
     ends = path[pairs, last[:, None]]
     way = np.hypot(*np.moveaxis(ends, -1, 0)).mean(axis=1)
     apart = np.hypot(*(ends[:, 0] - ends[:, 1]).T) / np.maximum(way, 1e-9)
-    drove = way > _LEAST_WAY_M
+    drove = way > _MIN_DISTANCE_M
     apart, pairs = np.sort(apart[drove]), pairs[drove][np.argsort(apart[drove])]
     count = len(apart)
-    few = max(_FEWEST_PAIRS, int(_LEAST_SHARE * count))
+    few = max(_MIN_PAIRS, int(_MIN_SHARE * count))
     if count < 2 * few:
         return
     gaps = apart[few : count - few + 1] / np.maximum(apart[few - 1 : count - few], 1e-9)

@@ -10,10 +10,10 @@ from agvbench.diagnosis.data.splits import HELD_OUT_SHARE
 from agvbench.diagnosis.data.windows import InitialStates
 from agvbench.errors import FitError
 
-MOST_FITTED = 300
+MAX_FITTED = 300
 """Largest number of windows in a fit, evenly spaced: adjacent windows are strongly correlated."""
 
-MOST_JUDGED = 1500
+MAX_ASSESSED = 1500
 """Largest number of training windows for which errors are reported."""
 _MAX_SHARE = 1.0 / 3.0
 _MIN_TRAINING_SESSIONS = 2

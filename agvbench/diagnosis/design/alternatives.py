@@ -14,7 +14,7 @@ from agvbench.diagnosis.selection.candidates import Candidate, bounds_of
 from agvbench.types import Floats
 
 _SHORT, _LONG = 2, 8
-_MOST_PAIRS = 3
+_MAX_PAIRS = 3
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def alternative_models(
         group = [Alternative(name, name, chosen)]
         group += [Alternative(other, name, swapped(chosen, name, other, candidates)) for other in others]
         # Of many alternatives, those to the named one come first: what remains is for the run after the next.
-        pairs += list(combinations(group, 2))[: max(_MOST_PAIRS, len(others))]
+        pairs += list(combinations(group, 2))[: max(_MAX_PAIRS, len(others))]
     return pairs
 
 

@@ -12,11 +12,11 @@ from agvbench.diagnosis.model.nodal_maps import NodalMaps
 from agvbench.types import Commands, Floats
 
 SET_FIRST_S = 0.4
-LONGEST_S = 9.0
-_SHORTEST_S = 0.3
-_MOST_STEPS = 14
+MAX_DURATION_S = 9.0
+_MIN_STEP_S = 0.3
+_MAX_STEPS = 14
 _RHYTHMS_S = (2.4, 1.2, 0.6, 0.3)
-_FARTHEST_RAD = 0.6
+_MAX_ANGLE_RAD = 0.6
 Step = tuple[float, float, float, float]
 
 
@@ -83,7 +83,7 @@ def _steering(nodes: Floats, angle: Floats, neutral: float) -> tuple[float, ...]
     bent = angle - angle[straight]
     chosen = [straight]
     for sign in (1.0, -1.0):
-        own = np.flatnonzero((sign * bent > 0.03) & (np.abs(angle) < _FARTHEST_RAD))
+        own = np.flatnonzero((sign * bent > 0.03) & (np.abs(angle) < _MAX_ANGLE_RAD))
         if len(own):
             far = own[np.argmax(sign * bent[own])]
             half = own[np.argmin(np.abs(bent[own] - 0.5 * bent[far]))]
@@ -130,7 +130,7 @@ def _steerings(levels: Levels) -> Iterator[tuple[float, float]]:
 
 def _repeated(steps: list[Step]) -> list[Step]:
     seconds = sum(step[0] for step in steps)
-    return steps * max(1, min(int(LONGEST_S / seconds), _MOST_STEPS // len(steps)))
+    return steps * max(1, min(int(MAX_DURATION_S / seconds), _MAX_STEPS // len(steps)))
 
 
 def mutated(design: Design, levels: Levels, rng: np.random.Generator) -> Design:
@@ -140,16 +140,16 @@ def mutated(design: Design, levels: Levels, rng: np.random.Generator) -> Design:
     duration, drive, front, rear = steps[k]
     kind = int(rng.integers(6))
     if kind == 0:
-        steps[k] = (round(max(_SHORTEST_S, duration * float(rng.choice([0.6, 0.8, 1.25, 1.6]))), 2), drive, front, rear)
+        steps[k] = (round(max(_MIN_STEP_S, duration * float(rng.choice([0.6, 0.8, 1.25, 1.6]))), 2), drive, front, rear)
     elif kind == 1:
         steps[k] = (duration, float(rng.choice([*levels.drive, levels.neutral])), front, rear)
     elif kind == 2:
         steps[k] = (duration, drive, float(rng.choice(levels.front)), rear)
     elif kind == 3:
         steps[k] = (duration, drive, front, float(rng.choice(levels.rear)))
-    elif kind == 4 and len(steps) < _MOST_STEPS:
+    elif kind == 4 and len(steps) < _MAX_STEPS:
         steps.insert(k, (0.6, *steps[int(rng.integers(len(steps)))][1:]))
     elif len(steps) > 1:
         del steps[k]
     made = Design(tuple(steps), design.neutral)
-    return made if made.duration_s <= LONGEST_S + SET_FIRST_S + 0.5 else design
+    return made if made.duration_s <= MAX_DURATION_S + SET_FIRST_S + 0.5 else design

@@ -18,7 +18,7 @@ import numpy as np
 from agvbench.diagnosis.design.alternatives import Alternative, alternative_models
 from agvbench.diagnosis.design.designs import SET_FIRST_S, Design
 from agvbench.diagnosis.design.identifiability import Unidentified
-from agvbench.diagnosis.design.search import LEAST_REPEATS, Search
+from agvbench.diagnosis.design.search import MIN_REPEATS, Search
 from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.proposal import NextExperiment, Proposal
 from agvbench.diagnosis.selection.candidates import Candidate
@@ -70,14 +70,14 @@ DECISIVE = 40.0
 """Decisive expected difference in minus two log likelihood: beyond the margin of alternatives in 99 of 100 draws."""
 
 HOPELESS = 10.0
-"""What even `MOST_REPEATS` would not bring beyond this is not worth driving."""
+"""What even `MAX_REPEATS` would not bring beyond this is not worth driving."""
 
-MOST_REPEATS = 12
+MAX_REPEATS = 12
 PINNED = 0.5
 """A parameter is pinned when its standard error is below this part of its usual size."""
 
 _WELL_PINNED = 0.05
-_MOST_PINNED = 3
+_MAX_IDENTIFIED = 3
 _UNKNOWN = 100.0
 
 
@@ -115,14 +115,14 @@ def discriminate(
         return Proposal(None, {_names(pair): "a floor on which the vehicle can move" for pair in pairs})
     # Each pair on its own first: a pair that nothing parts must not decide between designs for the others.
     table = search.pair_scores(pairs, search.first)
-    most = MOST_REPEATS * table.max(axis=1)
+    most = MAX_REPEATS * table.max(axis=1)
     hopeless = {_names(p): required_measurements(_names(p)) for p, m in zip(pairs, most, strict=True) if m < HOPELESS}
     parted = [p for p, m in zip(pairs, most, strict=True) if m >= HOPELESS]
     if not parted:
         return Proposal(None, hopeless)
     best = search.best(lambda tried: search.pair_scores(parted, tried).min(axis=0))
     each = search.pair_scores(parted, [best])[:, 0]
-    repeats = int(np.clip(np.ceil(DECISIVE / max(float(each.min()), 1e-9)), LEAST_REPEATS, MOST_REPEATS))
+    repeats = int(np.clip(np.ceil(DECISIVE / max(float(each.min()), 1e-9)), MIN_REPEATS, MAX_REPEATS))
     separations = search.separations(parted, best, each * repeats)
     hardest = min(separations, key=lambda s: s.evidence)
     why = (
@@ -157,24 +157,24 @@ def pin(
     unit, workspace, seed
         As for `discriminate`.
     """
-    wanted = [item for item in flat if not item.partner][:_MOST_PINNED]
+    wanted = [item for item in flat if not item.partner][:_MAX_IDENTIFIED]
     if not wanted:
         return None
     search = Search(chosen, workspace or Workspace.circle(), seed)
     if not search.first:
         return None
-    least = search.pin_scores(wanted, search.first, LEAST_REPEATS).min(axis=1)
+    least = search.pin_scores(wanted, search.first, MIN_REPEATS).min(axis=1)
     wanted = [item for item, value in zip(wanted, least, strict=True) if value < PINNED]
     if not wanted:
         return None
 
     def score(tried: Sequence[Design]) -> Floats:
         # Patterns come from calm to quick: of those that pin well enough, the calmest is driven.
-        reached = search.pin_scores(wanted, tried, LEAST_REPEATS)
+        reached = search.pin_scores(wanted, tried, MIN_REPEATS)
         return np.asarray(-np.log(np.maximum(reached, _WELL_PINNED)).sum(axis=0))
 
     best = search.best(score)
-    reached = search.pin_scores(wanted, [best], LEAST_REPEATS)[:, 0]
+    reached = search.pin_scores(wanted, [best], MIN_REPEATS)[:, 0]
     pins = tuple(item.name for item, value in zip(wanted, reached, strict=True) if value < PINNED)
     reductions = ", ".join(
         f"{item.name} to ± {value * item.scale:.2g} ({_now(item)} now)"
@@ -185,9 +185,9 @@ def pin(
         return None
     trajectory = as_trajectory(best, unit, "next_excitation", "excites what nothing driven so far excites")
     return NextExperiment(
-        f"{LEAST_REPEATS} repeats would reduce the standard error of {reductions}",
+        f"{MIN_REPEATS} repeats would reduce the standard error of {reductions}",
         trajectory,
-        LEAST_REPEATS,
+        MIN_REPEATS,
         tuple(search.starts(best)),
         (),
         pins,

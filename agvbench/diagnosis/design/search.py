@@ -25,11 +25,11 @@ from agvbench.diagnosis.proposal import Discrimination
 from agvbench.planning import Workspace
 from agvbench.types import Floats, Pose
 
-LEAST_REPEATS = 4
+MIN_REPEATS = 4
 """As few repeats as a run is worth the way for."""
 
 _SHOWS, _NOT_LOOKED_AT = 0.02, 1e3
-_FARTHEST_APART_M, _FARTHEST_APART_RAD = 0.25, 0.35
+_MAX_DIFFERENCE_M, _MAX_DIFFERENCE_RAD = 0.25, 0.35
 _KEPT, _ROUNDS, _MUTANTS = 16, 3, 12
 
 
@@ -84,7 +84,7 @@ class Search:
             for wrong, difference in ((one.fit, apart[rows]), (other.fit, -apart[rows])):
                 new = information(wrong, like(wrong, some, self.geometry), wrong.parameters, difference)
                 known = wrong.information.total
-                gains.append(evidence(known, new, LEAST_REPEATS) / LEAST_REPEATS)
+                gains.append(evidence(known, new, MIN_REPEATS) / MIN_REPEATS)
             out[k, chosen] = np.minimum(*gains) * _gentle(apart, len(tried))[chosen] ** 2
         return out
 
@@ -155,5 +155,5 @@ def _gentle(apart: Floats, count: int) -> Floats:
     """
     position = np.hypot(apart[..., 0], apart[..., 1]).reshape(count, -1).max(axis=1)
     heading = np.abs(apart[..., 2]).reshape(count, -1).max(axis=1)
-    most = np.maximum(position / _FARTHEST_APART_M, heading / _FARTHEST_APART_RAD)
+    most = np.maximum(position / _MAX_DIFFERENCE_M, heading / _MAX_DIFFERENCE_RAD)
     return np.asarray(1.0 / np.maximum(most, 1.0))

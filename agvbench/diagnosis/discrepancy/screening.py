@@ -1,4 +1,4 @@
-"""Which discrepancy terms are promising, by linear regressions on residual rates over a grid of shapes.
+"""Which discrepancy terms are screened_terms, by linear regressions on residual rates over a grid of shapes.
 
 A shape's numbers that are not linear (a place, a radius, a time constant) come from the grid; its sizes are those of
 the regression.
@@ -28,7 +28,7 @@ _RADII_M = (0.2, 0.35, 0.5, 0.8)
 _DISC_STEP, _LINE_STEP = 18, 40
 _LINE_DIRECTIONS = 16
 _STRIP_DIRECTIONS, _STRIP_STEP, _WIDTHS_M = 8, 16, (0.3, 0.6, 1.0, 1.6)
-_BLUR_M, _SHARP_M, _BEST_LINES, _FINE, _FEWEST_CROSSINGS = 0.1, 0.01, 4, 9, 5
+_BLUR_M, _SHARP_M, _BEST_LINES, _FINE, _MIN_CROSSINGS = 0.1, 0.01, 4, 9, 5
 _RUN_TIMES_S = (0.4, 0.8, 1.6, 3.2, 6.4)
 _HOURS = (0.1, 0.2, 0.4, 0.8, 2.0)
 _WAVES_M = np.geomspace(0.12, 1.5, 50)
@@ -176,7 +176,7 @@ def _across(direction: float) -> Floats:
 def _crossed(rates: Rates, direction: float, place: float, blur_m: float) -> Floats | None:
     """Return by how much of a line each step crosses (n, 1), per metre; None where hardly any does."""
     before, after = ((p[:, :2] @ _across(direction) - place) / blur_m for p in (rates.begin, rates.end))
-    if np.count_nonzero((before > 0.0) != (after > 0.0)) < _FEWEST_CROSSINGS:
+    if np.count_nonzero((before > 0.0) != (after > 0.0)) < _MIN_CROSSINGS:
         return None
     part = 0.5 * (np.tanh(after) - np.tanh(before))
     return np.asarray((part * rates.covariates["direction"] / rates.weight)[:, None])

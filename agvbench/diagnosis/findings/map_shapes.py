@@ -20,15 +20,15 @@ from agvbench.types import Floats
 from agvbench.vehicle.maps import StaticMap
 
 _MODEL_ERROR = 0.002
-_LEAST_GAIN = 12.0
+_MIN_GAIN = 12.0
 _PER_PARAMETER = 2.0
-_LEAST_SHORT = 0.015
+_MIN_SHORT = 0.015
 _CLEAR = 4.0
-_FEWEST_INSIDE = 3
-_MOST_AT_A_STOP = 0.4
+_MIN_INSIDE = 3
+_MAX_SHARE_AT_STOP = 0.4
 _UNKNOWN_RAD = 0.1
 _WIDTHS = 60
-_MOST_NEAR = 5
+_MAX_NEAR = 5
 _BENDS = np.geomspace(0.1, 4.0, 10)
 
 
@@ -87,19 +87,19 @@ def end_stops(refitted: RefittedMap, prior_model: StaticMap) -> EndStops | None:
     known = np.flatnonzero(np.sqrt(np.diagonal(refitted.covariance)) < _UNKNOWN_RAD)
     own = refitted.select(known)
     inner = np.asarray(prior_model(own.commands))
-    if len(known) < _FEWEST_INSIDE + 1 or np.ptp(inner) == 0.0:
+    if len(known) < _MIN_INSIDE + 1 or np.ptp(inner) == 0.0:
         return None
     rising = bool(np.polyfit(own.commands, own.values, 1)[0] > 0.0)
     inner = (inner - inner.mean()) / float(np.ptp(inner))
     free = own.fit(np.vander(inner, 2))[0]
     best, misfit = None, free
-    most = int(_MOST_AT_A_STOP * len(known))
+    most = int(_MAX_SHARE_AT_STOP * len(known))
     for first, last in product(range(most + 1), repeat=2):
-        if not first + last or len(known) - first - last < _FEWEST_INSIDE:
+        if not first + last or len(known) - first - last < _MIN_INSIDE:
             continue
         fitted = _with_stops(own, inner, first, last)
-        if fitted is not None and fitted[0] + _LEAST_GAIN * ((first > 0) + (last > 0)) < misfit:
-            best, misfit = (fitted, first, last), fitted[0] + _LEAST_GAIN * ((first > 0) + (last > 0))
+        if fitted is not None and fitted[0] + _MIN_GAIN * ((first > 0) + (last > 0)) < misfit:
+            best, misfit = (fitted, first, last), fitted[0] + _MIN_GAIN * ((first > 0) + (last > 0))
     if best is None:
         return None
     (chi, coefficients, errors), first, last = best
@@ -135,7 +135,7 @@ def _with_stops(own: RefittedMap, inner: Floats, first: int, last: int) -> tuple
         short = side * (line[outermost] - coefficients[column])
         # Inside, the stop is not reached; at the outermost command the line would be well beyond it.
         inside = side * (coefficients[column] - line[innermost])
-        if short < max(_LEAST_SHORT * own.size, _CLEAR * float(errors[column])) or inside < -_MODEL_ERROR * own.size:
+        if short < max(_MIN_SHORT * own.size, _CLEAR * float(errors[column])) or inside < -_MODEL_ERROR * own.size:
             return None
     return chi, coefficients, errors
 
@@ -168,7 +168,7 @@ def dead_band(refitted: RefittedMap, prior_model: StaticMap, neutral: float) -> 
     spread = 0.5 * float(np.ptp([side.edge for side in found]))
     gain = sum(side.gain for side in found)
     farthest = float(np.max(np.abs(own.commands - neutral)))
-    if width < max(_CLEAR * stderr, 0.02 * farthest) or gain < _LEAST_GAIN:
+    if width < max(_CLEAR * stderr, 0.02 * farthest) or gain < _MIN_GAIN:
         return None
     return DeadBand(width, math.hypot(stderr, spread), gain)
 
@@ -206,9 +206,9 @@ def _edge(own: RefittedMap, prior_model: StaticMap, neutral: float, sign: float)
 def _between(side: RefittedMap, neutral: float, low: float, high: float) -> tuple[float, float]:
     """Return an edge between the last level that stood still and the first that moved."""
     middle, spread = 0.5 * (low + high), (high - low) / math.sqrt(12.0)
-    if len(side.values) < _FEWEST_INSIDE:
+    if len(side.values) < _MIN_INSIDE:
         return middle, spread
-    found = _shifted(side.select(np.argsort(np.abs(side.commands - neutral))[:_MOST_NEAR]), neutral, low, high)
+    found = _shifted(side.select(np.argsort(np.abs(side.commands - neutral))[:_MAX_NEAR]), neutral, low, high)
     if found is None:
         return middle, spread
     return found[1], min(max(found[2], 0.01 * (high - low)), spread)
@@ -216,7 +216,7 @@ def _between(side: RefittedMap, neutral: float, low: float, high: float) -> tupl
 
 def _extrapolated(side: RefittedMap, neutral: float) -> _Edge | None:
     """Return an edge to which the levels that move lead back, if no curve that begins at neutral does as well."""
-    side = side.select(np.argsort(np.abs(side.commands - neutral))[:_MOST_NEAR])
+    side = side.select(np.argsort(np.abs(side.commands - neutral))[:_MAX_NEAR])
     nearest = float(np.min(np.abs(side.commands - neutral)))
     found = _shifted(side, neutral, -0.5 * nearest, nearest)
     if found is None:

@@ -25,7 +25,7 @@ from agvbench.vehicle.maps import DeadBandWithSaturation, Fixed, FullSpeedOrStop
 _SOURCE = "read off the refitted map against the nominal one"
 _FLAT = 0.05
 _GRID = 400
-_STILL, _LEAST_BAND = 0.01, 0.02
+_STILL, _MIN_BAND = 0.01, 0.02
 
 
 @dataclass(frozen=True)
@@ -123,4 +123,4 @@ def _prior_has_dead_band(prior_model: StaticMap, commands: Floats, neutral: floa
     speed = np.abs(prior_model(at))
     still = np.abs(at[speed <= _STILL * float(speed.max())] - neutral)
     # A line stands still for as much of its range as is called still; a dead band for more.
-    return bool(len(still) and float(still.max()) > (_STILL + _LEAST_BAND) * farthest)
+    return bool(len(still) and float(still.max()) > (_STILL + _MIN_BAND) * farthest)

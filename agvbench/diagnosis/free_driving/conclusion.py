@@ -144,7 +144,7 @@ class WindowConclusion:
             error = None if other is None else self._error(self._poses(other))
             out[name] = {
                 "kept": kept,
-                "gain": self.selection.gains[name] if kept else chosen.total - other.total if other else 0.0,
+                "gain": self.selection.gains[name] if kept else chosen.deviance - other.deviance if other else 0.0,
                 "extrapolates": name in self.selector.extrapolating,
                 "held_out_position_mm": {"with": now if kept else error, "without": error if kept else now},
             }

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from agvbench.calibration.campaign_protocol import HeaderLike
 from agvbench.diagnosis.context import DiagnosisContext, require_runs
 from agvbench.diagnosis.data.readings import Readings, read_windows
-from agvbench.diagnosis.data.window_splits import MOST_FITTED, MOST_JUDGED, held_out_windows, thinned
+from agvbench.diagnosis.data.window_splits import MAX_ASSESSED, MAX_FITTED, held_out_windows, thinned
 from agvbench.diagnosis.data.windows import Horizon
 from agvbench.diagnosis.estimation.fit import Fit, fit
 from agvbench.diagnosis.free_driving.conclusion import WindowConclusion
@@ -22,14 +22,14 @@ from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.result import Diagnosis
 from agvbench.diagnosis.selection.candidates import given_effects
 from agvbench.diagnosis.selection.fitted_models import OnProgress
-from agvbench.diagnosis.selection.variants import tried_beside
+from agvbench.diagnosis.selection.variants import candidates_for
 from agvbench.errors import CampaignError
 from agvbench.types import Run
 from agvbench.vehicle.geometry import Geometry
 
-FEWEST_WINDOWS = 20
-FEWEST_STRETCHES = 5
-_LEAST_TURN_RAD = 0.05
+MIN_WINDOWS = 20
+MIN_BLOCKS = 5
+_MIN_TURN_RAD = 0.05
 
 
 def diagnose_windows(
@@ -46,13 +46,13 @@ def diagnose_windows(
     held = held_out_windows(readings, context.seed)
     if not held.any():
         return context.not_identifiable(readings, "no stretch of driving can be spared for the test: drive for longer")
-    fitted = readings.select(thinned(np.flatnonzero(~held), MOST_FITTED))
+    fitted = readings.select(thinned(np.flatnonzero(~held), MAX_FITTED))
     on_progress(f"{len(fitted)} windows to fit, {np.count_nonzero(held)} held out")
     static = _static(fitted, context.geometry, context.header.neutral)
     selector = _selector(context, readings, held, static, on_progress)
     selection = selector.select()
     on_progress("judging on what was held out")
-    assessment = readings.select(np.sort(np.r_[np.flatnonzero(held), thinned(np.flatnonzero(~held), MOST_JUDGED)]))
+    assessment = readings.select(np.sort(np.r_[np.flatnonzero(held), thinned(np.flatnonzero(~held), MAX_ASSESSED)]))
     held = np.isin([r.run_id for r in assessment.runs], [r.run_id for r in readings.select(held).runs])
     return WindowConclusion(context, readings, assessment, held, static, selector, selection).diagnosis(horizon)
 
@@ -62,8 +62,8 @@ def _selector(
 ) -> WindowSelector:
     """Return what tries effects on the windows that `static` was fitted to, none of those `held` out."""
     fitted, maps = static.predictor.readings, static.predictor.maps
-    aside = readings.select(thinned(np.flatnonzero(held), MOST_FITTED))
-    tried, kinds = tried_beside(context.vehicle)
+    aside = readings.select(thinned(np.flatnonzero(held), MAX_FITTED))
+    tried, kinds = candidates_for(context.vehicle)
     names, values = given_effects(context.vehicle, tried)
     several = len(np.unique(readings.initial_states.session)) > 1 if readings.initial_states else False
     variance_components = nodal_deviation(static.predictor, static.parameters) if several else np.inf
@@ -77,19 +77,19 @@ def _selector(
 
 def _insufficient_data(readings: Readings, header: HeaderLike, horizon: Horizon) -> str:
     require_runs(readings, header)
-    if len(readings) < FEWEST_WINDOWS:
+    if len(readings) < MIN_WINDOWS:
         raise CampaignError(
             "too little free driving to diagnose",
             where=f"campaign {header.name}",
             value=f"{len(readings)} windows of {horizon.horizon_s:g} s",
-            limit=f"at least {FEWEST_WINDOWS}",
+            limit=f"at least {MIN_WINDOWS}",
             remedy="drive for longer, or predict less far ahead (campaign.toml, [prediction] horizon_s)",
         )
-    if len(np.unique(readings.group)) < FEWEST_STRETCHES:
+    if len(np.unique(readings.group)) < MIN_BLOCKS:
         stretches = len(np.unique(readings.group))
         return f"{stretches} stretches of {horizon.block_s:g} s are too few to set some aside: drive for longer"
     turned = np.nanmax(np.abs(readings.poses[..., 2] - readings.start[:, None, 2]), axis=1)
-    if np.count_nonzero(turned > _LEAST_TURN_RAD) < FEWEST_STRETCHES:
+    if np.count_nonzero(turned > _MIN_TURN_RAD) < MIN_BLOCKS:
         return "steering was never excited: hardly a window turns"
     return ""
 

@@ -23,7 +23,7 @@ AHEAD = (SAMPLES // 2 - 1, SAMPLES - 1)
 
 _RESAMPLES = 2000
 _CONFIDENCE = 0.95
-_FEWEST_STRETCHES = 3
+_MIN_BLOCKS = 3
 
 
 def squares(readings: Readings, poses: Floats, sample: int = -1) -> dict[str, Floats]:
@@ -110,7 +110,7 @@ def interval(values: Floats, group: NDArray[np.int64], seed: int) -> dict[str, f
     out = {"rms": rms(values, "position_rms_mm"), "low": np.nan, "high": np.nan}
     seen = np.isfinite(values)
     names, index = np.unique(group, return_inverse=True)
-    if len(names) < _FEWEST_STRETCHES:
+    if len(names) < _MIN_BLOCKS:
         return out
     sums = np.bincount(index, weights=np.where(seen, values, 0.0))
     counts = np.bincount(index, weights=seen.astype(np.float64))

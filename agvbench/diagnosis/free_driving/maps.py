@@ -19,7 +19,7 @@ NODES = ((9, 6), (13, 10), (19, 15))
 _MANY_LEVELS = 12
 _LATE_S = 0.15
 _STIFFNESS = 0.3
-_SLOWEST_MPS = 0.05
+_MIN_SPEED_MPS = 0.05
 
 
 def smooth_maps(runs: Sequence[Run], neutral: float, steering: int, drive: int) -> NodalMaps:
@@ -69,7 +69,7 @@ def start_values_of_windows(maps: NodalMaps, readings: Readings, geometry: Geome
     front, rear = axle_angles(forward, left, turn / dt, geometry)
     value = {"front": front, "rear": rear, "drive": 2.0 * forward / (np.cos(front) + np.cos(rear))}
     when = 0.5 * (time[:, 1:] + time[:, :-1]) - _LATE_S
-    moving = np.isfinite(front + rear) & (np.abs(forward) > _SLOWEST_MPS)
+    moving = np.isfinite(front + rear) & (np.abs(forward) > _MIN_SPEED_MPS)
     out = []
     for role in ROLES:
         commanded = np.array([held_command(run.commands, role, t) for run, t in zip(readings.runs, when, strict=True)])

@@ -92,7 +92,7 @@ def nodal_deviation(predictor: Predictor, parameters: Floats) -> float:
     session = initial_states.session[use]
     for name in np.unique(session):
         off[session == name] -= np.median(off[session == name])
-    return max(_LEAST_DEVIATION, 2.0 * robust_std(off)) if len(off) else _LEAST_DEVIATION
+    return max(_MIN_DEVIATION, 2.0 * robust_std(off)) if len(off) else _MIN_DEVIATION
 
 
 def autocorrelation_time(fitted: Fit) -> float:
@@ -106,9 +106,9 @@ def autocorrelation_time(fitted: Fit) -> float:
     e = e / np.maximum(np.median(np.abs(e), axis=0), 1e-9)
     e = e / np.sqrt(1.0 + np.sum(e * e, axis=1, keepdims=True))  # as Student's law weighs them
     total, own = 1.0, float(np.mean(np.sum(e * e, axis=1)))
-    for k in range(1, _FARTHEST_ALIKE + 1):
+    for k in range(1, _MAX_LAG + 1):
         alike = group[k:] == group[:-k]
-        if np.count_nonzero(alike) < _FEWEST_PAIRS:
+        if np.count_nonzero(alike) < _MIN_PAIRS:
             break
         correlation = float(np.mean(np.sum(e[k:] * e[:-k], axis=1)[alike])) / own
         if correlation <= 0.0:
@@ -117,7 +117,7 @@ def autocorrelation_time(fitted: Fit) -> float:
     return total
 
 
-_FARTHEST_ALIKE, _FEWEST_PAIRS = 10, 10
+_MAX_LAG, _MIN_PAIRS = 10, 10
 _SHORTLY_S = 0.01
 _SLOW_MPS = 0.05
-_LEAST_DEVIATION = 0.05
+_MIN_DEVIATION = 0.05

@@ -26,9 +26,9 @@ class WindowSelector(Selector):
     """
 
     # Fast stretches may be few: only the single best stretch is left out to see whether others gain, too.
-    best_share: ClassVar[float] = 0.0
+    excluded_share: ClassVar[float] = 0.0
     # Residuals of windows are mostly systematic, so that a small part of them is no cause of its own.
-    noticeable: ClassVar[float] = 0.3
+    min_relative_change: ClassVar[float] = 0.3
     elsewhere: Batch | None = None
     extrapolating: set[str] = field(default_factory=set)
 

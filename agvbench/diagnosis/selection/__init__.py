@@ -1,1 +1,1 @@
-"""Which effects the model needs: candidates, stepwise selection, variants of laws, validation."""
+"""Selection of the effects that the model needs: candidates, stepwise selection, variants, validation."""

@@ -1,4 +1,4 @@
-"""Which effects are tried, from where, and between which bounds."""
+"""Candidate effects, with the bounds and initial values of their parameters."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from agvbench.effects.variants import effect_variants
 from agvbench.model import VehicleModel
 from agvbench.types import Floats
 
-IN_THE_MAPS = frozenset({"steering_saturation", "drive_dead_band"})
-"""What nodal maps describe by themselves: end stops and dead bands are read off the maps."""
+ABSORBED_BY_MAPS = frozenset({"steering_saturation", "drive_dead_band"})
+"""Effects that nodal maps absorb: end stops and dead bands are read off the fitted maps."""
 
 _UNBOUNDED = 1e3
 _STARTS = (0.1, 1.0)
@@ -26,10 +26,10 @@ _LIMIT_STARTS = (0.3, 1.0, 3.0)
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect to try: its ``bounds`` (p, 2), ``scale`` (p,) of its parameters and ``starts`` (n, p) of fits.
+    """A candidate effect: ``bounds`` (p, 2), ``scale`` (p,) of its parameters, and ``starts`` (n, p) of fits.
 
-    ``screened`` says that a regression chose the starts: one of them is near if there is anything to find. ``foremost``
-    says that its predicted gain is larger than that of others: its fit is given all the steps that it takes.
+    ``screened`` is True if a regression determined the starts: then one of them is close if the effect is present.
+    ``patient`` is True if its predicted gain is the largest of all: its fit is then iterated to convergence.
     """
 
     name: str
@@ -37,22 +37,22 @@ class Candidate:
     scale: Floats
     starts: Floats
     screened: bool = False
-    foremost: bool = False
+    patient: bool = False
 
     @property
     def key(self) -> frozenset[tuple[str, bytes]]:
-        """What makes it another candidate than others of that name, to be compared."""
-        return frozenset({(self.name, self.starts.tobytes() + bytes((self.screened, self.foremost)))})
+        """The key that distinguishes this candidate from others with the same name."""
+        return frozenset({(self.name, self.starts.tobytes() + bytes((self.screened, self.patient)))})
 
 
 def candidates(exclude: Iterable[str] = ()) -> dict[str, Candidate]:
-    """Return every effect of the library that nodal maps do not describe anyway, by name."""
-    out = {*exclude, *IN_THE_MAPS}
-    return {name: candidate(kind) for name, kind in effect_kinds().items() if name not in out}
+    """Return every effect of the library, by name, except those that nodal maps absorb and those in `exclude`."""
+    excluded = {*exclude, *ABSORBED_BY_MAPS}
+    return {name: candidate(kind) for name, kind in effect_kinds().items() if name not in excluded}
 
 
 def candidate(kind: type[Effect]) -> Candidate:
-    """Return how an effect is tried: from a tenth of its scale and from its scale, either sign where it has one."""
+    """Return the candidate of an effect: initial values are 0.1 and 1 times its scale, with each possible sign."""
     parameters = kind.parameters()
     bounds = np.array([[max(p.low, -_UNBOUNDED), min(p.high, _UNBOUNDED)] for p in parameters])
     scale = np.array([p.scale for p in parameters])
@@ -64,7 +64,7 @@ def candidate(kind: type[Effect]) -> Candidate:
     if len(parameters) == 1:
         starts = np.array(choices[0])[:, None]
     else:
-        # Not every combination: all parameters small or all large, each with its own sign.
+        # Not all combinations: either all parameters are small or all are large, with all signs.
         starts = np.array([row for column in zip(*_by_share(choices), strict=True) for row in product(*column)])
     return Candidate(kind.name, bounds, scale, np.clip(starts, bounds[:, 0], bounds[:, 1]))
 
@@ -74,19 +74,19 @@ def _by_share(choices: list[list[float]]) -> list[list[list[float]]]:
 
 
 def given_effects(vehicle: VehicleModel | None, tried: Iterable[str]) -> tuple[tuple[str, ...], Floats]:
-    """Return names and parameters (p,) of the effects that a vehicle is known to have, of those that are `tried`."""
+    """Return names and parameters (p,) of the effects that a vehicle is known to have, restricted to `tried`."""
     known = {*tried}
     given = [e for e in (vehicle.effects if vehicle else ()) if e.name in known and not e.is_null]
     return tuple(e.name for e in given), np.array([value for e in given for value in e.values.values()])
 
 
 @cache
-def usual(name: str) -> Candidate:
-    """Return how the effect called `name` is tried unless asked otherwise: of the library, another law, or a term."""
+def default_candidate(name: str) -> Candidate:
+    """Return the default candidate of an effect of the library, a variant or a discrepancy term."""
     kinds: dict[str, type[Effect]] = {**effect_kinds(), **effect_variants(), **{term.name: term for term in TERMS}}
     return candidate(kinds[name])
 
 
 def bounds_of(names: Iterable[str]) -> Floats:
     """Return the bounds (p, 2) of all parameters of the effects called `names`."""
-    return np.concatenate([np.empty((0, 2)), *(usual(name).bounds for name in names)])
+    return np.concatenate([np.empty((0, 2)), *(default_candidate(name).bounds for name in names)])

@@ -1,4 +1,4 @@
-"""Models with more effects or fewer: fitted once, cross-validated, and remembered."""
+"""Fits models with different sets of effects, cross-validates them, and caches the results."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ from agvbench.diagnosis.estimation.fit import Fit, fit
 from agvbench.diagnosis.estimation.score_test import first_order_gain, initial_parameters
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
-from agvbench.diagnosis.selection.candidates import Candidate, bounds_of, usual
+from agvbench.diagnosis.selection.candidates import Candidate, bounds_of, default_candidate
 from agvbench.types import Floats
 
 OnProgress = Callable[[str], None]
 
-_SHORT, _LONG = 3, 10
-_HOPELESS = 3.0  # an effect with a smaller predicted gain is not fitted
-_LIKELY = 40.0  # an effect with a larger one is fitted to convergence
-_MOST_STARTS = 2
-_WORSE = 20.0  # a fit that has not ended yet may still be so much worse than without the effect
-_KEPT = 0.5  # of the predicted gain: a fit that gains less has lost its way
+_FEW_ITERATIONS, _MANY_ITERATIONS = 3, 10
+_MIN_PREDICTED_GAIN = 3.0  # an effect with a smaller one is not fitted
+_LARGE_PREDICTED_GAIN = 40.0  # an effect with a larger one is fitted to convergence
+_MAX_STARTS = 2
+_MAX_INCREASE = 20.0  # of the loss in a preliminary fit that need not gain
+_MIN_GAIN_SHARE = 0.5  # of the predicted gain: a fit with less has ended in a local minimum
 
 
 Starts = frozenset[tuple[str, bytes]]
-"""Which effects were fitted from other values than the usual, and from which."""
+"""Effects that were fitted from other than the default initial values, with these values."""
 
 
 @dataclass(frozen=True)
 class Request:
-    """A model that is asked for: its effects, and which of them start elsewhere than usual.
+    """A requested model: its effects, and those of them with other initial values than the default.
 
-    Equal requests have the same answer, whatever was asked for in between.
+    Equal requests have equal results, whatever was requested before.
     """
 
     names: frozenset[str]
@@ -45,7 +45,7 @@ class Request:
 
 @dataclass(frozen=True)
 class ScoredModel:
-    """A fitted model, the effects in it, each run's cross-validated loss (R,), and its unusual starts."""
+    """A fitted model: its effects, the cross-validated loss of each run (R,), and non-default initial values."""
 
     names: tuple[str, ...]
     fit: Fit
@@ -54,34 +54,34 @@ class ScoredModel:
 
     @property
     def request(self) -> Request:
-        """What was asked for."""
+        """The request that this model answers."""
         return Request(frozenset(self.names), self.starts)
 
     @property
     def is_fitted(self) -> bool:
-        """Whether the effects were fitted; False for a model that is not worth it and predicts as without the last."""
+        """Whether the effects were fitted; False if the last one was not, for lack of a predicted gain."""
         return self.fit.predictor.effects == self.names
 
     @property
-    def total(self) -> float:
-        """The cross-validated loss of all runs."""
+    def deviance(self) -> float:
+        """The cross-validated deviance: the loss of all runs."""
         return float(self.loss.sum())
 
     def gain_over(self, other: ScoredModel) -> float:
-        """Return by how much this model predicts better, and fits better: the lesser of the two.
+        """Return the gain in cross-validated deviance or in deviance of the fit, whichever is smaller.
 
-        Where few runs determine a value of the maps, predicting without them is unreliable, and gains or loses a
-        hundred. What does not fit better is no gain.
+        If few runs determine a nodal value, predictions without them are unreliable, and the cross-validated deviance
+        may differ by a hundred. A gain that does not show in the fit itself does not count.
         """
-        return min(other.total - self.total, float(other.fit.loss.sum() - self.fit.loss.sum()))
+        return min(other.deviance - self.deviance, float(other.fit.loss.sum() - self.fit.loss.sum()))
 
 
 @dataclass
 class FittedModels:
-    """Fits models to the runs to be fitted.
+    """Fits and cross-validates models of the training runs.
 
-    ``given`` are effects that the vehicle is known to have: they stay in every model, with parameters fitted again from
-    ``given_values``. ``tried`` counts the models that were fitted.
+    ``given`` are effects that the vehicle is known to have. Every model contains them, with parameters fitted from
+    ``given_values``. ``tried`` counts the fitted models.
     """
 
     batch: Batch
@@ -99,17 +99,17 @@ class FittedModels:
         self._fold = folds(fold_groups(self.batch.readings), FOLDS, self.seed)
 
     def base(self) -> ScoredModel:
-        """Return the model without any effect that the vehicle is not known to have."""
+        """Return the model with the given effects only."""
         return self.score(self.given, np.r_[self.start, self.given_values], None)
 
     def adopt(self, scored_model: ScoredModel) -> ScoredModel:
-        """Take over what was fitted elsewhere to runs that this model predicts alike, and return it as one's own."""
+        """Add a model that was fitted with another batch, provided that it predicts these runs equally."""
         fitted = replace(scored_model.fit, predictor=self._predictor(scored_model.names))
         own = self._known[scored_model.request] = replace(scored_model, fit=fitted)
         return own
 
     def known(self, names: tuple[str, ...]) -> ScoredModel | None:
-        """Return the model with the effects `names`, all from their usual starts, if it was fitted."""
+        """Return the cached model with the effects `names` and default initial values, or None."""
         return self._known.get(Request(frozenset(names)))
 
     def without_effect(self, base: ScoredModel, current: ScoredModel, name: str) -> ScoredModel:
@@ -123,24 +123,24 @@ class FittedModels:
         starts = frozenset(start for start in current.starts if start[0] != name)
         return self.score(names, np.r_[maps, kept], current.fit, starts=starts)
 
-    def with_effect(self, current: ScoredModel, name: str, unusual: Candidate | None = None) -> ScoredModel:
-        """Return `current` with the effect called `name`, fitted from the best of its starts.
+    def with_effect(self, current: ScoredModel, name: str, candidate: Candidate | None = None) -> ScoredModel:
+        """Return `current` with the effect called `name`, fitted from the best of its initial values.
 
-        These are the usual ones, or those of the candidate `unusual`.
+        These are the initial values of `candidate`, or of the default candidate.
         """
         names = (*current.names, name)
-        starts = current.starts if unusual is None else current.starts | unusual.key
+        starts = current.starts if candidate is None else current.starts | candidate.key
         if found := self._known.get(Request(frozenset(names), starts)):
             return found
         try:
-            return self._with_effect(current, self._predictor(names), unusual or usual(name), starts)
+            return self._with_effect(current, self._predictor(names), candidate or default_candidate(name), starts)
         except np.linalg.LinAlgError:
-            # What runs away to where nothing can be predicted describes nothing.
+            # A fit that diverges counts as no effect.
             return replace(current, names=names)
 
     def predicted_gain(self, current: ScoredModel, name: str) -> float:
         """Return the predicted gain of the effect `name` beside `current`, to first order, from its best start."""
-        return max(self._predicted_gains(current, self._predictor((*current.names, name)), usual(name)))
+        return max(self._predicted_gains(current, self._predictor((*current.names, name)), default_candidate(name)))
 
     @staticmethod
     def _predicted_gains(current: ScoredModel, predictor: Predictor, candidate: Candidate) -> list[float]:
@@ -153,36 +153,44 @@ class FittedModels:
         bounds = bounds_of(names)
         predicted_gains = self._predicted_gains(current, predictor, candidate)
         predicted_gain = max(predicted_gains)
-        if predicted_gain < _HOPELESS:
-            return replace(current, names=names)  # as good as without it, and never chosen
+        if predicted_gain < _MIN_PREDICTED_GAIN:
+            return replace(current, names=names)  # equal to the model without the effect: never selected
         ordered = [candidate.starts[k] for k in np.argsort(predicted_gains)[::-1]]
-        prior_model = candidate.screened and predicted_gain > _LIKELY
-        short = self._begun(current, predictor, ordered, bounds, _KEPT * predicted_gain if prior_model else None)
+        is_likely = candidate.screened and predicted_gain > _LARGE_PREDICTED_GAIN
+        preliminary = self._preliminary_fit(
+            current, predictor, ordered, bounds, _MIN_GAIN_SHARE * predicted_gain if is_likely else None
+        )
         # A large predicted gain may need a worse fit first: maps that absorbed a cause must give it back.
-        if predicted_gain < _LIKELY and float(now.loss.sum() - short.loss.sum()) < _HOPELESS:
+        if (
+            predicted_gain < _LARGE_PREDICTED_GAIN
+            and float(now.loss.sum() - preliminary.loss.sum()) < _MIN_PREDICTED_GAIN
+        ):
             self.tried += 1
-            tried = ScoredModel(names, short, cross_validated(short, self._fold, bounds), starts)
+            tried = ScoredModel(names, preliminary, cross_validated(preliminary, self._fold, bounds), starts)
             return self._known.setdefault(tried.request, tried)
-        return self.score(names, short.parameters, short, starts=starts, patient=prior_model and candidate.foremost)
+        return self.score(
+            names, preliminary.parameters, preliminary, starts=starts, patient=is_likely and candidate.patient
+        )
 
-    def _begun(
+    def _preliminary_fit(
         self, current: ScoredModel, predictor: Predictor, starts: list[Floats], bounds: Floats, least: float | None
     ) -> Fit:
-        """Return a fit of some steps from the first of `starts`, or the best of them where it gains less than `least`.
+        """Return a fit of few iterations from the first of `starts`, or the best of several if that gains too little.
 
-        A start is far from the valley, for the maps have absorbed what it adds, and the descent may end anywhere: then
-        the maps are first fitted beside it, held where it starts. Where nothing can be expected (`least` is None), that
-        is done if the fit ends worse than without, and for a few steps only.
+        The maps have absorbed the new effect, so that a start is far from the optimum, and the iteration may end in
+        another local minimum. In that case the maps are first fitted with the effect fixed at its start. If no gain can
+        be expected (`least` is None), this is done only if the loss is larger than without the effect, and for few
+        iterations.
         """
-        found = [self._first_steps(current, predictor, starts[0], bounds)]
-        iterations = _SHORT if least is None else _LONG
-        if current.fit.loss.sum() - found[0].loss.sum() <= (-_WORSE if least is None else least):
-            for start in starts[:_MOST_STARTS]:
+        fits = [self._first_steps(current, predictor, starts[0], bounds)]
+        iterations = _FEW_ITERATIONS if least is None else _MANY_ITERATIONS
+        if current.fit.loss.sum() - fits[0].loss.sum() <= (-_MAX_INCREASE if least is None else least):
+            for start in starts[:_MAX_STARTS]:
                 held = bounds.copy()
                 held[-len(start) :] = start[:, None]
-                beside = self._first_steps(current, predictor, start, held, iterations=iterations)
-                found.append(self._first_steps(current, predictor, start, bounds, beside, iterations=iterations))
-        return min(found, key=lambda one: float(one.loss.sum()))
+                conditional = self._first_steps(current, predictor, start, held, iterations=iterations)
+                fits.append(self._first_steps(current, predictor, start, bounds, conditional, iterations=iterations))
+        return min(fits, key=lambda one: float(one.loss.sum()))
 
     @staticmethod
     def _first_steps(
@@ -190,17 +198,17 @@ class FittedModels:
         predictor: Predictor,
         start: Floats,
         bounds: Floats,
-        beside: Fit | None = None,
+        conditional: Fit | None = None,
         *,
-        iterations: int = _SHORT,
+        iterations: int = _FEW_ITERATIONS,
     ) -> Fit:
         now = current.fit
         return fit(
             predictor,
-            initial_parameters(now, predictor, start) if beside is None else beside.parameters,
+            initial_parameters(now, predictor, start) if conditional is None else conditional.parameters,
             bounds,
-            random_effects=(beside or now).random_effects,
-            variance_components=(beside or now).variance_components,
+            random_effects=(conditional or now).random_effects,
+            variance_components=(conditional or now).variance_components,
             iterations=iterations,
             near=now.linear,
         )
@@ -214,9 +222,9 @@ class FittedModels:
         starts: Starts = frozenset(),
         patient: bool = False,
     ) -> ScoredModel:
-        """Fit the model with the effects `names` and cross-validate it; what was fitted before is remembered.
+        """Fit the model with the effects `names` and cross-validate it, unless it is cached.
 
-        Of these, `starts` begin elsewhere than usual. A `patient` fit is given more steps while they are worth it.
+        `starts` are the non-default initial values among them. A `patient` fit is iterated further as long as it gains.
         """
         request = Request(frozenset(names), starts)
         if request not in self._known:
@@ -227,7 +235,7 @@ class FittedModels:
                 bounds,
                 random_effects=None if near is None else near.random_effects,
                 variance_components=None if near is None else near.variance_components,
-                iterations=_LONG,
+                iterations=_MANY_ITERATIONS,
                 patient=patient,
                 near=None if near is None else near.linear,
             )
@@ -235,33 +243,33 @@ class FittedModels:
             self._known[request] = ScoredModel(names, fitted, cross_validated(fitted, self._fold, bounds), starts)
         return self._known[request]
 
-    def left(self, smaller: ScoredModel, larger: ScoredModel) -> ScoredModel:
-        """Return what is left of `larger` when an effect is dropped that it does not need.
+    def reduced(self, smaller: ScoredModel, larger: ScoredModel) -> ScoredModel:
+        """Return the model `smaller`, refitted from `larger`, which contains one effect more.
 
-        The smaller model may have been fitted before, from elsewhere, and have ended somewhere else.
+        The smaller model may have been fitted before from other initial values, to another local minimum.
         """
         if smaller.names == self.given:
             return smaller
         again = self._known[smaller.request] = self.refitted_from(smaller, larger)
         return again
 
-    def refitted_from(self, model: ScoredModel, beyond: ScoredModel) -> ScoredModel:
-        """Return `model` fitted again, patiently, from where the model `beyond` stands, if it predicts better.
+    def refitted_from(self, model: ScoredModel, other: ScoredModel) -> ScoredModel:
+        """Return `model` refitted with patience from the parameters of `other`, if that has the smaller deviance.
 
-        What another model gains may be nothing but the way that its fit went on. Effects that it lacks begin where they
-        are in `model`.
+        The gain of another model may come from its longer iteration only. Effects that `other` lacks start from their
+        values in `model`.
         """
-        own = model.fit.effect_values() | beyond.fit.effect_values()
+        own = model.fit.effect_values() | other.fit.effect_values()
         kept = [value for name in model.names for key, value in own.items() if key.partition(".")[0] == name]
         bounds = bounds_of(model.names)
-        again = fit(
-            self._predictor(model.names), np.r_[beyond.fit.parameters[: self.batch.maps.size], kept], bounds,
-            random_effects=beyond.fit.random_effects, variance_components=beyond.fit.variance_components,
-            iterations=_LONG, patient=True,
+        refitted = fit(
+            self._predictor(model.names), np.r_[other.fit.parameters[: self.batch.maps.size], kept], bounds,
+            random_effects=other.fit.random_effects, variance_components=other.fit.variance_components,
+            iterations=_MANY_ITERATIONS, patient=True,
         )  # fmt: skip
         self.tried += 1
-        scored_model = ScoredModel(model.names, again, cross_validated(again, self._fold, bounds), model.starts)
-        return min(model, scored_model, key=lambda one: one.total)
+        scored_model = ScoredModel(model.names, refitted, cross_validated(refitted, self._fold, bounds), model.starts)
+        return min(model, scored_model, key=lambda one: one.deviance)
 
     def _predictor(self, names: tuple[str, ...]) -> Predictor:
         return Predictor(self.batch, names)

@@ -1,4 +1,4 @@
-"""Which effects the model needs, and which others would do as well."""
+"""Stepwise selection of the effects that the model needs, and of their indistinguishable alternatives."""
 
 from __future__ import annotations
 
@@ -14,28 +14,27 @@ from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.residuals.residuals import pose_residuals
 from agvbench.diagnosis.selection.fitted_models import FittedModels, ScoredModel
 
-LEAST_GAIN = 12.0
-"""Selection criterion: the least cross-validated gain in minus two log likelihood, before the correction for having
-tried many: each effect tried adds as if its gain came from one of so many."""
+MIN_GAIN = 12.0
+"""Least gain of an effect in minus two log likelihood, before the correction for the number of candidates."""
 
 ALTERNATIVE_MARGIN = 10.0
-"""An effect that predicts this much worse, or less, in place of a named one is an indistinguishable alternative."""
+"""Largest difference in deviance between a selected effect and an indistinguishable alternative."""
 
-NOTICEABLE = 0.15
-"""An effect has to move the prediction by this part of what remains unpredicted, be it ever so certain."""
+MIN_RELATIVE_CHANGE = 0.15
+"""Least change of the prediction by an effect, relative to the residuals that remain with it."""
 
-_NEARLY_ALTERNATIVE = 100.0  # an alternative may look so much worse because its fit ended sooner
-_MOST_EFFECTS = 4
+_NEARLY_ALTERNATIVE = 100.0  # up to this difference an alternative is refitted, for its fit may have ended too soon
+_MAX_EFFECTS = 4
 
 
 @dataclass(frozen=True)
 class Selection:
-    """What was chosen.
+    """The result of a selection.
 
-    ``base`` is the model without effects, ``chosen`` the one with all that meet the selection criterion;
-    ``alternatives`` by named effect the others that would do in its place, with how much worse they predict;
-    ``gains`` by named effect what its removal would cost; ``tried`` how many models were fitted, ``rejected`` the gain
-    of each effect that does not meet the criterion.
+    ``base`` is the model with the given effects only. ``chosen`` is the model with all effects that meet the selection
+    criterion. ``alternatives`` maps each selected effect to those that predict as well in its place, with their
+    difference in deviance. ``gains`` are the increases of deviance when a selected effect is removed. ``rejected`` are
+    the gains of effects that do not meet the criterion. ``tried`` counts the fitted models.
     """
 
     base: ScoredModel
@@ -48,38 +47,38 @@ class Selection:
 
 @dataclass
 class Selector(FittedModels):
-    """Tries effects on the runs to be fitted, and decides which meet the selection criterion.
+    """Fits effects to the training runs, and selects those that meet the criterion.
 
-    ``wide`` keeps a batch with more than the library, once one was needed.
+    ``extended`` caches a batch with the extended library, once it was needed.
     """
 
-    best_share: ClassVar[float] = 0.05
-    noticeable: ClassVar[float] = NOTICEABLE
-    wide: Batch | None = field(init=False, default=None)
+    excluded_share: ClassVar[float] = 0.05
+    min_relative_change: ClassVar[float] = MIN_RELATIVE_CHANGE
+    extended: Batch | None = field(init=False, default=None)
 
     @property
-    def least_gain(self) -> float:
-        """What an effect must gain, corrected for the number of effects that are tried for each place."""
-        return LEAST_GAIN + 2.0 * math.log(max(len(self.candidates), 1))
+    def min_gain(self) -> float:
+        """The least gain of an effect, corrected for the number of candidates."""
+        return MIN_GAIN + 2.0 * math.log(max(len(self.candidates), 1))
 
-    def over(self, batch: Batch) -> Selector:
-        """Return a selector like this one of other runs, which knows nothing yet."""
+    def for_batch(self, batch: Batch) -> Selector:
+        """Return a selector with the same candidates for another batch, with an empty cache."""
         return Selector(
             batch, dict(self.candidates), self.start, self.seed, self.on_progress, self.given, self.given_values
         )
 
     def select(self) -> Selection:
-        """Add effects until none gains, then drop those without which the model predicts as well."""
+        """Add effects until none meets the criterion, then remove those without which the model predicts as well."""
         base = current = self.base()
         rejected: dict[str, float] = {}
-        while len(current.names) < len(self.given) + _MOST_EFFECTS:
-            offers = {name: self.with_effect(current, name) for name in self.candidates if name not in current.names}
-            rejected = {name: offer.gain_over(current) for name, offer in offers.items()}
-            worthy = {name: offer for name, offer in offers.items() if self.meets_criterion(current, offer)}
-            if not worthy:
+        while len(current.names) < len(self.given) + _MAX_EFFECTS:
+            larger = {name: self.with_effect(current, name) for name in self.candidates if name not in current.names}
+            rejected = {name: model.gain_over(current) for name, model in larger.items()}
+            accepted = {name: model for name, model in larger.items() if self.meets_criterion(current, model)}
+            if not accepted:
                 break
-            current = min(worthy.values(), key=lambda offer: offer.total)
-            self.on_progress(f"{' + '.join(current.names)}: gains {base.total - current.total:.0f}")
+            current = min(accepted.values(), key=lambda model: model.deviance)
+            self.on_progress(f"{' + '.join(current.names)}: gains {base.deviance - current.deviance:.0f}")
         current, gains = self.backward_elimination(base, current)
         current, alternatives = self.with_swaps(base, current)
         if set(current.names) != set(gains) | set(self.given):
@@ -89,20 +88,20 @@ class Selector(FittedModels):
         return Selection(base, current, alternatives, gains, rejected, self.tried)
 
     def meets_criterion(self, without: ScoredModel, with_it: ScoredModel) -> bool:
-        """Whether the larger model predicts better by enough, not in a few groups of runs alone, and to be noticed."""
+        """Return whether the effects in `with_it` but not in `without` meet the selection criterion."""
         gain = without.loss - with_it.loss
         return bool(
-            with_it.gain_over(without) > self.least_gain
-            and without_best_groups(gain, self.batch.readings.group, self.best_share) > 0.0
-            and self._noticeable(without, with_it)
+            with_it.gain_over(without) > self.min_gain
+            and without_best_groups(gain, self.batch.readings.group, self.excluded_share) > 0.0
+            and self._changes_prediction(without, with_it)
             and all(
                 differs_from_null(with_it.fit, name, self.batch.readings.group)
                 for name in set(with_it.names) - set(without.names)
             )
         )
 
-    def _noticeable(self, without: ScoredModel, with_it: ScoredModel) -> bool:
-        """Whether the prediction moves by a noticeable part of the larger model's residuals."""
+    def _changes_prediction(self, without: ScoredModel, with_it: ScoredModel) -> bool:
+        """Return whether the change of the prediction is large enough relative to the larger model's residuals."""
         readings = self.batch.readings
         small, large = (model.fit.predictor.predict(model.fit.parameters) for model in (without, with_it))
         residuals = pose_residuals(readings, large).squares()
@@ -110,58 +109,58 @@ class Selector(FittedModels):
             replace(readings, poses=np.where(readings.seen[..., None], small, np.nan)), large
         ).squares()
         return any(
-            float(np.mean(moved[name])) > self.noticeable**2 * float(np.mean(residuals[name]))
+            float(np.mean(moved[name])) > self.min_relative_change**2 * float(np.mean(residuals[name]))
             for name in ("position_rms_mm", "heading_rms_deg")
         )
 
-    def _found(self, current: ScoredModel) -> tuple[str, ...]:
+    def _added_effects(self, current: ScoredModel) -> tuple[str, ...]:
         return tuple(name for name in current.names if name not in self.given)
 
     def backward_elimination(self, base: ScoredModel, current: ScoredModel) -> tuple[ScoredModel, dict[str, float]]:
-        """Return the model with only the effects that meet the criterion, and what the loss of each would cost."""
-        while found := self._found(current):
+        """Remove effects that do not meet the criterion; return the model and the gain of each effect in it."""
+        while found := self._added_effects(current):
             smaller = {name: self.without_effect(base, current, name) for name in found}
-            gains = {name: model.total - current.total for name, model in smaller.items()}
-            useless = [name for name, model in smaller.items() if not self.meets_criterion(model, current)]
-            if not useless:
+            gains = {name: model.deviance - current.deviance for name, model in smaller.items()}
+            unnecessary = [name for name, model in smaller.items() if not self.meets_criterion(model, current)]
+            if not unnecessary:
                 return current, gains
-            current = self.left(smaller[min(useless, key=lambda name: gains[name])], current)
+            current = self.reduced(smaller[min(unnecessary, key=lambda name: gains[name])], current)
         return current, {}
 
     def with_swaps(
         self, base: ScoredModel, current: ScoredModel, among: Mapping[str, Iterable[str]] | None = None
     ) -> tuple[ScoredModel, dict[str, dict[str, float]]]:
-        """Return the model with effects replaced by others that predict better, and the alternatives left.
+        """Replace effects by others that predict better in their place; return the model and the alternatives left.
 
-        What was chosen first was chosen in the place of all the others, too, and may only look like one of them.
+        The effect that was added first absorbed those that were not in the model yet, and may only mimic one of them.
 
         Parameters
         ----------
         base, current
-            The model without effects, and the one to judge.
+            The model with the given effects only, and the model in which effects are replaced.
         among
-            By effect, which others are tried in its place; by default every candidate.
+            By effect, the others that are fitted in its place; by default every candidate.
         """
-        for _ in range(_MOST_EFFECTS):
-            swapped = {name: self._in_place_of(name, base, current, among) for name in self._found(current)}
+        for _ in range(_MAX_EFFECTS):
+            swapped = {name: self._swaps_of(name, base, current, among) for name in self._added_effects(current)}
             better = [
-                offer
-                for name, offers in swapped.items()
-                for offer in offers.values()
-                if offer.gain_over(current) > LEAST_GAIN
-                and self.meets_criterion(self.without_effect(base, current, name), offer)
+                model
+                for name, models in swapped.items()
+                for model in models.values()
+                if model.gain_over(current) > MIN_GAIN
+                and self.meets_criterion(self.without_effect(base, current, name), model)
             ]
             if not better:
                 break
-            best = min(better, key=lambda offer: offer.total)
+            best = min(better, key=lambda model: model.deviance)
             self.on_progress(f"{' + '.join(best.names)} in place of {' + '.join(current.names)}")
             current = best
         return current, self._alternatives(swapped, current)
 
-    def _in_place_of(
+    def _swaps_of(
         self, name: str, base: ScoredModel, current: ScoredModel, among: Mapping[str, Iterable[str]] | None
     ) -> dict[str, ScoredModel]:
-        """Return, by its name, what each other effect makes of the model in the place of the one called `name`."""
+        """Return, by name, the models with another effect in the place of the one called `name`."""
         tried = self.candidates if among is None else among.get(name, ())
         return {
             other: self.with_effect(self.without_effect(base, current, name), other)
@@ -172,14 +171,19 @@ class Selector(FittedModels):
     def _alternatives(
         self, swapped: dict[str, dict[str, ScoredModel]], current: ScoredModel
     ) -> dict[str, dict[str, float]]:
-        """Return, by named effect, those that predict nearly as well in its place, and by how much worse they do."""
-        worse = {n: {o: self._worse(offer, current) for o, offer in offers.items()} for n, offers in swapped.items()}
-        alternatives = {n: {o: w for o, w in others.items() if w < ALTERNATIVE_MARGIN} for n, others in worse.items()}
+        """Return the alternatives of each selected effect, with their difference in deviance."""
+        differences = {
+            n: {o: self._loss_difference(model, current) for o, model in models.items()}
+            for n, models in swapped.items()
+        }
+        alternatives = {
+            n: {o: w for o, w in others.items() if w < ALTERNATIVE_MARGIN} for n, others in differences.items()
+        }
         return {name: others for name, others in alternatives.items() if name in current.names}
 
-    def _worse(self, offer: ScoredModel, current: ScoredModel) -> float:
-        """Return by how much another effect predicts worse, its fit carried on from where the chosen one stands."""
-        worse = offer.total - current.total
-        if ALTERNATIVE_MARGIN <= worse < _NEARLY_ALTERNATIVE and offer.is_fitted:
-            worse = self.refitted_from(offer, current).total - current.total
-        return worse
+    def _loss_difference(self, model: ScoredModel, current: ScoredModel) -> float:
+        """Return the deviance of `model` minus that of `current`, refitted from `current` if it is close."""
+        difference = model.deviance - current.deviance
+        if ALTERNATIVE_MARGIN <= difference < _NEARLY_ALTERNATIVE and model.is_fitted:
+            difference = self.refitted_from(model, current).deviance - current.deviance
+        return difference

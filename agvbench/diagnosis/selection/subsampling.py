@@ -1,7 +1,7 @@
-"""Causes are looked for in some hundred runs and measured in all of them.
+"""Selection in a subsample of the runs, and the final fit to all training runs.
 
-Repeats beyond a few say more of how large a cause is, and hardly more of which: trying hundreds of models on all of
-them costs minutes and gigabytes.
+Further repeats reduce the standard errors of parameters, but hardly help to select effects. Fitting hundreds of models
+to all runs would take minutes and gigabytes.
 """
 
 from __future__ import annotations
@@ -16,60 +16,60 @@ from agvbench.diagnosis.data.window_splits import thinned
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
-from agvbench.diagnosis.selection.variants import BEYOND
+from agvbench.diagnosis.selection.variants import EXTENDED_LIBRARY
 from agvbench.diagnosis.selection.with_term import TermSelection
 
-MOST_RUNS = 240
-"""In so many runs causes are looked for, as far as commands with a repeat each leave it at that."""
+MAX_RUNS = 240
+"""Largest number of runs in the selection, unless two repeats per group are more."""
 
-_FEWEST_REPEATS = 2
+_MIN_REPEATS = 2
 
 
-def some_repeats(group: NDArray[np.int64], most: int) -> NDArray[np.bool_]:
-    """Return which runs to look for causes in, (R,): as many repeats of each group, spread over the session.
+def subsample_repeats(group: NDArray[np.int64], most: int) -> NDArray[np.bool_]:
+    """Return the runs for the selection, (R,): an equal number of repeats per group, evenly spaced over the session.
 
     Parameters
     ----------
     group
-        (R,): a number for each run, in the order in which they were driven; repeats share it.
+        (R,): the group of each run, in the order of the runs.
     most
-        So many runs are enough.
+        The largest number of runs, unless two repeats per group are more.
     """
     sizes = np.bincount(group)
-    repeats = np.arange(_FEWEST_REPEATS, max(int(sizes.max()), _FEWEST_REPEATS) + 1)
+    repeats = np.arange(_MIN_REPEATS, max(int(sizes.max()), _MIN_REPEATS) + 1)
     total = np.minimum(sizes[:, None], repeats).sum(axis=0)
-    fair = int(repeats[max(int(np.searchsorted(total, most, side="right")) - 1, 0)])
+    per_group = int(repeats[max(int(np.searchsorted(total, most, side="right")) - 1, 0)])
     chosen = np.zeros(len(group), dtype=np.bool_)
     for g in np.unique(group):
-        chosen[thinned(np.flatnonzero(group == g), fair)] = True
+        chosen[thinned(np.flatnonzero(group == g), per_group)] = True
     return chosen
 
 
-def measured_in_all(
+def refit_to_all(
     selection: Selection, term_selection: TermSelection | None, selector: Selector, readings: Readings
 ) -> tuple[Selection, TermSelection | None]:
-    """Return what was found with its models fitted to all training runs; gains and alternatives stay as found.
+    """Refit the selected models to all training runs; gains and alternatives stay those of the subsample.
 
     Parameters
     ----------
-    selection, explained
-        What was found in some of the runs.
+    selection, term_selection
+        The selection in the subsample.
     selector
-        That found it.
+        The selector of the subsample.
     readings
-        All runs to be fitted.
+        All training runs.
     """
     batch = selector.batch
     preset = replace(readings, preset=batch.readings.preset)
-    whole = selector.over(Batch(preset, batch.maps, batch.geometry, kinds=BEYOND))
+    on_all = selector.for_batch(Batch(preset, batch.maps, batch.geometry, kinds=EXTENDED_LIBRARY))
 
-    def again(model: ScoredModel) -> ScoredModel:
-        return whole.score(model.names, model.fit.parameters, None)
+    def refitted(model: ScoredModel) -> ScoredModel:
+        return on_all.score(model.names, model.fit.parameters, None)
 
     def both(found: Selection) -> Selection:
-        return replace(found, base=again(found.base), chosen=again(found.chosen))
+        return replace(found, base=refitted(found.base), chosen=refitted(found.chosen))
 
     if term_selection is None:
         return both(selection), None
-    term = replace(term_selection, selection=both(term_selection.selection), without=again(term_selection.without))
+    term = replace(term_selection, selection=both(term_selection.selection), without=refitted(term_selection.without))
     return both(selection), term

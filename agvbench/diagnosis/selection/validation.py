@@ -23,7 +23,7 @@ from agvbench.diagnosis.residuals.residuals import (
 )
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection
-from agvbench.diagnosis.selection.variants import BEYOND
+from agvbench.diagnosis.selection.variants import EXTENDED_LIBRARY
 from agvbench.diagnosis.selection.with_term import TermSelection
 from agvbench.effects.variants import effect_variants
 from agvbench.types import Floats
@@ -39,8 +39,8 @@ class Assessment:
     lack_of_fit: float | None
 
     @property
-    def lacks(self) -> bool:
-        """Whether the residuals are above repeatability, and significantly so."""
+    def has_lack_of_fit(self) -> bool:
+        """Whether the residuals exceed the repeatability, and the lack of fit is significant."""
         after = self.after.rms()
         above = any(
             after[name] > WITHIN_REPEATABILITY * self.repeatability[name]
@@ -54,12 +54,13 @@ def assess(
     held: NDArray[np.bool_],
     before: Floats,
     after: Floats,
-    spread: EndCovariance,
+    covariance: EndCovariance,
     repeats: NDArray[np.bool_] | None = None,
 ) -> Assessment | None:
-    """Return the residuals of the runs `held` (R,) from poses (R, K, 3) ``before`` and ``after``; None without repeats.
+    """Assess predicted poses (R, K, 3) ``before`` and ``after`` in the runs `held` (R,); return None without repeats.
 
-    The lack of fit is tested against the runs `repeats` (R,), those `held` among them; by default these.
+    The lack of fit is tested against the deviations between the runs `repeats` (R,), which include `held`; by default
+    they are `held`.
     """
     kept = readings.select(held)
     residuals = pose_residuals(kept, after[held])
@@ -67,32 +68,34 @@ def assess(
     if least is None:
         return None
     among = held if repeats is None else repeats
-    several = readings.select(among)
-    p_value = lack_of_fit(pose_residuals(several, after[among]), several.group, spread.select(among), held[among])
+    repeated = readings.select(among)
+    p_value = lack_of_fit(pose_residuals(repeated, after[among]), repeated.group, covariance.select(among), held[among])
     return Assessment(pose_residuals(kept, before[held]), residuals, least, p_value)
 
 
-def predicts(selection: Selection, term_selection: TermSelection | None, readings: Readings) -> Predictor:
-    """Return what predicts `readings` with the effects that were chosen, and the term if there is one."""
+def predictor_for(selection: Selection, term_selection: TermSelection | None, readings: Readings) -> Predictor:
+    """Return the predictor of `readings` with the selected effects, and the discrepancy term if there is one."""
     chosen = (term_selection.selection if term_selection else selection).chosen
     fitted = chosen.fit.predictor.batch
     has_variants = bool(effect_variants().keys() & set(chosen.names))
-    batch = Batch(readings, fitted.maps, fitted.geometry, kinds=BEYOND if term_selection or has_variants else ())
+    batch = Batch(
+        readings, fitted.maps, fitted.geometry, kinds=EXTENDED_LIBRARY if term_selection or has_variants else ()
+    )
     return Predictor(batch, chosen.names)
 
 
 def fails_validation(selection: Selection, readings: Readings, held: NDArray[np.bool_]) -> bool:
-    """Whether the residuals of the runs `held` (R,) show lack of fit of what was chosen; without runs they do not."""
+    """Return whether the residuals of the runs `held` (R,) show lack of fit; False without runs."""
     if not held.any():
         return False
     kept = readings.select(held)
     assessment = _assess(selection, kept, np.ones(len(kept), dtype=np.bool_)) or _assess(selection, readings, held)
-    return assessment is not None and assessment.lacks
+    return assessment is not None and assessment.has_lack_of_fit
 
 
 def _assess(selection: Selection, readings: Readings, held: NDArray[np.bool_]) -> Assessment | None:
     fit = selection.chosen.fit
-    every = predicts(selection, None, readings)
+    every = predictor_for(selection, None, readings)
     poses = every.predict(fit.parameters)
     return assess(readings, held, poses, poses, end_covariance(every, fit))
 
@@ -100,19 +103,19 @@ def _assess(selection: Selection, readings: Readings, held: NDArray[np.bool_]) -
 def validated(
     selection: Selection, term_selection: TermSelection | None, kept: Readings, on_progress: Callable[[str], None]
 ) -> tuple[Selection, TermSelection | None]:
-    """Return what was found, or the maps alone where they predict the validation runs better.
+    """Return the selection, or the maps alone if these predict the validation runs better.
 
-    Cross-validation uses the runs that were fitted, and a bias that they share may mislead it. A real cause improves
-    unseen runs, too.
+    Cross-validation uses the training runs, and a bias that they share may mislead it. A real cause improves the
+    prediction of unseen runs, too.
 
     Parameters
     ----------
-    selection, explained
-        What was found.
+    selection, term_selection
+        The selection, and the one with a discrepancy term if there is one.
     kept
-        The validation runs; without any, what was found is kept.
+        The validation runs; without any, the selection is returned.
     on_progress
-        Called with a line if it is rejected.
+        Called with a line if the selection is rejected.
     """
     chosen = term_selection.selection.chosen if term_selection else selection.chosen
     if chosen.names == selection.base.names or not len(kept):

@@ -1,4 +1,4 @@
-"""A selection with an empirical term, and what is said of it."""
+"""A selection with a discrepancy term, and its entries in the diagnosis."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _FLIPS = 9999
 
 @dataclass(frozen=True)
 class TermSelection:
-    """A selection with an empirical term.
+    """A selection with a discrepancy term.
 
-    ``selection.chosen`` holds the term beside the effects that predict better with it; ``without`` is the model of
-    these effects alone. ``gain`` is the term's, in cross-validated minus two log likelihood; ``p_value`` that of
-    as great a gain if it helped each group of runs as often as not.
+    ``selection.chosen`` contains the term and the selected effects; ``without`` is the model with these effects only.
+    ``gain`` is that of the term, in cross-validated minus two log likelihood. ``p_value`` is that of such a gain under
+    random signs of the gains of groups.
     """
 
     selection: Selection
@@ -40,8 +40,8 @@ class TermSelection:
         return {p.name: own[f"{self.term.name}.{p.name}"] for p in self.term.parameters()}
 
 
-def described(term_selection: TermSelection) -> dict[str, object]:
-    """Return what is said of an empirical term in the diagnosis."""
+def term_entry(term_selection: TermSelection) -> dict[str, object]:
+    """Return the entry of a discrepancy term in the provenance."""
     return {
         "name": term_selection.term.name,
         "covariate": term_selection.term.covariates[0],
@@ -53,9 +53,9 @@ def described(term_selection: TermSelection) -> dict[str, object]:
 
 
 def with_term_first(rest: list[Dependence], term_selection: TermSelection) -> list[Dependence]:
-    """Return the dependences with what the term depends on first.
+    """Return the dependences, with that of the term first.
 
-    Where the term does not decide between covariates (x or y) it is the one that smooth curves find stronger.
+    If a term has several covariates (x and y), the dependence is that with the larger share in the covariate test.
     """
     own = [d for d in rest if d.covariate in term_selection.term.covariates]
     if own:
@@ -70,13 +70,13 @@ def with_term_first(rest: list[Dependence], term_selection: TermSelection) -> li
 
 
 def _sum_of_squares(model: ScoredModel) -> float:
-    """Return the sum of squares of a model's residuals without random effects."""
+    """Return the sum of squares of a model's residuals, with random effects of zero."""
     predictor = model.fit.predictor
     return float(np.nansum(residual_of(predictor, predictor.predict(model.fit.parameters)) ** 2))
 
 
 def gain_p_value(gain: Floats, group: NDArray[np.int64], seed: int) -> float:
-    """Return how often the total gain would be as great if each group's gain (R,) had its sign by chance."""
+    """Return the p-value of the total gain under random signs of the groups' gains; `gain` (R,) is by run."""
     gains = by_group(gain, group)
     rng = np.random.default_rng([0xF119, seed])
     signs = rng.integers(0, 2, (_FLIPS, len(gains))) * 2.0 - 1.0
