@@ -1,4 +1,4 @@
-"""What the vehicle model lacks: residual, candidate effects, verdict."""
+"""Diagnosis: the effects that the vehicle model lacks, from the residuals of a campaign."""
 
 from agvbench.diagnosis.diagnose import diagnose
 from agvbench.diagnosis.residuals.covariate_test import Dependence

@@ -1,4 +1,4 @@
-"""What is concluded from the effects that were chosen: judged on the test runs, and put into a verdict."""
+"""The conclusion: assessment of the selected effects on the test runs, and the verdict."""
 
 from __future__ import annotations
 
@@ -38,30 +38,30 @@ def conclude(
     term_selection: TermSelection | None,
     searched: int,
 ) -> Diagnosis:
-    """Return the diagnosis that what was found amounts to; the test runs are opened here, and nothing is chosen after.
+    """Return the diagnosis; the test runs are opened here, and nothing is selected afterwards.
 
     Parameters
     ----------
-    asked, readings
-        What was asked, and every run.
+    context, readings
+        The context of the diagnosis, and all runs.
     split
-        What each run is for.
-    library, explained
-        What was chosen of the library, and what an empirical term adds to it.
+        Training, validation and test runs.
+    library, term_selection
+        The selection from the library, and the one with a discrepancy term if there is one.
     searched
-        In how many runs causes were looked for.
+        Number of runs used in the selection.
     """
     selection = term_selection.selection if term_selection else library
     fit = selection.chosen.fit
     every = predictor_for(library, term_selection, readings)
     batch, has_variants = every.batch, bool(effect_variants().keys() & set(selection.chosen.names))
-    poses, before = every.predict(fit.parameters), _poses_before(context.vehicle, batch, selection)
-    spread = end_covariance(every, fit)
-    # Validation runs decided what is kept, and are not tested; the repeatability depends on no choice.
-    tested = assess(readings, split.test, before, poses, spread, repeats=~split.training)
+    poses, before = every.predict(fit.parameters), _predicted_before(context.vehicle, batch, selection)
+    covariance = end_covariance(every, fit)
+    # The validation runs influenced the selection, and are not tested; the repeatability depends on no selection.
+    tested = assess(readings, split.test, before, poses, covariance, repeats=~split.training)
     if tested is None:
         return context.not_identifiable(readings, "there are no repeats among the runs, and so no repeatability")
-    rest, likely = _what_is_left(batch, poses, term_selection, context.seed)
+    rest, likely = _remaining_dependences(batch, poses, term_selection, context.seed)
     effects = named_effects(selection, bounds_of(selection.chosen.names)) + map_effects(fit, context.vehicle)
     significant = term_selection is not None or tested.has_lack_of_fit or bool(rest)
     verdict, why = _verdict(effects, significant, rest, term_selection)
@@ -77,7 +77,7 @@ def conclude(
         corrected_vehicle(context.header, context.geometry, fit, fit.predictor.maps, context.seed),
         selection.rejected,
         context.provenance(readings)
-        | _how_it_was_fitted(selection, readings)
+        | _fit_provenance(selection, readings)
         | {"fit_runs": int(split.training.sum()), "searched_runs": searched}
         | {"validation_runs": int(split.validation.sum())}
         | {"lack_of_fit_p_value": tested.lack_of_fit}
@@ -90,35 +90,35 @@ def conclude(
     return with_next_experiment(found, selection, readings, context.header, context.seed)
 
 
-def _poses_before(vehicle: VehicleModel | None, batch: Batch, selection: Selection) -> Floats:
-    """Return what the nominal vehicle predicts; without one, what static maps do."""
+def _predicted_before(vehicle: VehicleModel | None, batch: Batch, selection: Selection) -> Floats:
+    """Return the poses that the nominal vehicle predicts; without one, those of the static maps."""
     if vehicle is None:
         return Predictor(batch, selection.base.names).predict(selection.base.fit.parameters)
     readings = batch.readings
     return np.array(vehicle.rollout([run.commands for run in readings.runs], readings.start, list(readings.t_s)))
 
 
-def _what_is_left(
+def _remaining_dependences(
     batch: Batch, poses: Floats, term_selection: TermSelection | None, seed: int
 ) -> tuple[list[Dependence], list[Dependence]]:
-    """Return what the rest depends on, and what it is likely to.
+    """Return the significant and the likely dependences of the remaining residual.
 
-    It is the rest of the model without an empirical term, whose own covariate comes first.
+    The residual is that of the model without the discrepancy term. The covariate of the term comes first.
     """
-    readings, unexplained = batch.readings, poses
+    readings, without_term = batch.readings, poses
     if term_selection is not None:
         without = term_selection.without
-        unexplained = Predictor(batch, without.names).predict(without.fit.parameters)
-    rates = residual_rates(readings, unexplained)
+        without_term = Predictor(batch, without.names).predict(without.fit.parameters)
+    rates = residual_rates(readings, without_term)
     likely = dependences(rates, readings.group, seed, readings.start, alpha=LIKELY)
     rest = [d for d in likely if d.p_value < ALPHA]
-    # A place passed through in every run can look periodic: a period is looked for in what the term leaves.
+    # A position that every run passes can look periodic: the test for a period uses the residual with the term.
     if (periodic := periodic_disturbance(residual_rates(readings, poses), readings.group, seed)) is not None:
         rest = [periodic, *(d for d in rest if d.covariate != RANDOM_PHASE)]
     return (rest if term_selection is None else with_term_first(rest, term_selection)), likely
 
 
-def _how_it_was_fitted(selection: Selection, readings: Readings) -> dict[str, object]:
+def _fit_provenance(selection: Selection, readings: Readings) -> dict[str, object]:
     random_effects = selection.chosen.fit.variance_components.random_effects
     return {
         "models_fitted": selection.tried,
@@ -135,17 +135,17 @@ def _verdict(
     effects: tuple[NamedEffect, ...], significant: bool, rest: list[Dependence], term_selection: TermSelection | None
 ) -> tuple[Verdict, str]:
     if significant:
-        on = f"it depends on {rest[0].covariate if rest else 'none of the covariates looked at'}"
+        on = f"it depends on {rest[0].covariate if rest else 'none of the covariates tested'}"
         if term_selection is not None:
             on += f", and {term_selection.term.name} describes it"
         elif rest and rest[0].covariate == RANDOM_PHASE:
-            on += ", with another phase in every run, which nothing that is planned beforehand can remove"
+            on += ", with a random phase in every run, which no plan can compensate"
         return Verdict.UNKNOWN, _REMAINS + on
     if not effects:
-        return Verdict.ADEQUATE, "the model, its maps fitted again, predicts as well as repeats agree with one another"
+        return Verdict.ADEQUATE, "with refitted maps the residual is within repeatability"
     if any(effect.confounded_with for effect in effects):
         return Verdict.AMBIGUOUS, "several effects explain the residual equally well"
-    return Verdict.NAMED, "the effects named bring the prediction to the floor"
+    return Verdict.NAMED, "with the named effects the residual is within repeatability"
 
 
 def _held_out(kept: Readings, assessment: Assessment) -> HeldOut:
@@ -156,11 +156,11 @@ def _held_out(kept: Readings, assessment: Assessment) -> HeldOut:
         name: {"before": before[name], "after": after[name], "floor": assessment.repeatability[name]} for name in before
     }
     was, now = assessment.before.squares()["position_rms_mm"], assessment.after.squares()["position_rms_mm"]
-    slack = (assessment.repeatability["position_rms_mm"] / 1e3) ** 2
+    tolerance = (assessment.repeatability["position_rms_mm"] / 1e3) ** 2
     worse = []
     for g in np.unique(kept.group):
         own = kept.group == g
-        if float(np.mean(now[own])) > float(np.mean(was[own])) + slack:
+        if float(np.mean(now[own])) > float(np.mean(was[own])) + tolerance:
             run = kept.runs[int(np.argmax(own))]
             worse.append(run.trajectory or run.run_id)
     return HeldOut(len(kept), errors, tuple(dict.fromkeys(worse)))

@@ -1,4 +1,4 @@
-"""What a diagnosis is asked of, and where its answer comes from."""
+"""The context of a diagnosis: campaign, vehicle and seed, with the provenance of its result."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from agvbench.vehicle.geometry import Geometry
 
 
 def provenance(header: HeaderLike, readings: Readings, seed: int, *, runs_used: int) -> dict[str, object]:
-    """Return version, campaign, seed, how many runs were used, and how many were refused for which reason."""
+    """Return version, campaign, seed, and the numbers of runs used and of runs excluded, by reason."""
     from agvbench import __version__
 
     return {
@@ -27,7 +27,7 @@ def provenance(header: HeaderLike, readings: Readings, seed: int, *, runs_used: 
 
 
 def require_runs(readings: Readings, header: HeaderLike) -> None:
-    """Raise `CampaignError` if no run can be used, with what is wrong with the first."""
+    """Raise `CampaignError` if no run can be used, with the reason of the first."""
     if not len(readings):
         first = next(iter(readings.refused.items()), ("", "there are none"))
         raise CampaignError("no run can be used", where=f"campaign {header.name}", value=f"{first[0]}: {first[1]}")
@@ -35,7 +35,7 @@ def require_runs(readings: Readings, header: HeaderLike) -> None:
 
 @dataclass(frozen=True)
 class DiagnosisContext:
-    """What a diagnosis was asked of: the campaign's header, the model before if one was given, the seed."""
+    """The campaign's header, geometry, the vehicle model before if there is one, and the seed."""
 
     header: HeaderLike
     geometry: Geometry
@@ -43,11 +43,11 @@ class DiagnosisContext:
     seed: int
 
     def not_identifiable(self, readings: Readings, why: str) -> Diagnosis:
-        """Return the verdict NOT_IDENTIFIABLE, and why."""
+        """Return a diagnosis with the verdict NOT_IDENTIFIABLE and its reason."""
         return Diagnosis(Verdict.NOT_IDENTIFIABLE, why, provenance=self.provenance(readings))
 
     def provenance(self, readings: Readings) -> dict[str, object]:
-        """Return where the answer comes from."""
+        """Return the provenance of the diagnosis."""
         if readings.initial_states is None:
             return provenance(self.header, readings, self.seed, runs_used=len(readings))
         driven = {run.run_id.rpartition("@")[0] for run in readings.runs}

@@ -1,4 +1,4 @@
-"""From a campaign to a verdict."""
+"""The diagnosis of runs from rest: load, check, split, select, validate, conclude."""
 
 from __future__ import annotations
 
@@ -41,25 +41,25 @@ def diagnose(
     seed: int = 0,
     on_progress: OnProgress = lambda _: None,
 ) -> Diagnosis:
-    """Say whether static maps describe the vehicle that drove `campaign`, and if not which effects they lack.
+    """Diagnose whether static maps describe the vehicle that drove `campaign`, and which effects they lack.
 
     Parameters
     ----------
     campaign
-        Header and runs. Where the header has a prediction horizon, or runs do not begin at rest, they are cut into
+        Header and runs. If the header has a prediction horizon, or most runs do not begin at rest, they are cut into
         windows.
     vehicle
-        The model before; effects that it has stay, and are not named again. By default static maps fitted to the
-        campaign's own runs.
+        The vehicle model before. Effects that it has remain in every model, and are not reported. By default it is
+        static maps fitted to the campaign's runs.
     seed
-        Draws which runs are for training, validation and test, where the campaign has no column ``split``.
+        Seed of the random split into training, validation and test runs, for campaigns without a column ``split``.
     on_progress
-        Called with a line whenever there is progress.
+        Called with one line of text at each step.
 
     Raises
     ------
     CampaignError, FitError
-        If the campaign is too small, or its tables contradict themselves.
+        If the campaign is too small, or its tables are inconsistent.
     """
     header = campaign.header
     runs = list(campaign)
@@ -82,55 +82,57 @@ def diagnose(
     selection, selector = select_variants_and_reconsider(chosen, selector)
     selection, term_selection, selector = add_term_and_reconsider(selection, selector)
     readings = replace(readings, preset=selector.batch.readings.preset)
-    known, validation = readings.select(~split.test), readings.select(split.validation)
+    opened, validation = readings.select(~split.test), readings.select(split.validation)
     if (searched := len(selector.batch.readings)) < len(fitted):
-        on_progress(f"causes were looked for in {searched} runs; now they are measured in all {len(fitted)}")
-    found = _measured_and_kept(selection, term_selection, selector, fitted, validation)
-    if found[1] is None and found[0].gains and fails_validation(found[0], known, split.validation[~split.test]):
-        on_progress("the validation runs contradict what was found: a term is tried in its place")
-        if (other := term_in_place(selection, selector)) is not None:
-            again = _measured_and_kept(selection, other, selector, fitted, validation)
-            found = found if again[1] is None else again
+        on_progress(f"effects were selected in {searched} runs; they are refitted to all {len(fitted)}")
+    found = _refitted_and_validated(selection, term_selection, selector, fitted, validation)
+    if found[1] is None and found[0].gains and fails_validation(found[0], opened, split.validation[~split.test]):
+        on_progress("the validation runs contradict the selection: a discrepancy term is tried in its place")
+        if (term := term_in_place(selection, selector)) is not None:
+            with_term = _refitted_and_validated(selection, term, selector, fitted, validation)
+            found = found if with_term[1] is None else with_term
     return conclude(context, readings, split, *found, searched)
 
 
-def _measured_and_kept(
+def _refitted_and_validated(
     selection: Selection,
     term_selection: TermSelection | None,
     selector: Selector,
     fitted: Readings,
     validation: Readings,
 ) -> tuple[Selection, TermSelection | None]:
-    """Return what was found measured in all runs `fitted`, or the maps alone where the validation runs say so."""
+    """Return the selection refitted to all training runs `fitted`, or the maps alone if validation rejects it."""
     if len(selector.batch.readings) < len(fitted):
         selection, term_selection = refit_to_all(selection, term_selection, selector, fitted)
     return validated(selection, term_selection, validation, selector.on_progress)
 
 
-def _selector(context: DiagnosisContext, some: Readings, on_progress: OnProgress) -> Selector:
-    """Return what tries effects on these runs, where steering stood before them settled."""
+def _selector(context: DiagnosisContext, readings: Readings, on_progress: OnProgress) -> Selector:
+    """Return the selector for these runs, with the better of both initial states of the steering."""
     header = context.header
-    maps = nodal_maps(some.runs, header.neutral)
-    start = start_values(maps, _measured(some.runs, context.geometry, header.neutral), _prior_values(maps, context))
+    maps = nodal_maps(readings.runs, header.neutral)
+    start = start_values(
+        maps, _measurements(readings.runs, context.geometry, header.neutral), _prior_values(maps, context)
+    )
     tried, kinds = candidates_for(context.vehicle)
-    batch = Batch(some, maps, context.geometry, kinds=kinds)
+    batch = Batch(readings, maps, context.geometry, kinds=kinds)
     return choose_initial_steering(
         Selector(batch, tried, start, context.seed, on_progress, *given_effects(context.vehicle, tried))
     )
 
 
-def _measured(runs: tuple[Run, ...], geometry: Geometry, neutral: float) -> list[RunMeasurement]:
+def _measurements(runs: tuple[Run, ...], geometry: Geometry, neutral: float) -> list[RunMeasurement]:
     out = []
     for run in runs:
         try:
             out.append(measure_run(run, geometry, neutral=neutral))
         except FitError:
-            continue  # a run without a steady part is no start value, but evidence all the same
+            continue  # a run without a steady part gives no initial value, but remains in the fit
     return out
 
 
 def _prior_values(maps: NodalMaps, context: DiagnosisContext) -> dict[str, Floats]:
-    """Return what the model before says at the maps' nodes, by role."""
+    """Return the values of the vehicle model before (or the nominal one) at the nodes of the maps, by role."""
     header = context.header
     model = context.vehicle or nominal_model(header.vehicle_name, context.geometry, header.command_unit, header.neutral)
     return {role: np.asarray(getattr(model, role)(maps.nodes[role])) for role in ROLES}

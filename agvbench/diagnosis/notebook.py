@@ -1,4 +1,4 @@
-"""How a notebook shows a diagnosis: as tables of pandas, and as HTML."""
+"""A diagnosis in notebooks: as pandas tables and as HTML."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is proposed to be driven next."""
+"""The proposal of the next experiment."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from agvbench.types import Pose
 
 @dataclass(frozen=True)
 class Discrimination:
-    """What the proposed run does for one pair of alternatives.
+    """How well the proposed run discriminates one pair of alternatives.
 
-    ``between`` their names; ``evidence`` expected in minus two log likelihood for all repeats; ``apart_mm`` and
-    ``apart_deg``: the farthest that their predictions differ along it, before either is fitted again.
+    ``between``: their names. ``evidence``: expected minus two log likelihood ratio of all repeats. ``apart_mm`` and
+    ``apart_deg``: the largest difference of their predictions along the run, before refitting.
     """
 
     between: tuple[str, str]
@@ -28,9 +28,10 @@ class Discrimination:
 
 @dataclass(frozen=True)
 class NextExperiment:
-    """The run to drive: ``why`` in words, ``trajectory``, how many ``repeats`` and from which ``starts`` in turn.
+    """The run to drive next: ``why``, ``trajectory``, number of ``repeats`` and their ``starts`` in turn.
 
-    ``separates`` says for each pair of alternatives how well; ``pins`` which parameters it would identify.
+    ``separates`` rates the discrimination of each pair of alternatives. ``pins`` names the parameters that the run
+    identifies.
     """
 
     why: str
@@ -41,7 +42,7 @@ class NextExperiment:
     pins: tuple[str, ...] = ()
 
     def to_table(self) -> dict[str, Any]:
-        """Return what stands in the diagnosis' JSON."""
+        """Return the content for the diagnosis' JSON."""
         return {
             "why": self.why,
             "trajectory": self.trajectory.to_table(),
@@ -69,9 +70,9 @@ class NextExperiment:
 
 @dataclass(frozen=True)
 class Proposal:
-    """What may be driven next, if anything can decide, and what no run can.
+    """The next experiment, if a run can discriminate any pair of alternatives.
 
-    ``inseparable`` pairs of alternatives, with the measurement that would distinguish them.
+    ``inseparable`` maps the other pairs to the measurement that would discriminate them.
     """
 
     experiment: NextExperiment | None = None

@@ -1,4 +1,4 @@
-"""What a diagnosis says, and its JSON (schema 1)."""
+"""The result of a diagnosis, and its JSON (schema 1)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _ALWAYS = ("delta_heading_deg", "delta_s_mm", "position_rms_mm", "heading_rms_de
 
 
 class Verdict(StrEnum):
-    """The answer."""
+    """The verdict of a diagnosis."""
 
     ADEQUATE = "ADEQUATE"
     NAMED = "NAMED"
@@ -33,7 +33,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Estimate:
-    """A parameter's ``value`` with its ``stderr`` and ``unit``; ``note`` says if the data do not pin it."""
+    """A parameter's ``value`` with ``stderr`` and ``unit``; ``note`` says if the data do not determine it."""
 
     value: float
     stderr: float
@@ -45,8 +45,8 @@ class Estimate:
 class NamedEffect:
     """An effect that meets the selection criterion.
 
-    ``parameters`` by name; ``confounded_with`` the effects that predict as well in its place; ``evidence``: what
-    leaving it out costs in cross-validated minus two log likelihood, and how much worse each alternative is.
+    ``parameters``: estimates by name. ``confounded_with``: indistinguishable alternatives. ``evidence``: increase of
+    the cross-validated deviance (minus two log likelihood) without the effect, and with each alternative in its place.
     """
 
     name: str
@@ -57,9 +57,10 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Errors on the test runs: by quantity (``end_position_mm`` …) ``before``, ``after`` and ``repeatability``.
+    """Errors in the test runs: by quantity (``end_position_mm`` …) ``before``, ``after`` and ``floor``.
 
-    ``repeatability`` is the repeatability.
+    ``floor`` is the repeatability. ``worse_on`` names the trajectories or recordings whose error is larger after than
+    before.
     """
 
     runs: int
@@ -69,13 +70,14 @@ class HeldOut:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What the vehicle model lacks.
+    """The result of a diagnosis: the effects that the vehicle model lacks.
 
-    ``verdict`` and ``why`` in words; ``effects``; ``depends_on`` what the rest depends on, ``significant`` whether that
-    matters; ``held_out`` (None if nothing could be predicted); ``model`` with refitted maps and the effects found;
-    ``rejected`` the gain of each effect that did not meet the criterion; ``provenance``; ``next_experiment``: the run
-    that would discriminate alternatives or identify parameters, None where there is none; ``residuals`` as
-    `agvbench.diagnosis.findings.residual_table` returns them, for pictures.
+    ``verdict`` with ``why``, its reason. ``effects`` that were selected. ``depends_on``: dependences of the remaining
+    residual; ``significant``: whether the residual shows structure. ``held_out``: errors in the test runs, None if
+    nothing could be predicted. ``model``: the vehicle with refitted maps and the selected effects. ``rejected``: gains
+    of effects that do not meet the criterion. ``provenance``. ``next_experiment``: the run that discriminates
+    alternatives or identifies parameters, or None. ``residuals``: the table of
+    `agvbench.diagnosis.findings.residual_table`, for figures.
     """
 
     verdict: Verdict
@@ -92,7 +94,7 @@ class Diagnosis:
 
     @property
     def adequate(self) -> bool:
-        """Whether the model needs nothing but its maps."""
+        """Whether the static maps are sufficient."""
         return self.verdict is Verdict.ADEQUATE
 
     def effects_frame(self) -> pd.DataFrame:
@@ -146,7 +148,7 @@ class Diagnosis:
         return dict(_finite(content))
 
     def to_text(self) -> str:
-        """Return the JSON file's text, the same for the same diagnosis."""
+        """Return the text of the JSON file; equal diagnoses have equal texts."""
         return json.dumps(self.to_json(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 

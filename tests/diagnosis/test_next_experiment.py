@@ -10,10 +10,10 @@ from tiny_vehicle import HEADER, Tiny, drive
 
 from agvbench.diagnosis import conclusion, diagnose
 from agvbench.diagnosis.design.alternatives import swapped
-from agvbench.diagnosis.design.criteria import like, simulated_readings
+from agvbench.diagnosis.design.criteria import predictor_like, simulated_readings
 from agvbench.diagnosis.design.designs import Design, designs, levels_of, mutated
 from agvbench.diagnosis.design.identifiability import unidentified
-from agvbench.diagnosis.design.next_experiment import discriminate, pin, required_measurements
+from agvbench.diagnosis.design.next_experiment import discriminate, identify, required_measurements
 from agvbench.diagnosis.selection.candidates import candidates
 from agvbench.model import nominal_model
 from agvbench.planning import Workspace, plan, trajectory_from_table
@@ -81,7 +81,7 @@ def test_the_run_that_separates_rivals_does_so_when_it_is_driven(diagnosed):
         for start in experiment.starts:
             frames = drive(truth, commands, start, 0.0, np.random.default_rng(rng.integers(2**31)))
             design = Design(tuple(_steps(commands)), HEADER.neutral)
-            predicted = like(model, simulated_readings([design], [[start]], np.zeros(3)), GEOMETRY)
+            predicted = predictor_like(model, simulated_readings([design], [[start]], np.zeros(3)), GEOMETRY)
             poses = predicted.predict(model.parameters)[0]
             at = predicted.readings.t_s[0]
             x, y = np.interp(at, frames.t_s, frames.x_m), np.interp(at, frames.t_s, frames.y_m)
@@ -105,7 +105,7 @@ def test_steering_that_never_changes_while_driving_leaves_its_lag_open_and_a_run
     fronts = np.diff([row[2] for row in experiment.trajectory.commands.rows[1:]])
     rears = np.diff([row[3] for row in experiment.trajectory.commands.rows[1:]])
     assert np.any(fronts != 0.0) or np.any(rears != 0.0)
-    assert pin(selection.chosen.fit, [], unit="us") is None
+    assert identify(selection.chosen.fit, [], unit="us") is None
 
 
 def test_where_everything_was_excited_nothing_is_proposed(diagnosed):

@@ -1,4 +1,4 @@
-"""Consistency of a campaign: units, clocks and mirrored floors, and repeats that contradict one another."""
+"""Consistency checks of a campaign: units, clocks, mirrored floor frames, and contradicting repeats."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from agvbench.types import Floats, Run
 
 _RATE_FACTOR = 30.0
 _MAX_UNORDERED = 0.25
-_EVERY_S = 0.3
+_FRAME_INTERVAL_S = 0.3
 _MIN_TURN_RAD, _MIN_STEPS, _MIN_TURNING = 0.15, 5, 5
-_SAME_TURN = (0.5, 2.0)
+_TURN_RATIO_LIMITS = (0.5, 2.0)
 
 
 def require_ordered_clocks(refused: Mapping[str, str], runs: int, *, where: str) -> None:
-    """Raise an error if in many of so many `runs` time goes back; `refused` says by run why it cannot be used.
+    """Raise an error if time goes back in many of the `runs`; `refused` maps excluded runs to their reason.
 
     Raises
     ------
     CampaignError
-        If in more than a quarter.
+        If time goes back in more than a quarter of the runs.
     """
     back = [run_id for run_id, why in refused.items() if why.startswith(BACK_IN_TIME)]
     if len(back) > _MAX_UNORDERED * runs:
@@ -41,18 +41,18 @@ def require_ordered_clocks(refused: Mapping[str, str], runs: int, *, where: str)
 
 
 def require_plausible_units(runs: Sequence[Run], header: HeaderLike) -> None:
-    """Raise an error if times are not in seconds, or headings do not turn as the path does.
+    """Raise an error if times are not in seconds, or if headings are inconsistent with the path.
 
-    Metres and radians are checked when a campaign is opened (`agvbench.campaign.tables.motion_checks`). What is asked
-    here needs no model either: how often the camera looks, and that a vehicle on an arc turns by as much as its path.
+    Metres and radians are checked when a campaign is opened (`agvbench.campaign.tables.motion_checks`). The checks here
+    need no model either: the frame rate, and that a vehicle on an arc turns by as much as its path.
 
     Raises
     ------
     CampaignError
-        If so, naming the column.
+        If a check fails, naming the column.
     """
     where = f"campaign {header.name}: poses"
-    times = [np.unique(run.frames.t_s) for run in runs if run.is_ok]  # doubled frames come at once
+    times = [np.unique(run.frames.t_s) for run in runs if run.is_ok]  # duplicate frames have equal times
     steps_s = [np.median(np.diff(each)) for each in times if len(each) > 1]
     if not steps_s:
         return
@@ -67,10 +67,10 @@ def require_plausible_units(runs: Sequence[Run], header: HeaderLike) -> None:
             remedy="convert t_s to seconds, or correct mocap.rate_hz",
         )
     ratio = _turn_ratio(list(_tracks(runs)))
-    if ratio is None or _SAME_TURN[0] < ratio < _SAME_TURN[1]:
+    if ratio is None or _TURN_RATIO_LIMITS[0] < ratio < _TURN_RATIO_LIMITS[1]:
         return
     value = f"the heading turns {ratio:.3g} times as far as the path"
-    if -_SAME_TURN[1] < ratio < -_SAME_TURN[0]:
+    if -_TURN_RATIO_LIMITS[1] < ratio < -_TURN_RATIO_LIMITS[0]:
         what, remedy = "heading_rad and the floor are mirrored", "count headings counter-clockwise from x towards y"
     else:
         what, remedy = "heading_rad does not belong to x_m and y_m", "see that all three are of one body"
@@ -78,7 +78,7 @@ def require_plausible_units(runs: Sequence[Run], header: HeaderLike) -> None:
 
 
 def _tracks(runs: Sequence[Run]) -> Iterator[tuple[Floats, Floats]]:
-    """Yield times (n,) and poses (n, 3), with a continuous heading, of each run, a frame every 0.3 s."""
+    """Yield times (n,) and poses (n, 3), with a continuous heading, of each run, one frame every 0.3 s."""
     for run in runs:
         f = run.frames
         seen = f.tracked.astype(np.bool_) & np.isfinite(f.t_s + f.x_m + f.y_m + f.heading_rad)
@@ -87,19 +87,19 @@ def _tracks(runs: Sequence[Run]) -> Iterator[tuple[Floats, Floats]]:
             continue
         t_s = f.t_s[order]
         poses = np.column_stack([f.x_m[order], f.y_m[order], np.unwrap(f.heading_rad[order])])
-        # Rounding may put the last moment past the last frame.
-        chosen = np.unique(np.searchsorted(t_s[:-1], np.arange(t_s[0], t_s[-1], _EVERY_S)))
+        # Rounding may put the last time past the last frame.
+        chosen = np.unique(np.searchsorted(t_s[:-1], np.arange(t_s[0], t_s[-1], _FRAME_INTERVAL_S)))
         yield t_s[chosen], poses[chosen]
 
 
 def _turn_ratio(tracks: list[tuple[Floats, Floats]]) -> float | None:
-    """Return how far headings turn while the direction of motion turns once, in the median of runs that turn."""
+    """Return the rotation of headings relative to that of the direction of motion, the median of turning runs."""
     ratios = []
     for _, poses in tracks:
         step = np.diff(poses[:, :2], axis=0)
         length = np.hypot(step[:, 0], step[:, 1])
         moves = length > 0.3 * np.max(length, initial=0.0)
-        # Modulo half a turn: a vehicle that reverses goes the other way along the same line.
+        # Modulo half a turn: a reversing vehicle moves in the opposite direction along the same line.
         course = np.unwrap(np.arctan2(step[moves, 1], step[moves, 0]), period=np.pi)
         heading = (0.5 * (poses[1:, 2] + poses[:-1, 2]))[moves]
         if len(course) >= _MIN_STEPS and np.std(course) > _MIN_TURN_RAD:
@@ -108,61 +108,61 @@ def _turn_ratio(tracks: list[tuple[Floats, Floats]]) -> float | None:
 
 
 _FAR_SHARE, _FAR_M = 0.3, 0.15
-_AS_LONG = 0.05
+_DURATION_TOLERANCE = 0.05
 _MAX_GROUPS = 0.25
 _MIN_DISTANCE_M, _MIN_SHARE, _MIN_PAIRS = 0.3, 0.15, 6
-_GAP, _FAR_APART, _TIMES_AS_FAR = 1.5, 0.02, 6.0
+_MIN_GAP_RATIO, _MIN_FAR_DISTANCE, _MIN_CLUSTER_RATIO = 1.5, 0.02, 6.0
 
 
 def require_consistent_repeats(readings: Readings, *, where: str) -> None:
-    """Raise an error if repeats of many commands went to different places, as seen from where they began.
+    """Raise an error if repeats of many commands end at different places relative to their start poses.
 
-    One run that went wrong is an outlier. When in a quarter of all repeated commands the typical run is off by a third
-    of the way, frames and commands do not belong together, or there was more than one vehicle: no model describes that.
+    A single deviating run is an outlier. If a quarter of all repeated commands has a mean deviation of 30 % of the
+    distance, frames and commands do not belong together, or several vehicles drove: no model describes that.
 
     Raises
     ------
     CampaignError
-        If that is so.
+        If more than a quarter of the repeated commands deviates.
     """
-    preset = np.broadcast_to(readings.start[:, None], readings.poses.shape)
-    path = pose_residuals(readings, np.asarray(preset)).path[..., :2]
-    far, repeated, example = 0, 0, ""
+    resting = np.broadcast_to(readings.start[:, None], readings.poses.shape)
+    path = pose_residuals(readings, np.asarray(resting)).path[..., :2]
+    deviating, repeated, example = 0, 0, ""
     for g in np.unique(readings.group):
         own = np.flatnonzero(readings.group == g)
-        own = own[_as_long(readings, own, int(own[0]))]
+        own = own[_same_duration(readings, own, int(own[0]))]
         both = readings.seen[own].all(axis=0)
         if len(own) < 2 or not both.any():
             continue
         repeated += 1
         ends = path[own][:, np.flatnonzero(both)[-1]]
-        off = float(np.mean(np.hypot(*(ends - ends.mean(axis=0)).T)))
-        way = float(np.median(np.hypot(*ends.T)))
-        if off > max(_FAR_SHARE * way, _FAR_M):
-            far += 1
-            example = example or f"{readings.runs[own[0]].run_id} and its repeats end {off:.2f} m from their mean"
-    if far <= _MAX_GROUPS * repeated:
-        _require_one_kind(readings, path, where)
+        deviation = float(np.mean(np.hypot(*(ends - ends.mean(axis=0)).T)))
+        distance = float(np.median(np.hypot(*ends.T)))
+        if deviation > max(_FAR_SHARE * distance, _FAR_M):
+            deviating += 1
+            example = example or f"{readings.runs[own[0]].run_id} and its repeats end {deviation:.2f} m from their mean"
+    if deviating <= _MAX_GROUPS * repeated:
+        _require_single_cluster(readings, path, where)
     else:
         raise CampaignError(
             "runs with the same commands contradict each other",
             where=where,
-            value=f"{far} of {repeated} repeated commands; {example}",
+            value=f"{deviating} of {repeated} repeated commands; {example}",
             limit="a quarter of them",
             remedy="see that frames belong to their runs, and that one vehicle drove them all under one calibration",
         )
 
 
-def _as_long(readings: Readings, runs: NDArray[np.int64], others: NDArray[np.int64] | int) -> NDArray[np.bool_]:
-    """Whether runs were seen for as long as others: else their samples are of other times, and cannot be compared."""
-    return np.asarray(np.isclose(readings.t_s[runs, -1], readings.t_s[others, -1], rtol=_AS_LONG))
+def _same_duration(readings: Readings, runs: NDArray[np.int64], others: NDArray[np.int64] | int) -> NDArray[np.bool_]:
+    """Return whether runs have about the duration of others, so that their samples can be compared."""
+    return np.asarray(np.isclose(readings.t_s[runs, -1], readings.t_s[others, -1], rtol=_DURATION_TOLERANCE))
 
 
-def _require_one_kind(readings: Readings, path: Floats, where: str) -> None:
-    """Raise an error if repeats agree closely or are off by one and the same amount, with nothing between.
+def _require_single_cluster(readings: Readings, path: Floats, where: str) -> None:
+    """Raise an error if the deviations between repeats have two clusters with a gap between them.
 
-    Random errors, wear and places on the floor fill the gap between; two vehicles under one name, or two calibrations,
-    do not.
+    Random errors, wear and positions on the floor fill the gap. Two vehicles under one name, or two calibrations, do
+    not.
     """
     pairs = np.array(
         [
@@ -172,21 +172,25 @@ def _require_one_kind(readings: Readings, path: Floats, where: str) -> None:
         ]
     ).reshape(-1, 2)
     seen = readings.seen[pairs[:, 0]] & readings.seen[pairs[:, 1]]
-    usable = seen.any(axis=1) & _as_long(readings, pairs[:, 0], pairs[:, 1])
+    usable = seen.any(axis=1) & _same_duration(readings, pairs[:, 0], pairs[:, 1])
     pairs, last = pairs[usable], seen.shape[1] - 1 - np.argmax(seen[usable][:, ::-1], axis=1)
     ends = path[pairs, last[:, None]]
-    way = np.hypot(*np.moveaxis(ends, -1, 0)).mean(axis=1)
-    apart = np.hypot(*(ends[:, 0] - ends[:, 1]).T) / np.maximum(way, 1e-9)
-    drove = way > _MIN_DISTANCE_M
-    apart, pairs = np.sort(apart[drove]), pairs[drove][np.argsort(apart[drove])]
-    count = len(apart)
-    few = max(_MIN_PAIRS, int(_MIN_SHARE * count))
-    if count < 2 * few:
+    distance = np.hypot(*np.moveaxis(ends, -1, 0)).mean(axis=1)
+    deviation = np.hypot(*(ends[:, 0] - ends[:, 1]).T) / np.maximum(distance, 1e-9)
+    driven = distance > _MIN_DISTANCE_M
+    deviation, pairs = np.sort(deviation[driven]), pairs[driven][np.argsort(deviation[driven])]
+    count = len(deviation)
+    smallest = max(_MIN_PAIRS, int(_MIN_SHARE * count))
+    if count < 2 * smallest:
         return
-    gaps = apart[few : count - few + 1] / np.maximum(apart[few - 1 : count - few], 1e-9)
-    at = few + int(np.argmax(gaps))
-    near, far = apart[:at], apart[at:]
-    if gaps.max() < _GAP or far[0] < _FAR_APART or np.median(far) < _TIMES_AS_FAR * np.median(near):
+    gaps = deviation[smallest : count - smallest + 1] / np.maximum(deviation[smallest - 1 : count - smallest], 1e-9)
+    at = smallest + int(np.argmax(gaps))
+    near, far = deviation[:at], deviation[at:]
+    if (
+        gaps.max() < _MIN_GAP_RATIO
+        or far[0] < _MIN_FAR_DISTANCE
+        or np.median(far) < _MIN_CLUSTER_RATIO * np.median(near)
+    ):
         return
     i, j = pairs[at]
     raise CampaignError(

@@ -16,12 +16,12 @@ _MIN_TURN_RAD = 0.05
 
 
 def insufficient_data(readings: Readings, header: HeaderLike) -> str:
-    """Return why this campaign cannot be diagnosed, or nothing.
+    """Return why this campaign cannot be diagnosed, or an empty string.
 
     Raises
     ------
     CampaignError
-        If it has too few runs, or clocks that contradict each other.
+        If it has too few runs, or if time goes back in many of them.
     """
     require_ordered_clocks(readings.refused, len(readings) + len(readings.refused), where=f"campaign {header.name}")
     require_runs(readings, header)
@@ -40,7 +40,7 @@ def insufficient_data(readings: Readings, header: HeaderLike) -> str:
         return "steering was never excited: its commands are the same in all runs"
     _, sizes = np.unique(readings.group, return_counts=True)
     if np.count_nonzero(sizes >= 2) < MIN_REPEATED:
-        return f"without repeats there is no floor: at least {MIN_REPEATED} commands must be driven twice or more"
+        return f"repeatability cannot be estimated: at least {MIN_REPEATED} commands must be driven twice or more"
     moved = np.nanmax(np.hypot(*np.moveaxis(readings.poses[..., :2] - readings.start[:, None, :2], -1, 0)), axis=1)
     if np.count_nonzero(moved > 0.1) < MIN_RUNS // 2:
         return f"the vehicle hardly moved: {np.count_nonzero(moved > 0.1)} runs went farther than 0.1 m"

@@ -1,1 +1,1 @@
-"""The experiment to drive next: designs, criteria, search."""
+"""Design of the next experiment: designs, criteria, search."""

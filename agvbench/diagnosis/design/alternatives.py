@@ -1,4 +1,4 @@
-"""Alternative models, each fitted again so that it agrees with the data at hand as well as it can."""
+"""Alternative models, each refitted to the data at hand."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.candidates import Candidate, bounds_of
 from agvbench.types import Floats
 
-_SHORT, _LONG = 2, 8
+_FEW_ITERATIONS, _MANY_ITERATIONS = 2, 8
 _MAX_PAIRS = 3
 
 
 @dataclass(frozen=True)
 class Alternative:
-    """A fitted model, and the effect by which it differs from the others (``name``) in the place of ``instead_of``."""
+    """A fitted model with the effect ``name`` in the place of ``instead_of``."""
 
     name: str
     instead_of: str
@@ -29,22 +29,22 @@ class Alternative:
 def alternative_models(
     chosen: Fit, alternatives: Mapping[str, Mapping[str, float]], candidates: Mapping[str, Candidate]
 ) -> list[tuple[Alternative, Alternative]]:
-    """Return the pairs of models to discriminate: named effect and alternative, and alternatives among themselves.
+    """Return the pairs of models to discriminate: named effects, their alternatives, and alternatives among themselves.
 
     Parameters
     ----------
     chosen
         The model with every named effect.
     alternatives
-        By named effect, the effects that would do in its place.
+        By named effect, the effects that predict as well in its place.
     candidates
-        Bounds and starts of effects, by name.
+        Bounds and initial values of effects, by name.
     """
     pairs = []
     for name, others in alternatives.items():
         group = [Alternative(name, name, chosen)]
         group += [Alternative(other, name, swapped(chosen, name, other, candidates)) for other in others]
-        # Of many alternatives, those to the named one come first: what remains is for the run after the next.
+        # Pairs with the named effect come first; the others are left to a later experiment.
         pairs += list(combinations(group, 2))[: max(_MAX_PAIRS, len(others))]
     return pairs
 
@@ -58,14 +58,14 @@ def swapped(chosen: Fit, name: str, other: str, candidates: Mapping[str, Candida
     maps = chosen.parameters[: chosen.predictor.maps.size]
 
     def fitted(start: Floats) -> Fit:
-        begin = np.r_[maps, kept, start]
+        initial = np.r_[maps, kept, start]
         return fit(
             predictor,
-            begin,
+            initial,
             bounds,
             random_effects=chosen.random_effects,
             variance_components=chosen.variance_components,
-            iterations=_SHORT,
+            iterations=_FEW_ITERATIONS,
         )
 
     best = min((fitted(start) for start in candidates[other].starts), key=lambda f: float(f.loss.sum()))
@@ -75,5 +75,5 @@ def swapped(chosen: Fit, name: str, other: str, candidates: Mapping[str, Candida
         bounds,
         random_effects=best.random_effects,
         variance_components=best.variance_components,
-        iterations=_LONG,
+        iterations=_MANY_ITERATIONS,
     )

@@ -1,4 +1,4 @@
-"""How well runs not driven yet would discriminate models, or identify a parameter, beside the data at hand."""
+"""Design criteria: expected evidence between models, and expected standard errors, with the data at hand."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from agvbench.types import NO_TARGET, Floats, Frames, Pose, Run
 from agvbench.vehicle.geometry import Geometry
 
 HEADINGS_RAD = (0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi)
-"""Repeats set off in turn in these directions, so that what depends on the floor differs between them."""
+"""Start headings of repeats in turn, so that effects of the floor differ between them."""
 
 _AFTER_S = 0.8
 _START_M, _START_RAD = 3e-4, 5e-4
@@ -28,9 +28,10 @@ _WEAK = 1e-6
 
 @dataclass(frozen=True)
 class DesignInformation:
-    """What runs of one design say about parameters, offsets integrated out: ``matrix`` (D, P, P), D designs.
+    """Information of runs of D designs about parameters, with random effects integrated out: ``matrix`` (D, P, P).
 
-    ``pull`` (D, P) and ``square`` (D,) are of a difference in prediction, if one was given.
+    ``pull`` (D, P) and ``square`` (D,) are the gradient and the squared norm of a difference between predictions, if
+    one was given.
     """
 
     matrix: Floats
@@ -39,9 +40,9 @@ class DesignInformation:
 
 
 def simulated_readings(designs: Sequence[Design], starts: Sequence[Sequence[Pose]], noise: Floats) -> Readings:
-    """Return runs of `designs` as if driven, one from each of its `starts`; `noise` (3,) is that of their start poses.
+    """Return simulated runs of `designs`, one from each of their `starts`; `noise` (3,) is that of the start poses.
 
-    Each design has as many starts; its runs lie one after another.
+    All designs have equally many starts; the runs of a design are consecutive.
     """
     runs, t_s = [], []
     for design in designs:
@@ -65,22 +66,22 @@ def _run(commands: object, repeat: int) -> Run:
     return Run("", "free", "", "calibrated", repeat, NO_TARGET, 0.0, "ok", "", commands, Frames.empty())  # type: ignore[arg-type]
 
 
-def like(fitted: Fit, readings: Readings, geometry: Geometry) -> Predictor:
-    """Return the model that `fitted` is, for other runs."""
+def predictor_like(fitted: Fit, readings: Readings, geometry: Geometry) -> Predictor:
+    """Return the predictor of other runs with the maps and effects of `fitted`."""
     return Predictor(Batch(readings, fitted.predictor.maps, geometry), fitted.predictor.effects)
 
 
 def starts_within(path: Floats, workspace: Workspace, geometry: Geometry) -> list[Pose] | None:
-    """Return a start pose per heading of `HEADINGS_RAD` that keeps `path` (n, 3) about the floor's middle.
+    """Return a start pose for each heading of `HEADINGS_RAD` that centres `path` (n, 3) on the floor.
 
-    None if it is too wide for the floor, or is not finite. The path begins at the origin, along x.
+    None if the path does not fit on the floor, or is not finite. The path begins at the origin, along x.
     """
     if not np.isfinite(path).all():
         return None
     middle = 0.5 * (path[:, :2].min(axis=0) + path[:, :2].max(axis=0))
-    reach = float(np.hypot(*(path[:, :2] - middle).T).max()) + max(geometry.front_axle_m, geometry.rear_axle_m)
+    radius = float(np.hypot(*(path[:, :2] - middle).T).max()) + max(geometry.front_axle_m, geometry.rear_axle_m)
     centre = np.asarray(workspace.centre)
-    if reach > float(workspace.clearances(centre[None, :]).min()) - workspace.margin_m:
+    if radius > float(workspace.clearances(centre[None, :]).min()) - workspace.margin_m:
         return None
     out = []
     for heading in HEADINGS_RAD:
@@ -98,9 +99,9 @@ def starts_within(path: Floats, workspace: Workspace, geometry: Geometry) -> lis
 def information(
     fitted: Fit, predictor: Predictor, parameters: Floats, difference: Floats | None = None
 ) -> DesignInformation:
-    """Return the information of the runs of `predictor` on `parameters`, with the variance components of `fitted`.
+    """Return the information of the runs of `predictor` about `parameters`, with the variance components of `fitted`.
 
-    ``difference`` (R, K, 3), if given, is what another model predicts otherwise.
+    ``difference`` (R, K, 3), if given, is the difference to the prediction of another model.
     """
     readings = predictor.readings
     linear = predictor.linearise(parameters, np.zeros((len(readings), len(RANDOM_EFFECTS))))
@@ -108,18 +109,18 @@ def information(
     weighted = Weighted(readings, seen, linear.by_random_effects, fitted)
     e = weighted.column(np.zeros_like(linear.poses) if difference is None else difference)
     j = weighted.columns(linear.by_parameters)
-    fixed, off = weighted.without_random_effects(j), weighted.without_random_effects(e[..., None])
+    projected, projected_error = weighted.without_random_effects(j), weighted.without_random_effects(e[..., None])
     jt = j.transpose(0, 2, 1)
-    parts = (jt @ fixed, (jt @ off)[..., 0], np.sum(e * off[..., 0], axis=1))
+    parts = (jt @ projected, (jt @ projected_error)[..., 0], np.sum(e * projected_error[..., 0], axis=1))
     sizes = np.bincount(readings.group)
     first = np.concatenate([[0], np.cumsum(sizes)[:-1]])
     return DesignInformation(*(np.add.reduceat(part, first, axis=0) / sizes[0] for part in parts))
 
 
 class Weighted:
-    """Runs' samples over noise, with what differs from run to run integrated out.
+    """Weights samples of runs by their noise, and integrates random effects out.
 
-    The variance components are those of `fitted`, the priors of the random effects too.
+    The variance components and the priors of the random effects are those of `fitted`.
     """
 
     def __init__(self, readings: Readings, seen: NDArray[np.bool_], by_random_effects: Floats, fitted: Fit) -> None:
@@ -138,23 +139,22 @@ class Weighted:
         self._inverse = np.linalg.inv(inner)
 
     def column(self, values: Floats) -> Floats:
-        """Return values (R, K, 3) over noise, (R, 3 K)."""
+        """Return values (R, K, 3) over their standard deviations, (R, 3 K)."""
         return np.asarray((values * self._weight).reshape(len(values), -1))
 
     def columns(self, values: Floats) -> Floats:
-        """Return values (R, K, 3, q) over noise, (R, 3 K, q)."""
+        """Return values (R, K, 3, q) over their standard deviations, (R, 3 K, q)."""
         return np.asarray((values * self._weight[..., None]).reshape(len(values), -1, values.shape[-1]))
 
     def without_random_effects(self, columns: Floats) -> Floats:
-        """Return columns (R, 3 K, q) multiplied by the inverse covariance of noise and offsets."""
+        """Return columns (R, 3 K, q) times the inverse covariance of noise and random effects."""
         return np.asarray(columns - self._a @ (self._inverse @ (self._a.transpose(0, 2, 1) @ columns)))
 
 
 def evidence(known: Floats, new: DesignInformation, repeats: float) -> Floats:
-    """Return by how much minus two log likelihood of the wrong model would rise (D,), after it was fitted again.
+    """Return the expected increase (D,) of minus two log likelihood of the wrong model, after it was refitted.
 
-    ``known`` (P, P) is what the data say about its parameters already. It is the quadratic minimum over what
-    the parameters may still move.
+    ``known`` (P, P) is the information of the data at hand about its parameters.
     """
     matrix = known + repeats * new.matrix
     matrix = matrix + _WEAK * np.eye(matrix.shape[-1])
@@ -163,7 +163,7 @@ def evidence(known: Floats, new: DesignInformation, repeats: float) -> Floats:
 
 
 def expected_stderr(known: Floats, new: Floats, repeats: float, at: Floats) -> Floats:
-    """Return the standard errors (D, len(at)) of the parameters numbered `at` with the new runs (D, P, P) added."""
+    """Return the standard errors (D, len(at)) of the parameters with indices `at`, with new runs (D, P, P)."""
     matrix = known + repeats * new
     matrix = matrix + _WEAK * np.eye(matrix.shape[-1])
     return np.asarray(np.sqrt(np.diagonal(np.linalg.inv(matrix), axis1=1, axis2=2)[:, at]))

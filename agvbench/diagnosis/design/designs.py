@@ -1,4 +1,4 @@
-"""Runs that may be driven next: commands at levels that the vehicle has known, in many orders and rhythms."""
+"""Designs: candidate runs with command levels of the campaign, in various orders and durations."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Step = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class Levels:
-    """Commands to choose from: ``drive`` (forward and backward, strong and weak), ``front`` and ``rear``."""
+    """Command levels of a design: ``drive`` (forward and backward, fast and slow), ``front`` and ``rear``."""
 
     drive: tuple[float, ...]
     front: tuple[float, ...]
@@ -32,14 +32,14 @@ class Levels:
 
 @dataclass(frozen=True)
 class Design:
-    """``steps`` of duration [s], drive, front, rear; the vehicle stands before and after, its wheels set."""
+    """``steps`` of duration [s], drive, front, rear; the vehicle is at rest before and after, with its axles set."""
 
     steps: tuple[Step, ...]
     neutral: float
 
     @property
     def duration_s(self) -> float:
-        """When it stops [s]."""
+        """The time of the stop [s]."""
         return SET_FIRST_S + sum(step[0] for step in self.steps)
 
     def rows(self) -> tuple[tuple[float, float, float, float], ...]:
@@ -54,7 +54,7 @@ class Design:
         return tuple(rows)
 
     def commands(self) -> Commands:
-        """Return the commands with the stop behind them."""
+        """Return the commands, with the stop at the end."""
         rows = self.rows()
         _, _, front, rear = rows[-1]
         table = np.array([*rows, (round(self.duration_s, 3), self.neutral, front, rear)])
@@ -63,7 +63,7 @@ class Design:
 
 
 def levels_of(maps: NodalMaps, values: Floats) -> Levels:
-    """Return levels among those that the data know: `values` are the maps' fitted ones."""
+    """Return levels among the nodes of the maps; `values` are the fitted nodal values."""
     where = maps.slices()
     speed = values[where["drive"]]
     drives = []
@@ -78,7 +78,7 @@ def levels_of(maps: NodalMaps, values: Floats) -> Levels:
 
 
 def _steering(nodes: Floats, angle: Floats, neutral: float) -> tuple[float, ...]:
-    """Return straight first, then far and half way to either side."""
+    """Return the straight level first, then the far and half-way levels to either side."""
     straight = int(np.argmin(np.abs(nodes - neutral)))
     bent = angle - angle[straight]
     chosen = [straight]
@@ -92,7 +92,7 @@ def _steering(nodes: Floats, angle: Floats, neutral: float) -> tuple[float, ...]
 
 
 def designs(levels: Levels) -> list[Design]:
-    """Return the designs to begin with: holds, steering in steps, stops and starts, there and back."""
+    """Return the initial designs: constant commands, steering in steps, stops and starts, forward and backward."""
     return [Design(tuple(steps), levels.neutral) for steps in _sequences(levels) if steps]
 
 
@@ -134,7 +134,7 @@ def _repeated(steps: list[Step]) -> list[Step]:
 
 
 def mutated(design: Design, levels: Levels, rng: np.random.Generator) -> Design:
-    """Return a design that differs in one step: another level or duration, one more or one less."""
+    """Return a design with one step changed: another level or duration, or one step more or less."""
     steps = list(design.steps)
     k = int(rng.integers(len(steps)))
     duration, drive, front, rear = steps[k]

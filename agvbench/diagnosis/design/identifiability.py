@@ -1,4 +1,4 @@
-"""Parameters that the data at hand cannot pin, and how well a run would."""
+"""Parameters that the data at hand do not identify, and the standard errors that a run would give."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from agvbench.effects import effect_kinds
 from agvbench.types import Floats
 
 _WEAK = 1e-6
-_SAME = 0.99
+_MIN_CORRELATION = 0.99
 
 
 @dataclass(frozen=True)
 class Unidentified:
-    """A parameter that the data do not pin.
+    """A parameter that the data do not identify.
 
-    ``effect`` and ``parameter``; ``stderr`` expected from the data, and ``scale`` the size that such an effect
-    usually has; ``why`` in words; ``start`` (q,) the effect's parameters where that was computed; ``at`` the
-    parameter's number among them; ``partner`` the parameter that does the same here, if one does.
+    ``effect`` and ``parameter``: names. ``stderr``: expected from the data; ``scale``: typical size of the parameter.
+    ``why``: the reason. ``start`` (q,): the effect's parameters at which it was computed; ``at``: index of the
+    parameter among them. ``partner``: the selected parameter with the same influence on these runs, if there is one.
     """
 
     effect: str
@@ -38,15 +38,15 @@ class Unidentified:
 
     @property
     def name(self) -> str:
-        """Such as ``steering_lag.time_constant_s``."""
+        """The full name, such as ``steering_lag.time_constant_s``."""
         return f"{self.effect}.{self.parameter}"
 
 
 def unidentified(chosen: Fit, candidates: Mapping[str, Candidate]) -> list[Unidentified]:
-    """Return the parameters of effects that `chosen` lacks which would not show at their usual size.
+    """Return the parameters of effects outside `chosen` that are not significant at their typical size.
 
-    To first order about the chosen model: each effect's slopes, freed of what maps, effects found and the runs' own
-    offsets can absorb. Limits, whose null is infinite, are left out: they show where they act or nowhere.
+    The derivatives of each effect are linearised about the chosen model, and projected on what maps, selected effects
+    and random effects cannot absorb. Limits, with an infinite null value, are left out.
     """
     readings = chosen.predictor.readings
     weighted = Weighted(readings, readings.seen, chosen.linear.by_random_effects, chosen)
@@ -62,13 +62,13 @@ def unidentified(chosen: Fit, candidates: Mapping[str, Candidate]) -> list[Unide
         start = candidate.starts[0]
         predictor = Predictor(chosen.predictor.batch, (*chosen.predictor.effects, name))
         _, slopes = predictor.by_last(np.r_[chosen.parameters, start], chosen.random_effects, len(start))
-        slope = weighted.columns(slopes)
-        fixed = weighted.without_random_effects(slope)
-        plain = np.einsum("ria,rib->ab", slope, fixed)
-        cross = np.einsum("rip,ria->pa", own, fixed)
-        left = np.linalg.pinv(plain - cross.T @ inverse @ cross + _WEAK * np.diag(candidate.scale**-2.0))
+        weighted_slopes = weighted.columns(slopes)
+        projected = weighted.without_random_effects(weighted_slopes)
+        plain = np.einsum("ria,rib->ab", weighted_slopes, projected)
+        cross = np.einsum("rip,ria->pa", own, projected)
+        covariance = np.linalg.pinv(plain - cross.T @ inverse @ cross + _WEAK * np.diag(candidate.scale**-2.0))
         for k, p in enumerate(parameters):
-            stderr = float(np.sqrt(max(left[k, k], 0.0)))
+            stderr = float(np.sqrt(max(covariance[k, k], 0.0)))
             if stderr > p.scale:
                 share = np.sqrt(plain[k, k]) * p.scale
                 partner = _partner(cross[:, k], plain[k, k], known, chosen)
@@ -78,12 +78,12 @@ def unidentified(chosen: Fit, candidates: Mapping[str, Candidate]) -> list[Unide
 
 
 def _partner(cross: Floats, plain: float, known: Floats, chosen: Fit) -> str:
-    """Return the effect found that alone does what the parameter does, if one does."""
-    alike = np.abs(cross) / np.sqrt(np.maximum(np.diagonal(known) * plain, 1e-300))
+    """Return the selected parameter with the same influence, if there is one."""
+    correlation = np.abs(cross) / np.sqrt(np.maximum(np.diagonal(known) * plain, 1e-300))
     maps = chosen.predictor.maps.size
     names = chosen.predictor.parameter_names
-    best = int(np.argmax(alike[maps:])) if names else -1
-    return names[best] if best >= 0 and alike[maps + best] > _SAME else ""
+    best = int(np.argmax(correlation[maps:])) if names else -1
+    return names[best] if best >= 0 and correlation[maps + best] > _MIN_CORRELATION else ""
 
 
 def _why(share: float, partner: str) -> str:
@@ -94,10 +94,10 @@ def _why(share: float, partner: str) -> str:
     return "flat: the maps, the other effects and the variation between runs can do the same"
 
 
-def pin_scores(chosen: Fit, flat: Sequence[Unidentified], predictors: Sequence[Predictor], repeats: float) -> Floats:
-    """Return the expected standard errors over scales (len(flat), designs) with so many repeats of each design.
+def stderr_ratios(chosen: Fit, flat: Sequence[Unidentified], predictors: Sequence[Predictor], repeats: float) -> Floats:
+    """Return the expected standard errors over scales (len(flat), designs) with `repeats` of each design.
 
-    ``predictors`` are the chosen model with each of the parameters' effects added, for the designs' runs.
+    ``predictors`` are those of the chosen model with each of the parameters' effects added, for the designs' runs.
     """
     out = []
     known = chosen.information.total
@@ -107,7 +107,7 @@ def pin_scores(chosen: Fit, flat: Sequence[Unidentified], predictors: Sequence[P
         size = maps + len(item.start)
         base = np.zeros((size, size))
         base[:maps, :maps] = known
-        # What the data say about the parameter itself is next to nothing, and is taken as that.
+        # The information of the data at hand about the parameter itself is negligible, and left out.
         matrix = base + repeats * new.matrix + _WEAK * np.eye(size)
         inverse = np.linalg.inv(matrix)
         out.append(np.sqrt(np.maximum(inverse[:, maps + item.at, maps + item.at], 0.0)) / item.scale)

@@ -26,7 +26,7 @@ from agvbench.planning import Trajectory, Workspace
 from agvbench.planning.trajectories.shapes import CommandTable
 from agvbench.types import CommandUnit, Floats
 
-_NEEDS: dict[frozenset[str], str] = {
+_REQUIRED_FOR_PAIR: dict[frozenset[str], str] = {
     frozenset({"actuation_delay", "mocap_latency"}): (
         "a time that vehicle and cameras share: a light on the vehicle that its firmware switches with the drive, "
         "an encoder on board that is logged with the commands, or the vehicle pushed by hand with a clap in view"
@@ -40,7 +40,7 @@ _NEEDS: dict[frozenset[str], str] = {
 _CLOCK = "a reference beside cameras and commands, such as an encoder on board"
 _LENGTH = "two markers at a known distance, measured at several places"
 _AXES = "the vehicle's own axis measured on the floor, with a straight edge or by pushing it along a rail"
-_BY_STAGE = {
+_REQUIRED_FOR_EFFECT = {
     "mocap_latency": _CLOCK,
     "actuation_delay": _CLOCK,
     "mocap_scale": _LENGTH,
@@ -56,11 +56,11 @@ def required_measurements(names: tuple[str, ...]) -> str:
     'a time that vehicle and cameras share'
     """
     for pair in combinations(names, 2):
-        if frozenset(pair) in _NEEDS:
-            return _NEEDS[frozenset(pair)]
+        if frozenset(pair) in _REQUIRED_FOR_PAIR:
+            return _REQUIRED_FOR_PAIR[frozenset(pair)]
     for name in names:
-        if name in _BY_STAGE:
-            return _BY_STAGE[name]
+        if name in _REQUIRED_FOR_EFFECT:
+            return _REQUIRED_FOR_EFFECT[name]
     return (
         "a direct measurement of one of them: an angle, a speed or a distance that does not come from the same drives"
     )
@@ -69,14 +69,14 @@ def required_measurements(names: tuple[str, ...]) -> str:
 DECISIVE = 40.0
 """Decisive expected difference in minus two log likelihood: beyond the margin of alternatives in 99 of 100 draws."""
 
-HOPELESS = 10.0
-"""What even `MAX_REPEATS` would not bring beyond this is not worth driving."""
+MIN_EVIDENCE = 10.0
+"""Least evidence that `MAX_REPEATS` must give for a pair; otherwise no run is proposed for it."""
 
 MAX_REPEATS = 12
-PINNED = 0.5
-"""A parameter is pinned when its standard error is below this part of its usual size."""
+IDENTIFIED = 0.5
+"""A parameter is identified if its standard error is below this share of its typical size."""
 
-_WELL_PINNED = 0.05
+_WELL_IDENTIFIED = 0.05
 _MAX_IDENTIFIED = 3
 _UNKNOWN = 100.0
 
@@ -97,15 +97,15 @@ def discriminate(
     chosen
         The model with every named effect.
     alternatives
-        By named effect, the effects that predict as well in its place, with how much worse they are.
+        By named effect, the effects that predict as well in its place, with their difference in deviance.
     candidates
-        Effects that were tried, by name.
+        Candidate effects, by name.
     unit
-        Of commands.
+        Unit of commands.
     workspace
-        The floor; the circle of 6.1 m by default.
+        The floor; by default a circle with a radius of 6.1 m.
     seed
-        Draws the changes that are tried.
+        Seed of the random changes of designs.
     """
     pairs = alternative_models(chosen, alternatives, candidates)
     if not pairs:
@@ -113,17 +113,19 @@ def discriminate(
     search = Search(chosen, workspace or Workspace.circle(), seed)
     if not search.first:
         return Proposal(None, {_names(pair): "a floor on which the vehicle can move" for pair in pairs})
-    # Each pair on its own first: a pair that nothing parts must not decide between designs for the others.
+    # Pairs that no design discriminates must not influence the choice for the others.
     table = search.pair_scores(pairs, search.first)
     most = MAX_REPEATS * table.max(axis=1)
-    hopeless = {_names(p): required_measurements(_names(p)) for p, m in zip(pairs, most, strict=True) if m < HOPELESS}
-    parted = [p for p, m in zip(pairs, most, strict=True) if m >= HOPELESS]
-    if not parted:
-        return Proposal(None, hopeless)
-    best = search.best(lambda tried: search.pair_scores(parted, tried).min(axis=0))
-    each = search.pair_scores(parted, [best])[:, 0]
+    inseparable = {
+        _names(p): required_measurements(_names(p)) for p, m in zip(pairs, most, strict=True) if m < MIN_EVIDENCE
+    }
+    separable = [p for p, m in zip(pairs, most, strict=True) if m >= MIN_EVIDENCE]
+    if not separable:
+        return Proposal(None, inseparable)
+    best = search.best(lambda tried: search.pair_scores(separable, tried).min(axis=0))
+    each = search.pair_scores(separable, [best])[:, 0]
     repeats = int(np.clip(np.ceil(DECISIVE / max(float(each.min()), 1e-9)), MIN_REPEATS, MAX_REPEATS))
-    separations = search.separations(parted, best, each * repeats)
+    separations = search.separations(separable, best, each * repeats)
     hardest = min(separations, key=lambda s: s.evidence)
     why = (
         f"distinguishes {' from '.join(hardest.between)}: predictions differ by up to {hardest.apart_mm:.1f} mm and "
@@ -133,10 +135,10 @@ def discriminate(
     names = "_or_".join(dict.fromkeys(name for s in separations for name in s.between))
     trajectory = as_trajectory(best, unit, f"next_{names}"[:60].rstrip("_"), "discriminates alternatives")
     starts = search.starts(best)
-    return Proposal(NextExperiment(why, trajectory, repeats, tuple(starts), separations), hopeless)
+    return Proposal(NextExperiment(why, trajectory, repeats, tuple(starts), separations), inseparable)
 
 
-def pin(
+def identify(
     chosen: Fit,
     flat: Sequence[Unidentified],
     *,
@@ -144,42 +146,42 @@ def pin(
     workspace: Workspace | None = None,
     seed: int = 0,
 ) -> NextExperiment | None:
-    """Return the run that identifies most of the parameters that the data do not, or None where none does.
+    """Return the run that identifies most of the parameters that the data do not; None if no run does.
 
-    Those that one of the effects found does the same as are left out: `discriminate` is for them.
+    Parameters with the same influence as a selected one are left out: `discriminate` is for them.
 
     Parameters
     ----------
     chosen
-        The model found.
+        The selected model.
     flat
-        What `unidentified` returned.
+        The parameters that `unidentified` returned.
     unit, workspace, seed
         As for `discriminate`.
     """
-    wanted = [item for item in flat if not item.partner][:_MAX_IDENTIFIED]
-    if not wanted:
+    parameters = [item for item in flat if not item.partner][:_MAX_IDENTIFIED]
+    if not parameters:
         return None
     search = Search(chosen, workspace or Workspace.circle(), seed)
     if not search.first:
         return None
-    least = search.pin_scores(wanted, search.first, MIN_REPEATS).min(axis=1)
-    wanted = [item for item, value in zip(wanted, least, strict=True) if value < PINNED]
-    if not wanted:
+    least = search.stderr_ratios(parameters, search.first, MIN_REPEATS).min(axis=1)
+    parameters = [item for item, value in zip(parameters, least, strict=True) if value < IDENTIFIED]
+    if not parameters:
         return None
 
     def score(tried: Sequence[Design]) -> Floats:
-        # Patterns come from calm to quick: of those that pin well enough, the calmest is driven.
-        reached = search.pin_scores(wanted, tried, MIN_REPEATS)
-        return np.asarray(-np.log(np.maximum(reached, _WELL_PINNED)).sum(axis=0))
+        # Designs come in the order of their rates: of those that suffice, the one with the lowest rate is driven.
+        ratios = search.stderr_ratios(parameters, tried, MIN_REPEATS)
+        return np.asarray(-np.log(np.maximum(ratios, _WELL_IDENTIFIED)).sum(axis=0))
 
     best = search.best(score)
-    reached = search.pin_scores(wanted, [best], MIN_REPEATS)[:, 0]
-    pins = tuple(item.name for item, value in zip(wanted, reached, strict=True) if value < PINNED)
+    ratios = search.stderr_ratios(parameters, [best], MIN_REPEATS)[:, 0]
+    pins = tuple(item.name for item, value in zip(parameters, ratios, strict=True) if value < IDENTIFIED)
     reductions = ", ".join(
         f"{item.name} to ± {value * item.scale:.2g} ({_now(item)} now)"
-        for item, value in zip(wanted, reached, strict=True)
-        if value < PINNED
+        for item, value in zip(parameters, ratios, strict=True)
+        if value < IDENTIFIED
     )
     if not pins:
         return None
@@ -199,7 +201,7 @@ def _now(item: Unidentified) -> str:
 
 
 def as_trajectory(design: Design, unit: CommandUnit, name: str, description: str) -> Trajectory:
-    """Return a design in the trajectory schema."""
+    """Return a design as a trajectory."""
     table = CommandTable(unit=unit, rows=design.rows(), duration_s=round(design.duration_s, 3))
     return Trajectory(
         schema=1,

@@ -1,4 +1,4 @@
-"""A diagnosis with the run to drive next."""
+"""The diagnosis with the next experiment."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from agvbench.calibration.campaign_protocol import HeaderLike
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.design.identifiability import unidentified
-from agvbench.diagnosis.design.next_experiment import discriminate, pin
+from agvbench.diagnosis.design.next_experiment import discriminate, identify
 from agvbench.diagnosis.design.search import MIN_REPEATS
 from agvbench.diagnosis.proposal import NextExperiment
 from agvbench.diagnosis.result import Diagnosis, Verdict
@@ -24,34 +24,34 @@ from agvbench.vehicle.geometry import Geometry
 def with_next_experiment(
     found: Diagnosis, selection: Selection, readings: Readings, header: HeaderLike, seed: int
 ) -> Diagnosis:
-    """Return `found` with the run that discriminates its alternatives or, without any, identifies parameters.
+    """Return `found` with the run that discriminates alternatives or, without any, identifies parameters.
 
     ``provenance["inseparable"]`` lists the pairs that no run can discriminate, with the required measurement;
     ``provenance["not_identifiable"]`` the parameters that these data do not identify.
     """
     tried = candidates()
     chosen = selection.chosen.fit
-    repeatability = floor_covered(readings, chosen.predictor.batch.geometry)
+    workspace = covered_workspace(readings, chosen.predictor.batch.geometry)
     unit = header.command_unit
     alternatives = {e.name: {name: 0.0 for name in e.confounded_with if name in tried} for e in found.effects}
     alternatives = {name: others for name, others in alternatives.items() if others}
     flat = unidentified(chosen, tried)
     extra: dict[str, object] = {}
     experiment = None
-    if repeatability is not None and alternatives:
-        proposal = discriminate(chosen, alternatives, tried, unit=unit, workspace=repeatability, seed=seed)
+    if workspace is not None and alternatives:
+        proposal = discriminate(chosen, alternatives, tried, unit=unit, workspace=workspace, seed=seed)
         experiment = proposal.experiment
         extra["inseparable"] = [{"between": list(pair), "needs": n} for pair, n in proposal.inseparable.items()]
     if flat:
         extra["not_identifiable"] = {item.name: item.why for item in flat}
     # An answer that is whole needs no further run for effects that were never excited and never asked for.
-    if experiment is None and repeatability is not None and flat:
-        experiment = pin(chosen, flat, unit=unit, workspace=repeatability, seed=seed)
+    if experiment is None and workspace is not None and flat:
+        experiment = identify(chosen, flat, unit=unit, workspace=workspace, seed=seed)
     return dataclasses.replace(found, next_experiment=experiment, provenance={**found.provenance, **extra})
 
 
 def with_first_experiment(found: Diagnosis) -> Diagnosis:
-    """Return a diagnosis NOT_IDENTIFIABLE with the drive that it lacks: repeated, turning, at speed."""
+    """Return a diagnosis NOT_IDENTIFIABLE with a first run to drive: repeated, turning, at speed."""
     if found.verdict is not Verdict.NOT_IDENTIFIABLE or found.next_experiment is not None:
         return found
     slalom = Trajectory(
@@ -66,17 +66,19 @@ def with_first_experiment(found: Diagnosis) -> Diagnosis:
     return dataclasses.replace(found, next_experiment=NextExperiment(why, slalom, MIN_REPEATS))
 
 
-def floor_covered(readings: Readings, geometry: Geometry) -> Workspace | None:
-    """Return the floor that the axles have covered so far, or None if that is no area.
+def covered_workspace(readings: Readings, geometry: Geometry) -> Workspace | None:
+    """Return the convex hull of the axle positions so far as workspace; None if it has no area.
 
-    The size of the floor is not known to the diagnosis: where the vehicle has been, it may be again.
+    The size of the floor is unknown, but the vehicle may drive where it has been before.
     """
     from scipy.spatial import ConvexHull, QhullError
 
     poses = readings.poses.reshape(-1, 3)
     poses = poses[np.isfinite(poses).all(axis=1)]
-    ahead = np.column_stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])])
-    points = np.concatenate([poses[:, :2] + geometry.front_axle_m * ahead, poses[:, :2] - geometry.rear_axle_m * ahead])
+    forward = np.column_stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])])
+    points = np.concatenate(
+        [poses[:, :2] + geometry.front_axle_m * forward, poses[:, :2] - geometry.rear_axle_m * forward]
+    )
     try:
         corners = points[ConvexHull(points).vertices]
         return Workspace.polygon([(float(x), float(y)) for x, y in corners], 0.0)

@@ -1,1 +1,1 @@
-"""A discrepancy term for what no effect of the library explains."""
+"""Discrepancy terms: screening by regression, and selection in the simulation."""

@@ -1,1 +1,1 @@
-"""What is published of the effects found: estimates, structure in the maps, residuals, the corrected vehicle."""
+"""Findings for publication: estimates, structure of the maps, residuals, the corrected vehicle."""

@@ -18,7 +18,7 @@ _DIGITS = 9
 
 
 def corrected_vehicle(header: HeaderLike, geometry: Geometry, fitted: Fit, maps: NodalMaps, seed: int) -> VehicleModel:
-    """Return the vehicle that `fitted` describes; its maps are tables, made monotone where noise made them turn."""
+    """Return the vehicle of `fitted`; its maps are tables, made monotone by isotonic regression."""
     where = maps.slices()
     weight = np.maximum(np.diagonal(fitted.information.total), 1e-6)
     values = {role: fitted.parameters[own] for role, own in where.items()}
@@ -47,7 +47,7 @@ def _effects(fitted: Fit) -> tuple[Effect, ...]:
     return tuple(
         kinds[name](**{key.partition(".")[2]: v for key, v in values.items() if key.partition(".")[0] == name})
         for name in fitted.predictor.effects
-        if name in kinds  # an empirical term is not a cause, and no part of a vehicle
+        if name in kinds  # a discrepancy term is no part of a vehicle
     )
 
 

@@ -1,4 +1,4 @@
-"""Parameters of the effects found, with standard errors and what the data do not pin."""
+"""Parameters of the selected effects, with standard errors and notes."""
 
 from __future__ import annotations
 
@@ -10,14 +10,11 @@ from agvbench.effects import Effect, effect_kinds
 from agvbench.effects.variants import cause_of, effect_variants
 from agvbench.types import Floats
 
-_FLAT = 3.0
+_MAX_RELATIVE_STDERR = 3.0
 
 
 def named_effects(selection: Selection, bounds: Floats) -> tuple[NamedEffect, ...]:
-    """Return the effects of the chosen model.
-
-    Standard errors are those of `standard_errors`.
-    """
+    """Return the selected effects, with estimates and the standard errors of `standard_errors`."""
     fit = selection.chosen.fit
     maps = fit.predictor.maps.size
     stderr = standard_errors(fit, fit.predictor.readings.group)
@@ -32,7 +29,7 @@ def named_effects(selection: Selection, bounds: Floats) -> tuple[NamedEffect, ..
             estimates[p.name] = Estimate(value, error, p.unit, note)
             at += 1
         if name in selection.base.names or issubclass(kinds[name], DiscrepancyTerm):
-            continue  # the vehicle was known to have it; or it is no effect but a description
+            continue  # a given effect, or a discrepancy term
         alternatives = sorted(selection.alternatives[name].items(), key=lambda pair: pair[1])
         found.append(
             NamedEffect(
@@ -53,6 +50,6 @@ def named_effects(selection: Selection, bounds: Floats) -> tuple[NamedEffect, ..
 def _note(value: float, stderr: float, bounds: Floats, scale: float) -> str:
     if value <= bounds[0] or value >= bounds[1]:
         return "at its bound"
-    if stderr > _FLAT * scale:
+    if stderr > _MAX_RELATIVE_STDERR * scale:
         return "the data hardly pin it"
     return ""

@@ -1,8 +1,7 @@
-"""Shapes of static maps, fitted to refitted values under their covariance: end stops and dead bands.
+"""End stops and dead bands as shapes of static maps, fitted to the nodal values under their covariance.
 
-The values are free and each has its error; a shape is judged by how far they are from it in these errors (generalised
-least squares), beside a smooth shape of as many parameters. A share of the range is added to every error: no real map
-is exactly a line.
+Shapes are compared by generalised least squares with a smooth shape of as many parameters. The standard error of every
+value includes a share of the range as model error, because no real map is exactly linear.
 """
 
 from __future__ import annotations
@@ -23,18 +22,18 @@ _MODEL_ERROR = 0.002
 _MIN_GAIN = 12.0
 _PER_PARAMETER = 2.0
 _MIN_SHORT = 0.015
-_CLEAR = 4.0
+_SIGNIFICANCE = 4.0
 _MIN_INSIDE = 3
 _MAX_SHARE_AT_STOP = 0.4
-_UNKNOWN_RAD = 0.1
+_MAX_STDERR_RAD = 0.1
 _WIDTHS = 60
-_MAX_NEAR = 5
-_BENDS = np.geomspace(0.1, 4.0, 10)
+_MAX_LEVELS = 5
+_SATURATIONS = np.geomspace(0.1, 4.0, 10)
 
 
 @dataclass(frozen=True)
 class RefittedMap:
-    """Free ``values`` (n,) of a map at its ``commands`` (n,), ascending, with their ``covariance`` (n, n)."""
+    """Nodal ``values`` (n,) of a map at its ``commands`` (n,), ascending, with their ``covariance`` (n, n)."""
 
     commands: Floats
     values: Floats
@@ -47,22 +46,22 @@ class RefittedMap:
 
     @cached_property
     def root(self) -> Floats:
-        """What whitens values: its square is the inverse of their covariance, the error of any shape included."""
+        """The whitening matrix of the values (n, n): a square root of the inverse covariance with model error."""
         whole = self.covariance + np.eye(len(self.values)) * (_MODEL_ERROR * self.size) ** 2
         return np.asarray(np.linalg.cholesky(np.linalg.inv(whole)).T)
 
     def agrees_with(self, prior_model: StaticMap) -> bool:
-        """Return whether a map goes through the values, as far as their errors say: then it lacks nothing there."""
-        off = self.root @ (self.values - np.asarray(prior_model(self.commands)))
+        """Return whether a map agrees with the values within their errors (χ² test)."""
+        whitened = self.root @ (self.values - np.asarray(prior_model(self.commands)))
         count = len(self.values)
-        return float(off @ off) <= count + _CLEAR * math.sqrt(2.0 * count)
+        return float(whitened @ whitened) <= count + _SIGNIFICANCE * math.sqrt(2.0 * count)
 
     def select(self, chosen: NDArray[np.int64]) -> RefittedMap:
-        """Return the part of the map that an index chooses, its errors as they are with the rest unknown."""
+        """Return the part of the map with the `chosen` indices, with its marginal covariance."""
         return RefittedMap(self.commands[chosen], self.values[chosen], self.covariance[np.ix_(chosen, chosen)])
 
     def fit(self, basis: Floats) -> tuple[float, Floats, Floats]:
-        """Return how far the values are from what `basis` (n, p) can make, the coefficients (p,) and their errors."""
+        """Return χ² of the best fit of `basis` (n, p), its coefficients (p,) and their standard errors (p,)."""
         left, right = self.root @ basis, self.root @ self.values
         coefficients = np.asarray(np.linalg.lstsq(left, right, rcond=1e-12)[0], dtype=np.float64)
         errors = np.sqrt(np.diagonal(np.linalg.pinv(left.T @ left, hermitian=True)))
@@ -71,7 +70,7 @@ class RefittedMap:
 
 @dataclass(frozen=True)
 class EndStops:
-    """Lowest and highest output with standard errors, NaN where none was met; ``gain`` in χ² over no stops."""
+    """Lowest and highest output with standard errors, NaN without a stop; ``gain``: reduction of χ²."""
 
     low: tuple[float, float]
     high: tuple[float, float]
@@ -80,11 +79,11 @@ class EndStops:
 
 
 def end_stops(refitted: RefittedMap, prior_model: StaticMap) -> EndStops | None:
-    """Return where a steering map stops turning; None where a line, or a smooth curve, describes it as well.
+    """Return the end stops of a steering map; None if a line or a smooth curve describes it as well.
 
-    Between its stops the map is the nominal one, stretched and shifted.
+    Between the stops the shape is the nominal map, scaled and shifted.
     """
-    known = np.flatnonzero(np.sqrt(np.diagonal(refitted.covariance)) < _UNKNOWN_RAD)
+    known = np.flatnonzero(np.sqrt(np.diagonal(refitted.covariance)) < _MAX_STDERR_RAD)
     own = refitted.select(known)
     inner = np.asarray(prior_model(own.commands))
     if len(known) < _MIN_INSIDE + 1 or np.ptp(inner) == 0.0:
@@ -115,7 +114,7 @@ def end_stops(refitted: RefittedMap, prior_model: StaticMap) -> EndStops | None:
 
 
 def _with_stops(own: RefittedMap, inner: Floats, first: int, last: int) -> tuple[float, Floats, Floats] | None:
-    """Fit a line on which the first and the last values stand at a stop; None where it does not fall short of it."""
+    """Fit a line with the first and last values at a stop; None if the line does not extend beyond the stop."""
     count = len(inner)
     basis = np.zeros((count, 2 + (first > 0) + (last > 0)))
     basis[:, :2] = np.vander(inner, 2)
@@ -133,16 +132,19 @@ def _with_stops(own: RefittedMap, inner: Floats, first: int, last: int) -> tuple
         if innermost == outermost:
             continue
         short = side * (line[outermost] - coefficients[column])
-        # Inside, the stop is not reached; at the outermost command the line would be well beyond it.
+        # At the innermost command the line is below the stop, at the outermost one clearly beyond it.
         inside = side * (coefficients[column] - line[innermost])
-        if short < max(_MIN_SHORT * own.size, _CLEAR * float(errors[column])) or inside < -_MODEL_ERROR * own.size:
+        if (
+            short < max(_MIN_SHORT * own.size, _SIGNIFICANCE * float(errors[column]))
+            or inside < -_MODEL_ERROR * own.size
+        ):
             return None
     return chi, coefficients, errors
 
 
 @dataclass(frozen=True)
 class DeadBand:
-    """Half the ``width`` of the commands that do not move the vehicle, its ``stderr``, and the ``gain`` in χ²."""
+    """Half ``width`` of the dead band, its ``stderr``, and the ``gain`` in χ²."""
 
     width: float
     stderr: float
@@ -150,9 +152,9 @@ class DeadBand:
 
 
 def dead_band(refitted: RefittedMap, prior_model: StaticMap, neutral: float) -> DeadBand | None:
-    """Return how far from neutral the drive starts to move, where it does not do so at once; else None.
+    """Return the dead band of the drive about neutral, or None.
 
-    Each side has its own edge, so that a neutral that is merely another one is no dead band; what counts is their mean.
+    Each side has its own edge, because a shift of neutral alone is no dead band. The width is the mean of both edges.
     """
     known = np.flatnonzero(np.sqrt(np.diagonal(refitted.covariance)) < _MODEL_ERROR * 10.0 * refitted.size)
     if not len(known):
@@ -168,7 +170,7 @@ def dead_band(refitted: RefittedMap, prior_model: StaticMap, neutral: float) -> 
     spread = 0.5 * float(np.ptp([side.edge for side in found]))
     gain = sum(side.gain for side in found)
     farthest = float(np.max(np.abs(own.commands - neutral)))
-    if width < max(_CLEAR * stderr, 0.02 * farthest) or gain < _MIN_GAIN:
+    if width < max(_SIGNIFICANCE * stderr, 0.02 * farthest) or gain < _MIN_GAIN:
         return None
     return DeadBand(width, math.hypot(stderr, spread), gain)
 
@@ -182,41 +184,41 @@ class _Edge:
 
 
 def _edge(own: RefittedMap, prior_model: StaticMap, neutral: float, sign: float) -> _Edge | None:
-    """Return where one side starts to move; None where it has too few levels, or none that speaks for an edge."""
+    """Return the edge of the dead band on one side; None with too few levels or without evidence for an edge."""
     chosen = np.flatnonzero(sign * (own.commands - neutral) > 0.0)
     if len(chosen) < 2:
         return None
     side = own.select(chosen)
-    away = np.abs(side.commands - neutral)
+    distance = np.abs(side.commands - neutral)
     error = np.sqrt(np.diagonal(side.covariance)) + _MODEL_ERROR * own.size
     nominal = np.abs(np.asarray(prior_model(side.commands)))
-    still = (np.abs(side.values) < _CLEAR * error) & (nominal > 2.0 * _CLEAR * error)
-    moving = ~still
-    if still.any():
-        nearest = float(away[moving].min()) if moving.any() else math.inf
-        farthest_still = float(away[still].max())
+    at_rest = (np.abs(side.values) < _SIGNIFICANCE * error) & (nominal > 2.0 * _SIGNIFICANCE * error)
+    moving = ~at_rest
+    if at_rest.any():
+        nearest = float(distance[moving].min()) if moving.any() else math.inf
+        farthest_still = float(distance[at_rest].max())
         if nearest < farthest_still or not math.isfinite(nearest):
             return None
-        gain = float(np.sum((nominal[still] / error[still]) ** 2))
+        gain = float(np.sum((nominal[at_rest] / error[at_rest]) ** 2))
         edge, stderr = _between(side.select(np.flatnonzero(moving)), neutral, farthest_still, nearest)
         return _Edge(edge, stderr, gain, stopped=True)
     return _extrapolated(side, neutral)
 
 
 def _between(side: RefittedMap, neutral: float, low: float, high: float) -> tuple[float, float]:
-    """Return an edge between the last level that stood still and the first that moved."""
+    """Return an edge between the last level at rest and the first in motion, with its standard error."""
     middle, spread = 0.5 * (low + high), (high - low) / math.sqrt(12.0)
     if len(side.values) < _MIN_INSIDE:
         return middle, spread
-    found = _shifted(side.select(np.argsort(np.abs(side.commands - neutral))[:_MAX_NEAR]), neutral, low, high)
+    found = _shifted(side.select(np.argsort(np.abs(side.commands - neutral))[:_MAX_LEVELS]), neutral, low, high)
     if found is None:
         return middle, spread
     return found[1], min(max(found[2], 0.01 * (high - low)), spread)
 
 
 def _extrapolated(side: RefittedMap, neutral: float) -> _Edge | None:
-    """Return an edge to which the levels that move lead back, if no curve that begins at neutral does as well."""
-    side = side.select(np.argsort(np.abs(side.commands - neutral))[:_MAX_NEAR])
+    """Return an edge extrapolated from the levels in motion, if no curve from neutral fits as well."""
+    side = side.select(np.argsort(np.abs(side.commands - neutral))[:_MAX_LEVELS])
     nearest = float(np.min(np.abs(side.commands - neutral)))
     found = _shifted(side, neutral, -0.5 * nearest, nearest)
     if found is None:
@@ -228,25 +230,25 @@ def _extrapolated(side: RefittedMap, neutral: float) -> _Edge | None:
 
 
 def _curves(side: RefittedMap, neutral: float, edge: float, *, most: int) -> Iterator[tuple[Floats, int]]:
-    """Yield curves that begin at an edge, as bases (n, p), and how many parameters each has: powers, and others.
+    """Yield curves that begin at an edge, as bases (n, p) with their number of parameters.
 
-    Drives rise straight, bend down towards full command, or up at first.
+    They are polynomials, saturating curves, and curves that rise slowly at first.
     """
-    away = np.maximum(np.abs(side.commands - neutral) - edge, 0.0)
+    distance = np.maximum(np.abs(side.commands - neutral) - edge, 0.0)
     for count in range(1, most + 1):
-        yield away[:, None] ** np.arange(1, count + 1), count
-    for bend in _BENDS * float(away.max()):
-        yield (away / (away + bend))[:, None], 2
-        yield (-np.expm1(-away / bend))[:, None], 2
+        yield distance[:, None] ** np.arange(1, count + 1), count
+    for saturation in _SATURATIONS * float(distance.max()):
+        yield (distance / (distance + saturation))[:, None], 2
+        yield (-np.expm1(-distance / saturation))[:, None], 2
 
 
 def _misfit(side: RefittedMap, basis: Floats, parameters: int) -> float | None:
-    """Return χ² with what its parameters cost; None for a curve with so many that it says nothing."""
+    """Return χ² with a penalty per parameter; None if the curve has as many parameters as values."""
     return None if parameters >= len(side.values) else side.fit(basis)[0] + _PER_PARAMETER * parameters
 
 
 def _shifted(side: RefittedMap, neutral: float, low: float, high: float) -> tuple[float, float, float] | None:
-    """Fit curves that begin at an edge between `low` and `high`; return misfit, edge and its error."""
+    """Fit curves that begin at an edge between `low` and `high`; return χ², the edge and its standard error."""
     edges = np.linspace(low, high, _WIDTHS + 2)[1:-1]
     tried = [
         [_misfit(side, basis, parameters + 1) for basis, parameters in _curves(side, neutral, e, most=2)]
@@ -257,11 +259,11 @@ def _shifted(side: RefittedMap, neutral: float, low: float, high: float) -> tupl
         return None
     best, step = int(np.argmin(misfits)), float(edges[1] - edges[0])
     least = float(misfits[best])
-    # Misfit rises by one within a standard error.
+    # χ² rises by one within a standard error.
     within = edges[misfits <= least + 1.0]
     stderr = max(0.5 * float(np.ptp(within)), step)
     if best in (0, len(edges) - 1):
         return least, float(edges[best]), stderr
-    sides = misfits[best - 1] - least, misfits[best + 1] - least
-    off = 0.5 * step * float((sides[0] - sides[1]) / max(sides[0] + sides[1], 1e-12))
-    return least, float(edges[best] + off), stderr
+    slopes = misfits[best - 1] - least, misfits[best + 1] - least
+    shift = 0.5 * step * float((slopes[0] - slopes[1]) / max(slopes[0] + slopes[1], 1e-12))
+    return least, float(edges[best] + shift), stderr

@@ -1,9 +1,9 @@
-"""End stops and dead bands that the nominal map lacks: read off the refitted one.
+"""End stops and dead bands in the refitted maps that the nominal maps lack.
 
-Nodal maps absorb an end stop or a dead band, so no effect has to be fitted for them; but the nominal vehicle file lacks
-them, and a planner that uses it asks for angles and speeds that cannot be reached. Both are looked for in the refitted
-values: shapes with and without them are fitted to the values under their covariance.
-A map that is merely of another slope, offset or smooth shape has neither.
+Nodal maps absorb an end stop or a dead band, so that no effect has to be fitted for them. The nominal vehicle file
+lacks them, however, and a planner that uses it requests angles and speeds that cannot be reached. Shapes with and
+without them are therefore fitted to the refitted values under their covariance. A map that differs from the nominal one
+in slope, offset or smooth shape only has neither.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from agvbench.types import Floats
 from agvbench.vehicle.maps import DeadBandWithSaturation, Fixed, FullSpeedOrStop, LineWithEndStops, StaticMap
 
 _SOURCE = "read off the refitted map against the nominal one"
-_FLAT = 0.05
+_FLAT_SLOPE = 0.05
 _GRID = 400
-_STILL, _MIN_BAND = 0.01, 0.02
+_REST_SHARE, _MIN_BAND = 0.01, 0.02
 
 
 @dataclass(frozen=True)
-class _Known:
-    """What the vehicle file and the refitted maps say of one role."""
+class _MapPair:
+    """The nominal and the refitted map of one role."""
 
     prior_model: StaticMap
     refitted: RefittedMap
 
 
 def map_effects(fitted: Fit, vehicle: VehicleModel | None) -> tuple[NamedEffect, ...]:
-    """Return ``steering_saturation`` and ``drive_dead_band`` where runs went beyond what `vehicle` knows of them.
+    """Return ``steering_saturation`` and ``drive_dead_band`` where the maps have them and `vehicle` does not.
 
-    Without a vehicle there is no nominal map that they could contradict.
+    Without a vehicle there is no nominal map to compare with.
     """
     if vehicle is None:
         return ()
@@ -53,18 +53,18 @@ def map_effects(fitted: Fit, vehicle: VehicleModel | None) -> tuple[NamedEffect,
     return tuple(found)
 
 
-def _known(fitted: Fit, vehicle: VehicleModel) -> dict[str, _Known]:
+def _known(fitted: Fit, vehicle: VehicleModel) -> dict[str, _MapPair]:
     maps = fitted.predictor.maps
     covariance = clustered_covariance(fitted, fitted.predictor.readings.group)
     out = {}
     for role, own in maps.slices().items():
         prior_model: StaticMap = getattr(vehicle, role)
         refitted = RefittedMap(maps.nodes[role], fitted.parameters[own], covariance[own, own])
-        out[role] = _Known(prior_model, refitted)
+        out[role] = _MapPair(prior_model, refitted)
     return out
 
 
-def _saturation(axles: dict[str, _Known]) -> Iterator[NamedEffect]:
+def _saturation(axles: dict[str, _MapPair]) -> Iterator[NamedEffect]:
     estimates, gain = {}, 0.0
     for role, known in axles.items():
         if isinstance(known.prior_model, Fixed) or known.refitted.agrees_with(known.prior_model):
@@ -89,7 +89,7 @@ def _side(stops: EndStops, side: str, is_nominal: bool) -> Iterator[tuple[float,
 
 
 def _prior_has_stops(prior_model: StaticMap, commands: Floats, *, rising: bool) -> tuple[bool, bool]:
-    """Return whether a map has a stop at low and at high outputs, by its kind or by being flat where runs were."""
+    """Return whether a map has a stop at low and at high outputs, by its kind or because its ends are flat."""
     if isinstance(prior_model, LineWithEndStops):
         return math.isfinite(prior_model.output_low), math.isfinite(prior_model.output_high)
     if isinstance(prior_model, DeadBandWithSaturation):
@@ -97,11 +97,11 @@ def _prior_has_stops(prior_model: StaticMap, commands: Floats, *, rising: bool) 
     at = np.linspace(commands[0], commands[-1], _GRID)
     slope = np.abs(np.diff(prior_model(at)))
     usual = float(np.median(slope))
-    ends = bool(slope[0] <= _FLAT * usual), bool(slope[-1] <= _FLAT * usual)
+    ends = bool(slope[0] <= _FLAT_SLOPE * usual), bool(slope[-1] <= _FLAT_SLOPE * usual)
     return ends if rising else (ends[1], ends[0])
 
 
-def _dead_band(drive: _Known, neutral: float) -> Iterator[NamedEffect]:
+def _dead_band(drive: _MapPair, neutral: float) -> Iterator[NamedEffect]:
     if drive.refitted.agrees_with(drive.prior_model) or _prior_has_dead_band(
         drive.prior_model, drive.refitted.commands, neutral
     ):
@@ -113,7 +113,7 @@ def _dead_band(drive: _Known, neutral: float) -> Iterator[NamedEffect]:
 
 
 def _prior_has_dead_band(prior_model: StaticMap, commands: Floats, neutral: float) -> bool:
-    """Return whether a map has a dead band, or says nothing of small commands that could be contradicted."""
+    """Return whether a map has a dead band, or does not define small commands."""
     if isinstance(prior_model, FullSpeedOrStop | Fixed):
         return True
     if isinstance(prior_model, DeadBandWithSaturation):
@@ -121,6 +121,6 @@ def _prior_has_dead_band(prior_model: StaticMap, commands: Floats, neutral: floa
     farthest = float(np.max(np.abs(commands - neutral)))
     at = neutral + farthest * np.linspace(-1.0, 1.0, 2 * _GRID + 1)
     speed = np.abs(prior_model(at))
-    still = np.abs(at[speed <= _STILL * float(speed.max())] - neutral)
-    # A line stands still for as much of its range as is called still; a dead band for more.
-    return bool(len(still) and float(still.max()) > (_STILL + _MIN_BAND) * farthest)
+    at_rest = np.abs(at[speed <= _REST_SHARE * float(speed.max())] - neutral)
+    # A line is below the limit of rest in a known share of its range, a dead band in a larger one.
+    return bool(len(at_rest) and float(at_rest.max()) > (_REST_SHARE + _MIN_BAND) * farthest)

@@ -1,4 +1,4 @@
-"""The residual before and after, step by step, with what it may depend on: what is drawn and kept in a file."""
+"""Table of the residuals before and after, step by step, with their covariates."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ COVARIATES = (
 def residual_table(readings: Readings, held: NDArray[np.bool_], before: Floats, after: Floats) -> pd.DataFrame:
     """Return one row per step between samples of a run.
 
-    Columns: ``run_id``, ``held_out``, the covariates of `COVARIATES`, ``length_m``, and for each feature
-    ``before_…`` and ``after_…``: ``speed`` and ``sideways`` as shares of the distance, ``turning`` in rad/m. Steps
-    that only one of the two predictions makes are left out.
+    Columns: ``run_id``, ``held_out``, the covariates of `COVARIATES`, ``length_m``, and for each feature ``before_…``
+    and ``after_…``: ``speed`` and ``sideways`` (longitudinal and lateral) as shares of the distance, ``turning`` in
+    rad/m. Steps without a counterpart in the other prediction are left out.
 
     Parameters
     ----------
     readings
         R runs of K samples.
     held
-        (R,) which were held out.
+        (R,): mask of the test runs.
     before, after
-        (R, K, 3) predicted poses.
+        (R, K, 3): predicted poses.
     """
     import pandas as pd
 
@@ -58,5 +58,5 @@ def residual_table(readings: Readings, held: NDArray[np.bool_], before: Floats, 
 def with_residuals(
     found: Diagnosis, readings: Readings, held: NDArray[np.bool_], before: Floats, after: Floats
 ) -> Diagnosis:
-    """Return `found` with its residuals, to be drawn."""
+    """Return `found` with the table of its residuals."""
     return dataclasses.replace(found, residuals=residual_table(readings, held, before, after))

@@ -1,4 +1,4 @@
-"""What is concluded from windows of free driving: judged on the test windows, and put into a verdict."""
+"""The conclusion from windows of free driving: assessment on the test windows, and the verdict."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.findings.corrected_vehicle import corrected_vehicle
 from agvbench.diagnosis.findings.estimates import named_effects
 from agvbench.diagnosis.free_driving.errors import QUANTITIES, by_recording, repeatability_squares, rms, squares
-from agvbench.diagnosis.free_driving.predictors import by_speed_error, constant_velocity, prior_model, speed_held
+from agvbench.diagnosis.free_driving.predictors import change_by_speed_error, constant_velocity, prior_model, speed_held
 from agvbench.diagnosis.free_driving.selection import WindowSelector
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
@@ -29,16 +29,16 @@ from agvbench.types import Floats
 
 WITHIN_REPEATABILITY = 1.25
 FAR_ABOVE = 5.0
-"""The repeatability of windows is a lower bound, for the vehicle's own variation cannot be seen without repeats: beyond
-so many times it, residuals are significant."""
+"""Ratio to the repeatability above which residuals count as structure. The repeatability of windows is a lower bound,
+because the variation between repeats is unknown."""
 
 
 @dataclasses.dataclass
 class WindowConclusion:
-    """Judges what was chosen on the test windows.
+    """Assesses the selection on the test windows.
 
-    ``readings`` are all windows and ``assessment`` those that are predicted here, of which ``held`` are the test
-    windows; ``static`` are the maps without effects, fitted to the others.
+    ``readings`` are all windows, ``assessment`` those that are predicted here, with the mask ``held`` of the test
+    windows. ``static`` are the maps without effects, fitted to the training windows.
     """
 
     context: DiagnosisContext
@@ -50,7 +50,7 @@ class WindowConclusion:
     selection: Selection
 
     def diagnosis(self, horizon: Horizon) -> Diagnosis:
-        """Return the diagnosis that what was chosen amounts to."""
+        """Return the diagnosis."""
         context, chosen = self.context, self.selection.chosen
         poses = self._poses(chosen)
         static = Predictor(Batch(self.assessment, self.static.predictor.maps, context.geometry))
@@ -63,10 +63,12 @@ class WindowConclusion:
         before = predicted["static"]
         if context.vehicle is not None:
             before = predicted["believed"] = prior_model(context.vehicle, self.assessment, self.selector.batch.kinds)
-        perturbed = by_speed_error(Predictor(self._every, chosen.fit.predictor.effects), chosen.fit.parameters)
+        perturbed = change_by_speed_error(
+            Predictor(self._assessed, chosen.fit.predictor.effects), chosen.fit.parameters
+        )
         effects = named_effects(self.selection, bounds_of(chosen.names))
         held_out = self._held_out(before, poses, perturbed)
-        # Small structure shows in many windows; what lies within repeatability needs no further cause.
+        # Many windows make even small structure significant: within repeatability it needs no cause.
         rest = self._dependences(poses) if _above(held_out, WITHIN_REPEATABILITY) else []
         far = _above(held_out, FAR_ABOVE)
         verdict, why = _verdict(effects, rest, far)
@@ -79,11 +81,11 @@ class WindowConclusion:
             held_out,
             corrected_vehicle(context.header, context.geometry, chosen.fit, chosen.fit.predictor.maps, context.seed),
             self.selection.rejected,
-            context.provenance(self.readings) | self._how(horizon, predicted, perturbed),
+            context.provenance(self.readings) | self._fit_provenance(horizon, predicted, perturbed),
         )
 
-    def _how(self, horizon: Horizon, predicted: dict[str, Floats], perturbed: Floats) -> dict[str, object]:
-        """Return how it was fitted, and what each predictor and each effect is worth."""
+    def _fit_provenance(self, horizon: Horizon, predicted: dict[str, Floats], perturbed: Floats) -> dict[str, object]:
+        """Return the provenance of the fit, with the errors of each predictor and each effect."""
         batch = self.selector.batch
         return {
             "fit_windows": len(batch.readings),
@@ -95,16 +97,16 @@ class WindowConclusion:
                 "level_scatter": float(batch.nodal_deviation),
                 "redundancy": batch.autocorrelation_time,
                 "recordings": by_recording(self.assessment, predicted, perturbed, self.held, self.context.seed),
-                "effects": self._each(predicted["after"]),
+                "effects": self._effect_errors(predicted["after"]),
             },
         }
 
     def _poses(self, model: ScoredModel) -> Floats:
-        """Return what `model` predicts for every window that is judged."""
-        return Predictor(self._every, model.fit.predictor.effects).predict(model.fit.parameters)
+        """Return the poses that `model` predicts for every assessed window."""
+        return Predictor(self._assessed, model.fit.predictor.effects).predict(model.fit.parameters)
 
     @cached_property
-    def _every(self) -> Batch:
+    def _assessed(self) -> Batch:
         batch = self.selector.batch
         return Batch(self.assessment, batch.maps, self.context.geometry, batch.nodal_deviation, kinds=batch.kinds)
 
@@ -125,10 +127,10 @@ class WindowConclusion:
                 worse.append(name)
         return HeldOut(len(kept), errors, tuple(worse))
 
-    def _each(self, poses: Floats) -> dict[str, dict[str, object]]:
-        """Return for each effect whether it was kept, and the held-out position error with and without it.
+    def _effect_errors(self, poses: Floats) -> dict[str, dict[str, object]]:
+        """Return for each effect whether it was selected, and the position error with and without it.
 
-        An effect without predicted gain was not fitted: its gain is zero, and there is no error with it.
+        An effect without predicted gain was not fitted: its gain is zero, and it has no error.
         """
         chosen = self.selection.chosen
         out: dict[str, dict[str, object]] = {}
@@ -155,10 +157,10 @@ class WindowConclusion:
         return rms(squares(self.assessment.select(self.held), poses[self.held])[name], name)
 
     def _dependences(self, poses: Floats) -> list[Dependence]:
-        """Return what the rest depends on, a stretch of driving being one piece of evidence."""
+        """Return the dependences of the residual, with blocks of driving as units."""
         rates = residual_rates(self.assessment, poses)
         _, stretch = np.unique(self.assessment.group, return_inverse=True)
-        rates.covariates.pop("distance_m")  # counted from the window's beginning, where a wheel may stand anyhow
+        rates.covariates.pop("distance_m")  # from the beginning of the window, where the wheel angle is arbitrary
         clustered = dataclasses.replace(rates, run=stretch[rates.run].astype(np.int64))
         return dependences(clustered, np.arange(int(stretch.max()) + 1), self.context.seed)
 
@@ -176,7 +178,7 @@ def _verdict(effects: tuple[NamedEffect, ...], rest: list[Dependence], far: bool
             "but depend on none of the covariates tested"
         )
     if not effects:
-        return Verdict.ADEQUATE, "nothing that was looked at predicts better than static maps, fitted again"
+        return Verdict.ADEQUATE, "no effect predicts better than refitted static maps"
     if any(effect.confounded_with for effect in effects):
         return Verdict.AMBIGUOUS, "several effects explain the residual equally well"
-    return Verdict.NAMED, "nothing that was looked at explains what the effects named leave"
+    return Verdict.NAMED, "no dependence remains beside the named effects"

@@ -1,4 +1,4 @@
-"""From free driving to a verdict: windows in place of runs from rest."""
+"""The diagnosis of free driving: windows in place of runs from rest."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def diagnose_windows(
 ) -> Diagnosis:
     """Diagnose free driving; see `agvbench.diagnosis.diagnose`.
 
-    Errors are those at the horizon. What differs from session to session in the drive's level is read off the speed at
-    the beginning of a window, where there are several sessions.
+    Errors are those at the horizon. Differences of the drive level between sessions are estimated from the initial
+    speed of each window, if there are several sessions.
     """
     readings = read_windows(runs, horizon, context.header.neutral)
     if reason := _insufficient_data(readings, context.header, horizon):
@@ -60,19 +60,21 @@ def diagnose_windows(
 def _selector(
     context: DiagnosisContext, readings: Readings, held: NDArray[np.bool_], static: Fit, on_progress: OnProgress
 ) -> WindowSelector:
-    """Return what tries effects on the windows that `static` was fitted to, none of those `held` out."""
+    """Return the selector for the training windows of `static`; the windows `held` are for test."""
     fitted, maps = static.predictor.readings, static.predictor.maps
-    aside = readings.select(thinned(np.flatnonzero(held), MAX_FITTED))
+    test = readings.select(thinned(np.flatnonzero(held), MAX_FITTED))
     tried, kinds = candidates_for(context.vehicle)
     names, values = given_effects(context.vehicle, tried)
-    several = len(np.unique(readings.initial_states.session)) > 1 if readings.initial_states else False
-    variance_components = nodal_deviation(static.predictor, static.parameters) if several else np.inf
-    level = fit(
+    has_sessions = len(np.unique(readings.initial_states.session)) > 1 if readings.initial_states else False
+    variance_components = nodal_deviation(static.predictor, static.parameters) if has_sessions else np.inf
+    fitted_maps = fit(
         Predictor(Batch(fitted, maps, context.geometry, variance_components)), static.parameters, np.empty((0, 2))
     )
-    batch = Batch(fitted, maps, context.geometry, variance_components, autocorrelation_time(level), kinds)
-    elsewhere = Batch(aside, maps, context.geometry, variance_components, kinds=kinds)
-    return WindowSelector(batch, tried, level.parameters, context.seed, on_progress, names, values, elsewhere=elsewhere)
+    batch = Batch(fitted, maps, context.geometry, variance_components, autocorrelation_time(fitted_maps), kinds)
+    test_batch = Batch(test, maps, context.geometry, variance_components, kinds=kinds)
+    return WindowSelector(
+        batch, tried, fitted_maps.parameters, context.seed, on_progress, names, values, test_batch=test_batch
+    )
 
 
 def _insufficient_data(readings: Readings, header: HeaderLike, horizon: Horizon) -> str:
@@ -87,7 +89,7 @@ def _insufficient_data(readings: Readings, header: HeaderLike, horizon: Horizon)
         )
     if len(np.unique(readings.group)) < MIN_BLOCKS:
         stretches = len(np.unique(readings.group))
-        return f"{stretches} stretches of {horizon.block_s:g} s are too few to set some aside: drive for longer"
+        return f"{stretches} stretches of {horizon.block_s:g} s are too few for a test: drive for longer"
     turned = np.nanmax(np.abs(readings.poses[..., 2] - readings.start[:, None, 2]), axis=1)
     if np.count_nonzero(turned > _MIN_TURN_RAD) < MIN_BLOCKS:
         return "steering was never excited: hardly a window turns"
@@ -95,7 +97,7 @@ def _insufficient_data(readings: Readings, header: HeaderLike, horizon: Horizon)
 
 
 def _static(fitted: Readings, geometry: Geometry, neutral: float) -> Fit:
-    """Return the static maps fitted to the windows, as fine as their errors ask for (by Schwarz's criterion)."""
+    """Return the static maps fitted to the windows, with the number of nodes by Schwarz's criterion."""
     best: tuple[float, Fit] | None = None
     for steering, drive in NODES:
         maps = smooth_maps(fitted.runs, neutral, steering, drive)

@@ -1,4 +1,4 @@
-"""Static maps of free driving: few free values over the range of the commands, and where a fit starts."""
+"""Static maps of free driving: few nodes over the range of the commands, and initial nodal values."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.kinematics import axle_angles
 
 NODES = ((9, 6), (13, 10), (19, 15))
-"""Free values of steering and drive maps over the range of their commands, where those take many levels."""
+"""Numbers of nodes of steering and drive maps, for commands with many levels."""
 
 _MANY_LEVELS = 12
-_LATE_S = 0.15
+_TYPICAL_DELAY_S = 0.15
 _STIFFNESS = 0.3
 _MIN_SPEED_MPS = 0.05
 
 
 def smooth_maps(runs: Sequence[Run], neutral: float, steering: int, drive: int) -> NodalMaps:
-    """Return nodal maps with a node for every level, or so many evenly spaced nodes where there are many levels.
+    """Return nodal maps with a node at every level, or with evenly spaced nodes if there are many levels.
 
-    Even spacing, not quantiles: another day's driving may dwell where this one only passed.
+    Nodes are evenly spaced and not at quantiles, because driving on another day may use other levels more often.
     """
     nodes = dict(nodal_maps(runs, neutral).nodes)
     for role in ROLES:
@@ -40,22 +40,22 @@ def smooth_maps(runs: Sequence[Run], neutral: float, steering: int, drive: int) 
 def _even(commanded: Floats, count: int, neutral: float, role: str) -> Floats:
     if role != "drive":
         return np.linspace(commanded.min(), commanded.max(), count)
-    # Each direction has nodes of its own: between them lies neutral, where the drive stands.
+    # Each direction has its own nodes; the speed at neutral, between them, is zero.
     sides = [commanded[commanded < neutral], commanded[commanded > neutral]]
     return np.concatenate([_side(side, count, neutral) for side in sides if len(side)])
 
 
 def _side(commanded: Floats, count: int, neutral: float) -> Floats:
-    """Return nodes from the command that is passed on the way to driving to the largest."""
-    away = np.abs(commanded - neutral)
-    low, high = np.quantile(away, 0.02), away.max()
+    """Return evenly spaced nodes from the 2 % quantile of the distance from neutral to the largest."""
+    distance = np.abs(commanded - neutral)
+    low, high = np.quantile(distance, 0.02), distance.max()
     return np.sort(neutral + np.sign(commanded[0] - neutral) * np.linspace(low, high, count))
 
 
 def start_values_of_windows(maps: NodalMaps, readings: Readings, geometry: Geometry) -> Floats:
-    """Return values to start a fit from: the motion between samples, inverted to axle angles and speed.
+    """Return initial nodal values: the motion between samples, inverted to axle angles and speed.
 
-    Each is set against the command of a little earlier, since vehicles follow late; a stiff curve is laid through them.
+    Each value is assigned to the command 0.15 s before, a typical delay, and a stiff curve is fitted to them.
     """
     time = np.column_stack([readings.begins_s, readings.t_s])
     poses = np.concatenate([readings.start[:, None], readings.poses], axis=1)
@@ -68,26 +68,26 @@ def start_values_of_windows(maps: NodalMaps, readings: Readings, geometry: Geome
     left = (np.cos(middle) * step[..., 1] - np.sin(middle) * step[..., 0]) * per_s
     front, rear = axle_angles(forward, left, turn / dt, geometry)
     value = {"front": front, "rear": rear, "drive": 2.0 * forward / (np.cos(front) + np.cos(rear))}
-    when = 0.5 * (time[:, 1:] + time[:, :-1]) - _LATE_S
+    when = 0.5 * (time[:, 1:] + time[:, :-1]) - _TYPICAL_DELAY_S
     moving = np.isfinite(front + rear) & (np.abs(forward) > _MIN_SPEED_MPS)
     out = []
     for role in ROLES:
         commanded = np.array([held_command(run.commands, role, t) for run, t in zip(readings.runs, when, strict=True)])
         use = moving & ((commanded != maps.neutral) if role == "drive" else True)
-        out.append(_stiff(maps.nodes[role], maps.weights(role, commanded[use]), value[role][use]))
+        out.append(_smoothed(maps.nodes[role], maps.weights(role, commanded[use]), value[role][use]))
     return np.concatenate(out)
 
 
-def _stiff(nodes: Floats, weights: Floats, value: Floats) -> Floats:
-    """Return node values of a curve through `value`, robustly, stiff where there are few."""
-    bends = np.diff(np.eye(len(nodes)), 2, axis=0) if len(nodes) > 2 else np.empty((0, len(nodes)))
-    trust: Floats = np.ones(len(value))
-    found: Floats = np.zeros(len(nodes))
+def _smoothed(nodes: Floats, weights: Floats, value: Floats) -> Floats:
+    """Return the nodal values of a robust smoothing curve through `value`."""
+    second_differences = np.diff(np.eye(len(nodes)), 2, axis=0) if len(nodes) > 2 else np.empty((0, len(nodes)))
+    weight: Floats = np.ones(len(value))
+    fitted: Floats = np.zeros(len(nodes))
     for _ in range(5):
-        matrix = weights.T @ (weights * trust[:, None])
-        stiff = _STIFFNESS * np.mean(np.diagonal(matrix)) * bends.T @ bends
-        # Where nothing was driven, the line through neighbours, and zero without any.
-        found = np.asarray(np.linalg.solve(matrix + stiff + 1e-6 * np.eye(len(nodes)), weights.T @ (trust * value)))
-        off = np.abs(value - weights @ found)
-        trust = np.asarray(1.0 / np.maximum(off, 1e-3 + np.median(off)))
-    return found
+        matrix = weights.T @ (weights * weight[:, None])
+        stiff = _STIFFNESS * np.mean(np.diagonal(matrix)) * second_differences.T @ second_differences
+        # Nodes without data lie on the line through their neighbours, or at zero without any.
+        fitted = np.asarray(np.linalg.solve(matrix + stiff + 1e-6 * np.eye(len(nodes)), weights.T @ (weight * value)))
+        deviation = np.abs(value - weights @ fitted)
+        weight = np.asarray(1.0 / np.maximum(deviation, 1e-3 + np.median(deviation)))
+    return fitted

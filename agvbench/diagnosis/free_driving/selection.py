@@ -1,4 +1,4 @@
-"""Choosing effects for free driving: what is learnt in one way of driving must not be trusted in quite another."""
+"""Selection of effects for free driving, without extrapolation to other driving."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selector
 from agvbench.types import Floats
 
-_SEEN_QUANTILE = 0.98
+_EXTRAPOLATION_QUANTILE = 0.98
 
 
 @dataclass
 class WindowSelector(Selector):
-    """Tries effects on windows; see `Selector`.
+    """Selects effects by windows; see `Selector`.
 
-    ``elsewhere`` holds the test windows. Only their commands and initial states are used, to see how far an effect
-    would reach: one that moves the usual window there by more than nearly every window that it was fitted to
-    extrapolates, and is rejected. ``extrapolating`` names those that were rejected for that.
+    ``test_batch`` holds the test windows, of which only commands and initial states are used. An effect extrapolates if
+    its median change of the test windows is larger than its change of 98 % of the training windows. Such effects are
+    rejected; ``extrapolating`` names them.
     """
 
-    # Fast stretches may be few: only the single best stretch is left out to see whether others gain, too.
+    # Blocks of fast driving may be few: only the block with the largest gain is excluded.
     excluded_share: ClassVar[float] = 0.0
-    # Residuals of windows are mostly systematic, so that a small part of them is no cause of its own.
+    # Residuals of windows are mostly systematic: a small change of the prediction is no evidence for an effect.
     min_relative_change: ClassVar[float] = 0.3
-    elsewhere: Batch | None = None
+    test_batch: Batch | None = None
     extrapolating: set[str] = field(default_factory=set)
 
     def meets_criterion(self, without: ScoredModel, with_it: ScoredModel) -> bool:
-        """Whether the larger model predicts better by enough, and where it was tried is where it is used."""
+        """Return whether the added effects meet the criterion and do not extrapolate."""
         if not super().meets_criterion(without, with_it):
             return False
         added = set(with_it.names) - set(without.names)
@@ -44,13 +44,13 @@ class WindowSelector(Selector):
         return True
 
     def _extrapolates(self, without: ScoredModel, with_it: ScoredModel) -> bool:
-        if self.elsewhere is None:
+        if self.test_batch is None:
             return False
-        learnt, used = (self._moved(batch, without, with_it) for batch in (self.batch, self.elsewhere))
-        return bool(np.median(used) > np.quantile(learnt, _SEEN_QUANTILE))
+        training, test = (self._moved(batch, without, with_it) for batch in (self.batch, self.test_batch))
+        return bool(np.median(test) > np.quantile(training, _EXTRAPOLATION_QUANTILE))
 
     @staticmethod
     def _moved(batch: Batch, without: ScoredModel, with_it: ScoredModel) -> Floats:
-        """Return how far apart both models predict each window to end (W,) [m]."""
+        """Return the distance between the end positions that both models predict for each window (W,) [m]."""
         small, large = (Predictor(batch, m.fit.predictor.effects).predict(m.fit.parameters) for m in (without, with_it))
         return np.asarray(np.hypot(*(large - small)[:, -1, :2].T))

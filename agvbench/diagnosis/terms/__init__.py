@@ -1,8 +1,8 @@
-"""Empirical terms: shapes for what no effect of the library explains, simulated and fitted like effects.
+"""Discrepancy terms: shapes for causes outside the library, simulated and fitted like effects.
 
-They name no cause. Each says on which ``covariates`` the residual depends, the first of them first, and through what.
-They are shapes (a disc, a line, an exponential) and not tables, since a shape needs few numbers and so
-predicts runs that it was not fitted to.
+They name no cause. Each declares the ``covariates`` on which the residual depends, the main one first, and the output
+channel that it acts ``through``. They are parametric shapes (a disc, a line, an exponential) and not tables: a shape
+has few parameters, and therefore predicts runs that it was not fitted to.
 """
 
 from agvbench.diagnosis.terms.base import DiscrepancyTerm
@@ -31,7 +31,7 @@ TERMS: tuple[type[DiscrepancyTerm], ...] = (
     SteeringByHistory,
     WaveByDistance,
 )
-"""Every shape that is tried."""
+"""All discrepancy terms."""
 
 __all__ = [
     "TERMS",

@@ -1,4 +1,4 @@
-"""What an empirical term is."""
+"""The base class of discrepancy terms."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from agvbench.effects.base import Effect
 
 @dataclass(frozen=True)
 class DiscrepancyTerm(Effect):
-    """A shape without a cause: ``covariates`` says on what the residual depends, ``through`` what it acts."""
+    """A shape without a cause: the residual depends on ``covariates``, and the shape acts ``through`` a channel."""
 
     relaxes: ClassVar[str] = "none: it stands for an unknown cause"
     reference: ClassVar[str] = "empirical"

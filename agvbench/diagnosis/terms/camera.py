@@ -1,4 +1,4 @@
-"""Shapes of what the camera reports beside the truth."""
+"""Discrepancy terms of the camera."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class BentPicture(DiscrepancyTerm):
 
     @staticmethod
     def see(state: Floats, per_m2: float, x_m: float, y_m: float) -> None:
-        """Move what is seen away from the centre."""
+        """Displace the measured position away from the centre."""
         x, y = state[SEEN_X] - x_m, state[SEEN_Y] - y_m
         bend = per_m2 * (x * x + y * y)
         state[SEEN_X] += bend * x

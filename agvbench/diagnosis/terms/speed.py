@@ -1,4 +1,4 @@
-"""Shapes of a speed that is not what commands make it."""
+"""Discrepancy terms of the speed."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _EDGE_M = 0.015
 
 @dataclass(frozen=True)
 class SpeedInDisc(DiscrepancyTerm):
-    """In a disc of the floor the vehicle is slower: ``v ← v (1 − loss)``, with an edge of some centimetres."""
+    """The vehicle is slower in a disc of the floor: ``v ← v (1 − loss)``, with an edge of some centimetres."""
 
     name: ClassVar[str] = "speed_in_disc"
     stage: ClassVar[Stage] = Stage.WHEELS
@@ -34,16 +34,16 @@ class SpeedInDisc(DiscrepancyTerm):
         """Slow both axles inside."""
         if loss != 0.0:
             inside = radius_m - math.hypot(state[X] - x_m, state[Y] - y_m)
-            left = 1.0 - 0.5 * loss * (1.0 + math.tanh(inside / _EDGE_M))
-            state[FRONT_SPEED] *= left
-            state[REAR_SPEED] *= left
+            factor = 1.0 - 0.5 * loss * (1.0 + math.tanh(inside / _EDGE_M))
+            state[FRONT_SPEED] *= factor
+            state[REAR_SPEED] *= factor
 
 
 @dataclass(frozen=True)
 class SpeedInStrip(DiscrepancyTerm):
-    """In a strip of the floor, such as a carpet, the vehicle is slower: ``v ← v (1 − loss)``, edges as of the disc.
+    """The vehicle is slower in a strip of the floor, such as a carpet: ``v ← v (1 − loss)``, edges as of the disc.
 
-    The strip lies across ``direction_rad``, its middle ``place_m`` from the origin.
+    The normal of the strip has direction ``direction_rad``; its centre line is ``place_m`` from the origin.
     """
 
     name: ClassVar[str] = "speed_in_strip"
@@ -62,14 +62,14 @@ class SpeedInStrip(DiscrepancyTerm):
         """Slow both axles inside."""
         if loss != 0.0:
             across = state[X] * math.cos(direction_rad) + state[Y] * math.sin(direction_rad) - place_m
-            left = 1.0 - 0.5 * loss * (1.0 + math.tanh((0.5 * width_m - abs(across)) / _EDGE_M))
-            state[FRONT_SPEED] *= left
-            state[REAR_SPEED] *= left
+            factor = 1.0 - 0.5 * loss * (1.0 + math.tanh((0.5 * width_m - abs(across)) / _EDGE_M))
+            state[FRONT_SPEED] *= factor
+            state[REAR_SPEED] *= factor
 
 
 @dataclass(frozen=True)
 class SpeedByHeading(DiscrepancyTerm):
-    """Speed depends on where the vehicle points: ``v ← v (1 + a cos ψ + b sin ψ)``."""
+    """The speed depends on the heading: ``v ← v (1 + a cos ψ + b sin ψ)``."""
 
     name: ClassVar[str] = "speed_by_heading"
     stage: ClassVar[Stage] = Stage.WHEELS
@@ -84,14 +84,14 @@ class SpeedByHeading(DiscrepancyTerm):
     def drive(state: Floats, cosine: float, sine: float) -> None:
         """Change the speed of both axles."""
         if cosine != 0.0 or sine != 0.0:
-            left = 1.0 + cosine * math.cos(state[HEADING]) + sine * math.sin(state[HEADING])
-            state[FRONT_SPEED] *= left
-            state[REAR_SPEED] *= left
+            factor = 1.0 + cosine * math.cos(state[HEADING]) + sine * math.sin(state[HEADING])
+            state[FRONT_SPEED] *= factor
+            state[REAR_SPEED] *= factor
 
 
 @dataclass(frozen=True)
 class SpeedByRunTime(DiscrepancyTerm):
-    """Speed falls (or grows) within each run: ``v ← v (1 − share (1 − e^(−t/T)))``."""
+    """The speed decreases (or increases) within each run: ``v ← v (1 − share (1 − e^(−t/T)))``."""
 
     name: ClassVar[str] = "speed_by_run_time"
     stage: ClassVar[Stage] = Stage.WHEELS
@@ -106,6 +106,6 @@ class SpeedByRunTime(DiscrepancyTerm):
     def drive(state: Floats, share: float, time_constant_s: float) -> None:
         """Slow both axles by the time in the run."""
         if share != 0.0:
-            left = 1.0 - share * (1.0 - math.exp(-max(state[TIME], 0.0) / max(time_constant_s, 0.05)))
-            state[FRONT_SPEED] *= left
-            state[REAR_SPEED] *= left
+            factor = 1.0 - share * (1.0 - math.exp(-max(state[TIME], 0.0) / max(time_constant_s, 0.05)))
+            state[FRONT_SPEED] *= factor
+            state[REAR_SPEED] *= factor

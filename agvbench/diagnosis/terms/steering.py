@@ -1,4 +1,4 @@
-"""Shapes of angles that are not what commands make them."""
+"""Discrepancy terms of the axle angles."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from agvbench.types import Floats
 
 @dataclass(frozen=True)
 class SteeringByCampaignTime(DiscrepancyTerm):
-    """Steering changes as hours pass: ``δ ← δ (1 + gain (1 − e^(−h/T)))``, both axles."""
+    """The steering gain changes with time: ``δ ← δ (1 + gain (1 − e^(−h/T)))``, both axles."""
 
     name: ClassVar[str] = "steering_by_campaign_time"
     stage: ClassVar[Stage] = Stage.WHEELS
@@ -26,16 +26,16 @@ class SteeringByCampaignTime(DiscrepancyTerm):
 
     @staticmethod
     def steer(state: Floats, gain: float, time_constant_h: float) -> None:
-        """Turn both axles further."""
+        """Scale both angles."""
         if gain != 0.0:
-            more = 1.0 + gain * (1.0 - math.exp(-state[HOURS] / max(time_constant_h, 0.01)))
-            state[FRONT] *= more
-            state[REAR] *= more
+            factor = 1.0 + gain * (1.0 - math.exp(-state[HOURS] / max(time_constant_h, 0.01)))
+            state[FRONT] *= factor
+            state[REAR] *= factor
 
 
 @dataclass(frozen=True)
 class TrimByCampaignTime(DiscrepancyTerm):
-    """Where axles point drifts as hours pass: ``δ ← δ + rate · hours``."""
+    """The offset of the axle angles drifts with time: ``δ ← δ + rate · hours``."""
 
     name: ClassVar[str] = "trim_by_campaign_time"
     stage: ClassVar[Stage] = Stage.WHEELS
@@ -47,14 +47,14 @@ class TrimByCampaignTime(DiscrepancyTerm):
 
     @staticmethod
     def steer(state: Floats, front_rad_per_h: float, rear_rad_per_h: float) -> None:
-        """Turn each axle by the hours that have passed."""
+        """Turn each axle in proportion to time."""
         state[FRONT] += front_rad_per_h * state[HOURS]
         state[REAR] += rear_rad_per_h * state[HOURS]
 
 
 @dataclass(frozen=True)
 class SteeringByDirection(DiscrepancyTerm):
-    """Axles point one way driving forward, the other way driving backward: ``δ ← δ ± angle``."""
+    """The offset of the axle angles has the sign of the driving direction: ``δ ← δ ± angle``."""
 
     name: ClassVar[str] = "steering_by_direction"
     stage: ClassVar[Stage] = Stage.WHEELS
@@ -74,9 +74,9 @@ class SteeringByDirection(DiscrepancyTerm):
 
 @dataclass(frozen=True)
 class SteeringByHistory(DiscrepancyTerm):
-    """Axles stop short of where they are sent, by a share of the way from where they stood, the same for both.
+    """Axles stop short of their target by a share of the change of angle, the same for both axles.
 
-    Few runs turn an axle back, and often one axle alone: two shares would leave the other's to chance.
+    Few runs turn an axle back, and often only one of both: two shares would be poorly determined.
     """
 
     name: ClassVar[str] = "steering_by_history"
@@ -88,6 +88,6 @@ class SteeringByHistory(DiscrepancyTerm):
 
     @staticmethod
     def aim(state: Floats, share: float) -> None:
-        """Aim short."""
+        """Reduce the change of both targets."""
         state[FRONT_AIM] -= share * (state[FRONT_AIM] - state[FRONT_BEFORE])
         state[REAR_AIM] -= share * (state[REAR_AIM] - state[REAR_BEFORE])

@@ -1,4 +1,4 @@
-"""Shapes of a path that bends without a cause in the steering."""
+"""Discrepancy terms of the path curvature."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _PER_ROOT = 1.0 / math.sqrt(math.tau)
 
 @dataclass(frozen=True)
 class TurnAtLine(DiscrepancyTerm):
-    """A line on the floor turns what crosses it, one way across and the other way on the return."""
+    """A line on the floor turns a vehicle that crosses it, in opposite directions for opposite crossings."""
 
     name: ClassVar[str] = "turn_at_line"
     stage: ClassVar[Stage] = Stage.FLOOR
@@ -33,7 +33,7 @@ class TurnAtLine(DiscrepancyTerm):
 
     @staticmethod
     def drift(state: Floats, turn_rad: float, place_m: float, direction_rad: float) -> None:
-        """Turn while the line is near, by as much as it is crossed."""
+        """Add a yaw rate near the line, in proportion to the crossing speed."""
         if turn_rad != 0.0:
             c, s = math.cos(direction_rad), math.sin(direction_rad)
             beyond = (c * state[X] + s * state[Y] - place_m) / _EDGE_M
@@ -43,7 +43,7 @@ class TurnAtLine(DiscrepancyTerm):
 
 @dataclass(frozen=True)
 class TurnByHeading(DiscrepancyTerm):
-    """The path bends by where the vehicle points: ``κ ← κ + a cos ψ + b sin ψ``."""
+    """The path curvature depends on the heading: ``κ ← κ + a cos ψ + b sin ψ``."""
 
     name: ClassVar[str] = "turn_by_heading"
     stage: ClassVar[Stage] = Stage.BODY
@@ -56,15 +56,15 @@ class TurnByHeading(DiscrepancyTerm):
 
     @staticmethod
     def move(state: Floats, cosine: float, sine: float) -> None:
-        """Turn with the way driven."""
+        """Add the curvature to the yaw rate."""
         if cosine != 0.0 or sine != 0.0:
-            bend = cosine * math.cos(state[HEADING]) + sine * math.sin(state[HEADING])
-            state[YAW_RATE] += bend * state[FORWARD]
+            curvature = cosine * math.cos(state[HEADING]) + sine * math.sin(state[HEADING])
+            state[YAW_RATE] += curvature * state[FORWARD]
 
 
 @dataclass(frozen=True)
 class TwistAtStart(DiscrepancyTerm):
-    """As it begins to move the vehicle loses time and turns, the other way when it starts backward."""
+    """At the start of motion the vehicle is delayed and turns, with the sign of the driving direction."""
 
     name: ClassVar[str] = "twist_at_start"
     stage: ClassVar[Stage] = Stage.BODY
@@ -77,7 +77,7 @@ class TwistAtStart(DiscrepancyTerm):
 
     @staticmethod
     def move(state: Floats, twist_rad: float, lost_s: float) -> None:
-        """Twist and hold back within the first centimetres, by which `lost_s` is lost."""
+        """Turn and slow down within the first centimetres, with a total delay of `lost_s`."""
         if (twist_rad != 0.0 or lost_s != 0.0) and state[SPEED] != 0.0:
             since = state[DISTANCE] / (abs(state[SPEED]) * _START_S)
             if since < 40.0:
@@ -92,7 +92,7 @@ class TwistAtStart(DiscrepancyTerm):
 
 @dataclass(frozen=True)
 class WaveByDistance(DiscrepancyTerm):
-    """Speed and course vary with the distance driven in the run, once per period."""
+    """Speed and curvature vary periodically with the distance driven in the run."""
 
     name: ClassVar[str] = "wave_by_distance"
     stage: ClassVar[Stage] = Stage.BODY
@@ -110,11 +110,11 @@ class WaveByDistance(DiscrepancyTerm):
     def move(
         state: Floats, period_m: float, speed_cosine: float, speed_sine: float, turn_cosine: float, turn_sine: float
     ) -> None:
-        """Oscillate."""
+        """Modulate speed and yaw rate."""
         if period_m > 0.0:
             angle = math.tau * state[DISTANCE] / period_m
             c, s = math.cos(angle), math.sin(angle)
             state[YAW_RATE] += (turn_cosine * c + turn_sine * s) * state[FORWARD]
-            left = 1.0 + speed_cosine * c + speed_sine * s
-            state[FORWARD] *= left
-            state[LEFT] *= left
+            factor = 1.0 + speed_cosine * c + speed_sine * s
+            state[FORWARD] *= factor
+            state[LEFT] *= factor
