@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -171,3 +175,22 @@ def test_points_of_another_shape_are_an_input_error(points):
 def test_unknown_method_is_an_input_error():
     with pytest.raises(InputError, match="unknown circle fit"):
         fit_circle(LINE, "kasa")  # type: ignore[arg-type]
+
+
+@pytest.mark.slow
+def test_code_that_was_just_compiled_and_code_from_the_cache_give_the_same_numbers(tmp_path):
+    # A function that is not inlined exists twice in the process that compiles, optimised alone and within its caller.
+    code = (
+        "import numpy as np, sys; from agvbench.calibration import fit_circles; r = np.random.default_rng(0);"
+        "arcs = [np.column_stack([np.cos(a), np.sin(a)]) + r.normal(0.0, 3e-4, (len(a), 2))"
+        " for a in (np.linspace(0.0, e, 60 + 7 * k) for k, e in enumerate(np.linspace(0.3, 5.0, 40)))];"
+        "f = fit_circles(arcs); found = np.column_stack([f.center, f.radius, f.radius_stderr]);"
+        "sys.stdout.buffer.write(found.tobytes())"
+    )
+    environment = {**os.environ, "AGVBENCH_CACHE": str(tmp_path)}
+    first, second = (
+        subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, env=environment).stdout
+        for _ in range(2)
+    )
+    assert first == second
+    assert len(first) == 40 * 4 * 8

@@ -22,10 +22,12 @@ CURVATURE, SE_CURVATURE, POINT_X, POINT_Y, DIRECTION, SE_DIRECTION, POINTS = ran
 COLUMNS = 15
 
 _MAX_PASSES = 40
+# Every function but the last is inlined: one that is not exists twice in the process that compiles it, optimised alone
+# and within its caller, and the first session after an installation would differ from the next in the last bits.
 _FAST = {"reassoc", "contract", "arcp", "nsz"}  # NaN and infinity keep their meaning
 
 
-@cached_njit(fastmath=_FAST, error_model="numpy")
+@cached_njit(fastmath=_FAST, error_model="numpy", forceinline=True)
 def _centroid(flat: Floats, x: Floats, y: Floats) -> tuple[float, float]:
     """Copy x₀, y₀, x₁, … into `x`, `y` relative to their centroid, which is returned (NaN if one is not finite)."""
     n = len(flat) // 2
@@ -44,7 +46,7 @@ def _centroid(flat: Floats, x: Floats, y: Floats) -> tuple[float, float]:
     return mean_x, mean_y
 
 
-@cached_njit(fastmath=_FAST, error_model="numpy")
+@cached_njit(fastmath=_FAST, error_model="numpy", forceinline=True)
 def _moments(x: Floats, y: Floats, n: int) -> tuple[float, float, float, float, float, float]:
     xx = yy = xy = xz = yz = zz = 0.0
     for i in range(n):
@@ -58,7 +60,7 @@ def _moments(x: Floats, y: Floats, n: int) -> tuple[float, float, float, float, 
     return xx / n, yy / n, xy / n, xz / n, yz / n, zz / n
 
 
-@cached_njit(error_model="numpy")
+@cached_njit(error_model="numpy", forceinline=True)
 def _hyper_root(xx: float, yy: float, xy: float, xz: float, yz: float, zz: float) -> float:
     """Return the smallest positive root of the characteristic polynomial of the Hyper fit, by Newton from 0."""
     z = xx + yy
@@ -80,7 +82,7 @@ def _hyper_root(xx: float, yy: float, xy: float, xz: float, yz: float, zz: float
     return root
 
 
-@cached_njit(error_model="numpy")
+@cached_njit(error_model="numpy", forceinline=True)
 def _start(xx: float, yy: float, xy: float, xz: float, yz: float, root: float) -> tuple[float, float, float, float]:
     """Return (point x, point y, direction, curvature) of the algebraic circle A z + B x + C y + D = 0."""
     z = xx + yy
@@ -103,7 +105,7 @@ def _start(xx: float, yy: float, xy: float, xz: float, yz: float, root: float) -
     return away * normal_x, away * normal_y, direction, 2.0 * a / on_circle
 
 
-@cached_njit(fastmath=_FAST, error_model="numpy")
+@cached_njit(fastmath=_FAST, error_model="numpy", forceinline=True)
 def _distances(
     x: Floats, y: Floats, n: int, px: float, py: float, direction: float, offset: float, curvature: float, work: Floats
 ) -> None:
@@ -127,7 +129,7 @@ def _distances(
         by_curvature[i] = (e * (b - curvature * r2) - r2 * rho) * inverse
 
 
-@cached_njit(fastmath=_FAST, error_model="numpy")
+@cached_njit(fastmath=_FAST, error_model="numpy", forceinline=True)
 def _accumulate(
     x: Floats, y: Floats, n: int, px: float, py: float, direction: float, offset: float, curvature: float, work: Floats
 ) -> tuple[float, float, float, float, float, float, float, float, float, float]:
@@ -151,7 +153,7 @@ def _accumulate(
     return sse, g0, g1, g2, h00, h01, h02, h11, h12, h22
 
 
-@cached_njit(fastmath=True, error_model="numpy")
+@cached_njit(fastmath=True, error_model="numpy", forceinline=True)
 def _arc(x: Floats, y: Floats, n: int, px: float, py: float, direction: float, curvature: float) -> float:
     """Return the angle [rad] that the points span about the centre, seen from the middle of the arc."""
     cos, sin = math.cos(direction), math.sin(direction)
@@ -169,13 +171,13 @@ def _arc(x: Floats, y: Floats, n: int, px: float, py: float, direction: float, c
     return arc
 
 
-@cached_njit(error_model="numpy")
+@cached_njit(error_model="numpy", forceinline=True)
 def _side(cosine: float, sine: float) -> float:
     """Return the angle of the farthest point on one side, from whichever of its functions noise disturbs less."""
     return math.asin(min(sine, 1.0)) if cosine > 0.5 else math.acos(max(cosine, -1.0))
 
 
-@cached_njit(error_model="numpy")
+@cached_njit(error_model="numpy", forceinline=True)
 def _inverse(
     h00: float, h01: float, h02: float, h11: float, h12: float, h22: float
 ) -> tuple[float, float, float, float, float, float]:
@@ -188,7 +190,7 @@ def _inverse(
     return c00 / det, c01 / det, c02 / det, c11 / det, c12 / det, c22 / det
 
 
-@cached_njit(error_model="numpy")
+@cached_njit(error_model="numpy", forceinline=True)
 def _refine(
     x: Floats,
     y: Floats,
@@ -228,7 +230,7 @@ def _refine(
     return direction, offset, curvature, now[0], cov
 
 
-@cached_njit(error_model="numpy")
+@cached_njit(error_model="numpy", forceinline=True)
 def _write_circle(
     row: Floats,
     x0: float,
@@ -254,7 +256,7 @@ def _write_circle(
     row[SE_CENTER_Y] = math.sqrt(variance * max(along * ty * ty + left * tx * tx + cross, 0.0))
 
 
-@cached_njit(error_model="numpy")
+@cached_njit(error_model="numpy", forceinline=True)
 def _fit(flat: Floats, algebraic: bool, work: Floats, row: Floats) -> None:
     n = len(flat) // 2
     x, y = work[4], work[5]
