@@ -1,4 +1,4 @@
-"""Commands take time to arrive."""
+"""Delay of commands."""
 
 from __future__ import annotations
 
@@ -26,5 +26,5 @@ class ActuationDelay(Effect):
 
     @staticmethod
     def arrive(state: Floats, time_s: float, delay_s: float) -> float:
-        """Arrive later by the delay."""
+        """Return the time later by the delay."""
         return time_s + delay_s

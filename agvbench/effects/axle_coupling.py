@@ -1,4 +1,4 @@
-"""Each axle moves a little with the other."""
+"""Mechanical coupling of the axles."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class AxleCoupling(Effect):
 
     @staticmethod
     def steer(state: Floats, front_from_rear: float, rear_from_front: float) -> None:
-        """Add to each angle a share of the other, both as they were."""
+        """Add to each angle a share of the other, both before coupling."""
         front, rear = state[FRONT], state[REAR]
         state[FRONT] = front + front_from_rear * rear
         state[REAR] = rear + rear_from_front * front

@@ -1,4 +1,4 @@
-"""Axles whose wheels point apart brake each other."""
+"""Braking by the slower of both axles."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class AxleOverrun(Effect):
 
     @staticmethod
     def move(state: Floats, excess: float) -> None:
-        """Slow the body by what the slower axle costs."""
+        """Scale the motion of the body by the braking of the slower axle."""
         front, rear = abs(state[FRONT_SPEED]) * state[COS_FRONT], abs(state[REAR_SPEED]) * state[COS_REAR]
-        whole = front + rear
-        if excess > 0.0 and whole > 0.0:
-            left = 2.0 * (whole + excess * min(front, rear)) / ((2.0 + excess) * whole)
-            state[FORWARD] *= left
-            state[LEFT] *= left
-            state[YAW_RATE] *= left
+        total = front + rear
+        if excess > 0.0 and total > 0.0:
+            factor = 2.0 * (total + excess * min(front, rear)) / ((2.0 + excess) * total)
+            state[FORWARD] *= factor
+            state[LEFT] *= factor
+            state[YAW_RATE] *= factor

@@ -1,4 +1,4 @@
-"""The rear wheels run at another speed than the front ones."""
+"""Different speeds of front and rear wheels."""
 
 from __future__ import annotations
 
@@ -26,5 +26,5 @@ class AxleSpeedMismatch(Effect):
 
     @staticmethod
     def drive(state: Floats, ratio: float) -> None:
-        """Drive the rear axle faster."""
+        """Scale the speed of the rear axle."""
         state[REAR_SPEED] *= 1.0 + ratio

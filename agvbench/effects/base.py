@@ -1,4 +1,4 @@
-"""What every effect declares."""
+"""The base class of effects, and the declaration of their parameters."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from agvbench.vehicle.tables import from_table, to_table
 
 
 class Stage(StrEnum):
-    """Where in the chain from command to measured pose an effect acts; the chain is in this order."""
+    """Stages of the chain from command to measured pose, in this order."""
 
     TRANSPORT = "transport"
     SERVO = "servo"
@@ -37,11 +37,11 @@ class Parameter:
     unit
         SI unit, ``"–"`` for a ratio.
     null
-        The value at which the effect does nothing (∞ for a limit).
+        The value without influence (∞ for a limit).
     low, high
-        The values that make sense: what a file may say and a fit may search.
+        Bounds of the value, in files and in fits.
     scale
-        How large it is where it matters: a fit starts and steps in this measure.
+        Typical size of the value: unit of the initial values and steps of a fit.
     """
 
     name: str
@@ -91,24 +91,24 @@ class Effect:
     name
         The name in files and verdicts.
     stage
-        Where it acts.
+        The stage of the chain.
     relaxes
-        The assumption of the thesis (sections 3.2, 7.3, 9.2) that does not hold if the effect is there.
+        The assumption of the thesis (sections 3.2, 7.3, 9.2) that the effect violates.
     reference
-        Where the equation comes from.
+        Source of the equation.
     limits
-        Where the equation stops to hold, or what cannot be distinguished from it.
+        Limits of the equation, and effects that cannot be distinguished from it.
     local
-        Whether its hooks change over short times or ways, when the actuators rest (with place, time, distance): the
-        simulation then keeps its steps short.
+        Whether the hooks change over short times or distances while the actuators are settled (with position, time or
+        distance): the simulation then takes short steps.
     arrive
-        ``arrive(state, time_s, …) -> time_s``: when a command given at `time_s` takes effect; may change
+        ``arrive(state, time_s, …) -> time_s``: time at which a command given at `time_s` takes effect; may change
         ``REAR_WAIT`` and ``DRIVE_WAIT``.
     aim
-        Called when a command takes effect, which is in ``DRIVE_COMMAND`` …; may change where actuators settle and how
-        they get there: ``FRONT_AIM`` … ``BRAKE_LAG``, ``STEERING_INERTIA`` … ``BRAKING_LIMIT``.
+        Called when a command takes effect, which is in ``DRIVE_COMMAND`` …; may change the aims and the dynamics of the
+        actuators: ``FRONT_AIM`` … ``BRAKE_LAG``, ``STEERING_INERTIA`` … ``BRAKING_LIMIT``.
     steer
-        Called at every moment, as all that follow; may change ``FRONT`` and ``REAR``.
+        Called at every time of evaluation, as all hooks below; may change ``FRONT`` and ``REAR``.
     drive
         May change ``FRONT_SPEED`` and ``REAR_SPEED``; knows the tangents of the angles.
     move
@@ -116,7 +116,7 @@ class Effect:
     drift
         May change ``X_RATE``, ``Y_RATE`` and ``YAW_RATE``.
     capture
-        ``capture(state, time_s, …) -> time_s``: when the pose that is stamped `time_s` was true.
+        ``capture(state, time_s, …) -> time_s``: true time of the pose with the time stamp `time_s`.
     see
         Called for every frame; may change ``SEEN_X``, ``SEEN_Y`` and ``SEEN_HEADING``, given ``X``, ``Y``, ``HEADING``,
         and ``SEEN_LAG``.
@@ -140,10 +140,10 @@ class Effect:
 
     @staticmethod
     def beside(outputs: Floats, at_neutral: float, *parameters: float) -> Floats:
-        """Return a steering map's outputs (n,) [rad] beside this effect, of a map that was fitted without it.
+        """Convert the outputs of a steering map (n,) [rad], fitted without this effect, for a model with it.
 
-        Runs begin at neutral, where the map is `at_neutral`. A map that absorbed a cause may lie where the cause hides
-        its values, and a fit that began there would never identify them. By default nothing changes.
+        Runs begin at neutral, where the map is `at_neutral`. A map that absorbed an effect may lie where the effect
+        hides its values, and a fit from there would have a zero gradient. By default the outputs are unchanged.
         """
         del at_neutral, parameters
         return outputs
@@ -163,7 +163,7 @@ class Effect:
 
     @classmethod
     def hooks(cls) -> Mapping[str, Hook]:
-        """Return the hooks that this effect has, by name, in the order of the chain."""
+        """Return the hooks of this effect, by name, in the order of the chain."""
         return {name: hook for name in HOOKS if (hook := getattr(cls, name)) is not None}
 
     @property
@@ -173,7 +173,7 @@ class Effect:
 
     @property
     def is_null(self) -> bool:
-        """Whether every parameter is at the value that does nothing."""
+        """Whether every parameter has its null value."""
         return all(getattr(self, p.name) == p.null for p in self.parameters())
 
     def to_toml(self) -> dict[str, Any]:

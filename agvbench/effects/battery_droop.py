@@ -1,4 +1,4 @@
-"""The vehicle slows as its battery drains."""
+"""Decrease of the speed with battery discharge."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class BatteryDroop(Effect):
 
     @staticmethod
     def drive(state: Floats, per_hour: float) -> None:
-        """Slow both axles by the hours that have passed."""
-        left = 1.0 - per_hour * state[HOURS]
-        state[FRONT_SPEED] *= left
-        state[REAR_SPEED] *= left
+        """Scale both axle speeds by time."""
+        factor = 1.0 - per_hour * state[HOURS]
+        state[FRONT_SPEED] *= factor
+        state[REAR_SPEED] *= factor

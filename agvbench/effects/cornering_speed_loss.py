@@ -1,4 +1,4 @@
-"""Steered wheels cost speed."""
+"""Loss of speed with steered wheels."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class CorneringSpeedLoss(Effect):
 
     @staticmethod
     def drive(state: Floats, loss: float) -> None:
-        """Slow both axles."""
-        left = 1.0 - loss * (abs(state[TAN_FRONT]) + abs(state[TAN_REAR]))
-        state[FRONT_SPEED] *= left
-        state[REAR_SPEED] *= left
+        """Scale both axle speeds."""
+        factor = 1.0 - loss * (abs(state[TAN_FRONT]) + abs(state[TAN_REAR]))
+        state[FRONT_SPEED] *= factor
+        state[REAR_SPEED] *= factor

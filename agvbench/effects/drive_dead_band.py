@@ -1,4 +1,4 @@
-"""Small drive commands do not move the vehicle."""
+"""Dead band of the drive about neutral."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class DriveDeadBand(Effect):
 
     @staticmethod
     def aim(state: Floats, width: float) -> None:
-        """Take the dead band off the speed aimed at."""
+        """Subtract the dead band from the speed aim."""
         if width > 0.0:
             distance = abs(state[DRIVE_COMMAND])
             state[SPEED_AIM] *= 1.0 - width / distance if distance > width else 0.0

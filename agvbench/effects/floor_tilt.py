@@ -1,4 +1,4 @@
-"""The floor slopes."""
+"""Slope of the floor."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class FloorTilt(Effect):
 
     @staticmethod
     def drift(state: Floats, drift_mps: float, direction_rad: float) -> None:
-        """Drift while moving."""
+        """Add the drift velocity while moving."""
         if drift_mps != 0.0:
             square = state[FORWARD] * state[FORWARD] + state[LEFT] * state[LEFT]
             speed = -drift_mps * math.expm1(-square / _MOVING_MPS**2)

@@ -1,4 +1,4 @@
-"""The camera's idea of ahead is turned."""
+"""Misalignment of the measured heading."""
 
 from __future__ import annotations
 
@@ -26,5 +26,5 @@ class HeadingMisalignment(Effect):
 
     @staticmethod
     def see(state: Floats, angle_rad: float) -> None:
-        """Turn the heading."""
+        """Rotate the measured heading."""
         state[SEEN_HEADING] += angle_rad

@@ -1,4 +1,4 @@
-"""Fast turns are wider."""
+"""Lateral slip of the tyres (understeer)."""
 
 from __future__ import annotations
 
@@ -26,6 +26,6 @@ class LateralSlip(Effect):
 
     @staticmethod
     def move(state: Floats, gradient: float) -> None:
-        """Turn less, the more the faster."""
+        """Reduce the yaw rate with the square of the speed."""
         square = state[FORWARD] * state[FORWARD] + state[LEFT] * state[LEFT]
         state[YAW_RATE] /= 1.0 + gradient * square

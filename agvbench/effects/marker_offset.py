@@ -1,4 +1,4 @@
-"""Markers are not where the vehicle file says."""
+"""Offset of the marker centroid."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class MarkerOffset(Effect):
 
     @staticmethod
     def see(state: Floats, forward_m: float, left_m: float) -> None:
-        """Report the markers' centroid."""
+        """Displace the measured position."""
         if forward_m != 0.0 or left_m != 0.0:
             c, s = math.cos(state[HEADING]), math.sin(state[HEADING])
             state[SEEN_X] += c * forward_m - s * left_m

@@ -1,4 +1,4 @@
-"""Poses are stamped late."""
+"""Latency of the motion capture system."""
 
 from __future__ import annotations
 
@@ -26,5 +26,5 @@ class MocapLatency(Effect):
 
     @staticmethod
     def capture(state: Floats, time_s: float, latency_s: float) -> float:
-        """Look at an earlier pose."""
+        """Return the earlier time of the pose."""
         return time_s - latency_s

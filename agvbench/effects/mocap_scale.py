@@ -1,4 +1,4 @@
-"""The camera's metre is not a metre."""
+"""Scale error of the motion capture system."""
 
 from __future__ import annotations
 
@@ -26,6 +26,6 @@ class MocapScale(Effect):
 
     @staticmethod
     def see(state: Floats, scale: float) -> None:
-        """Scale the position."""
+        """Scale the measured position."""
         state[SEEN_X] *= 1.0 + scale
         state[SEEN_Y] *= 1.0 + scale

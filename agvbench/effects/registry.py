@@ -1,4 +1,4 @@
-"""Find effects by file: a module in this package that defines an `Effect` adds its name."""
+"""Registry of effects: every module of this package that defines an `Effect` registers it by its name."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def effect_from_toml(table: object, *, where: str = "effect") -> Effect:
     """
     if not isinstance(table, Mapping):
         raise VehicleError("must be a table", where=where, value=repr(table))
-    # Other laws of a cause derive from what this module's package defines, and are found when they are needed.
+    # Variants derive from classes of this package, and are therefore imported here only.
     from agvbench.effects.variants import effect_variants
 
     kinds: dict[str, type[Effect]] = {**effect_kinds(), **effect_variants()}

@@ -1,4 +1,4 @@
-"""Axles steer by another amount when driving backward."""
+"""Different steering gain in reverse."""
 
 from __future__ import annotations
 

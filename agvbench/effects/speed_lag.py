@@ -1,4 +1,4 @@
-"""Speed builds up and decays gradually."""
+"""First-order lag of the speed."""
 
 from __future__ import annotations
 
@@ -30,6 +30,6 @@ class SpeedLag(Effect):
 
     @staticmethod
     def aim(state: Floats, accelerate_s: float, brake_s: float) -> None:
-        """Give the drive its lags."""
+        """Set the lags of the drive."""
         state[ACCELERATE_LAG] = accelerate_s
         state[BRAKE_LAG] = brake_s

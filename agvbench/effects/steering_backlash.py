@@ -1,4 +1,4 @@
-"""Axles have play."""
+"""Backlash between servo and axle."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from agvbench.types import Floats
 class SteeringBacklash(Effect):
     """Free play between servo and axle: δ rests until its servo is half a width away, then follows at that distance.
 
-    The position of an axle depends on its previous positions. A run begins with both axles in the middle of the play.
+    The position of an axle depends on its previous positions. A run begins with both axles in the middle of the gap.
     """
 
     name: ClassVar[str] = "steering_backlash"
@@ -33,11 +33,11 @@ class SteeringBacklash(Effect):
 
     @staticmethod
     def beside(outputs: Floats, at_neutral: float, *parameters: float) -> Floats:
-        """Return the map of a servo whose axle stayed behind by half the play on its way from neutral."""
+        """Return the map of a servo whose axle lags by half the backlash on its way from neutral."""
         (width_rad,) = parameters
         return np.asarray(outputs + 0.5 * width_rad * np.sign(outputs - at_neutral))
 
     @staticmethod
     def aim(state: Floats, width_rad: float) -> None:
-        """Give the linkage its play."""
+        """Set the width of the backlash."""
         state[BACKLASH] = width_rad

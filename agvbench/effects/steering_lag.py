@@ -1,4 +1,4 @@
-"""Axles turn gradually."""
+"""First-order lag of the axle angles."""
 
 from __future__ import annotations
 
@@ -26,5 +26,5 @@ class SteeringLag(Effect):
 
     @staticmethod
     def aim(state: Floats, time_constant_s: float) -> None:
-        """Give the servos their lag."""
+        """Set the lag of the servos."""
         state[STEERING_LAG] = time_constant_s

@@ -1,4 +1,4 @@
-"""Axles turn no faster than their servos."""
+"""Rate limit of the servos."""
 
 from __future__ import annotations
 
@@ -28,5 +28,5 @@ class SteeringRateLimit(Effect):
 
     @staticmethod
     def aim(state: Floats, rate_rad_per_s: float) -> None:
-        """Give the servos their rate."""
+        """Set the rate limit of the servos."""
         state[STEERING_RATE] = rate_rad_per_s

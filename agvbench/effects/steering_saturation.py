@@ -1,4 +1,4 @@
-"""Axles stop at their end stops."""
+"""End stops of the axles."""
 
 from __future__ import annotations
 
@@ -26,6 +26,6 @@ class SteeringSaturation(Effect):
 
     @staticmethod
     def aim(state: Floats, front_rad: float, rear_rad: float) -> None:
-        """Keep both aims within their limits."""
+        """Limit both aims."""
         state[FRONT_AIM] = min(front_rad, max(-front_rad, state[FRONT_AIM]))
         state[REAR_AIM] = min(rear_rad, max(-rear_rad, state[REAR_AIM]))

@@ -1,4 +1,4 @@
-"""Wheels on one side are larger."""
+"""Unequal wheel diameters left and right."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Maps, kinematics and effects composed into a vehicle model."""
+"""Vehicle models: static maps, kinematics and effects."""
 
 from agvbench.model.examples import example_names, example_path, example_vehicle, thesis_vehicle
 from agvbench.model.nominal import nominal_model

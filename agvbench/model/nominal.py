@@ -1,4 +1,4 @@
-"""The nominal model of a vehicle: what is assumed before anything is measured."""
+"""The nominal vehicle model, valid before any measurement."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Poses that a vehicle model, with its effects, has under commands: of one run and of many."""
+"""Simulated poses of a vehicle model with its effects, for one run or many."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def rollout(
 ) -> list[Floats]:
     """Simulate a batch of runs and return their poses at given times.
 
-    Until a run's first command takes effect the vehicle stands at the initial pose with its axles at neutral. Each
-    command holds until the next, the last one for ever. The error of integration is about 1e-6 m and rad.
+    Until a run's first command takes effect the vehicle is at rest at the initial pose with its axles at neutral. Each
+    command holds until the next one, the last one for ever. The error of integration is about 1e-6 m and rad.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def rollout(
         SimulatedRun(given, np.asarray(times, dtype=np.float64), float(hour))
         for given, times, hour in zip(commands, t_s, hours, strict=True)
     ]
-    kinds = _beyond_the_library([type(effect) for effect in model.effects])
+    kinds = _outside_the_library([type(effect) for effect in model.effects])
     simulation = Simulation(model.geometry, model.neutral, runs, kinds=kinds)
     settled = simulation.settled(model.front, model.rear, model.drive)
     _check_angles(model, simulation, settled)
@@ -87,8 +87,8 @@ def simulate(
 ) -> Floats:
     """Return the poses that `model`, with its effects, has at the times `t_s` of one run.
 
-    Until the first command takes effect the vehicle stands at `initial` with its axles at neutral. Each command holds
-    until the next one, the last one for ever.
+    Until the first command takes effect the vehicle is at rest at `initial` with its axles at neutral. Each command
+    holds until the next one, the last one for ever.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def simulate(
 
     Examples
     --------
-    Ten seconds straight ahead at 0.3 m/s, and the same with a motor that takes its time:
+    Ten seconds straight ahead at 0.3 m/s, without and with a lag of the speed:
 
     >>> from agvbench.effects import SpeedLag
     >>> from agvbench.model import thesis_vehicle
@@ -162,8 +162,8 @@ def _check_angles(model: VehicleModel, simulation: Simulation, settled: Floats) 
             )
 
 
-def _beyond_the_library(kinds: Sequence[type[Effect]]) -> list[type[Effect]]:
-    """Return the further `kinds` of a simulation: variants all together, since each set takes long to compile."""
+def _outside_the_library(kinds: Sequence[type[Effect]]) -> list[type[Effect]]:
+    """Return the `kinds` outside the library: all variants if there is one, because each set is compiled separately."""
     variants = list(effect_variants().values())
     others = [kind for kind in kinds if kind not in effect_kinds().values() and kind not in variants]
     return [*(variants if any(kind in variants for kind in kinds) else []), *others]

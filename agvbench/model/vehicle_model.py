@@ -1,4 +1,4 @@
-"""The vehicle model of the bench: static maps, kinematics, and the effects it has been given."""
+"""The vehicle model: static maps, kinematics and effects."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from agvbench.vehicle.checks import coerce_float
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import StaticMap
 
-# Beyond this an axle has no sensible tangent, and no vehicle gets there.
+# The tangent diverges at 90°, and no vehicle has such an angle.
 _LARGEST_ANGLE_RAD = math.radians(89.0)
 
 
@@ -32,24 +32,24 @@ class VehicleModel:
     name
         The vehicle's name.
     geometry
-        Where its axles are.
+        Positions of the axles.
     command_unit
         ``"us"`` or ``"normalised"``.
     neutral
-        The command at which it stands and points (about) straight ahead, in command units.
+        Command at standstill with (about) straight axles, in command units.
     front, rear
         Command → axle angle [rad], counter-clockwise positive; `Fixed` for an axle that is not steered.
     drive
         Command → speed of the axles along their wheels [m/s].
     effects
-        What else is known of it, each effect at most once; they act in the order of their stages.
+        Further effects, each at most once; they act in the order of their stages.
     provenance
-        Where all this comes from; not part of the physics.
+        Origin of the model; not part of the physics.
 
     Raises
     ------
     VehicleError
-        If the parts do not make a vehicle.
+        If a field is invalid.
     """
 
     name: str
@@ -84,22 +84,22 @@ class VehicleModel:
                     raise VehicleError("axle angle is too large", where=f"maps.{axle}", value=value, limit=limit)
 
     def axle_angles(self, front_command: ArrayLike, rear_command: ArrayLike) -> tuple[Floats, Floats]:
-        """Return the settled angles of both axles [rad] for commands of any shape."""
+        """Return the steady-state angles of both axles [rad] for commands of any shape."""
         return self.front(front_command), self.rear(rear_command)
 
     def speed(self, drive_command: ArrayLike) -> Floats:
-        """Return the settled speed of the axles [m/s] for commands of any shape."""
+        """Return the steady-state speed of the axles [m/s] for commands of any shape."""
         return self.drive(drive_command)
 
     def command_for(self, front_rad: float, rear_rad: float, speed_mps: float) -> Command:
-        """Return the command that settles at these axle angles [rad] and this speed of the axles [m/s].
+        """Return the command whose steady state has these axle angles [rad] and this speed of the axles [m/s].
 
-        Where neutral already does it (standing still, an axle that is not steered), the command is neutral.
+        If neutral already gives the value (standstill, an axle that is not steered), the command is neutral.
 
         Raises
         ------
         VehicleError
-            If an axle cannot turn that far or the drive cannot go that fast, with the limit.
+            If an angle or the speed is out of reach, with the limit.
         """
         return Command(
             drive=self._inverse("drive", speed_mps, "speed", 1.0, "m/s"),
@@ -136,7 +136,7 @@ class VehicleModel:
 
     @property
     def calibration_hash(self) -> str:
-        """Sixteen hexadecimal digits that change if and only if the physics does (not the name or provenance)."""
+        """Sixteen hexadecimal digits that depend on the physics only, not on name or provenance."""
         return physics_digest(self)
 
     def _repr_html_(self) -> str:
@@ -183,7 +183,7 @@ _UNITS = {"front": ("°", math.degrees(1.0)), "rear": ("°", math.degrees(1.0)),
 
 
 def model_html(model: VehicleModel) -> str:
-    """Return its geometry, its static maps with the range of their outputs, and its effects with their parameters."""
+    """Return geometry, static maps with the range of their outputs, and effects with their parameters, as HTML."""
     geometry = model.geometry
     line = (
         f"front axle {geometry.front_axle_m:g} m ahead of the marker centroid, rear axle {geometry.rear_axle_m:g} m "

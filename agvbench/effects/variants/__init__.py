@@ -1,4 +1,4 @@
-"""Other laws of causes in the library: a cause keeps its name though its law is another."""
+"""Variants: other equations for effects of the library, whose names they keep in a diagnosis."""
 
 from agvbench.effects.variants.base import Variant, cause_of, effect_variants
 

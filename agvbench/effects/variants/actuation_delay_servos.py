@@ -1,4 +1,4 @@
-"""Commands take time to arrive: both servos the same, the drive another."""
+"""Delays of the servos and of the drive."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ class ActuationDelayServos(Variant):
 
     @classmethod
     def starts(cls, fitted: Mapping[str, float]) -> list[tuple[float, ...]]:
-        """Begin with a drive that obeys a little sooner than the servos, and a little later."""
+        """Start with a slightly smaller delay of the drive than of the servos, and with a slightly larger one."""
         delay = fitted["delay_s"]
         return [(1.1 * delay, 0.9 * delay), (0.9 * delay, 1.1 * delay)]
 
     @staticmethod
     def arrive(state: Floats, time_s: float, steering_s: float, drive_s: float) -> float:
-        """Let the servos' command arrive, and say how much later the drive's does."""
+        """Return the arrival of the servos' command, and set the relative delay of the drive's."""
         state[REAR_WAIT] = 0.0
         state[DRIVE_WAIT] = drive_s - steering_s
         return time_s + steering_s

@@ -1,4 +1,4 @@
-"""Commands take time to arrive, each channel its own."""
+"""Different delays of the command channels."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ class ActuationDelayUneven(Variant):
 
     @classmethod
     def starts(cls, fitted: Mapping[str, float]) -> list[tuple[float, ...]]:
-        """Begin with a drive that obeys a little sooner than the servos, and a little later."""
+        """Start with a slightly smaller delay of the drive than of the servos, and with a slightly larger one."""
         delay = fitted["delay_s"]
         return [(1.1 * delay, 1.1 * delay, 0.9 * delay), (0.9 * delay, 0.9 * delay, 1.1 * delay)]
 
     @staticmethod
     def arrive(state: Floats, time_s: float, front_s: float, rear_s: float, drive_s: float) -> float:
-        """Let the front servo's command arrive, and say how much later the others do."""
-        # Where it does nothing it leaves what the other law of delays has said.
+        """Return the arrival of the front servo's command, and set the relative delays of the others."""
+        # At null it keeps the relative delays of the other variant.
         if front_s != 0.0 or rear_s != 0.0 or drive_s != 0.0:
             state[REAR_WAIT] = rear_s - front_s
             state[DRIVE_WAIT] = drive_s - front_s

@@ -1,4 +1,4 @@
-"""What another law of a cause declares, and how it is found: one file each, beside this one."""
+"""The base class of variants, one per file of this package, and their registry."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from agvbench.registry import classes_by_file
 
 @dataclass(frozen=True)
 class Variant(Effect, ABC):
-    """The cause that the library calls ``variant_of``, with another law; in vehicle files it has its own name.
+    """Another equation for the effect ``variant_of`` of the library; vehicle files contain its own name.
 
-    A law with an exponent of its own stands for many: the library's is the one at which a diagnosis begins.
+    A variant with an exponent represents a family of equations. A diagnosis starts from the library's exponent.
     """
 
     variant_of: ClassVar[str]
@@ -25,17 +25,17 @@ class Variant(Effect, ABC):
     @classmethod
     @abstractmethod
     def starts(cls, fitted: Mapping[str, float]) -> list[tuple[float, ...]]:
-        """Return parameters to begin a fit with, given those of the library's law by name."""
+        """Return initial values of a fit, given the library's parameters by name."""
 
 
 @cache
 def effect_variants() -> Mapping[str, type[Variant]]:
-    """Return every other law by its own name, in alphabetical order."""
+    """Return every variant by its name, in alphabetical order."""
     found = {cls.name: cls for cls in classes_by_file("agvbench.effects.variants", Variant)}  # type: ignore[type-abstract]
     return MappingProxyType(dict(sorted(found.items())))
 
 
 def cause_of(name: str) -> str:
-    """Return what the library calls the cause whose law is called `name`."""
+    """Return the name of the effect that `name` is a variant of, or `name` itself."""
     variant = effect_variants().get(name)
     return name if variant is None else variant.variant_of

@@ -1,4 +1,4 @@
-"""Speed falls fast at first, then slowly."""
+"""Exponential decrease of the speed."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ class BatteryDroopExponential(Variant):
 
     @classmethod
     def starts(cls, fitted: Mapping[str, float]) -> list[tuple[float, ...]]:
-        """Begin with the library's slope at the beginning of the session."""
+        """Start with the library's slope at the beginning of the session."""
         return [(fitted["per_hour"] * hours, hours) for hours in (0.3, 1.0)]
 
     @staticmethod
     def drive(state: Floats, share: float, time_constant_h: float) -> None:
-        """Slow both axles by the hours that have passed."""
+        """Scale both axle speeds by time."""
         if share != 0.0:
-            left = 1.0 + share * math.expm1(-state[HOURS] / time_constant_h)
-            state[FRONT_SPEED] *= left
-            state[REAR_SPEED] *= left
+            factor = 1.0 + share * math.expm1(-state[HOURS] / time_constant_h)
+            state[FRONT_SPEED] *= factor
+            state[REAR_SPEED] *= factor

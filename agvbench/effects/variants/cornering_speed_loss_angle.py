@@ -1,4 +1,4 @@
-"""Steered wheels cost speed by a power of the angle."""
+"""Loss of speed by a power of the axle angle."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class CorneringSpeedLossAngle(CorneringSpeedLossPower):
 
     @staticmethod
     def drive(state: Floats, loss: float, exponent: float) -> None:
-        """Slow both axles."""
+        """Scale both axle speeds."""
         if loss != 0.0:
-            left = 1.0 - loss * (abs(state[FRONT]) ** exponent + abs(state[REAR]) ** exponent)
-            state[FRONT_SPEED] *= left
-            state[REAR_SPEED] *= left
+            factor = 1.0 - loss * (abs(state[FRONT]) ** exponent + abs(state[REAR]) ** exponent)
+            state[FRONT_SPEED] *= factor
+            state[REAR_SPEED] *= factor

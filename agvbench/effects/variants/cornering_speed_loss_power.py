@@ -1,4 +1,4 @@
-"""Steered wheels cost speed by a power of the angle's tangent."""
+"""Loss of speed by a power of the angle's tangent."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ class CorneringSpeedLossPower(Variant):
 
     @classmethod
     def starts(cls, fitted: Mapping[str, float]) -> list[tuple[float, ...]]:
-        """Begin with the library's law, and with twice the loss at the square."""
+        """Start near the library's equation, and with twice the loss at the square."""
         return [(fitted["loss"], 1.2), (2.0 * fitted["loss"], 2.0)]
 
     @staticmethod
     def drive(state: Floats, loss: float, exponent: float) -> None:
-        """Slow both axles."""
+        """Scale both axle speeds."""
         if loss != 0.0:
-            left = 1.0 - loss * (abs(state[TAN_FRONT]) ** exponent + abs(state[TAN_REAR]) ** exponent)
-            state[FRONT_SPEED] *= left
-            state[REAR_SPEED] *= left
+            factor = 1.0 - loss * (abs(state[TAN_FRONT]) ** exponent + abs(state[TAN_REAR]) ** exponent)
+            state[FRONT_SPEED] *= factor
+            state[REAR_SPEED] *= factor

@@ -1,4 +1,4 @@
-"""A moving vehicle drifts down the slope by a power of its speed."""
+"""Drift down the slope by a power of the speed."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ class FloorTiltPower(Variant):
 
     @classmethod
     def starts(cls, fitted: Mapping[str, float]) -> list[tuple[float, ...]]:
-        """Begin with half the way to proportion, and with proportion."""
+        """Start with exponents of 0.5 and 1."""
         return [(fitted["drift_mps"], fitted["direction_rad"], p) for p in (0.5, 1.0)]
 
     @staticmethod
     def drift(state: Floats, drift_mps: float, direction_rad: float, exponent: float) -> None:
-        """Drift while moving."""
+        """Add the drift velocity."""
         if drift_mps != 0.0:
             square = state[FORWARD] * state[FORWARD] + state[LEFT] * state[LEFT]
             speed = drift_mps * (square / (_TYPICAL_MPS * _TYPICAL_MPS)) ** (0.5 * exponent)

@@ -1,4 +1,4 @@
-"""Turning falls short by a power of the speed."""
+"""Lateral slip by a power of the speed."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ class LateralSlipPower(Variant):
 
     @classmethod
     def starts(cls, fitted: Mapping[str, float]) -> list[tuple[float, ...]]:
-        """Begin near the library's law, and with one in proportion to the speed."""
+        """Start near the library's exponent, and with an exponent of 1."""
         loss = fitted["gradient"] * _TYPICAL_MPS**2
         return [(loss, 1.8), (loss, 1.0)]
 
     @staticmethod
     def move(state: Floats, loss: float, exponent: float) -> None:
-        """Turn less, the more the faster."""
+        """Reduce the yaw rate with a power of the speed."""
         if loss != 0.0:
             square = state[FORWARD] * state[FORWARD] + state[LEFT] * state[LEFT]
             state[YAW_RATE] /= 1.0 + loss * (square / (_TYPICAL_MPS * _TYPICAL_MPS)) ** (0.5 * exponent)

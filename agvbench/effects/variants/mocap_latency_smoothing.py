@@ -1,4 +1,4 @@
-"""Poses are smoothed, and so late."""
+"""Smoothing of poses, with its latency."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ class MocapLatencySmoothing(Variant):
 
     @classmethod
     def starts(cls, fitted: Mapping[str, float]) -> list[tuple[float, ...]]:
-        """Begin with all of the library's latency by smoothing, and with half of it."""
+        """Start with all of the library's latency by smoothing, and with half of it."""
         late = fitted["latency_s"]
         return [((1.0 - share) * late, max(0.0, share * late)) for share in (1.0, 0.5)]
 
     @staticmethod
     def capture(state: Floats, time_s: float, latency_s: float, time_constant_s: float) -> float:
-        """Look at an earlier pose."""
+        """Return the earlier time of the pose."""
         return time_s - latency_s
 
     @staticmethod
     def see(state: Floats, latency_s: float, time_constant_s: float) -> None:
-        """Follow what is seen."""
+        """Set the time constant of smoothing."""
         state[SEEN_LAG] = time_constant_s

@@ -1,4 +1,4 @@
-"""Speed builds up and falls at a constant acceleration."""
+"""Constant acceleration and braking."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ class SpeedLagRamp(Variant):
 
     @classmethod
     def starts(cls, fitted: Mapping[str, float]) -> list[tuple[float, ...]]:
-        """Begin with ramps that go as far as the library's lags, at a typical speed and at twice that."""
+        """Start with ramps over the distance of the library's lags, at a typical speed and at twice that."""
         lags = [max(fitted[name], _SHORTEST_S) for name in ("accelerate_s", "brake_s")]
         return [(speed / (2.0 * lags[0]), speed / (2.0 * lags[1])) for speed in (_TYPICAL_MPS, 2.0 * _TYPICAL_MPS)]
 
     @staticmethod
     def aim(state: Floats, acceleration_mps2: float, braking_mps2: float) -> None:
-        """Give the drive its limits."""
+        """Set the limits of the drive."""
         state[ACCELERATION_LIMIT] = acceleration_mps2
         state[BRAKING_LIMIT] = braking_mps2

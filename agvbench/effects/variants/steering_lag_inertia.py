@@ -1,4 +1,4 @@
-"""Axles have to be set turning."""
+"""Second-order lag of the axle angles."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ class SteeringLagInertia(Variant):
 
     @classmethod
     def starts(cls, fitted: Mapping[str, float]) -> list[tuple[float, ...]]:
-        """Begin with critical damping, and with little inertia."""
+        """Start with critical damping, and with little inertia."""
         lag = fitted["time_constant_s"]
         return [(lag, 0.5 * lag), (lag, 0.2 * lag)]
 
     @staticmethod
     def aim(state: Floats, time_constant_s: float, inertia_s: float) -> None:
-        """Give the servos lag and inertia."""
+        """Set lag and inertia of the servos."""
         state[STEERING_LAG] = max(state[STEERING_LAG], time_constant_s)
         state[STEERING_INERTIA] = inertia_s

@@ -1,4 +1,4 @@
-"""Axles turn no faster than their servos, which have to get up to that rate."""
+"""Rate and acceleration limits of the servos."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ class SteeringRateLimitAcceleration(Variant):
 
     @classmethod
     def starts(cls, fitted: Mapping[str, float]) -> list[tuple[float, ...]]:
-        """Begin with servos that get up to the library's rate in 0.2 s, and in 0.05 s."""
+        """Start with servos that reach the library's rate in 0.2 s, and in 0.05 s."""
         rate = fitted["rate_rad_per_s"]
         return [(rate, rate / 0.2), (rate, rate / 0.05)]
 
     @staticmethod
     def aim(state: Floats, rate_rad_per_s: float, acceleration_rad_per_s2: float) -> None:
-        """Give the servos their limits."""
+        """Set the limits of the servos."""
         state[STEERING_RATE] = min(state[STEERING_RATE], rate_rad_per_s)
         state[STEERING_ACCELERATION] = acceleration_rad_per_s2

@@ -1,1 +1,1 @@
-"""The generated simulation: effects composed into one compiled loop."""
+"""The simulation of runs: a generated kernel with all effects, and its interface."""

@@ -1,10 +1,10 @@
 # mypy: warn-return-any=False
 """Servos and drive while one command is in force, in closed form.
 
-A servo obeys δ̇ = (aim − δ) / lag within ± rate: it ramps as long as the lag asks for more than the rate, and then its
-gap decays. Its way is monotone, so the axle behind it, with play, is known from where it stood. Servos of second order
-are in `agvbench.model.simulation.servos`. The drive obeys v̇ = (aim − v) / lag within limits of v̇, as a servo does;
-where it has to reverse it brakes to rest first. All of this is kept as a *plan*, an array.
+A servo obeys δ̇ = (aim − δ) / lag within ± rate: it ramps while the rate limit is active, and then its gap decays. Its
+motion is monotone, so that the position of the axle behind a backlash follows from the initial positions. Servos of
+second order are in `agvbench.model.simulation.servos`. The drive obeys v̇ = (aim − v) / lag within limits of v̇, as a
+servo does; to reverse it brakes to rest first. An array, the *plan*, holds all of this.
 """
 
 from __future__ import annotations
@@ -46,15 +46,15 @@ from agvbench.model.simulation.servos import (
 )
 from agvbench.types import Floats
 
-# A plan: for each servo (from `SERVOS` on), then for the drive. Moments are seconds since the command took effect.
-# A gap closes by a ramp and a decay: its size, how fast the ramp and the decay are, when the ramp ends and with what
-# left, when it has settled.
+# A plan: for each servo, then for the drive. Times are seconds since the command took effect.
+# A gap closes by a ramp and a decay: initial size, rate of the ramp, time constant of the decay, end of the ramp with
+# the gap left there, settling time.
 _GAP, _RATE, _LAG, _RAMPED_S, _RAMPED_GAP, _SETTLED_S = range(6)
-# A servo: such a gap, or a way of second order in the same place; then where it goes.
+# A servo: such a gap, or a response of second order in the same place; then aim, direction and axle position.
 _AIM, _DIRECTION, _AXLE = range(WAY_SIZE, WAY_SIZE + 3)
 _SERVO_SIZE = WAY_SIZE + 3
 _FRONT, _REAR = 0, _SERVO_SIZE
-# The drive: its gap at first, and if it reverses that from rest.
+# The drive: its initial gap, and if it reverses the gap from rest.
 _FIRST = 2 * _SERVO_SIZE
 _SECOND = _FIRST + 6
 _SPEED_AIM, _SPEED_DIRECTION, _RESTS_S = range(_SECOND + 6, _SECOND + 9)
@@ -67,17 +67,17 @@ PLAN_SIZE = _EVENTS + _EVENT_COUNT
 # commands have made it recently, the servos' rates.
 SERVOS_SIZE = 8
 
-# What is left of a gap [rad, m/s] when it counts as settled.
+# Below this gap [rad, m/s] an actuator counts as settled.
 _SETTLED = 1e-9
-# How long a step may be in time constants: at first, and per time constant that has passed.
+# Length of a step in time constants: the first one, and its growth per time constant.
 _FIRST_STEP, _STEP_GROWTH = 0.5, 0.15
 # The longest step while a servo or the drive ramps, and how close to a kink counts as there [s].
 _RAMP_STEP_S, _TOGETHER = 0.05, 1e-12
-# Where play and a way of second order meet, kinks are not looked for: steps are short [s].
+# With backlash and a servo of second order kinks are not computed: steps are short [s].
 _BACKLASH_STEP_S = 0.005
-# Numbers that ask for shorter steps are nonsense, but must not hang the loop [s].
+# Invalid parameters must not make the loop endless [s].
 _SHORTEST_S = 1e-6
-# Less inertia oscillates faster than any camera sees, undamped, and each oscillation would be simulated.
+# A smaller inertia oscillates faster than any camera resolves, and would need a step per oscillation.
 _LEAST_INERTIA_S = 1e-3
 
 
@@ -93,7 +93,7 @@ def _plan_gap(plan: Floats, at: int, gap: float, lag: float, rate: float) -> Non
 
 @compiled(inner=True)
 def _gap(plan: Floats, at: int, tau: float) -> float:
-    """Return how much of a gap is left `tau` seconds after it began to close."""
+    """Return the rest of a gap `tau` seconds after it began to close."""
     if tau >= plan[at + _SETTLED_S]:
         return 0.0
     if tau < plan[at + _RAMPED_S]:
@@ -103,7 +103,7 @@ def _gap(plan: Floats, at: int, tau: float) -> float:
 
 @compiled(inner=True)
 def _reaches(plan: Floats, at: int, gap: float) -> float:
-    """Return when `gap` is left of a gap; ∞ if it never is."""
+    """Return the time at which the rest of a gap is `gap`; ∞ if it never is."""
     if gap <= _SETTLED or gap >= plan[at + _GAP]:
         return math.inf
     if gap >= plan[at + _RAMPED_GAP]:
@@ -113,7 +113,7 @@ def _reaches(plan: Floats, at: int, gap: float) -> float:
 
 @compiled(inner=True)
 def _kink(plan: Floats, at: int) -> float:
-    """Return when a ramp ends; ∞ if there is none."""
+    """Return the end of a ramp; ∞ if there is none."""
     return plan[at + _RAMPED_S] if plan[at + _RAMPED_S] > 0.0 else math.inf
 
 
@@ -164,7 +164,7 @@ def _plan_drive(
 
 @compiled(inner=True)
 def plan_command(plan: Floats, state: Floats, servos: Floats) -> None:
-    """Plan how servos and drive, of which `servos` says where they are, go to the aims in `state`."""
+    """Compute the plan of servos and drive from their states `servos` to the aims in `state`."""
     plan[_HALF_BACKLASH], plan[_ORDER] = 0.5 * state[BACKLASH], FIRST_ORDER
     inert = state[STEERING_INERTIA] >= _LEAST_INERTIA_S
     if inert or state[STEERING_ACCELERATION] < math.inf:
@@ -198,7 +198,7 @@ def _way_position(plan: Floats, servo: int, tau: float) -> float:
 
 @compiled(inner=True)
 def _way_axle(plan: Floats, servo: int, tau: float) -> float:
-    """Return where the axle is: a servo of second order took it along to wherever it turned back."""
+    """Return the position of the axle behind a servo of second order, with its reversals."""
     axle = plan[servo + _AXLE]
     if plan[_HALF_BACKLASH] > 0.0:
         turns = plan[servo + TURNS_S]
@@ -226,7 +226,7 @@ def actuate(plan: Floats, tau: float, state: Floats) -> None:
 
 @compiled(inner=True)
 def actuate_any_order(plan: Floats, tau: float, state: Floats) -> None:
-    """Do as `actuate` does, also with servos of second order: of its own, since the branch costs the others a tenth."""
+    """Do as `actuate`, also for servos of second order; separate, because the branch would cost the others a tenth."""
     if plan[_ORDER] == FIRST_ORDER:
         actuate(plan, tau, state)
     else:
@@ -280,7 +280,7 @@ def _within_way(plan: Floats, servo: int, tau: float, longest: float) -> float:
 
 @compiled(inner=True)
 def step_length(plan: Floats, tau: float, longest: float) -> float:
-    """Return how long a step from `tau` may be: to the next kink at most, and short while a lag is under way."""
+    """Return the length of a step from `tau`: at most to the next kink, and short while a lag is active."""
     if plan[_ORDER] == FIRST_ORDER:
         step = _within_gap(plan, _REAR, tau, _within_gap(plan, _FRONT, tau, longest))
     else:

@@ -1,8 +1,8 @@
-"""Make one compiled kernel of the loop and the hooks of all effects.
+"""Composition of the compiled kernel, from the loop and the hooks of all effects.
 
-The kernel is a real module file, so that numba can keep its machine code: the text of `simulation_loop`, and of the
-files that it calls and that know of stages, with one function per stage that calls the hooks in turn. The file's name
-has a hash of every source that goes into it; see `agvbench.compiled`.
+The kernel is a module file, so that numba can cache its machine code. It contains the text of the loop and of the files
+that call stages, with one function per stage that calls the hooks in turn. The name of the file has a hash of every
+source in it; see `agvbench.compiled`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from agvbench.model.simulation import loop as simulation_loop
 from agvbench.model.simulation import stages as simulation_stages
 from agvbench.model.simulation import step as simulation_step
 
-# The files of the kernel that call stages, or what calls them, each after those that it imports.
+# The files of the kernel that call stages directly or indirectly, each after those that it imports.
 _PARTS = (simulation_frames, simulation_step, simulation_level, simulation_loop)
 _INSIDE = {simulation_stages.__name__, *(part.__name__ for part in _PARTS)}
 _ACTUATE, _ACTUATE_ANY_ORDER = "actuate", "actuate_any_order"
@@ -74,12 +74,12 @@ def kernel_text(kinds: Sequence[type[Effect]]) -> str:
 
 
 def _is_inside(node: ast.Import | ast.ImportFrom) -> bool:
-    """Whether what is imported is in the kernel itself: another part of it, or a stage."""
+    """Whether an import is from the kernel itself: another part of it, or a stage."""
     return isinstance(node, ast.ImportFrom) and node.module in _INSIDE
 
 
 def _chosen(node: ast.Import | ast.ImportFrom, second_order: bool) -> ast.Import | ast.ImportFrom:
-    """Return the import with servos of any order in place of those of first order, where one has to be."""
+    """Return the import with servos of any order in place of those of first order, if an effect needs them."""
     for alias in node.names:
         if alias.name == _ACTUATE and second_order:
             alias.name, alias.asname = _ACTUATE_ANY_ORDER, _ACTUATE
@@ -113,7 +113,7 @@ def _stage(name: str, calls: Sequence[str]) -> str:
 
 
 def _write(path: Path, text: str) -> None:
-    """Write the whole file or nothing: others may be writing it at the same time."""
+    """Write the whole file or nothing, because other processes may be writing it at the same time."""
     path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
     handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
     with os.fdopen(handle, "w", encoding="utf-8") as file:

@@ -1,6 +1,6 @@
-"""What the camera reports of the motion: at the start of a run, while the vehicle stands, and within each step.
+"""The poses that the camera reports: at the start of a run, at rest, and within each step.
 
-Frames are read off the polynomial of a step. A part of the kernel; see `agvbench.model.simulation.compose`.
+Frames are evaluated from the polynomial of a step. A part of the kernel; see `agvbench.model.simulation.compose`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from agvbench.types import Floats
 
 @compiled(inner=True)
 def start_run(s: Floats, p: Floats, initial: Floats, run: int) -> None:
-    """Put the true pose into `s` that the camera reports as `initial`: what it changes is small, so fixed point."""
+    """Put the true pose into `s` that the camera reports as `initial`, by fixed-point iteration."""
     s[X], s[Y], s[HEADING] = initial[run, 0], initial[run, 1], initial[run, 2]
     for _ in range(60):
         look(s, p)
@@ -29,7 +29,7 @@ def start_run(s: Floats, p: Floats, initial: Floats, run: int) -> None:
 
 @compiled(inner=True)
 def look(s: Floats, p: Floats) -> None:
-    """Put into `s` what a camera that does not smooth reports of the pose there."""
+    """Put into `s` the pose that a camera without smoothing reports."""
     s[SEEN_X], s[SEEN_Y], s[SEEN_HEADING] = s[X], s[Y], s[HEADING]
     see(s, p)
 
@@ -53,7 +53,7 @@ def wait(s: Floats, p: Floats, start: Floats, until: float, t_s: Floats, out: Fl
 
 @compiled(inner=True)
 def see_step(s: Floats, p: Floats, work: Floats, start: Floats, length: float) -> None:
-    """Note what a camera that smooths sees in a step."""
+    """Store the true poses of a step for a smoothing camera."""
     for i in range(COUNT + 1):
         x, y, heading = start[0], start[1], start[2]
         if i > 0:
@@ -70,7 +70,7 @@ def see_step(s: Floats, p: Floats, work: Floats, start: Floats, length: float) -
 
 @compiled(inner=True)
 def follow_seen(s: Floats, work: Floats, start: Floats, length: float, share: float, out: Floats) -> None:
-    """Report what a camera that smooths makes of a share of a step."""
+    """Report the pose of a smoothing camera after a share of a step."""
     for i in range(3):
         out[i] = smoothed(work, SMOOTH + i * (COUNT + 1), start[4 + i], length / s[SEEN_LAG], share)
 

@@ -1,4 +1,4 @@
-"""Collocation at four Gauss–Legendre nodes, and how the general simulation's kernel lays out its arrays."""
+"""Collocation at four Gauss–Legendre nodes, and the layout of the kernel's arrays."""
 
 from __future__ import annotations
 

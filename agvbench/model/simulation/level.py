@@ -1,4 +1,4 @@
-"""Where a simulation begins in mid-drive: the speed that was measured there, and the level of the drive from it.
+"""The initial state of a simulation in motion: the measured speed, and the drive level that it indicates.
 
 A part of the kernel; see `agvbench.model.simulation.compose`.
 """
@@ -13,15 +13,15 @@ from agvbench.model.simulation.layout import FRONT_AXLE, NODAL_DEVIATION, REAR_A
 from agvbench.model.simulation.step import set_motion
 from agvbench.types import Floats
 
-# Less of the drive's speed than this is left ahead only if numbers are nonsense.
+# Least ratio of longitudinal speed to drive speed; less occurs with invalid parameters only.
 _LEAST_PART = 0.05
-# Below this speed [m/s] the drive's level hardly shows.
+# Below this speed [m/s] the drive level is not significant.
 _LEVEL_MPS = 0.05
 
 
 @compiled(inner=True)
 def _longitudinal_speed(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, speed: float) -> float:
-    """Return how fast the centroid moves ahead at this speed of the drive, as the axles stand."""
+    """Return the longitudinal speed of the centroid at this speed of the drive, with the current axle angles."""
     s[TIME] = now
     s[HOURS] = vehicle[STARTED] + now / SECONDS_PER_HOUR
     s[FRONT], s[REAR], s[SPEED] = servos[2], servos[3], speed
@@ -31,7 +31,7 @@ def _longitudinal_speed(s: Floats, p: Floats, vehicle: Floats, servos: Floats, n
 
 @compiled(inner=True)
 def drive_speed(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, longitudinal: float) -> float:
-    """Return the drive's speed with which the centroid moves forward at `longitudinal`."""
+    """Return the speed of the drive at which the centroid has the speed `longitudinal`."""
     if longitudinal == 0.0:
         return 0.0
     part = _longitudinal_speed(s, p, vehicle, servos, now, longitudinal) / longitudinal
@@ -42,22 +42,22 @@ def drive_speed(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: floa
 def level_lift(
     s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, recent_speed: float, speed: float
 ) -> float:
-    """Return by how much the drive has recently been faster than its commands made it, beyond random deviation."""
+    """Return the difference of the drive speed to the commanded one, weighted by its significance."""
     deviation = vehicle[NODAL_DEVIATION]
     if deviation == math.inf:
         return 0.0
     commanded = _longitudinal_speed(s, p, vehicle, servos, now, servos[5])
     factor = (commanded * recent_speed + _LEVEL_MPS**2) / (commanded * commanded + _LEVEL_MPS**2)
-    off = math.log(factor) if factor > 0.0 else 0.0
-    if off == 0.0:
+    log_ratio = math.log(factor) if factor > 0.0 else 0.0
+    if log_ratio == 0.0:
         return 0.0
-    weight = 1.0 / (1.0 + (deviation / off) ** 4)
+    weight = 1.0 / (1.0 + (deviation / log_ratio) ** 4)
     return float(weight * (drive_speed(s, p, vehicle, servos, now, speed) - servos[5]))
 
 
 @compiled(inner=True)
 def see_late(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, start: Floats) -> None:
-    """Move the start ahead of what a camera reports that smooths: it is behind as in a steady motion."""
+    """Move the start ahead of the pose that a smoothing camera reports, by its delay in steady motion."""
     _longitudinal_speed(s, p, vehicle, servos, now, servos[4])
     cosine, sine, lag = math.cos(start[2]), math.sin(start[2]), s[SEEN_LAG]
     start[0] += lag * (cosine * s[FORWARD] - sine * s[LEFT])

@@ -1,9 +1,10 @@
-"""The general simulation's loop over runs, commands and steps, from command to measured pose.
+"""The loop of the simulation over runs, commands and steps, from command to measured pose.
 
-Steps end where a command takes effect and where the actuators' way has a kink, so that nothing in a step jumps.
+Steps end where a command takes effect and where the motion of an actuator has a kink, so that all quantities are smooth
+within a step.
 
-The stages imported here do nothing. The simulation runs this file's text, and that of the files that it calls, with
-the effects' hooks in their place; see `agvbench.model.simulation.compose`.
+The imported stages do nothing. The kernel contains the text of this file and of the files that it calls, with the hooks
+of the effects in place of the stages; see `agvbench.model.simulation.compose`.
 """
 
 from __future__ import annotations
@@ -53,9 +54,9 @@ from agvbench.types import Floats
 
 Integers = NDArray[np.int64]
 
-# The first step of a command, whose turn is not known yet [s]; how far a later one may turn [rad, and s at most 1].
+# Length of the first step of a command, with unknown yaw rate [s]; rotation in a later step [rad; s below 1 rad/s].
 _FIRST_STEP_S, _TURN_PER_STEP = 0.05, 0.15
-# No vehicle turns faster [rad/s]: numbers that say so are nonsense, but must not hang the loop.
+# Limit of the yaw rate [rad/s]: invalid parameters must not make the loop endless.
 _FASTEST_TURN = 150.0
 _TOGETHER = 1e-12
 # Recent speed: averaged with weights that fall with this time constant [s].
@@ -67,7 +68,7 @@ _STATE = 4
 def _obey(
     s: Floats, p: Floats, commands: Floats, settled: Floats, driven: int, front: int, rear: int, lift: float
 ) -> None:
-    """Put the command and what it aims at into `s`; a drive that is commanded to go goes faster by `lift`.
+    """Put commands and aims into `s`; a driving command gets the speed `lift` of the drive level.
 
     The drive obeys the row `driven`, the servos `front` and `rear`.
     """
@@ -100,7 +101,7 @@ def _hold(
     k: int,
     stop: int,
 ) -> int:
-    """Drive one command for `duration` seconds, or to the last frame; return the next frame."""
+    """Simulate one command for `duration` seconds, or to the last frame; return the next frame."""
     tau, longest = 0.0, min(vehicle[LONGEST_STEP], _FIRST_STEP_S)
     while tau < duration and k < stop:
         length = step_length(plan, tau, longest)
@@ -144,9 +145,9 @@ def _drive_run(
     k: int,
     stop: int,
 ) -> None:
-    """Drive one run, whose pose is held until `begin`; actuators obey what comes before."""
+    """Simulate one run, whose pose is held until `begin`; commands before that move the actuators only."""
     now, lift = -math.inf, 0.0
-    # At first nothing was before.
+    # There is no command before the first one.
     s[FRONT_COMMAND], s[REAR_COMMAND] = commands[first, 1], commands[first, 2]
     s[FRONT_BEFORE], s[REAR_BEFORE] = settled[first, 0], settled[first, 1]
     driven = front = rear = first
@@ -157,7 +158,7 @@ def _drive_run(
         end = min(to_front, to_rear, to_drive)
         _obey(s, p, commands, settled, driven, front, rear, lift)
         if now == -math.inf:
-            # At rest at neutral, for as long as it may have been.
+            # At rest with settled axles before the first command.
             servos[0] = servos[2] = s[FRONT_AIM]
             servos[1] = servos[3] = s[REAR_AIM]
             servos[4] = servos[5] = servos[6] = servos[7] = 0.0
@@ -208,24 +209,24 @@ def simulate(
     Parameters
     ----------
     vehicle
-        (5,): distances of front and rear axle from the marker centroid, longest step; the fourth is for the loop; and
-        how far, as a logarithm, the speed at the start may deviate by chance from what the commands before it made it:
-        beyond that the drive runs at another level (∞: never).
+        (5,): distances of front and rear axle from the marker centroid, longest step, a working value of the loop, and
+        the standard deviation of the logarithm of the initial speed over the speed that earlier commands result in:
+        a larger deviation indicates another drive level (∞: never).
     p
         Every effect's parameters.
     initial
-        (runs, 4): the measured pose at the start, and the speed ahead there (NaN: what the commands before made it); or
-        (runs, 5) with the recent speed ahead, which determines the drive's level.
+        (runs, 4): the measured initial pose, and the longitudinal speed (NaN: that of the earlier commands); or
+        (runs, 5) with the recent longitudinal speed, which determines the drive level.
     begins_s
-        (runs,): stamp of the measured pose at the start; NaN where the vehicle stands until its first command.
+        (runs,): time stamp of the initial pose; NaN for runs that are at rest until their first command.
     started_h
-        (runs,): when each run began, in hours since the session began.
+        (runs,): start of each run, in hours since the session began.
     commands, settled
-        (rows, 3): commands (drive, front, rear) from neutral; settled angles and speed (front, rear, drive).
+        (rows, 3): commands (drive, front, rear) from neutral; steady-state values (front, rear, speed).
     command_t_s, command_starts
-        (rows,), (runs + 1,): when each command was given, the first of a run at −∞; where each run's rows begin.
+        (rows,), (runs + 1,): time of each command, −∞ for the first of a run; index of each run's first row.
     t_s, starts
-        (frames,), (runs + 1,): stamps asked for, and where each run's begin.
+        (frames,), (runs + 1,): time stamps to report; index of each run's first frame.
     chosen
         Runs to simulate.
     out

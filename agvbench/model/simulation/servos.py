@@ -1,9 +1,9 @@
 # mypy: warn-return-any=False
 """Servos of second order while one command is in force, in closed form: with inertia, or with limited acceleration.
 
-A servo with inertia obeys τ² δ̈ + lag δ̇ = aim − δ, a linear equation. One with limited acceleration goes to its aim as
-fast as its rate and acceleration allow and stops there: three parabolas. Either may come in turning, and so go the
-wrong way at first; one with inertia may also oscillate about its aim. Where they turn back is known.
+A servo with inertia obeys τ² δ̈ + lag δ̇ = aim − δ, a linear equation. A servo with limited acceleration moves to its aim
+as fast as its rate and acceleration allow, and stops there: three parabolas. Either may have an initial rate away from
+its aim; a servo with inertia may also oscillate about its aim. The times of reversal are known in closed form.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from agvbench.types import Floats
 
 FIRST_ORDER, LIMITED, INERT = range(3)
 
-# A way: gap and its rate at first, when it has settled, when it first turns back and how often after that; then for
+# A response: initial gap and rate, settling time, first time of reversal and the interval of further ones; then for
 # inertia the decay, the frequency squared (negative: overdamped) and the lag squared, for limits the ends of the first
 # two parabolas, the rate between them and the acceleration.
 GAP, GAP_RATE, SETTLED_S, TURNS_S, TURNS_EVERY_S, _DECAY, _SQUARE, _TAU = range(8)
@@ -28,7 +28,7 @@ _LONG = 20.0
 
 @compiled(inner=True)
 def plan_inert(plan: Floats, way: int, gap: float, gap_rate: float, lag: float, tau: float) -> None:
-    """Plan the way of a servo with inertia; its `gap` is signed."""
+    """Compute the response of a servo with inertia; its `gap` is signed."""
     decay, square = 0.5 * lag / (tau * tau), 1.0 / (tau * tau) - 0.25 * lag * lag / tau**4
     plan[way + GAP], plan[way + GAP_RATE] = gap, gap_rate
     plan[way + _DECAY], plan[way + _SQUARE], plan[way + _TAU] = decay, square, tau
@@ -44,7 +44,7 @@ def plan_inert(plan: Floats, way: int, gap: float, gap_rate: float, lag: float, 
 
 @compiled(inner=True)
 def _plan_turns(plan: Floats, way: int) -> None:
-    """Find when the rate, c g′ − s (decay g′ + g / τ²), is zero."""
+    """Compute the times of reversal, at which the rate c g′ − s (decay g′ + g / τ²) is zero."""
     tau, square = plan[way + _TAU], plan[way + _SQUARE]
     rate = plan[way + GAP_RATE]
     against = plan[way + _DECAY] * rate + plan[way + GAP] / (tau * tau)
@@ -79,10 +79,10 @@ def _inert(plan: Floats, way: int, t: float) -> tuple[float, float]:
 
 @compiled(inner=True)
 def plan_limited(plan: Floats, way: int, gap: float, gap_rate: float, rate: float, acceleration: float) -> None:
-    """Plan the way of a servo with limited rate and acceleration; its `gap` is signed."""
+    """Compute the response of a servo with limited rate and acceleration; its `gap` is signed."""
     plan[way + GAP], plan[way + GAP_RATE] = gap, gap_rate
     plan[way + TURNS_S] = plan[way + TURNS_EVERY_S] = math.inf
-    # It goes whither there is still a gap when it has stopped.
+    # It moves towards the gap that remains after braking to rest.
     stopped = gap + 0.5 * gap_rate * abs(gap_rate) / acceleration
     towards = math.copysign(1.0, stopped)
     coming = -towards * gap_rate
@@ -122,7 +122,7 @@ def way_at(plan: Floats, way: int, order: int, t: float) -> tuple[float, float]:
 
 @compiled(inner=True)
 def longest_step(plan: Floats, way: int, order: int, t: float, longest: float) -> float:
-    """Return how long a step from `t` may be for the motion to be smooth within it."""
+    """Return the length of a step from `t` within which the motion is smooth."""
     if t >= plan[way + SETTLED_S] or order == LIMITED:
         return longest
     tau, decay, square = plan[way + _TAU], plan[way + _DECAY], plan[way + _SQUARE]

@@ -35,19 +35,19 @@ _CHANNELS = ("drive", "front", "rear")
 
 @dataclass(frozen=True)
 class SimulatedRun:
-    """What is to be simulated of one run.
+    """The input of the simulation for one run.
 
     Parameters
     ----------
     commands
         Its commands, in the vehicle's unit.
     t_s
-        Stamps of the frames to predict [s], ascending, on the commands' clock.
+        Time stamps of the frames to predict [s], ascending, on the commands' clock.
     started_h
-        When it began, in hours since the session began.
+        Start of the run, in hours since the session began.
     begins_s
-        Stamp of the initial pose, for a window of free driving: commands before it only set the actuators in motion.
-        None for a run from rest, where the vehicle stands at the initial pose until its first command takes effect.
+        Time stamp of the initial pose, for a window of free driving: commands before it move the actuators only. None
+        for a run from rest, where the vehicle is at rest at the initial pose until its first command takes effect.
     preset
         Front and rear command at which the axles had settled before the first command; by default neutral.
     """
@@ -67,14 +67,14 @@ class SimulatedRun:
 class Simulation:
     """A compiled simulation of many runs with every effect of the registry, composed in the order of the chain.
 
-    Steps are aligned with the moments at which commands take effect and with the kinks of the actuators' way, so
-    predictions are smooth in every parameter, delays and lags included. Effects at null do nothing and cost little: one
-    kernel serves every combination.
+    Steps end where commands take effect and where the motion of an actuator has a kink. Predictions are therefore
+    smooth in every parameter, delays and lags included. Effects at null do nothing and cost little: one kernel serves
+    every combination.
 
     Parameters
     ----------
     geometry
-        Where the axles are.
+        Positions of the axles.
     neutral
         The neutral command, in command units.
     runs
@@ -82,7 +82,7 @@ class Simulation:
     step_s
         Longest step [s] while an effect is `local`; else steps are as long as the motion allows.
     kinds
-        Further effects than those of the registry, say empirical terms: classes in a module of their own.
+        Effects outside the registry, such as discrepancy terms: classes at module level.
 
     Attributes
     ----------
@@ -95,9 +95,9 @@ class Simulation:
     drive, front, rear : ndarray, shape (rows,)
         Commands of each row, in the vehicle's unit.
     row_starts, frame_starts : ndarray, shape (runs + 1,)
-        Where each run's rows and frames begin.
+        Index of the first row and frame of each run.
     row_runs, frame_runs : ndarray, shape (rows,), (frames,)
-        Which run each row or frame belongs to.
+        Index of the run of each row and frame.
     t_s : ndarray, shape (frames,)
         Stamps.
 
@@ -153,7 +153,7 @@ class Simulation:
         return len(self._started_h)
 
     def settled(self, front: Map, rear: Map, drive: Map) -> Floats:
-        """Return (rows, 3): settled front and rear angle [rad] and speed [m/s] of every row, by these maps."""
+        """Return steady-state front and rear angle [rad] and speed [m/s] of every row, (rows, 3), by these maps."""
         columns = (front(self.front), rear(self.rear), drive(self.drive))
         return np.column_stack([np.broadcast_to(np.asarray(c, dtype=np.float64), self.drive.shape) for c in columns])
 
@@ -182,7 +182,7 @@ class Simulation:
         return tuple(effect for effect in made if not effect.is_null)
 
     def indices(self, *effects: str) -> Integers:
-        """Return where the parameters of the effects called `effects` are in a parameter vector."""
+        """Return the indices of the parameters of the effects called `effects` in a parameter vector."""
         wanted = [i for i, name in enumerate(self.parameter_names) if name.partition(".")[0] in effects]
         return np.array(wanted, dtype=np.int64)
 
@@ -201,7 +201,7 @@ class Simulation:
         Parameters
         ----------
         settled
-            (rows, 3): settled front angle, rear angle, speed of every row; see `settled`.
+            (rows, 3): steady-state front angle, rear angle and speed of every row; see `settled`.
         parameters
             (p,); see `parameters`. Nothing checks that they are within bounds.
         initial

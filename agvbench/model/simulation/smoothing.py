@@ -1,8 +1,8 @@
 # mypy: warn-return-any=False
-"""What a camera reports that smooths: m′ = (q − m) / lag, where q is what it sees.
+"""A camera that smooths: m′ = (q − m) / lag, where q is the true pose that it measures.
 
-Within a step q is the polynomial through its values at the step's start and at the nodes; m follows in closed form,
-or where the step is much shorter than the lag, so that the closed form cancels, by quadrature.
+Within a step q is the polynomial through its values at the step's start and at the nodes, and m follows in closed form.
+In steps much shorter than the lag the closed form would cancel, and quadrature replaces it.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ _NODES, _WEIGHTS = 0.5 + 0.5 * _GAUSS[0], 0.5 * _GAUSS[1]
 #: From values at a step's start and nodes to coefficients of 1, share, share² …
 _TO_POWERS = np.linalg.inv(np.vander(np.concatenate((np.zeros(1), _NODES)), _POWERS, increasing=True))
 
-# Coefficients of what is seen: x, y and heading, one after another.
+# Coefficients of q: x, y and heading in sequence.
 SMOOTH_SIZE = 3 * _POWERS
-# So long a step, in lags, that the closed form does not cancel.
+# Shortest step, in time constants, for which the closed form does not cancel.
 _LONG = 0.2
 
 
 @compiled(inner=True)
 def bend(work: Floats, at: int) -> None:
-    """Turn five values of what is seen, at the step's start and nodes, into coefficients, for x, y and heading."""
+    """Convert values of q at the start and the nodes of a step to polynomial coefficients, for x, y and heading."""
     for channel in range(at, at + SMOOTH_SIZE, _POWERS):
         first, a, b, c, d = work[channel], work[channel + 1], work[channel + 2], work[channel + 3], work[channel + 4]
         a, b, c, d = a - first, b - first, c - first, d - first
@@ -40,7 +40,7 @@ def bend(work: Floats, at: int) -> None:
 
 @compiled(inner=True)
 def smoothed(work: Floats, channel: int, before: float, lags: float, share: float) -> float:
-    """Return what is reported after a share of a step that is so many `lags` long, if `before` was at its start."""
+    """Return m after a share of a step of length `lags` (in time constants), with `before` at its start."""
     decay = math.exp(-lags * share)
     q0, q1, q2, q3, q4 = work[channel], work[channel + 1], work[channel + 2], work[channel + 3], work[channel + 4]
     if lags >= _LONG:
@@ -50,9 +50,9 @@ def smoothed(work: Floats, channel: int, before: float, lags: float, share: floa
         p1 = q1 - 2.0 / lags * p2
         p0 = -p1 / lags
         return q0 + p0 + share * (p1 + share * (p2 + share * (p3 + share * p4))) + decay * (before - q0 - p0)
-    recent_speed = 0.0
+    integral = 0.0
     for i in range(_COUNT):
         u = share * _NODES[i]
-        seen = u * (q1 + u * (q2 + u * (q3 + u * q4)))
-        recent_speed += _WEIGHTS[i] * math.exp(-lags * (share - u)) * seen
-    return q0 + lags * share * recent_speed + decay * (before - q0)
+        value = u * (q1 + u * (q2 + u * (q3 + u * q4)))
+        integral += _WEIGHTS[i] * math.exp(-lags * (share - u)) * value
+    return q0 + lags * share * integral + decay * (before - q0)

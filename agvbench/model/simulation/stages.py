@@ -1,6 +1,6 @@
-"""The stages of a vehicle without effects: none does anything.
+"""The stages of a vehicle without effects, which do nothing.
 
-`agvbench.model.simulation.compose` puts the hooks of all effects in the place of these functions.
+`agvbench.model.simulation.compose` replaces these functions by calls of the hooks of all effects.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ def arrive(s: Floats, time_s: float, p: Floats) -> float:
 
 @compiled(inner=True)
 def aim(s: Floats, p: Floats) -> None:
-    """Change what a command makes the actuators aim at, and how they get there."""
+    """Change the aims of the actuators under a command, and their dynamics."""
 
 
 @compiled(inner=True)

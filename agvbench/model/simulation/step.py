@@ -1,7 +1,7 @@
-"""One step of the general simulation: nothing in it jumps.
+"""One step of the simulation, within which all quantities are smooth.
 
-The motion is taken at the four Gauss–Legendre nodes; heading and position follow by collocation (Hairer, Nørsett and
-Wanner 1993, section II.7). A part of the kernel; see `agvbench.model.simulation.compose`.
+The motion is evaluated at the four Gauss–Legendre nodes; heading and position follow by collocation (Hairer, Nørsett
+and Wanner 1993, section II.7). A part of the kernel; see `agvbench.model.simulation.compose`.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def take_step(
         actuate(plan, tau + elapsed, s)
         s[TIME] = begin + tau + elapsed
         s[HOURS] = vehicle[STARTED] + s[TIME] / SECONDS_PER_HOUR
-        # Good enough for what depends on the place: the velocity at the last node.
+        # Position for effects that depend on it, extrapolated with the velocity at the last node.
         s[X], s[Y], s[HEADING] = start[0] + elapsed * x_rate, start[1] + elapsed * y_rate, start[2]
         s[DISTANCE] = start[3] + elapsed * abs(s[SPEED])
         set_motion(s, p, vehicle[FRONT_AXLE], vehicle[REAR_AXLE])
