@@ -233,7 +233,7 @@ def known_trials(path: Path, repeats: int) -> dict[tuple[str, int], Trial]:
         content = read_json(path)
         found = msgspec.convert(_with_nan(content["each"]), list[Trial])
         was = content["repeats"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, msgspec.ValidationError) as error:
         raise FileError(
             "holds no challenge to go on with", where=path, value=str(error).splitlines()[0],
             remedy="leave out --resume to begin anew",

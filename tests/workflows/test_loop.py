@@ -148,7 +148,7 @@ def test_everything_is_there_and_fits_together(driven):
     assert list(plans) == [str(k) for k in range(1, 9)]
     assert all(abs(plan["remaining"]["along_mm"]) < 0.5 for plan in plans.values())
     html = (directory / "report.html").read_text()
-    for heading in ("Before and after", "What the calibrated model lacks", "What corrected plans make up for"):
+    for heading in ("Before and after", "What the calibrated model lacks", "What corrected plans compensate"):
         assert heading in html
     assert not list(directory.glob(".*"))
 
