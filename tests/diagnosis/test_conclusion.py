@@ -55,12 +55,12 @@ def test_what_lacks_is_above_the_floor_and_beyond_scatter(after_floors, lack_of_
 @pytest.mark.parametrize(
     ("effects", "significant", "rest", "verdict", "why"),
     [
-        ((), False, [], Verdict.ADEQUATE, "as repeats agree"),
-        ((NamedEffect("steering_lag", {}, (), {}),), False, [], Verdict.NAMED, "to the floor"),
+        ((), False, [], Verdict.ADEQUATE, "with refitted maps"),
+        ((NamedEffect("steering_lag", {}, (), {}),), False, [], Verdict.NAMED, "with the named effects"),
         ((NamedEffect("steering_lag", {}, ("mocap_latency",), {}),), False, [], Verdict.AMBIGUOUS, "equally well"),
         ((NamedEffect("steering_lag", {}, (), {}),), True, [PATCH], Verdict.UNKNOWN, "depends on x_m"),
         ((), True, [], Verdict.UNKNOWN, "none of the covariates"),
-        ((), True, [Dependence(RANDOM_PHASE, "speed", 1e-3, 0.5)], Verdict.UNKNOWN, "another phase in every run"),
+        ((), True, [Dependence(RANDOM_PHASE, "speed", 1e-3, 0.5)], Verdict.UNKNOWN, "random phase in every run"),
     ],
 )
 def test_a_verdict_says_what_is_known_and_what_is_not(effects, significant, rest, verdict, why):
