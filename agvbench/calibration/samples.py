@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from agvbench.errors import FitError
 from agvbench.types import Floats
 
+# Smaller values, whose squares underflow, are zero: no fit divides by them or takes their logarithm.
+_ZERO = 1e-100
+
 
 @dataclass(frozen=True)
 class CurvePoints:
@@ -44,6 +47,7 @@ class CurvePoints:
         x, y = np.asarray(command, dtype=np.float64), np.asarray(value, dtype=np.float64)
         if x.ndim != 1 or x.shape != y.shape:
             raise FitError("commands and values must be two lists of equal length", value=f"{x.shape} and {y.shape}")
+        y = np.where(np.abs(y) < _ZERO, 0.0, y)
         known = np.isfinite(x) & np.isfinite(y)
         commands, group = np.unique(x[known], return_inverse=True)
         repeats = [y[known][group == k] for k in range(len(commands))]

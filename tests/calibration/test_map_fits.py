@@ -6,7 +6,7 @@ import csv
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from agvbench.calibration import (
@@ -191,6 +191,8 @@ def test_a_drive_in_one_direction_gets_a_table():
 
 
 @given(st.lists(st.tuples(st.integers(900, 2100), st.floats(-1, 1)), max_size=30))
+@example([(900, 1.0), (901, 0.0), (902, 0.0), (903, 1.1298916416127903e-308)])
+@example([(900, 0.0), (901, 0.0), (902, 0.0), (903, 1.1298916416127903e-308)])
 @settings(max_examples=80, deadline=None)
 def test_any_measurements_give_maps_that_are_monotone_or_a_fit_error(pairs):
     command, value = [float(c) for c, _ in pairs], [v for _, v in pairs]

@@ -37,9 +37,10 @@ def agvbench(wheel, tmp_path_factory):
     dependencies = root / "dependencies"
     dependencies.mkdir()
     for entry in Path(site.getsitepackages()[0]).iterdir():
-        if not entry.name.startswith(("agvbench", "_agvbench", "__editable__")) and entry.suffix != ".pth":
+        if not entry.name.startswith(("agvbench", "_agvbench", "__editable__", "_editable")):
             (dependencies / entry.name).symlink_to(entry)
-    (packages / "dependencies.pth").write_text(str(dependencies))
+    # As a site directory: packages there may have files of paths themselves.
+    (packages / "dependencies.pth").write_text(f"import site; site.addsitedir({str(dependencies)!r})")
     python = root / "bin" / "python"
 
     def run(*arguments, cwd):
