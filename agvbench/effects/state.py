@@ -1,7 +1,7 @@
 """The state of one vehicle at one time, which the hooks of effects read and change: an array with named indices.
 
-Angles are counter-clockwise positive, speeds forward positive; units are SI and radians. `Hook` says which hook
-may change what.
+Angles are counter-clockwise positive, speeds forward positive; units are SI and radians. `Effect` lists the hooks
+and the indices that each may change; the how-to "Write an effect" describes the indices.
 """
 
 from __future__ import annotations
