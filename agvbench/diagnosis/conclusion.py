@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from agvbench.diagnosis.context import DiagnosisContext
+from agvbench.diagnosis.criteria import RESIDUAL
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.data.splits import Split
 from agvbench.diagnosis.design.propose import with_next_experiment
@@ -15,7 +16,7 @@ from agvbench.diagnosis.findings.residual_table import with_residuals
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.residuals.body_rates import residual_rates
-from agvbench.diagnosis.residuals.covariate_test import ALPHA, LIKELY, RANDOM_PHASE, Dependence, dependences
+from agvbench.diagnosis.residuals.covariate_test import RANDOM_PHASE, Dependence, dependences
 from agvbench.diagnosis.residuals.periodic import periodic_disturbance
 from agvbench.diagnosis.residuals.residuals import MEDIAN, end_covariance
 from agvbench.diagnosis.result import Diagnosis, HeldOut, NamedEffect, Verdict
@@ -110,8 +111,8 @@ def _remaining_dependences(
         without = term_selection.without
         without_term = Predictor(batch, without.names).predict(without.fit.parameters)
     rates = residual_rates(readings, without_term)
-    likely = dependences(rates, readings.group, seed, readings.start, alpha=LIKELY)
-    rest = [d for d in likely if d.p_value < ALPHA]
+    likely = dependences(rates, readings.group, seed, readings.start, alpha=RESIDUAL.likely_alpha)
+    rest = [d for d in likely if d.p_value < RESIDUAL.dependence_alpha]
     # A position that every run passes can look periodic: the test for a period uses the residual with the term.
     if (periodic := periodic_disturbance(residual_rates(readings, poses), readings.group, seed)) is not None:
         rest = [periodic, *(d for d in rest if d.covariate != RANDOM_PHASE)]

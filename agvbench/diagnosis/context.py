@@ -6,24 +6,12 @@ from collections import Counter
 from dataclasses import dataclass
 
 from agvbench.calibration.campaign_protocol import HeaderLike
+from agvbench.diagnosis.criteria import FREE_DRIVING, SELECTION, stated_criteria
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.result import Diagnosis, Verdict
 from agvbench.errors import CampaignError
 from agvbench.model import VehicleModel
 from agvbench.vehicle.geometry import Geometry
-
-
-def provenance(header: HeaderLike, readings: Readings, seed: int, *, runs_used: int) -> dict[str, object]:
-    """Return version, campaign, seed, and the numbers of runs used and of runs excluded, by reason."""
-    from agvbench import __version__
-
-    return {
-        "agvbench": __version__,
-        "campaign": header.name,
-        "seed": seed,
-        "runs_used": runs_used,
-        "runs_refused": dict(Counter(readings.refused.values())),
-    }
 
 
 def require_runs(readings: Readings, header: HeaderLike) -> None:
@@ -47,8 +35,17 @@ class DiagnosisContext:
         return Diagnosis(Verdict.NOT_IDENTIFIABLE, why, provenance=self.provenance(readings))
 
     def provenance(self, readings: Readings) -> dict[str, object]:
-        """Return the provenance of the diagnosis."""
-        if readings.initial_states is None:
-            return provenance(self.header, readings, self.seed, runs_used=len(readings))
-        driven = {run.run_id.rpartition("@")[0] for run in readings.runs}
-        return provenance(self.header, readings, self.seed, runs_used=len(driven)) | {"windows_used": len(readings)}
+        """Return version, campaign, seed, numbers of runs used and of runs excluded by reason, and the criteria."""
+        from agvbench import __version__
+
+        windows = readings.initial_states is not None
+        driven = {run.run_id.rpartition("@")[0] if windows else run.run_id for run in readings.runs}
+        return {
+            "agvbench": __version__,
+            "campaign": self.header.name,
+            "seed": self.seed,
+            "runs_used": len(driven),
+            "runs_refused": dict(Counter(readings.refused.values())),
+            **({"windows_used": len(readings)} if windows else {}),
+            "criteria": stated_criteria(FREE_DRIVING if windows else SELECTION),
+        }

@@ -12,6 +12,7 @@ from agvbench.diagnosis.checks.consistency import require_consistent_repeats, re
 from agvbench.diagnosis.checks.sufficiency import insufficient_data
 from agvbench.diagnosis.conclusion import conclude
 from agvbench.diagnosis.context import DiagnosisContext
+from agvbench.diagnosis.criteria import DATA
 from agvbench.diagnosis.data.readings import Readings, read_runs
 from agvbench.diagnosis.data.splits import split_runs
 from agvbench.diagnosis.data.windows import horizon_of
@@ -24,7 +25,7 @@ from agvbench.diagnosis.selection.candidates import given_effects
 from agvbench.diagnosis.selection.fitted_models import OnProgress
 from agvbench.diagnosis.selection.initial_steering import choose_initial_steering, reconsider_initial_steering
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
-from agvbench.diagnosis.selection.subsampling import MAX_RUNS, refit_to_all, subsample_repeats
+from agvbench.diagnosis.selection.subsampling import refit_to_all, subsample_repeats
 from agvbench.diagnosis.selection.validation import fails_validation, validated
 from agvbench.diagnosis.selection.variants import candidates_for, select_variants_and_reconsider
 from agvbench.diagnosis.selection.with_term import TermSelection
@@ -77,7 +78,7 @@ def diagnose(
         return context.not_identifiable(readings, why)
     fitted = readings.select(split.training)
     on_progress(f"{len(fitted)} training runs, {split.validation.sum()} validation runs, {split.test.sum()} test runs")
-    selector = _selector(context, fitted.select(subsample_repeats(fitted.group, MAX_RUNS)), on_progress)
+    selector = _selector(context, fitted.select(subsample_repeats(fitted.group, DATA.max_selection_runs)), on_progress)
     chosen, selector = reconsider_initial_steering(selector.select(), selector)
     selection, selector = select_variants_and_reconsider(chosen, selector)
     selection, term_selection, selector = add_term_and_reconsider(selection, selector)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from agvbench.diagnosis.conclusion import _held_out, _verdict
-from agvbench.diagnosis.free_driving.conclusion import FAR_ABOVE, WITHIN_REPEATABILITY, _above
+from agvbench.diagnosis.criteria import RESIDUAL
+from agvbench.diagnosis.free_driving.conclusion import _above
 from agvbench.diagnosis.free_driving.conclusion import _verdict as verdict_of_windows
 from agvbench.diagnosis.residuals.covariate_test import RANDOM_PHASE, Dependence
 from agvbench.diagnosis.residuals.residuals import MEDIAN, QUANTITIES, PoseResiduals
@@ -81,8 +82,8 @@ def test_a_verdict_says_what_is_known_and_what_is_not(effects, significant, rest
 )
 def test_free_driving_is_unknown_far_above_its_floor_or_where_something_is_depended_on(effects, rest, floors, verdict):
     held = HeldOut(9, {"heading_rms_deg": {"before": 9.0, "after": floors, "floor": 1.0}}, ())
-    assert verdict_of_windows(effects, rest, _above(held, FAR_ABOVE))[0] is verdict
-    assert _above(held, WITHIN_REPEATABILITY) is (floors > 1.25)
+    assert verdict_of_windows(effects, rest, _above(held, RESIDUAL.far_above_noise))[0] is verdict
+    assert _above(held, RESIDUAL.within_repeatability) is (floors > 1.25)
 
 
 def test_what_got_worse_by_more_than_the_floor_is_told():

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tiny_vehicle import NEUTRAL, experiments
 
-from agvbench.diagnosis.data.splits import HELD_OUT_SHARE, folds, group_runs, split_runs
+from agvbench.diagnosis.criteria import DATA
+from agvbench.diagnosis.data.splits import folds, group_runs, split_runs
 from agvbench.errors import FitError
 from agvbench.types import NO_TARGET, Commands, Frames, Run
 
@@ -47,7 +48,7 @@ def test_what_is_set_aside_is_whole_groups_whose_levels_were_driven_elsewhere_to
     assert np.array_equal(held, split.validation | split.test)
     assert not set(group[split.validation]) & set(group[split.test])
     assert abs(split.validation.sum() - split.test.sum()) <= 3
-    assert 0 < held.sum() <= 1.1 * HELD_OUT_SHARE * len(runs)
+    assert 0 < held.sum() <= 1.1 * DATA.test_share * len(runs)
     assert not set(group[held]) & set(group[~held])
     for role in ("drive", "front", "rear"):
         kept = {float(v) for run, out in zip(runs, held, strict=True) if not out for v in getattr(run.commands, role)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from tiny_vehicle import Tiny
 
 from agvbench.diagnosis import Verdict, diagnose
+from agvbench.diagnosis.criteria import DATA
 from agvbench.diagnosis.selection.subsampling import subsample_repeats
 
 GROUPS = st.lists(st.integers(0, 12), min_size=1, max_size=200).map(np.array)
@@ -37,13 +39,14 @@ def test_what_is_kept_of_a_group_is_spread_over_the_session(size, most):
 def test_causes_found_in_some_runs_are_measured_in_all(tiny_campaign, monkeypatch):
     campaign = tiny_campaign(Tiny(steering_lag_s=0.15))
     whole = diagnose(campaign)
-    monkeypatch.setattr(importlib.import_module("agvbench.diagnosis.diagnose"), "MAX_RUNS", 70)
+    module = importlib.import_module("agvbench.diagnosis.diagnose")
+    monkeypatch.setattr(module, "DATA", replace(DATA, max_selection_runs=70))
     said: list[str] = []
     found = diagnose(campaign, on_progress=said.append)
     assert found.verdict is Verdict.NAMED
     assert [effect.name for effect in found.effects] == ["steering_lag"]
     assert found.provenance["searched_runs"] < found.provenance["fit_runs"] == whole.provenance["fit_runs"]
-    assert any("measured in all" in line for line in said)
+    assert any("refitted to all" in line for line in said)
     few, all_of_them = (each.effects[0].parameters["time_constant_s"] for each in (found, whole))
     # The same runs are fitted in the end, and only the way there was another.
     assert few.value == pytest.approx(all_of_them.value, abs=0.05 * all_of_them.stderr)

@@ -11,11 +11,12 @@ from tiny_vehicle import FRONT_M, REAR_M, Tiny, campaign_runs
 
 from agvbench.diagnosis import Verdict, diagnose, terms
 from agvbench.diagnosis.checks.consistency import require_consistent_repeats
+from agvbench.diagnosis.criteria import RESIDUAL
 from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.discrepancy.regression import SteeringTangents
 from agvbench.diagnosis.discrepancy.screening import Start, screen
 from agvbench.diagnosis.residuals.body_rates import Rates
-from agvbench.diagnosis.residuals.covariate_test import ALPHA, LIKELY, RANDOM_PHASE, dependences
+from agvbench.diagnosis.residuals.covariate_test import RANDOM_PHASE, dependences
 from agvbench.diagnosis.residuals.periodic import periodic_disturbance
 from agvbench.diagnosis.selection.with_term import gain_p_value
 from agvbench.errors import CampaignError
@@ -70,7 +71,7 @@ def test_a_dependence_is_found_with_its_covariate_first():
     rates.value[:, 0] += 0.04 * np.sin(2.0 * rates.covariates["x_m"])
     (first, *_) = dependences(rates, np.arange(RUNS), 0)
     assert (first.covariate, first.feature) == ("x_m", "speed")
-    assert first.p_value < ALPHA
+    assert first.p_value < RESIDUAL.dependence_alpha
 
 
 def test_what_pulls_towards_a_place_is_a_drift_that_depends_on_it():
@@ -94,9 +95,9 @@ def test_where_structure_is_known_to_remain_what_is_likely_is_found_too():
     rates = drives(1)
     rates.value[:, 0] += 0.012 * np.sin(2.0 * rates.covariates["x_m"])
     assert dependences(rates, GROUP, 0) == []
-    (likely,) = dependences(rates, GROUP, 0, alpha=LIKELY)
+    (likely,) = dependences(rates, GROUP, 0, alpha=RESIDUAL.likely_alpha)
     assert (likely.covariate, likely.feature) == ("x_m", "speed")
-    assert ALPHA < likely.p_value < LIKELY
+    assert RESIDUAL.dependence_alpha < likely.p_value < RESIDUAL.likely_alpha
 
 
 @pytest.mark.parametrize("period", [0.3, 0.45])

@@ -7,12 +7,9 @@ import numpy as np
 from agvbench.calibration.campaign_protocol import HeaderLike
 from agvbench.diagnosis.checks.consistency import require_ordered_clocks
 from agvbench.diagnosis.context import require_runs
+from agvbench.diagnosis.criteria import DATA
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.errors import CampaignError
-
-MIN_RUNS = 20
-MIN_REPEATED = 3
-_MIN_TURN_RAD = 0.05
 
 
 def insufficient_data(readings: Readings, header: HeaderLike) -> str:
@@ -25,12 +22,12 @@ def insufficient_data(readings: Readings, header: HeaderLike) -> str:
     """
     require_ordered_clocks(readings.refused, len(readings) + len(readings.refused), where=f"campaign {header.name}")
     require_runs(readings, header)
-    if len(readings) < MIN_RUNS:
+    if len(readings) < DATA.min_runs:
         raise CampaignError(
             "too few runs to diagnose",
             where=f"campaign {header.name}",
             value=len(readings),
-            limit=f"at least {MIN_RUNS} that begin at rest",
+            limit=f"at least {DATA.min_runs} that begin at rest",
             remedy="drive bench_calibration.py and bench_trajectories.py first",
         )
     commands = [run.commands for run in readings.runs]
@@ -39,12 +36,13 @@ def insufficient_data(readings: Readings, header: HeaderLike) -> str:
     if len({(f, r) for c in commands for f, r in zip(c.front.tolist(), c.rear.tolist(), strict=True)}) == 1:
         return "steering was never excited: its commands are the same in all runs"
     _, sizes = np.unique(readings.group, return_counts=True)
-    if np.count_nonzero(sizes >= 2) < MIN_REPEATED:
-        return f"repeatability cannot be estimated: at least {MIN_REPEATED} commands must be driven twice or more"
+    if np.count_nonzero(sizes >= 2) < DATA.min_repeated_groups:
+        least = DATA.min_repeated_groups
+        return f"repeatability cannot be estimated: at least {least} commands must be driven twice or more"
     moved = np.nanmax(np.hypot(*np.moveaxis(readings.poses[..., :2] - readings.start[:, None, :2], -1, 0)), axis=1)
-    if np.count_nonzero(moved > 0.1) < MIN_RUNS // 2:
+    if np.count_nonzero(moved > 0.1) < DATA.min_runs // 2:
         return f"the vehicle hardly moved: {np.count_nonzero(moved > 0.1)} runs went farther than 0.1 m"
     turned = np.nanmax(np.abs(readings.poses[..., 2] - readings.start[:, None, 2]), axis=1)
-    if np.count_nonzero(turned > _MIN_TURN_RAD) < MIN_REPEATED:
+    if np.count_nonzero(turned > DATA.min_turn_rad) < DATA.min_repeated_groups:
         return "steering was never excited: hardly a run turns"
     return ""

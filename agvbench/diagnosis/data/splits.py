@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.diagnosis.criteria import DATA
 from agvbench.errors import FitError
 from agvbench.types import Commands, Floats, Run
 
-HELD_OUT_SHARE = 0.25
 _SAME_TIME_S = 0.05
 _SAME_LEVEL = 1e-5
 _ROLES = ("drive", "front", "rear")
@@ -104,7 +104,7 @@ def split_runs(runs: Sequence[Run], group: NDArray[np.int64], seed: int) -> Spli
     """
     split, rng = np.array([run.split or "" for run in runs]), np.random.default_rng([0xD1A6, seed])
     if not np.any(split != ""):
-        held = _drawn(runs, group, rng, HELD_OUT_SHARE)
+        held = _drawn(runs, group, rng, DATA.test_share)
         test = _for_test(runs, group, held)
         return Split(~held, held & ~test, test)
     test, validation = split == "held_out", split == "validation"
@@ -114,7 +114,7 @@ def split_runs(runs: Sequence[Run], group: NDArray[np.int64], seed: int) -> Spli
         raise FitError("the column split must name runs to fit and runs held out", where="runs", value=named)
     if not validation.any():
         rest = np.flatnonzero(training)
-        validation[rest[_drawn([runs[int(i)] for i in rest], group[rest], rng, HELD_OUT_SHARE / 2.0)]] = True
+        validation[rest[_drawn([runs[int(i)] for i in rest], group[rest], rng, DATA.test_share / 2.0)]] = True
     return Split(training & ~validation, validation, test)
 
 

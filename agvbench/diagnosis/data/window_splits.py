@@ -5,16 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.diagnosis.criteria import DATA
 from agvbench.diagnosis.data.readings import Readings
-from agvbench.diagnosis.data.splits import HELD_OUT_SHARE
 from agvbench.diagnosis.data.windows import InitialStates
 from agvbench.errors import FitError
 
-MAX_FITTED = 300
-"""Largest number of windows in a fit, evenly spaced: adjacent windows are strongly correlated."""
-
-MAX_ASSESSED = 1500
-"""Largest number of training windows for which errors are reported."""
 _MAX_SHARE = 1.0 / 3.0
 _MIN_TRAINING_SESSIONS = 2
 _MIN_FOLDS = 4
@@ -79,7 +74,7 @@ def _drawn(names: NDArray[np.str_], kept: int, rng: np.random.Generator) -> NDAr
     for name in rng.permutation(known).tolist():
         own = names == name
         share = (np.count_nonzero(held) + np.count_nonzero(own)) / len(names)
-        if spare and share <= _MAX_SHARE and np.count_nonzero(held) < HELD_OUT_SHARE * len(names):
+        if spare and share <= _MAX_SHARE and np.count_nonzero(held) < DATA.test_share * len(names):
             held |= own
             spare -= 1
     return held

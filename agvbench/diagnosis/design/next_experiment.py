@@ -15,10 +15,11 @@ from itertools import combinations
 
 import numpy as np
 
+from agvbench.diagnosis.criteria import DESIGN
 from agvbench.diagnosis.design.alternatives import Alternative, alternative_models
 from agvbench.diagnosis.design.designs import SET_FIRST_S, Design
 from agvbench.diagnosis.design.identifiability import Unidentified
-from agvbench.diagnosis.design.search import MIN_REPEATS, Search
+from agvbench.diagnosis.design.search import Search
 from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.proposal import NextExperiment, Proposal
 from agvbench.diagnosis.selection.candidates import Candidate
@@ -66,16 +67,6 @@ def required_measurements(names: tuple[str, ...]) -> str:
     )
 
 
-DECISIVE = 40.0
-"""Decisive expected difference in minus two log likelihood: beyond the margin of alternatives in 99 of 100 draws."""
-
-MIN_EVIDENCE = 10.0
-"""Least evidence that `MAX_REPEATS` must give for a pair; otherwise no run is proposed for it."""
-
-MAX_REPEATS = 12
-IDENTIFIED = 0.5
-"""A parameter is identified if its standard error is below this share of its typical size."""
-
 _WELL_IDENTIFIED = 0.05
 _MAX_IDENTIFIED = 3
 _UNKNOWN = 100.0
@@ -115,22 +106,24 @@ def discriminate(
         return Proposal(None, {_names(pair): "a floor on which the vehicle can move" for pair in pairs})
     # Pairs that no design discriminates must not influence the choice for the others.
     table = search.pair_scores(pairs, search.first)
-    most = MAX_REPEATS * table.max(axis=1)
+    most = DESIGN.max_repeats * table.max(axis=1)
     inseparable = {
-        _names(p): required_measurements(_names(p)) for p, m in zip(pairs, most, strict=True) if m < MIN_EVIDENCE
+        _names(p): required_measurements(_names(p)) for p, m in zip(pairs, most, strict=True) if m < DESIGN.min_evidence
     }
-    separable = [p for p, m in zip(pairs, most, strict=True) if m >= MIN_EVIDENCE]
+    separable = [p for p, m in zip(pairs, most, strict=True) if m >= DESIGN.min_evidence]
     if not separable:
         return Proposal(None, inseparable)
     best = search.best(lambda tried: search.pair_scores(separable, tried).min(axis=0))
     each = search.pair_scores(separable, [best])[:, 0]
-    repeats = int(np.clip(np.ceil(DECISIVE / max(float(each.min()), 1e-9)), MIN_REPEATS, MAX_REPEATS))
+    repeats = int(
+        np.clip(np.ceil(DESIGN.decisive / max(float(each.min()), 1e-9)), DESIGN.min_repeats, DESIGN.max_repeats)
+    )
     separations = search.separations(separable, best, each * repeats)
     hardest = min(separations, key=lambda s: s.evidence)
     why = (
         f"distinguishes {' from '.join(hardest.between)}: predictions differ by up to {hardest.apart_mm:.1f} mm and "
         f"{hardest.apart_deg:.2f}° along it; {repeats} repeats should decide (expected {hardest.evidence:.0f}, "
-        f"{DECISIVE:.0f} is decisive)"
+        f"{DESIGN.decisive:.0f} is decisive)"
     )
     names = "_or_".join(dict.fromkeys(name for s in separations for name in s.between))
     trajectory = as_trajectory(best, unit, f"next_{names}"[:60].rstrip("_"), "discriminates alternatives")
@@ -165,31 +158,31 @@ def identify(
     search = Search(chosen, workspace or Workspace.circle(), seed)
     if not search.first:
         return None
-    least = search.stderr_ratios(parameters, search.first, MIN_REPEATS).min(axis=1)
-    parameters = [item for item, value in zip(parameters, least, strict=True) if value < IDENTIFIED]
+    least = search.stderr_ratios(parameters, search.first, DESIGN.min_repeats).min(axis=1)
+    parameters = [item for item, value in zip(parameters, least, strict=True) if value < DESIGN.identified]
     if not parameters:
         return None
 
     def score(tried: Sequence[Design]) -> Floats:
         # Designs come in the order of their rates: of those that suffice, the one with the lowest rate is driven.
-        ratios = search.stderr_ratios(parameters, tried, MIN_REPEATS)
+        ratios = search.stderr_ratios(parameters, tried, DESIGN.min_repeats)
         return np.asarray(-np.log(np.maximum(ratios, _WELL_IDENTIFIED)).sum(axis=0))
 
     best = search.best(score)
-    ratios = search.stderr_ratios(parameters, [best], MIN_REPEATS)[:, 0]
-    pins = tuple(item.name for item, value in zip(parameters, ratios, strict=True) if value < IDENTIFIED)
+    ratios = search.stderr_ratios(parameters, [best], DESIGN.min_repeats)[:, 0]
+    pins = tuple(item.name for item, value in zip(parameters, ratios, strict=True) if value < DESIGN.identified)
     reductions = ", ".join(
         f"{item.name} to ± {value * item.scale:.2g} ({_now(item)} now)"
         for item, value in zip(parameters, ratios, strict=True)
-        if value < IDENTIFIED
+        if value < DESIGN.identified
     )
     if not pins:
         return None
     trajectory = as_trajectory(best, unit, "next_excitation", "excites what nothing driven so far excites")
     return NextExperiment(
-        f"{MIN_REPEATS} repeats would reduce the standard error of {reductions}",
+        f"{DESIGN.min_repeats} repeats would reduce the standard error of {reductions}",
         trajectory,
-        MIN_REPEATS,
+        DESIGN.min_repeats,
         tuple(search.starts(best)),
         (),
         pins,

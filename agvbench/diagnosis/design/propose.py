@@ -7,10 +7,10 @@ import dataclasses
 import numpy as np
 
 from agvbench.calibration.campaign_protocol import HeaderLike
+from agvbench.diagnosis.criteria import DESIGN
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.design.identifiability import unidentified
 from agvbench.diagnosis.design.next_experiment import discriminate, identify
-from agvbench.diagnosis.design.search import MIN_REPEATS
 from agvbench.diagnosis.proposal import NextExperiment
 from agvbench.diagnosis.result import Diagnosis, Verdict
 from agvbench.diagnosis.selection.candidates import candidates
@@ -62,8 +62,9 @@ def with_first_experiment(found: Diagnosis) -> Diagnosis:
         steering="front",
         slalom=Slalom(turn="left", radius_m=1.0, angle_deg=60.0, arcs=4),
     )
-    why = f"not identifiable from this campaign ({found.why}); {MIN_REPEATS} repeats of a slalom move, turn and repeat"
-    return dataclasses.replace(found, next_experiment=NextExperiment(why, slalom, MIN_REPEATS))
+    repeats = DESIGN.min_repeats
+    why = f"not identifiable from this campaign ({found.why}); {repeats} repeats of a slalom move, turn and repeat"
+    return dataclasses.replace(found, next_experiment=NextExperiment(why, slalom, repeats))
 
 
 def covered_workspace(readings: Readings, geometry: Geometry) -> Workspace | None:

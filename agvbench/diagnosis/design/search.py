@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from agvbench.diagnosis.criteria import DESIGN
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.design.alternatives import Alternative
 from agvbench.diagnosis.design.criteria import (
@@ -24,9 +25,6 @@ from agvbench.diagnosis.model.predictor import RANDOM_EFFECTS, Predictor
 from agvbench.diagnosis.proposal import Discrimination
 from agvbench.planning import Workspace
 from agvbench.types import Floats, Pose
-
-MIN_REPEATS = 4
-"""Smallest number of repeats of a proposed run."""
 
 _MIN_EFFECT, _NOT_EVALUATED = 0.02, 1e3
 _MAX_DIFFERENCE_M, _MAX_DIFFERENCE_RAD = 0.25, 0.35
@@ -84,7 +82,7 @@ class Search:
             for wrong, difference in ((one.fit, difference_of_pair[rows]), (other.fit, -difference_of_pair[rows])):
                 new = information(wrong, predictor_like(wrong, some, self.geometry), wrong.parameters, difference)
                 known = wrong.information.total
-                gains.append(evidence(known, new, MIN_REPEATS) / MIN_REPEATS)
+                gains.append(evidence(known, new, DESIGN.min_repeats) / DESIGN.min_repeats)
             out[k, chosen] = np.minimum(*gains) * _limited_share(difference_of_pair, len(tried))[chosen] ** 2
         return out
 

@@ -6,17 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from agvbench.diagnosis.criteria import DISCREPANCY, RESIDUAL
 from agvbench.diagnosis.discrepancy.regression import steering_tangents
 from agvbench.diagnosis.discrepancy.screening import Start, screen
 from agvbench.diagnosis.estimation.cross_validation import without_best_groups
 from agvbench.diagnosis.residuals.body_rates import residual_rates
-from agvbench.diagnosis.residuals.residuals import (
-    LACK_OF_FIT,
-    WITHIN_REPEATABILITY,
-    lack_of_fit,
-    pose_residuals,
-    repeatability,
-)
+from agvbench.diagnosis.residuals.residuals import lack_of_fit, pose_residuals, repeatability
 from agvbench.diagnosis.selection.candidates import candidate
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
@@ -31,8 +26,6 @@ from agvbench.diagnosis.terms import TERMS, DiscrepancyTerm
 ModelWithTerm = tuple[ScoredModel, type[DiscrepancyTerm], dict[str, float], dict[str, dict[str, float]]]
 """A model with a term, the term, the gains of the effects beside it, and the alternatives of these effects."""
 
-_MAX_REFITTED = 3
-_MAX_NAMES = 5
 _TERM_NAMES = frozenset(term.name for term in TERMS)
 
 
@@ -47,7 +40,7 @@ def reselect_effects(
     alternatives: dict[str, dict[str, float]] = {}
     current = _add_masked_effects(extended, current)
     names = [n for n in selection.chosen.names if n not in current.names]
-    names += sorted(selection.rejected, key=lambda n: -selection.rejected[n])[:_MAX_REFITTED]
+    names += sorted(selection.rejected, key=lambda n: -selection.rejected[n])[: DISCREPANCY.max_refitted]
     for name in names:
         larger = extended.with_effect(current, name)
         if name not in current.names and extended.meets_criterion(current, larger):
@@ -69,10 +62,10 @@ def _add_masked_effects(extended: Selector, current: ScoredModel) -> ScoredModel
     An effect without a gain beside the first selection may become significant once the term is in the model. The gain
     of each effect is predicted, and only the best are fitted.
     """
-    while len(current.names) < _MAX_NAMES and has_lack_of_fit(current):
+    while len(current.names) < DISCREPANCY.max_effects and has_lack_of_fit(current):
         names = [name for name in extended.candidates if name not in current.names and name not in _TERM_NAMES]
         predicted_gains = {name: extended.predicted_gain(current, name) for name in names}
-        best = sorted(predicted_gains, key=lambda name: -predicted_gains[name])[:_MAX_REFITTED]
+        best = sorted(predicted_gains, key=lambda name: -predicted_gains[name])[: DISCREPANCY.max_refitted]
         models = [extended.with_effect(current, name) for name in best if predicted_gains[name] > extended.min_gain]
         accepted = [model for model in models if extended.meets_criterion(current, model)]
         if not accepted:
@@ -87,17 +80,12 @@ def has_lack_of_fit(model: ScoredModel) -> bool:
     residuals = pose_residuals(predictor.readings, predictor.predict(model.fit.parameters))
     least, group = repeatability(residuals, predictor.readings.group), predictor.readings.group
     p_value = lack_of_fit(residuals, group)
-    if least is None or p_value is None or p_value >= LACK_OF_FIT:
+    if least is None or p_value is None or p_value >= RESIDUAL.lack_of_fit_alpha:
         return False
     return any(
-        residuals.rms()[name] > WITHIN_REPEATABILITY * least[name] for name in ("position_rms_mm", "heading_rms_deg")
+        residuals.rms()[name] > RESIDUAL.within_repeatability * least[name]
+        for name in ("position_rms_mm", "heading_rms_deg")
     )
-
-
-_MAX_STARTS = 3
-_MIN_PREDICTED_GAIN = 4.0
-_MIN_SHARE_OF_BEST = 0.3
-_SHARE_OF_GROUPS = 0.1
 
 
 def add_term(selection: Selection, selector: Selector) -> TermSelection | None:
@@ -224,8 +212,8 @@ def screened_terms(extended: Selector, root: ScoredModel) -> list[Start]:
     rates = residual_rates(batch.readings, poses)
     tangents = steering_tangents(batch, root.fit.parameters, rates)
     starts = screen(rates, tangents, batch.geometry, batch.readings.group, extended.seed)
-    least = max(_MIN_PREDICTED_GAIN, _MIN_SHARE_OF_BEST * starts[0].gain) if starts else 0.0
-    return [start for start in starts if start.gain > least][:_MAX_STARTS]
+    least = max(DISCREPANCY.min_predicted_gain, DISCREPANCY.min_share_of_best_start * starts[0].gain) if starts else 0.0
+    return [start for start in starts if start.gain > least][: DISCREPANCY.max_starts]
 
 
 def _best_term(
@@ -249,8 +237,8 @@ def _depends_on_few_groups(selector: Selector, selection: Selection, name: str) 
     without = selection.base if names == selection.base.names else selector.known(names)
     if without is None:
         return False
-    gain = without.loss - chosen.loss
-    return without_best_groups(gain, selector.batch.readings.group, _SHARE_OF_GROUPS) < 0.5 * float(gain.sum())
+    gain, group = without.loss - chosen.loss, selector.batch.readings.group
+    return without_best_groups(gain, group, DISCREPANCY.few_groups_share) < 0.5 * float(gain.sum())
 
 
 def _term_in_place_of_effect(

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.diagnosis.criteria import SELECTION
 from agvbench.diagnosis.estimation.fit import Fit, loss_at
 from agvbench.types import Floats
 
 FOLDS = 5
-_BEST_SHARE = 0.05
-_WALD_ALPHA = 1e-4
 _MIN_SHARE = 0.01  # of the information about a direction
 
 
@@ -77,7 +76,7 @@ def _cross_validated_windows(fitted: Fit, fold: NDArray[np.int64], bounds: Float
     return loss
 
 
-def without_best_groups(gain: Floats, group: NDArray[np.int64], share: float = _BEST_SHARE) -> float:
+def without_best_groups(gain: Floats, group: NDArray[np.int64], share: float = SELECTION.best_group_share) -> float:
     """Return the total of `gain` (R,) without the `share` of groups with the largest gain, at least one group.
 
     A true cause improves the prediction of all groups on which it acts. A gain in a single group is an artefact of
@@ -126,4 +125,4 @@ def differs_from_null(fitted: Fit, name: str, group: NDArray[np.int64]) -> bool:
     off = fitted.parameters[at] - nulls
     covariance = clustered_covariance(fitted, group)[np.ix_(at, at)]
     statistic = float(off @ np.linalg.pinv(covariance, hermitian=True) @ off)
-    return bool(special.chdtrc(len(at), statistic) < _WALD_ALPHA)
+    return bool(special.chdtrc(len(at), statistic) < SELECTION.wald_alpha)

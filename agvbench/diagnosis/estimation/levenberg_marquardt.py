@@ -7,6 +7,7 @@ from enum import Enum, auto
 
 import numpy as np
 
+from agvbench.diagnosis.criteria import FIT
 from agvbench.diagnosis.estimation.likelihood import Terms, objective, residual_of, ridge, terms_of
 from agvbench.diagnosis.estimation.variance import VarianceComponents, update_variance_components
 from agvbench.diagnosis.model.predictor import Linearised, Predictor
@@ -91,12 +92,6 @@ class StepSolver:
         return move
 
 
-_NON_MONOTONE_STEPS, _ROUNDS = 6, 4
-_MIN_REDUCTION = 10.0
-_CONVERGED = 0.05
-_NEARLY_CONVERGED = 1.0
-
-
 @dataclass(frozen=True)
 class FitState:
     """The estimates of a fit: ``parameters`` (P,), each run's ``random_effects`` (R, 6), ``variance_components``."""
@@ -151,9 +146,9 @@ class LevenbergMarquardt:
         for step in range(iterations):
             evaluation = self.evaluate(state, near)
             state, full_step = self._step(state, evaluation)
-            if near is not None and (before - evaluation.loss < _NEARLY_CONVERGED or step >= iterations // 2):
+            if near is not None and (before - evaluation.loss < FIT.nearly_converged or step >= iterations // 2):
                 near = None
-            elif abs(before - evaluation.loss) < _CONVERGED:
+            elif abs(before - evaluation.loss) < FIT.converged:
                 return state, Convergence.CONVERGED
             before = evaluation.loss
         return state, Convergence.FAST if full_step else Convergence.SLOW
@@ -167,13 +162,13 @@ class LevenbergMarquardt:
         rounds of `iterations` steps as long as each round reduces the loss enough.
         """
         evaluation = self.evaluate(state)
-        for _ in range(_ROUNDS if patient else 1):
+        for _ in range(FIT.rounds if patient else 1):
             beyond = self.non_monotone_steps(state, evaluation) if convergence is Convergence.SLOW else None
             if convergence is Convergence.CONVERGED or (beyond is None and not patient):
                 break
             state, convergence = self.iterate(state if beyond is None else beyond, iterations)
             before, evaluation = evaluation.loss, self.evaluate(state)
-            if before - evaluation.loss < _MIN_REDUCTION:
+            if before - evaluation.loss < FIT.min_reduction:
                 break
         return state, evaluation
 
@@ -207,9 +202,9 @@ class LevenbergMarquardt:
         start, near = evaluation.loss, evaluation.linear
         point = self._step_solver(state, evaluation).full(self._point(state, evaluation), evaluation.terms)
         now = self._updated(point, state, evaluation)
-        for _ in range(_NON_MONOTONE_STEPS):
+        for _ in range(FIT.non_monotone_steps):
             evaluation = self.evaluate(now, near)
-            if evaluation.loss < start - _MIN_REDUCTION:
+            if evaluation.loss < start - FIT.min_reduction:
                 return now
             now, _ = self._step(now, evaluation)
         return None

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from agvbench.diagnosis.criteria import SELECTION
 from agvbench.diagnosis.estimation.standard_errors import standard_errors
 from agvbench.diagnosis.result import Estimate, NamedEffect
-from agvbench.diagnosis.selection.stepwise import ALTERNATIVE_MARGIN, Selection
+from agvbench.diagnosis.selection.stepwise import Selection
 from agvbench.diagnosis.terms import TERMS, DiscrepancyTerm
 from agvbench.effects import Effect, effect_kinds
 from agvbench.effects.variants import cause_of, effect_variants
@@ -38,7 +39,7 @@ def named_effects(selection: Selection, bounds: Floats) -> tuple[NamedEffect, ..
                 tuple(alternative for alternative, _ in alternatives),
                 {
                     "loss_without_it": selection.gains[name],
-                    "rival_margin": ALTERNATIVE_MARGIN,
+                    "rival_margin": SELECTION.alternative_margin,
                     **({"form": name} if name in effect_variants() else {}),
                     **{f"{alternative}_instead": worse for alternative, worse in alternatives},
                 },

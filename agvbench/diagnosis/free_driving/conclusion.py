@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.diagnosis.context import DiagnosisContext
+from agvbench.diagnosis.criteria import RESIDUAL
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.data.windows import SUPPORT_S, Horizon
 from agvbench.diagnosis.estimation.fit import Fit
@@ -26,11 +27,6 @@ from agvbench.diagnosis.selection.candidates import bounds_of
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection
 from agvbench.types import Floats
-
-WITHIN_REPEATABILITY = 1.25
-FAR_ABOVE = 5.0
-"""Ratio to the repeatability above which residuals count as structure. The repeatability of windows is a lower bound,
-because the variation between repeats is unknown."""
 
 
 @dataclasses.dataclass
@@ -69,8 +65,8 @@ class WindowConclusion:
         effects = named_effects(self.selection, bounds_of(chosen.names))
         held_out = self._held_out(before, poses, perturbed)
         # Many windows make even small structure significant: within repeatability it needs no cause.
-        rest = self._dependences(poses) if _above(held_out, WITHIN_REPEATABILITY) else []
-        far = _above(held_out, FAR_ABOVE)
+        rest = self._dependences(poses) if _above(held_out, RESIDUAL.within_repeatability) else []
+        far = _above(held_out, RESIDUAL.far_above_noise)
         verdict, why = _verdict(effects, rest, far)
         return Diagnosis(
             verdict,
@@ -174,7 +170,7 @@ def _verdict(effects: tuple[NamedEffect, ...], rest: list[Dependence], far: bool
         return Verdict.UNKNOWN, f"structure remains that no effect explains: it depends on {rest[0].covariate}"
     if far:
         return Verdict.UNKNOWN, (
-            f"the residuals are more than {FAR_ABOVE:g} times what noise explains, "
+            f"the residuals are more than {RESIDUAL.far_above_noise:g} times what noise explains, "
             "but depend on none of the covariates tested"
         )
     if not effects:

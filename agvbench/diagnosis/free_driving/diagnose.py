@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from agvbench.calibration.campaign_protocol import HeaderLike
 from agvbench.diagnosis.context import DiagnosisContext, require_runs
+from agvbench.diagnosis.criteria import DATA
 from agvbench.diagnosis.data.readings import Readings, read_windows
-from agvbench.diagnosis.data.window_splits import MAX_ASSESSED, MAX_FITTED, held_out_windows, thinned
+from agvbench.diagnosis.data.window_splits import held_out_windows, thinned
 from agvbench.diagnosis.data.windows import Horizon
 from agvbench.diagnosis.estimation.fit import Fit, fit
 from agvbench.diagnosis.free_driving.conclusion import WindowConclusion
@@ -27,10 +28,6 @@ from agvbench.errors import CampaignError
 from agvbench.types import Run
 from agvbench.vehicle.geometry import Geometry
 
-MIN_WINDOWS = 20
-MIN_BLOCKS = 5
-_MIN_TURN_RAD = 0.05
-
 
 def diagnose_windows(
     context: DiagnosisContext, runs: Sequence[Run], horizon: Horizon, on_progress: OnProgress
@@ -46,13 +43,15 @@ def diagnose_windows(
     held = held_out_windows(readings, context.seed)
     if not held.any():
         return context.not_identifiable(readings, "no stretch of driving can be spared for the test: drive for longer")
-    fitted = readings.select(thinned(np.flatnonzero(~held), MAX_FITTED))
+    fitted = readings.select(thinned(np.flatnonzero(~held), DATA.max_fitted_windows))
     on_progress(f"{len(fitted)} windows to fit, {np.count_nonzero(held)} held out")
     static = _static(fitted, context.geometry, context.header.neutral)
     selector = _selector(context, readings, held, static, on_progress)
     selection = selector.select()
     on_progress("judging on what was held out")
-    assessment = readings.select(np.sort(np.r_[np.flatnonzero(held), thinned(np.flatnonzero(~held), MAX_ASSESSED)]))
+    assessment = readings.select(
+        np.sort(np.r_[np.flatnonzero(held), thinned(np.flatnonzero(~held), DATA.max_assessed_windows)])
+    )
     held = np.isin([r.run_id for r in assessment.runs], [r.run_id for r in readings.select(held).runs])
     return WindowConclusion(context, readings, assessment, held, static, selector, selection).diagnosis(horizon)
 
@@ -62,7 +61,7 @@ def _selector(
 ) -> WindowSelector:
     """Return the selector for the training windows of `static`; the windows `held` are for test."""
     fitted, maps = static.predictor.readings, static.predictor.maps
-    test = readings.select(thinned(np.flatnonzero(held), MAX_FITTED))
+    test = readings.select(thinned(np.flatnonzero(held), DATA.max_fitted_windows))
     tried, kinds = candidates_for(context.vehicle)
     names, values = given_effects(context.vehicle, tried)
     has_sessions = len(np.unique(readings.initial_states.session)) > 1 if readings.initial_states else False
@@ -79,19 +78,19 @@ def _selector(
 
 def _insufficient_data(readings: Readings, header: HeaderLike, horizon: Horizon) -> str:
     require_runs(readings, header)
-    if len(readings) < MIN_WINDOWS:
+    if len(readings) < DATA.min_windows:
         raise CampaignError(
             "too little free driving to diagnose",
             where=f"campaign {header.name}",
             value=f"{len(readings)} windows of {horizon.horizon_s:g} s",
-            limit=f"at least {MIN_WINDOWS}",
+            limit=f"at least {DATA.min_windows}",
             remedy="drive for longer, or predict less far ahead (campaign.toml, [prediction] horizon_s)",
         )
-    if len(np.unique(readings.group)) < MIN_BLOCKS:
+    if len(np.unique(readings.group)) < DATA.min_blocks:
         stretches = len(np.unique(readings.group))
         return f"{stretches} stretches of {horizon.block_s:g} s are too few for a test: drive for longer"
     turned = np.nanmax(np.abs(readings.poses[..., 2] - readings.start[:, None, 2]), axis=1)
-    if np.count_nonzero(turned > _MIN_TURN_RAD) < MIN_BLOCKS:
+    if np.count_nonzero(turned > DATA.min_turn_rad) < DATA.min_blocks:
         return "steering was never excited: hardly a window turns"
     return ""
 

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from agvbench.diagnosis.criteria import FREE_DRIVING, SelectionCriteria
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
@@ -25,10 +26,7 @@ class WindowSelector(Selector):
     rejected; ``extrapolating`` names them.
     """
 
-    # Blocks of fast driving may be few: only the block with the largest gain is excluded.
-    excluded_share: ClassVar[float] = 0.0
-    # Residuals of windows are mostly systematic: a small change of the prediction is no evidence for an effect.
-    min_relative_change: ClassVar[float] = 0.3
+    criteria: ClassVar[SelectionCriteria] = FREE_DRIVING
     test_batch: Batch | None = None
     extrapolating: set[str] = field(default_factory=set)
 

@@ -7,18 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.diagnosis.criteria import RESIDUAL
 from agvbench.diagnosis.data.splits import folds
 from agvbench.diagnosis.residuals.body_rates import FEATURES, Rates
 from agvbench.types import Floats
-
-ALPHA = 1e-3
-"""Level of significance of a dependence, after correction for the number of tests."""
-
-LIKELY = 0.05
-"""Level below which a dependence is reported if structure is already known to remain."""
-
-MIN_SHARE = 0.02
-"""Smallest share of variance that a reported dependence predicts."""
 
 RANDOM_PHASE = "distance_modulo_period_m"
 DRIFT = "drift"
@@ -43,7 +35,12 @@ class Dependence:
 
 
 def dependences(
-    rates: Rates, group: NDArray[np.int64], seed: int, starts: Floats | None = None, *, alpha: float = ALPHA
+    rates: Rates,
+    group: NDArray[np.int64],
+    seed: int,
+    starts: Floats | None = None,
+    *,
+    alpha: float = RESIDUAL.dependence_alpha,
 ) -> list[Dependence]:
     """Return the significant dependences of the residual, the one with the largest share first.
 
@@ -92,7 +89,7 @@ def dependences(
     significant = [
         Dependence(label, feature, p_value, share)
         for label, feature, strength, share in found
-        if share > MIN_SHARE and (p_value := float(np.mean(np.r_[most >= strength, True]))) < alpha
+        if share > RESIDUAL.min_share and (p_value := float(np.mean(np.r_[most >= strength, True]))) < alpha
     ]
     significant.sort(key=lambda d: -d.share)
     # Drifts along x and along y have one name: the stronger one represents both.

@@ -8,6 +8,7 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.diagnosis.criteria import RESIDUAL
 from agvbench.diagnosis.residuals.body_rates import FEATURES, Rates
 from agvbench.diagnosis.residuals.covariate_test import RANDOM_PHASE, Dependence
 from agvbench.types import Floats
@@ -15,7 +16,6 @@ from agvbench.types import Floats
 _PERIODS_M = np.geomspace(0.15, 1.0, 48)
 _PERMUTATIONS, _MIN_STEPS, _STEPS_PER_PERIOD, _MIN_SHARE = 999, 12, 1.6, 0.3
 _WINSOR_LIMIT = 3.0  # times the median run
-_PERIODIC_ALPHA = 5e-3  # resolved by the number of permutations
 
 
 def periodic_disturbance(rates: Rates, group: NDArray[np.int64], seed: int) -> Dependence | None:
@@ -45,7 +45,7 @@ def periodic_disturbance(rates: Rates, group: NDArray[np.int64], seed: int) -> D
             permuted += _explained(rng.permuted(np.tile(value, (_PERMUTATIONS, 1)), axis=1), waves)
         p_value = (1.0 + float(np.count_nonzero(permuted.max(axis=1) >= size[period]))) / (_PERMUTATIONS + 1.0)
         best = Dependence(RANDOM_PHASE, feature, p_value, float(share[period]))
-    return best if best is not None and best.p_value < _PERIODIC_ALPHA else None
+    return best if best is not None and best.p_value < RESIDUAL.periodic_alpha else None
 
 
 def _contrasts(rates: Rates, feature: str, group: NDArray[np.int64]) -> Iterator[tuple[Floats, Floats, Floats]]:

@@ -63,12 +63,6 @@ QUANTITIES = (
 )
 """Errors of the end pose (along and across in the start frame), then errors over the whole path."""
 MEDIAN = "end_position_median_mm"
-WITHIN_REPEATABILITY = 1.25
-"""A residual is within repeatability up to this factor, or if the lack-of-fit test is not significant."""
-
-LACK_OF_FIT = 0.01
-"""Level of significance of the lack-of-fit test."""
-
 _MIN_WITHIN_DOF = 9
 """Smallest number of degrees of freedom for the standard deviation of repeats."""
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.diagnosis.criteria import FIT
 from agvbench.diagnosis.data.splits import folds
 from agvbench.diagnosis.data.window_splits import fold_groups
 from agvbench.diagnosis.estimation.cross_validation import FOLDS, cross_validated
@@ -19,13 +20,6 @@ from agvbench.diagnosis.selection.candidates import Candidate, bounds_of, defaul
 from agvbench.types import Floats
 
 OnProgress = Callable[[str], None]
-
-_FEW_ITERATIONS, _MANY_ITERATIONS = 3, 10
-_MIN_PREDICTED_GAIN = 3.0  # an effect with a smaller one is not fitted
-_LARGE_PREDICTED_GAIN = 40.0  # an effect with a larger one is fitted to convergence
-_MAX_STARTS = 2
-_MAX_INCREASE = 20.0  # of the loss in a preliminary fit that need not gain
-_MIN_GAIN_SHARE = 0.5  # of the predicted gain: a fit with less has ended in a local minimum
 
 
 Starts = frozenset[tuple[str, bytes]]
@@ -153,17 +147,17 @@ class FittedModels:
         bounds = bounds_of(names)
         predicted_gains = self._predicted_gains(current, predictor, candidate)
         predicted_gain = max(predicted_gains)
-        if predicted_gain < _MIN_PREDICTED_GAIN:
+        if predicted_gain < FIT.min_predicted_gain:
             return replace(current, names=names)  # equal to the model without the effect: never selected
         ordered = [candidate.starts[k] for k in np.argsort(predicted_gains)[::-1]]
-        is_likely = candidate.screened and predicted_gain > _LARGE_PREDICTED_GAIN
+        is_likely = candidate.screened and predicted_gain > FIT.large_predicted_gain
         preliminary = self._preliminary_fit(
-            current, predictor, ordered, bounds, _MIN_GAIN_SHARE * predicted_gain if is_likely else None
+            current, predictor, ordered, bounds, FIT.min_share_of_predicted_gain * predicted_gain if is_likely else None
         )
         # A large predicted gain may need a worse fit first: maps that absorbed a cause must give it back.
         if (
-            predicted_gain < _LARGE_PREDICTED_GAIN
-            and float(now.loss.sum() - preliminary.loss.sum()) < _MIN_PREDICTED_GAIN
+            predicted_gain < FIT.large_predicted_gain
+            and float(now.loss.sum() - preliminary.loss.sum()) < FIT.min_predicted_gain
         ):
             self.tried += 1
             tried = ScoredModel(names, preliminary, cross_validated(preliminary, self._fold, bounds), starts)
@@ -183,9 +177,9 @@ class FittedModels:
         iterations.
         """
         fits = [self._first_steps(current, predictor, starts[0], bounds)]
-        iterations = _FEW_ITERATIONS if least is None else _MANY_ITERATIONS
-        if current.fit.loss.sum() - fits[0].loss.sum() <= (-_MAX_INCREASE if least is None else least):
-            for start in starts[:_MAX_STARTS]:
+        iterations = FIT.few_steps if least is None else FIT.steps
+        if current.fit.loss.sum() - fits[0].loss.sum() <= (-FIT.max_increase if least is None else least):
+            for start in starts[: FIT.max_starts]:
                 held = bounds.copy()
                 held[-len(start) :] = start[:, None]
                 conditional = self._first_steps(current, predictor, start, held, iterations=iterations)
@@ -200,7 +194,7 @@ class FittedModels:
         bounds: Floats,
         conditional: Fit | None = None,
         *,
-        iterations: int = _FEW_ITERATIONS,
+        iterations: int = FIT.few_steps,
     ) -> Fit:
         now = current.fit
         return fit(
@@ -235,7 +229,7 @@ class FittedModels:
                 bounds,
                 random_effects=None if near is None else near.random_effects,
                 variance_components=None if near is None else near.variance_components,
-                iterations=_MANY_ITERATIONS,
+                iterations=FIT.steps,
                 patient=patient,
                 near=None if near is None else near.linear,
             )
@@ -265,7 +259,7 @@ class FittedModels:
         refitted = fit(
             self._predictor(model.names), np.r_[other.fit.parameters[: self.batch.maps.size], kept], bounds,
             random_effects=other.fit.random_effects, variance_components=other.fit.variance_components,
-            iterations=_MANY_ITERATIONS, patient=True,
+            iterations=FIT.steps, patient=True,
         )  # fmt: skip
         self.tried += 1
         scored_model = ScoredModel(model.names, refitted, cross_validated(refitted, self._fold, bounds), model.starts)

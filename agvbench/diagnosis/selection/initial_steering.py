@@ -9,16 +9,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from agvbench.diagnosis.criteria import SELECTION
 from agvbench.diagnosis.estimation.score_test import first_order_gain
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.candidates import default_candidate
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
-from agvbench.diagnosis.selection.stepwise import MIN_GAIN, Selection, Selector
+from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.effects.variants import cause_of
 
 STEERING_DYNAMICS = ("steering_lag", "steering_rate_limit", "steering_backlash")
-_MIN_PREDICTED_GAIN = 20.0
 
 
 def choose_initial_steering(selector: Selector) -> Selector:
@@ -29,13 +29,13 @@ def choose_initial_steering(selector: Selector) -> Selector:
     names = [name for name in STEERING_DYNAMICS if name in selector.candidates]
     base, other = selector.base(), under_other_initial_steering(selector)
     if set(STEERING_DYNAMICS) & {cause_of(name) for name in selector.given}:
-        return other if other.base().deviance < base.deviance - MIN_GAIN else selector
+        return other if other.base().deviance < base.deviance - SELECTION.min_gain else selector
     adopted = other.adopt(base)
-    if max(_predicted_gain(other, adopted, name) for name in names) < _MIN_PREDICTED_GAIN:
+    if max(_predicted_gain(other, adopted, name) for name in names) < SELECTION.min_gain_of_initial_steering:
         return selector
     at_neutral = min(selector.with_effect(base, name).deviance for name in names)
     at_first = min(other.with_effect(adopted, name).deviance for name in names)
-    return other if at_first < at_neutral - MIN_GAIN else selector
+    return other if at_first < at_neutral - SELECTION.min_gain else selector
 
 
 def reconsider_initial_steering(selection: Selection, selector: Selector) -> tuple[Selection, Selector]:
@@ -44,7 +44,7 @@ def reconsider_initial_steering(selection: Selection, selector: Selector) -> tup
     if not set(STEERING_DYNAMICS) & {cause_of(name) for name in chosen.names}:
         return selection, selector
     other = under_other_initial_steering(selector)
-    if other.score(chosen.names, chosen.fit.parameters, None).deviance >= chosen.deviance - MIN_GAIN:
+    if other.score(chosen.names, chosen.fit.parameters, None).deviance >= chosen.deviance - SELECTION.min_gain:
         return selection, selector
     return other.select(), other
 

@@ -9,22 +9,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from agvbench.diagnosis.criteria import SELECTION, SelectionCriteria
 from agvbench.diagnosis.estimation.cross_validation import differs_from_null, without_best_groups
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.residuals.residuals import pose_residuals
 from agvbench.diagnosis.selection.fitted_models import FittedModels, ScoredModel
-
-MIN_GAIN = 12.0
-"""Least gain of an effect in minus two log likelihood, before the correction for the number of candidates."""
-
-ALTERNATIVE_MARGIN = 10.0
-"""Largest difference in deviance between a selected effect and an indistinguishable alternative."""
-
-MIN_RELATIVE_CHANGE = 0.15
-"""Least change of the prediction by an effect, relative to the residuals that remain with it."""
-
-_NEARLY_ALTERNATIVE = 100.0  # up to this difference an alternative is refitted, for its fit may have ended too soon
-_MAX_EFFECTS = 4
 
 
 @dataclass(frozen=True)
@@ -52,14 +41,13 @@ class Selector(FittedModels):
     ``extended`` caches a batch with the extended library, once it was needed.
     """
 
-    excluded_share: ClassVar[float] = 0.05
-    min_relative_change: ClassVar[float] = MIN_RELATIVE_CHANGE
+    criteria: ClassVar[SelectionCriteria] = SELECTION
     extended: Batch | None = field(init=False, default=None)
 
     @property
     def min_gain(self) -> float:
         """The least gain of an effect, corrected for the number of candidates."""
-        return MIN_GAIN + 2.0 * math.log(max(len(self.candidates), 1))
+        return SELECTION.min_gain + 2.0 * math.log(max(len(self.candidates), 1))
 
     def for_batch(self, batch: Batch) -> Selector:
         """Return a selector with the same candidates for another batch, with an empty cache."""
@@ -71,7 +59,7 @@ class Selector(FittedModels):
         """Add effects until none meets the criterion, then remove those without which the model predicts as well."""
         base = current = self.base()
         rejected: dict[str, float] = {}
-        while len(current.names) < len(self.given) + _MAX_EFFECTS:
+        while len(current.names) < len(self.given) + SELECTION.max_effects:
             larger = {name: self.with_effect(current, name) for name in self.candidates if name not in current.names}
             rejected = {name: model.gain_over(current) for name, model in larger.items()}
             accepted = {name: model for name, model in larger.items() if self.meets_criterion(current, model)}
@@ -92,7 +80,7 @@ class Selector(FittedModels):
         gain = without.loss - with_it.loss
         return bool(
             with_it.gain_over(without) > self.min_gain
-            and without_best_groups(gain, self.batch.readings.group, self.excluded_share) > 0.0
+            and without_best_groups(gain, self.batch.readings.group, self.criteria.best_group_share) > 0.0
             and self._changes_prediction(without, with_it)
             and all(
                 differs_from_null(with_it.fit, name, self.batch.readings.group)
@@ -109,7 +97,7 @@ class Selector(FittedModels):
             replace(readings, poses=np.where(readings.seen[..., None], small, np.nan)), large
         ).squares()
         return any(
-            float(np.mean(moved[name])) > self.min_relative_change**2 * float(np.mean(residuals[name]))
+            float(np.mean(moved[name])) > self.criteria.min_relative_change**2 * float(np.mean(residuals[name]))
             for name in ("position_rms_mm", "heading_rms_deg")
         )
 
@@ -141,13 +129,13 @@ class Selector(FittedModels):
         among
             By effect, the others that are fitted in its place; by default every candidate.
         """
-        for _ in range(_MAX_EFFECTS):
+        for _ in range(SELECTION.max_effects):
             swapped = {name: self._swaps_of(name, base, current, among) for name in self._added_effects(current)}
             better = [
                 model
                 for name, models in swapped.items()
                 for model in models.values()
-                if model.gain_over(current) > MIN_GAIN
+                if model.gain_over(current) > SELECTION.min_gain
                 and self.meets_criterion(self.without_effect(base, current, name), model)
             ]
             if not better:
@@ -177,13 +165,14 @@ class Selector(FittedModels):
             for n, models in swapped.items()
         }
         alternatives = {
-            n: {o: w for o, w in others.items() if w < ALTERNATIVE_MARGIN} for n, others in differences.items()
+            n: {o: w for o, w in others.items() if w < SELECTION.alternative_margin}
+            for n, others in differences.items()
         }
         return {name: others for name, others in alternatives.items() if name in current.names}
 
     def _loss_difference(self, model: ScoredModel, current: ScoredModel) -> float:
         """Return the deviance of `model` minus that of `current`, refitted from `current` if it is close."""
         difference = model.deviance - current.deviance
-        if ALTERNATIVE_MARGIN <= difference < _NEARLY_ALTERNATIVE and model.is_fitted:
+        if SELECTION.alternative_margin <= difference < SELECTION.nearly_alternative and model.is_fitted:
             difference = self.refitted_from(model, current).deviance - current.deviance
         return difference

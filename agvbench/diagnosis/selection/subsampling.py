@@ -19,9 +19,6 @@ from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.variants import EXTENDED_LIBRARY
 from agvbench.diagnosis.selection.with_term import TermSelection
 
-MAX_RUNS = 240
-"""Largest number of runs in the selection, unless two repeats per group are more."""
-
 _MIN_REPEATS = 2
 
 

@@ -8,12 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.diagnosis.criteria import RESIDUAL
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.residuals.residuals import (
-    LACK_OF_FIT,
-    WITHIN_REPEATABILITY,
     EndCovariance,
     PoseResiduals,
     end_covariance,
@@ -43,10 +42,10 @@ class Assessment:
         """Whether the residuals exceed the repeatability, and the lack of fit is significant."""
         after = self.after.rms()
         above = any(
-            after[name] > WITHIN_REPEATABILITY * self.repeatability[name]
+            after[name] > RESIDUAL.within_repeatability * self.repeatability[name]
             for name in ("position_rms_mm", "heading_rms_deg")
         )
-        return above and self.lack_of_fit is not None and self.lack_of_fit < LACK_OF_FIT
+        return above and self.lack_of_fit is not None and self.lack_of_fit < RESIDUAL.lack_of_fit_alpha
 
 
 def assess(

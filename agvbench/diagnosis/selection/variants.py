@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from agvbench.diagnosis.criteria import FIT, SELECTION, VARIANT
 from agvbench.diagnosis.estimation.fit import fit
 from agvbench.diagnosis.estimation.score_test import first_order_gain
 from agvbench.diagnosis.model.batch import Batch
@@ -14,7 +15,7 @@ from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.candidates import Candidate, bounds_of, candidate, candidates
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.initial_steering import STEERING_DYNAMICS, under_other_initial_steering
-from agvbench.diagnosis.selection.stepwise import ALTERNATIVE_MARGIN, MIN_GAIN, Selection, Selector
+from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.terms import TERMS
 from agvbench.effects import Effect
 from agvbench.effects.variants import Variant, cause_of, effect_variants
@@ -23,11 +24,6 @@ from agvbench.types import Floats
 
 EXTENDED_LIBRARY: tuple[type[Effect], ...] = (*TERMS, *effect_variants().values())
 """Discrepancy terms and variants: the extended library. One simulation contains all, because compiling is slow."""
-
-_FEW_ITERATIONS = 3
-_MIN_FIT_GAIN = 40.0  # an effect with this gain of fit is tried in its variants even if it predicts no better
-_MAX_VARIANTS_ALONE = 3
-_MIN_GAIN_SHARE = 0.5  # of the gain of an effect: another one with a smaller gain is not tried in its variants
 
 
 def variant_candidates() -> dict[str, Candidate]:
@@ -107,7 +103,8 @@ def _variant_alone(selection: Selection, selector: Selector) -> Selection:
     base = selection.base
     known = ((variant, selector.known((*base.names, variant.variant_of))) for variant in effect_variants().values())
     fitted = [(_fit_gain(base, model), variant, model) for variant, model in known if model]
-    strong = sorted((one for one in fitted if one[0] > _MIN_FIT_GAIN), key=lambda one: -one[0])[:_MAX_VARIANTS_ALONE]
+    large = sorted((one for one in fitted if one[0] > VARIANT.min_fit_gain), key=lambda one: -one[0])
+    strong = large[: VARIANT.max_alone]
     if not strong:
         return selection
     extended = with_extended_library(selector)
@@ -148,7 +145,7 @@ def prefers_other_initial_steering(chosen: ScoredModel, selector: Selector) -> b
     if not {*STEERING_DYNAMICS} & {cause_of(name) for name in chosen.names}:
         return False
     there = under_other_initial_steering(with_extended_library(selector))
-    return there.score(chosen.names, chosen.fit.parameters, None).deviance < chosen.deviance - MIN_GAIN
+    return there.score(chosen.names, chosen.fit.parameters, None).deviance < chosen.deviance - SELECTION.min_gain
 
 
 def select_under_other_initial_steering(selector: Selector) -> tuple[Selection, Selector]:
@@ -165,23 +162,23 @@ def _replacements(selection: Selection, selector: Selector, extended: Selector, 
     """
     chosen = selection.chosen
     without = selector.without_effect(selection.base, chosen, name)
+    chosen_gains = without.deviance - chosen.deviance, _fit_gain(without, chosen)
     models = {name: chosen} | {
         other: selector.with_effect(without, other) for other in selector.candidates if other not in chosen.names
     }
     for variant in effect_variants().values():
         if (model := models.get(variant.variant_of)) is None:
             continue
-        kind, term_selection = candidate(variant), _fit_gain(without, chosen)
+        kind = candidate(variant)
         # A strong effect with the wrong equation fits well and predicts badly.
-        if without.deviance - model.deviance >= _MIN_GAIN_SHARE * (without.deviance - chosen.deviance) or (
-            _fit_gain(without, model) >= _MIN_GAIN_SHARE * term_selection
-        ):
+        gains = without.deviance - model.deviance, _fit_gain(without, model)
+        if any(own >= VARIANT.min_gain_share * gain for own, gain in zip(gains, chosen_gains, strict=True)):
             yield _Replacement(name, variant, _starts_of(variant, model))
             continue
         # The library's equation may fail where a variant does not.
         larger = Predictor(extended.batch, (*without.names, variant.name))
         predicted_gains = [first_order_gain(without.fit, larger, start, kind.bounds) for start in kind.starts]
-        if max(predicted_gains) >= _MIN_GAIN_SHARE * term_selection:
+        if max(predicted_gains) >= VARIANT.min_gain_share * chosen_gains[1]:
             yield _Replacement(name, variant, kind.starts[[int(np.argmax(predicted_gains))]])
 
 
@@ -216,7 +213,7 @@ def _swapped_models(extended: Selector, current: ScoredModel, replacement: _Repl
 def _best_replacement(extended: Selector, current: ScoredModel, models: list[ScoredModel]) -> ScoredModel:
     """Return the best acceptable model, by deviance with a penalty for the number of effects."""
     acceptable = [model for model in models if _is_acceptable(model, current)]
-    best = min((current, *acceptable), key=lambda model: model.deviance + MIN_GAIN * len(model.names))
+    best = min((current, *acceptable), key=lambda model: model.deviance + SELECTION.min_gain * len(model.names))
     if best is current:
         return current
     extended.on_progress(f"{' + '.join(best.names)}: a variant gains {current.deviance - best.deviance:.0f}")
@@ -226,8 +223,8 @@ def _best_replacement(extended: Selector, current: ScoredModel, models: list[Sco
 def _is_acceptable(model: ScoredModel, current: ScoredModel) -> bool:
     """Return whether a model gains over `current` or, with fewer effects, predicts about as well."""
     if len(model.names) < len(current.names):
-        return model.deviance < current.deviance + MIN_GAIN
-    return model.gain_over(current) > MIN_GAIN
+        return model.deviance < current.deviance + SELECTION.min_gain
+    return model.gain_over(current) > SELECTION.min_gain
 
 
 def _swapped(extended: Selector, current: ScoredModel, out: set[str], variant: Candidate) -> ScoredModel:
@@ -242,7 +239,7 @@ def _swapped(extended: Selector, current: ScoredModel, out: set[str], variant: C
         fit(
             Predictor(extended.batch, names), np.r_[maps, kept, start], bounds_of(names),
             random_effects=near.random_effects, variance_components=near.variance_components,
-            iterations=_FEW_ITERATIONS,
+            iterations=FIT.few_steps,
         )
         for start in variant.starts
     ]  # fmt: skip
@@ -253,7 +250,11 @@ def _swapped(extended: Selector, current: ScoredModel, out: set[str], variant: C
 def _alternatives(selection: Selection, name: str, gain: float) -> dict[str, float]:
     """Return the alternatives of the effect `name` that remain after the `gain` of its variant."""
     known = selection.alternatives.get(cause_of(name), {})
-    return {other: difference + gain for other, difference in known.items() if difference + gain < ALTERNATIVE_MARGIN}
+    return {
+        other: difference + gain
+        for other, difference in known.items()
+        if difference + gain < SELECTION.alternative_margin
+    }
 
 
 def _other_causes(current: ScoredModel, name: str, tried: list[tuple[_Replacement, ScoredModel]]) -> dict[str, float]:
@@ -264,5 +265,5 @@ def _other_causes(current: ScoredModel, name: str, tried: list[tuple[_Replacemen
         for replacement, model in tried
         if {*model.names} - {replacement.variant.name} == others
         and replacement.variant.variant_of != cause_of(name)
-        and model.deviance - current.deviance < ALTERNATIVE_MARGIN
+        and model.deviance - current.deviance < SELECTION.alternative_margin
     }

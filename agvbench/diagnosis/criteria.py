@@ -1,0 +1,227 @@
+"""The criteria of a diagnosis: every constant that decides what is selected, tested or refused, with its reason.
+
+Every diagnosis states them under ``provenance.criteria``. Constants that only set a resolution or a tolerance of the
+arithmetic stand beside the code that uses them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+
+@dataclass(frozen=True)
+class DataCriteria:
+    """What a campaign must contain, and how its runs are divided.
+
+    ``min_runs``
+        Runs from rest. A model has about fifteen nodal values, and fewer runs leave no residual to judge it.
+    ``min_repeated_groups``
+        Groups of equal commands with repeats. The repeatability needs their degrees of freedom.
+    ``min_turn_rad``
+        Largest heading change of a campaign [rad]. Below it no run shows what the steering does.
+    ``test_share``
+        Share of the groups of runs that is set apart for the test. A quarter leaves most commands in the fit.
+    ``max_selection_runs``
+        Runs in the selection of effects, unless two repeats per group are more. Time grows with the number of runs, and
+        the chosen model is refitted to all training runs.
+    ``min_windows``, ``min_blocks``
+        Windows of free driving, and blocks of 10 s. Adjacent windows are strongly correlated, and blocks are not.
+    ``max_fitted_windows``, ``max_assessed_windows``
+        Windows in a fit, and windows for which errors are reported, evenly spaced.
+    """
+
+    min_runs: int = 20
+    min_repeated_groups: int = 3
+    min_turn_rad: float = 0.05
+    test_share: float = 0.25
+    max_selection_runs: int = 240
+    min_windows: int = 20
+    min_blocks: int = 5
+    max_fitted_windows: int = 300
+    max_assessed_windows: int = 1500
+
+
+@dataclass(frozen=True)
+class FitCriteria:
+    """When a fit is started, continued and ended. Differences are in minus two log likelihood.
+
+    ``few_steps``, ``steps``
+        Steps of a preliminary fit, which only ranks initial values, and of a round of a fit to convergence.
+    ``converged``, ``nearly_converged``
+        Reduction per step below which a fit ends, and below which derivatives are computed anew.
+    ``min_reduction``
+        Least reduction for which a fit that converges slowly goes on. It is below the margin of alternatives.
+    ``rounds``, ``non_monotone_steps``
+        Rounds of a patient fit, and full steps that may increase the loss (watchdog technique).
+    ``min_predicted_gain``
+        An effect whose gain is predicted to be smaller is not fitted. It is a quarter of the least gain of an effect.
+    ``large_predicted_gain``
+        An effect whose gain is predicted to be larger is fitted to convergence even if its first steps gain nothing.
+    ``min_share_of_predicted_gain``
+        A fit that gains less than this share of the prediction has ended in a local minimum, and starts elsewhere.
+    ``max_starts``, ``max_increase``
+        Initial values that are tried, and the increase of the loss in a preliminary fit that starts elsewhere.
+    """
+
+    few_steps: int = 3
+    steps: int = 10
+    converged: float = 0.05
+    nearly_converged: float = 1.0
+    min_reduction: float = 10.0
+    rounds: int = 4
+    non_monotone_steps: int = 6
+    min_predicted_gain: float = 3.0
+    large_predicted_gain: float = 40.0
+    min_share_of_predicted_gain: float = 0.5
+    max_starts: int = 2
+    max_increase: float = 20.0
+
+
+@dataclass(frozen=True)
+class SelectionCriteria:
+    """When an effect belongs to the model. Gains are differences of the cross-validated deviance.
+
+    ``min_gain``
+        Least gain of an effect; twice the logarithm of the number of candidates is added to it. With nothing hidden,
+        the largest gain of any candidate exceeds the sum in fewer than 1 of 100 campaigns.
+    ``alternative_margin``
+        Largest difference to an indistinguishable alternative: a likelihood ratio of about 150.
+    ``nearly_alternative``
+        Up to this difference an alternative is refitted, because its fit may have ended too soon.
+    ``min_relative_change``
+        Least change of the prediction by an effect, relative to the residual that remains with it. A smaller change is
+        not noticeable, however significant.
+    ``best_group_share``
+        Share of the groups of runs with the largest gains, without which an effect must still gain.
+    ``wald_alpha``
+        Level at which the parameters of an effect must differ from their null values, with errors clustered by group.
+    ``max_effects``
+        Effects that are added one by one.
+    ``min_gain_of_initial_steering``
+        Predicted gain of slow steering above which the other initial steering is fitted.
+    """
+
+    min_gain: float = 12.0
+    alternative_margin: float = 10.0
+    nearly_alternative: float = 100.0
+    min_relative_change: float = 0.15
+    best_group_share: float = 0.05
+    wald_alpha: float = 1e-4
+    max_effects: int = 4
+    min_gain_of_initial_steering: float = 20.0
+
+
+@dataclass(frozen=True)
+class VariantCriteria:
+    """Which effects are tried with other equations.
+
+    ``min_fit_gain``
+        An effect with this gain of the fit is tried in its variants even if it predicts no better: the wrong equation
+        biases the maps, and the prediction of runs left out fails.
+    ``min_gain_share``
+        Another effect with a smaller share of the selected effect's gain is not tried in its variants.
+    ``max_alone``
+        Variants that are fitted if no effect was selected.
+    """
+
+    min_fit_gain: float = 40.0
+    min_gain_share: float = 0.5
+    max_alone: int = 3
+
+
+@dataclass(frozen=True)
+class DiscrepancyCriteria:
+    """When a discrepancy term stands for a cause outside the library, and which effects are kept beside it.
+
+    ``min_predicted_gain``, ``min_share_of_best_start``, ``max_starts``
+        Starts of terms that are fitted: predicted to gain this much, and this share of what the best is predicted to
+        gain, and at most this many, because each is a fit of several seconds.
+    ``max_refitted``, ``max_effects``
+        Effects that are reconsidered beside a term, and effects beside a term.
+    ``few_groups_share``
+        An effect that gains nothing without this share of the groups rests on few of them. A term may take its place.
+    """
+
+    min_predicted_gain: float = 4.0
+    min_share_of_best_start: float = 0.3
+    max_starts: int = 3
+    max_refitted: int = 3
+    max_effects: int = 5
+    few_groups_share: float = 0.1
+
+
+@dataclass(frozen=True)
+class ResidualCriteria:
+    """When the residual shows structure.
+
+    ``within_repeatability``
+        A residual below this multiple of the repeatability is within it. The ratio of two standard deviations with
+        twenty degrees of freedom each exceeds it in one of six comparisons by chance, so that a test decides beyond it.
+    ``lack_of_fit_alpha``
+        Level of the lack-of-fit test.
+    ``dependence_alpha``, ``likely_alpha``
+        Levels of a dependence after the correction for the number of tests: for a residual of which nothing is known,
+        and for one that is known to have structure.
+    ``min_share``
+        Smallest share of the variance that a reported dependence predicts.
+    ``periodic_alpha``
+        Level of the test for a periodic disturbance with random phase. The number of permutations resolves it.
+    ``far_above_noise``
+        Ratio to the noise above which residuals of windows count as structure. The repeatability of free driving is a
+        lower bound, because the variation between repeats is unknown.
+    """
+
+    within_repeatability: float = 1.25
+    lack_of_fit_alpha: float = 0.01
+    dependence_alpha: float = 1e-3
+    likely_alpha: float = 0.05
+    min_share: float = 0.02
+    periodic_alpha: float = 5e-3
+    far_above_noise: float = 5.0
+
+
+@dataclass(frozen=True)
+class DesignCriteria:
+    """When a next experiment is proposed. Differences are expected ones in minus two log likelihood.
+
+    ``decisive``
+        A difference that is beyond the margin of alternatives in 99 of 100 campaigns.
+    ``min_evidence``
+        Least difference that ``max_repeats`` must give; otherwise no run is proposed for the pair.
+    ``min_repeats``, ``max_repeats``
+        Repeats of a proposed run: enough for a repeatability, and few enough for a quarter of an hour.
+    ``identified``
+        A parameter is identified if its standard error is below this share of its typical size.
+    """
+
+    decisive: float = 40.0
+    min_evidence: float = 10.0
+    min_repeats: int = 4
+    max_repeats: int = 12
+    identified: float = 0.5
+
+
+DATA = DataCriteria()
+FIT = FitCriteria()
+SELECTION = SelectionCriteria()
+FREE_DRIVING = SelectionCriteria(min_relative_change=0.3, best_group_share=0.0)
+"""Criteria for windows of free driving. Their residuals are mostly systematic, so that a small change of the prediction
+is no evidence; blocks of fast driving may be few, so that only the block with the largest gain is excluded."""
+
+VARIANT = VariantCriteria()
+DISCREPANCY = DiscrepancyCriteria()
+RESIDUAL = ResidualCriteria()
+DESIGN = DesignCriteria()
+
+
+def stated_criteria(selection: SelectionCriteria = SELECTION) -> dict[str, dict[str, float]]:
+    """Return every criterion with its value, by class, for the provenance of a diagnosis with this `selection`."""
+    return {
+        "data": asdict(DATA),
+        "fit": asdict(FIT),
+        "selection": asdict(selection),
+        "variant": asdict(VARIANT),
+        "discrepancy": asdict(DISCREPANCY),
+        "residual": asdict(RESIDUAL),
+        "design": asdict(DESIGN),
+    }
