@@ -13,8 +13,9 @@ from agvbench import adapters, effects, simulator
 
 DOCS = Path(__file__).parents[2] / "docs"
 IMPORT = re.compile(r"^\s*(?:>>> )?from (agvbench[\w.]*) import (.+)$", re.MULTILINE)
-# What the hooks of an effect see has names of its own, such as X and PLAY.
-PACKAGES = re.compile(r"agvbench(\.\w+)?|agvbench\.effects\.state|agvbench\.simulator\.hidden")
+# What the hooks of an effect see has names of its own, such as X and PLAY. An effect is a file of the package
+# agvbench.effects, which is still being imported when the effect is, so that it imports its base class from its module.
+PACKAGES = re.compile(r"agvbench(\.\w+)?|agvbench\.effects\.(state|base)|agvbench\.simulator\.hidden")
 
 
 def classes_in(annotation: object) -> set[type]:

@@ -86,7 +86,7 @@ def test_without_repeats_there_is_no_floor_and_no_verdict(tiny_campaign):
     once = type(campaign)([run for run in campaign if run.repeat == 1])
     found = diagnose(once)
     assert found.verdict is Verdict.NOT_IDENTIFIABLE
-    assert "repeats" in found.why
+    assert "repeatability cannot be estimated" in found.why
     assert found.held_out is None
 
 
