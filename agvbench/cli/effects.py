@@ -8,6 +8,8 @@ examples:
   agvbench effects --markdown              the same at length, as in the documentation
   agvbench effects new servo_warm_up       write agvbench/effects/servo_warm_up.py, to be edited
   agvbench effects new seam --dir /tmp     write it elsewhere
+
+The how-to docs/how-to/write-an-effect.md takes an effect from the file to the diagnosis that names it.
 """
 
 from __future__ import annotations
@@ -36,7 +38,8 @@ def run(arguments: argparse.Namespace) -> int:
     from agvbench.workflows.effects import write_template
 
     if arguments.action == "new":
-        print(f"wrote {write_template(arguments.name, arguments.dir)}: now say what it does")
+        print(f"wrote {write_template(arguments.name, arguments.dir)}")
+        print("next: write its equation and parameters; docs/how-to/write-an-effect.md takes it from file to diagnosis")
         return 0
     if arguments.markdown:
         print(reference_page(), end="")

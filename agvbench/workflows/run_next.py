@@ -63,7 +63,7 @@ def run_next(
         Directory of the extended campaign, which must not exist; by default beside the old one, ``-next`` behind its
         name.
     seed
-        That of the diagnosis: the runs that it held out stay held out.
+        That of the diagnosis: its test runs remain test runs.
 
     Raises
     ------

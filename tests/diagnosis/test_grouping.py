@@ -87,7 +87,7 @@ def test_of_few_runs_the_test_is_made_first():
 
 def test_a_split_that_leaves_nothing_to_fit_is_one_line():
     runs = [dataclasses.replace(r, split="held_out") for r in bare_runs()]
-    with pytest.raises(FitError, match="must name runs to fit and runs held out"):
+    with pytest.raises(FitError, match="must name training runs and test runs"):
         split_runs(runs, group_runs(runs), 0)
 
 

@@ -111,7 +111,7 @@ def split_runs(runs: Sequence[Run], group: NDArray[np.int64], seed: int) -> Spli
     training = ~(test | validation)
     if not training.any() or not test.any():
         named = {run.split for run in runs}
-        raise FitError("the column split must name runs to fit and runs held out", where="runs", value=named)
+        raise FitError("the column split must name training runs and test runs", where="runs", value=named)
     if not validation.any():
         rest = np.flatnonzero(training)
         validation[rest[_drawn([runs[int(i)] for i in rest], group[rest], rng, DATA.test_share / 2.0)]] = True

@@ -31,7 +31,7 @@ def held_out_windows(readings: Readings, seed: int) -> NDArray[np.bool_]:
     if any(split):
         held = np.array([name == "held_out" for name in split])
         if held.all() or not held.any():
-            raise FitError("the column split must name runs to fit and runs held out", where="runs", value=set(split))
+            raise FitError("the column split must name training runs and test runs", where="runs", value=set(split))
         return held
     rng = np.random.default_rng([0xD1A7, seed])
     initial_states = _initial_states(readings)

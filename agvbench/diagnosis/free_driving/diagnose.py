@@ -44,11 +44,11 @@ def diagnose_windows(
     if not held.any():
         return context.not_identifiable(readings, "no stretch of driving can be spared for the test: drive for longer")
     fitted = readings.select(thinned(np.flatnonzero(~held), DATA.max_fitted_windows))
-    on_progress(f"{len(fitted)} windows to fit, {np.count_nonzero(held)} held out")
+    on_progress(f"{len(fitted)} training windows, {np.count_nonzero(held)} test windows")
     static = _static(fitted, context.geometry, context.header.neutral)
     selector = _selector(context, readings, held, static, on_progress)
     selection = selector.select()
-    on_progress("judging on what was held out")
+    on_progress("computing the errors of the test windows")
     assessment = readings.select(
         np.sort(np.r_[np.flatnonzero(held), thinned(np.flatnonzero(~held), DATA.max_assessed_windows)])
     )

@@ -36,9 +36,7 @@ def print_diagnosis(found: Diagnosis, console: Console) -> None:
     if found.held_out is not None:
         console.print()
         runs = found.held_out.runs
-        console.print(
-            f"Prediction errors of {runs} runs held out, root mean squares but for the median:", highlight=False
-        )
+        console.print(f"Prediction errors of {runs} test runs, root mean squares but for the median:", highlight=False)
         console.print(errors_table(found.held_out))
         console.print(Text(DEFINITIONS, style="dim"))
         _say(fit_in_words(content), console)
@@ -77,14 +75,14 @@ _MOST_ROWS = 24
 
 
 def windows_table(windows: Mapping[str, Any]) -> Table:
-    """Return position errors [mm] by recording, those held out first, with 95 % intervals where they are known."""
+    """Return position errors [mm] by recording, the test recordings first, with 95 % intervals where they are known."""
     rows = sorted(windows["recordings"], key=lambda row: not row["held_out"])[:_MOST_ROWS]
     known = [name for name in _PREDICTORS if f"{name}_mm" in _errors(rows[0])[0][1]]
     table = Table(title="position error by recording, mm", box=box.SIMPLE_HEAD, title_justify="left")
     for heading in ("recording", "ahead", "floor", *(_PREDICTORS[name] for name in known)):
         table.add_column(heading, justify="left" if heading == "recording" else "right")
     for row in rows:
-        label = f"{row['recording']}{' (held out)' if row['held_out'] else ''}"
+        label = f"{row['recording']}{' (test)' if row['held_out'] else ''}"
         for ahead, errors in _errors(row):
             cells = [_cell(errors[f"{name}_mm"]) for name in known]
             table.add_row(Text(label), ahead, f"{errors['floor_mm']:.1f}", *cells)

@@ -122,7 +122,7 @@ def _errors(content: Mapping[str, Any]) -> Table:
             rows.append([title, *(number(errors.get(key)) for key in COLUMNS)])
     columns = [Column("quantity", "root mean square"), *(Column(key, title, 2) for key, title in COLUMNS.items())]
     runs = number(held.get("runs"))
-    return Table("held_out", f"Prediction errors of {runs:.0f} runs held out.", columns, rows, note=DEFINITIONS)
+    return Table("held_out", f"Prediction errors of {runs:.0f} test runs.", columns, rows, note=DEFINITIONS)
 
 
 def _pictures(residuals: pd.DataFrame) -> list[Block]:
