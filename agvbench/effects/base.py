@@ -98,9 +98,10 @@ class Effect:
         Source of the equation.
     limits
         Limits of the equation, and effects that cannot be distinguished from it.
-    local
-        Whether the hooks change over short times or distances while the actuators are settled (with position, time or
-        distance): the simulation then takes short steps.
+    longest_step_s
+        Longest step of the simulation [s] while the effect is active. It is finite if a hook changes while the
+        actuators are settled: with position, heading, time or distance. A step is integrated with four Gauss–Legendre
+        nodes, so a quarter of the shortest period is enough.
     arrive
         ``arrive(state, time_s, …) -> time_s``: time at which a command given at `time_s` takes effect; may change
         ``REAR_WAIT`` and ``DRIVE_WAIT``.
@@ -128,7 +129,7 @@ class Effect:
     reference: ClassVar[str]
     limits: ClassVar[str]
 
-    local: ClassVar[bool] = False
+    longest_step_s: ClassVar[float] = math.inf
     arrive: ClassVar[Hook | None] = None
     aim: ClassVar[Hook | None] = None
     steer: ClassVar[Hook | None] = None

@@ -142,7 +142,7 @@ def test_a_window_may_begin_at_another_speed():
     lag = parameters(simulation, {"speed_lag": {"accelerate_s": 0.3, "brake_s": 0.5}})
     poses = simulation.predict(np.zeros((2, 3)), lag, np.array([[0.0, 0.0, 0.0, 0.4]]))
     rolled = np.where(FRAMES[10:] > 1.0, 0.4 * 0.5 * -np.expm1(-(FRAMES[10:] - 1.0) / 0.5), 0.0)
-    np.testing.assert_allclose(poses[:, 0], rolled, atol=5e-7)
+    np.testing.assert_allclose(poses[:, 0], rolled, atol=2e-6)
 
 
 def test_effects_and_parameters_are_two_ways_to_say_the_same(simulation):

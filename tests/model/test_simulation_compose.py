@@ -26,7 +26,7 @@ from agvbench.effects.state import FRONT_SPEED, REAR_SPEED, X, Y
 class SlowPatch(Effect):
     name = "slow_patch"
     stage = Stage.WHEELS
-    local = True
+    longest_step_s = 0.025
     loss: float = parameter(unit="–", low=0.0, high=1.0, scale=0.1)
 
     @staticmethod

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -252,7 +253,7 @@ def _term_in_place_of_effect(
     best: tuple[ScoredModel, type[DiscrepancyTerm]] | None = None
     for name in selection.gains:
         without = extended.without_effect(selection.base, selection.chosen, name)
-        for term in (term for term in TERMS if not term.local):
+        for term in (term for term in TERMS if term.longest_step_s == math.inf):
             model = extended.with_effect(without, term.name)
             if model.deviance < (best[0] if best else selection.chosen).deviance and extended.meets_criterion(
                 without, model

@@ -12,6 +12,7 @@ from agvbench.effects.state import FRONT_SPEED, HEADING, REAR_SPEED, TIME, X, Y
 from agvbench.types import Floats
 
 _EDGE_M = 0.015
+_EDGE_STEP_S = 0.025
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class SpeedInDisc(DiscrepancyTerm):
     stage: ClassVar[Stage] = Stage.WHEELS
     covariates: ClassVar[tuple[str, ...]] = ("x_m", "y_m")
     through: ClassVar[str] = "speed"
-    local: ClassVar[bool] = True
+    longest_step_s: ClassVar[float] = _EDGE_STEP_S
 
     loss: float = parameter(unit="–", low=-1.0, high=0.9, scale=0.1)
     x_m: float = parameter(unit="m", low=-50.0, high=50.0, scale=0.5)
@@ -50,7 +51,7 @@ class SpeedInStrip(DiscrepancyTerm):
     stage: ClassVar[Stage] = Stage.WHEELS
     covariates: ClassVar[tuple[str, ...]] = ("x_m", "y_m")
     through: ClassVar[str] = "speed"
-    local: ClassVar[bool] = True
+    longest_step_s: ClassVar[float] = _EDGE_STEP_S
 
     loss: float = parameter(unit="–", low=-1.0, high=0.9, scale=0.1)
     place_m: float = parameter(unit="m", low=-50.0, high=50.0, scale=0.5)
@@ -75,7 +76,7 @@ class SpeedByHeading(DiscrepancyTerm):
     stage: ClassVar[Stage] = Stage.WHEELS
     covariates: ClassVar[tuple[str, ...]] = ("heading_rad",)
     through: ClassVar[str] = "speed"
-    local: ClassVar[bool] = True
+    longest_step_s: ClassVar[float] = 0.1
 
     cosine: float = parameter(unit="–", low=-0.7, high=0.7, scale=0.03)
     sine: float = parameter(unit="–", low=-0.7, high=0.7, scale=0.03)
@@ -97,7 +98,7 @@ class SpeedByRunTime(DiscrepancyTerm):
     stage: ClassVar[Stage] = Stage.WHEELS
     covariates: ClassVar[tuple[str, ...]] = ("time_in_run_s",)
     through: ClassVar[str] = "speed"
-    local: ClassVar[bool] = True
+    longest_step_s: ClassVar[float] = 0.2
 
     share: float = parameter(unit="–", low=-0.9, high=0.9, scale=0.05)
     time_constant_s: float = parameter(unit="s", low=0.0, high=60.0, scale=2.0)

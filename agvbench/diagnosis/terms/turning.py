@@ -12,6 +12,7 @@ from agvbench.effects.state import DISTANCE, FORWARD, HEADING, LEFT, SPEED, X_RA
 from agvbench.types import Floats
 
 _EDGE_M = 0.015
+_EDGE_STEP_S = 0.025
 _TURN = math.tau
 _START_S = 0.1
 _PER_ROOT = 1.0 / math.sqrt(math.tau)
@@ -25,7 +26,7 @@ class TurnAtLine(DiscrepancyTerm):
     stage: ClassVar[Stage] = Stage.FLOOR
     covariates: ClassVar[tuple[str, ...]] = ("x_m", "y_m")
     through: ClassVar[str] = "turning"
-    local: ClassVar[bool] = True
+    longest_step_s: ClassVar[float] = _EDGE_STEP_S
 
     turn_rad: float = parameter(unit="rad", low=-0.5, high=0.5, scale=0.02)
     place_m: float = parameter(unit="m", low=-50.0, high=50.0, scale=0.5)
@@ -49,7 +50,7 @@ class TurnByHeading(DiscrepancyTerm):
     stage: ClassVar[Stage] = Stage.BODY
     covariates: ClassVar[tuple[str, ...]] = ("heading_rad",)
     through: ClassVar[str] = "turning"
-    local: ClassVar[bool] = True
+    longest_step_s: ClassVar[float] = 0.1
 
     cosine: float = parameter(unit="1/m", low=-2.0, high=2.0, scale=0.02)
     sine: float = parameter(unit="1/m", low=-2.0, high=2.0, scale=0.02)
@@ -70,7 +71,7 @@ class TwistAtStart(DiscrepancyTerm):
     stage: ClassVar[Stage] = Stage.BODY
     covariates: ClassVar[tuple[str, ...]] = ("time_in_run_s", "history")
     through: ClassVar[str] = "turning"
-    local: ClassVar[bool] = True
+    longest_step_s: ClassVar[float] = 0.025
 
     twist_rad: float = parameter(unit="rad", low=-0.5, high=0.5, scale=0.02)
     lost_s: float = parameter(unit="s", low=0.0, high=0.8, scale=0.1)
@@ -98,7 +99,7 @@ class WaveByDistance(DiscrepancyTerm):
     stage: ClassVar[Stage] = Stage.BODY
     covariates: ClassVar[tuple[str, ...]] = ("distance_modulo_period_m",)
     through: ClassVar[str] = "speed and turning"
-    local: ClassVar[bool] = True
+    longest_step_s: ClassVar[float] = 0.05
 
     period_m: float = parameter(unit="m", low=0.0, high=10.0, scale=0.1)
     speed_cosine: float = parameter(unit="–", low=-0.7, high=0.7, scale=0.03)

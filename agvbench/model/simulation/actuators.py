@@ -68,11 +68,11 @@ PLAN_SIZE = _EVENTS + _EVENT_COUNT
 SERVOS_SIZE = 8
 
 # Below this gap [rad, m/s] an actuator counts as settled.
-_SETTLED = 1e-9
+_SETTLED = 1e-7
 # Length of a step in time constants: the first one, and its growth per time constant.
-_FIRST_STEP, _STEP_GROWTH = 0.5, 0.15
+_FIRST_STEP, _STEP_GROWTH = 0.7, 0.25
 # The longest step while a servo or the drive ramps, and how close to a kink counts as there [s].
-_RAMP_STEP_S, _TOGETHER = 0.05, 1e-12
+_RAMP_STEP_S, _TOGETHER = 0.1, 1e-12
 # With backlash and a servo of second order kinks are not computed: steps are short [s].
 _BACKLASH_STEP_S = 0.005
 # Invalid parameters must not make the loop endless [s].

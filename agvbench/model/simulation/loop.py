@@ -40,6 +40,7 @@ from agvbench.effects.state import (
     STEERING_RATE,
     X_RATE,
     Y_RATE,
+    YAW_RATE,
     X,
     Y,
 )
@@ -55,7 +56,7 @@ from agvbench.types import Floats
 Integers = NDArray[np.int64]
 
 # Length of the first step of a command, with unknown yaw rate [s]; rotation in a later step [rad; s below 1 rad/s].
-_FIRST_STEP_S, _TURN_PER_STEP = 0.05, 0.15
+_FIRST_STEP_S, _TURN_PER_STEP = 0.08, 0.3
 # Limit of the yaw rate [rad/s]: invalid parameters must not make the loop endless.
 _FASTEST_TURN = 150.0
 _TOGETHER = 1e-12
@@ -241,7 +242,7 @@ def simulate(
             continue
         first, last = command_starts[run], command_starts[run + 1] - 1
         vehicle[STARTED] = started_h[run]
-        s[X_RATE] = s[Y_RATE] = 0.0
+        s[X_RATE] = s[Y_RATE] = s[YAW_RATE] = 0.0
         start_run(s, p, initial, run)
         start[0], start[1], start[2], start[3] = s[X], s[Y], s[HEADING], 0.0
         start[4], start[5], start[6] = initial[run, 0], initial[run, 1], initial[run, 2]

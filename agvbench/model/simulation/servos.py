@@ -22,7 +22,10 @@ GAP, GAP_RATE, SETTLED_S, TURNS_S, TURNS_EVERY_S, _DECAY, _SQUARE, _TAU = range(
 SPED_S, CRUISED_S, _CRUISE, _ACCELERATION = range(5, 9)
 WAY_SIZE = 9
 
-_SETTLED = 1e-9
+# Below this gap [rad] a servo counts as settled.
+_SETTLED = 1e-7
+# Length of a step in time constants: the first one, and its growth per time constant.
+_FIRST_STEP, _STEP_GROWTH = 0.7, 0.25
 _LONG = 20.0
 
 
@@ -127,5 +130,5 @@ def longest_step(plan: Floats, way: int, order: int, t: float, longest: float) -
         return longest
     tau, decay, square = plan[way + _TAU], plan[way + _DECAY], plan[way + _SQUARE]
     if square < 0.0:  # the fast decay first, then the slow one
-        return min(longest, 0.5 / (decay + math.sqrt(-square)) + 0.15 * t)
-    return min(longest, tau, 0.5 * tau + 0.15 * t)
+        return min(longest, _FIRST_STEP / (decay + math.sqrt(-square)) + _STEP_GROWTH * t)
+    return min(longest, _FIRST_STEP * tau)

@@ -29,7 +29,6 @@ from agvbench.vehicle.geometry import Geometry
 Integers = NDArray[np.int64]
 Map = Callable[[Floats], ArrayLike]
 
-STEP_S = 0.025
 _CHANNELS = ("drive", "front", "rear")
 
 
@@ -79,8 +78,6 @@ class Simulation:
         The neutral command, in command units.
     runs
         At least one.
-    step_s
-        Longest step [s] while an effect is `local`; else steps are as long as the motion allows.
     kinds
         Effects outside the registry, such as discrepancy terms: classes at module level.
 
@@ -113,13 +110,10 @@ class Simulation:
         neutral: float,
         runs: Sequence[SimulatedRun],
         *,
-        step_s: float = STEP_S,
         kinds: Sequence[type[Effect]] = (),
     ) -> None:
         _check_lengths(runs)
-        if not step_s > 0.0:
-            raise InputError("must be greater than zero", where="step_s", value=f"{step_s:g} s")
-        self.geometry, self.neutral, self.step_s = geometry, neutral, step_s
+        self.geometry, self.neutral = geometry, neutral
         self.kinds = (*effect_kinds().values(), *kinds)
         declared = [(kind.name, p) for kind in self.kinds for p in kind.parameters()]
         self.parameter_names = tuple(f"{name}.{p.name}" for name, p in declared)
@@ -145,7 +139,7 @@ class Simulation:
         self._from_neutral = np.column_stack([self.drive, self.front, self.rear]) - neutral
         self._started_h = np.array([run.started_h for run in runs], dtype=np.float64)
         self._begins_s = np.array([np.nan if run.begins_s is None else run.begins_s for run in runs])
-        self._local = np.array([kind.local for kind in self.kinds for _ in kind.parameters()])
+        self._steps_s = np.array([kind.longest_step_s for kind in self.kinds for _ in kind.parameters()])
         self._all_runs = np.arange(len(runs))
         self._kernel = kernel(self.kinds)
 
@@ -258,7 +252,7 @@ class Simulation:
         return poses
 
     def _longest_step(self, parameters: Floats) -> float:
-        return self.step_s if np.any(parameters[self._local] != self.nulls[self._local]) else np.inf
+        return float(np.min(self._steps_s[parameters != self.nulls], initial=np.inf))
 
     def split(self, frames: Floats) -> list[Floats]:
         """Return an array over all frames as one per run."""

@@ -79,14 +79,14 @@ def take_step(
     start: Floats,
 ) -> None:  # fmt: skip
     """Fill `work` for a step of `length` from `tau` after `begin`; `start` is the pose there and the distance."""
-    x_rate, y_rate = s[X_RATE], s[Y_RATE]
+    x_rate, y_rate, yaw_rate = s[X_RATE], s[Y_RATE], s[YAW_RATE]
     for i in range(COUNT):
         elapsed = NODES[i] * length
         actuate(plan, tau + elapsed, s)
         s[TIME] = begin + tau + elapsed
         s[HOURS] = vehicle[STARTED] + s[TIME] / SECONDS_PER_HOUR
-        # Position for effects that depend on it, extrapolated with the velocity at the last node.
-        s[X], s[Y], s[HEADING] = start[0] + elapsed * x_rate, start[1] + elapsed * y_rate, start[2]
+        # Pose for effects that depend on it, extrapolated with the velocity at the last node.
+        s[X], s[Y], s[HEADING] = start[0] + elapsed * x_rate, start[1] + elapsed * y_rate, start[2] + elapsed * yaw_rate
         s[DISTANCE] = start[3] + elapsed * abs(s[SPEED])
         set_motion(s, p, vehicle[FRONT_AXLE], vehicle[REAR_AXLE])
         work[LONGITUDINAL + i], work[LATERAL + i], work[TURN + i] = s[FORWARD], s[LEFT], s[YAW_RATE]
