@@ -202,12 +202,13 @@ def _values(model: ScoredModel, name: str) -> dict[str, float]:
 def _swapped_models(extended: Selector, current: ScoredModel, replacement: _Replacement) -> list[ScoredModel]:
     """Return `current` with a variant in place of its effect, also with one more effect removed."""
     variant = replace(candidate(replacement.variant), starts=replacement.starts)
+    swapped = _swapped(extended, current, {replacement.replaced}, variant)
+    # A model with fewer effects fits no better: nothing is removed from one that fits much worse already.
+    if _fit_gain(current, swapped) < -SELECTION.nearly_alternative:
+        return [swapped]
     # Another effect may only compensate for the wrong equation.
     others = [other for other in current.names if other != replacement.replaced and other not in extended.given]
-    return [
-        _swapped(extended, current, {replacement.replaced, *more}, variant)
-        for more in ([], *([other] for other in others))
-    ]
+    return [swapped, *(_swapped(extended, current, {replacement.replaced, other}, variant) for other in others)]
 
 
 def _best_replacement(extended: Selector, current: ScoredModel, models: list[ScoredModel]) -> ScoredModel:
