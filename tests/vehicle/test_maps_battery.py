@@ -54,7 +54,9 @@ def test_forward_of_inverse_is_the_output(static_map: StaticMap, share: float) -
 def test_inverse_of_forward_is_the_command_unless_the_map_is_flat_there(static_map: StaticMap, share: float) -> None:
     low, high = finite_range(static_map)
     command = low + share * (high - low)
-    steepness = abs(float(static_map.derivative(command))) * (high - low)
+    step = 1e-6 * (high - low)
+    risen = float(static_map(min(command + step, high))) - float(static_map(max(command - step, low)))
+    steepness = abs(risen) / 2e-6
     if steepness > 0.05 * abs(float(static_map(high)) - float(static_map(low))):
         assert float(static_map.inverse(static_map(command))) == pytest.approx(command, abs=1e-6 * (high - low))
 
@@ -73,23 +75,10 @@ def test_beyond_the_range_nothing_changes(static_map: StaticMap) -> None:
     for end, beyond in zip(static_map.command_range, (-1e9, 1e9), strict=True):
         if math.isfinite(end):
             assert float(static_map(beyond)) == float(static_map(end))
-            assert float(static_map.derivative(beyond)) == 0.0
     low, high = static_map.output_range
     outputs = static_map(np.linspace(*finite_range(static_map), 101))
     assert np.all(outputs >= low - 1e-12)
     assert np.all(outputs <= high + 1e-12)
-
-
-@pytest.mark.parametrize("static_map", EXAMPLES)
-@given(share=st.floats(0.001, 0.999))
-def test_derivative_agrees_with_differences(static_map: StaticMap, share: float) -> None:
-    low, high = finite_range(static_map)
-    command, step = low + share * (high - low), 1e-6 * (high - low)
-    before, here, after = (float(static_map(command + k * step)) for k in (-1, 0, 1))
-    slopes = sorted(((here - before) / step, (after - here) / step))
-    scale = abs(float(static_map(high)) - float(static_map(low))) / (high - low)
-    tolerance = 1e-3 * scale + 1e-12
-    assert slopes[0] - tolerance <= float(static_map.derivative(command)) <= slopes[1] + tolerance
 
 
 @pytest.mark.parametrize("static_map", EXAMPLES)
@@ -98,7 +87,6 @@ def test_shapes_are_kept(static_map: StaticMap) -> None:
     for shape in ((), (0,), (3,), (2, 3)):
         commands = np.full(shape, middle)
         assert static_map(commands).shape == shape
-        assert static_map.derivative(commands).shape == shape
         outputs = np.full(shape, static_map.output_range[0] if isinstance(static_map, Fixed | FullSpeedOrStop) else 0.0)
         assert static_map.inverse(outputs).shape == shape
 

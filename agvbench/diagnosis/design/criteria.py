@@ -160,10 +160,3 @@ def evidence(known: Floats, new: DesignInformation, repeats: float) -> Floats:
     matrix = matrix + _WEAK * np.eye(matrix.shape[-1])
     move = np.linalg.solve(matrix, repeats * new.pull[..., None])[..., 0]
     return np.asarray(repeats * new.square - np.sum(repeats * new.pull * move, axis=1))
-
-
-def expected_stderr(known: Floats, new: Floats, repeats: float, at: Floats) -> Floats:
-    """Return the standard errors (D, len(at)) of the parameters with indices `at`, with new runs (D, P, P)."""
-    matrix = known + repeats * new
-    matrix = matrix + _WEAK * np.eye(matrix.shape[-1])
-    return np.asarray(np.sqrt(np.diagonal(np.linalg.inv(matrix), axis1=1, axis2=2)[:, at]))

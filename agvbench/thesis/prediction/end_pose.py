@@ -51,11 +51,6 @@ class EndPosePrediction:
     turned_deg: float
     delta_s_mm: float
 
-    @property
-    def delta_heading_deg(self) -> float:
-        """Heading change minus its target [deg], signed."""
-        return self.turned_deg - math.degrees(self.trajectory.heading_rad)
-
 
 def predict(trajectory: ThesisTrajectory, condition: Condition, assumed: Assumptions) -> EndPosePrediction:
     """Return the predicted end of `trajectory` driven under `condition`."""

@@ -57,12 +57,6 @@ class StaticMap(ABC):
             )
         return np.asarray(self._command(np.clip(wanted, low, high)))
 
-    def derivative(self, command: ArrayLike) -> Floats:
-        """Return d output / d command, in the shape of `command`: 0 beyond the range, one-sided at a kink."""
-        asked = np.asarray(command, dtype=np.float64)
-        low, high = self.command_range
-        return np.where((asked < low) | (asked > high), 0.0, self._slope(self._clip(asked)))
-
     @property
     @abstractmethod
     def command_range(self) -> tuple[float, float]:
@@ -107,10 +101,6 @@ class StaticMap(ABC):
     @abstractmethod
     def _command(self, output: Floats) -> Floats:
         """Return the command for outputs inside the range."""
-
-    @abstractmethod
-    def _slope(self, command: Floats) -> Floats:
-        """Return the derivative for commands inside the range."""
 
     def _clip(self, command: ArrayLike) -> Floats:
         return np.clip(np.asarray(command, dtype=np.float64), *self.command_range)

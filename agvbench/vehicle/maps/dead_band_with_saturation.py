@@ -90,14 +90,6 @@ class DeadBandWithSaturation(StaticMap):
         centre = 0.5 * (self.low_edge + self.high_edge)
         return np.where(low_share > 0.0, low, np.where(high_share > 0.0, high, centre))
 
-    def _slope(self, command: Floats) -> Floats:
-        low, high = self._rise(command)
-        low_slope = -self.low_output * self.low_exponent / self._low_width * (1.0 - low) ** (self.low_exponent - 1.0)
-        high_slope = (
-            self.high_output * self.high_exponent / self._high_width * (1.0 - high) ** (self.high_exponent - 1.0)
-        )
-        return np.where(command <= self.low_edge, low_slope, np.where(command >= self.high_edge, high_slope, 0.0))
-
     def _rise(self, command: Floats) -> tuple[Floats, Floats]:
         """Return u on the low and on the high side, 0 … 1."""
         low = np.clip((self.low_edge - command) / self._low_width, 0.0, 1.0)

@@ -59,6 +59,3 @@ class Fixed(StaticMap):
 
     def _command(self, output: Floats) -> Floats:
         return np.full_like(output, self.command)
-
-    def _slope(self, command: Floats) -> Floats:
-        return np.zeros_like(command)

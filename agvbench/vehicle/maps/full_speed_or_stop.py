@@ -81,11 +81,6 @@ class FullSpeedOrStop(StaticMap):
             )
         return np.asarray(commands[index])
 
-    def _slope(self, command: Floats) -> Floats:
-        commands, speeds = self._points
-        slopes = np.diff(speeds) / np.diff(commands)
-        return np.asarray(slopes[np.where(command < self.command_stop, 0, 1)])
-
     @property
     def _points(self) -> tuple[Floats, Floats]:
         commands = np.array([self.command_low, self.command_stop, self.command_high])

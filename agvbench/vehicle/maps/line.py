@@ -68,6 +68,3 @@ class Line(StaticMap):
 
     def _command(self, output: Floats) -> Floats:
         return np.clip((output - self.intercept) / self.slope, *self.command_range)
-
-    def _slope(self, command: Floats) -> Floats:
-        return np.full_like(command, self.slope)

@@ -72,6 +72,3 @@ class LineWithEndStops(StaticMap):
 
     def _command(self, output: Floats) -> Floats:
         return (output - self.intercept) / self.slope
-
-    def _slope(self, command: Floats) -> Floats:
-        return np.full_like(command, self.slope)
