@@ -114,6 +114,11 @@ class Content:
     blocks: Sequence[Block] = field(default_factory=tuple)
 
     @property
+    def is_absent(self) -> bool:
+        """Whether all that the section says is why it has nothing to show."""
+        return all(isinstance(block, Paragraph) and not block.lead for block in self.blocks)
+
+    @property
     def tables(self) -> list[Table]:
         """Return the section's tables."""
         return [block for block in self.blocks if isinstance(block, Table)]
