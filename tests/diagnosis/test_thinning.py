@@ -39,7 +39,7 @@ def test_what_is_kept_of_a_group_is_spread_over_the_session(size, most):
 def test_causes_found_in_some_runs_are_measured_in_all(tiny_campaign, monkeypatch):
     campaign = tiny_campaign(Tiny(steering_lag_s=0.15))
     whole = diagnose(campaign)
-    module = importlib.import_module("agvbench.diagnosis.diagnose")
+    module = importlib.import_module("agvbench.diagnosis.runs_from_rest")
     monkeypatch.setattr(module, "DATA", replace(DATA, max_selection_runs=70))
     said: list[str] = []
     found = diagnose(campaign, on_progress=said.append)

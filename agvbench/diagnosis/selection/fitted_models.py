@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,13 +13,11 @@ from agvbench.diagnosis.data.window_splits import fold_groups
 from agvbench.diagnosis.estimation.cross_validation import FOLDS, cross_validated
 from agvbench.diagnosis.estimation.fit import Fit, fit
 from agvbench.diagnosis.estimation.score_test import first_order_gain, initial_parameters
+from agvbench.diagnosis.method import OnProgress
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.candidates import Candidate, bounds_of, default_candidate
 from agvbench.types import Floats
-
-OnProgress = Callable[[str], None]
-
 
 Starts = frozenset[tuple[str, bytes]]
 """Effects that were fitted from other than the default initial values, with these values."""

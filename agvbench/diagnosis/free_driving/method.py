@@ -1,0 +1,139 @@
+"""The diagnosis of free driving: windows in place of runs from rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from agvbench.diagnosis.context import require_runs
+from agvbench.diagnosis.criteria import DATA
+from agvbench.diagnosis.data.readings import Readings, read_windows
+from agvbench.diagnosis.data.splits import Split
+from agvbench.diagnosis.data.window_splits import held_out_windows, thinned
+from agvbench.diagnosis.data.windows import Horizon
+from agvbench.diagnosis.estimation.fit import Fit, fit
+from agvbench.diagnosis.free_driving.conclusion import WindowConclusion
+from agvbench.diagnosis.free_driving.maps import NODES, smooth_maps, start_values_of_windows
+from agvbench.diagnosis.free_driving.predictors import autocorrelation_time, nodal_deviation
+from agvbench.diagnosis.free_driving.selection import WindowSelector
+from agvbench.diagnosis.method import Method
+from agvbench.diagnosis.model.batch import Batch
+from agvbench.diagnosis.model.predictor import Predictor
+from agvbench.diagnosis.result import Diagnosis
+from agvbench.diagnosis.selection.candidates import given_effects
+from agvbench.diagnosis.selection.stepwise import Selection
+from agvbench.diagnosis.selection.variants import candidates_for
+from agvbench.errors import CampaignError
+from agvbench.types import Run
+from agvbench.vehicle.geometry import Geometry
+
+
+@dataclass(frozen=True)
+class SelectedFromWindows:
+    """Static maps without effects, the selector, and its selection."""
+
+    static: Fit
+    selector: WindowSelector
+    selection: Selection
+
+
+@dataclass
+class FreeDriving(Method[SelectedFromWindows]):
+    """Diagnoses free driving by windows, each predicted from its measured initial state over the `horizon`.
+
+    Errors are those at the horizon. Differences of the drive level between sessions are estimated from the initial
+    speed of each window, if there are several sessions.
+    """
+
+    no_test: ClassVar[str] = "no stretch of driving can be spared for the test: drive for longer"
+    horizon: Horizon
+
+    def read(self, runs: Sequence[Run]) -> Readings:
+        """Return the poses of the windows."""
+        return read_windows(runs, self.horizon, self.context.header.neutral)
+
+    def insufficient_data(self, readings: Readings) -> str:
+        """Return why the campaign cannot be diagnosed, or an empty string."""
+        require_runs(readings, self.context.header)
+        if len(readings) < DATA.min_windows:
+            raise CampaignError(
+                "too little free driving to diagnose",
+                where=f"campaign {self.context.header.name}",
+                value=f"{len(readings)} windows of {self.horizon.horizon_s:g} s",
+                limit=f"at least {DATA.min_windows}",
+                remedy="drive for longer, or predict less far ahead (campaign.toml, [prediction] horizon_s)",
+            )
+        if (stretches := len(np.unique(readings.group))) < DATA.min_blocks:
+            return f"{stretches} stretches of {self.horizon.block_s:g} s are too few for a test: drive for longer"
+        turned = np.nanmax(np.abs(readings.poses[..., 2] - readings.start[:, None, 2]), axis=1)
+        if np.count_nonzero(turned > DATA.min_turn_rad) < DATA.min_blocks:
+            return "steering was never excited: hardly a window turns"
+        return ""
+
+    def split(self, readings: Readings) -> Split:
+        """Return the training and test windows; no window is for validation."""
+        test = held_out_windows(readings, self.context.seed)
+        return Split(~test, np.zeros_like(test), test)
+
+    def select(self, readings: Readings, split: Split) -> SelectedFromWindows:
+        """Select effects in evenly spaced training windows."""
+        fitted = readings.select(thinned(np.flatnonzero(split.training), DATA.max_fitted_windows))
+        self.on_progress(f"{len(fitted)} training windows, {np.count_nonzero(split.test)} test windows")
+        static = _static(fitted, self.context.geometry, self.context.header.neutral)
+        selector = self._selector(readings, split, static)
+        return SelectedFromWindows(static, selector, selector.select())
+
+    def conclude(self, readings: Readings, split: Split, selected: SelectedFromWindows) -> Diagnosis:
+        """Open the test windows, and return the diagnosis."""
+        self.on_progress("computing the errors of the test windows")
+        trained = thinned(np.flatnonzero(split.training), DATA.max_assessed_windows)
+        assessed = np.sort(np.r_[np.flatnonzero(split.test), trained])
+        return WindowConclusion(
+            self.context,
+            readings,
+            readings.select(assessed),
+            split.test[assessed],
+            selected.static,
+            selected.selector,
+            selected.selection,
+        ).diagnosis(self.horizon)
+
+    def _selector(self, readings: Readings, split: Split, static: Fit) -> WindowSelector:
+        """Return the selector for the training windows of `static`."""
+        context, fitted, maps = self.context, static.predictor.readings, static.predictor.maps
+        test = readings.select(thinned(np.flatnonzero(split.test), DATA.max_fitted_windows))
+        tried, kinds = candidates_for(context.vehicle)
+        given = given_effects(context.vehicle, tried)
+        has_sessions = len(np.unique(readings.initial_states.session)) > 1 if readings.initial_states else False
+        deviation = nodal_deviation(static.predictor, static.parameters) if has_sessions else np.inf
+        fitted_maps = fit(
+            Predictor(Batch(fitted, maps, context.geometry, deviation)), static.parameters, np.empty((0, 2))
+        )
+        redundancy = autocorrelation_time(fitted_maps)
+        return WindowSelector(
+            Batch(fitted, maps, context.geometry, deviation, redundancy, kinds),
+            tried,
+            fitted_maps.parameters,
+            context.seed,
+            self.on_progress,
+            *given,
+            test_batch=Batch(test, maps, context.geometry, deviation, kinds=kinds),
+        )
+
+
+def _static(fitted: Readings, geometry: Geometry, neutral: float) -> Fit:
+    """Return the static maps fitted to the windows, with the number of nodes by Schwarz's criterion."""
+    best: tuple[float, Fit] | None = None
+    for steering, drive in NODES:
+        maps = smooth_maps(fitted.runs, neutral, steering, drive)
+        start = start_values_of_windows(maps, fitted, geometry)
+        found = fit(Predictor(Batch(fitted, maps, geometry)), start, np.empty((0, 2)))
+        total = float(found.loss.sum()) + maps.size * float(np.log(len(fitted)))
+        if best is not None and total > best[0]:
+            break
+        best = total, found
+    assert best is not None, "there is a first choice of nodes"  # noqa: S101
+    return best[1]

@@ -1,0 +1,133 @@
+"""The diagnosis of runs that begin at rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from agvbench.calibration import RunMeasurement, measure_run
+from agvbench.diagnosis.checks.consistency import require_consistent_repeats
+from agvbench.diagnosis.checks.sufficiency import insufficient_data
+from agvbench.diagnosis.conclusion import conclude
+from agvbench.diagnosis.context import DiagnosisContext
+from agvbench.diagnosis.criteria import DATA
+from agvbench.diagnosis.data.readings import Readings, read_runs
+from agvbench.diagnosis.data.splits import Split, split_runs
+from agvbench.diagnosis.discrepancy.stepwise import add_term_and_reconsider, term_in_place
+from agvbench.diagnosis.method import Method
+from agvbench.diagnosis.model.batch import Batch
+from agvbench.diagnosis.model.nodal_maps import ROLES, NodalMaps, nodal_maps, start_values
+from agvbench.diagnosis.result import Diagnosis
+from agvbench.diagnosis.selection.candidates import given_effects
+from agvbench.diagnosis.selection.initial_steering import choose_initial_steering, reconsider_initial_steering
+from agvbench.diagnosis.selection.stepwise import Selection, Selector
+from agvbench.diagnosis.selection.subsampling import refit_to_all, subsample_repeats
+from agvbench.diagnosis.selection.validation import fails_validation, validated
+from agvbench.diagnosis.selection.variants import candidates_for, select_variants_and_reconsider
+from agvbench.diagnosis.selection.with_term import TermSelection
+from agvbench.errors import FitError
+from agvbench.model import nominal_model
+from agvbench.types import Floats, Run
+from agvbench.vehicle.geometry import Geometry
+
+
+@dataclass(frozen=True)
+class SelectedFromRest:
+    """The selection from the library, that with a discrepancy term if there is one, and its selector."""
+
+    library: Selection
+    with_term: TermSelection | None
+    selector: Selector
+
+
+class RunsFromRest(Method[SelectedFromRest]):
+    """Diagnoses runs that begin at rest: each run is one observation, and is predicted from its start pose."""
+
+    no_test: ClassVar[str] = "no run can be spared for the test: drive repeats, or commands in more combinations"
+
+    def read(self, runs: Sequence[Run]) -> Readings:
+        """Return the poses of the runs."""
+        return read_runs(runs, self.context.header.neutral)
+
+    def insufficient_data(self, readings: Readings) -> str:
+        """Return why the campaign cannot be diagnosed, or an empty string."""
+        reason = insufficient_data(readings, self.context.header)
+        if not reason:
+            require_consistent_repeats(readings, where=f"campaign {self.context.header.name}")
+        return reason
+
+    def split(self, readings: Readings) -> Split:
+        """Return the training, validation and test runs; whole groups of runs with equal commands."""
+        return split_runs(readings.runs, readings.group, self.context.seed)
+
+    def select(self, readings: Readings, split: Split) -> SelectedFromRest:
+        """Select effects, variants and a discrepancy term in the training runs; validation runs may reject them."""
+        fitted, validation = readings.select(split.training), int(split.validation.sum())
+        self.on_progress(f"{len(fitted)} training runs, {validation} validation runs, {split.test.sum()} test runs")
+        searched = fitted.select(subsample_repeats(fitted.group, DATA.max_selection_runs))
+        selector = self._selector(searched)
+        chosen, selector = reconsider_initial_steering(selector.select(), selector)
+        library, selector = select_variants_and_reconsider(chosen, selector)
+        library, with_term, selector = add_term_and_reconsider(library, selector)
+        if len(searched) < len(fitted):
+            self.on_progress(f"effects were selected in {len(searched)} runs; they are refitted to all {len(fitted)}")
+        return self._validated(SelectedFromRest(library, with_term, selector), readings, split)
+
+    def conclude(self, readings: Readings, split: Split, selected: SelectedFromRest) -> Diagnosis:
+        """Open the test runs, and return the diagnosis."""
+        batch = selected.selector.batch
+        readings = replace(readings, preset=batch.readings.preset)
+        return conclude(self.context, readings, split, selected.library, selected.with_term, len(batch.readings))
+
+    def _validated(self, selected: SelectedFromRest, readings: Readings, split: Split) -> SelectedFromRest:
+        """Return the selection that validation runs accept: this one, one with a term in its place, or the maps."""
+        readings = replace(readings, preset=selected.selector.batch.readings.preset)
+        opened = readings.select(~split.test)
+        found = self._refitted_and_validated(selected, readings, split)
+        rejects = found.with_term is None and found.library.gains
+        if rejects and fails_validation(found.library, opened, split.validation[~split.test]):
+            self.on_progress("the validation runs contradict the selection: a discrepancy term is tried in its place")
+            if (term := term_in_place(selected.library, selected.selector)) is not None:
+                again = self._refitted_and_validated(replace(selected, with_term=term), readings, split)
+                return found if again.with_term is None else again
+        return found
+
+    def _refitted_and_validated(self, selected: SelectedFromRest, readings: Readings, split: Split) -> SelectedFromRest:
+        """Return the selection refitted to all training runs, or the maps alone if validation rejects it."""
+        library, with_term, selector = selected.library, selected.with_term, selected.selector
+        fitted = readings.select(split.training)
+        if len(selector.batch.readings) < len(fitted):
+            library, with_term = refit_to_all(library, with_term, selector, fitted)
+        library, with_term = validated(library, with_term, readings.select(split.validation), self.on_progress)
+        return SelectedFromRest(library, with_term, selector)
+
+    def _selector(self, readings: Readings) -> Selector:
+        """Return the selector for these runs, with the better of both initial states of the steering."""
+        context = self.context
+        maps = nodal_maps(readings.runs, context.header.neutral)
+        measured = _measurements(readings.runs, context.geometry, context.header.neutral)
+        start = start_values(maps, measured, _prior_values(maps, context))
+        tried, kinds = candidates_for(context.vehicle)
+        batch = Batch(readings, maps, context.geometry, kinds=kinds)
+        given = given_effects(context.vehicle, tried)
+        return choose_initial_steering(Selector(batch, tried, start, context.seed, self.on_progress, *given))
+
+
+def _measurements(runs: tuple[Run, ...], geometry: Geometry, neutral: float) -> list[RunMeasurement]:
+    out = []
+    for run in runs:
+        try:
+            out.append(measure_run(run, geometry, neutral=neutral))
+        except FitError:
+            continue  # a run without a steady part gives no initial value, but remains in the fit
+    return out
+
+
+def _prior_values(maps: NodalMaps, context: DiagnosisContext) -> dict[str, Floats]:
+    """Return the values of the vehicle model before (or the nominal one) at the nodes of the maps, by role."""
+    header = context.header
+    model = context.vehicle or nominal_model(header.vehicle_name, context.geometry, header.command_unit, header.neutral)
+    return {role: np.asarray(getattr(model, role)(maps.nodes[role])) for role in ROLES}
