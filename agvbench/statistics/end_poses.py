@@ -48,8 +48,8 @@ def end_pose_table(errors: pd.DataFrame, *, thesis_vehicle: bool = True) -> pd.D
     published = {tuple(row[key] for key in keys): row for row in known}
     rows = [
         row
-        for name in dict.fromkeys(errors["trajectory"])
-        for row in _trajectory_rows(str(name), valid(errors[errors["trajectory"] == name]), published)
+        for name, runs in valid(errors).groupby("trajectory", sort=False)
+        for row in _trajectory_rows(str(name), runs, published)
     ]
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
@@ -61,8 +61,6 @@ def in_order(conditions: pd.Series) -> list[str]:
 
 
 def _trajectory_rows(name: str, errors: pd.DataFrame, published: _Published) -> Iterator[dict[str, Any]]:
-    if errors.empty:
-        return
     target = Pose(*errors[["target_x_m", "target_y_m", "target_heading_rad"]].iloc[0])
     case = thesis_case(name, target)
     turns = abs(target.heading_rad) > 0.01

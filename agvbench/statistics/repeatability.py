@@ -58,16 +58,13 @@ def bias_and_spread(errors: pd.DataFrame) -> pd.DataFrame:
     """
     import pandas as pd
 
-    rows = []
-    counted = valid(errors)
-    for trajectory in dict.fromkeys(counted["trajectory"]):
-        of_trajectory = counted[counted["trajectory"] == trajectory]
-        for condition in in_order(of_trajectory["condition"]):
-            group = of_trajectory[of_trajectory["condition"] == condition]
-            rows += [
-                {"trajectory": trajectory, "condition": condition, **_component(group, column)} for column in COMPONENTS
-            ]
-    return pd.DataFrame(rows)
+    return pd.DataFrame(
+        {"trajectory": trajectory, "condition": condition, **_component(groups.get_group((condition,)), column)}
+        for trajectory, runs in valid(errors).groupby("trajectory", sort=False)
+        for groups in [runs.groupby(["condition"])]
+        for condition in in_order(runs["condition"])
+        for column in COMPONENTS
+    )
 
 
 def _component(group: pd.DataFrame, column: str) -> dict[str, object]:

@@ -39,8 +39,7 @@ class EndPoseFigureSection(Section):
 
 
 def _panels(counted: pd.DataFrame, numbers: dict[str, int]) -> Iterator[Panel]:
-    for index, name in enumerate(dict.fromkeys(counted["trajectory"])):
-        rows = counted[counted["trajectory"] == name]
+    for index, (name, rows) in enumerate(counted.groupby("trajectory", sort=False)):
         ends = {n: in_target_frame(rows[rows["condition"] == c]) for c, n in numbers.items()}
         drawn = {n: points for n, points in ends.items() if len(points)}
         target = Pose(*rows[[f"target_{axis}" for axis in _POSE]].iloc[0])
