@@ -9,12 +9,14 @@ import pytest
 from tiny_vehicle import FRONT_M, HEADER, NEUTRAL, REAR_M, Tiny
 
 from agvbench.calibration import measure_run
+from agvbench.diagnosis.criteria import SELECTION
 from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.discrepancy import stepwise as empirical
 from agvbench.diagnosis.estimation.fit import fit
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.nodal_maps import ROLES, nodal_maps, start_values
 from agvbench.diagnosis.model.predictor import Predictor
+from agvbench.diagnosis.selection import stepwise
 from agvbench.diagnosis.selection import variants as forms
 from agvbench.diagnosis.selection.candidates import bounds_of, candidates, default_candidate
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
@@ -68,7 +70,7 @@ def test_what_is_left_of_a_model_is_not_what_once_ended_elsewhere(selector):
 
 
 def test_a_rival_is_judged_by_a_fit_that_went_as_far(selector, monkeypatch):
-    monkeypatch.setattr("agvbench.diagnosis.selection.stepwise._NEARLY_ALTERNATIVE", np.inf)
+    monkeypatch.setattr(stepwise, "SELECTION", replace(SELECTION, nearly_alternative=np.inf))
     lag = selector.with_effect(selector.base(), "steering_lag")
     begun = fit(Predictor(selector.batch, lag.names), np.r_[selector.start, 0.1], NO_LIMIT, iterations=1)
     early = ScoredModel(lag.names, begun, begun.loss)
