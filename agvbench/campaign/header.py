@@ -80,32 +80,33 @@ class CampaignHeader:
         _check_schema(table.get("schema"), path)
         remedy = "correct campaign.toml (docs/reference/campaign-directory.md)"
         file = convert(table, _File, where=str(path), error=CampaignError, remedy=remedy)
-        vehicle, prediction = file.vehicle, file.prediction or _Prediction()
-        return cls.made_for(
-            path,
-            schema=file.schema,
-            name=file.name,
-            vehicle_name=vehicle.name,
-            front_axle_m=vehicle.front_axle_m,
-            rear_axle_m=vehicle.rear_axle_m,
-            command_unit=vehicle.command_unit,
-            neutral=vehicle.neutral,
-            mocap_rate_hz=file.mocap.rate_hz,
-            prediction_horizon_s=prediction.horizon_s,
-            prediction_stride_s=prediction.stride_s or prediction.horizon_s,
-        )
+        return cls.from_tables(path, file.name, file.vehicle, file.mocap, file.prediction)
 
     @classmethod
-    def made_for(cls, where: object, **values: Any) -> CampaignHeader:
-        """Return a header; an impossible value is reported as one of file `where`.
+    def from_tables(
+        cls, where: object, name: str, vehicle: Vehicle, mocap: Mocap, prediction: Prediction | None
+    ) -> CampaignHeader:
+        """Return the header that these tables make; an impossible value is reported as one of file `where`.
 
         Raises
         ------
         CampaignError
             As the constructor.
         """
+        prediction = prediction or Prediction()
         try:
-            return cls(**values)
+            return cls(
+                schema=SCHEMA,
+                name=name,
+                vehicle_name=vehicle.name,
+                front_axle_m=vehicle.front_axle_m,
+                rear_axle_m=vehicle.rear_axle_m,
+                command_unit=vehicle.command_unit,
+                neutral=vehicle.neutral,
+                mocap_rate_hz=mocap.rate_hz,
+                prediction_horizon_s=prediction.horizon_s,
+                prediction_stride_s=prediction.stride_s or prediction.horizon_s,
+            )
         except CampaignError as error:
             place = str(error.where).replace(FILE_NAME, str(where), 1)
             raise CampaignError(
@@ -134,7 +135,9 @@ class CampaignHeader:
         record(Path(path).parent, {Path(path).name: tomli_w.dumps(table).encode()})
 
 
-class _Vehicle(msgspec.Struct):
+class Vehicle(msgspec.Struct, frozen=True):
+    """The table ``[vehicle]``."""
+
     name: str
     front_axle_m: float
     rear_axle_m: float
@@ -142,11 +145,15 @@ class _Vehicle(msgspec.Struct):
     neutral: float
 
 
-class _Mocap(msgspec.Struct):
+class Mocap(msgspec.Struct, frozen=True):
+    """The table ``[mocap]``."""
+
     rate_hz: FrameRate
 
 
-class _Prediction(msgspec.Struct):
+class Prediction(msgspec.Struct, frozen=True):
+    """The table ``[prediction]``."""
+
     horizon_s: _Positive | None = None
     stride_s: _Positive | None = None
 
@@ -154,9 +161,9 @@ class _Prediction(msgspec.Struct):
 class _File(msgspec.Struct):
     schema: int
     name: str
-    vehicle: _Vehicle
-    mocap: _Mocap
-    prediction: _Prediction | None = None
+    vehicle: Vehicle
+    mocap: Mocap
+    prediction: Prediction | None = None
 
 
 def _read_toml(path: Path) -> dict[str, Any]:

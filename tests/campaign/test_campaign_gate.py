@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agvbench.campaign.recordings.jump_detection import jumped
-from agvbench.campaign.recordings.mapping_schema import Gate
+from agvbench.campaign.recordings.mapping import Gate
 from agvbench.errors import InputError
 
 GATE = Gate(max_speed_m_per_s=2.0, max_yaw_rate_rad_per_s=6.0)

@@ -14,8 +14,7 @@ from agvbench import __version__
 from agvbench.campaign.campaign import Campaign
 from agvbench.campaign.header import FILE_NAME, CampaignHeader
 from agvbench.campaign.manifest import sha256
-from agvbench.campaign.recordings.mapping import find_mapping, load_mapping
-from agvbench.campaign.recordings.mapping_schema import FileRule, Mapping
+from agvbench.campaign.recordings.mapping import FileRule, Mapping, find_mapping, load_mapping
 from agvbench.campaign.recordings.recording import Recording, read_recording
 from agvbench.campaign.recordings.segmentation import Account, account_for, cut, why_nothing
 from agvbench.campaign.tables.motion_checks import check_motion

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.campaign.recordings.mapping_schema import Gate
+from agvbench.campaign.recordings.mapping import Gate
 from agvbench.errors import InputError
 from agvbench.types import Floats, wrap_angle
 

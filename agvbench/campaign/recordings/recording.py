@@ -12,8 +12,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from agvbench.campaign.recordings.jump_detection import jumped
-from agvbench.campaign.recordings.mapping import TIME, factor, quantities
-from agvbench.campaign.recordings.mapping_schema import ISO_8601, Flag, Mapping
+from agvbench.campaign.recordings.mapping import ISO_8601, TIME, Flag, Mapping, factor, quantities
 from agvbench.campaign.tables.csv_text import read_csv_text
 from agvbench.campaign.tables.schema import UNKNOWN_COUNT, ColumnSpec, Kind, fill_columns, type_columns
 from agvbench.errors import FileError

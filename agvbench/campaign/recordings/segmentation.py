@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.campaign.manifest import sha256
-from agvbench.campaign.recordings.mapping_schema import Runs
+from agvbench.campaign.recordings.mapping import Runs
 from agvbench.campaign.recordings.recording import Recording
 from agvbench.types import Floats
 
