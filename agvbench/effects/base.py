@@ -11,8 +11,7 @@ from typing import Any, ClassVar, Self
 
 from agvbench.errors import VehicleError
 from agvbench.types import Floats
-from agvbench.vehicle.checks import coerce_float
-from agvbench.vehicle.tables import from_table, to_table
+from agvbench.vehicle.fields import coerce_float, from_table, to_table
 
 
 class Stage(StrEnum):

@@ -44,9 +44,9 @@ import tomli_w
 from agvbench.effects import Effect, effect_from_toml
 from agvbench.errors import FileError, VehicleError
 from agvbench.text_files import read_toml
+from agvbench.vehicle.fields import check_keys, from_table, number, to_table
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import StaticMap, map_from_toml
-from agvbench.vehicle.tables import check_keys, from_table, number, to_table
 
 if TYPE_CHECKING:
     from agvbench.model.vehicle_model import VehicleModel

@@ -15,7 +15,7 @@ from agvbench.errors import VehicleError
 from agvbench.model.toml import naming_file, physics_digest, read_vehicle, write_vehicle
 from agvbench.notebook_html import heading_html, table_html
 from agvbench.types import Command, Commands, CommandUnit, Floats
-from agvbench.vehicle.checks import coerce_float
+from agvbench.vehicle.fields import coerce_float
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import StaticMap
 

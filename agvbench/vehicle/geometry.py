@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from agvbench.errors import VehicleError
-from agvbench.vehicle.checks import coerce_float, require_positive
+from agvbench.vehicle.fields import coerce_float, require_positive
 
 LONGEST_M = 20.0
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from agvbench.model import VehicleModel
-from agvbench.vehicle.maps.registry import map_kinds
+from agvbench.vehicle.maps import map_kinds
 
 TEXT = (Path(__file__).parents[2] / "docs" / "reference" / "vehicle-file.md").read_text(encoding="utf-8")
 

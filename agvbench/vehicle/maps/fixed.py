@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from agvbench.types import Floats
-from agvbench.vehicle.checks import coerce_float
+from agvbench.vehicle.fields import coerce_float
 from agvbench.vehicle.maps.base import StaticMap
 
 

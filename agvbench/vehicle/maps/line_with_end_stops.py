@@ -10,7 +10,7 @@ import numpy as np
 
 from agvbench.errors import VehicleError
 from agvbench.types import Floats
-from agvbench.vehicle.checks import coerce_float, require_ascending
+from agvbench.vehicle.fields import coerce_float, require_ascending
 from agvbench.vehicle.maps.base import StaticMap
 
 

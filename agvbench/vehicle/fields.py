@@ -1,4 +1,4 @@
-"""Frozen dataclasses from TOML tables and back, with one clear line for each mistake."""
+"""Fields of frozen dataclasses: checked on construction, read from TOML tables and written to them."""
 
 from __future__ import annotations
 
@@ -6,11 +6,48 @@ import dataclasses
 import difflib
 import math
 from collections.abc import Collection, Mapping
+from itertools import pairwise
 from typing import Any, TypeVar, get_type_hints
 
 from agvbench.errors import VehicleError
 
 T = TypeVar("T")
+
+
+def coerce_float(instance: object, *names: str, allow_infinite: bool = False) -> None:
+    """Turn the named fields of a frozen dataclass into floats.
+
+    Raises
+    ------
+    VehicleError
+        If a field is no number, NaN, or infinite where that is not allowed.
+    """
+    for name in names:
+        raw = getattr(instance, name)
+        try:
+            value = float(raw)
+        except (TypeError, ValueError):
+            raise VehicleError("must be a number", where=name, value=repr(raw)) from None
+        if math.isnan(value) or (math.isinf(value) and not allow_infinite):
+            raise VehicleError("must be a finite number", where=name, value=value)
+        object.__setattr__(instance, name, value)
+
+
+def require_positive(instance: object, *names: str) -> None:
+    """Raise `VehicleError` unless the named fields are greater than zero."""
+    for name in names:
+        value = getattr(instance, name)
+        if not value > 0.0:
+            raise VehicleError("must be greater than zero", where=name, value=value)
+
+
+def require_ascending(instance: object, *names: str, strict: bool = True) -> None:
+    """Raise `VehicleError` unless the named fields ascend in the order given."""
+    for low_name, high_name in pairwise(names):
+        low, high = getattr(instance, low_name), getattr(instance, high_name)
+        if high < low or (strict and high == low):
+            limit = f"{'more than' if strict else 'at least'} {low_name} = {low}"
+            raise VehicleError("is too low", where=high_name, value=high, limit=limit)
 
 
 def from_table(cls: type[T], table: Mapping[str, Any], *, where: str) -> T:
