@@ -33,13 +33,7 @@ class Completeness:
 
     @classmethod
     def of(cls, campaign: Campaign) -> Completeness | None:
-        """Return it for `campaign`, or None where the campaign has no table ``planned``.
-
-        Raises
-        ------
-        CampaignError
-            If the table cannot be read.
-        """
+        """Return it for `campaign`, None without a table ``planned``; raise `CampaignError` if that cannot be read."""
         if not campaign.has_table(PLANNED_TABLE):
             return None
         planned = tuple(campaign.table(PLANNED_TABLE)["run_id"].astype(str))

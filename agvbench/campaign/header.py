@@ -86,13 +86,7 @@ class CampaignHeader:
     def from_tables(
         cls, where: object, name: str, vehicle: Vehicle, mocap: Mocap, prediction: Prediction | None
     ) -> CampaignHeader:
-        """Return the header that these tables make; an impossible value is reported as one of file `where`.
-
-        Raises
-        ------
-        CampaignError
-            As the constructor.
-        """
+        """Return the header that these tables make; an impossible value is a `CampaignError` of file `where`."""
         prediction = prediction or Prediction()
         try:
             return cls(

@@ -94,13 +94,7 @@ class Manifest:
         return CampaignError(what, where=self._directory / MANIFEST_FILE, remedy=remedy)
 
     def require_files(self) -> None:
-        """Refuse a campaign that has lost files.
-
-        Raises
-        ------
-        CampaignError
-            If a file that was in place is not there.
-        """
+        """Raise `CampaignError` if a file that was in place is not there."""
         missing = [name for name in self._hashes if name in self._in_place and not (self._directory / name).exists()]
         if missing:
             more = f" and {len(missing) - _SHOWN} more" if len(missing) > _SHOWN else ""
@@ -121,13 +115,7 @@ class Manifest:
         return file.relative_to(self._directory).as_posix() in self._in_place
 
     def check(self, file: Path) -> None:
-        """Compare `file` with its hash, if it is listed.
-
-        Raises
-        ------
-        CampaignError
-            If its content is not what was recorded.
-        """
+        """Raise `CampaignError` if `file` is listed and its content is not what was recorded."""
         name = file.relative_to(self._directory).as_posix()
         if name not in self._hashes or not file.is_file():
             return
@@ -141,24 +129,12 @@ class Manifest:
             )  # fmt: skip
 
     def check_beside(self) -> None:
-        """Check every listed file that lies beside the tables' parts, such as ``vehicle.toml``.
-
-        Raises
-        ------
-        CampaignError
-            As `check`.
-        """
+        """`check` every listed file that lies beside the tables' parts, such as ``vehicle.toml``."""
         for name in self.names_beside:
             self.check(self._directory / name)
 
     def renew(self, files: Iterable[Path], *, durable: bool = True) -> None:
-        """Check `files` and write the list again: one line for each of them, listed before or not.
-
-        Raises
-        ------
-        CampaignError
-            As `check`.
-        """
+        """`check` `files` and write the list again: one line for each of them, listed before or not."""
         present = {file.relative_to(self._directory).as_posix(): file for file in files}
         for file in present.values():
             self.check(file)

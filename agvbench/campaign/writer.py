@@ -206,13 +206,7 @@ class CampaignWriter:
 
 
 def check_parts(tables: Mapping[str, pa.Table], where: Path, unit: CommandUnit) -> None:
-    """Refuse now a run that would make a whole campaign unreadable later.
-
-    Raises
-    ------
-    CampaignError
-        If the parts contradict the schema; the message begins with `where`.
-    """
+    """Raise `CampaignError`, at `where`, for a run that would make a whole campaign unreadable later."""
     run_ids, status = (tables["runs"][name].to_pylist() for name in ("run_id", "status"))
     check_runs(tables["runs"], where)
     commands = TimedTable(where, tables["commands"], run_ids, in_parts=True)
@@ -226,13 +220,7 @@ _LEFT_OVER = frozenset((MANIFEST_FILE, LOCK_FILE))
 
 
 def refuse_occupied(path: Path, remedy: str) -> None:
-    """Refuse a path that is not a directory or has something in it.
-
-    Raises
-    ------
-    CampaignError
-        Then.
-    """
+    """Raise `CampaignError` if a path is not a directory or has something in it."""
     try:
         if path.exists() and not path.is_dir():
             raise CampaignError("is not a directory", where=path, remedy="choose another directory")

@@ -51,10 +51,7 @@ class Leg:
 def legs_of(trajectory: Trajectory, model: VehicleModel) -> list[Leg]:
     """Return the legs of a trajectory, with the rests in which the steering is set.
 
-    Raises
-    ------
-    PlanError
-        If an axle angle is beyond its end stops or a speed beyond what the drive reaches.
+    Raise `PlanError` if an axle angle is beyond its end stops or a speed beyond what the drive reaches.
     """
     segments = trajectory.expand()
     driven = [_leg(segment, trajectory, model, where=trajectory.segment_name(i)) for i, segment in enumerate(segments)]

@@ -140,13 +140,7 @@ def place(made: Plan, workspace: Workspace) -> Pose:
 
 
 def commands_of(legs: Sequence[Leg], model: VehicleModel) -> Commands:
-    """Return the commands that drive `legs`, followed by the stop.
-
-    Raises
-    ------
-    PlanError
-        If the model knows no command for a leg.
-    """
+    """Return the commands that drive `legs` and then stop; raise `PlanError` if the model knows none for a leg."""
     rows: list[tuple[float, Command]] = []
     t = 0.0
     for leg in legs:
@@ -186,10 +180,7 @@ def commands_from_rows(rows: Sequence[Row]) -> Commands:
 def commands_and_legs(trajectory: Trajectory, model: VehicleModel) -> tuple[Commands, list[Leg]]:
     """Return a trajectory's own commands with the stop behind them, and the legs that they drive.
 
-    Raises
-    ------
-    PlanError
-        If they are in another unit than the vehicle's, or beyond what may be commanded in it.
+    Raise `PlanError` if they are in another unit than the vehicle's, or beyond what may be commanded in it.
     """
     table = trajectory.commands
     assert table is not None  # noqa: S101 - only called for raw commands

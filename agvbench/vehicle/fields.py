@@ -17,10 +17,7 @@ T = TypeVar("T")
 def coerce_float(instance: object, *names: str, allow_infinite: bool = False) -> None:
     """Turn the named fields of a frozen dataclass into floats.
 
-    Raises
-    ------
-    VehicleError
-        If a field is no number, NaN, or infinite where that is not allowed.
+    Raise `VehicleError` if one is no number, NaN, or infinite where that is not allowed.
     """
     for name in names:
         raw = getattr(instance, name)
@@ -97,13 +94,7 @@ def located(error: VehicleError, where: str) -> VehicleError:
 
 
 def number(value: object, *, where: str) -> float:
-    """Return a TOML integer or float as a float, infinities included.
-
-    Raises
-    ------
-    VehicleError
-        If `value` is no number, or NaN.
-    """
+    """Return a TOML integer or float as a float, infinities included; raise `VehicleError` if it is neither, or NaN."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise VehicleError("must be a number", where=where, value=repr(value))
     if math.isnan(value):

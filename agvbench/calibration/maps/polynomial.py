@@ -17,10 +17,7 @@ from agvbench.vehicle.maps import Cubic, Line
 def fit_line(points: CurvePoints, *, name: str = "line", reasons: Mapping[float, str] | None = None) -> MapFit:
     """Fit a first-order polynomial by least squares to the points without a reason to be left out.
 
-    Raises
-    ------
-    FitError
-        If fewer than two points are left, or they show no slope.
+    Raise `FitError` if fewer than two points are left, or they show no slope.
     """
     used = points.select(without(points, reasons))
     require_points(used, 2, "line")

@@ -107,10 +107,7 @@ def compare_maps(points: CurvePoints, fitters: dict[str, Fitter]) -> dict[str, M
 def preferred(fits: dict[str, MapFit | FitError], order: tuple[str, ...]) -> MapFit:
     """Return the first fit in `order` that no other predicts clearly better (by half as much again).
 
-    Raises
-    ------
-    FitError
-        If none could be fitted.
+    Raise `FitError`, that of the first in `order`, if none could be fitted.
     """
     good = [fit for name in order if isinstance(fit := fits.get(name), MapFit)]
     if not good:

@@ -38,10 +38,7 @@ class Path:
 def fit_path(t_s: Floats, points: Floats, *, where: str) -> Path:
     """Fit a circle or line to `points` (n, 2) [m] seen at `t_s` (n,), by least distances without the outliers.
 
-    Raises
-    ------
-    FitError
-        If the points determine neither.
+    Raise `FitError` if the points determine neither.
     """
     used = np.ones(len(points), dtype=np.bool_)
     for _ in range(4):

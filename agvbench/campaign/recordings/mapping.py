@@ -168,26 +168,15 @@ class Mapping(_Strict, frozen=True):
     files: list[FileRule] = []
 
     def header(self, path: Path) -> CampaignHeader:
-        """Return the head of the campaign that this mapping, read from `path`, makes.
-
-        Raises
-        ------
-        CampaignError
-            If the vehicle's geometry is impossible.
-        """
+        """Return the campaign's head by this mapping, read from `path`; raise `CampaignError` if it is impossible."""
         return CampaignHeader.from_tables(path, self.name, self.vehicle, self.mocap, self.prediction)
 
 
 def find_mapping(name: str | Path) -> Path:
-    """Return the path of a mapping: a file, or the name of one that ships with agvbench.
+    """Return the path of a mapping, a file or the name of one that ships; raise `FileError` if there is neither.
 
     >>> find_mapping("dart").name
     'dart.toml'
-
-    Raises
-    ------
-    FileError
-        If there is neither.
     """
     path = Path(name)
     if path.is_file():
@@ -259,15 +248,10 @@ TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9}
 
 
 def factor(unit: str, units: dict[str, float], where: object) -> float:
-    """Return the factor from `unit` to SI.
+    """Return the factor from `unit` to SI; raise `InputError` if it is not one of `units`.
 
     >>> factor("mm", LENGTH, "columns.x")
     0.001
-
-    Raises
-    ------
-    InputError
-        If `unit` is not one of `units`.
     """
     if unit in units:
         return units[unit]

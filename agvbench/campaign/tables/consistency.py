@@ -38,13 +38,7 @@ _COMMAND_LIMITS: dict[CommandUnit, _Limits] = {
 
 
 def check_runs(table: pa.Table, where: object) -> None:
-    """Check the runs table.
-
-    Raises
-    ------
-    CampaignError
-        If two runs share an id, or a status, split, repeat, start or target cannot be.
-    """
+    """Raise `CampaignError` if two runs share an id, or a status, split, repeat, start or target cannot be."""
     ids: list[str] = table["run_id"].to_pylist()
     _refuse_doubles(ids, where)
     for row in table.to_pylist():
@@ -109,12 +103,9 @@ def _is_status(text: str) -> bool:
 
 
 def check_commands(commands: TimedTable, status: list[str], unit: CommandUnit) -> None:
-    """Check the commands table against the runs.
+    """Raise `CampaignError` if the commands table contradicts the runs.
 
-    Raises
-    ------
-    CampaignError
-        If a run that counts has no commands, a value is not finite or in another unit, or time does not increase.
+    A run that counts has commands; all are finite and in the unit, and their time increases from about 0.
     """
     _refuse_runs_without(commands, status)
     for name in ("t_s", "drive", "front", "rear"):
@@ -137,12 +128,10 @@ def check_commands(commands: TimedTable, status: list[str], unit: CommandUnit) -
 
 
 def check_poses(poses: TimedTable, status: list[str], last_command_s: Floats) -> None:
-    """Check the poses table, NaN where not tracked, against the runs; `last_command_s` [s] has shape (runs,).
+    """Raise `CampaignError` if the poses table contradicts the runs.
 
-    Raises
-    ------
-    CampaignError
-        If a run that counts has no poses, a tracked value is infinite, or the clock or a unit is another one.
+    A run that counts has poses; what is tracked is finite, and clock and units are the campaign's. The poses are NaN
+    where not tracked; `last_command_s` [s] has shape (runs,).
     """
     _refuse_runs_without(poses, status)
     t_s, tracked, heading = poses.column("t_s"), poses.column("tracked").astype(bool), poses.column("heading_rad")

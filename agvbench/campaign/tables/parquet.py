@@ -111,10 +111,7 @@ def _text_bytes(column: pa.ChunkedArray) -> int:
 def _plain(table: pa.Table) -> pa.Table:
     """Decode dictionary columns, such as texts and pandas categoricals, so that equal columns have equal types.
 
-    Raises
-    ------
-    ArrowInvalid
-        If a text is not UTF-8.
+    Raise `ArrowInvalid` if a text is not UTF-8.
     """
     for index, kind in enumerate(table.schema.types):
         if isinstance(kind, pa.DictionaryType):

@@ -18,13 +18,10 @@ _LONGEST_NAME = 200
 def part_name(run_id: str) -> str:
     """Return the file name of a run's parts: its id, with what file names cannot hold as %XX.
 
+    Raise `CampaignError` if the id is empty or too long for a file name.
+
     >>> part_name("drive/1500 us")
     'drive%2F1500%20us.parquet'
-
-    Raises
-    ------
-    CampaignError
-        If the id is empty or too long for a file name.
     """
     name = quote(run_id, safe="")
     name = name.replace(".", "%2E", 1) if name.startswith(".") else name
@@ -47,10 +44,7 @@ def run_id_of(part: Path) -> str:
 def parts_of(run: Run) -> dict[str, pa.Table]:
     """Return the run's parts in the order in which they are to be written: the row of ``runs`` makes it exist.
 
-    Raises
-    ------
-    CampaignError
-        If an extra column has the name of a known one.
+    Raise `CampaignError` if an extra column has the name of a known one.
     """
     return {"poses": _poses_part(run), "commands": _commands_part(run), "runs": _runs_part(run)}
 

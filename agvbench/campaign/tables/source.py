@@ -80,13 +80,7 @@ class Source:
 
 
 def parts(directory: Path) -> tuple[Path, ...]:
-    """Return the whole parts in `directory`, by name.
-
-    Raises
-    ------
-    CampaignError
-        If it cannot be listed.
-    """
+    """Return the whole parts in `directory`, by name; raise `CampaignError` if it cannot be listed."""
     try:
         files = [file for file in directory.iterdir() if file.suffix in SUFFIXES and not is_temporary(file)]
     except OSError as error:

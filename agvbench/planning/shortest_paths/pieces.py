@@ -107,13 +107,7 @@ def by_length(paths: Sequence[tuple[Piece, ...]], radius_m: float) -> list[tuple
 
 
 def require_solvable(start: Pose, goal: Pose, radius_m: float) -> None:
-    """Require a turning radius and poses that a path exists for.
-
-    Raises
-    ------
-    PlanError
-        If the radius is not positive or a pose is not finite.
-    """
+    """Raise `PlanError` if the turning radius is not positive or a pose is not finite."""
     if not (radius_m > 0.0 and math.isfinite(radius_m)):
         raise PlanError("turning radius is not a positive number", value=f"{radius_m} m")
     if not (start.is_finite and goal.is_finite):

@@ -44,13 +44,7 @@ def load_trajectory(name_or_path: str | Path, *, directory: Path | None = None) 
 
 
 def trajectory_file(name_or_path: str | Path, *, directory: Path | None = None) -> Path:
-    """Return the file that `load_trajectory` reads.
-
-    Raises
-    ------
-    FileError
-        If there is no trajectory of that name.
-    """
+    """Return the file that `load_trajectory` reads; raise `FileError` if there is no trajectory of that name."""
     if isinstance(name_or_path, Path) or name_or_path.endswith(".toml"):
         return Path(name_or_path)
     files = trajectory_files(directory) if directory else [*_local_files(), *_shipped_files()]

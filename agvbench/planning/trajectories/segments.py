@@ -142,10 +142,7 @@ def check_speed(speed: Speed) -> None:
 def axle_speed(speed: Speed, full_mps: float, *, where: str) -> float:
     """Return the axle speed [m/s, positive] that `speed` means for a vehicle whose full speed is `full_mps`.
 
-    Raises
-    ------
-    PlanError
-        If the vehicle does not go so fast, or no one knows how fast it goes.
+    Raise `PlanError` if the vehicle does not go so fast, or no one knows how fast it goes.
     """
     if isinstance(speed, str):
         if not math.isfinite(full_mps):

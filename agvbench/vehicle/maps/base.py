@@ -85,10 +85,7 @@ class StaticMap(ABC):
     def from_toml(cls, table: Mapping[str, Any], *, where: str = "map") -> Self:
         """Build a map of this kind from a TOML table; the key ``kind`` may be there or not.
 
-        Raises
-        ------
-        VehicleError
-            If the table does not fit, naming the key.
+        Raise `VehicleError`, naming the key, if the table does not fit.
         """
         return from_table(cls, {key: value for key, value in table.items() if key != "kind"}, where=where)
 
