@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 Maps = Literal["default", "thesis"]
 Fits = dict[Role, dict[str, MapFit | FitError]]
+Best = dict[Role, MapFit]
 MIN_COMMANDS = 4
 
 
@@ -95,8 +96,9 @@ def calibrate(campaign: CampaignLike, *, maps: Maps | str = "default", session: 
         free = read_free_driving(runs, geometry, header)
         samples, warnings, used = free.samples, free.words, free.runs_used
     fits, chosen = _fit_roles(samples, header, maps, free)
-    warnings = [*warnings, *_warnings(fits, chosen, samples)]
-    front, rear, drive = (_chosen_map(role, fits, chosen, samples) for role in ROLES)
+    best = {role: fit for role in ROLES if isinstance(fit := fits[role].get(chosen[role]), MapFit)}
+    warnings = [*warnings, *_warnings(best, samples)]
+    front, rear, drive = (_chosen_map(role, best, samples) for role in ROLES)
     method = "windows of free driving" if free else "arcs and straights"
     model = VehicleModel(
         name=header.vehicle_name,
@@ -106,9 +108,9 @@ def calibrate(campaign: CampaignLike, *, maps: Maps | str = "default", session: 
         front=front,
         rear=rear,
         drive=drive,
-        provenance=_provenance(header, method, used, maps, fits, chosen, session),
+        provenance=_provenance(header, method, used, maps, chosen, best, session),
     )
-    return Calibration(model, fits, chosen, _table(samples, fits, chosen), warnings)
+    return Calibration(model, fits, chosen, _table(samples, best), warnings)
 
 
 def _from_arcs(runs: list[Run], geometry: Geometry, header: HeaderLike) -> tuple[list[Sample], list[str], int]:
@@ -161,15 +163,14 @@ def _fit_role(
         raise FitError(error.what, where=where, value=error.value, limit=error.limit, remedy=error.remedy) from None
 
 
-def _chosen_map(role: Role, fits: Fits, chosen: dict[Role, str], samples: list[Sample]) -> StaticMap:
-    fit = fits[role].get(chosen[role])
-    if isinstance(fit, MapFit):
-        return fit.map
+def _chosen_map(role: Role, best: Best, samples: list[Sample]) -> StaticMap:
+    if role in best:
+        return best[role].map
     points = points_of(samples, role)
     return Fixed(output=rounded(float(points.value[0])), command=float(points.command[0]))
 
 
-def _warnings(fits: Fits, chosen: dict[Role, str], samples: list[Sample]) -> list[str]:
+def _warnings(best: Best, samples: list[Sample]) -> list[str]:
     """Return in words what was left out of the chosen fits, and what looks odd."""
     words = []
     for role in ROLES:
@@ -177,8 +178,7 @@ def _warnings(fits: Fits, chosen: dict[Role, str], samples: list[Sample]) -> lis
         aside = [s for s in samples if s.role == role and s.why_left_out]
         reasons = Counter(s.why_left_out for s in aside)
         words += [f"{role}: {count} samples left out: {why}" for why, count in reasons.items()]
-        fit = fits[role].get(chosen[role])
-        if not isinstance(fit, MapFit):
+        if (fit := best.get(role)) is None:
             value = scale * float(points_of(samples, role).value[0])
             words.append(f"{role}: its command never varied; taken as fixed at {value:.2f}{unit}")
             continue
@@ -199,8 +199,8 @@ def _provenance(
     method: str,
     used: int,
     maps: str,
-    fits: Fits,
     chosen: dict[Role, str],
+    best: Best,
     session: str | None,
 ) -> dict[str, str | float | int]:
     """Return where the maps come from; nothing in it depends on when or where the calibration is made."""
@@ -214,8 +214,7 @@ def _provenance(
         provenance["session"] = session
     for role in ROLES:
         provenance[f"{role}_fit"] = chosen[role]
-        fit = fits[role].get(chosen[role])
-        if not isinstance(fit, MapFit):
+        if (fit := best.get(role)) is None:
             continue
         provenance[f"{role}_r_squared"] = round(fit.r_squared, 6)
         provenance[f"{role}_commands"] = len(fit.points)
@@ -224,13 +223,10 @@ def _provenance(
     return provenance
 
 
-def _table(samples: list[Sample], fits: Fits, chosen: dict[Role, str]) -> pd.DataFrame:
+def _table(samples: list[Sample], best: Best) -> pd.DataFrame:
     import pandas as pd
 
-    reasons: dict[tuple[Role, float], str] = {}
-    for role in ROLES:
-        if isinstance(fit := fits[role].get(chosen[role]), MapFit):
-            reasons |= {(role, out.command): out.why for out in fit.left_out}
+    reasons = {(role, out.command): out.why for role, fit in best.items() for out in fit.left_out}
     rows = []
     for s in samples:
         scale = 1.0 if s.role == "drive" else math.degrees(1.0)

@@ -14,47 +14,38 @@ class HeaderLike(Protocol):
     @property
     def name(self) -> str:
         """Name of the campaign."""
-        ...
 
     @property
     def vehicle_name(self) -> str:
         """Name of the vehicle."""
-        ...
 
     @property
     def front_axle_m(self) -> float:
         """From the marker centroid forward to the front axle [m]."""
-        ...
 
     @property
     def rear_axle_m(self) -> float:
         """From the marker centroid backward to the rear axle [m]."""
-        ...
 
     @property
     def command_unit(self) -> CommandUnit:
         """Unit of the commands."""
-        ...
 
     @property
     def neutral(self) -> float:
         """Command at which the vehicle stands and steers straight."""
-        ...
 
     @property
     def mocap_rate_hz(self) -> float:
         """Frame rate of the camera [Hz]."""
-        ...
 
     @property
     def prediction_horizon_s(self) -> float | None:
         """How far ahead free driving is predicted [s]; None where runs begin at rest."""
-        ...
 
     @property
     def prediction_stride_s(self) -> float | None:
         """From one prediction to the next [s]; the horizon where None."""
-        ...
 
 
 class CampaignLike(Protocol):
@@ -63,8 +54,6 @@ class CampaignLike(Protocol):
     @property
     def header(self) -> HeaderLike:
         """What holds for all runs."""
-        ...
 
     def __iter__(self) -> Iterator[Run]:
         """Iterate over all runs, by time of start."""
-        ...

@@ -42,15 +42,11 @@ class DriveData:
 class DriveRegression:
     """What was found.
 
-    ``map`` of the drive in the session with the most windows; ``lag_s``; ``loss`` in turns; ``session_scale``;
-    ``r_squared`` of the windows' speeds; ``settled_mps`` of each window, with lag, turn and session taken out;
-    ``stderr`` of lag and loss; ``words`` for people.
+    ``map`` of the drive in the session with the most windows; ``r_squared`` of the windows' speeds; ``settled_mps`` of
+    each window, with lag, turn and session taken out; ``stderr`` of lag and loss; ``words`` for people.
     """
 
     map: StaticMap
-    lag_s: float
-    loss: float
-    session_scale: dict[str, float]
     r_squared: float
     settled_mps: Floats
     stderr: dict[str, float]
@@ -97,9 +93,6 @@ def regress_drive(data: DriveData, neutral: float) -> DriveRegression:
     ]
     return DriveRegression(
         map=_ramp_map(ramps, neutral),
-        lag_s=float(p[0]),
-        loss=float(p[1]),
-        session_scale=named,
         r_squared=explained,
         settled_mps=(data.speed_mps + p[0] * data.acceleration_mps2) / problem.left(p) / scale[problem.session],
         stderr={"lag_s": float(errors[0]), "loss": float(errors[1])},

@@ -13,7 +13,7 @@ from agvbench.types import Floats
 from agvbench.vehicle.maps import DeadBandWithSaturation, MonotoneTable
 
 
-def fit_monotone_table(points: CurvePoints, *, interpolation: str = "pchip") -> MapFit:
+def fit_monotone_table(points: CurvePoints) -> MapFit:
     """Fit the monotone curve closest to the points in least squares (isotonic regression, weighted by repeats).
 
     Whether it rises or falls is taken from the points. Every point is a knot, so its R² says little: compare by
@@ -32,7 +32,7 @@ def fit_monotone_table(points: CurvePoints, *, interpolation: str = "pchip") -> 
     value = min(fits, key=lambda fit: float(np.sum(weights * (fit - points.value) ** 2)))
     if np.ptp(value) == 0.0:
         raise FitError("the output does not change with the command", value=f"{value[0]:.4g} throughout")
-    static_map = MonotoneTable(tuple(points.command.tolist()), tuple(rounded(v) for v in value.tolist()), interpolation)
+    static_map = MonotoneTable(tuple(points.command.tolist()), tuple(map(rounded, value.tolist())))
     stderr = {f"outputs[{k}]": float(se) for k, se in enumerate(points.stderr) if np.isfinite(se)}
     return assess_map("monotone_table", static_map, points, parameters=len(np.unique(value)), stderr=stderr)
 

@@ -21,7 +21,7 @@ _MAX_RMS_SHARE = 0.01
 _MAX_RMS_SIGMAS = 4.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RunMeasurement:
     """What a run at one command says about the vehicle.
 
@@ -34,16 +34,16 @@ class RunMeasurement:
 
     run_id: str
     command: Command
-    front_rad: float
-    rear_rad: float
+    front_rad: float = math.nan
+    rear_rad: float = math.nan
     speed_mps: float
-    front_stderr_rad: float
-    rear_stderr_rad: float
+    front_stderr_rad: float = math.nan
+    rear_stderr_rad: float = math.nan
     speed_stderr_mps: float
-    curvature_per_m: float
-    curvature_stderr_per_m: float
-    sideslip_rad: float
-    sideslip_stderr_rad: float
+    curvature_per_m: float = math.nan
+    curvature_stderr_per_m: float = math.nan
+    sideslip_rad: float = math.nan
+    sideslip_stderr_rad: float = math.nan
     arc_rad: float
     rms_m: float
     begin_s: float
@@ -91,8 +91,9 @@ def measure_run(run: Run, geometry: Geometry, *, neutral: float | None = None) -
         )
     segment = driven_segment(run.commands, float(frames.t_s[-1]), neutral)
     steady = steady_frames(frames, segment, where=where)
-    measure = _stands if _stands_still(steady) else _moves
-    return measure(run.run_id, segment, steady, geometry, quality)
+    if _stands_still(steady):
+        return _stands(run.run_id, segment, steady, quality)
+    return _moves(run.run_id, segment, steady, geometry, quality)
 
 
 def _noise(points: Floats) -> float:
@@ -108,24 +109,15 @@ def _stands_still(frames: Frames) -> bool:
     return farthest < max(_STANDS_M, _STANDS_SIGMAS * _noise(points) / math.sqrt(len(points) / 8.0))
 
 
-def _stands(run_id: str, segment: Segment, frames: Frames, geometry: Geometry, quality: FrameQuality) -> RunMeasurement:
+def _stands(run_id: str, segment: Segment, frames: Frames, quality: FrameQuality) -> RunMeasurement:
     heading, _ = _robust_mean_angle(frames.heading_rad)
     forward = math.cos(heading) * frames.x_m + math.sin(heading) * frames.y_m
     speed = robust_slope(frames.t_s, forward)
-    nan = math.nan
     return RunMeasurement(
         run_id=run_id,
         command=segment.command,
-        front_rad=nan,
-        rear_rad=nan,
         speed_mps=speed,
-        front_stderr_rad=nan,
-        rear_stderr_rad=nan,
         speed_stderr_mps=slope_stderr(frames.t_s, forward, speed),
-        curvature_per_m=nan,
-        curvature_stderr_per_m=nan,
-        sideslip_rad=nan,
-        sideslip_stderr_rad=nan,
         arc_rad=0.0,
         rms_m=float(np.std(forward)),
         begin_s=float(frames.t_s[0]),
@@ -210,10 +202,10 @@ class Segment:
     end_s: float
 
 
-def driven_segment(commands: Commands, last_frame_s: float, neutral: float | None = None) -> Segment:
+def driven_segment(commands: Commands, last_frame_s: float, neutral: float | None) -> Segment:
     """Return the longest stretch of one command in which the vehicle was commanded to drive.
 
-    The last row is the stop, and `neutral` (by default its drive command) says which rows stand still: steering
+    The last row is the stop, and `neutral` (if None, its drive command) says which rows stand still: steering
     is set before the vehicle drives. A run that never leaves neutral, as in the middle of the drive
     calibration, is taken for what it is: its longest stretch.
     """

@@ -19,14 +19,12 @@ _MIN_FRAMES = 6
 class Windows:
     """Windows of one run, arrays of shape (n,).
 
-    ``t_s`` of the middle; ``forward_mps``, ``left_mps``, ``yaw_radps`` of the marker centroid in the vehicle frame;
+    ``t_s`` of the middle; ``forward_mps`` of the marker centroid in the vehicle frame;
     ``acceleration_mps2`` of the forward speed; ``front_rad``, ``rear_rad`` the axle angles that this motion implies.
     """
 
     t_s: Floats
     forward_mps: Floats
-    left_mps: Floats
-    yaw_radps: Floats
     acceleration_mps2: Floats
     front_rad: Floats
     rear_rad: Floats
@@ -62,7 +60,7 @@ def measured_windows(run: Run, geometry: Geometry) -> Windows:
     forward, left = c * vx + s * vy, c * vy - s * vx
     front, rear = axle_angles(forward, left, yaw, geometry)
     acceleration = c * ax + s * ay + yaw * left  # of the forward component, whose axis turns
-    return Windows(middle, forward, left, yaw, acceleration, front, rear)
+    return Windows(middle, forward, acceleration, front, rear)
 
 
 def held_command(commands: Commands, role: str, t_s: Floats) -> Floats:

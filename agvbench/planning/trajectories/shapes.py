@@ -43,7 +43,6 @@ class Shape(Protocol):
 
     def segments(self) -> tuple[Segment, ...]:
         """Return the segments of the shape, in the order in which they are driven."""
-        ...
 
 
 class PoseTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
