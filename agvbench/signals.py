@@ -1,8 +1,11 @@
-"""Statistics of measured signals that several layers need."""
+"""Statistics of measured signals, and chains of their pieces, that several layers need."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
+from numpy.typing import NDArray
 
 from agvbench.types import Floats
 
@@ -19,3 +22,33 @@ def robust_std(residual: Floats) -> float:
     1.4826
     """
     return MAD_TO_STD * float(np.median(np.abs(residual)))
+
+
+def best_chain(
+    score: Floats | NDArray[np.int64], follows: Callable[[slice, int], NDArray[np.bool_]], farthest_back: int
+) -> list[int]:
+    """Return the indices of the chain of pieces with the highest sum of scores (dynamic programming).
+
+    Parameters
+    ----------
+    score
+        Of each piece, shape (n,), all positive.
+    follows
+        After which of some pieces before it, given as a slice, a piece may come.
+    farthest_back
+        How many places a piece may come after the one before it.
+
+    >>> best_chain(np.array([2, 3, 2]), lambda before, piece: np.arange(3)[before] == piece - 2, 3)
+    [0, 2]
+    """
+    best, before = score.copy(), np.full(len(score), -1)
+    for piece in range(1, len(score)):
+        first = max(0, piece - farthest_back)
+        so_far = np.where(follows(slice(first, piece), piece), best[first:piece], 0)
+        if so_far.max() > 0:
+            before[piece] = first + so_far.argmax()
+            best[piece] += so_far.max()
+    chain = [int(best.argmax())]
+    while before[chain[-1]] >= 0:
+        chain.append(int(before[chain[-1]]))
+    return chain[::-1]

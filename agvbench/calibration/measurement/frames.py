@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.signals import best_chain
 from agvbench.types import Floats, Frames, wrap_angle
 
 # A frame that arrives this much behind later ones is late; further behind, its time stamp is wrong.
@@ -194,20 +195,13 @@ def _longest_chain(frames: Frames, max_speed_mps: float | None) -> NDArray[np.in
         return every
     starts, ends = np.r_[0, breaks], np.r_[breaks, len(frames)]
     lasting = frames.t_s[ends - 1] - frames.t_s[starts] >= _KICK_S
-    best, previous = (ends - starts).astype(np.int64), np.full(len(starts), -1)
-    for k in range(1, len(starts)):
-        # What comes before this piece: the best chain whose last pose this piece's first pose follows from.
-        first = max(0, k - _PIECES)
-        linked = follows(ends[first:k] - 1, int(starts[k]), lasting[first:k] & lasting[k])
-        length = np.where(linked, best[first:k], 0)
-        if length.max() > 0:
-            previous[k] = first + int(np.argmax(length))
-            best[k] += length.max()
-    chain, k = [], int(np.argmax(best))
-    while k >= 0:
-        chain.append(np.arange(starts[k], ends[k]))
-        k = int(previous[k])
-    return np.concatenate(chain[::-1])
+
+    def linked(before: slice, piece: int) -> NDArray[np.bool_]:
+        """Return whether a piece's first pose follows from the last ones of those before it."""
+        return follows(ends[before] - 1, int(starts[piece]), lasting[before] & lasting[piece])
+
+    chain = best_chain((ends - starts).astype(np.int64), linked, _PIECES)
+    return np.concatenate([np.arange(starts[piece], ends[piece]) for piece in chain])
 
 
 def _limits(t_s: Floats, values: Floats, fastest: float | None, at_least: float) -> tuple[float, float]:

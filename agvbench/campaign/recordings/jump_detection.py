@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from agvbench.campaign.recordings.mapping import Gate
 from agvbench.errors import InputError
+from agvbench.signals import best_chain
 from agvbench.types import Floats, wrap_angle
 
 Indices = NDArray[np.int64]
@@ -49,7 +50,11 @@ def jumped(t_s: Floats, x_m: Floats, y_m: Floats, heading_rad: Floats, gate: Gat
         )  # fmt: skip
     last = np.r_[first[1:], len(t_s)] - 1
     score = _driven(poses, first, last, gate.slack_m) + _FRAME_WORTH_M * (last - first + 1)
-    return np.repeat(~_best_chain(poses[first], poses[last], score, gate), last - first + 1)
+    starts, ends = poses[first], poses[last]
+    chain = best_chain(score, lambda before, piece: _reachable(ends[before], starts[piece][None], gate), _MOST_PIECES)
+    stranger = np.ones(len(first), np.bool_)
+    stranger[chain] = False
+    return np.repeat(stranger, last - first + 1)
 
 
 def _driven(poses: Floats, first: Indices, last: Indices, slack_m: float) -> Floats:
@@ -71,20 +76,3 @@ def _reachable(before: Floats, after: Floats, gate: Gate) -> NDArray[np.bool_]:
     turn = np.abs(wrap_angle(after[:, 3] - before[:, 3]))
     near = distance <= gate.max_speed_m_per_s * elapsed + gate.slack_m
     return near & (turn <= gate.max_yaw_rate_rad_per_s * elapsed + gate.slack_rad)
-
-
-def _best_chain(starts: Floats, ends: Floats, score: Floats, gate: Gate) -> NDArray[np.bool_]:
-    """Return which pieces lie on the reachable chain of the highest score (dynamic programming over pieces)."""
-    best = score.copy()
-    before = np.full(len(score), -1)
-    for piece in range(1, len(score)):
-        so_far = np.where(_reachable(ends[:piece], starts[piece][None], gate), best[:piece], 0.0)
-        if so_far.max() > 0.0:
-            before[piece] = so_far.argmax()
-            best[piece] += so_far.max()
-    chain = np.zeros(len(score), np.bool_)
-    piece = int(best.argmax())
-    while piece >= 0:
-        chain[piece] = True
-        piece = int(before[piece])
-    return chain
