@@ -11,11 +11,11 @@ from agvbench.calibration.maps.selection import (
     fit_steering_map,
     steering_fitters,
 )
-from agvbench.calibration.measurement.axle_angles import axle_angles_from_arc, axle_angles_from_curvature
 from agvbench.calibration.measurement.circle import CircleFit, CircleFits, fit_circle, fit_circles
 from agvbench.calibration.measurement.frames import FrameQuality, clean_frames, inspect_frames
 from agvbench.calibration.measurement.run_measurement import RunMeasurement, measure_run
 from agvbench.calibration.samples import CurvePoints
+from agvbench.vehicle.kinematics import axle_angles_from_arc, axle_angles_from_curvature
 from agvbench.vehicle.quaternion import quaternion_to_heading
 
 __all__ = [

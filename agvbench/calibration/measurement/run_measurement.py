@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agvbench.calibration.measurement.axle_angles import axle_angle_stderrs, axle_angles_from_curvature
 from agvbench.calibration.measurement.frames import FrameQuality, inspect_frames
 from agvbench.calibration.measurement.path import correlation_factor, fit_path, robust_slope, slope_stderr
 from agvbench.errors import FitError
 from agvbench.signals import robust_std
 from agvbench.types import Command, Commands, Floats, Frames, Run, wrap_angle
 from agvbench.vehicle.geometry import Geometry
+from agvbench.vehicle.kinematics import axle_angle_stderrs, axle_angles_from_curvature
 
 _STANDS_M = 0.01
 _STANDS_SIGMAS = 10.0
