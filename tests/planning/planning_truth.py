@@ -17,6 +17,13 @@ def nominal(drive, front, rear):
     return math.radians(45.0) * (1500.0 - front) / 600.0, math.radians(45.0) * (1500.0 - rear) / 600.0, speed
 
 
+def end_of(pieces, start):
+    """Return the pose after all pieces of a path, driven one after another from `start`."""
+    for piece in pieces:
+        start = piece.end(start)
+    return start
+
+
 def body_rates(state, front, rear, speed):
     """Return ẋ, ẏ, ψ̇ from the two axle points: their lateral speeds are forward speed times the tangents."""
     forward = 0.5 * speed * (math.cos(front) + math.cos(rear))

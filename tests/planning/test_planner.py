@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from planning_truth import FRONT_M, REAR_M, driven
+from planning_truth import FRONT_M, REAR_M, driven, end_of
 
 from agvbench.errors import PlanError
 from agvbench.model import nominal_model, thesis_vehicle
 from agvbench.planning import Workspace, load_trajectory, plan, trajectory_from_table
-from agvbench.planning.shortest_paths.pieces import Piece, end_of
+from agvbench.planning.shortest_paths.pieces import Piece
 from agvbench.types import Pose
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import Line

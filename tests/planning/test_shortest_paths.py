@@ -7,10 +7,11 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from ompl import base as ompl_base
+from planning_truth import end_of
 
 from agvbench.errors import PlanError
 from agvbench.planning.shortest_paths import dubins, reeds_shepp
-from agvbench.planning.shortest_paths.pieces import end_of, length_of
+from agvbench.planning.shortest_paths.pieces import length_of
 from agvbench.types import Pose
 
 PLANNERS = {

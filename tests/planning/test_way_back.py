@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from planning_truth import end_of
 
 from agvbench.errors import PlanError
 from agvbench.planning import Workspace
-from agvbench.planning.shortest_paths.pieces import end_of, length_of
+from agvbench.planning.shortest_paths.pieces import length_of
 from agvbench.planning.shortest_paths.reeds_shepp import paths_by_length, shortest_path
 from agvbench.planning.shortest_paths.return_path import GearLeg, Guided, plan_return_path
 from agvbench.types import Pose, wrap_angle

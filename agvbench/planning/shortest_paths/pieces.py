@@ -76,13 +76,6 @@ class Piece:
         return replace(self, backward=not self.backward)
 
 
-def end_of(pieces: Iterable[Piece], start: Pose) -> Pose:
-    """Return the pose after all `pieces`, driven one after another from `start`."""
-    for piece in pieces:
-        start = piece.end(start)
-    return start
-
-
 def length_of(pieces: Iterable[Piece]) -> float:
     """Return the length of a path [m]."""
     return math.fsum(piece.length_m for piece in pieces)
