@@ -150,7 +150,12 @@ class Campaign:
         return {run_id: index for index, run_id in enumerate(self.run_ids)}
 
     def _repr_html_(self) -> str:
-        return campaign_html(self)
+        counts = int((self.runs["status"] == RUN_OK).sum())
+        line = f"vehicle {self.header.vehicle_name}, {len(self.runs)} runs, {counts} of them count"
+        conditions = _in_order(self.runs["condition"])
+        columns = ["experiment", "trajectory", *conditions]
+        table = table_html("runs that count", columns, _rows(self.runs, conditions))
+        return heading_html(self.header.name, line) + table
 
     def run(self, run_id: str) -> Run:
         """Return one run.
@@ -221,16 +226,6 @@ def session_starts(runs: Iterable[Run]) -> dict[str | None, float]:
     for run in runs:
         began[run.session] = min(run.started_s, began.get(run.session, math.inf))
     return began
-
-
-def campaign_html(campaign: Campaign) -> str:
-    """Return its name and vehicle, and how many runs count by experiment, trajectory and condition."""
-    header, runs = campaign.header, campaign.runs
-    counts = int((runs["status"] == RUN_OK).sum())
-    line = f"vehicle {header.vehicle_name}, {len(runs)} runs, {counts} of them count"
-    conditions = _in_order(runs["condition"])
-    columns = ["experiment", "trajectory", *conditions]
-    return heading_html(header.name, line) + table_html("runs that count", columns, _rows(runs, conditions))
 
 
 def _rows(runs: pd.DataFrame, conditions: list[str]) -> list[list[str | float | None]]:

@@ -78,7 +78,7 @@ def corrected_plan(
     departure
         When and where the run begins; its start pose gives way to `start` or, with a workspace, to the one that is
         chosen there.
-    remainder
+    end_pose_bias
         What the model is known to miss on this trajectory: the measured end pose in the frame of the predicted one. The
         aim is moved, so that with it the vehicle ends on the target.
 

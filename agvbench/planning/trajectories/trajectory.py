@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from agvbench.model import VehicleModel
 
 SHAPES = ("segments", "dubins", "s_curve", "slalom", "step_steer", "speed_steps", "endurance", "commands")
+_MOST = 12
 TRAJECTORY_NAME = re.compile("[A-Za-z0-9][A-Za-z0-9_.-]*")
 Condition = Literal["uncalibrated", "calibrated", "corrected"]
 
@@ -117,7 +118,14 @@ class Trajectory(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, 
         return f"{self.name}: {self.shape}[{index}]"
 
     def _repr_html_(self) -> str:
-        return trajectory_html(self)
+        line = (
+            f"{self.shape.replace('_', ' ')}; speed {self.speed}, steering {self.steering}, "
+            f"conditions {', '.join(self.conditions)}"
+        )
+        segments = self.expand()
+        rows = [(str(index), *_row(segment)) for index, segment in enumerate(segments[:_MOST])]
+        rows += [("…", f"{len(segments) - _MOST} more", "")] if len(segments) > _MOST else []
+        return heading_html(self.name, self.description, line) + table_html("segments", ["", "kind", "sets"], rows)
 
     def with_steering(self, steering: Steering) -> Trajectory:
         """Return the same trajectory steered in another mode; its target is then where the kinematics lead.
@@ -155,23 +163,6 @@ def _without_none(value: object) -> object:
     if isinstance(value, (list, tuple)):
         return [_without_none(item) for item in value]
     return value
-
-
-_MOST = 12
-
-
-def trajectory_html(trajectory: Trajectory) -> str:
-    """Return what it says of itself, how it is driven, and its segments with what each of them sets."""
-    line = (
-        f"{trajectory.shape.replace('_', ' ')}; speed {trajectory.speed}, steering {trajectory.steering}, "
-        f"conditions {', '.join(trajectory.conditions)}"
-    )
-    segments = trajectory.expand()
-    rows = [(str(index), *_row(segment)) for index, segment in enumerate(segments[:_MOST])]
-    rows += [("…", f"{len(segments) - _MOST} more", "")] if len(segments) > _MOST else []
-    return heading_html(trajectory.name, trajectory.description, line) + table_html(
-        "segments", ["", "kind", "sets"], rows
-    )
 
 
 def _row(segment: msgspec.Struct) -> tuple[str, str]:
