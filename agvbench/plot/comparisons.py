@@ -52,8 +52,7 @@ def comparison(axes: Axes, compared: Comparison, *, quantity: str = "position_mm
     axes.axvline(0.0, color=ON_WHITE.ink, linewidth=0.8)
     for height, difference in enumerate(chosen):
         _draw(axes, difference, height)
-    several = len({d.condition for d in chosen if d.trajectory != ALL}) > 1
-    axes.set_yticks(range(len(chosen)), [_name(d, several=several) for d in chosen])
+    axes.set_yticks(range(len(chosen)), [_name(d, several=compared.has_several_conditions) for d in chosen])
     axes.set_ylim(len(chosen) - 0.5, -0.5)
     return axes
 

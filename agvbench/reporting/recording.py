@@ -91,14 +91,13 @@ def write_recording(data: ReportData, path: Path) -> None:
     three, held until the next). Poses are thinned to 60 Hz. The viewer opens with all runs on one floor, and with a tab
     for each trajectory, in it for each condition, in it for each run: its floor over its commands.
     """
-    import pandas as pd
     import rerun as rr
 
     counted = [run for run in data.runs if run.is_ok]
     plans = PlannedPaths(data.path, data.header)
     recording = rr.RecordingStream("agvbench", recording_id=plain(data.header.name), send_properties=False)
     recording.save(path, default_blueprint=_blueprint(counted))
-    numbers = condition_numbers(in_order(pd.Series([run.condition for run in data.runs], dtype=str)))
+    numbers = condition_numbers(in_order(run.condition for run in data.runs))
     recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     for run in counted:
         _send_run(recording, run, colour(numbers[run.condition]))

@@ -16,6 +16,7 @@ import numpy as np
 
 from agvbench.errors import FlagError
 from agvbench.statistics.differences import (
+    ALL,
     ALPHA,
     ComparisonVerdict,
     Difference,
@@ -25,6 +26,7 @@ from agvbench.statistics.differences import (
     of_all,
     of_cell,
     overall,
+    pooled_sd,
 )
 from agvbench.statistics.intervals import RESAMPLES
 from agvbench.statistics.matching import Cell, Side, match_cells
@@ -102,6 +104,11 @@ class Comparison:
             cell = d.trajectory, d.condition
             worst[cell] = min(rank, worst.get(cell, rank))
         return sorted(self.differences, key=lambda d: worst[d.trajectory, d.condition])
+
+    @property
+    def has_several_conditions(self) -> bool:
+        """Whether trajectories were compared under more than one condition, so that rows must name theirs."""
+        return len({d.condition for d in self.differences if d.trajectory != ALL}) > 1
 
     def differences_frame(self) -> pd.DataFrame:
         """Return one row per difference, worst first.
@@ -195,16 +202,12 @@ def checked_margins(margin_mm: float, margin_deg: float) -> dict[Quantity, float
     FlagError
         If one is negative or not finite.
     """
-    return {q: _margin({"mm": margin_mm, "deg": margin_deg}[q.unit], q) for q in QUANTITIES}
-
-
-def _margin(value: float, quantity: Quantity) -> float:
-    if not (math.isfinite(value) and value >= 0.0):
-        flag = f"--margin-{quantity.unit}"
-        raise FlagError(
-            "margin cannot be used", where=flag, value=value, limit=f"a finite number of {quantity.unit} ≥ 0"
-        )
-    return value
+    margins = {"mm": margin_mm, "deg": margin_deg}
+    for unit, value in margins.items():
+        if not (math.isfinite(value) and value >= 0.0):
+            limit = f"a finite number of {unit} ≥ 0"
+            raise FlagError("margin cannot be used", where=f"--margin-{unit}", value=value, limit=limit)
+    return {q: margins[q.unit] for q in QUANTITIES}
 
 
 _WITHIN = "the intervals cover the variation within a session, not what changes from one session to the next"
@@ -230,15 +233,7 @@ def session_note(cells: Sequence[Cell], *, same_campaign: bool) -> str:
 
 def between_sessions_sd(cells: Sequence[Cell], quantity: Quantity) -> float:
     """Return the standard deviation of session medians of the absolute error within one side; NaN with one session."""
-    squares, freedom = 0.0, 0
-    for cell in cells:
-        for side in (cell.a, cell.b):
-            if len(side.sessions) == 1:
-                continue
-            medians = _session_medians(side, quantity)
-            squares += float(np.sum((medians - medians.mean()) ** 2))
-            freedom += len(medians) - 1
-    return math.sqrt(squares / freedom) if freedom else math.nan
+    return pooled_sd([_session_medians(side, quantity) for cell in cells for side in (cell.a, cell.b)])
 
 
 def _session_medians(side: Side, quantity: Quantity) -> Floats:

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from agvbench.notebook_html import heading_html, table_html
-from agvbench.statistics.differences import ALL, ComparisonVerdict, Difference, EndShift, SampleSummary
+from agvbench.statistics.differences import ComparisonVerdict, Difference, EndShift, SampleSummary
 from agvbench.statistics.hypothesis_tests import required_sample_size
 from agvbench.statistics.intervals import CONFIDENCE
 from agvbench.statistics.quantities import DISTANCE, POSITION
@@ -53,7 +53,7 @@ def note_of(comparison: Comparison) -> str:
     found = comparison.noted_worse
     if not found:
         return ""
-    several = len({d.condition for d in comparison.differences if d.trajectory != ALL}) > 1
+    several = comparison.has_several_conditions
     where = dict.fromkeys(f"{d.trajectory} {d.condition}" if several else d.trajectory for d in found)
     name = " and ".join(dict.fromkeys(d.quantity.name for d in found))
     return f"Note: {name}, as the thesis defines it, is worse alone in {', '.join(where)}, which is no regression."

@@ -51,13 +51,7 @@ class Outliers:
         return self.low_severe + self.low_mild + self.high_mild + self.high_severe
 
     def __str__(self) -> str:
-        kinds = {
-            "low severe": self.low_severe,
-            "low mild": self.low_mild,
-            "high mild": self.high_mild,
-            "high severe": self.high_severe,
-        }
-        return ", ".join(f"{count} {kind}" for kind, count in kinds.items() if count) or "none"
+        return ", ".join(f"{n} {kind.replace('_', ' ')}" for kind, n in vars(self).items() if n) or "none"
 
 
 def classify_outliers(values: Floats) -> Outliers:

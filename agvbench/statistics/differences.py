@@ -20,7 +20,12 @@ from agvbench.statistics.hypothesis_tests import (
     rank_test,
     tarone_testable,
 )
-from agvbench.statistics.intervals import CONFIDENCE, Interval, average_difference_interval, median_difference_interval
+from agvbench.statistics.intervals import (
+    Interval,
+    average_difference_interval,
+    mean_difference_interval,
+    median_difference_interval,
+)
 from agvbench.statistics.matching import Cell, Strata
 from agvbench.statistics.quantities import DISTANCE, Quantity
 from agvbench.types import Floats
@@ -61,7 +66,6 @@ def decide(
     p_better: float,
     p_same: float,
     alpha: float = ALPHA,
-    alpha_same: float = ALPHA_SAME,
 ) -> ComparisonVerdict:
     """Return the verdict on a `difference` of medians (b − a) against a noise band of ±`margin`.
 
@@ -75,9 +79,10 @@ def decide(
     p_worse, p_better
         One-sided p-values of no difference, corrected for multiplicity.
     p_same
-        The larger p-value of the two one-sided tests of a difference of at least the margin, uncorrected.
-    alpha, alpha_same
-        The levels that the former and the latter are held against.
+        The larger p-value of the two one-sided tests of a difference of at least the margin, uncorrected; held against
+        5 %.
+    alpha
+        The level that `p_worse` and `p_better` are held against.
 
     Examples
     --------
@@ -90,7 +95,7 @@ def decide(
         return ComparisonVerdict.WORSE
     if p_better <= alpha and difference < -margin:
         return ComparisonVerdict.BETTER
-    return ComparisonVerdict.SAME if p_same <= alpha_same else ComparisonVerdict.INCONCLUSIVE
+    return ComparisonVerdict.SAME if p_same <= ALPHA_SAME else ComparisonVerdict.INCONCLUSIVE
 
 
 ALL = "all trajectories"
@@ -158,7 +163,7 @@ def of_all(cells: Sequence[Cell], quantity: Quantity, margin: float, resamples: 
     """Test all cells together: a small change everywhere shows here before it shows anywhere."""
     pairs = [cell.values(quantity) for cell in cells]
     samples = [
-        replace(_sample(np.concatenate(side)), median=float(np.mean([np.median(v) for v in side])), sd=_pooled_sd(side))
+        replace(_sample(np.concatenate(side)), median=float(np.mean([np.median(v) for v in side])), sd=pooled_sd(side))
         for side in zip(*pairs, strict=True)
     ]
     interval = average_difference_interval(pairs, resamples=resamples, seed=seed)
@@ -186,7 +191,7 @@ def _tested(
         p_worse=plain.p_greater,
         p_better=plain.p_less,
         p_same=max(at_least_worse, at_least_better),
-        cliffs_delta=cliffs_delta(plain.superiority),
+        cliffs_delta=plain.cliffs_delta,
         minimum_detectable=math.nan,
         testable=False,
         verdict=ComparisonVerdict.INCONCLUSIVE,
@@ -255,20 +260,11 @@ def _sample(values: Floats) -> SampleSummary:
     return SampleSummary(len(values), float(np.median(values)), sd, str(classify_outliers(values)))
 
 
-def _pooled_sd(groups: Sequence[Floats]) -> float:
+def pooled_sd(groups: Sequence[Floats]) -> float:
     """Return the standard deviation within groups; NaN where no group has two values."""
     squares = sum(float(np.sum((group - group.mean()) ** 2)) for group in groups)
     freedom = sum(len(group) - 1 for group in groups)
     return math.sqrt(squares / freedom) if freedom else math.nan
-
-
-def cliffs_delta(superiority: float) -> float:
-    """Return Cliff's delta, P(b > a) − P(b < a), from A₁₂ = P(b > a) + P(b = a) / 2.
-
-    >>> cliffs_delta(1.0), cliffs_delta(0.5)
-    (1.0, 0.0)
-    """
-    return 2.0 * superiority - 1.0
 
 
 @dataclass(frozen=True)
@@ -290,24 +286,3 @@ def end_shift(cell: Cell) -> EndShift:
     """Return the shift of the mean end position in `cell`."""
     along, across = (mean_difference_interval(cell.a.ends_mm[:, k], cell.b.ends_mm[:, k]) for k in (0, 1))
     return EndShift(cell.trajectory, cell.condition, along, across)
-
-
-def mean_difference_interval(a: Floats, b: Floats, *, confidence: float = CONFIDENCE) -> Interval:
-    """Return mean(b) − mean(a) with Welch's interval (1947); NaN bounds where a side has fewer than two values.
-
-    >>> shift = mean_difference_interval(np.array([0.0, 1.0, 2.0]), np.array([10.0, 11.0, 12.0]))
-    >>> shift.estimate, round(shift.low, 2), round(shift.high, 2)
-    (10.0, 7.73, 12.27)
-    """
-    from scipy.special import stdtrit
-
-    estimate = float(np.mean(b) - np.mean(a))
-    if min(len(a), len(b)) < 2:
-        return Interval(estimate, math.nan, math.nan)
-    squares = [float(np.var(side, ddof=1)) / len(side) for side in (a, b)]
-    total = sum(squares)
-    if total == 0.0:
-        return Interval(estimate, estimate, estimate)
-    freedom = total**2 / sum(s**2 / (len(side) - 1) for s, side in zip(squares, (a, b), strict=True))
-    half = float(stdtrit(freedom, 0.5 + confidence / 2.0)) * math.sqrt(total)
-    return Interval(estimate, estimate - half, estimate + half)

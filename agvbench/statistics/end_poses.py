@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -54,9 +54,9 @@ def end_pose_table(errors: pd.DataFrame, *, thesis_vehicle: bool = True) -> pd.D
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def in_order(conditions: pd.Series) -> list[str]:
+def in_order(conditions: Iterable[str]) -> list[str]:
     """Return the distinct conditions, the known ones first in their usual order."""
-    found = [str(condition) for condition in dict.fromkeys(conditions)]
+    found = list(dict.fromkeys(map(str, conditions)))
     return [c for c in CONDITIONS if c in found] + [c for c in found if c not in CONDITIONS]
 
 

@@ -85,13 +85,9 @@ def equivalence(values: Floats, *, margin_sds: float = 1.0) -> Equivalence:
 
 
 def equivalences(
-    errors: pd.DataFrame,
-    condition: str,
-    quantities: Sequence[Quantity] = COMPONENTS,
-    *,
-    margin_sds: float = 1.0,
+    errors: pd.DataFrame, condition: str, quantities: Sequence[Quantity] = COMPONENTS
 ) -> dict[tuple[str, str], Equivalence]:
-    """Return the test of each signed error of every trajectory under `condition`.
+    """Return the test of each signed error of every trajectory under `condition`, within ± 1 standard deviation.
 
     Parameters
     ----------
@@ -101,8 +97,6 @@ def equivalences(
         Whose runs count.
     quantities
         Which errors: along, across and heading by default.
-    margin_sds
-        The margin, in standard deviations of one repeat.
 
     Returns
     -------
@@ -112,11 +106,7 @@ def equivalences(
     counted = valid(errors)
     counted = counted[counted["condition"] == condition]
     return {
-        (str(name), quantity.column): equivalence(_signed(counted, name, quantity), margin_sds=margin_sds)
-        for name in dict.fromkeys(counted["trajectory"])
+        (str(name), quantity.column): equivalence(rows[quantity.column].to_numpy(dtype=float))
+        for name, rows in counted.groupby("trajectory", sort=False)
         for quantity in quantities
     }
-
-
-def _signed(errors: pd.DataFrame, trajectory: str, quantity: Quantity) -> Floats:
-    return errors.loc[errors["trajectory"] == trajectory, quantity.column].to_numpy(dtype=float)

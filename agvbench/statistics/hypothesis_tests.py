@@ -37,6 +37,11 @@ class RankTest:
     minimum_p: float
     superiority: float
 
+    @property
+    def cliffs_delta(self) -> float:
+        """Cliff's delta, P(b > a) − P(b < a): positive where b tends to be larger."""
+        return 2.0 * self.superiority - 1.0
+
 
 def rank_test(strata: Sequence[tuple[Floats, Floats]]) -> RankTest:
     """Test whether b tends to be larger or smaller than a, over all strata ``(a, b)`` together.
@@ -183,8 +188,8 @@ _DRAWS = 2000
 _MOST_SIMULATED = 100
 
 
-def minimum_detectable_difference(sd: float, n_a: int, n_b: int, *, alpha: float, power: float = POWER) -> float:
-    """Return which shift a one-sided rank-sum test of n_a against n_b repeats finds with probability `power`.
+def minimum_detectable_difference(sd: float, n_a: int, n_b: int, *, alpha: float) -> float:
+    """Return which shift a one-sided rank-sum test of n_a against n_b repeats finds nine times in ten.
 
     Infinite where even full separation would not be significant. For normal noise; about the same for heavier tails.
 
@@ -199,7 +204,7 @@ def minimum_detectable_difference(sd: float, n_a: int, n_b: int, *, alpha: float
     """
     if minimum_attainable_p(n_a, n_b) > alpha:
         return math.inf
-    return sd * (_simulated if n_a + n_b <= _MOST_SIMULATED else _approximated)(n_a, n_b, alpha, power)
+    return sd * (_simulated if n_a + n_b <= _MOST_SIMULATED else _approximated)(n_a, n_b, alpha)
 
 
 def minimum_attainable_p(n_a: int, n_b: int) -> float:
@@ -224,20 +229,20 @@ def required_sample_size(alpha: float) -> int:
 
 
 @lru_cache(maxsize=256)
-def _simulated(n_a: int, n_b: int, alpha: float, power: float) -> float:
+def _simulated(n_a: int, n_b: int, alpha: float) -> float:
     """Return the shift in standard deviations, over seeded draws of the two samples.
 
     A shift is found where it exceeds as many of the differences a − b as the test demands, so that every draw has
-    one least shift that is found, and the share `power` of the draws has it below the result.
+    one least shift that is found, and the share `POWER` of the draws has it below the result.
     """
     rng = np.random.default_rng(0)
     a, b = rng.standard_normal((_DRAWS, n_a, 1)), rng.standard_normal((_DRAWS, 1, n_b))
     apart = (a - b).reshape(_DRAWS, n_a * n_b)
     demanded = critical_pairs(n_a, n_b, alpha) - 1
-    return float(np.quantile(np.partition(apart, demanded, axis=1)[:, demanded], power))
+    return float(np.quantile(np.partition(apart, demanded, axis=1)[:, demanded], POWER))
 
 
-def _approximated(n_a: int, n_b: int, alpha: float, power: float) -> float:
+def _approximated(n_a: int, n_b: int, alpha: float) -> float:
     # The rank-sum test needs π/3 times the repeats of a t test on normal noise.
-    quantile = NormalDist().inv_cdf(1.0 - alpha) + NormalDist().inv_cdf(power)
+    quantile = NormalDist().inv_cdf(1.0 - alpha) + NormalDist().inv_cdf(POWER)
     return quantile * math.sqrt(math.pi / 3.0 * (1.0 / n_a + 1.0 / n_b))

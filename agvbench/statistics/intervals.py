@@ -1,4 +1,4 @@
-"""Confidence intervals: bootstrap of medians and their differences (seeded), exact bounds of proportions."""
+"""Confidence intervals: bootstrap of medians (seeded), Welch's of means, exact bounds of proportions."""
 
 from __future__ import annotations
 
@@ -28,28 +28,23 @@ class Interval(NamedTuple):
         return self.low <= value <= self.high
 
 
-def median_interval(
-    values: Floats, *, confidence: float = CONFIDENCE, resamples: int = RESAMPLES, seed: int = 0
-) -> Interval:
+def median_interval(values: Floats, *, resamples: int = RESAMPLES, seed: int = 0) -> Interval:
     """Return the median of `values`, shape (n,), with its percentile bootstrap interval."""
     medians = _resampled_medians(values, resamples, np.random.default_rng(seed))
-    return _interval(float(np.median(values)), medians, confidence)
+    return _interval(float(np.median(values)), medians)
 
 
-def median_difference_interval(
-    a: Floats, b: Floats, *, confidence: float = CONFIDENCE, resamples: int = RESAMPLES, seed: int = 0
-) -> Interval:
+def median_difference_interval(a: Floats, b: Floats, *, resamples: int = RESAMPLES, seed: int = 0) -> Interval:
     """Return median(b) − median(a) with its percentile bootstrap interval.
 
     The percentile interval, not BCa: the acceleration that BCa estimates by jackknife is not consistent for a median,
-    whose jackknife values take only two distinct values.
+    whose jackknife values take only two distinct values. With 10 + 10 values of normal, heavy-tailed or skewed noise
+    the nominal 95 % cover 96 %.
 
     Parameters
     ----------
     a, b
         Independent samples of shapes (n,) and (m,), finite. Fewer than three of either give NaN bounds.
-    confidence
-        Nominal coverage. With 10 + 10 values of normal, heavy-tailed or skewed noise the nominal 95 % cover 96 %.
     resamples
         How many bootstrap samples are drawn.
     seed
@@ -65,15 +60,11 @@ def median_difference_interval(
     difference = _resampled_medians(b, resamples, rng) - _resampled_medians(a, resamples, rng)
     if min(len(a), len(b)) < FEWEST:
         difference = np.full(1, np.nan)
-    return _interval(float(np.median(b) - np.median(a)), difference, confidence)
+    return _interval(float(np.median(b) - np.median(a)), difference)
 
 
 def average_difference_interval(
-    strata: Sequence[tuple[Floats, Floats]],
-    *,
-    confidence: float = CONFIDENCE,
-    resamples: int = RESAMPLES,
-    seed: int = 0,
+    strata: Sequence[tuple[Floats, Floats]], *, resamples: int = RESAMPLES, seed: int = 0
 ) -> Interval:
     """Return the average over strata ``(a, b)`` of median(b) − median(a), with its interval.
 
@@ -82,7 +73,7 @@ def average_difference_interval(
     rng = np.random.default_rng(seed)
     estimates = [float(np.median(b) - np.median(a)) for a, b in strata]
     resampled = [_resampled_medians(b, resamples, rng) - _resampled_medians(a, resamples, rng) for a, b in strata]
-    return _interval(float(np.mean(estimates)), np.mean(resampled, axis=0), confidence)
+    return _interval(float(np.mean(estimates)), np.mean(resampled, axis=0))
 
 
 def _resampled_medians(values: Floats, resamples: int, rng: np.random.Generator) -> Floats:
@@ -92,10 +83,31 @@ def _resampled_medians(values: Floats, resamples: int, rng: np.random.Generator)
     return np.asarray(np.median(drawn, axis=1, overwrite_input=True), dtype=float)
 
 
-def _interval(estimate: float, resampled: Floats, confidence: float) -> Interval:
-    tail = 50.0 * (1.0 - confidence)
+def _interval(estimate: float, resampled: Floats) -> Interval:
+    tail = 50.0 * (1.0 - CONFIDENCE)
     low, high = np.percentile(resampled, [tail, 100.0 - tail])
     return Interval(estimate, float(low), float(high))
+
+
+def mean_difference_interval(a: Floats, b: Floats) -> Interval:
+    """Return mean(b) − mean(a) with Welch's interval (1947); NaN bounds where a side has fewer than two values.
+
+    >>> shift = mean_difference_interval(np.array([0.0, 1.0, 2.0]), np.array([10.0, 11.0, 12.0]))
+    >>> shift.estimate, round(shift.low, 2), round(shift.high, 2)
+    (10.0, 7.73, 12.27)
+    """
+    from scipy.special import stdtrit
+
+    estimate = float(np.mean(b) - np.mean(a))
+    if min(len(a), len(b)) < 2:
+        return Interval(estimate, math.nan, math.nan)
+    squares = [float(np.var(side, ddof=1)) / len(side) for side in (a, b)]
+    total = sum(squares)
+    if total == 0.0:
+        return Interval(estimate, estimate, estimate)
+    freedom = total**2 / sum(s**2 / (len(side) - 1) for s, side in zip(squares, (a, b), strict=True))
+    half = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2.0)) * math.sqrt(total)
+    return Interval(estimate, estimate - half, estimate + half)
 
 
 @dataclass(frozen=True)

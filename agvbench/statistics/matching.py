@@ -102,17 +102,17 @@ def match_cells(
 
 
 def _sides(errors: pd.DataFrame, keys: list[str]) -> dict[_Key, Side]:
-    named = list(zip(*(errors[key].astype(str) for key in keys), strict=True))
-    absolute = {q.column: np.abs(errors[q.column].to_numpy(dtype=float)) for q in QUANTITIES}
-    session, target = errors["session"].to_numpy(dtype=object), errors[_TARGET].to_numpy(dtype=float)
-    ends = errors[[ALONG.column, ACROSS.column]].to_numpy(dtype=float)
-    sides = {}
-    for key in dict.fromkeys(named):
-        at = np.array([name == key for name in named])
-        sides[key] = Side(
-            {column: values[at] for column, values in absolute.items()}, ends[at], session[at], target[at][0]
-        )
-    return sides
+    groups = errors.groupby([errors[key].astype(str) for key in keys], sort=False)
+    return {tuple(map(str, key)): _side(rows) for key, rows in groups}
+
+
+def _side(rows: pd.DataFrame) -> Side:
+    return Side(
+        absolute={q.column: np.abs(rows[q.column].to_numpy(dtype=float)) for q in QUANTITIES},
+        ends_mm=rows[[ALONG.column, ACROSS.column]].to_numpy(dtype=float),
+        session=rows["session"].to_numpy(dtype=object),
+        target=rows[_TARGET].to_numpy(dtype=float)[0],
+    )
 
 
 def _counted(errors: pd.DataFrame, side: str) -> pd.DataFrame:

@@ -11,7 +11,8 @@ import numpy as np
 
 from agvbench.signals import robust_std
 from agvbench.statistics.end_poses import in_order
-from agvbench.statistics.intervals import Interval, median_interval
+from agvbench.statistics.intervals import CONFIDENCE, Interval, median_interval
+from agvbench.statistics.quantities import COMPONENTS, DISTANCE, Quantity
 from agvbench.statistics.run_errors import valid
 from agvbench.types import Floats
 
@@ -19,12 +20,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FEWEST = 5
-COMPONENTS = {
-    "along_mm": "along [mm]",
-    "across_mm": "across [mm]",
-    "delta_heading_deg": "heading error [deg]",
-    "delta_s_mm": "Δs [mm]",
-}
 
 
 @dataclass(frozen=True)
@@ -35,7 +30,7 @@ class Spread:
     robust_sd: float
 
 
-def spread(values: Floats, *, confidence: float = 0.95) -> Spread:
+def spread(values: Floats) -> Spread:
     """Return the dispersion of `values`, shape (n,), with Bonett's (2006) interval of the standard deviation.
 
     Bonett's interval uses the sample's own kurtosis where the chi-square interval assumes a normal distribution.
@@ -47,7 +42,7 @@ def spread(values: Floats, *, confidence: float = 0.95) -> Spread:
     """
     sd = float(np.std(values, ddof=1)) if len(values) > 1 else math.nan
     robust = robust_std(values - np.median(values))
-    return Spread(Interval(sd, *_bonett(values, sd, confidence)), robust)
+    return Spread(Interval(sd, *_bonett(values, sd)), robust)
 
 
 def bias_and_spread(errors: pd.DataFrame) -> pd.DataFrame:
@@ -59,19 +54,19 @@ def bias_and_spread(errors: pd.DataFrame) -> pd.DataFrame:
     import pandas as pd
 
     return pd.DataFrame(
-        {"trajectory": trajectory, "condition": condition, **_component(groups.get_group((condition,)), column)}
+        {"trajectory": trajectory, "condition": condition, **_component(groups.get_group((condition,)), quantity)}
         for trajectory, runs in valid(errors).groupby("trajectory", sort=False)
         for groups in [runs.groupby(["condition"])]
         for condition in in_order(runs["condition"])
-        for column in COMPONENTS
+        for quantity in (*COMPONENTS, DISTANCE)
     )
 
 
-def _component(group: pd.DataFrame, column: str) -> dict[str, object]:
-    values = group[column].to_numpy(dtype=float)
+def _component(group: pd.DataFrame, quantity: Quantity) -> dict[str, object]:
+    values = group[quantity.column].to_numpy(dtype=float)
     bias, dispersion = median_interval(values), spread(values)
     return {
-        "component": COMPONENTS[column],
+        "component": f"{quantity.symbol} [{quantity.unit}]",
         "repeats": len(values),
         **dict(zip(("bias", "bias_low", "bias_high"), bias, strict=True)),
         **dict(zip(("sd", "sd_low", "sd_high"), dispersion.sd, strict=True)),
@@ -79,11 +74,11 @@ def _component(group: pd.DataFrame, column: str) -> dict[str, object]:
     }
 
 
-def _bonett(values: Floats, sd: float, confidence: float) -> tuple[float, float]:
+def _bonett(values: Floats, sd: float) -> tuple[float, float]:
     n = len(values)
     if n < FEWEST or sd == 0.0:
         return math.nan, math.nan
-    z = NormalDist().inv_cdf(0.5 + confidence / 2.0)
+    z = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2.0)
     middle = _trimmed_mean(values, 1.0 / (2.0 * math.sqrt(n - 4.0)))
     squares = float(np.sum((values - values.mean()) ** 2))
     kurtosis = n * float(np.sum((values - middle) ** 4)) / squares**2

@@ -14,9 +14,11 @@ from agvbench.types import Pose, Run, wrap_angle
 if TYPE_CHECKING:
     import pandas as pd
 
+_OF_RUN = ("run_id", "experiment", "trajectory", "condition", "repeat", "session", "firmware", "status")
+_TARGET = ("target_x_m", "target_y_m", "target_heading_rad")
+_END = ("end_x_m", "end_y_m", "end_heading_rad")
 COLUMNS = (
-    *("run_id", "experiment", "trajectory", "condition", "repeat", "session", "firmware", "status", "problem"),
-    *("target_x_m", "target_y_m", "target_heading_rad", "end_x_m", "end_y_m", "end_heading_rad"),
+    *(*_OF_RUN, "problem", *_TARGET, *_END),
     *("position_mm", "along_mm", "across_mm", "heading_deg", "delta_s_mm", "delta_heading_deg", "rotation_deg"),
     *("stderr_position_mm", "stderr_heading_deg"),
 )
@@ -43,18 +45,8 @@ def valid(errors: pd.DataFrame) -> pd.DataFrame:
 
 
 def _row(run: Run) -> dict[str, object]:
-    row: dict[str, object] = {
-        "run_id": run.run_id,
-        "experiment": run.experiment,
-        "trajectory": run.trajectory,
-        "condition": run.condition,
-        "repeat": run.repeat,
-        "session": run.session or "",
-        "firmware": run.firmware,
-        "status": run.status,
-        "problem": "",
-    }
-    row |= dict(zip(("target_x_m", "target_y_m", "target_heading_rad"), run.target, strict=True))
+    row = {name: getattr(run, name) for name in _OF_RUN} | {"session": run.session or "", "problem": ""}
+    row |= dict(zip(_TARGET, run.target, strict=True))
     try:
         return row | _errors(run)
     except FitError as error:
@@ -64,18 +56,11 @@ def _row(run: Run) -> dict[str, object]:
 def _errors(run: Run) -> dict[str, object]:
     error = pose_error(start_pose(run), end_pose(run), run.target)
     sense = math.copysign(1.0, run.target.heading_rad) if run.target.heading_rad else 1.0
-    heading_deg = math.degrees(error.delta_heading_rad)
+    shown = _in_table_units(error)
     return {
-        "end_x_m": error.end.x_m,
-        "end_y_m": error.end.y_m,
-        "end_heading_rad": error.end.heading_rad,
-        "position_mm": error.position_m * 1e3,
-        "along_mm": error.along_m * 1e3,
-        "across_mm": error.across_m * 1e3,
-        "heading_deg": heading_deg,
-        "delta_s_mm": error.delta_s_m * 1e3,
-        "delta_heading_deg": heading_deg,
-        "rotation_deg": sense * (math.degrees(run.target.heading_rad) + heading_deg),
+        **dict(zip(_END, error.end, strict=True)),
+        **vars(shown),
+        "rotation_deg": sense * (math.degrees(run.target.heading_rad) + shown.heading_deg),
         "stderr_position_mm": error.stderr_position_m * 1e3,
         "stderr_heading_deg": math.degrees(error.stderr_heading_rad),
     }
@@ -172,7 +157,10 @@ def run_error(run: Run) -> RunError:
     """
     if not run.target.is_finite:
         raise InputError("the run has no target, so no error", where=run.run_id, remedy="drive a trajectory that has")
-    error = pose_error(start_pose(run), end_pose(run), run.target)
+    return _in_table_units(pose_error(start_pose(run), end_pose(run), run.target))
+
+
+def _in_table_units(error: PoseError) -> RunError:
     heading_deg = math.degrees(error.delta_heading_rad)
     return RunError(
         position_mm=1e3 * error.position_m,

@@ -89,7 +89,7 @@ def comparison_summary(comparison: Comparison) -> RenderableType:
         Column("interval", _INTERVAL),
         Column("verdict", "verdict"),
     ]
-    several = _several_conditions(comparison)
+    several = comparison.has_several_conditions
     rows = [_console_row(d, columns[5], several=several) for d in comparison.worst_first]
     caption = f"{heading_b} against {heading_a} (medians; smaller is better; worst first)"
     wide, grouped = (Table("comparison", caption, columns, made) for made in (_named_once(rows), rows))
@@ -123,7 +123,7 @@ def shift_summary(comparison: Comparison) -> RenderableType:
     columns = [Column("trajectory", "trajectory")]
     for name in ("along", "across"):
         columns += [Column(name, f"{name} mm", 1), Column(f"{name}_interval", _INTERVAL)]
-    several, rows = _several_conditions(comparison), []
+    several, rows = comparison.has_several_conditions, []
     for shift in comparison.shifts:
         cells: list[Value] = [f"{shift.trajectory} {shift.condition}" if several else shift.trajectory]
         for part in (shift.along, shift.across):
@@ -132,10 +132,6 @@ def shift_summary(comparison: Comparison) -> RenderableType:
     caption = f"Mean end position, {heading_b} minus {heading_a} (largest first; no verdict)"
     table = Table("end_shift", caption, columns, rows)
     return _Fitting(console_table(table), console_table(_without(_without(table, "along_interval"), "across_interval")))
-
-
-def _several_conditions(comparison: Comparison) -> bool:
-    return len({d.condition for d in comparison.differences if d.trajectory != ALL}) > 1
 
 
 def _headings(comparison: Comparison) -> tuple[str, str]:

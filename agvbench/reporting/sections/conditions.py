@@ -8,7 +8,7 @@ from agvbench.reporting.content import Block, Column, Paragraph, Table, Value
 from agvbench.reporting.sections.base import Section
 from agvbench.statistics import Comparison, Difference
 from agvbench.statistics.comparison_summary import describe, notes_in_words
-from agvbench.statistics.differences import ALL, ALPHA_SAME
+from agvbench.statistics.differences import ALPHA_SAME
 from agvbench.statistics.quantities import COMPONENT_DEFINITIONS
 from agvbench.workflows.report import ReportData
 
@@ -33,7 +33,7 @@ def comparison_table(comparison: Comparison, slug: str) -> Table:
         Column("words", "in words"),
     ]
     rows = [_row(d, comparison) for d in comparison.worst_first]
-    if len({d.condition for d in comparison.differences if d.trajectory != ALL}) == 1:
+    if not comparison.has_several_conditions:
         # Named in the headings of both sides already.
         columns, rows = columns[:1] + columns[2:], [row[:1] + row[2:] for row in rows]
     note = (

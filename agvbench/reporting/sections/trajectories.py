@@ -31,14 +31,12 @@ class TrajectoriesSection(Section):
 
     def blocks(self, data: ReportData) -> Sequence[Block]:
         """Return the figures, or why there are none."""
-        import pandas as pd
-
         runs = [run for run in data.runs if run.is_ok]
         paths = {run.run_id: path for run in runs if len(path := drawn_path(run.frames)) > 1}
         runs = [run for run in runs if run.run_id in paths]
         if not runs:
             return [Paragraph("No run that counts has frames to draw.")]
-        numbers = condition_numbers(in_order(pd.Series([run.condition for run in runs])))
+        numbers = condition_numbers(in_order(run.condition for run in runs))
         named = legend(numbers)
         aimed, free = ([run for run in runs if run.target.is_finite is whether] for whether in (True, False))
         over = [
