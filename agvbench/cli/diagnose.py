@@ -87,7 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
         wrote=wrote,
     )
     if arguments.report is not None:
-        from agvbench.reporting.diagnosis_report import write_diagnosis_report
+        from agvbench.reporting.write import write_diagnosis_report
 
         write_diagnosis_report(found, arguments.report)
         wrote(arguments.report)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import unicodedata
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from itertools import groupby
 
 Value = str | float | int | None
 _LONGEST = 120
@@ -36,6 +37,13 @@ class Column:
             return f"<{self.least:.{self.digits}f}"
         text = f"{value:.{self.digits}f}"
         return text.removeprefix("-") if float(text) == 0.0 else text.replace("-", "−")
+
+
+def spans(columns: Sequence[Column]) -> list[tuple[str, int]]:
+    """Return the groups that columns stand in, with how many columns each spans; none where there are no groups."""
+    if not any(column.group for column in columns):
+        return []
+    return [(group, len(list(members))) for group, members in groupby(columns, key=lambda c: c.group)]
 
 
 @dataclass(frozen=True)
@@ -111,7 +119,7 @@ class Content:
 
     slug: str
     title: str
-    blocks: Sequence[Block] = field(default_factory=tuple)
+    blocks: Sequence[Block] = ()
 
     @property
     def is_absent(self) -> bool:

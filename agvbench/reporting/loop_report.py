@@ -7,7 +7,10 @@ import statistics
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from rich.console import Console
+from rich.text import Text
 
 from agvbench.errors import FileError
 from agvbench.loop.before_after import (
@@ -41,14 +44,11 @@ from agvbench.types import CONDITIONS
 from agvbench.workflows.diagnosis_files import ShownDiagnosis, items, mapping, read_diagnosis
 from agvbench.workflows.report import gather
 
-if TYPE_CHECKING:
-    from rich.console import Console
-
 _NOTE = (
     f"{COMPONENT_DEFINITIONS} Bias: mean of the signed errors; sd: standard deviation of one repeat. The last column "
     "tests the corrected bias against ± 1 sd at the 5 % level: within, beyond, or too few repeats to say."
 )
-_LEARNED = ("along mm", "across mm", "heading deg")
+_LEARNED = ("along_mm", "across_mm", "heading_deg")
 _PLANNED = {
     "along_mm": ("along mm", 1),
     "across_mm": ("across mm", 1),
@@ -97,8 +97,6 @@ def write_loop_report(loop: Loop) -> LoopReport:
 
 def print_loop(console: Console, report: LoopReport) -> None:
     """Print before and after, and where the report is."""
-    from rich.text import Text
-
     console.print(console_table(_narrow(before_after_table(report.rows), report.rows)))
     console.print(console_table(_narrow_ends(report.ends)))
     for sentence in _headline(report.loop, report.rows, report.ends):
@@ -170,7 +168,7 @@ def _narrow(table: Table, rows: Sequence[BeforeAfter]) -> Table:
 
 
 def _sections(loop: Loop, rows: Sequence[BeforeAfter], ends: Sequence[EndPosition]) -> list[Content]:
-    said = [f"{plain(name)}: {sentence}" for name, sentence in _said(loop.plans)]
+    said = list(_said(loop.plans))
     blocks: list[Block] = [Paragraph(sentence, lead=True) for sentence in _headline(loop, rows, ends)]
     tables = [end_position_table(ends), before_after_table(rows)]
     return [
@@ -221,10 +219,9 @@ def _plans(plans: Mapping[str, Any]) -> Table:
     columns = [Column("trajectory", "trajectory")]
     for key, group in groups.items():
         columns += [Column(f"{key}_{field}", title, digits, group=group) for field, (title, digits) in _PLANNED.items()]
-    columns += [Column(f"learned_{c.split()[0]}_{c.split()[1]}", c, 2, group="bias before") for c in _LEARNED]
-    learned = ("along_mm", "across_mm", "heading_deg")
+    columns += [Column(f"learned_{field}", field.replace("_", " "), 2, group="bias before") for field in _LEARNED]
     rows: list[list[Value]] = [
-        [name, *(entry[key][field] for key in groups for field in _PLANNED), *(entry["remainder"][f] for f in learned)]
+        [name, *(entry[key][field] for key in groups for field in _PLANNED), *(entry["remainder"][f] for f in _LEARNED)]
         for name, entry in plans.items()
         if "remaining" in entry
     ]
@@ -237,10 +234,7 @@ def _plans(plans: Mapping[str, Any]) -> Table:
     )
 
 
-def _said(plans: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+def _said(plans: Mapping[str, Any]) -> Iterator[str]:
     for name, entry in plans.items():
         for sentence in [entry["problem"]] if "problem" in entry else entry.get("said", []):
-            yield name, plain_sentences(sentence)
-
-
-__all__ = ["LoopReport", "before_after_table", "print_loop", "write_loop_report"]
+            yield f"{plain(name)}: {plain_sentences(sentence)}"

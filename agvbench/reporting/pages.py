@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from itertools import groupby
 
-from agvbench.reporting.content import Block, Bullets, Column, Content, FigureBlock, Paragraph, Table
-from agvbench.reporting.figures.style import MARKERS
+from agvbench.plot.style import MARKERS
+from agvbench.reporting.content import Block, Bullets, Content, FigureBlock, Paragraph, Table, spans
 from agvbench.resources import resource_directory
 
 _SHAPES = {"o": "●", "s": "■", "^": "▲", "D": "◆", "v": "▼", "P": "✚"}
@@ -33,17 +32,10 @@ def to_html(title: str, subtitle: str, sections: Sequence[Content]) -> str:
         "table": lambda block: isinstance(block, Table),
         "drawing": lambda block: isinstance(block, FigureBlock),
     }
-    environment.filters["spans"] = _spans
+    environment.filters["spans"] = spans
     environment.filters["shape"] = lambda index: _SHAPES[MARKERS[index % len(MARKERS)]]
     template = environment.get_template("report.html.j2")
     return template.render(title=title, subtitle=subtitle, sections=sections)
-
-
-def _spans(columns: Sequence[Column]) -> list[tuple[str, int]]:
-    """Return the groups that columns stand in, with how many columns each spans; none where there are no groups."""
-    if not any(column.group for column in columns):
-        return []
-    return [(group, len(list(members))) for group, members in groupby(columns, key=lambda c: c.group)]
 
 
 _SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|~$!])")

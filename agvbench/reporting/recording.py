@@ -15,10 +15,9 @@ from agvbench.errors import AgvbenchError, FitError
 from agvbench.model import VehicleModel, thesis_vehicle
 from agvbench.planning import Plan, load_trajectory, plan, steered
 from agvbench.planning.trajectories.trajectory import TRAJECTORY_NAME
-from agvbench.plot.drawn_path import smooth_poses
+from agvbench.plot.driven_paths import smooth_poses
+from agvbench.plot.style import colour, condition_numbers
 from agvbench.reporting.content import plain
-from agvbench.reporting.figures.labels import condition_numbers
-from agvbench.reporting.figures.style import colour
 from agvbench.statistics.end_poses import in_order
 from agvbench.statistics.rest_poses import start_pose
 from agvbench.types import Commands, Floats, Pose, Run

@@ -7,10 +7,9 @@ import io
 import math
 import unicodedata
 from collections.abc import Iterator, Sequence
-from itertools import groupby
 from typing import TYPE_CHECKING
 
-from agvbench.reporting.content import Column, Table, Value, plain
+from agvbench.reporting.content import Column, Table, Value, plain, spans
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -102,10 +101,9 @@ def escape(text: str) -> str:
 
 
 def _head(columns: Sequence[Column]) -> Iterator[str]:
-    if any(column.group for column in columns):
-        spans = [(group, len(list(members))) for group, members in groupby(columns, key=lambda c: c.group)]
+    if groups := spans(columns):
         yield _line(
-            [f"\\multicolumn{{{n}}}{{c}}{{{escape(group)}}}" if group else " & " * (n - 1) for group, n in spans]
+            [f"\\multicolumn{{{n}}}{{c}}{{{escape(group)}}}" if group else " & " * (n - 1) for group, n in groups]
         )
     yield _line([escape(column.title) for column in columns])
 

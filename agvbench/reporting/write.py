@@ -1,4 +1,4 @@
-"""Write a report: HTML, Markdown, tables as CSV and LaTeX, and a recording for the Rerun viewer."""
+"""Write a report: HTML, Markdown, tables as CSV and LaTeX, a recording for the Rerun viewer; a diagnosis as HTML."""
 
 from __future__ import annotations
 
@@ -8,14 +8,18 @@ from functools import partial
 from pathlib import Path
 
 from agvbench.campaign.atomic_files import made_folder, replace_whole
+from agvbench.diagnosis import Diagnosis
 from agvbench.errors import FileError
 from agvbench.reporting.content import Content, plain
 from agvbench.reporting.pages import to_html, to_markdown
 from agvbench.reporting.progress import track
 from agvbench.reporting.recording import write_recording
 from agvbench.reporting.sections import all_sections
+from agvbench.reporting.sections.diagnosis import DiagnosisSection, diagnosis_blocks
 from agvbench.reporting.table_files import frame_to_csv, to_csv, to_latex
 from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
+from agvbench.workflows.diagnosis_files import shown
+from agvbench.workflows.output_files import write_file
 from agvbench.workflows.report import ReportData, gather
 
 HTML, MARKDOWN, TABLES = "report.html", "report.md", "tables"
@@ -117,3 +121,19 @@ def _replace(path: Path, write: Callable[[Path], object]) -> None:
         write(path)
     else:
         replace_whole(path.resolve(), write, durable=False)
+
+
+def write_diagnosis_report(found: Diagnosis, path: str | Path) -> Path:
+    """Write what was found, with pictures of the residual before and after, into the HTML file `path`.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written.
+    """
+    path = Path(path)
+    section = Content(DiagnosisSection.slug, DiagnosisSection.title, tuple(diagnosis_blocks(shown(found))))
+    title = plain(str(found.provenance.get("campaign", "diagnosis")))
+    text = to_html(title, f"{found.verdict}: diagnosis of {found.provenance.get('runs_used', 0)} runs", [section])
+    write_file("--report", path, lambda page: page.write_text(text, encoding="utf-8"))
+    return path

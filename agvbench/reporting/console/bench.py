@@ -8,7 +8,9 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
+from rich import box
 from rich.console import Console, Group, RenderableType
+from rich.table import Table
 from rich.text import Text
 
 from agvbench.errors import AgvbenchError
@@ -47,10 +49,6 @@ def dry_run_table(planned: Sequence[tuple[RunRequest, Plan]]) -> str:
 
     Times are those of the plans; beside them stands what passes between two runs.
     """
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_footer=bool(planned), caption_justify="left")
     table.collapse_padding = True
     table.title, table.caption = "What would be driven", _caption(planned)

@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
+
+from rich import box
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.measure import Measurement
+from rich.table import Table as RichTable
+from rich.text import Text
 
 from agvbench.reporting.content import Column, Paragraph, Table, Value, plain, plain_sentences
 from agvbench.statistics.comparison_summary import headline, notes_in_words
@@ -11,11 +19,6 @@ from agvbench.statistics.differences import ALL
 from agvbench.statistics.quantities import COMPONENT_DEFINITIONS, DEFINITIONS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from rich.console import Console, ConsoleOptions, RenderableType
-    from rich.text import Text
-
     from agvbench.reporting.write import WrittenReport
     from agvbench.statistics import Comparison, Difference
     from agvbench.statistics.intervals import Interval
@@ -30,10 +33,6 @@ _SHORT = {"same within margin": "same", "(same within margin)": "(same)"}
 
 def console_table(table: Table) -> RenderableType:
     """Return `table` for rich; names are shown as they are, never read as markup or control codes."""
-    from rich import box
-    from rich.table import Table as RichTable
-    from rich.text import Text
-
     shown = RichTable(title=Text(plain(table.caption)), box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
     shown.collapse_padding = True
     for column in table.columns:
@@ -48,10 +47,6 @@ def console_table(table: Table) -> RenderableType:
 
 def wide_console() -> Console:
     """Return standard output, at least 110 columns wide where neither a terminal nor ``COLUMNS`` says otherwise."""
-    import os
-
-    from rich.console import Console
-
     console = Console()
     is_said = console.is_terminal or os.environ.get("COLUMNS", "").isdigit()
     return console if is_said else Console(width=max(_NARROWEST, console.width))
@@ -64,8 +59,6 @@ class _Fitting:
         self._layouts = layouts
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[RenderableType]:
-        from rich.measure import Measurement
-
         unlimited = options.update(max_width=_UNLIMITED)
         widths = (Measurement.get(console, unlimited, layout).maximum for layout in self._layouts)
         fitting = (layout for layout, width in zip(self._layouts, widths, strict=True) if width <= options.max_width)
@@ -172,16 +165,12 @@ def end_pose_summary(data: ReportData) -> RenderableType:
 
 def said_first(report: WrittenReport) -> list[Text]:
     """Return the paragraphs of a report's first section."""
-    from rich.text import Text
-
     blocks = [block for block in report.sections[0].blocks if isinstance(block, Paragraph)]
     return [Text(block.text, style="" if block.lead else "dim") for block in blocks]
 
 
 def print_report(console: Console, report: WrittenReport) -> None:
     """Print what a report says in short, and where it is."""
-    from rich.text import Text
-
     for comparison in report.data.comparisons:
         console.print(comparison_summary(comparison))
     if not report.data.comparisons and len(report.data.end_poses):
@@ -193,16 +182,12 @@ def print_report(console: Console, report: WrittenReport) -> None:
 
 def print_warnings(console: Console, sentences: Sequence[str]) -> None:
     """Print what to know before a comparison."""
-    from rich.text import Text
-
     for sentence in sentences:
         console.print(Text(plain_sentences(sentence), style="yellow"), soft_wrap=not console.is_terminal)
 
 
 def print_comparison(console: Console, comparison: Comparison) -> None:
     """Print a comparison: table, what was left out, what intervals mean, and the answer last."""
-    from rich.text import Text
-
     if _headings(comparison) == ("A", "B"):
         console.print(Text(f"A: {plain(comparison.name_a)}\nB: {plain(comparison.name_b)}"), soft_wrap=True)
     console.print(comparison_summary(comparison))
@@ -227,7 +212,5 @@ def _legend(comparison: Comparison) -> str:
 
 
 def _styled(cell: str, column: Column) -> RenderableType:
-    from rich.text import Text
-
     style = _VERDICT_STYLES.get(cell.split(" ", maxsplit=1)[0], "") if column.name == "verdict" else ""
     return Text(cell, style=style)

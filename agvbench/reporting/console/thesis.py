@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from contextlib import nullcontext
+
+from rich import box
+from rich.console import Console, JustifyMethod
+from rich.markup import escape
+from rich.padding import Padding
+from rich.table import Table
 
 from agvbench.thesis.section import Cell, ThesisSection, ThesisTable, show
-
-if TYPE_CHECKING:
-    import rich.table
-    from rich.console import Console, JustifyMethod
 
 # Longer words (names of choices) may break at the edge of a column.
 _LONG_WORD = 13
@@ -18,22 +20,15 @@ _MIN_WIDTH = 100
 
 def thesis_console() -> Console:
     """Return the terminal, or 100 columns where it has fewer: a wrapped line is better than a lost column."""
-    from rich.console import Console
-
     console = Console()
     return console if console.width >= _MIN_WIDTH else Console(width=_MIN_WIDTH)
 
 
 def with_progress(sections: Iterator[ThesisSection]) -> Iterator[ThesisSection]:
     """Yield the sections; while one is computed, a terminal shows on standard error that something goes on."""
-    from rich.console import Console
-
     console = Console(stderr=True)
     while True:
-        if console.is_terminal:
-            with console.status("refitting and predicting …"):
-                section = next(sections, None)
-        else:
+        with console.status("refitting and predicting …") if console.is_terminal else nullcontext():
             section = next(sections, None)
         if section is None:
             return
@@ -42,9 +37,6 @@ def with_progress(sections: Iterator[ThesisSection]) -> Iterator[ThesisSection]:
 
 def print_section(section: ThesisSection, console: Console) -> None:
     """Print a section: its title, its findings, its tables."""
-    from rich.markup import escape
-    from rich.padding import Padding
-
     console.rule(f"[bold]{escape(section.title)}")
     for finding in section.findings:
         console.print(Padding(f"• {escape(finding)}", (0, 0, 0, 1)), highlight=False)
@@ -56,17 +48,8 @@ def print_section(section: ThesisSection, console: Console) -> None:
     console.print()
 
 
-def _rich_table(table: ThesisTable) -> rich.table.Table:
-    import rich.box
-    import rich.table
-    from rich.markup import escape
-
-    shown = rich.table.Table(
-        title=escape(table.title),
-        title_justify="left",
-        box=rich.box.SIMPLE_HEAD,
-        padding=0,
-    )
+def _rich_table(table: ThesisTable) -> Table:
+    shown = Table(title=escape(table.title), title_justify="left", box=box.SIMPLE_HEAD, padding=0)
     headings = table.narrow_columns or table.columns
     kept = [index for index, heading in enumerate(headings) if heading]
     for index in kept:

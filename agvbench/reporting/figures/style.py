@@ -3,30 +3,19 @@
 from __future__ import annotations
 
 import io
+import math
 import re
 import warnings
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from agvbench.plot.style import CONDITION_COLOURS, MARKERS, Ink, colour, marker
+from agvbench.plot.style import CONDITION_COLOURS, Ink
+from agvbench.reporting.content import plain
+from agvbench.types import Pose
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-__all__ = [
-    "CONDITION_COLOURS",
-    "GRID",
-    "INK",
-    "MARKERS",
-    "MUTED",
-    "ON_PAGE",
-    "PAPER",
-    "colour",
-    "dress",
-    "marker",
-    "new_figure",
-    "to_svg",
-]
 
 # Stand-ins that become CSS variables, so that one drawing serves light and dark pages.
 INK, MUTED, GRID, PAPER = "#010101", "#020202", "#030303", "#040404"
@@ -56,6 +45,28 @@ def dress(axes: Axes, *, x: str, y: str, size: float = 10.0) -> None:
         spine.set_visible(name in {"left", "bottom"})
         spine.set_color(MUTED)
         spine.set_linewidth(0.6)
+
+
+def legend(numbers: Mapping[str, int]) -> list[tuple[str, int]]:
+    """Return what a figure's legend names; nothing where runs have no conditions.
+
+    >>> legend({"calibrated": 1, "": 3}), legend({"": 3})
+    ([('calibrated', 1), ('no condition', 3)], [])
+    """
+    return [(plain(name) or "no condition", number) for name, number in numbers.items()] if any(numbers) else []
+
+
+def panel_title(name: str, target: Pose) -> str:
+    """Return the trajectory's name and where it leads, in the start frame.
+
+    >>> panel_title("6", Pose(1.0, -1.0, -math.pi / 2))
+    '6: to (1, −1) m, −90°'
+    """
+    if not name:
+        return ""
+    numbers = (target.x_m, target.y_m, math.degrees(target.heading_rad))
+    x, y, heading = (f"{value + 0.0:.3g}".replace("-", "−") for value in numbers)
+    return plain(f"{name}: to ({x}, {y}) m, {heading}°")
 
 
 def to_svg(figure: Figure, name: str) -> str:

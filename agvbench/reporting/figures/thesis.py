@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from agvbench.errors import FileError
-from agvbench.reporting.figures.style import CONDITION_COLOURS, MARKERS, new_figure
+from agvbench.plot.style import CONDITION_COLOURS, MARKERS
+from agvbench.reporting.figures.style import new_figure
 from agvbench.thesis.residuals import Traced, traced
 
 _INK, _GRID, _PAPER = "#222222", "#dddddd", "#ffffff"

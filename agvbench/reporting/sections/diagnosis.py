@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from agvbench.plot.residual_steps import AFTER, BEFORE, draw_steps
+from agvbench.plot.style import colour, marker
 from agvbench.reporting.content import (
     Block,
     Bullets,
@@ -22,7 +23,7 @@ from agvbench.reporting.content import (
     Value,
     plain_sentences,
 )
-from agvbench.reporting.figures.style import MUTED, ON_PAGE, colour, dress, marker, new_figure, to_svg
+from agvbench.reporting.figures.style import MUTED, ON_PAGE, dress, new_figure, to_svg
 from agvbench.reporting.sections.base import Section
 from agvbench.types import Floats
 from agvbench.workflows.diagnosis_files import (
@@ -132,7 +133,7 @@ def _pictures(residuals: pd.DataFrame) -> list[Block]:
         panels = [
             Panel(
                 f"{title}, against {words.partition(' [')[0].partition(' (')[0]}",
-                draw_dependence(residuals[name].to_numpy(), before, after, f"res-{feature}-{name}", x=words, y=label),
+                _draw_dependence(residuals[name].to_numpy(), before, after, f"res-{feature}-{name}", x=words, y=label),
             )
             for name, words in _AGAINST.items()
         ]
@@ -152,8 +153,7 @@ def _pictures(residuals: pd.DataFrame) -> list[Block]:
 _CELLS, _FEWEST_IN_CELL = 14, 4
 
 
-def draw_dependence(covariate: Floats, before: Floats, after: Floats, name: str, *, x: str, y: str) -> str:
-    """Return an SVG of both residuals (n,) against a covariate (n,): medians and quartiles of bins."""
+def _draw_dependence(covariate: Floats, before: Floats, after: Floats, name: str, *, x: str, y: str) -> str:
     figure = new_figure(3.3, 2.3)
     axes = figure.add_subplot()
     dress(axes, x=x, y=y, size=9.0)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from agvbench.plot.style import condition_numbers
 from agvbench.plot.target_frame import draw_ends, in_target_frame
 from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph
-from agvbench.reporting.figures.labels import condition_numbers, legend, panel_title
-from agvbench.reporting.figures.style import ON_PAGE, dress, new_figure, to_svg
+from agvbench.reporting.figures.style import ON_PAGE, dress, legend, new_figure, panel_title, to_svg
 from agvbench.reporting.sections.base import Section
 from agvbench.statistics import valid
 from agvbench.types import Floats, Pose
@@ -43,20 +43,10 @@ def _panels(counted: pd.DataFrame, numbers: dict[str, int]) -> Iterator[Panel]:
         ends = {n: in_target_frame(rows[rows["condition"] == c]) for c, n in numbers.items()}
         drawn = {n: points for n, points in ends.items() if len(points)}
         target = Pose(*rows[[f"target_{axis}" for axis in _POSE]].iloc[0])
-        yield Panel(panel_title(str(name), target), draw_end_poses(drawn, f"end-pose-{index}"))
+        yield Panel(panel_title(str(name), target), _drawing(drawn, f"end-pose-{index}"))
 
 
-def draw_end_poses(ends: Mapping[int, Floats], name: str) -> str:
-    """Return an SVG of end poses in the target frame.
-
-    Parameters
-    ----------
-    ends
-        By the number of the condition: shape (n, 3), mm ahead of the target, mm to its left, heading error [rad].
-        The short line of each point is its heading; along the horizontal axis it would be right.
-    name
-        Names the drawing.
-    """
+def _drawing(ends: Mapping[int, Floats], name: str) -> str:
     figure = new_figure(3.1, 2.9)
     axes = figure.add_subplot()
     dress(axes, x="ahead of target [mm]", y="left of target [mm]")

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from agvbench.plot.style import colour, condition_numbers, literal, marker
 from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph, plain
-from agvbench.reporting.figures.labels import condition_numbers, legend
-from agvbench.reporting.figures.style import INK, MUTED, PAPER, colour, dress, marker, new_figure, to_svg
+from agvbench.reporting.figures.style import INK, MUTED, PAPER, dress, legend, new_figure, to_svg
 from agvbench.reporting.sections.base import Section
 from agvbench.statistics import valid
 from agvbench.statistics.end_poses import CASES
@@ -124,7 +124,7 @@ def _layout(strips: Sequence[Strip]) -> tuple[list[float], list[tuple[float, str
 def _short(name: str) -> str:
     """Return a name that fits beside the figure, with dollar signs that begin no formula."""
     text = plain(name)
-    return (text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…").replace("$", r"\$")
+    return literal(text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…")
 
 
 def _draw(axes: Axes, strip: Strip, height: float) -> None:

@@ -6,11 +6,10 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from agvbench.plot.drawn_path import drawn_path
-from agvbench.plot.driven_paths import draw_group, draw_start_and_target, from_start, tip
+from agvbench.plot.driven_paths import draw_group, draw_start_and_target, drawn_path, from_start, tip
+from agvbench.plot.style import condition_numbers
 from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph
-from agvbench.reporting.figures.labels import condition_numbers, legend, panel_title
-from agvbench.reporting.figures.style import ON_PAGE, dress, new_figure, to_svg
+from agvbench.reporting.figures.style import ON_PAGE, dress, legend, new_figure, panel_title, to_svg
 from agvbench.reporting.sections.base import Section
 from agvbench.statistics.end_poses import in_order
 from agvbench.types import Floats, Pose, Run
