@@ -15,12 +15,11 @@ from statistics import mean, median
 import numpy as np
 
 from agvbench.thesis.prediction.assumptions import Assumptions, Condition
-from agvbench.thesis.prediction.calibrated_vehicle import true_speed
-from agvbench.thesis.prediction.commands import CommandedDrive, commanded
-from agvbench.thesis.prediction.end_pose import EndPosePrediction, arc_end, driven
+from agvbench.thesis.prediction.commands import CommandedDrive, commanded, true_speed
+from agvbench.thesis.prediction.end_pose import EndPosePrediction, arc_end, driven, neutral_share
 from agvbench.thesis.prediction.scoring import CONDITIONS, ScoredRow, score_row
 from agvbench.thesis.prediction.trajectories import ThesisTrajectory
-from agvbench.thesis.refits.cornering import NEUTRAL_US, cornering_share, fitted_loss
+from agvbench.thesis.refits.cornering import cornering_share, fitted_loss
 from agvbench.thesis.refits.steering import true_maps
 from agvbench.thesis.section import ThesisTable
 from agvbench.thesis.tables import GEOMETRY, end_pose_rows
@@ -117,13 +116,14 @@ def _commanded_drives(
 
 def predicted(cause: Cause | None, value: float, condition: Condition, assumed: Assumptions) -> list[EndPosePrediction]:
     """Return the predictions of one condition with `cause` at `value`; without a cause those of the plain model."""
+    neutral = neutral_share(assumed.true_steering, fitted_loss())
     out = []
     for trajectory, command, as_commanded in _commanded_drives(condition, assumed):
         drive = replace(as_commanded)
         if cause is not None:
             cause.act(drive, value)
         speed, sideslip, yaw = (float(x) for x in body_motion(drive.front_rad, drive.rear_rad, 1.0, 1.0, GEOMETRY))
-        kept = float(cornering_share(drive.front_rad, drive.rear_rad, fitted_loss())) / _neutral(assumed.true_steering)
+        kept = float(cornering_share(drive.front_rad, drive.rear_rad, fitted_loss())) / neutral
         length = drive.distance_m * kept * speed
         turned = drive.distance_m * kept * yaw * drive.bend + drive.curvature_per_m * length
         end, turned = arc_end(length, sideslip, turned)
@@ -132,18 +132,12 @@ def predicted(cause: Cause | None, value: float, condition: Condition, assumed: 
     return out
 
 
-@cache
-def _neutral(kind: str) -> float:
-    front, rear = (float(m(NEUTRAL_US)) for m in true_maps(kind))
-    speed, _, _ = body_motion(front, rear, 1.0, 1.0, GEOMETRY)
-    return float(speed) * float(cornering_share(front, rear, fitted_loss()))
-
-
 def rows_with(cause: Cause | None, value: float) -> list[ScoredRow]:
     """Return the 28 rows with `cause` at `value`."""
     assumed = Assumptions()
-    every = [(p.trajectory.number, c, p) for c in CONDITIONS for p in predicted(cause, value, c, assumed)]
-    by_key: dict[tuple[int, str], EndPosePrediction] = {(number, condition): p for number, condition, p in every}
+    by_key: dict[tuple[int, str], EndPosePrediction] = {
+        (p.trajectory.number, c): p for c in CONDITIONS for p in predicted(cause, value, c, assumed)
+    }
     return [score_row(row, by_key[row.trajectory, row.condition]) for row in end_pose_rows()]
 
 

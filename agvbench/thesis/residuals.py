@@ -16,11 +16,11 @@ import numpy as np
 from agvbench.calibration import CurvePoints, MapFit, drive_fitters, steering_fitters
 from agvbench.thesis.added_effects import chapter_8_findings, chapter_8_table
 from agvbench.thesis.refits.battery import fit_droop, held_out_errors
-from agvbench.thesis.refits.cornering import NEUTRAL_US, fit_loss, residual_of, samples, steering_measure
+from agvbench.thesis.refits.cornering import fit_loss, residual_of, samples, steering_measure
 from agvbench.thesis.refits.idle_axle import arm_across_tables, idle, idle_errors, slope_and_error
-from agvbench.thesis.refits.polynomial import fit_polynomial
+from agvbench.thesis.refits.polynomial import line_held_out_errors
 from agvbench.thesis.section import Cell, ThesisSection, ThesisTable
-from agvbench.thesis.tables import drive_table, endurance_table, rms, steering_table
+from agvbench.thesis.tables import NEUTRAL_US, drive_table, endurance_table, rms, steering_table
 from agvbench.types import Floats
 
 PRINT_STEP_MPS = 0.01
@@ -77,12 +77,7 @@ def _steering(axle: str) -> Traced:
     table = steering_table(axle)
     points = CurvePoints.from_measurements(table.pulse_us, np.radians(table.median_deg))
     stops = steering_fitters()["line_with_end_stops"]
-    index = np.arange(len(points))
-    line = []
-    for k in range(1, len(points) - 1):
-        used = (index >= 1) & (index < len(points) - 1) & (index != k)  # the thesis drops one point at each end
-        fit = fit_polynomial(points.command[used], points.value[used], 1)
-        line.append(points.value[k] - float(fit(points.command[k])))
+    line = line_held_out_errors(points.command, points.value, dropped=1)  # as the thesis does
     after = _left_out(points, stops)
     low, high = np.degrees(stops(points).map.output_range)
     number = "7.1" if axle == "front" else "7.2"
@@ -143,7 +138,7 @@ def _battery() -> Traced:
 
 
 def _idle(axle: str) -> Traced:
-    constant, lever, _, other = idle_errors()[axle]
+    constant, lever, other = idle_errors()[axle]
     part = idle(axle)
     arm, error, _ = slope_and_error(part.curvature_per_m, part.tangent)
     number = "7.1, rear" if axle == "rear" else "7.2, front"
@@ -166,7 +161,7 @@ def residuals_section() -> ThesisSection:
     values: dict[str, Cell] = {f"{t.name}_before": t.rms_before for t in traced()}
     values |= {f"{t.name}_after": t.rms_after for t in traced()}
     values["kinematics_alone_mm_per_s"] = kinematics_alone()
-    findings = (*_findings(), *chapter_8_findings())
+    findings = (_shrinking(), _appendix_b(), _idle_axle(), *chapter_8_findings())
     tables = (_residual_table(), _idle_table(), chapter_8_table())
     return ThesisSection("residuals", "From residual to effect, held out", findings, tables, values)
 
@@ -193,10 +188,6 @@ def _idle_table() -> ThesisTable:
         tuple((f"{a} axle", *values) for a, values in arm_across_tables().items()),
         "Only the axle's own mean is fitted to the table that is predicted.",
     )  # fmt: skip
-
-
-def _findings() -> tuple[str, str, str]:
-    return _shrinking(), _appendix_b(), _idle_axle()
 
 
 def _shrinking() -> str:

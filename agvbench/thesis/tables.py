@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,23 +13,16 @@ from agvbench.resources import resource_directory
 from agvbench.types import Floats
 from agvbench.vehicle.geometry import Geometry
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 #: Table 5.1: from the markers' centroid to the axles.
 GEOMETRY = Geometry(front_axle_m=0.181, rear_axle_m=0.121)
+NEUTRAL_US = 1500.0
 STATISTICS = ("min", "q1", "median", "q3", "max")
 
 
-class NumberedColumns:
-    """A table as printed: its rows by column name, every cell as text."""
-
-    def __init__(self, rows: list[dict[str, str]]) -> None:
-        self.rows = rows
-
-    def number(self, name: str) -> Floats:
-        """Return a column of numbers."""
-        return np.array([float(row[name]) for row in self.rows])
-
-
-def load_table(name: str) -> NumberedColumns:
+def load_table(name: str) -> pd.DataFrame:
     """Return one transcribed table, for example ``"table_7_4_straight_speed"``.
 
     Raises
@@ -37,14 +30,20 @@ def load_table(name: str) -> NumberedColumns:
     FileError
         If the installation lacks the table, or it cannot be read.
     """
+    import pandas as pd
+
     path = resource_directory("reports") / "reference" / "thesis" / f"{name}.csv"
     try:
-        with path.open(encoding="utf-8", newline="") as stream:
-            return NumberedColumns(list(csv.DictReader(stream)))
+        return pd.read_csv(path)
     except OSError as error:
         raise FileError(
             "table of the thesis cannot be read", where=path, value=error.strerror, remedy="install agvbench again"
         ) from None
+
+
+def _columns(table: str, *names: str) -> list[Floats]:
+    rows = load_table(table)
+    return [rows[name].to_numpy(dtype=float) for name in names]
 
 
 @dataclass(frozen=True)
@@ -62,9 +61,8 @@ class SteeringTable:
 
 
 def _steering(table: str, axle: str) -> SteeringTable:
-    rows = load_table(table)
-    angles = {s: rows.number(f"{axle}_{s}_deg") for s in STATISTICS}
-    return SteeringTable(axle, rows.number("pulse_us"), angles)
+    pulse_us, *angles = _columns(table, "pulse_us", *(f"{axle}_{s}_deg" for s in STATISTICS))
+    return SteeringTable(axle, pulse_us, dict(zip(STATISTICS, angles, strict=True)))
 
 
 @cache
@@ -84,15 +82,15 @@ def idle_axle_table(axle: str) -> SteeringTable:
 @cache
 def verification_table() -> tuple[Floats, Floats, Floats]:
     """Return table 6.1: pulse [µs], front and rear angle [deg], measured before chapter 7's calibration."""
-    rows = load_table("table_6_1_axle_angle")
-    return rows.number("pulse_us"), rows.number("front_deg"), rows.number("rear_deg")
+    pulse_us, front_deg, rear_deg = _columns("table_6_1_axle_angle", "pulse_us", "front_deg", "rear_deg")
+    return pulse_us, front_deg, rear_deg
 
 
 @cache
 def drive_table() -> tuple[Floats, Floats]:
     """Return table 7.4: drive pulse [µs] and straight speed [m/s]."""
-    rows = load_table("table_7_4_straight_speed")
-    return rows.number("drive_pulse_us"), rows.number("speed_mps")
+    pulse_us, speed_mps = _columns("table_7_4_straight_speed", "drive_pulse_us", "speed_mps")
+    return pulse_us, speed_mps
 
 
 @dataclass(frozen=True)
@@ -108,20 +106,19 @@ class CorneringTable:
 def cornering_table() -> CorneringTable:
     """Return appendix B: 16 drive pulses, 7 steering pulses, modes ``single``, ``double`` and ``crab``."""
     table = load_table("appendix_b_cornering_speed")
-    drive_us, steering_us = (np.unique(table.number(c)) for c in ("drive_pulse_us", "steering_pulse_us"))
-    grids: dict[str, Floats] = {}
-    for row in table.rows:
-        grid = grids.setdefault(row["mode"], np.full((len(drive_us), len(steering_us)), np.nan))
-        i = np.searchsorted(drive_us, float(row["drive_pulse_us"]))
-        grid[i, np.searchsorted(steering_us, float(row["steering_pulse_us"]))] = float(row["speed_mps"])
-    return CorneringTable(drive_us, steering_us, grids)
+    grids = {
+        str(mode): rows.pivot(index="drive_pulse_us", columns="steering_pulse_us", values="speed_mps")
+        for mode, rows in table.groupby("mode", sort=False)
+    }
+    drive_us, steering_us = (axis.to_numpy(dtype=float) for axis in next(iter(grids.values())).axes)
+    return CorneringTable(drive_us, steering_us, {mode: grid.to_numpy(dtype=float) for mode, grid in grids.items()})
 
 
 @cache
 def endurance_table() -> tuple[Floats, Floats]:
     """Return table 8.2: start of each interval [s] and its mean speed [m/s]."""
-    rows = load_table("table_8_2_endurance_intervals")
-    return rows.number("start_s"), rows.number("speed_mps")
+    start_s, speed_mps = _columns("table_8_2_endurance_intervals", "start_s", "speed_mps")
+    return start_s, speed_mps
 
 
 @dataclass(frozen=True)
@@ -139,20 +136,15 @@ class MeasuredRow:
 @cache
 def end_pose_rows() -> tuple[MeasuredRow, ...]:
     """Return the 28 rows of tables 8.3–8.10 in their order; Δs in mm, heading in deg."""
-    rows = load_table("tables_8_3_to_8_10_end_pose").rows
-    return tuple(
-        MeasuredRow(
-            int(r["trajectory"]), r["vehicle"], r["quantity"], float(r["median"]), float(r["q1"]), float(r["q3"])
-        )
-        for r in rows
-    )
+    table = load_table("tables_8_3_to_8_10_end_pose")[["trajectory", "vehicle", "quantity", "median", "q1", "q3"]]
+    return tuple(MeasuredRow(*row) for row in table.itertuples(index=False))
 
 
 @cache
 def endurance_percentiles() -> dict[int, float]:
     """Return table 8.1: percentile and speed [m/s]."""
-    rows = load_table("table_8_1_endurance_percentiles")
-    return dict(zip(rows.number("percentile").astype(int).tolist(), rows.number("speed_mps").tolist(), strict=True))
+    percentile, speed_mps = _columns("table_8_1_endurance_percentiles", "percentile", "speed_mps")
+    return dict(zip(percentile.astype(int).tolist(), speed_mps.tolist(), strict=True))
 
 
 def rms(values: Floats) -> float:

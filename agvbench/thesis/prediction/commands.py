@@ -14,14 +14,12 @@ from agvbench.thesis.prediction.assumptions import (
     TrueDrive,
     WholeDegrees,
 )
-from agvbench.thesis.prediction.calibrated_vehicle import true_speed
 from agvbench.thesis.prediction.trajectories import ThesisTrajectory, wanted_angles
-from agvbench.thesis.refits.drive import PARTIAL_US, cubic_map
+from agvbench.thesis.refits.drive import PARTIAL_US, cubic_map, dead_band_map
 from agvbench.thesis.refits.steering import published_lines, unrounded_lines
-from agvbench.thesis.tables import GEOMETRY
+from agvbench.thesis.tables import GEOMETRY, NEUTRAL_US
 from agvbench.vehicle.kinematics import body_motion
 
-NEUTRAL_US = 1500.0
 FULL_SPEED_MPS = 0.32
 NOMINAL_US_PER_DEG = 600.0 / 45.0
 
@@ -33,6 +31,15 @@ class CommandedDrive(NamedTuple):
     front_us: float
     rear_us: float
     duration_s: float
+
+
+@cache
+def true_speed(drive_us: float, kind: TrueDrive = "measured") -> float:
+    """Return the speed [m/s] at a drive pulse and 1500 µs of steering: the shipped vehicle's, from table 7.4.
+
+    ``"dead_band"`` takes the dead band with saturation fitted to the same table; at full command the two agree.
+    """
+    return float(thesis_vehicle().speed(drive_us) if kind == "measured" else dead_band_map()(drive_us))
 
 
 def commanded(trajectory: ThesisTrajectory, condition: str, assumed: Assumptions) -> CommandedDrive:

@@ -8,12 +8,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
+from typing import NamedTuple
 
 from agvbench.thesis.prediction.assumptions import Assumptions, Condition, Ramps
-from agvbench.thesis.prediction.calibrated_vehicle import steady_motion, true_speed
-from agvbench.thesis.prediction.commands import CommandedDrive, commanded
+from agvbench.thesis.prediction.commands import CommandedDrive, commanded, true_speed
 from agvbench.thesis.prediction.trajectories import EIGHT, ThesisTrajectory
+from agvbench.thesis.refits.cornering import cornering_share, fitted_loss
+from agvbench.thesis.refits.steering import true_maps, verification_maps
+from agvbench.thesis.tables import GEOMETRY, NEUTRAL_US
 from agvbench.types import Pose
+from agvbench.vehicle.kinematics import body_motion
 
 # 0.0 to 0.3 m/s in 0.294 s, and 0.32 to 0.02 m/s in 0.588 s.
 ACCELERATION_MPS2 = 0.3 / 0.294
@@ -38,6 +43,44 @@ def driven_distance(speed_mps: float, duration_s: float, ramps: Ramps) -> float:
     if ramps == "with_rebound":
         distance -= min(REBOUND_MPS, speed) ** 2 / BRAKING_MPS2
     return math.copysign(distance, speed_mps)
+
+
+class SteadyMotion(NamedTuple):
+    """How the markers move per metre that the same drive goes at 1500 µs of steering."""
+
+    speed: float
+    sideslip_rad: float
+    yaw_per_m: float
+
+
+def steady_motion(front_us: float, rear_us: float, condition: str, assumed: Assumptions) -> SteadyMotion:
+    """Return the motion at two steering pulses."""
+    before = condition == "uncalibrated" and assumed.uncalibrated_steering == "table_6_1"
+    kind = "table_6_1" if before else assumed.true_steering
+    return _steady_motion(front_us, rear_us, kind, assumed.cornering_loss == "appendix_b")
+
+
+@cache
+def _steady_motion(front_us: float, rear_us: float, kind: str, with_loss: bool) -> SteadyMotion:
+    loss = fitted_loss() if with_loss else 0.0
+    front, rear = _angles(kind, front_us, rear_us)
+    speed, sideslip, yaw_rate = (float(x) for x in body_motion(front, rear, 1.0, 1.0, GEOMETRY))
+    # Table 7.4 was driven at 1500 µs, so that is where the drive goes exactly as far as the table says.
+    kept = float(cornering_share(front, rear, loss)) / neutral_share(kind, loss)
+    return SteadyMotion(kept * speed, sideslip, kept * yaw_rate)
+
+
+def _angles(kind: str, front_us: float, rear_us: float) -> tuple[float, float]:
+    front, rear = verification_maps() if kind == "table_6_1" else true_maps(kind)
+    return float(front(front_us)), float(rear(rear_us))
+
+
+@cache
+def neutral_share(kind: str, loss: float) -> float:
+    """Return the share of the wheels' speed that is left at 1500 µs of steering, where neither axle is straight."""
+    front, rear = _angles(kind, NEUTRAL_US, NEUTRAL_US)
+    speed, _, _ = body_motion(front, rear, 1.0, 1.0, GEOMETRY)
+    return float(speed) * float(cornering_share(front, rear, loss))
 
 
 @dataclass(frozen=True)

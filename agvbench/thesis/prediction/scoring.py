@@ -134,6 +134,8 @@ def verdict(ours: float, null: float) -> str:
 def _rows_table(rows: list[ScoredRow]) -> ThesisTable:
     columns: tuple[str, ...] = ("trajectory", "condition", "quantity", "measured", "Q1", "Q3", "predicted", "error")
     columns += ("error, other sign", "null", "null error", "inside quartiles")
+    narrow: tuple[str, ...] = ("no.", "condition", "quantity", "measured", "", "", "predicted", "error", "other sign")
+    narrow += ("", "null error", "in Q1…3")
     return ThesisTable(
         "prediction_rows",
         "Tables 8.3–8.10: measured medians, predicted, and the null",
@@ -142,20 +144,7 @@ def _rows_table(rows: list[ScoredRow]) -> ThesisTable:
         "Predictions carry their sign, measured Δs and straight Δδ are printed without: 'error' compares "
         "magnitudes, 'other sign' is the error if the vehicle went the other way. The heading of a turn is the "
         "amount turned.",
-        (
-            "no.",
-            "condition",
-            "quantity",
-            "measured",
-            "",
-            "",
-            "predicted",
-            "error",
-            "other sign",
-            "",
-            "null error",
-            "in Q1…3",
-        ),
+        narrow,
     )
 
 

@@ -131,28 +131,15 @@ def _extent(scored: tuple[ScoredRow, ...]) -> tuple[float, float]:
     return min(magnitudes), max(magnitudes)
 
 
-def _other(condition: Condition) -> Condition:
-    return "calibrated" if condition == "uncalibrated" else "uncalibrated"
-
-
 def _post_hoc_table() -> ThesisTable:
     rows: list[tuple[Cell, ...]] = []
-    for condition in CONDITIONS:
-        chosen, other = best(condition), _other(condition)
+    for condition, other in zip(CONDITIONS, reversed(CONDITIONS), strict=True):
+        chosen = best(condition)
         elsewhere = score_against_null(score(shared_only(chosen.assumed), other))
         default_here = score_against_null(score(Assumptions(), condition))
         default_there = score_against_null(score(Assumptions(), other))
-        rows.append(
-            (
-                condition,
-                _differences(chosen.assumed),
-                default_here,
-                chosen.against_null,
-                other,
-                default_there,
-                elsewhere,
-            )
-        )
+        here = (condition, _differences(chosen.assumed), default_here, chosen.against_null)
+        rows.append((*here, other, default_there, elsewhere))
     columns: tuple[str, ...] = ("chosen on", "chosen (where not as assumed)", "as assumed there", "chosen there")
     columns += ("checked on", "as assumed, checked", "chosen, checked")
     note = (
@@ -223,6 +210,3 @@ def sensitivity_section() -> ThesisSection:
     values: dict[str, Cell] = {f"{c}_combinations": len(combinations(c)) for c in CONDITIONS}
     values |= {f"{c}_better_than_null": sum(x.against_null < 1.0 for x in combinations(c)) for c in CONDITIONS}
     return ThesisSection("sensitivity", "What the prediction hangs on", _findings(post_hoc, unreached), tables, values)
-
-
-__all__ = ["Combination", "Group", "best", "combinations", "sensitivity_section", "shared_only"]

@@ -82,15 +82,8 @@ def turns_section() -> ThesisSection:
         (t.number, t.condition, t.turned_deg, t.delta_s_mm, *t.arc(1), *t.arc(-1), ratios[t.number, t.condition])
         for t in measured_turns()
     )
-    columns: tuple[str, ...] = (
-        "trajectory",
-        "condition",
-        "turned [deg]",
-        "Δs [mm]",
-        "radius if + [mm]",
-        "length if + [mm]",
-    )
-    columns += ("radius if − [mm]", "length if − [mm]", "measured / predicted")
+    columns: tuple[str, ...] = ("trajectory", "condition", "turned [deg]", "Δs [mm]", "radius if + [mm]")
+    columns += ("length if + [mm]", "radius if − [mm]", "length if − [mm]", "measured / predicted")
     narrow = ("no.", "condition", "turned [deg]", "Δs [mm]", "radius +", "length +", "radius −", "length −", "ratio")
     carried = carried_over(assumed)
     carried_columns: tuple[str, ...] = ("condition", "own factor", "factor from", "factor", "error as predicted [deg]")

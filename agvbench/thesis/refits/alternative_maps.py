@@ -14,12 +14,11 @@ import numpy as np
 
 from agvbench.calibration import CurvePoints, MapFit, compare_maps, drive_fitters, steering_fitters
 from agvbench.errors import FitError
-from agvbench.thesis.refits.polynomial import fit_polynomial
+from agvbench.thesis.refits.polynomial import line_held_out_errors
 from agvbench.thesis.refits.steering import AXLES
 from agvbench.thesis.section import Cell, ThesisSection, ThesisTable
-from agvbench.thesis.tables import drive_table, rms, steering_table
+from agvbench.thesis.tables import NEUTRAL_US, drive_table, rms, steering_table
 
-NEUTRAL_US = 1500.0
 #: What a fit is called in the tables; fits of other names are the calibration's own variants.
 NAMES = {
     "thesis": "thesis: end points dropped",
@@ -43,22 +42,9 @@ def steering_fits(axle: str) -> Fits:
     for name, dropped in (("line", 0), ("thesis", 1)):
         if isinstance(fit := fits[name], MapFit):
             # A `Line` map stays put beyond its last command; eq. 7.1 does not, and is judged as it is written.
-            fits[name] = replace(fit, cross_validated_rms=math.radians(line_held_out_deg(axle, dropped)))
+            errors_deg = line_held_out_errors(table.pulse_us, table.median_deg, dropped)
+            fits[name] = replace(fit, cross_validated_rms=math.radians(rms(errors_deg)))
     return fits
-
-
-def line_held_out_deg(axle: str, dropped: int) -> float:
-    """Return the rms error [deg] of straight lines, `dropped` points left out at each end, on pulses left out too."""
-    table = steering_table(axle)
-    index = np.arange(len(table.pulse_us))
-    used = (index >= dropped) & (index < len(index) - dropped)
-    errors = [
-        float(fit_polynomial(table.pulse_us[used & (index != k)], table.median_deg[used & (index != k)], 1)(pulse))
-        - table.median_deg[k]
-        for k, pulse in enumerate(table.pulse_us)
-        if 0 < k < len(index) - 1
-    ]
-    return rms(np.array(errors))
 
 
 @cache

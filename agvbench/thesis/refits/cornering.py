@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from agvbench.thesis.refits.steering import true_maps
 from agvbench.thesis.section import Figure, ThesisSection, ThesisTable, figures_table
-from agvbench.thesis.tables import GEOMETRY, CorneringTable, cornering_table, drive_table, rms
+from agvbench.thesis.tables import GEOMETRY, NEUTRAL_US, CorneringTable, cornering_table, drive_table, rms
 from agvbench.types import Floats
 from agvbench.vehicle.kinematics import body_motion
 
@@ -108,7 +108,6 @@ def identical_blocks(table: CorneringTable | None = None) -> list[tuple[float, f
 
 Form = Callable[[Floats, Floats], Floats]
 
-NEUTRAL_US = 1500.0
 #: Table 7.4 varies by 0.8 mm/s where it is flat (900…1150 µs): about what one more median would add.
 REPEAT_NOISE_MPS = 0.001
 

@@ -97,8 +97,8 @@ def lever_arm_section() -> ThesisSection:
 
 
 @cache
-def idle_errors() -> dict[str, tuple[Floats, Floats, Floats, Floats]]:
-    """Return, per idle axle, held-out errors [deg]: of a constant, of a lever arm, of coupling; then the angle turned.
+def idle_errors() -> dict[str, tuple[Floats, Floats, Floats]]:
+    """Return, per idle axle, held-out errors [deg] of a constant and of a lever arm, and the other axle's angle [deg].
 
     Each pulse is predicted from the others. The lever arm's own offset of the axle is fitted beside it.
     """
@@ -114,11 +114,9 @@ def idle_errors() -> dict[str, tuple[Floats, Floats, Floats, Floats]]:
             arm, _, _ = slope_and_error(part.curvature_per_m[own], part.tangent[own])
             level = part.tangent[own].mean() - arm * part.curvature_per_m[own].mean()
             lever = math.atan(level + arm * part.curvature_per_m[k])
-            share, _, _ = slope_and_error(part.other_rad[own], angle[own])
-            coupled = angle[own].mean() + share * (part.other_rad[k] - part.other_rad[own].mean())
-            rows.append(np.degrees(angle[k] - np.array([constant, lever, coupled])))
+            rows.append(np.degrees(angle[k] - np.array([constant, lever])))
         errors = np.array(rows).T
-        found[axle] = errors[0], errors[1], errors[2], np.degrees(part.other_rad[1:-1])
+        found[axle] = errors[0], errors[1], np.degrees(part.other_rad[1:-1])
     return found
 
 

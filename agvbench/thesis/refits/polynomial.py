@@ -36,3 +36,12 @@ def fit_polynomial(x: Floats, y: Floats, order: int) -> Polynomial:
     if not isinstance(fit.map, (Line, Cubic)):
         raise TypeError(type(fit.map))
     return Polynomial(astuple(fit.map)[: order + 1], fit.r_squared)
+
+
+def line_held_out_errors(x: Floats, y: Floats, dropped: int) -> Floats:
+    """Return the errors of straight lines at every inner point, fitted without it and `dropped` points at each end."""
+    index = np.arange(len(x))
+    used = (index >= dropped) & (index < len(index) - dropped)
+    others = [used & (index != k) for k in index[1:-1]]
+    predicted = [float(fit_polynomial(x[o], y[o], 1)(left_out)) for o, left_out in zip(others, x[1:-1], strict=True)]
+    return np.asarray(y[1:-1] - predicted)

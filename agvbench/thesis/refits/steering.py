@@ -125,13 +125,10 @@ def steering_section() -> ThesisSection:
         figures_table("steering", "Steering lines, as printed and refitted", [f for a in AXLES for f in _figures(a)]),
         ThesisTable("steering_lines", "Lines by points dropped and by statistic", columns, tuple(rows), digits=5),
     )
-    values = {f"{a}_{k}": v for a in AXLES for k, v in _named(two[a])}
+    names = ("slope_deg_per_us", "intercept_deg")
+    values = {f"{a}_{k}": v for a in AXLES for k, v in zip(names, two[a].coefficients, strict=True)}
     return ThesisSection("steering", "Steering (tables 7.1, 7.2, eq. 7.1, 7.2)", findings, tables, dict(values))
 
 
 def _percent(two: dict[str, Polynomial], axle: str) -> float:
     return 100.0 * (1.0 - float(PRINTED[axle][0]) / two[axle].coefficients[0])
-
-
-def _named(line: Polynomial) -> list[tuple[str, float]]:
-    return list(zip(("slope_deg_per_us", "intercept_deg"), line.coefficients, strict=True))

@@ -30,7 +30,7 @@ def test_143_of_144_mirrored_pairs_are_identical():
 
 
 def test_mirrored_pairs_counted_from_the_bare_rows():
-    rows = load_table("appendix_b_cornering_speed").rows
+    rows = load_table("appendix_b_cornering_speed").to_dict("records")
     speed = {(r["drive_pulse_us"], r["mode"], int(r["steering_pulse_us"])): r["speed_mps"] for r in rows}
     pairs = [(key, (*key[:2], 3000 - key[2])) for key in speed if key[2] < 1500]
     assert sum(float(speed[a]) == float(speed[b]) for a, b in pairs) == 143
