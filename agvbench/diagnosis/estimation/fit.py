@@ -14,7 +14,7 @@ import numpy as np
 
 from agvbench.diagnosis.estimation.levenberg_marquardt import Convergence, FitState, LevenbergMarquardt
 from agvbench.diagnosis.estimation.likelihood import Information, residual_of, ridge, terms_of
-from agvbench.diagnosis.estimation.score_test import LinearisationPoint
+from agvbench.diagnosis.estimation.linearisation import LinearisationPoint
 from agvbench.diagnosis.estimation.variance import (
     VarianceComponents,
     initial_variance_components,
@@ -54,7 +54,9 @@ class Fit:
     @cached_property
     def linearisation_point(self) -> LinearisationPoint:
         """The point at which the predicted gain of every larger model is linearised."""
-        return LinearisationPoint.of(self)
+        return LinearisationPoint.of(
+            self.predictor, self.linear, self.information, self.variance_components, self.random_effects, self.residual
+        )
 
     def effect_values(self) -> dict[str, float]:
         """Return the effects' parameters by name."""

@@ -2,103 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING
-
 import numpy as np
-from numpy.typing import NDArray
 
-from agvbench.diagnosis.estimation.likelihood import WEAK, inner_inverse, residual_of, ridge, terms_of
-from agvbench.diagnosis.estimation.variance import priors, weights
+from agvbench.diagnosis.estimation.fit import Fit
+from agvbench.diagnosis.estimation.likelihood import residual_of, ridge, terms_of
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.effects import effect_kinds
 from agvbench.types import Floats
-
-if TYPE_CHECKING:
-    from agvbench.diagnosis.estimation.fit import Fit
-
-
-@dataclass(frozen=True)
-class LinearisationPoint:
-    """A fitted model about which larger models are linearised, with the random effects projected out.
-
-    ``weight`` (R, K, 3): weights of the residuals; ``a`` (R, 3K, 6): derivatives by the random effects; ``inverse``
-    (R, 6, 6): the inverse of their information; ``prior_gradient`` (R, 6): gradient of their prior; ``own`` (R, m):
-    indices of each run's active parameters; ``j`` (R, 3K, m): projected derivatives by these; ``covariance`` (P, P) of
-    the parameters; ``pull`` (P,): gradient of the prior of the random effects by the parameters; ``residual`` (R, 3K),
-    weighted.
-    """
-
-    weight: Floats
-    a: Floats
-    inverse: Floats
-    prior_gradient: Floats
-    own: NDArray[np.int64]
-    j: Floats
-    covariance: Floats
-    pull: Floats
-    residual: Floats
-
-    @classmethod
-    def of(cls, fitted: Fit) -> LinearisationPoint:
-        """Return the linearisation point of a fit."""
-        predictor, variance_components, linear = fitted.predictor, fitted.variance_components, fitted.linear
-        weight = weights(predictor, variance_components)
-        residual = (fitted.residual * weight).reshape(len(weight), -1)
-        a = (linear.by_random_effects * weight[..., None]).reshape(*residual.shape, -1)
-        j = (linear.by_own * weight[..., None]).reshape(*residual.shape, -1)
-        prior = priors(predictor, variance_components)
-        inverse = inner_inverse(a, prior)[1]
-        mixed = inverse @ (a.transpose(0, 2, 1) @ j)
-        prior_gradient = fitted.random_effects / prior**2
-        matrix = fitted.information.total + ridge(predictor)
-        pull = np.zeros(len(matrix))
-        np.add.at(pull, linear.own, np.einsum("rij,ri->rj", mixed, prior_gradient))
-        covariance = np.asarray(np.linalg.inv(matrix))
-        return cls(weight, a, inverse, prior_gradient, linear.own, j - a @ mixed, covariance, pull, residual)
-
-    @cached_property
-    def squares(self) -> float:
-        """The weighted sum of squares of the fit's residuals."""
-        return self._squares(self.residual)
-
-    def _squares(self, e: Floats) -> float:
-        """Return the weighted sum of squares of residuals `e` (R, 3K), minimised over the random effects."""
-        pull = (self.a.transpose(0, 2, 1) @ e[..., None])[..., 0] - self.prior_gradient
-        return float(np.sum(e * e) - np.sum(pull * (self.inverse @ pull[..., None])[..., 0]))
-
-    def predicted_gain(self, residual: Floats, slopes: Floats, start: Floats, bounds: Floats) -> float:
-        """Return the predicted reduction of the loss, to first order, from the larger model's linearisation.
-
-        `residual` (R, K, 3) is that of the larger model at `start` (q,). `slopes` (R, K, 3, q) are the derivatives by
-        its new parameters, and `bounds` (q, 2) their bounds.
-        """
-        e = (residual * self.weight).reshape(len(residual), -1)
-        new = (slopes * self.weight[..., None]).reshape(*e.shape, -1)
-        projected = new - self.a @ (self.inverse @ (self.a.transpose(0, 2, 1) @ new))
-        # The prior of the random effects contributes to the gradient, too.
-        pull = np.einsum("rnq,rn->q", projected, e) + np.einsum("rnq,rn->q", new, self._prior_change)
-        products = self._products(np.concatenate([e[..., None], new], axis=-1))
-        old_pull, shared = products[:, 0] + self.pull, products[:, 1:]
-        own = np.einsum("rnp,rnq->pq", new, projected) + WEAK * np.eye(len(start))
-        # The existing parameters are eliminated (Schur complement): the new parameters remain.
-        along = self.covariance @ shared
-        matrix, rest = own - shared.T @ along, pull - along.T @ old_pull
-        unbounded = start + np.linalg.lstsq(matrix, rest, rcond=1e-12)[0]
-        move = np.clip(unbounded, bounds[:, 0], bounds[:, 1]) - start
-        saved = old_pull @ self.covariance @ old_pull + 2.0 * rest @ move - move @ matrix @ move
-        return float(self.squares - self._squares(e) + saved)
-
-    @cached_property
-    def _prior_change(self) -> Floats:
-        return np.asarray((self.a @ (self.inverse @ self.prior_gradient[..., None]))[..., 0])
-
-    def _products(self, columns: Floats) -> Floats:
-        """Return the products of columns (R, 3K, q) with the derivatives by all parameters, (P, q)."""
-        out = np.zeros((len(self.pull), columns.shape[-1]))
-        np.add.at(out, self.own, self.j.transpose(0, 2, 1) @ columns)
-        return out
 
 
 def initial_parameters(fitted: Fit, larger: Predictor, start: Floats) -> Floats:
