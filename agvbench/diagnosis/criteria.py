@@ -115,18 +115,11 @@ class SelectionCriteria:
 class VariantCriteria:
     """Which effects are tried with other equations.
 
-    ``min_fit_gain``
-        An effect with this gain of the fit is tried in its variants even if it predicts no better: the wrong equation
-        biases the maps, and the prediction of runs left out fails.
     ``min_gain_share``
         Another effect with a smaller share of the selected effect's gain is not tried in its variants.
-    ``max_alone``
-        Variants that are fitted if no effect was selected.
     """
 
-    min_fit_gain: float = 40.0
     min_gain_share: float = 0.5
-    max_alone: int = 3
 
 
 @dataclass(frozen=True)

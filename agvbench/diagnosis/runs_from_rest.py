@@ -16,7 +16,7 @@ from agvbench.diagnosis.context import DiagnosisContext
 from agvbench.diagnosis.criteria import DATA
 from agvbench.diagnosis.data.readings import Readings, read_runs
 from agvbench.diagnosis.data.splits import Split, split_runs
-from agvbench.diagnosis.discrepancy.stepwise import add_term_and_reconsider, term_in_place
+from agvbench.diagnosis.discrepancy.stepwise import add_term_and_reconsider
 from agvbench.diagnosis.method import Method
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.nodal_maps import ROLES, NodalMaps, nodal_maps, start_values
@@ -25,7 +25,7 @@ from agvbench.diagnosis.selection.candidates import given_effects
 from agvbench.diagnosis.selection.initial_steering import choose_initial_steering, reconsider_initial_steering
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.subsampling import refit_to_all, subsample_repeats
-from agvbench.diagnosis.selection.validation import fails_validation, validated
+from agvbench.diagnosis.selection.validation import validated
 from agvbench.diagnosis.selection.variants import candidates_for, select_variants_and_reconsider
 from agvbench.diagnosis.selection.with_term import TermSelection
 from agvbench.errors import FitError
@@ -74,26 +74,13 @@ class RunsFromRest(Method[SelectedFromRest]):
         library, with_term, selector = add_term_and_reconsider(library, selector)
         if len(searched) < len(fitted):
             self.on_progress(f"effects were selected in {len(searched)} runs; they are refitted to all {len(fitted)}")
-        return self._validated(SelectedFromRest(library, with_term, selector), readings, split)
+        return self._refitted_and_validated(SelectedFromRest(library, with_term, selector), readings, split)
 
     def conclude(self, readings: Readings, split: Split, selected: SelectedFromRest) -> Diagnosis:
         """Open the test runs, and return the diagnosis."""
         batch = selected.selector.batch
         readings = replace(readings, preset=batch.readings.preset)
         return conclude(self.context, readings, split, selected.library, selected.with_term, len(batch.readings))
-
-    def _validated(self, selected: SelectedFromRest, readings: Readings, split: Split) -> SelectedFromRest:
-        """Return the selection that validation runs accept: this one, one with a term in its place, or the maps."""
-        readings = replace(readings, preset=selected.selector.batch.readings.preset)
-        opened = readings.select(~split.test)
-        found = self._refitted_and_validated(selected, readings, split)
-        rejects = found.with_term is None and found.library.gains
-        if rejects and fails_validation(found.library, opened, split.validation[~split.test]):
-            self.on_progress("the validation runs contradict the selection: a discrepancy term is tried in its place")
-            if (term := term_in_place(selected.library, selected.selector)) is not None:
-                again = self._refitted_and_validated(replace(selected, with_term=term), readings, split)
-                return found if again.with_term is None else again
-        return found
 
     def _refitted_and_validated(self, selected: SelectedFromRest, readings: Readings, split: Split) -> SelectedFromRest:
         """Return the selection refitted to all training runs, or the maps alone if validation rejects it."""

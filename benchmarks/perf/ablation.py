@@ -83,11 +83,6 @@ def _selection_alone(selection: Any, selector: Any) -> tuple[Any, None, Any]:
     return selection, None, selector
 
 
-def _not_swapped(selector: Any, base: Any, current: Any, among: Any = None) -> tuple[Any, Any]:
-    swapped = {name: selector._swaps_of(name, base, current, among) for name in selector._added_effects(current)}
-    return current, selector._alternatives(swapped, current)
-
-
 def _first_start(models: Any, current: Any, predictor: Any, starts: Any, bounds: Any, least: Any) -> Any:
     return models._first_steps(current, predictor, starts[0], bounds)
 
@@ -129,12 +124,6 @@ PARTS: dict[str, Part] = {
         lambda found, selector, without, with_it: not found and with_it.gain_over(without) > 12.0,
         watched="Selector.meets_criterion",
     ),
-    "swaps of effects": Part(
-        f"{_SELECTION}stepwise",
-        "Selector.with_swaps",
-        _not_swapped,
-        lambda found, selector, base, current, among=None: found[0] is not current,
-    ),
     "a second start beside which maps are fitted": Part(
         f"{_SELECTION}fitted_models", "FittedModels._preliminary_fit", _first_start, _begun_elsewhere
     ),
@@ -154,7 +143,6 @@ PARTS: dict[str, Part] = {
         f"{_SELECTION}variants", "prefers_other_initial_steering", lambda *_: False, _is_true
     ),
     "variants of equations": Part(f"{_SELECTION}variants", "select_variants", _first, _is_not_first),
-    "a variant alone": Part(f"{_SELECTION}variants", "_variant_alone", _first, _is_not_first),
     "discrepancy terms": Part(
         _DISCREPANCY, "add_term_and_reconsider", _selection_alone, lambda found, *_: found[1] is not None
     ),
@@ -172,9 +160,6 @@ PARTS: dict[str, Part] = {
     ),
     "a term in place of an effect that rests on few groups": Part(
         _DISCREPANCY, "_depends_on_few_groups", lambda *_: False, _is_true
-    ),
-    "a term in place of an effect that fails validation": Part(
-        _DISCREPANCY, "term_in_place", lambda *_: None, _is_something
     ),
     "the validation gate": Part(f"{_SELECTION}validation", "validated", _first_two, _is_not_first),
     "a way off the likelihood's plateaus": Part(

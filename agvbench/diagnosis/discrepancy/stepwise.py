@@ -38,7 +38,6 @@ def reselect_effects(
     An effect that was selected without the term may only mimic one that is right beside it.
     """
     base = selection.base
-    alternatives: dict[str, dict[str, float]] = {}
     current = _add_masked_effects(extended, current)
     names = [n for n in selection.chosen.names if n not in current.names]
     names += sorted(selection.rejected, key=lambda n: -selection.rejected[n])[: DISCREPANCY.max_refitted]
@@ -46,7 +45,7 @@ def reselect_effects(
         larger = extended.with_effect(current, name)
         if name not in current.names and extended.meets_criterion(current, larger):
             current = larger
-    current, alternatives = extended.with_swaps(base, current, selection.alternatives)
+    alternatives = extended.alternatives(base, current, selection.alternatives)
     while True:
         found = [n for n in current.names if n not in {*base.names, term.name}]
         smaller = {name: extended.without_effect(base, current, name) for name in found}
@@ -125,19 +124,6 @@ def add_term(selection: Selection, selector: Selector) -> TermSelection | None:
         found.append(_term_in_place_of_effect(extended, selection))
     models = [reselect_effects(extended, selection, *pair) for pair in found if pair is not None]
     return _best_with_term(extended, selection, selector, models)
-
-
-def term_in_place(selection: Selection, selector: Selector) -> TermSelection | None:
-    """Return the term that predicts better in the place of a selected effect; None if there is none.
-
-    It is for models that fail in validation although the training runs show no lack of fit: an effect then mimics a
-    cause that few training runs excite.
-    """
-    extended = with_extended_library(selector)
-    found = _term_in_place_of_effect(extended, selection)
-    return _best_with_term(
-        extended, selection, selector, [] if found is None else [reselect_effects(extended, selection, *found)]
-    )
 
 
 def _best_with_term(

@@ -68,10 +68,7 @@ class Selector(FittedModels):
             current = min(accepted.values(), key=lambda model: model.deviance)
             self.on_progress(f"{' + '.join(current.names)}: gains {base.deviance - current.deviance:.0f}")
         current, gains = self.backward_elimination(base, current)
-        current, alternatives = self.with_swaps(base, current)
-        if set(current.names) != set(gains) | set(self.given):
-            current, gains = self.backward_elimination(base, current)
-            alternatives = {name: others for name, others in alternatives.items() if name in gains}
+        alternatives = self.alternatives(base, current)
         rejected = {name: gain for name, gain in rejected.items() if name not in current.names}
         return Selection(base, current, alternatives, gains, rejected, self.tried)
 
@@ -115,60 +112,28 @@ class Selector(FittedModels):
             current = self.reduced(smaller[min(unnecessary, key=lambda name: gains[name])], current)
         return current, {}
 
-    def with_swaps(
+    def alternatives(
         self, base: ScoredModel, current: ScoredModel, among: Mapping[str, Iterable[str]] | None = None
-    ) -> tuple[ScoredModel, dict[str, dict[str, float]]]:
-        """Replace effects by others that predict better in their place; return the model and the alternatives left.
-
-        The effect that was added first absorbed those that were not in the model yet, and may only mimic one of them.
+    ) -> dict[str, dict[str, float]]:
+        """Return the alternatives of each selected effect, with their difference in deviance.
 
         Parameters
         ----------
         base, current
-            The model with the given effects only, and the model in which effects are replaced.
+            The model with the given effects only, and the selected model.
         among
             By effect, the others that are fitted in its place; by default every candidate.
         """
-        for _ in range(SELECTION.max_effects):
-            swapped = {name: self._swaps_of(name, base, current, among) for name in self._added_effects(current)}
-            better = [
-                model
-                for name, models in swapped.items()
-                for model in models.values()
-                if model.gain_over(current) > SELECTION.min_gain
-                and self.meets_criterion(self.without_effect(base, current, name), model)
-            ]
-            if not better:
-                break
-            best = min(better, key=lambda model: model.deviance)
-            self.on_progress(f"{' + '.join(best.names)} in place of {' + '.join(current.names)}")
-            current = best
-        return current, self._alternatives(swapped, current)
-
-    def _swaps_of(
-        self, name: str, base: ScoredModel, current: ScoredModel, among: Mapping[str, Iterable[str]] | None
-    ) -> dict[str, ScoredModel]:
-        """Return, by name, the models with another effect in the place of the one called `name`."""
-        tried = self.candidates if among is None else among.get(name, ())
-        return {
-            other: self.with_effect(self.without_effect(base, current, name), other)
-            for other in tried
-            if other not in current.names
-        }
-
-    def _alternatives(
-        self, swapped: dict[str, dict[str, ScoredModel]], current: ScoredModel
-    ) -> dict[str, dict[str, float]]:
-        """Return the alternatives of each selected effect, with their difference in deviance."""
-        differences = {
-            n: {o: self._loss_difference(model, current) for o, model in models.items()}
-            for n, models in swapped.items()
-        }
-        alternatives = {
-            n: {o: w for o, w in others.items() if w < SELECTION.alternative_margin}
-            for n, others in differences.items()
-        }
-        return {name: others for name, others in alternatives.items() if name in current.names}
+        found = {}
+        for name in self._added_effects(current):
+            without = self.without_effect(base, current, name)
+            others = [n for n in (self.candidates if among is None else among.get(name, ())) if n not in current.names]
+            worse = {n: self._loss_difference(self.with_effect(without, n), current) for n in others}
+            found[name] = {n: gap for n, gap in worse.items() if gap < SELECTION.alternative_margin}
+            found[name] = {
+                n: difference for n, difference in worse.items() if difference < SELECTION.alternative_margin
+            }
+        return found
 
     def _loss_difference(self, model: ScoredModel, current: ScoredModel) -> float:
         """Return the deviance of `model` minus that of `current`, refitted from `current` if it is close."""

@@ -15,7 +15,6 @@ from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.residuals.residuals import (
     EndCovariance,
     PoseResiduals,
-    end_covariance,
     lack_of_fit,
     pose_residuals,
     repeatability,
@@ -81,22 +80,6 @@ def predictor_for(selection: Selection, term_selection: TermSelection | None, re
         readings, fitted.maps, fitted.geometry, kinds=EXTENDED_LIBRARY if term_selection or has_variants else ()
     )
     return Predictor(batch, chosen.names)
-
-
-def fails_validation(selection: Selection, readings: Readings, held: NDArray[np.bool_]) -> bool:
-    """Return whether the residuals of the runs `held` (R,) show lack of fit; False without runs."""
-    if not held.any():
-        return False
-    kept = readings.select(held)
-    assessment = _assess(selection, kept, np.ones(len(kept), dtype=np.bool_)) or _assess(selection, readings, held)
-    return assessment is not None and assessment.has_lack_of_fit
-
-
-def _assess(selection: Selection, readings: Readings, held: NDArray[np.bool_]) -> Assessment | None:
-    fit = selection.chosen.fit
-    every = predictor_for(selection, None, readings)
-    poses = every.predict(fit.parameters)
-    return assess(readings, held, poses, poses, end_covariance(every, fit))
 
 
 def validated(

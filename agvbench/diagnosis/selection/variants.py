@@ -70,7 +70,7 @@ def select_variants(selection: Selection, selector: Selector) -> Selection:
     """
     effects = [name for name in selection.chosen.names if name not in selector.given]
     if not effects:
-        return _variant_alone(selection, selector)
+        return selection
     extended, current = with_extended_library(selector), selection.chosen
     replacements = [
         replacement for name in effects for replacement in _replacements(selection, selector, extended, name)
@@ -93,39 +93,6 @@ def select_variants(selection: Selection, selector: Selector) -> Selection:
     rejected = {n: g for n, g in (selection.rejected | selection.gains).items() if n not in causes}
     selector.candidates |= {n: c for n, c in variant_candidates().items() if n in current.names}
     return Selection(selection.base, current, alternatives, gains, rejected, selection.tried + extended.tried)
-
-
-def _variant_alone(selection: Selection, selector: Selector) -> Selection:
-    """Return the selection of a single variant whose effect fits much better than the maps but predicts no better.
-
-    A strong effect with the wrong equation biases the maps, and the prediction of runs left out fails.
-    """
-    base = selection.base
-    known = ((variant, selector.known((*base.names, variant.variant_of))) for variant in effect_variants().values())
-    fitted = [(_fit_gain(base, model), variant, model) for variant, model in known if model]
-    large = sorted((one for one in fitted if one[0] > VARIANT.min_fit_gain), key=lambda one: -one[0])
-    strong = large[: VARIANT.max_alone]
-    if not strong:
-        return selection
-    extended = with_extended_library(selector)
-    accepted = [
-        (replacement, swapped)
-        for replacement, model in (
-            (_Replacement(variant.variant_of, variant, _starts_of(variant, model)), model)
-            for _, variant, model in strong
-        )
-        for swapped in _swapped_models(extended, model, replacement)
-        if extended.meets_criterion(base, swapped)
-    ]
-    if not accepted:
-        return selection
-    replacement, best = min(accepted, key=lambda pair: pair[1].deviance)
-    name, gain = replacement.variant.name, base.deviance - best.deviance
-    extended.on_progress(f"{name}: gains {gain:.0f}")
-    selector.candidates[name] = variant_candidates()[name]
-    rejected = {n: g for n, g in selection.rejected.items() if n != replacement.replaced}
-    alternatives = {name: _other_causes(best, name, accepted)}
-    return Selection(base, best, alternatives, {name: gain}, rejected, selection.tried + extended.tried)
 
 
 def select_variants_and_reconsider(selection: Selection, selector: Selector) -> tuple[Selection, Selector]:
