@@ -86,8 +86,6 @@ class SelectionCriteria:
         the largest gain of any candidate exceeds the sum in fewer than 1 of 100 campaigns.
     ``alternative_margin``
         Largest difference to an indistinguishable alternative: a likelihood ratio of about 150.
-    ``nearly_alternative``
-        Up to this difference an alternative is refitted, because its fit may have ended too soon.
     ``min_relative_change``
         Least change of the prediction by an effect, relative to the residual that remains with it. A smaller change is
         not noticeable, however significant.
@@ -103,7 +101,6 @@ class SelectionCriteria:
 
     min_gain: float = 12.0
     alternative_margin: float = 10.0
-    nearly_alternative: float = 100.0
     min_relative_change: float = 0.15
     best_group_share: float = 0.05
     wald_alpha: float = 1e-4
@@ -115,10 +112,13 @@ class SelectionCriteria:
 class VariantCriteria:
     """Which effects are tried with other equations.
 
+    ``max_fit_loss``
+        No effect is removed beside a variant that fits worse by more: a model with fewer effects fits no better.
     ``min_gain_share``
         Another effect with a smaller share of the selected effect's gain is not tried in its variants.
     """
 
+    max_fit_loss: float = 100.0
     min_gain_share: float = 0.5
 
 

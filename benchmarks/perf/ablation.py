@@ -127,12 +127,6 @@ PARTS: dict[str, Part] = {
     "a second start beside which maps are fitted": Part(
         f"{_SELECTION}fitted_models", "FittedModels._preliminary_fit", _first_start, _begun_elsewhere
     ),
-    "a refit from the larger model": Part(
-        f"{_SELECTION}fitted_models",
-        "FittedModels.refitted_from",
-        lambda models, model, beyond: model,
-        lambda found, models, model, beyond: found is not model,
-    ),
     "the choice of the initial steering": Part(
         f"{_SELECTION}initial_steering", "choose_initial_steering", _first, _is_not_first
     ),
@@ -151,12 +145,6 @@ PARTS: dict[str, Part] = {
         "_add_masked_effects",
         lambda wide, current: current,
         lambda found, wide, current: found is not current,
-    ),
-    "a term beside no effect, afterwards": Part(
-        _DISCREPANCY,
-        "_reselect_from_term",
-        lambda selection, term_selection, selector: term_selection,
-        lambda found, selection, term_selection, selector: found is not term_selection,
     ),
     "a term in place of an effect that rests on few groups": Part(
         _DISCREPANCY, "_depends_on_few_groups", lambda *_: False, _is_true

@@ -9,17 +9,12 @@ import pytest
 from tiny_vehicle import FRONT_M, HEADER, NEUTRAL, REAR_M, Tiny
 
 from agvbench.calibration import measure_run
-from agvbench.diagnosis.criteria import SELECTION
 from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.discrepancy import stepwise as empirical
-from agvbench.diagnosis.estimation.fit import fit
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.nodal_maps import ROLES, nodal_maps, start_values
-from agvbench.diagnosis.model.predictor import Predictor
-from agvbench.diagnosis.selection import stepwise
 from agvbench.diagnosis.selection import variants as forms
-from agvbench.diagnosis.selection.candidates import bounds_of, candidates, default_candidate
-from agvbench.diagnosis.selection.fitted_models import ScoredModel
+from agvbench.diagnosis.selection.candidates import candidates, default_candidate
 from agvbench.diagnosis.selection.initial_steering import under_other_initial_steering
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.variants import prefers_other_initial_steering, with_extended_library
@@ -38,44 +33,6 @@ def selector(tiny_campaign):
     prior_model = {role: np.zeros(len(maps.nodes[role])) for role in ROLES}
     start = start_values(maps, [measure_run(run, geometry, neutral=NEUTRAL) for run in runs], prior_model)
     return Selector(Batch(readings, maps, geometry), candidates(), start, 0, lambda _: None)
-
-
-def test_a_model_left_half_way_is_fitted_again_from_where_the_larger_one_stands(selector):
-    lag = selector.with_effect(selector.base(), "steering_lag")
-    bounds = bounds_of(lag.names)
-    begun = fit(Predictor(selector.batch, lag.names), np.r_[selector.start, 0.02], bounds, iterations=1)
-    early = ScoredModel(lag.names, begun, begun.loss)
-    larger = selector.with_effect(lag, "lateral_slip")
-    again = selector.refitted_from(early, larger)
-    assert again.names == lag.names
-    assert again.deviance < early.deviance - 100.0
-    assert again.fit.effect_values()["steering_lag.time_constant_s"] == pytest.approx(0.15, rel=0.03)
-
-
-def test_a_model_that_is_at_its_best_stays(selector):
-    lag = selector.with_effect(selector.base(), "steering_lag")
-    again = selector.refitted_from(lag, selector.with_effect(lag, "lateral_slip"))
-    assert lag.deviance - 1.0 < again.deviance <= lag.deviance
-
-
-def test_what_is_left_of_a_model_is_not_what_once_ended_elsewhere(selector):
-    lag = selector.with_effect(selector.base(), "steering_lag")
-    larger = selector.score(("steering_lag", "lateral_slip"), np.r_[lag.fit.parameters, 0.01], lag.fit)
-    poor = fit(Predictor(selector.batch, lag.names), np.r_[selector.start, 0.4], np.array([[0.4, 0.4]]), iterations=8)
-    selector.adopt(ScoredModel(lag.names, poor, poor.loss))
-    left, gains = selector.backward_elimination(selector.base(), larger)
-    assert left.names == lag.names
-    assert list(gains) == ["steering_lag"]
-    assert left.deviance == pytest.approx(lag.deviance, abs=2.0)
-
-
-def test_a_rival_is_judged_by_a_fit_that_went_as_far(selector, monkeypatch):
-    monkeypatch.setattr(stepwise, "SELECTION", replace(SELECTION, nearly_alternative=np.inf))
-    lag = selector.with_effect(selector.base(), "steering_lag")
-    begun = fit(Predictor(selector.batch, lag.names), np.r_[selector.start, 0.1], NO_LIMIT, iterations=1)
-    early = ScoredModel(lag.names, begun, begun.loss)
-    assert early.deviance > lag.deviance + 100.0
-    assert abs(selector._loss_difference(early, lag)) < 2.0
 
 
 @pytest.mark.parametrize(

@@ -53,7 +53,7 @@ def reselect_effects(
         unnecessary = [name for name, model in smaller.items() if not extended.meets_criterion(model, current)]
         if not unnecessary:
             return current, term, gains, {name: alternatives.get(name, {}) for name in gains}
-        current = extended.reduced(smaller[min(unnecessary, key=lambda name: gains[name])], current)
+        current = smaller[min(unnecessary, key=lambda name: gains[name])]
 
 
 def _add_masked_effects(extended: Selector, current: ScoredModel) -> ScoredModel:
@@ -134,7 +134,7 @@ def _best_with_term(
     if not models:
         return None
     chosen, term, gains, alternatives = min(models, key=lambda model: model[0].deviance)
-    without = extended.refitted_from(extended.without_effect(selection.base, chosen, term.name), chosen)
+    without = extended.without_effect(selection.base, chosen, term.name)
     if not extended.meets_criterion(without, chosen):
         return None
     gain = without.loss - chosen.loss
@@ -165,31 +165,7 @@ def add_term_and_reconsider(
         again = add_term(selected, other)
         if again is not None and again.selection.chosen.deviance < term_selection.selection.chosen.deviance:
             selection, term_selection, selector = selected, again, other
-    return selection, _reselect_from_term(selection, term_selection, selector), selector
-
-
-def _reselect_from_term(selection: Selection, term_selection: TermSelection, selector: Selector) -> TermSelection:
-    """Return the selection of effects beside the term alone, if that is better.
-
-    An effect that was selected before the term may only mimic one that is right beside it. The selection is not
-    repeated if the residuals show no lack of fit.
-    """
-    if not selection.gains or not has_lack_of_fit(term_selection.selection.chosen):
-        return term_selection
-    extended, term = with_extended_library(selector), term_selection.term
-    kind, values = candidate(term), np.array([list(term_selection.values.values())])
-    alone = extended.with_effect(selection.base, term.name, replace(kind, starts=values, screened=True, patient=True))
-    if not alone.is_fitted:
-        return term_selection
-    without_effects = replace(selection, chosen=selection.base, gains={}, alternatives={})
-    reselected = _best_with_term(
-        extended, selection, selector, [reselect_effects(extended, without_effects, alone, term)]
-    )
-    return (
-        reselected
-        if reselected is not None and reselected.selection.chosen.deviance < term_selection.selection.chosen.deviance
-        else term_selection
-    )
+    return selection, term_selection, selector
 
 
 def screened_terms(extended: Selector, root: ScoredModel) -> list[Start]:

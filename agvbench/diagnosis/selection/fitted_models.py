@@ -234,33 +234,5 @@ class FittedModels:
             self._known[request] = ScoredModel(names, fitted, cross_validated(fitted, self._fold, bounds), starts)
         return self._known[request]
 
-    def reduced(self, smaller: ScoredModel, larger: ScoredModel) -> ScoredModel:
-        """Return the model `smaller`, refitted from `larger`, which contains one effect more.
-
-        The smaller model may have been fitted before from other initial values, to another local minimum.
-        """
-        if smaller.names == self.given:
-            return smaller
-        again = self._known[smaller.request] = self.refitted_from(smaller, larger)
-        return again
-
-    def refitted_from(self, model: ScoredModel, other: ScoredModel) -> ScoredModel:
-        """Return `model` refitted with patience from the parameters of `other`, if that has the smaller deviance.
-
-        The gain of another model may come from its longer iteration only. Effects that `other` lacks start from their
-        values in `model`.
-        """
-        own = model.fit.effect_values() | other.fit.effect_values()
-        kept = [value for name in model.names for key, value in own.items() if key.partition(".")[0] == name]
-        bounds = bounds_of(model.names)
-        refitted = fit(
-            self._predictor(model.names), np.r_[other.fit.parameters[: self.batch.maps.size], kept], bounds,
-            random_effects=other.fit.random_effects, variance_components=other.fit.variance_components,
-            iterations=FIT.steps, patient=True,
-        )  # fmt: skip
-        self.tried += 1
-        scored_model = ScoredModel(model.names, refitted, cross_validated(refitted, self._fold, bounds), model.starts)
-        return min(model, scored_model, key=lambda one: one.deviance)
-
     def _predictor(self, names: tuple[str, ...]) -> Predictor:
         return Predictor(self.batch, names)

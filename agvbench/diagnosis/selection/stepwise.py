@@ -109,7 +109,7 @@ class Selector(FittedModels):
             unnecessary = [name for name, model in smaller.items() if not self.meets_criterion(model, current)]
             if not unnecessary:
                 return current, gains
-            current = self.reduced(smaller[min(unnecessary, key=lambda name: gains[name])], current)
+            current = smaller[min(unnecessary, key=lambda name: gains[name])]
         return current, {}
 
     def alternatives(
@@ -128,16 +128,9 @@ class Selector(FittedModels):
         for name in self._added_effects(current):
             without = self.without_effect(base, current, name)
             others = [n for n in (self.candidates if among is None else among.get(name, ())) if n not in current.names]
-            worse = {n: self._loss_difference(self.with_effect(without, n), current) for n in others}
+            worse = {n: self.with_effect(without, n).deviance - current.deviance for n in others}
             found[name] = {n: gap for n, gap in worse.items() if gap < SELECTION.alternative_margin}
             found[name] = {
                 n: difference for n, difference in worse.items() if difference < SELECTION.alternative_margin
             }
         return found
-
-    def _loss_difference(self, model: ScoredModel, current: ScoredModel) -> float:
-        """Return the deviance of `model` minus that of `current`, refitted from `current` if it is close."""
-        difference = model.deviance - current.deviance
-        if SELECTION.alternative_margin <= difference < SELECTION.nearly_alternative and model.is_fitted:
-            difference = self.refitted_from(model, current).deviance - current.deviance
-        return difference

@@ -171,7 +171,7 @@ def _swapped_models(extended: Selector, current: ScoredModel, replacement: _Repl
     variant = replace(candidate(replacement.variant), starts=replacement.starts)
     swapped = _swapped(extended, current, {replacement.replaced}, variant)
     # A model with fewer effects fits no better: nothing is removed from one that fits much worse already.
-    if _fit_gain(current, swapped) < -SELECTION.nearly_alternative:
+    if _fit_gain(current, swapped) < -VARIANT.max_fit_loss:
         return [swapped]
     # Another effect may only compensate for the wrong equation.
     others = [other for other in current.names if other != replacement.replaced and other not in extended.given]
