@@ -11,6 +11,7 @@ from agvbench.calibration.samples import Role, Sample
 from agvbench.errors import FitError
 from agvbench.types import Run
 from agvbench.vehicle.geometry import Geometry
+from agvbench.vehicle.kinematics import wheel_speed
 
 CALIBRATION_EXPERIMENTS = ("steering_front", "steering_rear", "steering_opposite", "drive")
 # Whose runs say most about a role; the next are asked where these vary its command too little.
@@ -45,12 +46,12 @@ def arc_samples(runs: Sequence[Run], measured: dict[str, RunMeasurement], geomet
 
     An axle's curve is read from the runs that vary this axle alone (tables 7.1, 7.2), so that the other axle's coupling
     stays out of it. The drive's is read from straight runs: what speed is lost in turns is an effect, not
-    the map (appendix B). Its unit is speed along the wheels: v · 2 cos β / (cos δf + cos δr), by eq. 5.6.
+    the map (appendix B). Its unit is speed along the wheels, by eq. 5.6.
     """
     samples: list[Sample] = []
     for role, experiments in _OWN.items():
         chosen = _chosen(role, experiments, runs, measured)
-        samples += [_sample(role, measured[run.run_id]) for run in chosen]
+        samples += [_sample(role, measured[run.run_id], geometry) for run in chosen]
     return samples
 
 
@@ -66,19 +67,19 @@ def _chosen(
     return usable
 
 
-def _sample(role: Role, m: RunMeasurement) -> Sample:
+def _sample(role: Role, m: RunMeasurement, geometry: Geometry) -> Sample:
     command = float(getattr(m.command, role))
     if role == "drive":
-        return _drive_sample(command, m)
+        return _drive_sample(command, m, geometry)
     value, stderr = getattr(m, f"{role}_rad"), getattr(m, f"{role}_stderr_rad")
     sample = Sample(role, command, value, stderr, m.run_id)
     return sample if m.moves else sample.without("the vehicle stood still: no angle to be seen")
 
 
-def _drive_sample(command: float, m: RunMeasurement) -> Sample:
+def _drive_sample(command: float, m: RunMeasurement, geometry: Geometry) -> Sample:
     if not m.moves:  # what its frames drift is noise: a vehicle that stands has no speed
         return Sample("drive", command, 0.0, m.speed_stderr_mps, m.run_id)
-    along = 2.0 * math.cos(m.sideslip_rad) / (math.cos(m.front_rad) + math.cos(m.rear_rad))
+    along = float(wheel_speed(math.cos(m.sideslip_rad), m.front_rad, m.rear_rad, geometry))
     sample = Sample("drive", command, along * m.speed_mps, along * m.speed_stderr_mps, m.run_id)
     if max(abs(m.front_rad), abs(m.rear_rad)) <= _STRAIGHT_RAD:
         return sample

@@ -84,7 +84,7 @@ def calibrate(campaign: CampaignLike, *, maps: Maps | str = "default", session: 
     if maps not in ("default", "thesis"):
         raise InputError("unknown maps", where="maps", value=repr(maps), limit="default, thesis")
     header = campaign.header
-    geometry = Geometry(header.front_axle_m, header.rear_axle_m)
+    geometry = header.geometry
     runs = [run for run in campaign if run.split not in {"held_out", "validation"} and session in (None, run.session)]
     if session is not None and not runs:
         raise InputError("no run belongs to this session", where=f"campaign {header.name}", value=repr(session))

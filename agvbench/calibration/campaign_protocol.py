@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Protocol
 
 from agvbench.types import CommandUnit, Run
+from agvbench.vehicle.geometry import Geometry
 
 
 class HeaderLike(Protocol):
@@ -20,12 +21,8 @@ class HeaderLike(Protocol):
         """Name of the vehicle."""
 
     @property
-    def front_axle_m(self) -> float:
-        """From the marker centroid forward to the front axle [m]."""
-
-    @property
-    def rear_axle_m(self) -> float:
-        """From the marker centroid backward to the rear axle [m]."""
+    def geometry(self) -> Geometry:
+        """Where the axles are, and which of them drives."""
 
     @property
     def command_unit(self) -> CommandUnit:

@@ -15,6 +15,7 @@ from agvbench.calibration.samples import Role, Sample
 from agvbench.errors import FitError
 from agvbench.types import Floats, Run
 from agvbench.vehicle.geometry import Geometry
+from agvbench.vehicle.kinematics import wheel_speed
 
 _MOVES_MPS = 0.05
 _DELAYS_S = np.arange(0.0, 0.61, 0.02)
@@ -151,8 +152,7 @@ def _drive(moving: list[_Drive], header: HeaderLike, words: list[str]) -> tuple[
     spread = float(np.ptp(command[np.isfinite(command)]))
     level, kept = _levels(command, None, spread or 1.0)
     front, rear = gathered("front_rad"), gathered("rear_rad")
-    # Along the wheels, as eq. 5.6 has it: u = v cos β · 2 / (cos δf + cos δr).
-    along = 2.0 / (np.cos(front) + np.cos(rear))
+    along = wheel_speed(1.0, front, rear, header.geometry)  # along the wheels, as in eq. 5.6
     data = DriveData(
         command=command[kept],
         speed_mps=(along * gathered("forward_mps"))[kept],

@@ -15,8 +15,11 @@ from agvbench.errors import CampaignError, FileError
 from agvbench.text_files import read_toml
 from agvbench.types import CommandUnit
 from agvbench.validation import convert
+from agvbench.vehicle.geometry import Driven, Geometry
 
 SCHEMA = 1
+SCHEMA_OF_DRIVEN_AXLE = 2
+"""The schema that knows ``driven``; campaigns of vehicles that both axles drive are written in schema 1."""
 FILE_NAME = "campaign.toml"
 _MAX_BYTES = 1 << 20
 
@@ -25,13 +28,19 @@ FrameRate = Annotated[float, msgspec.Meta(gt=0.0, le=1e6)]
 """Of a camera [Hz]; above, times of frames cannot be distinguished in nanoseconds."""
 
 
+def schema_for(driven: Driven) -> int:
+    """Return the lowest schema that describes a vehicle."""
+    return SCHEMA if driven == "both" else SCHEMA_OF_DRIVEN_AXLE
+
+
 @dataclass(frozen=True)
 class CampaignHeader:
     """What holds for every run of a campaign.
 
     ``front_axle_m`` and ``rear_axle_m`` [m] are the distances from the markers' centroid to the axles;
-    ``neutral`` is the command at which the vehicle stands still and steers straight, in ``command_unit``;
-    ``prediction_horizon_s`` and ``prediction_stride_s`` [s] say how to cut free driving into predictions.
+    ``driven`` is the driven axle; ``neutral`` is the command at which the vehicle stands still and steers straight,
+    in ``command_unit``; ``prediction_horizon_s`` and ``prediction_stride_s`` [s] say how to cut free driving into
+    predictions.
 
     Raises
     ------
@@ -49,6 +58,7 @@ class CampaignHeader:
     mocap_rate_hz: float
     prediction_horizon_s: float | None = None
     prediction_stride_s: float | None = None
+    driven: Driven = "both"
 
     def __post_init__(self) -> None:
         _check_schema(self.schema, FILE_NAME)
@@ -58,6 +68,14 @@ class CampaignHeader:
                 raise CampaignError(
                     f"{field.name} is not a finite number", where=FILE_NAME, value=value, remedy="give a number"
                 )
+        if self.driven != "both" and self.schema < SCHEMA_OF_DRIVEN_AXLE:
+            raise CampaignError(
+                "a driven axle needs a newer schema",
+                where=f"{FILE_NAME}: [vehicle]",
+                value=f'driven = "{self.driven}" in schema {self.schema}',
+                limit=f"schema {SCHEMA_OF_DRIVEN_AXLE}",
+                remedy=f"set schema = {SCHEMA_OF_DRIVEN_AXLE}",
+            )
         if self.front_axle_m + self.rear_axle_m <= 0.0:
             raise CampaignError(
                 "the wheelbase front_axle_m + rear_axle_m is not positive",
@@ -65,6 +83,17 @@ class CampaignHeader:
                 value=f"{self.front_axle_m + self.rear_axle_m:g} m",
                 remedy="give the distances from the markers' centroid to the axles in metres",
             )
+
+    @property
+    def geometry(self) -> Geometry:
+        """The axles: their distances from the markers' centroid, and which of them drives.
+
+        Raises
+        ------
+        VehicleError
+            If an axle is not where a vehicle can have it.
+        """
+        return Geometry(self.front_axle_m, self.rear_axle_m, self.driven)
 
     @classmethod
     def load(cls, path: str | Path) -> CampaignHeader:
@@ -80,17 +109,27 @@ class CampaignHeader:
         _check_schema(table.get("schema"), path)
         remedy = "correct campaign.toml (docs/reference/campaign-directory.md)"
         file = convert(table, _File, where=str(path), error=CampaignError, remedy=remedy)
-        return cls.from_tables(path, file.name, file.vehicle, file.mocap, file.prediction)
+        return cls.from_tables(path, file.name, file.vehicle, file.mocap, file.prediction, schema=file.schema)
 
     @classmethod
     def from_tables(
-        cls, where: object, name: str, vehicle: Vehicle, mocap: Mocap, prediction: Prediction | None
+        cls,
+        where: object,
+        name: str,
+        vehicle: Vehicle,
+        mocap: Mocap,
+        prediction: Prediction | None,
+        *,
+        schema: int | None = None,
     ) -> CampaignHeader:
-        """Return the header that these tables make; an impossible value is a `CampaignError` of file `where`."""
+        """Return the header that these tables make; an impossible value is a `CampaignError` of file `where`.
+
+        Without `schema` it is the lowest that describes the vehicle.
+        """
         prediction = prediction or Prediction()
         try:
             return cls(
-                schema=SCHEMA,
+                schema=schema or schema_for(vehicle.driven),
                 name=name,
                 vehicle_name=vehicle.name,
                 front_axle_m=vehicle.front_axle_m,
@@ -100,6 +139,7 @@ class CampaignHeader:
                 mocap_rate_hz=mocap.rate_hz,
                 prediction_horizon_s=prediction.horizon_s,
                 prediction_stride_s=prediction.stride_s or prediction.horizon_s,
+                driven=vehicle.driven,
             )
         except CampaignError as error:
             place = str(error.where).replace(FILE_NAME, str(where), 1)
@@ -120,6 +160,7 @@ class CampaignHeader:
                 "rear_axle_m": self.rear_axle_m,
                 "command_unit": self.command_unit,
                 "neutral": self.neutral,
+                **({} if self.driven == "both" else {"driven": self.driven}),
             },
             "mocap": {"rate_hz": self.mocap_rate_hz},
         }
@@ -137,6 +178,7 @@ class Vehicle(msgspec.Struct, frozen=True):
     rear_axle_m: float
     command_unit: CommandUnit
     neutral: float
+    driven: Driven = "both"
 
 
 class Mocap(msgspec.Struct, frozen=True):
@@ -180,13 +222,13 @@ def _read_toml(path: Path) -> dict[str, Any]:
 def _check_schema(schema: object, where: object) -> None:
     if schema is None:
         raise CampaignError("has no schema", where=where, remedy=f"add schema = {SCHEMA} at the top")
-    if schema != SCHEMA or isinstance(schema, bool):
+    if schema not in (SCHEMA, SCHEMA_OF_DRIVEN_AXLE) or isinstance(schema, bool):
         newer = isinstance(schema, int) and schema > SCHEMA
         remedy = "install a newer agvbench" if newer else f"set schema = {SCHEMA}"
         raise CampaignError(
             "was written in a schema that this agvbench does not read",
             where=where,
             value=f"schema {schema}",
-            limit=f"schema {SCHEMA}",
+            limit=f"schema {SCHEMA} or {SCHEMA_OF_DRIVEN_AXLE}",
             remedy=remedy,
         )

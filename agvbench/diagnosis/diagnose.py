@@ -11,7 +11,6 @@ from agvbench.diagnosis.method import OnProgress
 from agvbench.diagnosis.result import Diagnosis
 from agvbench.diagnosis.runs_from_rest import RunsFromRest
 from agvbench.model import VehicleModel
-from agvbench.vehicle.geometry import Geometry
 
 
 def diagnose(
@@ -42,7 +41,7 @@ def diagnose(
         If the campaign is too small, or its tables are inconsistent.
     """
     header, runs = campaign.header, list(campaign)
-    context = DiagnosisContext(header, Geometry(header.front_axle_m, header.rear_axle_m), vehicle, seed)
+    context = DiagnosisContext(header, header.geometry, vehicle, seed)
     require_plausible_units(runs, header)
     if (horizon := horizon_of(header, runs)) is not None:
         return FreeDriving(context, on_progress, horizon).diagnose(runs)

@@ -96,8 +96,8 @@ class RunsFromRest(Method[SelectedFromRest]):
         context = self.context
         maps = nodal_maps(readings.runs, context.header.neutral)
         measured = _measurements(readings.runs, context.geometry, context.header.neutral)
-        start = start_values(maps, measured, _prior_values(maps, context))
-        tried, kinds = candidates_for(context.vehicle)
+        start = start_values(maps, measured, _prior_values(maps, context), context.geometry)
+        tried, kinds = candidates_for(context.vehicle, context.geometry)
         batch = Batch(readings, maps, context.geometry, kinds=kinds)
         given = given_effects(context.vehicle, tried)
         return choose_initial_steering(Selector(batch, tried, start, context.seed, self.on_progress, *given))

@@ -25,6 +25,7 @@ class AxleOverrun(Effect):
     limits: ClassVar[str] = "no influence where both axles steer by the same angle; cornering_speed_loss has one"
 
     excess: float = parameter(unit="–", low=0.0, high=20.0, scale=1.0)
+    needs_both_axles_driven: ClassVar[bool] = True
 
     @staticmethod
     def move(state: Floats, excess: float) -> None:

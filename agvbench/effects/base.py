@@ -101,6 +101,8 @@ class Effect:
         Longest step of the simulation [s] while the effect is active. It is finite if a hook changes while the
         actuators are settled: with position, heading, time or distance. A step is integrated with four Gauss–Legendre
         nodes, so a quarter of the shortest period is enough.
+    needs_both_axles_driven
+        Whether the effect is about two driven axles, and no candidate where one is driven.
     arrive
         ``arrive(state, time_s, …) -> time_s``: time at which a command given at `time_s` takes effect; may change
         ``REAR_WAIT`` and ``DRIVE_WAIT``.
@@ -129,6 +131,7 @@ class Effect:
     limits: ClassVar[str]
 
     longest_step_s: ClassVar[float] = math.inf
+    needs_both_axles_driven: ClassVar[bool] = False
     arrive: ClassVar[Hook | None] = None
     aim: ClassVar[Hook | None] = None
     steer: ClassVar[Hook | None] = None

@@ -10,6 +10,7 @@
     [geometry]
     front_axle_m = 0.181           # marker centroid to axle
     rear_axle_m = 0.121
+    driven = "both"                # or "front", "rear"; "both" where it is left out
 
     [maps.front]                   # and [maps.rear]: command → rad, counter-clockwise positive
     kind = "line_with_end_stops"
@@ -109,7 +110,7 @@ def vehicle_to_toml(model: VehicleModel) -> dict[str, Any]:
         "name": model.name,
         "command_unit": model.command_unit,
         "neutral": model.neutral,
-        "geometry": to_table(model.geometry),
+        "geometry": _geometry_to_toml(model.geometry),
         "maps": {role: _map_to_toml(getattr(model, role), unit) for role, unit in _UNITS.items()},
     }
     if model.effects:
@@ -173,6 +174,12 @@ def _table(content: Mapping[str, Any], key: str) -> Mapping[str, Any]:
     if not isinstance(table, Mapping):
         raise VehicleError("must be a table", where=key, value=repr(table))
     return table
+
+
+def _geometry_to_toml(geometry: Geometry) -> dict[str, Any]:
+    """Return the geometry without the default driven axle, so that files and hashes of such vehicles stay."""
+    table = to_table(geometry)
+    return {key: value for key, value in table.items() if (key, value) != ("driven", "both")}
 
 
 def _map_to_toml(static_map: StaticMap, unit: str) -> dict[str, Any]:

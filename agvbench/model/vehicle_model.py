@@ -74,6 +74,15 @@ class VehicleModel:
         for name in names:
             if names.count(name) > 1:
                 raise VehicleError("an effect may be given once", where="effects", value=name)
+        for effect in self.effects:
+            if effect.needs_both_axles_driven and self.geometry.driven != "both" and not effect.is_null:
+                raise VehicleError(
+                    "an effect of two driven axles, but one is driven",
+                    where="effects",
+                    value=effect.name,
+                    limit=f'driven = "{self.geometry.driven}"',
+                    remedy="remove the effect, or correct geometry.driven",
+                )
 
     def _check_angles(self) -> None:
         for axle in ("front", "rear"):

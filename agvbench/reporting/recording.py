@@ -21,7 +21,6 @@ from agvbench.reporting.content import plain
 from agvbench.statistics.end_poses import in_order
 from agvbench.statistics.rest_poses import start_pose
 from agvbench.types import Commands, Floats, Pose, Run
-from agvbench.vehicle.geometry import Geometry
 from agvbench.workflows.report import ReportData
 
 if TYPE_CHECKING:
@@ -73,7 +72,7 @@ def _vehicle(path: Path, header: CampaignHeader) -> VehicleModel:
     try:
         return VehicleModel.load(path / "vehicle.toml")
     except AgvbenchError:
-        return replace(thesis_vehicle(), geometry=Geometry(header.front_axle_m, header.rear_axle_m))
+        return replace(thesis_vehicle(), geometry=header.geometry)
 
 
 TIMELINE = "run_time"

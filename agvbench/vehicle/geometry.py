@@ -1,18 +1,23 @@
-"""Where the axles are."""
+"""Where the axles are, and which of them drives."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final, Literal, get_args
 
 from agvbench.errors import VehicleError
 from agvbench.vehicle.fields import coerce_float, require_positive
 
 LONGEST_M = 20.0
+Driven = Literal["both", "front", "rear"]
+"""Which axle the motor drives."""
+
+_FRONT_DRIVE_SHARES: Final[dict[str, float]] = {"both": 0.5, "front": 1.0, "rear": 0.0}
 
 
 @dataclass(frozen=True)
 class Geometry:
-    """Distances along the vehicle's centre line (thesis table 5.1, l_f and l_r).
+    """Distances along the vehicle's centre line (thesis table 5.1, l_f and l_r), and the driven axle.
 
     Parameters
     ----------
@@ -20,11 +25,13 @@ class Geometry:
         From the marker centroid forward to the front axle [m].
     rear_axle_m
         From the marker centroid backward to the rear axle [m].
+    driven
+        The driven axle. With one, the other rolls: the drive's speed is that of the driven axle alone.
 
     Raises
     ------
     VehicleError
-        Unless both are finite, greater than zero and at most 20 m.
+        Unless both distances are finite, greater than zero and at most 20 m, or if `driven` is unknown.
 
     Examples
     --------
@@ -34,6 +41,7 @@ class Geometry:
 
     front_axle_m: float
     rear_axle_m: float
+    driven: Driven = "both"
 
     def __post_init__(self) -> None:
         coerce_float(self, "front_axle_m", "rear_axle_m")
@@ -46,8 +54,17 @@ class Geometry:
                     limit=f"at most {LONGEST_M:g} m",
                     remedy="give metres",
                 )
+        if self.driven not in get_args(Driven):
+            raise VehicleError(
+                "unknown driven axle", where="driven", value=repr(self.driven), limit=", ".join(get_args(Driven))
+            )
 
     @property
     def wheelbase_m(self) -> float:
         """Distance from axle to axle [m]."""
         return self.front_axle_m + self.rear_axle_m
+
+    @property
+    def front_drive_share(self) -> float:
+        """Weight of the front axle's speed in the body's: 0.5 if both axles drive, 1 or 0 if one does."""
+        return _FRONT_DRIVE_SHARES[self.driven]

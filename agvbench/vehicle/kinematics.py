@@ -5,7 +5,8 @@ counter-clockwise positive: equal angles are crab, opposite angles are opposite 
 ``lr cos δr`` in eq. 5.6, where the speed vr belongs, and ``tan δf + tan δr`` in eq. 5.8, which
 contradicts its eq. 5.7; both follow from a rigid body whose axle points move along their wheels:
 
-- forward speed of the centroid u = (vf cos δf + vr cos δr) / 2 (the two are equal if nothing slips)
+- forward speed of the centroid u = (vf cos δf + vr cos δr) / 2 (the two are equal if nothing slips); with one driven
+  axle u = vf cos δf or u = vr cos δr
 - speed to the left w = u (lf tan δr + lr tan δf) / (lf + lr)
 - yaw rate ψ̇ = u (tan δf − tan δr) / (lf + lr)
 
@@ -31,9 +32,9 @@ def body_velocity(
     front_rad, rear_rad
         Axle angles [rad], counter-clockwise positive, within ±π/2; they and the speeds broadcast.
     front_mps, rear_mps
-        Speeds of the axles along their wheels [m/s], forward positive.
+        Speeds of the axles along their wheels [m/s], forward positive; that of an axle that is not driven is ignored.
     geometry
-        Where the axles are.
+        Where the axles are, and which of them drives.
 
     Returns
     -------
@@ -47,7 +48,8 @@ def body_velocity(
     (True, 0.0)
     """
     front, rear = np.asarray(front_rad, dtype=np.float64), np.asarray(rear_rad, dtype=np.float64)
-    forward = 0.5 * (np.asarray(front_mps) * np.cos(front) + np.asarray(rear_mps) * np.cos(rear))
+    share = geometry.front_drive_share
+    forward = share * np.asarray(front_mps) * np.cos(front) + (1.0 - share) * np.asarray(rear_mps) * np.cos(rear)
     tan_front, tan_rear = np.tan(front), np.tan(rear)
     left = forward * (geometry.front_axle_m * tan_rear + geometry.rear_axle_m * tan_front) / geometry.wheelbase_m
     return forward, left, forward * (tan_front - tan_rear) / geometry.wheelbase_m
@@ -63,7 +65,7 @@ def body_motion(
     Returns
     -------
     speed
-        v = (vf cos δf + vr cos δr) / (2 cos β) [m/s], negative when driving backward.
+        v = u / cos β [m/s], negative when driving backward; (vf cos δf + vr cos δr) / (2 cos β) if both axles drive.
     sideslip
         β = arctan((lf tan δr + lr tan δf) / (lf + lr)) [rad]: the velocity points along heading + β (eq. 5.9, 5.10).
     yaw_rate
@@ -74,6 +76,25 @@ def body_motion(
     lever = geometry.front_axle_m * np.tan(rear) + geometry.rear_axle_m * np.tan(front)
     sideslip = np.arctan(lever / geometry.wheelbase_m) + np.zeros_like(forward)
     return forward / np.cos(sideslip), sideslip, yaw_rate
+
+
+def wheel_speed(forward_mps: ArrayLike, front_rad: ArrayLike, rear_rad: ArrayLike, geometry: Geometry) -> Floats:
+    """Return the speed of the drive, along the wheels, that a forward speed of the centroid implies.
+
+    The inverse of `body_velocity` for equal speeds of the driven axles: u / cos δ of the driven axle, and
+    2 u / (cos δf + cos δr) if both drive (thesis eq. 5.6).
+
+    Parameters
+    ----------
+    forward_mps
+        Forward speed u of the centroid [m/s].
+    front_rad, rear_rad
+        Axle angles [rad] within ±π/2.
+    geometry
+        Which axle drives.
+    """
+    share = geometry.front_drive_share
+    return np.asarray(forward_mps, dtype=np.float64) / (share * np.cos(front_rad) + (1.0 - share) * np.cos(rear_rad))
 
 
 def axle_angles(

@@ -84,6 +84,8 @@ def _vehicles(a: Campaign, b: Campaign) -> Iterator[str]:
     if a.header.command_unit == b.header.command_unit:
         found.append(("neutral", a.header.neutral, b.header.neutral, a.header.command_unit))
     differing = [f"{name} {one:g} and {other:g} {unit}" for name, one, other, unit in found if one != other]
+    if a.header.driven != b.header.driven:
+        differing.append(f"driven axle {a.header.driven} and {b.header.driven}")
     if differing:
         yield f"The vehicles differ: {', '.join(differing)}."
 

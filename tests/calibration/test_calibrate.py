@@ -15,6 +15,7 @@ from agvbench.calibration import calibrate
 from agvbench.errors import FitError, InputError, VehicleError
 from agvbench.model import VehicleModel
 from agvbench.types import Commands, Run
+from agvbench.vehicle.geometry import Geometry
 
 STEPS = np.arange(-600.0, 601.0, 200.0)
 
@@ -27,6 +28,10 @@ class Header:
     rear_axle_m: float = REAR_M
     command_unit: str = "us"
     neutral: float = 1500.0
+
+    @property
+    def geometry(self) -> Geometry:
+        return Geometry(self.front_axle_m, self.rear_axle_m)
 
 
 class Runs(list):

@@ -66,7 +66,7 @@ def test_the_run_that_separates_rivals_does_so_when_it_is_driven(diagnosed):
     truth = Tiny(steering_lag_s=0.15)
     _, selection = diagnosed(truth, steps=False)
     chosen = selection.chosen.fit
-    proposal = discriminate(chosen, {"steering_lag": {"axle_coupling": 1.0}}, candidates(), unit="us")
+    proposal = discriminate(chosen, {"steering_lag": {"axle_coupling": 1.0}}, candidates(GEOMETRY), unit="us")
     experiment = proposal.experiment
     assert experiment is not None
     assert not proposal.inseparable
@@ -74,7 +74,7 @@ def test_the_run_that_separates_rivals_does_so_when_it_is_driven(diagnosed):
     nominal = nominal_model("tiny", GEOMETRY, "us", HEADER.neutral)
     commands = plan(trajectory, nominal).commands
     rng = np.random.default_rng(5)
-    alternative = swapped(chosen, "steering_lag", "axle_coupling", candidates())
+    alternative = swapped(chosen, "steering_lag", "axle_coupling", candidates(GEOMETRY))
     missed = {}
     for name, model in (("truth", chosen), ("rival", alternative)):
         squares = []
@@ -97,7 +97,7 @@ def _steps(commands):
 
 def test_steering_that_never_changes_while_driving_leaves_its_lag_open_and_a_run_pins_it(diagnosed):
     found, selection = diagnosed(Tiny(), steps=False)
-    flat = unidentified(selection.chosen.fit, candidates())
+    flat = unidentified(selection.chosen.fit, candidates(GEOMETRY))
     assert [item.name for item in flat] == ["steering_lag.time_constant_s"]
     assert found.to_json()["provenance"]["not_identifiable"][flat[0].name].startswith("never excited")
     experiment = found.next_experiment
@@ -138,7 +138,7 @@ def test_starts_keep_the_run_on_a_small_floor(diagnosed):
     repeatability = Workspace.circle(2.4, 0.1)
     alternatives = {"steering_lag": {"axle_coupling": 1.0}}
     experiment = discriminate(
-        selection.chosen.fit, alternatives, candidates(), unit="us", workspace=repeatability
+        selection.chosen.fit, alternatives, candidates(GEOMETRY), unit="us", workspace=repeatability
     ).experiment
     commands = plan(experiment.trajectory, nominal_model("tiny", GEOMETRY, "us", HEADER.neutral)).commands
     for start in experiment.starts:

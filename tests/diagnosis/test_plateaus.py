@@ -70,8 +70,10 @@ def selector(play):
     readings, geometry = read_runs(play.runs, NEUTRAL), Geometry(FRONT_M, REAR_M)
     maps = nodal_maps(readings.runs, NEUTRAL)
     prior_model = {role: np.zeros(len(maps.nodes[role])) for role in ROLES}
-    start = start_values(maps, [measure_run(run, geometry, neutral=NEUTRAL) for run in play.runs], prior_model)
-    return Selector(Batch(readings, maps, geometry), candidates(), start, 0, lambda _: None)
+    start = start_values(
+        maps, [measure_run(run, geometry, neutral=NEUTRAL) for run in play.runs], prior_model, geometry
+    )
+    return Selector(Batch(readings, maps, geometry), candidates(geometry), start, 0, lambda _: None)
 
 
 def test_a_fit_that_begins_on_a_plateau_ends_where_others_do(selector):

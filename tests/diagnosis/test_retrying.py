@@ -31,8 +31,8 @@ def selector(tiny_campaign):
     readings, geometry = read_runs(runs, HEADER.neutral), Geometry(FRONT_M, REAR_M)
     maps = nodal_maps(readings.runs, NEUTRAL)
     prior_model = {role: np.zeros(len(maps.nodes[role])) for role in ROLES}
-    start = start_values(maps, [measure_run(run, geometry, neutral=NEUTRAL) for run in runs], prior_model)
-    return Selector(Batch(readings, maps, geometry), candidates(), start, 0, lambda _: None)
+    start = start_values(maps, [measure_run(run, geometry, neutral=NEUTRAL) for run in runs], prior_model, geometry)
+    return Selector(Batch(readings, maps, geometry), candidates(geometry), start, 0, lambda _: None)
 
 
 @pytest.mark.parametrize(

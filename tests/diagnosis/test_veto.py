@@ -29,9 +29,9 @@ def chooser(campaign):
     held = ~split_runs(readings.runs, readings.group, 0).training
     maps = nodal_maps(readings.runs, NEUTRAL)
     prior_model = {role: np.zeros(len(maps.nodes[role])) for role in ROLES}
-    start = start_values(maps, [measure_run(run, geometry, neutral=NEUTRAL) for run in runs], prior_model)
+    start = start_values(maps, [measure_run(run, geometry, neutral=NEUTRAL) for run in runs], prior_model, geometry)
     batch = Batch(readings.select(~held), maps, geometry)
-    return Selector(batch, candidates(), start, 0, lambda _: None), readings, held
+    return Selector(batch, candidates(geometry), start, 0, lambda _: None), readings, held
 
 
 @pytest.fixture(scope="module")

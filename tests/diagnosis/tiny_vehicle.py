@@ -35,7 +35,7 @@ class InMemory:
     """A header and runs, as `diagnose` takes them."""
 
     runs: list[Run]
-    header = HEADER
+    header: CampaignHeader = HEADER
 
     def __iter__(self) -> Iterator[Run]:
         return iter(self.runs)
@@ -60,6 +60,7 @@ class Tiny:
     cornering_loss: float = 0.0
     reverse_gain: float = 0.0
     axle_ratio: float = 0.0
+    front_drive_share: float = 0.5
     warm_gain: float = 0.0
     warm_h: float = 0.4
     slow_patch: float = 0.0
@@ -129,7 +130,8 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
         v = s * (1.0 - tiny.cornering_loss * (abs(math.tan(df)) + abs(math.tan(dr))))
         if math.hypot(x - 0.6, y - 0.3) < 0.7:
             v *= 1.0 - tiny.slow_patch
-        forward = v * (math.cos(df) + (1.0 + tiny.axle_ratio) * math.cos(dr)) / 2.0
+        share = tiny.front_drive_share
+        forward = v * (share * math.cos(df) + (1.0 - share) * (1.0 + tiny.axle_ratio) * math.cos(dr))
         beta = math.atan((FRONT_M * math.tan(dr) + REAR_M * math.tan(df)) / (FRONT_M + REAR_M))
         convergence = forward / math.cos(beta)
         yaw = (

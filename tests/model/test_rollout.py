@@ -15,7 +15,7 @@ from agvbench.effects import ActuationDelay, SpeedLag, SteeringLag, effect_kinds
 from agvbench.errors import InputError, VehicleError
 from agvbench.model import VehicleModel, example_vehicle, thesis_vehicle
 from agvbench.types import Commands, Floats, Pose
-from agvbench.vehicle.geometry import Geometry
+from agvbench.vehicle.geometry import Driven, Geometry
 from agvbench.vehicle.maps import Line
 
 UNIT = Line(1.0, 0.0)
@@ -92,6 +92,16 @@ def test_settled_commands_give_exact_arcs(front: float, rear: float, speed: floa
     turned = (np.exp(1j * heading) - np.exp(0.7j)) / (1j * yaw) if yaw else t * np.exp(0.7j)
     position = complex(1.0, -2.0) + velocity * turned
     np.testing.assert_allclose(got, np.column_stack([position.real, position.imag, heading]), rtol=0.0, atol=2e-7)
+
+
+@pytest.mark.parametrize(("driven", "axle_m"), [("front", 0.181), ("rear", -0.121)])
+@pytest.mark.parametrize("speed", [0.3, -0.3])
+def test_the_driven_axle_covers_the_distance_of_the_drive(driven: Driven, axle_m: float, speed: float) -> None:
+    model = replace(vehicle(Truth(0.181, 0.121, 0.0, 0.0, 0.0, 0.0)), geometry=Geometry(0.181, 0.121, driven))
+    t = np.linspace(0.0, 10.0, 4001)
+    x, y, heading = model.rollout([commands(np.zeros(1), np.array([[0.4, -0.2, speed]]))], [(0.0, 0.0, 0.0)], [t])[0].T
+    axle = np.column_stack([x + axle_m * np.cos(heading), y + axle_m * np.sin(heading)])
+    assert np.hypot(*np.diff(axle, axis=0).T).sum() == pytest.approx(3.0, abs=1e-4)
 
 
 def test_straight_line_with_speed_lag_has_its_closed_form() -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 import tomli_w
 
-from agvbench.effects import ActuationDelay, SpeedLag, SteeringLag
+from agvbench.effects import ActuationDelay, AxleOverrun, SpeedLag, SteeringLag
 from agvbench.errors import AgvbenchError, FileError, VehicleError
 from agvbench.model import VehicleModel, example_names, example_vehicle, thesis_vehicle
 from agvbench.model.toml import vehicle_to_toml
@@ -28,6 +29,24 @@ def test_save_and_load_give_the_same_vehicle_and_the_same_bytes(name: str, tmp_p
     assert again == model
     assert again.calibration_hash == model.calibration_hash
     assert (tmp_path / "a.toml").read_bytes() == (tmp_path / "b.toml").read_bytes()
+
+
+def test_the_driven_axle_is_kept_and_is_part_of_the_physics(tmp_path: Path) -> None:
+    model = thesis_vehicle()
+    rear = replace(model, geometry=replace(model.geometry, driven="rear"))
+    rear.save(tmp_path / "v.toml")
+    again = VehicleModel.load(tmp_path / "v.toml")
+    assert again == rear
+    assert again.calibration_hash != model.calibration_hash
+    assert "driven" not in vehicle_to_toml(model)["geometry"]
+
+
+def test_an_effect_of_two_driven_axles_needs_both() -> None:
+    model = thesis_vehicle()
+    rear = replace(model, geometry=replace(model.geometry, driven="rear"))
+    assert rear.with_effects(AxleOverrun(0.0)).effects
+    with pytest.raises(VehicleError, match=r'axle_overrun.*driven = "rear".*correct geometry.driven'):
+        rear.with_effects(AxleOverrun(2.0))
 
 
 def test_the_file_says_its_units(tmp_path: Path) -> None:

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agvbench.errors import VehicleError
-from agvbench.vehicle.geometry import Geometry
-from agvbench.vehicle.kinematics import axle_angles, body_motion, body_velocity
+from agvbench.vehicle.geometry import Driven, Geometry
+from agvbench.vehicle.kinematics import axle_angles, body_motion, body_velocity, wheel_speed
 
 THESIS = Geometry(front_axle_m=0.181, rear_axle_m=0.121)
 angle = st.floats(-1.2, 1.2)
@@ -53,6 +53,28 @@ def test_turning_left_looks_as_it_should(mode: str, yaw_sign: int, left_sign: in
     _, left, yaw_rate = body_velocity(front, rear, 0.3, 0.3, THESIS)
     assert np.sign(np.round(yaw_rate, 12)) == yaw_sign
     assert np.sign(np.round(left, 12)) == left_sign
+
+
+@pytest.mark.parametrize(("driven", "axle_x"), [("front", 0.181), ("rear", -0.121)])
+@pytest.mark.parametrize("turn_rad", [0.4, -0.3])
+def test_the_driven_axle_moves_at_the_speed_of_the_drive(driven: Driven, axle_x: float, turn_rad: float) -> None:
+    front, rear = turn_rad, -0.5 * turn_rad
+    forward, left, yaw_rate = body_velocity(front, rear, 0.3, 0.3, Geometry(0.181, 0.121, driven))
+    along, across = velocity_at(axle_x, float(forward), float(left), float(yaw_rate))
+    assert math.hypot(along, across) == pytest.approx(0.3)
+    assert math.atan2(across, along) == pytest.approx(front if driven == "front" else rear)
+
+
+@given(front=angle, rear=angle, drive_mps=speed, driven=st.sampled_from(["both", "front", "rear"]))
+def test_wheel_speed_inverts_body_velocity(front: float, rear: float, drive_mps: float, driven: Driven) -> None:
+    geometry = Geometry(0.181, 0.121, driven)
+    forward, _, _ = body_velocity(front, rear, drive_mps, drive_mps, geometry)
+    assert float(wheel_speed(forward, front, rear, geometry)) == pytest.approx(drive_mps)
+
+
+def test_an_unknown_driven_axle_is_refused() -> None:
+    with pytest.raises(VehicleError, match=r"driven.*unknown driven axle.*'all'.*both, front, rear"):
+        Geometry(0.181, 0.121, "all")  # type: ignore[arg-type]
 
 
 def test_a_circle_about_a_centre_abeam_of_the_centroid() -> None:

@@ -29,7 +29,7 @@ def with_next_experiment(
     ``provenance["inseparable"]`` lists the pairs that no run can discriminate, with the required measurement;
     ``provenance["not_identifiable"]`` the parameters that these data do not identify.
     """
-    tried = candidates()
+    tried = candidates(header.geometry)
     chosen = selection.chosen.fit
     workspace = covered_workspace(readings, chosen.predictor.batch.geometry)
     unit = header.command_unit

@@ -101,6 +101,8 @@ class Search:
             approximate = self._approximate_evidence(slopes[..., item.at], len(tried))
             # Designs with a large effect are aggressive ones: evaluate some with a smaller effect, too.
             visible = np.flatnonzero(approximate > _MIN_EFFECT * float(approximate.max()))
+            if not len(visible):
+                continue  # no design shows it
             evaluated = visible[np.unique(np.linspace(0, len(visible) - 1, _EVALUATED).round().astype(int))]
             some = Batch(self.readings([tried[i] for i in evaluated]), chosen.predictor.maps, self.geometry)
             change = item.scale * slopes[..., item.at]

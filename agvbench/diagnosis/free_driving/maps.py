@@ -11,7 +11,7 @@ from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.model.nodal_maps import ROLES, NodalMaps, nodal_maps
 from agvbench.types import Floats, Run
 from agvbench.vehicle.geometry import Geometry
-from agvbench.vehicle.kinematics import axle_angles
+from agvbench.vehicle.kinematics import axle_angles, wheel_speed
 
 NODES = ((9, 6), (13, 10), (19, 15))
 """Numbers of nodes of steering and drive maps, for commands with many levels."""
@@ -67,7 +67,7 @@ def start_values_of_windows(maps: NodalMaps, readings: Readings, geometry: Geome
     forward = (np.cos(middle) * step[..., 0] + np.sin(middle) * step[..., 1]) * per_s
     left = (np.cos(middle) * step[..., 1] - np.sin(middle) * step[..., 0]) * per_s
     front, rear = axle_angles(forward, left, turn / dt, geometry)
-    value = {"front": front, "rear": rear, "drive": 2.0 * forward / (np.cos(front) + np.cos(rear))}
+    value = {"front": front, "rear": rear, "drive": wheel_speed(forward, front, rear, geometry)}
     when = 0.5 * (time[:, 1:] + time[:, :-1]) - _TYPICAL_DELAY_S
     moving = np.isfinite(front + rear) & (np.abs(forward) > _MIN_SPEED_MPS)
     out = []

@@ -105,7 +105,7 @@ class FreeDriving(Method[SelectedFromWindows]):
         """Return the selector for the training windows of `static`."""
         context, fitted, maps = self.context, static.predictor.readings, static.predictor.maps
         test = readings.select(thinned(np.flatnonzero(split.test), DATA.max_fitted_windows))
-        tried, kinds = candidates_for(context.vehicle)
+        tried, kinds = candidates_for(context.vehicle, context.geometry)
         given = given_effects(context.vehicle, tried)
         has_sessions = len(np.unique(readings.initial_states.session)) > 1 if readings.initial_states else False
         deviation = nodal_deviation(static.predictor, static.parameters) if has_sessions else np.inf

@@ -17,6 +17,7 @@ from agvbench.model import VehicleModel
 from agvbench.model.simulation.simulation import SimulatedRun, Simulation
 from agvbench.signals import robust_std
 from agvbench.types import Floats
+from agvbench.vehicle.kinematics import wheel_speed
 
 
 def constant_velocity(readings: Readings) -> Floats:
@@ -39,7 +40,7 @@ def speed_held(batch: Batch, parameters: Floats) -> Floats:
     settled, initial = predictor.settled(static)
     front, rear = settled[:, 0], settled[:, 1]
     speed = _initial_states(batch.readings).speed_mps[batch.base.row_runs]
-    settled[:, 2] = 2.0 * speed / (np.cos(front) + np.cos(rear))
+    settled[:, 2] = wheel_speed(speed, front, rear, batch.geometry)
     poses = batch.base.predict(settled, batch.base.nulls, initial)
     return poses.reshape(len(batch.readings), -1, 3)
 

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from agvbench.calibration import RunMeasurement
 from agvbench.effects import Effect
 from agvbench.types import Commands, Floats, Run
+from agvbench.vehicle.geometry import Geometry
+from agvbench.vehicle.kinematics import wheel_speed
 
 ROLES = ("front", "rear", "drive")
 _MAX_NODES = 40
@@ -139,7 +141,9 @@ def _driven_rows(commands: Commands, neutral: float) -> NDArray[np.bool_]:
     return np.asarray(commands.drive != neutral)
 
 
-def start_values(maps: NodalMaps, measured: Sequence[RunMeasurement], prior_model: dict[str, Floats]) -> Floats:
+def start_values(
+    maps: NodalMaps, measured: Sequence[RunMeasurement], prior_model: dict[str, Floats], geometry: Geometry
+) -> Floats:
     """Return the nodal values at which a fit starts: those of steady drives, by inverted kinematics.
 
     At nodes without a steady drive they are those of the prior model (`prior_model[role]`, values at the nodes), plus
@@ -150,7 +154,7 @@ def start_values(maps: NodalMaps, measured: Sequence[RunMeasurement], prior_mode
         nodes = maps.nodes[role]
         known = np.full(len(nodes), np.nan)
         for k, node in enumerate(nodes):
-            implied = [_implied(role, m) for m in measured if getattr(m.command, role) == node]
+            implied = [_implied(role, m, geometry) for m in measured if getattr(m.command, role) == node]
             implied = [v for v in implied if np.isfinite(v)]
             if implied:
                 known[k] = float(np.median(implied))
@@ -161,12 +165,12 @@ def start_values(maps: NodalMaps, measured: Sequence[RunMeasurement], prior_mode
     return np.concatenate(values)
 
 
-def _implied(role: str, m: RunMeasurement) -> float:
+def _implied(role: str, m: RunMeasurement, geometry: Geometry) -> float:
     if role != "drive":
         return float(getattr(m, f"{role}_rad")) if abs(m.speed_mps) > _MIN_SPEED_MPS else np.nan
     if not m.moves:
         return 0.0
-    return float(m.speed_mps * 2.0 * np.cos(m.sideslip_rad) / (np.cos(m.front_rad) + np.cos(m.rear_rad)))
+    return float(wheel_speed(m.speed_mps * np.cos(m.sideslip_rad), m.front_rad, m.rear_rad, geometry))
 
 
 def _interpolation(nodes: Floats, command: Floats) -> Floats:

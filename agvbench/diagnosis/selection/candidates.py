@@ -15,6 +15,7 @@ from agvbench.effects import Effect, effect_kinds
 from agvbench.effects.variants import effect_variants
 from agvbench.model import VehicleModel
 from agvbench.types import Floats
+from agvbench.vehicle.geometry import Geometry
 
 ABSORBED_BY_MAPS = frozenset({"steering_saturation", "drive_dead_band"})
 """Effects that nodal maps absorb: end stops and dead bands are read off the fitted maps."""
@@ -45,10 +46,17 @@ class Candidate:
         return frozenset({(self.name, self.starts.tobytes() + bytes((self.screened, self.patient)))})
 
 
-def candidates(exclude: Iterable[str] = ()) -> dict[str, Candidate]:
-    """Return every effect of the library, by name, except those that nodal maps absorb and those in `exclude`."""
+def candidates(geometry: Geometry, exclude: Iterable[str] = ()) -> dict[str, Candidate]:
+    """Return every effect of the library, by name, except those that nodal maps absorb and those in `exclude`.
+
+    Effects of two driven axles are no candidates if one is driven.
+    """
     excluded = {*exclude, *ABSORBED_BY_MAPS}
-    return {name: candidate(kind) for name, kind in effect_kinds().items() if name not in excluded}
+    return {
+        name: candidate(kind)
+        for name, kind in effect_kinds().items()
+        if name not in excluded and (geometry.driven == "both" or not kind.needs_both_axles_driven)
+    }
 
 
 def candidate(kind: type[Effect]) -> Candidate:

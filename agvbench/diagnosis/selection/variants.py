@@ -21,6 +21,7 @@ from agvbench.effects import Effect
 from agvbench.effects.variants import Variant, cause_of, effect_variants
 from agvbench.model import VehicleModel
 from agvbench.types import Floats
+from agvbench.vehicle.geometry import Geometry
 
 EXTENDED_LIBRARY: tuple[type[Effect], ...] = (*TERMS, *effect_variants().values())
 """Discrepancy terms and variants: the extended library. One simulation contains all, because compiling is slow."""
@@ -31,7 +32,9 @@ def variant_candidates() -> dict[str, Candidate]:
     return {name: candidate(variant) for name, variant in effect_variants().items()}
 
 
-def candidates_for(vehicle: VehicleModel | None) -> tuple[dict[str, Candidate], tuple[type[Effect], ...]]:
+def candidates_for(
+    vehicle: VehicleModel | None, geometry: Geometry
+) -> tuple[dict[str, Candidate], tuple[type[Effect], ...]]:
     """Return the candidates for a vehicle, and the effects outside the library that its simulation needs.
 
     A variant that the vehicle already has is a candidate in place of the effect of the library.
@@ -39,7 +42,7 @@ def candidates_for(vehicle: VehicleModel | None) -> tuple[dict[str, Candidate], 
     present = {effect.name for effect in (vehicle.effects if vehicle else ()) if not effect.is_null}
     variants = {name: one for name, one in variant_candidates().items() if name in present}
     known = {effect_variants()[name].variant_of for name in variants}
-    return candidates(exclude=known) | variants, EXTENDED_LIBRARY if variants else ()
+    return candidates(geometry, exclude=known) | variants, EXTENDED_LIBRARY if variants else ()
 
 
 def with_extended_library(selector: Selector) -> Selector:

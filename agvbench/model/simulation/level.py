@@ -9,7 +9,7 @@ import math
 
 from agvbench.effects.state import FORWARD, FRONT, HOURS, LEFT, REAR, SEEN_LAG, SPEED, TIME, YAW_RATE
 from agvbench.model.compiled import compiled
-from agvbench.model.simulation.layout import FRONT_AXLE, NODAL_DEVIATION, REAR_AXLE, SECONDS_PER_HOUR, STARTED
+from agvbench.model.simulation.layout import NODAL_DEVIATION, SECONDS_PER_HOUR, STARTED
 from agvbench.model.simulation.step import set_motion
 from agvbench.types import Floats
 
@@ -25,7 +25,7 @@ def _longitudinal_speed(s: Floats, p: Floats, vehicle: Floats, servos: Floats, n
     s[TIME] = now
     s[HOURS] = vehicle[STARTED] + now / SECONDS_PER_HOUR
     s[FRONT], s[REAR], s[SPEED] = servos[2], servos[3], speed
-    set_motion(s, p, vehicle[FRONT_AXLE], vehicle[REAR_AXLE])
+    set_motion(s, p, vehicle)
     return float(s[FORWARD])
 
 

@@ -231,6 +231,7 @@ class Simulation:
                 [
                     self.geometry.front_axle_m,
                     self.geometry.rear_axle_m,
+                    self.geometry.front_drive_share,
                     self._longest_step(parameters),
                     0.0,
                     nodal_deviation,

@@ -39,6 +39,7 @@ from agvbench.model.simulation.layout import (
     ALONG_Y,
     COUNT,
     FRONT_AXLE,
+    FRONT_DRIVE_SHARE,
     LATERAL,
     LONGITUDINAL,
     NODES,
@@ -55,7 +56,7 @@ from agvbench.types import Floats
 
 
 @compiled(inner=True, fast=True)
-def set_motion(s: Floats, p: Floats, front_axle_m: float, rear_axle_m: float) -> None:
+def set_motion(s: Floats, p: Floats, vehicle: Floats) -> None:
     """Turn angles and speed in `s` into the body's motion (thesis eq. 5.6–5.8, corrected)."""
     steer(s, p)
     front, rear = s[FRONT], s[REAR]
@@ -65,7 +66,8 @@ def set_motion(s: Floats, p: Floats, front_axle_m: float, rear_axle_m: float) ->
         s[TAN_FRONT], s[TAN_REAR] = math.sin(front) / s[COS_FRONT], math.sin(rear) / s[COS_REAR]
     s[FRONT_SPEED] = s[REAR_SPEED] = s[SPEED]
     drive(s, p)
-    forward = 0.5 * (s[FRONT_SPEED] * s[COS_FRONT] + s[REAR_SPEED] * s[COS_REAR])
+    front_axle_m, rear_axle_m, share = vehicle[FRONT_AXLE], vehicle[REAR_AXLE], vehicle[FRONT_DRIVE_SHARE]
+    forward = share * s[FRONT_SPEED] * s[COS_FRONT] + (1.0 - share) * s[REAR_SPEED] * s[COS_REAR]
     per_wheelbase = forward / (front_axle_m + rear_axle_m)
     s[FORWARD] = forward
     s[LEFT] = per_wheelbase * (front_axle_m * s[TAN_REAR] + rear_axle_m * s[TAN_FRONT])
@@ -88,7 +90,7 @@ def take_step(
         # Pose for effects that depend on it, extrapolated with the velocity at the last node.
         s[X], s[Y], s[HEADING] = start[0] + elapsed * x_rate, start[1] + elapsed * y_rate, start[2] + elapsed * yaw_rate
         s[DISTANCE] = start[3] + elapsed * abs(s[SPEED])
-        set_motion(s, p, vehicle[FRONT_AXLE], vehicle[REAR_AXLE])
+        set_motion(s, p, vehicle)
         work[LONGITUDINAL + i], work[LATERAL + i], work[TURN + i] = s[FORWARD], s[LEFT], s[YAW_RATE]
     for i in range(COUNT):
         turned = 0.0

@@ -16,7 +16,7 @@ import pandas as pd
 from agvbench.adapters import check_specs
 from agvbench.bus.link import VehicleLink
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
-from agvbench.campaign.header import FILE_NAME
+from agvbench.campaign.header import FILE_NAME, schema_for
 from agvbench.campaign.lock import locked
 from agvbench.campaign.manifest import PLANNED_TABLE
 from agvbench.campaign.writer import refuse_occupied
@@ -139,7 +139,7 @@ def _header(
     """Return the campaign's header; a session that is resumed keeps the names that it began with."""
     identity = link.identity()
     header = CampaignHeader(
-        schema=1,
+        schema=schema_for(nominal.geometry.driven),
         name=directory.resolve().name,
         vehicle_name=nominal.name if settings.vehicle else identity.vehicle,
         front_axle_m=nominal.geometry.front_axle_m,
@@ -147,6 +147,7 @@ def _header(
         command_unit=nominal.command_unit,
         neutral=nominal.neutral,
         mocap_rate_hz=identity.mocap_rate_hz,
+        driven=nominal.geometry.driven,
     )
     if resume and (directory / FILE_NAME).exists():
         stored = CampaignHeader.load(directory / FILE_NAME)
