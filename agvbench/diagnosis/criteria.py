@@ -93,8 +93,6 @@ class SelectionCriteria:
         Share of the groups of runs with the largest gains, without which an effect must still gain.
     ``wald_alpha``
         Level at which the parameters of an effect must differ from their null values, with errors clustered by group.
-    ``max_effects``
-        Effects that are added one by one.
     ``min_gain_of_initial_steering``
         Predicted gain of slow steering above which the other initial steering is fitted.
     """
@@ -104,7 +102,6 @@ class SelectionCriteria:
     min_relative_change: float = 0.15
     best_group_share: float = 0.05
     wald_alpha: float = 1e-4
-    max_effects: int = 4
     min_gain_of_initial_steering: float = 20.0
 
 
@@ -129,8 +126,8 @@ class DiscrepancyCriteria:
     ``min_predicted_gain``, ``min_share_of_best_start``, ``max_starts``
         Starts of terms that are fitted: predicted to gain this much, and this share of what the best is predicted to
         gain, and at most this many, because each is a fit of several seconds.
-    ``max_refitted``, ``max_effects``
-        Effects that are reconsidered beside a term, and effects beside a term.
+    ``max_refitted``
+        Effects that are reconsidered beside a term in one step.
     ``few_groups_share``
         An effect that gains nothing without this share of the groups rests on few of them. A term may take its place.
     """
@@ -139,7 +136,6 @@ class DiscrepancyCriteria:
     min_share_of_best_start: float = 0.3
     max_starts: int = 3
     max_refitted: int = 3
-    max_effects: int = 5
     few_groups_share: float = 0.1
 
 

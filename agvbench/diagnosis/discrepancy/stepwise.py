@@ -62,7 +62,7 @@ def _add_masked_effects(extended: Selector, current: ScoredModel) -> ScoredModel
     An effect without a gain beside the first selection may become significant once the term is in the model. The gain
     of each effect is predicted, and only the best are fitted.
     """
-    while len(current.names) < DISCREPANCY.max_effects and has_lack_of_fit(current):
+    while has_lack_of_fit(current):
         names = [name for name in extended.candidates if name not in current.names and name not in _TERM_NAMES]
         predicted_gains = {name: extended.predicted_gain(current, name) for name in names}
         best = sorted(predicted_gains, key=lambda name: -predicted_gains[name])[: DISCREPANCY.max_refitted]

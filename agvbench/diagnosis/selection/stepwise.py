@@ -59,7 +59,7 @@ class Selector(FittedModels):
         """Add effects until none meets the criterion, then remove those without which the model predicts as well."""
         base = current = self.base()
         rejected: dict[str, float] = {}
-        while len(current.names) < len(self.given) + SELECTION.max_effects:
+        while True:  # ends when no effect meets the criterion: there are only so many candidates
             larger = {name: self.with_effect(current, name) for name in self.candidates if name not in current.names}
             rejected = {name: model.gain_over(current) for name, model in larger.items()}
             accepted = {name: model for name, model in larger.items() if self.meets_criterion(current, model)}
