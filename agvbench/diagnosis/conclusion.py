@@ -9,6 +9,9 @@ from agvbench.diagnosis.criteria import RESIDUAL
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.data.splits import Split
 from agvbench.diagnosis.design.propose import with_next_experiment
+from agvbench.diagnosis.discrepancy.campaign_time import columns_by_campaign_time
+from agvbench.diagnosis.discrepancy.regression import steering_tangents
+from agvbench.diagnosis.discrepancy.stability import stability_test
 from agvbench.diagnosis.findings.corrected_vehicle import corrected_vehicle
 from agvbench.diagnosis.findings.estimates import named_effects
 from agvbench.diagnosis.findings.map_structure import map_effects
@@ -63,6 +66,9 @@ def conclude(
     if tested is None:
         return context.not_identifiable(readings, "there are no repeats among the runs, and so no repeatability")
     rest, likely = _remaining_dependences(batch, poses, term_selection, context.seed)
+    if (change := _change(batch, fit.parameters, poses, context.seed)) is not None:
+        at = int(term_selection is not None)
+        rest = [*rest[:at], change, *rest[at:]]
     effects = named_effects(selection, bounds_of(selection.chosen.names)) + map_effects(fit, context.vehicle)
     significant = term_selection is not None or tested.has_lack_of_fit or bool(rest)
     verdict, why = _verdict(effects, significant, rest, term_selection)
@@ -119,6 +125,13 @@ def _remaining_dependences(
     return (rest if term_selection is None else with_term_first(rest, term_selection)), likely
 
 
+def _change(batch: Batch, parameters: Floats, poses: Floats, seed: int) -> Dependence | None:
+    """Return on what repeats depend that were driven at different times, or None."""
+    rates = residual_rates(batch.readings, poses)
+    tangents = steering_tangents(batch, parameters, rates)
+    return stability_test(rates, columns_by_campaign_time(rates, tangents, batch.geometry), batch.readings, seed)
+
+
 def _fit_provenance(selection: Selection, readings: Readings) -> dict[str, object]:
     random_effects = selection.chosen.fit.variance_components.random_effects
     return {
@@ -154,7 +167,13 @@ def _held_out(kept: Readings, assessment: Assessment) -> HeldOut:
         {MEDIAN: residuals.median_mm()} | residuals.rms() for residuals in (assessment.before, assessment.after)
     )
     errors = {
-        name: {"before": before[name], "after": after[name], "floor": assessment.repeatability[name]} for name in before
+        name: {
+            "before": before[name],
+            "after": after[name],
+            "floor": assessment.repeatability[name],
+            "reproducibility": assessment.reproducibility[name],
+        }
+        for name in before
     }
     was, now = assessment.before.squares()["position_rms_mm"], assessment.after.squares()["position_rms_mm"]
     tolerance = (assessment.repeatability["position_rms_mm"] / 1e3) ** 2

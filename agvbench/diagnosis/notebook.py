@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from agvbench.diagnosis.result import Diagnosis
 
 _EFFECTS = ("effect", "parameter", "value", "stderr", "unit", "confounded_with")
-_ERRORS = ("quantity", "before", "after", "floor")
+_ERRORS = ("quantity", "before", "after", "floor", "reproducibility")
 
 
 def effects_frame(found: Diagnosis) -> pd.DataFrame:

@@ -57,10 +57,11 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Errors in the test runs: by quantity (``end_position_mm`` …) ``before``, ``after`` and ``floor``.
+    """Errors in the test runs: by quantity (``end_position_mm`` …) ``before``, ``after``, and the spread of repeats.
 
-    ``floor`` is the repeatability. ``worse_on`` names the trajectories or recordings whose error is larger after than
-    before.
+    ``floor`` is the repeatability: repeats in succession. ``reproducibility`` is that of all repeats of the campaign;
+    windows of free driving have none. ``worse_on`` names the trajectories or recordings whose error is larger after
+    than before.
     """
 
     runs: int
@@ -110,7 +111,8 @@ class Diagnosis:
     def errors_frame(self) -> pd.DataFrame:
         """Return one row per quantity, predicted for the test runs; without any where nothing could be predicted.
 
-        Columns: ``quantity`` (its unit ends the name), ``before``, ``after`` and ``floor``, the repeatability.
+        Columns: ``quantity`` (its unit ends the name), ``before``, ``after``, ``floor`` (the repeatability) and
+        ``reproducibility``.
         """
         from agvbench.diagnosis.notebook import errors_frame
 

@@ -102,7 +102,7 @@ QUANTITIES = {
     "heading_rms_deg": "heading along the way [°]",
 }
 """What errors before and after are of, by their name in the JSON."""
-COLUMNS = {"before": "before", "after": "after", "floor": "repeatability"}
+COLUMNS = {"before": "before", "after": "after", "floor": "repeatability", "reproducibility": "reproducibility"}
 """Headings of the errors of a quantity, by their name in the JSON."""
 DEFINITIONS = (
     "Errors are measured minus predicted. End position error: distance between the two end positions; along and "

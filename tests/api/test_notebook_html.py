@@ -53,7 +53,9 @@ def shown(result: object) -> Page:
 @pytest.fixture
 def diagnosis():
     effect = NamedEffect("steering_lag", {"time_constant_s": Estimate(0.2, 0.01, "s")}, ("<b>",), {})
-    held = HeldOut(8, {"end_position_mm": {"before": 80.0, "after": 6.0, "floor": 5.0}, "along_mm": {}}, ())
+    held = HeldOut(
+        8, {"end_position_mm": {"before": 80.0, "after": 6.0, "floor": 5.0, "reproducibility": 5.5}, "along_mm": {}}, ()
+    )
     why = "structure <remains>"
     depends = (Dependence("x_m", 0.001, 0.4, "speed"),)
     return agvbench.Diagnosis(agvbench.Verdict.UNKNOWN, why, effects=(effect,), depends_on=depends, held_out=held)
@@ -81,8 +83,8 @@ def test_every_trajectory_shows_its_segments(trajectory):
 def test_a_diagnosis_shows_verdict_effects_and_errors(diagnosis):
     page = shown(diagnosis)
     assert ["steering_lag", "time_constant_s", "0.2", "0.01", "s", "<b>"] in page.rows
-    assert ["end_position_mm", "80", "6", "5"] in page.rows
-    assert ["along_mm", "–", "–", "–"] in page.rows
+    assert ["end_position_mm", "80", "6", "5", "5.5"] in page.rows
+    assert ["along_mm", "–", "–", "–", "–"] in page.rows
     assert "UNKNOWN" in diagnosis._repr_html_()
     assert "depends on x_m" in diagnosis._repr_html_()
 

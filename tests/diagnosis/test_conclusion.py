@@ -42,7 +42,7 @@ def off_by(*position_m: float) -> PoseResiduals:
 
 def assessment(after_floors: float, lack_of_fit: float | None) -> Assessment:
     after = off_by(*[2e-3 * after_floors] * 4)
-    return Assessment(after, after, FLOOR, lack_of_fit)
+    return Assessment(after, after, FLOOR, FLOOR, lack_of_fit)
 
 
 @pytest.mark.parametrize(
@@ -92,9 +92,9 @@ def test_what_got_worse_by_more_than_the_floor_is_told():
     # Squares: 9 before; 9 + 4 × 0.25, 9 + 4 × 4 and less, the floor's square being 4 mm².
     after = off_by(*[np.sqrt(10.0) * 1e-3] * 2, *[5e-3] * 2, *[1e-3] * 2)
     kept = Kept(np.repeat([0, 1, 2], 2), runs)
-    found = _held_out(kept, Assessment(before, after, FLOOR, None))
+    found = _held_out(kept, Assessment(before, after, FLOOR, FLOOR, None))
     assert found.worse_on == ("2",)
     assert found.runs == 6
     assert found.errors["position_rms_mm"]["before"] == pytest.approx(3.0)
-    turned = _held_out(kept, Assessment(after, before, FLOOR, None))
+    turned = _held_out(kept, Assessment(after, before, FLOOR, FLOOR, None))
     assert turned.worse_on == ("free-1",)

@@ -39,7 +39,7 @@ def test_json_and_vehicle_of_a_whole_command(adequate, tmp_path, capsys):
     assert content["unexplained"] == {"significant": False, "depends_on": []}
     end_pose = ["end_position_mm", "end_position_median_mm", "along_mm", "across_mm", "delta_heading_deg", "delta_s_mm"]
     assert list(content["held_out"]) == ["runs", *end_pose, "position_rms_mm", "heading_rms_deg", "worse_on"]
-    assert all(set(content["held_out"][name]) == {"before", "after", "floor"} for name in end_pose)
+    assert all(set(content["held_out"][name]) == {"before", "after", "floor", "reproducibility"} for name in end_pose)
     model = VehicleModel.load(out)
     assert float(model.speed(900.0)) == pytest.approx(0.32, rel=0.01)
     assert float(model.front(1300.0)) == pytest.approx(0.274, abs=0.003)

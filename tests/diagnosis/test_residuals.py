@@ -1,13 +1,16 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 
 import numpy as np
 import pytest
 
-from agvbench.diagnosis.residuals.residuals import EndCovariance, PoseResiduals, lack_of_fit, repeatability
+from agvbench.diagnosis.residuals.repeatability import repeatability, reproducibility
+from agvbench.diagnosis.residuals.residuals import EndCovariance, PoseResiduals, lack_of_fit
 
 GROUP = np.repeat(np.arange(40), 4)
+STARTED_H = np.tile(np.linspace(0.0, 1.2, 4), 40)
 
 
 def scattered(seed: int, *, scatter_m: float, common_m: float) -> PoseResiduals:
@@ -21,8 +24,9 @@ def scattered(seed: int, *, scatter_m: float, common_m: float) -> PoseResiduals:
 
 
 def test_the_floor_is_the_scatter_of_repeats_whatever_they_have_in_common():
-    for common in (0.0, 0.05):
-        found = repeatability(scattered(1, scatter_m=0.004, common_m=common), GROUP)
+    for common, of in product((0.0, 0.05), (repeatability, reproducibility)):
+        residuals = scattered(1, scatter_m=0.004, common_m=common)
+        found = of(residuals, GROUP, STARTED_H) if of is repeatability else of(residuals, GROUP)
         assert found["position_rms_mm"] == pytest.approx(4.0, rel=0.15)
         assert found["delta_s_mm"] == pytest.approx(4.0, rel=0.15)
         assert found["along_mm"] == pytest.approx(4.0, rel=0.15)
@@ -45,12 +49,34 @@ def test_what_is_missed_across_shows_in_the_end_position_and_not_in_the_distance
 def test_one_spoilt_run_hardly_lifts_the_floor():
     missed = scattered(2, scatter_m=0.004, common_m=0.0)
     missed.path[5, :, 0] += 1.0
-    assert repeatability(missed, GROUP)["position_rms_mm"] < 8.0
+    assert repeatability(missed, GROUP, STARTED_H)["position_rms_mm"] < 8.0
+    assert reproducibility(missed, GROUP)["position_rms_mm"] < 8.0
+
+
+def test_a_step_in_mid_campaign_enters_reproducibility_more_than_repeatability():
+    missed = scattered(6, scatter_m=0.004, common_m=0.0)
+    missed.path[STARTED_H > 0.6, :, 0] += 0.02
+    # Of four repeats with a step d between the second and the third, the variance is d²/3, and that of the three
+    # successive differences d²/6.
+    assert repeatability(missed, GROUP, STARTED_H)["position_rms_mm"] == pytest.approx(np.hypot(4.0, 8.16), rel=0.1)
+    assert reproducibility(missed, GROUP)["position_rms_mm"] == pytest.approx(np.hypot(4.0, 11.55), rel=0.1)
+
+
+def test_runs_are_ordered_by_time_and_not_by_number():
+    missed, rng = scattered(7, scatter_m=0.004, common_m=0.0), np.random.default_rng(0)
+    missed.path[..., 0] += 0.02 * STARTED_H[:, None]
+    order = rng.permutation(160)
+    shuffled = PoseResiduals(
+        missed.path[order], missed.seen[order], missed.delta_s_m[order], missed.delta_heading_rad[order]
+    )
+    found = repeatability(shuffled, GROUP[order], STARTED_H[order])
+    assert found == pytest.approx(repeatability(missed, GROUP, STARTED_H))
 
 
 def test_without_repeats_there_is_no_floor():
     missed = scattered(3, scatter_m=0.004, common_m=0.0)
-    assert repeatability(missed, np.arange(160)) is None
+    assert repeatability(missed, np.arange(160), STARTED_H) is None
+    assert reproducibility(missed, np.arange(160)) is None
     assert lack_of_fit(missed, np.arange(160)) is None
 
 

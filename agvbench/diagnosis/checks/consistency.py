@@ -112,6 +112,7 @@ _DURATION_TOLERANCE = 0.05
 _MAX_GROUPS = 0.25
 _MIN_DISTANCE_M, _MIN_SHARE, _MIN_PAIRS = 0.3, 0.15, 6
 _MIN_GAP_RATIO, _MIN_FAR_DISTANCE, _MIN_CLUSTER_RATIO = 1.5, 0.02, 6.0
+_PARTS, _MIN_AGREEMENT, _SAME_START_M = 25, 0.9, 0.3
 
 
 def require_consistent_repeats(readings: Readings, *, where: str) -> None:
@@ -159,10 +160,10 @@ def _same_duration(readings: Readings, runs: NDArray[np.int64], others: NDArray[
 
 
 def _require_single_cluster(readings: Readings, path: Floats, where: str) -> None:
-    """Raise an error if the deviations between repeats have two clusters with a gap between them.
+    """Raise an error if the deviations between repeats have two clusters, and neither time nor place divides the runs.
 
-    Random errors, wear and positions on the floor fill the gap. Two vehicles under one name, or two calibrations, do
-    not.
+    Random errors and wear fill the gap between clusters. Two vehicles under one name, driven in turn, do not. A change
+    during the campaign and a disturbance at a place make two clusters, too: these are evidence for the diagnosis.
     """
     pairs = np.array(
         [
@@ -190,6 +191,8 @@ def _require_single_cluster(readings: Readings, path: Floats, where: str) -> Non
         gaps.max() < _MIN_GAP_RATIO
         or far[0] < _MIN_FAR_DISTANCE
         or np.median(far) < _MIN_CLUSTER_RATIO * np.median(near)
+        or _divided_by_time(readings.started_h[pairs], np.arange(count) >= at)
+        or _divided_by_place(readings.start[pairs, :2], np.arange(count) >= at)
     ):
         return
     i, j = pairs[at]
@@ -200,3 +203,22 @@ def _require_single_cluster(readings: Readings, path: Floats, where: str) -> Non
         f"{near[-1]:.0%}; {readings.runs[i].run_id} and {readings.runs[j].run_id} differ",
         remedy="see that one vehicle drove them all under one calibration, or diagnose its runs apart",
     )
+
+
+def _divided_by_time(hours: Floats, far: NDArray[np.bool_]) -> bool:
+    """Return whether one part of the campaign differs from the rest: pairs are far if one run is in it.
+
+    `hours` (pairs, 2) are the times at which the runs began, and `far` (pairs,) says which pairs are far.
+    """
+    times = np.quantile(hours, np.linspace(0.0, 1.0, _PARTS))
+    for begin, end in combinations([*times.tolist(), np.inf], 2):
+        inside = (hours >= begin) & (hours < end)
+        if np.mean((inside[:, 0] != inside[:, 1]) == far) > _MIN_AGREEMENT:
+            return True
+    return False
+
+
+def _divided_by_place(starts: Floats, far: NDArray[np.bool_]) -> bool:
+    """Return whether repeats from the same start are near; `starts` (pairs, 2, 2) are start positions [m]."""
+    same = np.hypot(*np.diff(starts, axis=1)[:, 0].T) <= _SAME_START_M
+    return bool(np.count_nonzero(same) >= _MIN_PAIRS and np.mean(~far[same]) > _MIN_AGREEMENT)

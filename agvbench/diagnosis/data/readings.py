@@ -60,6 +60,12 @@ class Readings:
         """Which samples there are, (R, K)."""
         return np.isfinite(self.poses[:, :, 0])
 
+    @property
+    def session_group(self) -> NDArray[np.int64]:
+        """The same number for runs with the same commands in the same session, (R,)."""
+        session = np.unique([run.session or "" for run in self.runs], return_inverse=True)[1]
+        return np.asarray(self.group * (int(session.max(initial=0)) + 1) + session)
+
     def select(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> Readings:
         """Return the runs that a mask or an index array selects."""
         chosen = np.arange(len(self))[index]

@@ -67,7 +67,7 @@ class GroupedRegression:
         self.folds, self.sqrt_weight = [np.flatnonzero(fold == f) for f in range(FOLDS)], np.sqrt(rates.weight)
         drive, axles = _dummies(tangents.levels[:, 0]), [_dummies(tangents.levels[:, k]) for k in (1, 2)]
         self.absorbed = [self._orthogonal([drive]), *[self._orthogonal(axles)] * 2]
-        self.values = [self._without_maps(k, _winsorised(rates.value[:, k])) for k in range(3)]
+        self.values = [self._without_maps(k, winsorised(rates.value[:, k])) for k in range(3)]
         self.size = [max(float(np.sqrt(np.mean(v * v))), _MIN_SCALE) for v in self.values]
         self.values = [v / s for v, s in zip(self.values, self.size, strict=True)]
         self.count = len(np.unique(rates.run))
@@ -107,7 +107,7 @@ class GroupedRegression:
         return np.array([c.T @ c for c, _ in parts]), np.array([c.T @ v for c, v in parts])
 
 
-def _winsorised(value: Floats) -> Floats:
+def winsorised(value: Floats) -> Floats:
     """Winsorise the values (n,): a single run with large residuals must not dominate the regression."""
     limit = _WINSOR_LIMIT * float(np.quantile(np.abs(value - np.median(value)), _WINSOR_QUANTILE))
     return np.clip(value, np.median(value) - limit, np.median(value) + limit)

@@ -7,7 +7,7 @@ squares. Groups of runs that are left out decide on the rank of a shape.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis import terms
 from agvbench.diagnosis.data.splits import folds
+from agvbench.diagnosis.discrepancy.campaign_time import by_axle_angles, changes
 from agvbench.diagnosis.discrepancy.regression import FOLDS, Columns, GroupedRegression, SteeringTangents
 from agvbench.diagnosis.residuals.body_rates import Rates
 from agvbench.diagnosis.terms import DiscrepancyTerm
@@ -28,10 +29,9 @@ _LINE_DIRECTIONS = 16
 _STRIP_DIRECTIONS, _STRIP_STEP, _WIDTHS_M = 8, 16, (0.3, 0.6, 1.0, 1.6)
 _BLUR_M, _SHARP_M, _BEST_LINES, _FINE_STEPS, _MIN_CROSSINGS = 0.1, 0.01, 4, 9, 5
 _RUN_TIMES_S = (0.4, 0.8, 1.6, 3.2, 6.4)
-_HOURS = (0.1, 0.2, 0.4, 0.8, 2.0)
 _WAVES_M = np.geomspace(0.12, 1.5, 50)
 
-Option = tuple[Columns, "Values"]
+Option = tuple[Columns, Callable[[Floats], list[float]]]
 
 
 class Values:
@@ -72,32 +72,16 @@ def options(
     yield terms.TurnByHeading, iter([({2: sine}, Values())])
     yield terms.SpeedByRunTime, _run_times(rates)
     yield terms.TwistAtStart, _starts(rates)
-    yield terms.SteeringByCampaignTime, _campaign_times(rates, tangents, geometry)
-    hours, direction = c["campaign_time_h"], c["direction"]
-    yield terms.TrimByCampaignTime, iter([(_axles(hours, hours, tangents, geometry), Values())])
-    yield terms.SteeringByDirection, iter([(_axles(direction, direction, tangents, geometry), Values())])
+    for term, shapes in changes(rates, tangents, geometry, regression):
+        yield term, ((columns, course.values) for columns, course in shapes)
+    direction = c["direction"]
+    yield terms.SteeringByDirection, iter([(by_axle_angles(direction, direction, tangents, geometry), Values())])
     change = tangents.previous - tangents.tangent
     angle = np.arctan(tangents.previous) - np.arctan(tangents.tangent)
     if np.any(change != 0.0):
-        both = _axles(angle[:, 0], angle[:, 1], tangents, geometry)
+        both = by_axle_angles(angle[:, 0], angle[:, 1], tangents, geometry)
         yield terms.SteeringByHistory, iter([({k: v.sum(axis=1, keepdims=True) for k, v in both.items()}, Values())])
     yield terms.WaveByDistance, _waves(rates)
-
-
-def _axles(front: Floats, rear: Floats, tangents: SteeringTangents, geometry: Geometry) -> Columns:
-    """Return the lateral and curvature residuals by changes of the axle angles [rad], a column per axle."""
-    slope = 1.0 + tangents.tangent**2
-    f, r = front * slope[:, 0], rear * slope[:, 1]
-    lf, lr, base = geometry.front_axle_m, geometry.rear_axle_m, geometry.wheelbase_m
-    return {1: np.column_stack([lr * f, lf * r]) / base, 2: np.column_stack([f, -r]) / base}
-
-
-def _campaign_times(rates: Rates, tangents: SteeringTangents, geometry: Geometry) -> Iterator[Option]:
-    angle = np.arctan(tangents.tangent)
-    for hours in _HOURS:
-        warm = -np.expm1(-rates.covariates["campaign_time_h"] / hours)
-        both = _axles(warm * angle[:, 0], warm * angle[:, 1], tangents, geometry)
-        yield {k: v.sum(axis=1, keepdims=True) for k, v in both.items()}, Values(hours)
 
 
 def _run_times(rates: Rates) -> Iterator[Option]:

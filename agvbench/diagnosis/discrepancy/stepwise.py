@@ -8,11 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from agvbench.diagnosis.criteria import DISCREPANCY, RESIDUAL
+from agvbench.diagnosis.discrepancy.campaign_time import complement
 from agvbench.diagnosis.discrepancy.regression import steering_tangents
 from agvbench.diagnosis.discrepancy.screening import Start, screen
 from agvbench.diagnosis.estimation.cross_validation import without_best_groups
 from agvbench.diagnosis.residuals.body_rates import residual_rates
-from agvbench.diagnosis.residuals.residuals import lack_of_fit, pose_residuals, repeatability
+from agvbench.diagnosis.residuals.repeatability import repeatability
+from agvbench.diagnosis.residuals.residuals import lack_of_fit, pose_residuals
 from agvbench.diagnosis.selection.candidates import candidate
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
@@ -23,6 +25,7 @@ from agvbench.diagnosis.selection.variants import (
 )
 from agvbench.diagnosis.selection.with_term import TermSelection, gain_p_value
 from agvbench.diagnosis.terms import TERMS, DiscrepancyTerm
+from agvbench.diagnosis.terms.campaign_time import ByCampaignTime
 
 ModelWithTerm = tuple[ScoredModel, type[DiscrepancyTerm], dict[str, float], dict[str, dict[str, float]]]
 """A model with a term, the term, the gains of the effects beside it, and the alternatives of these effects."""
@@ -48,12 +51,39 @@ def reselect_effects(
     alternatives = extended.alternatives(base, current, selection.alternatives)
     while True:
         found = [n for n in current.names if n not in {*base.names, term.name}]
-        smaller = {name: extended.without_effect(base, current, name) for name in found}
+        smaller = {name: extended.refitted_without(base, current, name) for name in found}
         gains = {name: model.deviance - current.deviance for name, model in smaller.items()}
         unnecessary = [name for name, model in smaller.items() if not extended.meets_criterion(model, current)]
         if not unnecessary:
-            return current, term, gains, {name: alternatives.get(name, {}) for name in gains}
+            simpler = _with_complement(extended, base, current, term)
+            if simpler is None:
+                return current, term, gains, {name: alternatives.get(name, {}) for name in gains}
+            current = simpler
+            continue
         current = smaller[min(unnecessary, key=lambda name: gains[name])]
+
+
+def _with_complement(
+    extended: Selector, base: ScoredModel, current: ScoredModel, term: type[DiscrepancyTerm]
+) -> ScoredModel | None:
+    """Return the model with the opposite change in the rest of the campaign, if that needs an effect less.
+
+    Markers that are displaced from a bump on are markers that are always displaced but not before the bump.
+    """
+    if not issubclass(term, ByCampaignTime):
+        return None
+    own = current.fit.effect_values()
+    values = np.array([own[f"{term.name}.{p.name}"] for p in term.parameters()])
+    opposite = complement(values, extended.batch.readings.started_h)
+    if opposite is None:
+        return None
+    kind = replace(candidate(term), starts=opposite[None], screened=True, patient=True)
+    without_term = extended.without_effect(base, current, term.name)
+    for name in (n for n in current.names if n not in {*base.names, term.name}):
+        model = extended.with_effect(extended.without_effect(base, without_term, name), term.name, kind)
+        if model.is_fitted and model.deviance < current.deviance + extended.min_gain:
+            return model
+    return None
 
 
 def _add_masked_effects(extended: Selector, current: ScoredModel) -> ScoredModel:
@@ -76,10 +106,10 @@ def _add_masked_effects(extended: Selector, current: ScoredModel) -> ScoredModel
 
 def has_lack_of_fit(model: ScoredModel) -> bool:
     """Return whether the residuals exceed the repeatability, and differ significantly between groups of repeats."""
-    predictor = model.fit.predictor
-    residuals = pose_residuals(predictor.readings, predictor.predict(model.fit.parameters))
-    least, group = repeatability(residuals, predictor.readings.group), predictor.readings.group
-    p_value = lack_of_fit(residuals, group)
+    readings = model.fit.predictor.readings
+    residuals = pose_residuals(readings, model.fit.predictor.predict(model.fit.parameters))
+    least = repeatability(residuals, readings.session_group, readings.started_h)
+    p_value = lack_of_fit(residuals, readings.group)
     if least is None or p_value is None or p_value >= RESIDUAL.lack_of_fit_alpha:
         return False
     return any(

@@ -1,4 +1,4 @@
-"""Prediction residuals, their repeatability, and the lack-of-fit test.
+"""Prediction residuals, and the lack-of-fit test.
 
 The same standard deviation of the axle angles causes a ten times larger end position error in a long slalom than in a
 short straight. Residuals of groups are therefore compared in units of their predicted standard deviations.
@@ -68,7 +68,7 @@ _MIN_WITHIN_DOF = 9
 
 _MIN_DEVIATION = 1e-6  # m, rad: below the noise of any camera
 
-_UNITS = {name: 1e3 if name.endswith("_mm") else 180.0 / np.pi for name in QUANTITIES}
+UNITS = {name: 1e3 if name.endswith("_mm") else 180.0 / np.pi for name in QUANTITIES}
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class PoseResiduals:
     def rms(self) -> dict[str, float]:
         """Return each quantity's root mean square over runs, in the unit of its name."""
         squares = self.squares()
-        return {name: _UNITS[name] * float(np.sqrt(np.mean(squares[name]))) for name in QUANTITIES}
+        return {name: UNITS[name] * float(np.sqrt(np.mean(squares[name]))) for name in QUANTITIES}
 
     def squares(self) -> Mapping[str, Floats]:
         """Return each quantity's mean square of each run (R,): runs have equal weights, whatever their length."""
@@ -131,50 +131,6 @@ def pose_residuals(readings: Readings, poses: Floats) -> PoseResiduals:
     measured = np.hypot(*(readings.poses[rows, last, :2] - readings.start[:, :2]).T)
     predicted = np.hypot(*(poses[rows, last, :2] - readings.start[:, :2]).T)
     return PoseResiduals(path, seen, measured - predicted, path[rows, last, 2])
-
-
-def repeatability(residuals: PoseResiduals, group: NDArray[np.int64]) -> dict[str, float] | None:
-    """Return the root mean square between repeats, to compare with `PoseResiduals.rms`; None without repeats.
-
-    The residuals are those of the *final* model. With raw poses, the effect of a cause that depends on place or time
-    would count as a difference between repeats. Standard deviations of groups are limited to four times their median,
-    so that a single bad run has little influence. `MEDIAN` is the median over runs of the distance between end position
-    and group mean.
-    """
-    per_group: dict[str, list[tuple[float, float]]] = {name: [] for name in QUANTITIES}
-    deviations_mm: list[float] = []
-    ends = residuals.ends
-    for g in np.unique(group):
-        own = np.flatnonzero(group == g)
-        if len(own) < 2:
-            continue
-        both = residuals.seen[own].all(axis=0)
-        path = residuals.path[own][:, both]
-        deviation = path - path.mean(axis=0)
-        dof = len(own) - 1.0
-        # Distances from a mean of n are biased by the factor √(1 − 1/n).
-        end_deviation = (ends[own] - ends[own].mean(axis=0)) * np.sqrt(len(own) / dof)
-        deviations_mm += (1e3 * np.hypot(*end_deviation[:, :2].T)).tolist()
-        along, across = np.var(ends[own, :2], axis=0, ddof=1).tolist()
-        values = {
-            "end_position_mm": along + across,
-            "along_mm": along,
-            "across_mm": across,
-            "position_rms_mm": float(np.sum(deviation[..., :2] ** 2)) / dof / max(int(both.sum()), 1),
-            "heading_rms_deg": float(np.sum(deviation[..., 2] ** 2)) / dof / max(int(both.sum()), 1),
-            "delta_s_mm": float(np.var(residuals.delta_s_m[own], ddof=1)),
-            "delta_heading_deg": float(np.var(residuals.delta_heading_rad[own], ddof=1)),
-        }
-        for name, value in values.items():
-            per_group[name].append((value, len(own)))
-    if not per_group["position_rms_mm"]:
-        return None
-    out = {}
-    for name, pairs in per_group.items():
-        value, runs = np.array(pairs).T
-        most = 16.0 * np.median(value)
-        out[name] = _UNITS[name] * float(np.sqrt(np.sum(np.minimum(value, most) * runs) / np.sum(runs)))
-    return out | {MEDIAN: float(np.median(deviations_mm))}
 
 
 def lack_of_fit(

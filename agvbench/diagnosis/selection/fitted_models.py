@@ -234,5 +234,21 @@ class FittedModels:
             self._known[request] = ScoredModel(names, fitted, cross_validated(fitted, self._fold, bounds), starts)
         return self._known[request]
 
+    def refitted_without(self, base: ScoredModel, current: ScoredModel, name: str) -> ScoredModel:
+        """Return the model without the effect called `name`, refitted from `current` if that has the smaller deviance.
+
+        The model without the effect may have been fitted before, by fewer iterations. What further iterations gain is
+        no evidence of an effect.
+        """
+        without = self.without_effect(base, current, name)
+        if without.names == self.given:
+            return without
+        own = current.fit.effect_values()
+        kept = [value for key, value in own.items() if key.partition(".")[0] != name]
+        parameters = np.r_[current.fit.parameters[: self.batch.maps.size], kept]
+        starts = without.starts | {(f"refitted without {name}", parameters.tobytes())}
+        refitted = self.score(without.names, parameters, current.fit, starts=starts, patient=True)
+        return min(without, refitted, key=lambda model: model.deviance)
+
     def _predictor(self, names: tuple[str, ...]) -> Predictor:
         return Predictor(self.batch, names)

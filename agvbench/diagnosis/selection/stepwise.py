@@ -129,7 +129,6 @@ class Selector(FittedModels):
             without = self.without_effect(base, current, name)
             others = [n for n in (self.candidates if among is None else among.get(name, ())) if n not in current.names]
             worse = {n: self.with_effect(without, n).deviance - current.deviance for n in others}
-            found[name] = {n: gap for n, gap in worse.items() if gap < SELECTION.alternative_margin}
             found[name] = {
                 n: difference for n, difference in worse.items() if difference < SELECTION.alternative_margin
             }

@@ -12,13 +12,8 @@ from agvbench.diagnosis.criteria import RESIDUAL
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
-from agvbench.diagnosis.residuals.residuals import (
-    EndCovariance,
-    PoseResiduals,
-    lack_of_fit,
-    pose_residuals,
-    repeatability,
-)
+from agvbench.diagnosis.residuals.repeatability import repeatability, reproducibility
+from agvbench.diagnosis.residuals.residuals import EndCovariance, PoseResiduals, lack_of_fit, pose_residuals
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection
 from agvbench.diagnosis.selection.variants import EXTENDED_LIBRARY
@@ -29,11 +24,15 @@ from agvbench.types import Floats
 
 @dataclass(frozen=True)
 class Assessment:
-    """Residuals ``before`` and ``after``, the ``repeatability`` by quantity, and the p-value of ``lack_of_fit``."""
+    """Residuals ``before`` and ``after``, the spread of repeats by quantity, and the p-value of ``lack_of_fit``.
+
+    ``repeatability`` is that of repeats in succession, ``reproducibility`` that of all repeats of the campaign.
+    """
 
     before: PoseResiduals
     after: PoseResiduals
     repeatability: dict[str, float]
+    reproducibility: dict[str, float]
     lack_of_fit: float | None
 
     @property
@@ -62,13 +61,23 @@ def assess(
     """
     kept = readings.select(held)
     residuals = pose_residuals(kept, after[held])
-    least = repeatability(residuals, kept.group) or repeatability(pose_residuals(readings, after), readings.group)
-    if least is None:
+    spread = _spread_of_repeats(kept, residuals) or _spread_of_repeats(readings, pose_residuals(readings, after))
+    if spread is None:
         return None
     among = held if repeats is None else repeats
     repeated = readings.select(among)
     p_value = lack_of_fit(pose_residuals(repeated, after[among]), repeated.group, covariance.select(among), held[among])
-    return Assessment(pose_residuals(kept, before[held]), residuals, least, p_value)
+    return Assessment(pose_residuals(kept, before[held]), residuals, *spread, p_value)
+
+
+def _spread_of_repeats(
+    readings: Readings, residuals: PoseResiduals
+) -> tuple[dict[str, float], dict[str, float]] | None:
+    """Return repeatability and reproducibility; the former has the value of the latter if no session has repeats."""
+    every = reproducibility(residuals, readings.group)
+    if every is None:
+        return None
+    return repeatability(residuals, readings.session_group, readings.started_h) or every, every
 
 
 def predictor_for(selection: Selection, term_selection: TermSelection | None, readings: Readings) -> Predictor:

@@ -7,13 +7,16 @@ has few parameters, and therefore predicts runs that it was not fitted to.
 
 from agvbench.diagnosis.terms.base import DiscrepancyTerm
 from agvbench.diagnosis.terms.camera import BentPicture
-from agvbench.diagnosis.terms.speed import SpeedByHeading, SpeedByRunTime, SpeedInDisc, SpeedInStrip
-from agvbench.diagnosis.terms.steering import (
+from agvbench.diagnosis.terms.campaign_time import (
+    ClockByCampaignTime,
+    DriftByCampaignTime,
+    MarkersByCampaignTime,
+    SpeedByCampaignTime,
     SteeringByCampaignTime,
-    SteeringByDirection,
-    SteeringByHistory,
     TrimByCampaignTime,
 )
+from agvbench.diagnosis.terms.speed import SpeedByHeading, SpeedByRunTime, SpeedInDisc, SpeedInStrip
+from agvbench.diagnosis.terms.steering import SteeringByDirection, SteeringByHistory
 from agvbench.diagnosis.terms.turning import TurnAtLine, TurnByHeading, TwistAtStart, WaveByDistance
 
 TERMS: tuple[type[DiscrepancyTerm], ...] = (
@@ -25,8 +28,12 @@ TERMS: tuple[type[DiscrepancyTerm], ...] = (
     TurnByHeading,
     SpeedByRunTime,
     TwistAtStart,
+    SpeedByCampaignTime,
     SteeringByCampaignTime,
     TrimByCampaignTime,
+    DriftByCampaignTime,
+    MarkersByCampaignTime,
+    ClockByCampaignTime,
     SteeringByDirection,
     SteeringByHistory,
     WaveByDistance,
@@ -36,7 +43,11 @@ TERMS: tuple[type[DiscrepancyTerm], ...] = (
 __all__ = [
     "TERMS",
     "BentPicture",
+    "ClockByCampaignTime",
     "DiscrepancyTerm",
+    "DriftByCampaignTime",
+    "MarkersByCampaignTime",
+    "SpeedByCampaignTime",
     "SpeedByHeading",
     "SpeedByRunTime",
     "SpeedInDisc",

@@ -8,48 +8,8 @@ from typing import ClassVar
 
 from agvbench.diagnosis.terms.base import DiscrepancyTerm
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.state import FRONT, FRONT_AIM, FRONT_BEFORE, HOURS, REAR, REAR_AIM, REAR_BEFORE, SPEED
+from agvbench.effects.state import FRONT, FRONT_AIM, FRONT_BEFORE, REAR, REAR_AIM, REAR_BEFORE, SPEED
 from agvbench.types import Floats
-
-
-@dataclass(frozen=True)
-class SteeringByCampaignTime(DiscrepancyTerm):
-    """The steering gain changes with time: ``δ ← δ (1 + gain (1 − e^(−h/T)))``, both axles."""
-
-    name: ClassVar[str] = "steering_by_campaign_time"
-    stage: ClassVar[Stage] = Stage.WHEELS
-    covariates: ClassVar[tuple[str, ...]] = ("campaign_time_h",)
-    through: ClassVar[str] = "steering"
-
-    gain: float = parameter(unit="–", low=-0.7, high=1.0, scale=0.05)
-    time_constant_h: float = parameter(unit="h", low=0.0, high=50.0, scale=0.4)
-
-    @staticmethod
-    def steer(state: Floats, gain: float, time_constant_h: float) -> None:
-        """Scale both angles."""
-        if gain != 0.0:
-            factor = 1.0 + gain * (1.0 - math.exp(-state[HOURS] / max(time_constant_h, 0.01)))
-            state[FRONT] *= factor
-            state[REAR] *= factor
-
-
-@dataclass(frozen=True)
-class TrimByCampaignTime(DiscrepancyTerm):
-    """The offset of the axle angles drifts with time: ``δ ← δ + rate · hours``."""
-
-    name: ClassVar[str] = "trim_by_campaign_time"
-    stage: ClassVar[Stage] = Stage.WHEELS
-    covariates: ClassVar[tuple[str, ...]] = ("campaign_time_h",)
-    through: ClassVar[str] = "steering"
-
-    front_rad_per_h: float = parameter(unit="rad/h", low=-2.0, high=2.0, scale=0.02)
-    rear_rad_per_h: float = parameter(unit="rad/h", low=-2.0, high=2.0, scale=0.02)
-
-    @staticmethod
-    def steer(state: Floats, front_rad_per_h: float, rear_rad_per_h: float) -> None:
-        """Turn each axle in proportion to time."""
-        state[FRONT] += front_rad_per_h * state[HOURS]
-        state[REAR] += rear_rad_per_h * state[HOURS]
 
 
 @dataclass(frozen=True)

@@ -20,12 +20,14 @@ from agvbench.effects.state import (
     BACKLASH,
     BRAKE_LAG,
     BRAKING_LIMIT,
+    DISTANCE,
     DRIVE_COMMAND,
     DRIVE_WAIT,
     FRONT_AIM,
     FRONT_BEFORE,
     FRONT_COMMAND,
     HEADING,
+    HOURS,
     KNOWN_FRONT,
     REAR_AIM,
     REAR_BEFORE,
@@ -38,6 +40,7 @@ from agvbench.effects.state import (
     STEERING_INERTIA,
     STEERING_LAG,
     STEERING_RATE,
+    TIME,
     X_RATE,
     Y_RATE,
     YAW_RATE,
@@ -242,7 +245,8 @@ def simulate(
             continue
         first, last = command_starts[run], command_starts[run + 1] - 1
         vehicle[STARTED] = started_h[run]
-        s[X_RATE] = s[Y_RATE] = s[YAW_RATE] = 0.0
+        s[X_RATE] = s[Y_RATE] = s[YAW_RATE] = s[TIME] = s[DISTANCE] = 0.0
+        s[HOURS] = started_h[run]
         start_run(s, p, initial, run)
         start[0], start[1], start[2], start[3] = s[X], s[Y], s[HEADING], 0.0
         start[4], start[5], start[6] = initial[run, 0], initial[run, 1], initial[run, 2]

@@ -53,14 +53,16 @@ def _say(lines: Iterable[str], console: Console) -> None:
 
 
 def errors_table(held: HeldOut) -> Table:
-    """Return errors before and after beside the repeatability."""
+    """Return errors before and after beside the spread of repeats."""
     table = Table(box=box.SIMPLE_HEAD)
     table.add_column("")
-    for heading in COLUMNS.values():
-        table.add_column(heading, justify="right")
+    known = {key: heading for key, heading in COLUMNS.items() if any(key in errors for errors in held.errors.values())}
+    for heading in known.values():
+        # Folded, so that the table fits 80 columns.
+        table.add_column(heading.replace("reproducibility", "reproduci-\nbility"), justify="right")
     for name, title in QUANTITIES.items():
         if errors := held.errors.get(name):
-            table.add_row(Text(title), *(f"{errors[column]:.2f}" for column in COLUMNS))
+            table.add_row(Text(title), *(f"{errors[key]:.2f}" for key in known))
     return table
 
 

@@ -13,6 +13,7 @@ from agvbench.simulator.hidden.constants import (
     DRIFT_SHARE,
     FRONT_AXLE,
     FRONT_FROM_REAR,
+    FRONT_TRIM,
     LOSS_SQUARE,
     LOSS_TANGENT,
     NAP,
@@ -47,7 +48,7 @@ _HOUR_S = 3600.0
 def wheels(p: Floats, front: float, rear: float, speed: float, session_s: float) -> tuple[float, float]:
     """Return the wheels' angles [rad] for the axles' angles: what the linkage makes of them."""
     warm = 1.0 + p[WARM_GAIN] * (1.0 - math.exp(-session_s / (_HOUR_S * p[WARM_HOURS])))
-    front, rear = warm * front, warm * rear
+    front, rear = warm * front + p[FRONT_TRIM], warm * rear
     front, rear = front + p[FRONT_FROM_REAR] * rear, rear + p[REAR_FROM_FRONT] * front
     if speed < 0.0:
         return (1.0 + p[REVERSE_GAIN]) * front - p[TORQUE_STEER], (1.0 + p[REVERSE_GAIN]) * rear

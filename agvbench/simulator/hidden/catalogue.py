@@ -188,7 +188,58 @@ OUTSIDE = (
 )  # fmt: skip
 
 
-CATALOGUE: Mapping[str, Recipe] = MappingProxyType({r.name: r for r in (*LIBRARY, *OTHER_VARIANTS, *OUTSIDE)})
+_AT_ONCE_H = 1e-9
+_STEP = {"begins_h": Size(0.3, 0.8, grows=0)}
+_BY_CAMPAIGN_TIME = ("campaign_time_h",)
+
+
+def _changing(
+    name: str, changes: tuple[str, ...], sizes: dict[str, Size], fixed: Values | None = None, /, **names: str
+) -> Recipe:
+    constants = renamed(**names)
+    return Recipe(
+        name, None, "outside", sizes, lambda values: constants(values) | (fixed or {}),
+        covariates=_BY_CAMPAIGN_TIME, changes=changes,
+    )  # fmt: skip
+
+
+CHANGING = (
+    _changing(  # a servo linkage wears: it turns less and less
+        "steering_gain_fade", ("warm_gain",),
+        {"gain": Size(0.05, 0.12, signed=True), "time_constant_h": Size(0.3, 1.5, grows=0)}, {"warm_hours": _AT_ONCE_H},
+        warm_gain="gain",
+    ),
+    _changing(  # the front servo's horn slips by a tooth
+        "steering_trim_step", ("front_trim",), {"angle_rad": Size(0.8 * _DEG, 2.5 * _DEG, signed=True)} | _STEP,
+        front_trim="angle_rad",
+    ),
+    _changing(  # the markers are bumped
+        "marker_bump", ("turned", "marker_forward", "marker_left"),
+        {
+            "angle_rad": Size(0.6 * _DEG, 2.0 * _DEG, signed=True), "forward_m": Size(0.005, 0.02, signed=True),
+            "left_m": Size(0.005, 0.02, signed=True),
+        } | _STEP,
+        turned="angle_rad", marker_forward="forward_m", marker_left="left_m",
+    ),
+    _changing(  # a fan blows for a part of the evening
+        "wind_in_a_part", ("drift",),
+        {"drift_mps": Size(0.002, 0.006), "direction_rad": _TURN, "ends_h": Size(0.8, 1.4, grows=0)} | _STEP,
+        drift="drift_mps", drift_direction="direction_rad",
+    ),
+    _changing(  # a fresh battery, or an emptier one
+        "battery_change", ("fade",), {"loss": Size(0.04, 0.10, signed=True)} | _STEP, {"fade_hours": _AT_ONCE_H},
+        fade="loss",
+    ),
+    _changing(  # the camera's clock falls behind that of the commands
+        "clock_drift", ("latency_s",), {"latency_s": Size(0.10, 0.30), "time_constant_h": Size(1.0, 3.0, grows=0)},
+        latency_s="latency_s",
+    ),
+)  # fmt: skip
+
+
+CATALOGUE: Mapping[str, Recipe] = MappingProxyType(
+    {r.name: r for r in (*LIBRARY, *OTHER_VARIANTS, *OUTSIDE, *CHANGING)}
+)
 NOTHING = "nothing"
 AND = "_and_"
 

@@ -7,9 +7,10 @@ import numpy as np
 from agvbench.errors import PlantError
 from agvbench.simulator.checked_plant import checked_advance, checked_pose
 from agvbench.simulator.hidden import _kernel as kernel
-from agvbench.simulator.hidden.constants import LATENCY_S, pack
+from agvbench.simulator.hidden.constants import LATENCY_S, NAMES, pack
 from agvbench.simulator.hidden.truth import SealedTruth
 
+_HOUR_S = 3600.0
 TURNAROUND_S = 15.0
 """Between a run and the next reset: what fetching the vehicle takes. Batteries drain and servos warm meanwhile."""
 _SEEDS = 2**64
@@ -31,7 +32,7 @@ class HiddenPlant:
     seed
         Seeds the play, together with the seed of each reset.
     truth
-        What `sealed_truth` returns.
+        What `sealed_truth` returns; it says when constants change.
     turnaround_s
         Time that passes at a reset after a drive [s].
     """
@@ -45,7 +46,7 @@ class HiddenPlant:
         *,
         turnaround_s: float = TURNAROUND_S,
     ) -> None:
-        self._constants = pack(constants)
+        self._full, self._constants = pack(constants), pack(constants)
         if self._constants[LATENCY_S] > 0.9 * kernel.PAST * kernel.STEP_S:
             raise PlantError(
                 "camera latency is too long", value=f"{self._constants[LATENCY_S]:g} s",
@@ -75,7 +76,15 @@ class HiddenPlant:
             self._state[kernel.SESSION] += self._work[1, 0] + self._turnaround_s
         self._driven = False
         self._work[1, 0] = 0.0
+        self._change_constants()
         kernel.begin(self._constants, self._state, self._past, self._marks, (x, y, heading))
+
+    def _change_constants(self) -> None:
+        """Set the constants that change to their values at this time: they are held during a run."""
+        for change in self._truth.changes:
+            share = change.share(float(self._state[kernel.SESSION]) / _HOUR_S)
+            for name in change.constants:
+                self._constants[NAMES.index(name)] = share * self._full[NAMES.index(name)]
 
     def advance(self, drive: float, front: float, rear: float, dt: float) -> tuple[float, float, float]:
         """Hold the command for `dt` seconds; return the pose that the camera sees, without its noise (m, m, rad).

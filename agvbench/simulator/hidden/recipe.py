@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from agvbench.simulator.hidden.truth import HiddenEffect, Kind
+from agvbench.simulator.hidden.truth import Change, HiddenEffect, Kind
 
 Values = dict[str, float]
 Constants = Callable[[Values], Values]
@@ -39,6 +39,10 @@ class Size:
         return float(math.copysign(min(abs(grown), self.most), grown))
 
 
+WHEN = ("begins_h", "ends_h", "time_constant_h")
+"""Parameters that say when an effect holds, and not what it is."""
+
+
 def _same(values: Values) -> Values:
     return dict(values)
 
@@ -59,6 +63,9 @@ class Recipe:
         Constants of the base vehicle that must give way: a map without end stops, say.
     absorbed
         Whether free static maps take it up by construction.
+    changes
+        The constants of an effect that holds in a part of the campaign only, or grows during it. The parameters that
+        say when are those of `Change`.
     """
 
     name: str
@@ -70,6 +77,7 @@ class Recipe:
     covariates: tuple[str, ...] = ()
     absorbed: bool = False
     random_phase: bool = False
+    changes: tuple[str, ...] = ()
 
     def draw(self, rng: np.random.Generator) -> Values:
         """Return parameters."""
@@ -78,6 +86,12 @@ class Recipe:
     def grown(self, values: Values, factor: float) -> Values:
         """Return the parameters of a stronger effect."""
         return {name: self.sizes[name].grown(value, factor) for name, value in values.items()}
+
+    def change(self, values: Values) -> Change | None:
+        """Return when the effect holds, or None if it always does."""
+        if not self.changes:
+            return None
+        return Change(self.changes, **{name: values[name] for name in WHEN if name in values})
 
     def effect(self, values: Values) -> HiddenEffect:
         """Return what the sealed truth says of it."""

@@ -58,7 +58,8 @@ def vehicle_of(seed: int) -> BaseVehicle:
 def sampled_spec(seed: int) -> str:
     """Return what `make_plant` hides for a seed: nothing in a fifth of cases, two effects in a fifth, else one."""
     rng = np.random.default_rng([0x5EA1, seed % _SEEDS])
-    share, names = rng.random(), list(CATALOGUE)
+    # Effects that change came later: what earlier seeds drew has been published.
+    share, names = rng.random(), [name for name, recipe in CATALOGUE.items() if not recipe.changes]
     if share < 0.2:
         return NOTHING
     chosen = rng.choice(len(names), size=2, replace=False)
@@ -94,6 +95,7 @@ def _sampled(spec: str, seed: int, floors: float) -> tuple[BaseVehicle, SealedTr
     return base, SealedTruth(
         _kind(effects), effects, found.refitted, found.held, found.floor_m,
         any(recipe.absorbed for recipe in hidden), base.constants | override | mechanism,
+        tuple(change for recipe in hidden if (change := recipe.change(sizes[recipe.name])) is not None),
     )  # fmt: skip
 
 
@@ -117,5 +119,5 @@ def _large_enough(bench: SeparationStudy | None, recipe: Recipe, seed: int, floo
 
 
 def _counts(found: Separation, recipe: Recipe) -> float:
-    """Return the separation that counts: what nodal maps absorb by construction is judged with the maps held."""
-    return found.held if recipe.absorbed else found.refitted
+    """Return the separation that counts: with the maps held where they would absorb it."""
+    return found.held if recipe.absorbed or recipe.changes else found.refitted

@@ -2,11 +2,38 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
 Kind = Literal["nothing", "library", "other form", "outside", "two"]
+
+
+@dataclass(frozen=True)
+class Change:
+    """When constants of a plant hold: a share of their full values by the time since the session began.
+
+    Parameters
+    ----------
+    constants
+        The constants by name; their null is 0.
+    begins_h, ends_h
+        Between these times they hold, and otherwise not [h].
+    time_constant_h
+        They approach their full values exponentially; 0 is a step [h].
+    """
+
+    constants: tuple[str, ...]
+    begins_h: float = 0.0
+    ends_h: float = math.inf
+    time_constant_h: float = 0.0
+
+    def share(self, hours: float) -> float:
+        """Return the share of the full values at a time [h]."""
+        if not self.begins_h <= hours < self.ends_h:
+            return 0.0
+        return 1.0 - math.exp((self.begins_h - hours) / self.time_constant_h) if self.time_constant_h else 1.0
 
 
 @dataclass(frozen=True)
@@ -66,7 +93,9 @@ class SealedTruth:
     floor_m: float = float("nan")
     absorbed: bool = False
     constants: Mapping[str, float] = field(default_factory=dict)
-    """All constants of the plant by name, base and mechanisms."""
+    """All constants of the plant by name, base and mechanisms, at their full values."""
+    changes: tuple[Change, ...] = ()
+    """When constants hold that do not always hold."""
 
     @property
     def library_names(self) -> tuple[str, ...]:

@@ -18,9 +18,10 @@ START = (0.3, -0.2, 0.7)
 EDGE = 1e-12  # s: to stay on one side of a break
 
 
-def quiet(turnaround_s=15.0, **constants):
+def quiet(turnaround_s=15.0, changes=(), **constants):
     """A plant of the default base vehicle without play."""
-    return HiddenPlant(constants, (0.0, 0.0, 0.0), 0, SealedTruth("nothing"), turnaround_s=turnaround_s)
+    truth = SealedTruth("nothing", changes=tuple(changes))
+    return HiddenPlant(constants, (0.0, 0.0, 0.0), 0, truth, turnaround_s=turnaround_s)
 
 
 def pulse(angle_rad):

@@ -339,6 +339,68 @@ def test_torque_steers_one_way_ahead_and_the_other_way_back():
         assert turned == pytest.approx(share * FULL_MPS * motion(angle, 0.0, 1.0, 1.0)[2], rel=1e-6)
 
 
+def changing(name, **sizes):
+    """A plant that changes, with a turnaround of a quarter of an hour."""
+    recipe = CATALOGUE[name]
+    return quiet(turnaround_s=900.0, changes=[recipe.change(sizes)], **recipe.constants(sizes))
+
+
+def ends_by_hour(plant, rows, start=START):
+    """The end poses of five runs that begin at 0 h, 0.25 h, 0.5 h, … and the few seconds that the runs before took."""
+    return [poses(plant, rows, start)[-1] for _ in range(5)]
+
+
+def test_steering_gain_fades_exponentially_with_the_sessions_time():
+    plant = changing("steering_gain_fade", gain=-0.1, time_constant_h=0.5)
+    for run, end in enumerate(ends_by_hour(plant, [(1.0, 1.0, A, 0.0)])):
+        gain = 1.0 - 0.1 * (1.0 - math.exp(-run * 901.0 / 1800.0))
+        assert end[2] - START[2] == pytest.approx(motion(gain * A, 0.0, FULL_MPS, FULL_MPS)[2], rel=1e-4)
+
+
+def test_trim_of_the_front_axle_steps_once():
+    plant = changing("steering_trim_step", angle_rad=0.04, begins_h=0.6)
+    for run, end in enumerate(ends_by_hour(plant, [(1.0, 1.0, A, 0.0)])):
+        angle = A + (0.04 if run >= 3 else 0.0)
+        assert end[2] - START[2] == pytest.approx(motion(angle, 0.0, FULL_MPS, FULL_MPS)[2], rel=1e-4)
+
+
+def test_bumped_markers_turn_the_path_about_the_start_that_the_camera_sees():
+    plant = changing("marker_bump", angle_rad=0.03, forward_m=0.0, left_m=0.0, begins_h=0.6)
+    for run, end in enumerate(ends_by_hour(plant, [(1.0, 1.0, 0.0, 0.0)], (0.0, 0.0, 0.0))):
+        turned = -0.03 if run >= 3 else 0.0
+        check(end, [FULL_MPS * math.cos(turned), FULL_MPS * math.sin(turned), 0.0])
+
+
+def test_displaced_markers_swing_with_the_heading():
+    plant = changing("marker_bump", angle_rad=0.0, forward_m=0.02, left_m=-0.01, begins_h=0.1)
+    before, after = (np.array(end) for end in ends_by_hour(plant, [(1.0, 1.0, A, 0.0)], (0.0, 0.0, 0.0))[:2])
+    c, s = math.cos(after[2]), math.sin(after[2])
+    swing = np.array([c * 0.02 + s * 0.01 - 0.02, s * 0.02 - c * 0.01 + 0.01])
+    check(after - before, [*swing, 0.0])
+
+
+def test_wind_blows_in_a_part_of_the_session():
+    plant = changing("wind_in_a_part", drift_mps=0.01, direction_rad=1.0, begins_h=0.4, ends_h=0.8)
+    ends = np.array(ends_by_hour(plant, [(1.0, 1.0, 0.0, 0.0)], (0.0, 0.0, 0.0)))
+    blown = np.array(
+        [[0.01 * math.cos(1.0), 0.01 * math.sin(1.0), 0.0] if run in {2, 3} else [0.0] * 3 for run in range(5)]
+    )
+    check(ends - [FULL_MPS, 0.0, 0.0], blown)
+
+
+def test_speed_steps_at_a_battery_change():
+    plant = changing("battery_change", loss=0.08, begins_h=0.4)
+    ends = np.array(ends_by_hour(plant, [(1.0, 1.0, 0.0, 0.0)], (0.0, 0.0, 0.0)))
+    assert ends[:, 0] == pytest.approx(FULL_MPS * np.array([1.0, 1.0, 0.92, 0.92, 0.92]), abs=1e-6)
+
+
+def test_clock_falls_behind_exponentially():
+    plant = changing("clock_drift", latency_s=0.2, time_constant_h=1.0)
+    ends = np.array(ends_by_hour(plant, [(1.0, 1.0, 0.0, 0.0)], (0.0, 0.0, 0.0)))
+    late_s = 0.2 * (1.0 - np.exp(-np.arange(5) * 901.0 / 3600.0))
+    assert ends[:, 0] == pytest.approx(FULL_MPS * (1.0 - late_s), abs=1e-6)
+
+
 def test_every_effect_is_checked_here():
     """An effect that is added without a check of its equation fails here."""
     source = Path(__file__).read_text(encoding="utf-8")

@@ -1,0 +1,152 @@
+"""Regressors of terms that depend on campaign time: courses of time, and what each quantity changes in the residual."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from agvbench.diagnosis import terms
+from agvbench.diagnosis.discrepancy.regression import Columns, GroupedRegression, SteeringTangents
+from agvbench.diagnosis.residuals.body_rates import Rates
+from agvbench.diagnosis.terms import DiscrepancyTerm
+from agvbench.diagnosis.terms.campaign_time import LATEST_H, LONGEST_H
+from agvbench.types import Floats
+from agvbench.vehicle.geometry import Geometry
+
+_TIME_CONSTANTS_H = (0.1, 0.2, 0.4, 0.8, 2.0, LONGEST_H)
+_PARTS = 12
+_AT_ONCE_H, _FEW = 1e-3, 0.03
+
+
+@dataclass(frozen=True)
+class Course:
+    """A course of time with its parameters: ``share`` (n,) of the change at each residual rate."""
+
+    share: Floats
+    begins_h: float
+    ends_h: float
+    time_constant_h: float
+
+    def values(self, coefficients: Floats) -> list[float]:
+        """Return the parameters of a term: coefficients, then those of the course."""
+        return [*coefficients.tolist(), self.begins_h, self.ends_h, self.time_constant_h]
+
+    @classmethod
+    def part(cls, hours: Floats, begins_h: float, ends_h: float) -> Course:
+        """Return the course of a change that holds between two times."""
+        return cls(((hours >= begins_h) & (hours < ends_h)).astype(np.float64), begins_h, ends_h, 0.0)
+
+
+def exponentials(hours: Floats) -> Iterator[Course]:
+    """Yield exponential courses from the beginning of the campaign, for times (n,) [h]."""
+    for constant in _TIME_CONSTANTS_H:
+        yield Course(-np.expm1(-hours / constant), 0.0, LATEST_H, constant)
+
+
+def coarse_parts(hours: Floats) -> Iterator[Course]:
+    """Yield parts of the campaign with ends on a coarse grid; none if the runs began at a few times only."""
+    between = _between_runs(hours)
+    if len(between) >= _PARTS:
+        grid = between[np.unique(np.linspace(0, len(between) - 1, _PARTS + 1).round().astype(int)[1:])]
+        for begin, end in combinations(grid.tolist(), 2):
+            yield Course.part(hours, begin, end)
+
+
+def _between_runs(hours: Floats) -> Floats:
+    """Return times between any two runs, and one after all of them [h]."""
+    starts = np.unique(hours)
+    return np.concatenate([0.5 * (starts[1:] + starts[:-1]), [LATEST_H]])
+
+
+def _best_part(hours: Floats, gain_of: Callable[[Course], float]) -> Course | None:
+    """Return the part of the campaign with the largest gain: the best of a coarse grid, then between any two runs.
+
+    The second search is local, and over one end at a time.
+    """
+    between = _between_runs(hours)
+    if len(between) < _PARTS:
+        return None
+
+    def gain(ends: tuple[float, float]) -> float:
+        return gain_of(Course.part(hours, *ends))
+
+    best = max(((part.begins_h, part.ends_h) for part in coarse_parts(hours)), key=gain)
+    near = len(between) // _PARTS + 1
+    for end in (0, 1, 0):
+        at = int(np.searchsorted(between, best[end]))
+        moved = between[max(at - near, 0) : at + near].tolist()
+        choices = [(one, best[1]) if end == 0 else (best[0], one) for one in moved]
+        best = max([best, *(c for c in choices if c[0] < c[1])], key=gain)
+    return Course.part(hours, *best)
+
+
+def complement(values: Floats, hours: Floats) -> Floats | None:
+    """Return the parameters (p,) of a step with the opposite change outside its part, or None if there are no such.
+
+    Maps or effects that absorb a constant change cannot tell the two apart, but one of them may need no effect beside.
+    `hours` (R,) are the times at which the runs began; a part that all but a few runs precede or follow has no end
+    there.
+    """
+    *sizes, begins_h, ends_h, time_constant_h = values.tolist()
+    opposite = [-size for size in sizes]
+    if time_constant_h > _AT_ONCE_H:
+        return None
+    if np.mean(hours < begins_h) < _FEW:
+        return np.array([*opposite, ends_h, LATEST_H, 0.0])
+    if np.mean(hours >= ends_h) < _FEW:
+        return np.array([*opposite, 0.0, begins_h, 0.0])
+    return None
+
+
+def columns_by_campaign_time(
+    rates: Rates, tangents: SteeringTangents, geometry: Geometry
+) -> Iterator[tuple[type[DiscrepancyTerm], Columns]]:
+    """Yield each term with what its full change adds to the residual rates, a column per parameter of the change."""
+    c = rates.covariates
+    one, zero, curvature = np.ones(len(rates.run)), np.zeros(len(rates.run)), c["curvature_per_m"]
+    yield terms.SpeedByCampaignTime, {0: one[:, None]}
+    angle = np.arctan(tangents.tangent)
+    gain = by_axle_angles(angle[:, 0], angle[:, 1], tangents, geometry)
+    yield terms.SteeringByCampaignTime, {k: v.sum(axis=1, keepdims=True) for k, v in gain.items()}
+    yield terms.TrimByCampaignTime, by_axle_angles(one, one, tangents, geometry)
+    heading = 0.5 * (rates.begin + rates.end)[:, 2]
+    cos, sin = (c["direction"] / c["speed_mps"] * of(heading) for of in (np.cos, np.sin))
+    yield terms.DriftByCampaignTime, {0: np.column_stack([cos, sin]), 1: np.column_stack([-sin, cos])}
+    yield (
+        terms.MarkersByCampaignTime,
+        {0: np.column_stack([zero, -curvature, zero]), 1: np.column_stack([curvature, zero, -one])},
+    )
+    first = np.r_[True, np.diff(rates.run) != 0]
+    before = np.where(first, 0.0, np.r_[0.0, c["speed_mps"][:-1]])
+    yield terms.ClockByCampaignTime, {0: ((before - c["speed_mps"]) / rates.weight)[:, None]}
+
+
+def by_axle_angles(front: Floats, rear: Floats, tangents: SteeringTangents, geometry: Geometry) -> Columns:
+    """Return the lateral and curvature residuals by changes of the axle angles [rad], a column per axle."""
+    slope = 1.0 + tangents.tangent**2
+    f, r = front * slope[:, 0], rear * slope[:, 1]
+    lf, lr, base = geometry.front_axle_m, geometry.rear_axle_m, geometry.wheelbase_m
+    return {1: np.column_stack([lr * f, lf * r]) / base, 2: np.column_stack([f, -r]) / base}
+
+
+def changes(
+    rates: Rates, tangents: SteeringTangents, geometry: Geometry, regression: GroupedRegression
+) -> Iterator[tuple[type[DiscrepancyTerm], Iterator[tuple[Columns, Course]]]]:
+    """Yield each term that depends on campaign time with its shapes: regressors, and the course of time."""
+    hours = rates.covariates["campaign_time_h"]
+    for term, columns in columns_by_campaign_time(rates, tangents, geometry):
+        yield term, _shapes(hours, columns, regression)
+
+
+def _shapes(hours: Floats, columns: Columns, regression: GroupedRegression) -> Iterator[tuple[Columns, Course]]:
+    def over_time(course: Course) -> Columns:
+        return {k: course.share[:, None] * c for k, c in columns.items()}
+
+    for course in exponentials(hours):
+        yield over_time(course), course
+    part = _best_part(hours, lambda course: regression.gain(over_time(course))[0])
+    if part is not None:
+        yield over_time(part), part

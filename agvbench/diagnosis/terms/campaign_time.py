@@ -1,0 +1,223 @@
+"""Discrepancy terms of quantities that change during a campaign.
+
+Each has the same course: a change holds between two times. With a time constant of zero it has its full size there.
+Otherwise it approaches its full size exponentially since the campaign began; a time constant of some hours is a drift
+that is linear within an evening. The exponential has no begin of its own: the maps absorb a constant share, so that the
+runs would not determine it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from agvbench.diagnosis.terms.base import DiscrepancyTerm
+from agvbench.effects.base import Stage, parameter
+from agvbench.effects.state import (
+    FORWARD,
+    FRONT,
+    FRONT_SPEED,
+    HEADING,
+    HOURS,
+    LEFT,
+    REAR,
+    REAR_SPEED,
+    SEEN_HEADING,
+    SEEN_X,
+    SEEN_Y,
+    X_RATE,
+    Y_RATE,
+)
+from agvbench.model.compiled import compiled
+from agvbench.types import Floats
+
+LONGEST_H = 6.0
+"""Largest time constant: within an evening, slower changes have the same course."""
+LATEST_H = 1e3
+_MOVING_MPS = 0.003
+
+
+@compiled(inline=True)
+def course(hours: float, begins_h: float, ends_h: float, time_constant_h: float) -> float:
+    """Return the share of a change at a time [h]: 0 before it begins and after it ended, 1 when it is complete."""
+    if hours < begins_h or hours >= ends_h:
+        return 0.0
+    if time_constant_h <= 0.0:
+        return 1.0
+    return 1.0 - math.exp(-hours / time_constant_h)
+
+
+def _begin() -> Any:
+    return parameter(unit="h", low=0.0, high=LATEST_H, scale=0.1)
+
+
+def _end() -> Any:
+    return parameter(unit="h", low=0.0, high=LATEST_H, scale=0.1)
+
+
+def _time_constant() -> Any:
+    return parameter(unit="h", low=0.0, high=LONGEST_H, scale=0.3)
+
+
+@dataclass(frozen=True)
+class ByCampaignTime(DiscrepancyTerm):
+    """A term that depends on the time since the campaign began."""
+
+    covariates: ClassVar[tuple[str, ...]] = ("campaign_time_h",)
+
+
+@dataclass(frozen=True)
+class SpeedByCampaignTime(ByCampaignTime):
+    """The speed changes: ``v ← v (1 + change · course)``."""
+
+    name: ClassVar[str] = "speed_by_campaign_time"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    through: ClassVar[str] = "speed"
+
+    change: float = parameter(unit="–", low=-0.9, high=2.0, scale=0.05)
+    begins_h: float = _begin()
+    ends_h: float = _end()
+    time_constant_h: float = _time_constant()
+
+    @staticmethod
+    def drive(state: Floats, change: float, begins_h: float, ends_h: float, time_constant_h: float) -> None:
+        """Scale both axle speeds."""
+        if change != 0.0:
+            factor = 1.0 + change * course(state[HOURS], begins_h, ends_h, time_constant_h)
+            state[FRONT_SPEED] *= factor
+            state[REAR_SPEED] *= factor
+
+
+@dataclass(frozen=True)
+class SteeringByCampaignTime(ByCampaignTime):
+    """The steering gain of both axles changes: ``δ ← δ (1 + gain · course)``."""
+
+    name: ClassVar[str] = "steering_by_campaign_time"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    through: ClassVar[str] = "steering"
+
+    gain: float = parameter(unit="–", low=-0.9, high=2.0, scale=0.05)
+    begins_h: float = _begin()
+    ends_h: float = _end()
+    time_constant_h: float = _time_constant()
+
+    @staticmethod
+    def steer(state: Floats, gain: float, begins_h: float, ends_h: float, time_constant_h: float) -> None:
+        """Scale both angles."""
+        if gain != 0.0:
+            factor = 1.0 + gain * course(state[HOURS], begins_h, ends_h, time_constant_h)
+            state[FRONT] *= factor
+            state[REAR] *= factor
+
+
+@dataclass(frozen=True)
+class TrimByCampaignTime(ByCampaignTime):
+    """The offset of the axle angles changes: ``δ ← δ + angle · course``."""
+
+    name: ClassVar[str] = "trim_by_campaign_time"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    through: ClassVar[str] = "steering"
+
+    front_rad: float = parameter(unit="rad", low=-1.0, high=1.0, scale=0.02)
+    rear_rad: float = parameter(unit="rad", low=-1.0, high=1.0, scale=0.02)
+    begins_h: float = _begin()
+    ends_h: float = _end()
+    time_constant_h: float = _time_constant()
+
+    @staticmethod
+    def steer(
+        state: Floats, front_rad: float, rear_rad: float, begins_h: float, ends_h: float, time_constant_h: float
+    ) -> None:
+        """Turn both axles."""
+        if front_rad != 0.0 or rear_rad != 0.0:
+            share = course(state[HOURS], begins_h, ends_h, time_constant_h)
+            state[FRONT] += front_rad * share
+            state[REAR] += rear_rad * share
+
+
+@dataclass(frozen=True)
+class DriftByCampaignTime(ByCampaignTime):
+    """A drift of the moving vehicle over the floor changes, such as a wind: a velocity in the floor frame · course.
+
+    Moving has the meaning of `agvbench.effects.floor_tilt.FloorTilt`.
+    """
+
+    name: ClassVar[str] = "drift_by_campaign_time"
+    stage: ClassVar[Stage] = Stage.FLOOR
+    through: ClassVar[str] = "drift"
+
+    x_mps: float = parameter(unit="m/s", low=-0.3, high=0.3, scale=0.005)
+    y_mps: float = parameter(unit="m/s", low=-0.3, high=0.3, scale=0.005)
+    begins_h: float = _begin()
+    ends_h: float = _end()
+    time_constant_h: float = _time_constant()
+
+    @staticmethod
+    def drift(
+        state: Floats, x_mps: float, y_mps: float, begins_h: float, ends_h: float, time_constant_h: float
+    ) -> None:
+        """Add the velocity while moving."""
+        if x_mps != 0.0 or y_mps != 0.0:
+            square = state[FORWARD] * state[FORWARD] + state[LEFT] * state[LEFT]
+            moving = -math.expm1(-square / _MOVING_MPS**2)
+            share = moving * course(state[HOURS], begins_h, ends_h, time_constant_h)
+            state[X_RATE] += x_mps * share
+            state[Y_RATE] += y_mps * share
+
+
+@dataclass(frozen=True)
+class MarkersByCampaignTime(ByCampaignTime):
+    """The markers move on the vehicle: the measured pose is displaced by (forward, left, angle) · course."""
+
+    name: ClassVar[str] = "markers_by_campaign_time"
+    stage: ClassVar[Stage] = Stage.CAMERA
+    through: ClassVar[str] = "camera"
+
+    forward_m: float = parameter(unit="m", low=-0.5, high=0.5, scale=0.01)
+    left_m: float = parameter(unit="m", low=-0.5, high=0.5, scale=0.01)
+    angle_rad: float = parameter(unit="rad", low=-0.5, high=0.5, scale=0.02)
+    begins_h: float = _begin()
+    ends_h: float = _end()
+    time_constant_h: float = _time_constant()
+
+    @staticmethod
+    def see(
+        state: Floats,
+        forward_m: float,
+        left_m: float,
+        angle_rad: float,
+        begins_h: float,
+        ends_h: float,
+        time_constant_h: float,
+    ) -> None:
+        """Displace the measured pose."""
+        if forward_m != 0.0 or left_m != 0.0 or angle_rad != 0.0:
+            share = course(state[HOURS], begins_h, ends_h, time_constant_h)
+            c, s = math.cos(state[HEADING]), math.sin(state[HEADING])
+            state[SEEN_X] += share * (c * forward_m - s * left_m)
+            state[SEEN_Y] += share * (s * forward_m + c * left_m)
+            state[SEEN_HEADING] += share * angle_rad
+
+
+@dataclass(frozen=True)
+class ClockByCampaignTime(ByCampaignTime):
+    """The camera's clock drifts against that of the commands: the pose stamped t was true at t − delay · course."""
+
+    name: ClassVar[str] = "clock_by_campaign_time"
+    stage: ClassVar[Stage] = Stage.CAMERA
+    through: ClassVar[str] = "camera"
+
+    delay_s: float = parameter(unit="s", low=-2.0, high=2.0, scale=0.05)
+    begins_h: float = _begin()
+    ends_h: float = _end()
+    time_constant_h: float = _time_constant()
+
+    @staticmethod
+    def capture(
+        state: Floats, time_s: float, delay_s: float, begins_h: float, ends_h: float, time_constant_h: float
+    ) -> float:
+        """Return the earlier time of the pose."""
+        if delay_s == 0.0:
+            return time_s
+        return time_s - delay_s * course(state[HOURS], begins_h, ends_h, time_constant_h)

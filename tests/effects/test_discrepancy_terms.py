@@ -1,0 +1,78 @@
+"""What holds for every discrepancy term, and what those of campaign time do."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from effect_checks import check_form, check_null_hooks
+from hypothesis import given
+from hypothesis import strategies as st
+
+from agvbench.diagnosis.terms import TERMS, DiscrepancyTerm
+from agvbench.diagnosis.terms.campaign_time import ByCampaignTime, course
+from agvbench.effects import TIME_HOOKS, effect_kinds
+from agvbench.effects import state as s
+from agvbench.model.simulation.simulation import SimulatedRun, Simulation
+from agvbench.types import Commands
+from agvbench.vehicle.geometry import Geometry
+
+each_term = pytest.mark.parametrize("term", TERMS, ids=[term.name for term in TERMS])
+OF_TIME = [term for term in TERMS if issubclass(term, ByCampaignTime)]
+WHEN = {"begins_h", "ends_h", "time_constant_h"}
+TIMES = np.array([0.0, 1.0, 2.0, 3.0])
+COMMANDS = Commands(TIMES, np.array([900.0, 900.0, 2100.0, 1500.0]), np.full(4, 1400.0), np.full(4, 1600.0))
+ROWS = np.array([[0.0, 0.0, 0.0], [0.3, -0.2, 0.3], [-0.2, 0.3, 0.3], [0.2, 0.2, -0.3], [0.0, 0.0, 0.0]])
+
+
+@each_term
+def test_it_is_declared_as_an_effect_is(term: type[DiscrepancyTerm]) -> None:
+    check_form(term)
+    check_null_hooks(term)
+    assert term.name not in effect_kinds()
+    assert term.covariates
+    assert term.through
+
+
+@pytest.mark.parametrize("term", OF_TIME, ids=[term.name for term in OF_TIME])
+def test_a_change_holds_in_its_part_of_the_campaign_only(term: type[DiscrepancyTerm]) -> None:
+    hours = (0.1, 0.5, 0.9)
+    runs = [SimulatedRun(COMMANDS, np.linspace(0.2, 4.0, 40), started_h=h) for h in hours]
+    simulation = Simulation(Geometry(0.18, 0.12), 1500.0, runs, kinds=(term,))
+    nothing = simulation.parameters()
+    values = {p.name: p.scale for p in term.parameters()} | {"begins_h": 0.3, "ends_h": 0.7, "time_constant_h": 0.0}
+    inside = nothing.copy()
+    inside[simulation.indices(term.name)] = list(values.values())
+    rows, starts = np.tile(ROWS, (3, 1)), np.tile([0.5, 0.2, 0.3, 0.0], (3, 1))
+    moved = np.abs(simulation.predict(rows, inside, starts) - simulation.predict(rows, nothing, starts))
+    before, during, after = moved.reshape(3, -1).max(axis=1)
+    assert before == after == 0.0
+    assert during > 1e-3
+
+
+@given(hours=st.floats(0.0, 20.0), begin=st.floats(0.0, 5.0), end=st.floats(0.0, 10.0), constant=st.floats(0.0, 6.0))
+def test_the_share_of_a_change_is_between_none_and_all(hours, begin, end, constant) -> None:
+    share = course(hours, begin, end, constant)
+    assert 0.0 <= share <= 1.0
+    if begin <= hours < end:
+        assert share == (pytest.approx(-math.expm1(-hours / constant)) if constant else 1.0)
+    else:
+        assert share == 0.0
+
+
+@pytest.mark.parametrize("term", OF_TIME, ids=[term.name for term in OF_TIME])
+def test_hooks_called_as_python_change_the_state_by_the_share(term: type[DiscrepancyTerm]) -> None:
+    sizes = [p.scale for p in term.parameters() if p.name not in WHEN]
+    for name, hook in term.hooks().items():
+        changed = []
+        for hours in (0.2, 0.5, 3.0):
+            state = np.random.default_rng(7).uniform(0.5, 1.0, s.SIZE)
+            state[s.HOURS] = hours
+            before = state.copy()
+            time_s = (
+                hook(state, 1.0, *sizes, 0.3, 2.0, 0.4) if name in TIME_HOOKS else hook(state, *sizes, 0.3, 2.0, 0.4)
+            )
+            changed.append(np.abs(state - before).max() if time_s is None else abs(time_s - 1.0))
+        assert changed[0] == changed[2] == 0.0
+        assert changed[1] > 1e-4
