@@ -93,6 +93,9 @@ class SelectionCriteria:
         Share of the groups of runs with the largest gains, without which an effect must still gain.
     ``wald_alpha``
         Level at which the parameters of an effect must differ from their null values, with errors clustered by group.
+    ``camera_share``
+        If the residuals show structure, actuators take the place of a latency of the camera unless they lose more than
+        this share of its gain.
     ``min_gain_of_initial_steering``
         Predicted gain of slow steering above which the other initial steering is fitted.
     """
@@ -102,6 +105,7 @@ class SelectionCriteria:
     min_relative_change: float = 0.15
     best_group_share: float = 0.05
     wald_alpha: float = 1e-4
+    camera_share: float = 0.1
     min_gain_of_initial_steering: float = 20.0
 
 

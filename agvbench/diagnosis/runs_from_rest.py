@@ -21,6 +21,7 @@ from agvbench.diagnosis.method import Method
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.nodal_maps import ROLES, NodalMaps, nodal_maps, start_values
 from agvbench.diagnosis.result import Diagnosis
+from agvbench.diagnosis.selection.actuators import prefer_actuators
 from agvbench.diagnosis.selection.candidates import given_effects
 from agvbench.diagnosis.selection.initial_steering import choose_initial_steering, reconsider_initial_steering
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
@@ -68,9 +69,10 @@ class RunsFromRest(Method[SelectedFromRest]):
         fitted, validation = readings.select(split.training), int(split.validation.sum())
         self.on_progress(f"{len(fitted)} training runs, {validation} validation runs, {split.test.sum()} test runs")
         searched = fitted.select(subsample_repeats(fitted.group, DATA.max_selection_runs))
-        selector = self._selector(searched)
+        selector = self.selector(searched)
         chosen, selector = reconsider_initial_steering(selector.select(), selector)
         library, selector = select_variants_and_reconsider(chosen, selector)
+        library = prefer_actuators(library, selector)
         library, with_term, selector = add_term_and_reconsider(library, selector)
         if len(searched) < len(fitted):
             self.on_progress(f"effects were selected in {len(searched)} runs; they are refitted to all {len(fitted)}")
@@ -91,7 +93,7 @@ class RunsFromRest(Method[SelectedFromRest]):
         library, with_term = validated(library, with_term, readings.select(split.validation), self.on_progress)
         return SelectedFromRest(library, with_term, selector)
 
-    def _selector(self, readings: Readings) -> Selector:
+    def selector(self, readings: Readings) -> Selector:
         """Return the selector for these runs, with the better of both initial states of the steering."""
         context = self.context
         maps = nodal_maps(readings.runs, context.header.neutral)

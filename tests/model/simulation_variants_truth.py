@@ -5,6 +5,7 @@ from __future__ import annotations
 import bisect
 import math
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -90,6 +91,29 @@ def ramped(aim: Path, moments: Floats, speeding: float, braking: float, end: flo
     return lambda t: float(np.interp(t, moments, known))
 
 
+def ramped_up(aim: Path, moments: Floats, speeding: float, brake_s: float, end: float) -> Path:
+    """Return the path of a speed that ramps while it grows and decays exponentially while it falls, from rest."""
+    begins, pieces, v = [], [], 0.0
+    for begin, until in zip(moments.tolist(), [*moments[1:].tolist(), end], strict=True):
+        aimed, now = float(aim(begin + 1e-9)), begin
+        while now < until:
+            falls = v * aimed < 0.0 or abs(aimed) < abs(v)
+            if falls:
+                piece = partial(
+                    lambda t, at, was, to: to + (was - to) * math.exp((at - t) / brake_s), at=now, was=v, to=aimed
+                )
+                stops = now + brake_s * math.log((v - aimed) / -aimed) if v * aimed < 0.0 else math.inf
+            else:
+                slope = math.copysign(speeding, aimed - v) if aimed != v else 0.0
+                piece = partial(lambda t, at, was, by: was + by * (t - at), at=now, was=v, by=slope)
+                stops = now + abs(aimed - v) / speeding if aimed != v else math.inf
+            begins.append(now)
+            pieces.append(piece)
+            now = min(until, stops)
+            v = (0.0 if falls else aimed) if now == stops else piece(now)
+    return lambda t: pieces[max(0, bisect.bisect_right(begins, t) - 1)](max(t, begins[0]))
+
+
 def _pieces(equation: Any, aim: Path, state: Floats, moments: Floats, end: float) -> Path:
     found = []
     for begin, until in zip(moments, [*moments[1:], end], strict=True):
@@ -159,6 +183,8 @@ def true_form(name: str, values: dict[str, float], start: tuple[float, float, fl
         front, rear = (servo_path(name, values, channel, RUN_TIMES, end) for channel in (0, 1))
     if name == "speed_lag_ramp":
         speed = ramped(speed, drives, values["acceleration_mps2"], values["braking_mps2"], end)
+    if name == "speed_lag_ramp_up":
+        speed = ramped_up(speed, drives, values["acceleration_mps2"], values["brake_s"], end)
     smoothing = values.get("time_constant_s", 0.0) if name == "mocap_latency_smoothing" else 0.0
     seen = times - values.get("latency_s", 0.0)
     return drive(front, rear, speed, np.array(start), seen, np.r_[fronts, rears, drives], smoothing)

@@ -17,7 +17,9 @@ FILES = sorted((REFERENCE / "blind-trials").glob("*.json"))
 
 
 def test_there_are_files():
-    assert [file.name for file in FILES] == ["hysteresis-9040.json", "nothing-20168.json", "vehicles-9030.json"]
+    assert [file.name for file in FILES] == [
+        "change-9841.json", "hysteresis-9040.json", "nothing-20168.json", "vehicles-9030.json"
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)

@@ -7,16 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from agvbench.diagnosis.criteria import DISCREPANCY, RESIDUAL
+from agvbench.diagnosis.criteria import DISCREPANCY
 from agvbench.diagnosis.discrepancy.campaign_time import complement
 from agvbench.diagnosis.discrepancy.regression import steering_tangents
 from agvbench.diagnosis.discrepancy.screening import Start, screen
 from agvbench.diagnosis.estimation.cross_validation import without_best_groups
 from agvbench.diagnosis.residuals.body_rates import residual_rates
-from agvbench.diagnosis.residuals.repeatability import repeatability
-from agvbench.diagnosis.residuals.residuals import lack_of_fit, pose_residuals
 from agvbench.diagnosis.selection.candidates import candidate
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
+from agvbench.diagnosis.selection.lack_of_fit import has_lack_of_fit
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.variants import (
     prefers_other_initial_steering,
@@ -102,20 +101,6 @@ def _add_masked_effects(extended: Selector, current: ScoredModel) -> ScoredModel
             break
         current = min(accepted, key=lambda model: model.deviance)
     return current
-
-
-def has_lack_of_fit(model: ScoredModel) -> bool:
-    """Return whether the residuals exceed the repeatability, and differ significantly between groups of repeats."""
-    readings = model.fit.predictor.readings
-    residuals = pose_residuals(readings, model.fit.predictor.predict(model.fit.parameters))
-    least = repeatability(residuals, readings.session_group, readings.started_h)
-    p_value = lack_of_fit(residuals, readings.group)
-    if least is None or p_value is None or p_value >= RESIDUAL.lack_of_fit_alpha:
-        return False
-    return any(
-        residuals.rms()[name] > RESIDUAL.within_repeatability * least[name]
-        for name in ("position_rms_mm", "heading_rms_deg")
-    )
 
 
 def add_term(selection: Selection, selector: Selector) -> TermSelection | None:

@@ -30,9 +30,9 @@ class WindowSelector(Selector):
     test_batch: Batch | None = None
     extrapolating: set[str] = field(default_factory=set)
 
-    def meets_criterion(self, without: ScoredModel, with_it: ScoredModel) -> bool:
+    def meets_criterion(self, without: ScoredModel, with_it: ScoredModel, *, of_group: bool = False) -> bool:
         """Return whether the added effects meet the criterion and do not extrapolate."""
-        if not super().meets_criterion(without, with_it):
+        if not super().meets_criterion(without, with_it, of_group=of_group):
             return False
         added = set(with_it.names) - set(without.names)
         if self._extrapolates(without, with_it):

@@ -78,7 +78,12 @@ def candidate(kind: type[Effect]) -> Candidate:
 
 
 def _by_share(choices: list[list[float]]) -> list[list[list[float]]]:
-    return [[[v for v in column if abs(v) == size] for size in sorted({abs(v) for v in column})] for column in choices]
+    """Return the initial values of each parameter by size; a parameter with fewer sizes repeats its largest."""
+    by_size = [
+        [[v for v in column if abs(v) == size] for size in sorted({abs(v) for v in column})] for column in choices
+    ]
+    most = max(len(sizes) for sizes in by_size)
+    return [sizes + sizes[-1:] * (most - len(sizes)) for sizes in by_size]
 
 
 def given_effects(vehicle: VehicleModel | None, tried: Iterable[str]) -> tuple[tuple[str, ...], Floats]:

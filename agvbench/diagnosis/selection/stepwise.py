@@ -14,6 +14,7 @@ from agvbench.diagnosis.estimation.cross_validation import differs_from_null, wi
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.residuals.residuals import pose_residuals
 from agvbench.diagnosis.selection.fitted_models import FittedModels, ScoredModel
+from agvbench.effects.variants import cause_of
 
 
 @dataclass(frozen=True)
@@ -72,13 +73,16 @@ class Selector(FittedModels):
         rejected = {name: gain for name, gain in rejected.items() if name not in current.names}
         return Selection(base, current, alternatives, gains, rejected, self.tried)
 
-    def meets_criterion(self, without: ScoredModel, with_it: ScoredModel) -> bool:
-        """Return whether the effects in `with_it` but not in `without` meet the selection criterion."""
+    def meets_criterion(self, without: ScoredModel, with_it: ScoredModel, *, of_group: bool = False) -> bool:
+        """Return whether the effects in `with_it` but not in `without` meet the selection criterion.
+
+        An effect that is one `of_group` need not change the prediction noticeably: others of its group take its place.
+        """
         gain = without.loss - with_it.loss
         return bool(
             with_it.gain_over(without) > self.min_gain
             and without_best_groups(gain, self.batch.readings.group, self.criteria.best_group_share) > 0.0
-            and self._changes_prediction(without, with_it)
+            and (of_group or self._changes_prediction(without, with_it))
             and all(
                 differs_from_null(with_it.fit, name, self.batch.readings.group)
                 for name in set(with_it.names) - set(without.names)
@@ -101,12 +105,22 @@ class Selector(FittedModels):
     def _added_effects(self, current: ScoredModel) -> tuple[str, ...]:
         return tuple(name for name in current.names if name not in self.given)
 
-    def backward_elimination(self, base: ScoredModel, current: ScoredModel) -> tuple[ScoredModel, dict[str, float]]:
-        """Remove effects that do not meet the criterion; return the model and the gain of each effect in it."""
+    def backward_elimination(
+        self, base: ScoredModel, current: ScoredModel, group: Iterable[str] = ()
+    ) -> tuple[ScoredModel, dict[str, float]]:
+        """Remove effects that do not meet the criterion; return the model and the gain of each effect in it.
+
+        Effects with a cause in `group` are alike, and are judged by their gain alone.
+        """
+        alike = {*group}
         while found := self._added_effects(current):
             smaller = {name: self.without_effect(base, current, name) for name in found}
             gains = {name: model.deviance - current.deviance for name, model in smaller.items()}
-            unnecessary = [name for name, model in smaller.items() if not self.meets_criterion(model, current)]
+            unnecessary = [
+                name
+                for name, model in smaller.items()
+                if not self.meets_criterion(model, current, of_group=cause_of(name) in alike)
+            ]
             if not unnecessary:
                 return current, gains
             current = smaller[min(unnecessary, key=lambda name: gains[name])]

@@ -81,7 +81,7 @@ def select_variants(selection: Selection, selector: Selector) -> Selection:
     tried: list[tuple[_Replacement, ScoredModel]] = []
     for name in effects:
         for replacement in replacements:
-            if replacement.replaced == name and name in current.names:
+            if replacement.replaced == name and name in current.names and _is_new(replacement, current):
                 tried += [(replacement, model) for model in _swapped_models(extended, current, replacement)]
         current = _best_replacement(
             extended, current, [model for replacement, model in tried if replacement.replaced == name]
@@ -150,6 +150,12 @@ def _replacements(selection: Selection, selector: Selector, extended: Selector, 
         predicted_gains = [first_order_gain(without.fit, larger, start, kind.bounds) for start in kind.starts]
         if max(predicted_gains) >= VARIANT.min_gain_share * chosen_gains[1]:
             yield _Replacement(name, variant, kind.starts[[int(np.argmax(predicted_gains))]])
+
+
+def _is_new(replacement: _Replacement, current: ScoredModel) -> bool:
+    """Return whether no other effect of the model has the cause of the variant: a model has one equation per cause."""
+    others = {cause_of(name) for name in current.names if name != replacement.replaced}
+    return replacement.variant.variant_of not in others
 
 
 def _fit_gain(without: ScoredModel, model: ScoredModel) -> float:

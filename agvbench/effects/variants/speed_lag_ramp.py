@@ -42,5 +42,5 @@ class SpeedLagRamp(Variant):
     @staticmethod
     def aim(state: Floats, acceleration_mps2: float, braking_mps2: float) -> None:
         """Set the limits of the drive."""
-        state[ACCELERATION_LIMIT] = acceleration_mps2
-        state[BRAKING_LIMIT] = braking_mps2
+        state[ACCELERATION_LIMIT] = min(state[ACCELERATION_LIMIT], acceleration_mps2)
+        state[BRAKING_LIMIT] = min(state[BRAKING_LIMIT], braking_mps2)

@@ -1,0 +1,22 @@
+"""Lack of fit of a model in the training runs, while effects are selected."""
+
+from __future__ import annotations
+
+from agvbench.diagnosis.criteria import RESIDUAL
+from agvbench.diagnosis.residuals.repeatability import repeatability
+from agvbench.diagnosis.residuals.residuals import lack_of_fit, pose_residuals
+from agvbench.diagnosis.selection.fitted_models import ScoredModel
+
+
+def has_lack_of_fit(model: ScoredModel) -> bool:
+    """Return whether the residuals exceed the repeatability, and differ significantly between groups of repeats."""
+    readings = model.fit.predictor.readings
+    residuals = pose_residuals(readings, model.fit.predictor.predict(model.fit.parameters))
+    least = repeatability(residuals, readings.session_group, readings.started_h)
+    p_value = lack_of_fit(residuals, readings.group)
+    if least is None or p_value is None or p_value >= RESIDUAL.lack_of_fit_alpha:
+        return False
+    return any(
+        residuals.rms()[name] > RESIDUAL.within_repeatability * least[name]
+        for name in ("position_rms_mm", "heading_rms_deg")
+    )
