@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from agvbench.diagnosis.proposal import NextExperiment
 from agvbench.diagnosis.residuals.covariate_test import Dependence
+from agvbench.effects import effect_kinds
 from agvbench.model import VehicleModel
 
 if TYPE_CHECKING:
@@ -163,6 +164,7 @@ def _effect(effect: NamedEffect) -> dict[str, Any]:
         },
         "confounded_with": list(effect.confounded_with),
         "evidence": dict(effect.evidence),
+        "remedy": effect_kinds()[effect.name].remedy if effect.name in effect_kinds() else "",
     }
 
 

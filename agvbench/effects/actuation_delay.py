@@ -21,6 +21,10 @@ class ActuationDelay(Effect):
     relaxes: ClassVar[str] = "no variable delay in the controller (9.2)"
     reference: ClassVar[str] = "Bentvelsen 2015, section 9.2"
     limits: ClassVar[str] = "where runs start and end at rest it cannot be distinguished from mocap_latency"
+    remedy: ClassVar[str] = (
+        "measure the time from command to motion of servos and drive; shorten it in the firmware, or send "
+        "commands earlier by it"
+    )
 
     delay_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.05)
 

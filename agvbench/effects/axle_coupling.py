@@ -19,6 +19,10 @@ class AxleCoupling(Effect):
     relaxes: ClassVar[str] = "parts are tight (3.2)"
     reference: ClassVar[str] = "Bentvelsen 2015, table 7.1 (the rear angle drifts while the front turns)"
     limits: ClassVar[str] = "markers off the centre line (marker_offset) cause the same drift where only one axle turns"
+    remedy: ClassVar[str] = (
+        "check the steering linkages for a common rod or a twisting frame; measure the axle distances from "
+        "the marker centroid again, because a wrong distance looks alike"
+    )
 
     front_from_rear: float = parameter(unit="–", low=-0.5, high=0.5, scale=0.05)
     rear_from_front: float = parameter(unit="–", low=-0.5, high=0.5, scale=0.05)

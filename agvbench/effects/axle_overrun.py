@@ -23,6 +23,10 @@ class AxleOverrun(Effect):
     relaxes: ClassVar[str] = "speed does not depend on steering (7.4)"
     reference: ClassVar[str] = "Bentvelsen 2015, equation 5.6 and appendix B; the equation is agvbench's own"
     limits: ClassVar[str] = "no influence where both axles steer by the same angle; cornering_speed_loss has one"
+    remedy: ClassVar[str] = (
+        "check whether the motor controller of one axle brakes what the other drives; let both coast, or "
+        "control both to the same speed of the body"
+    )
 
     excess: float = parameter(unit="–", low=0.0, high=20.0, scale=1.0)
     needs_both_axles_driven: ClassVar[bool] = True

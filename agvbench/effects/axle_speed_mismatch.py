@@ -21,6 +21,7 @@ class AxleSpeedMismatch(Effect):
     limits: ClassVar[str] = (
         "with equal angles of both axles it is a scale of speed, which the drive's map absorbs; 5 % changes little"
     )
+    remedy: ClassVar[str] = "match the speeds of both axles: wheel diameters, gears, settings of the motor controllers"
     needs_both_axles_driven: ClassVar[bool] = True
 
     ratio: float = parameter(unit="–", low=-0.5, high=0.5, scale=0.05)

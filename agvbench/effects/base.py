@@ -97,6 +97,8 @@ class Effect:
         Source of the equation.
     limits
         Limits of the equation, and effects that cannot be distinguished from it.
+    remedy
+        What to do in the workshop where it was found.
     longest_step_s
         Longest step of the simulation [s] while the effect is active. It is finite if a hook changes while the
         actuators are settled: with position, heading, time or distance. A step is integrated with four Gauss–Legendre
@@ -129,6 +131,7 @@ class Effect:
     relaxes: ClassVar[str]
     reference: ClassVar[str]
     limits: ClassVar[str]
+    remedy: ClassVar[str] = ""
 
     longest_step_s: ClassVar[float] = math.inf
     needs_both_axles_driven: ClassVar[bool] = False

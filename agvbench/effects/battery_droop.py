@@ -21,6 +21,10 @@ class BatteryDroop(Effect):
     limits: ClassVar[str] = (
         "linear in time: neither the steep end of a discharge nor a battery that recovers in a pause"
     )
+    remedy: ClassVar[str] = (
+        "control the speed of the wheels instead of the voltage, or charge between runs; record the battery "
+        "voltage of each run"
+    )
 
     per_hour: float = parameter(unit="1/h", low=-1.0, high=2.0, scale=0.1)
 

@@ -19,8 +19,11 @@ class CorneringSpeedLoss(Effect):
     relaxes: ClassVar[str] = "speed does not depend on steering (7.4)"
     reference: ClassVar[str] = "Bentvelsen 2015, appendix B (cornering speed)"
     limits: ClassVar[str] = "other equations (in the square of the angle, in curvature) differ at large angles"
+    remedy: ClassVar[str] = (
+        "check wheels for scrub in turns (toe, Ackermann geometry, tyres), or plan turns with the lower speed"
+    )
 
-    loss: float = parameter(unit="–", low=-0.5, high=0.7, scale=0.1)
+    loss: float = parameter(unit="–", low=0.0, high=0.7, scale=0.1)
 
     @staticmethod
     def drive(state: Floats, loss: float) -> None:

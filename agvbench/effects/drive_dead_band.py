@@ -22,6 +22,7 @@ class DriveDeadBand(Effect):
     relaxes: ClassVar[str] = "a cubic describes the drive (7.4)"
     reference: ClassVar[str] = "Bentvelsen 2015, table 7.4; Tao and Kokotović 1996 (dead zone)"
     limits: ClassVar[str] = "a static map with a dead band contains it: use it only beside a map without one"
+    remedy: ClassVar[str] = "calibrate the dead band of the motor controller, or avoid commands within it"
 
     width: float = parameter(unit="command", low=0.0, high=500.0, scale=1.0)
 

@@ -28,6 +28,7 @@ class FloorTilt(Effect):
     limits: ClassVar[str] = (
         "one slope for the whole floor, no part proportional to speed; only runs in several directions show it"
     )
+    remedy: ClassVar[str] = "level the floor, or stop the draught; a run in the opposite direction confirms it"
 
     drift_mps: float = parameter(unit="m/s", low=0.0, high=0.2, scale=0.005)
     direction_rad: float = parameter(unit="rad", low=-math.pi, high=math.pi, scale=0.5)

@@ -21,6 +21,7 @@ class LateralSlip(Effect):
     limits: ClassVar[str] = (
         "steady turning at one gradient; the centroid's direction in the vehicle frame stays that of the kinematics"
     )
+    remedy: ClassVar[str] = "drive turns more slowly, or fit tyres with more grip; a run at another speed confirms it"
 
     gradient: float = parameter(unit="s²/m²", low=-0.2, high=20.0, scale=0.5)
 

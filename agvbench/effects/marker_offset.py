@@ -22,6 +22,10 @@ class MarkerOffset(Effect):
     limits: ClassVar[str] = (
         "one circle does not distinguish it from heading_misalignment, left_m hardly from wheel_diameter_mismatch"
     )
+    remedy: ClassVar[str] = (
+        "measure the distances of both axles from the marker centroid, and correct them in campaign.toml or "
+        "move the markers"
+    )
 
     forward_m: float = parameter(unit="m", low=-0.5, high=0.5, scale=0.01)
     left_m: float = parameter(unit="m", low=-0.5, high=0.5, scale=0.01)

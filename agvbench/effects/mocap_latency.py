@@ -21,6 +21,10 @@ class MocapLatency(Effect):
         "where runs start and end at rest it cannot be distinguished from actuation_delay: "
         "that needs a common reference of time"
     )
+    remedy: ClassVar[str] = (
+        "compare the time stamps of camera and commands with a common clock, and check the filters of the "
+        "motion capture software"
+    )
 
     latency_s: float = parameter(unit="s", low=-0.5, high=2.0, scale=0.05)
 

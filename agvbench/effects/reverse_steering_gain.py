@@ -21,6 +21,7 @@ class ReverseSteeringGain(Effect):
         "Bentvelsen 2015, chapter 8 (backward turns); Dixon 1996, Tires, Suspension and Handling (compliance steer)"
     )
     limits: ClassVar[str] = "needs runs in both directions; one gain for both axles"
+    remedy: ClassVar[str] = "tighten the steering linkage: under load it yields in one direction of travel"
 
     gain: float = parameter(unit="–", low=-0.5, high=0.5, scale=0.05)
 

@@ -28,6 +28,9 @@ class SteeringBacklash(Effect):
     limits: ClassVar[str] = (
         "visible only where a command is reached from both sides; otherwise it is an offset, which a static map absorbs"
     )
+    remedy: ClassVar[str] = (
+        "tighten or replace the joints of the steering linkage; until then approach each angle from the same side"
+    )
 
     width_rad: float = parameter(unit="rad", low=0.0, high=0.5, scale=0.03)
 

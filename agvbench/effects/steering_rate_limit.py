@@ -23,6 +23,10 @@ class SteeringRateLimit(Effect):
     relaxes: ClassVar[str] = "axles rotate instantaneously (7.3)"
     reference: ClassVar[str] = "slew rate of hobby servos, stated as seconds per 60°; Bentvelsen 2015, section 7.3"
     limits: ClassVar[str] = "one rate for both axles and both directions; small steps of steering hardly depend on it"
+    remedy: ClassVar[str] = (
+        "let the servos settle before driving off, limit steps of steering in the plan, or check the supply "
+        "voltage of the servos"
+    )
 
     rate_rad_per_s: float = parameter(unit="rad/s", low=0.01, high=100.0, scale=2.0, null=math.inf)
 

@@ -25,6 +25,7 @@ class WheelDiameterMismatch(Effect):
         "nearly the same as an offset of both maps or as markers off the centre line: "
         "tight circles both ways distinguish them"
     )
+    remedy: ClassVar[str] = "compare diameters and tyre pressures of left and right wheels, and the toe of both axles"
 
     curvature_per_m: float = parameter(unit="1/m", low=-1.0, high=1.0, scale=0.02)
 

@@ -142,6 +142,13 @@ def fit_in_words(content: Mapping[str, Any]) -> Iterator[str]:
         yield f"Lack of fit of the {tested:.0f} test runs, {among}: p = {p_value:.2g}."
 
 
+def remedies_in_words(content: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what to do in the workshop about each effect."""
+    for effect in map(mapping, items(content.get("effects"))):
+        if remedy := effect.get("remedy"):
+            yield f"Remedy of {effect.get('name')}: {remedy}."
+
+
 def next_in_words(content: Mapping[str, Any]) -> Iterator[str]:
     """Yield what to drive next, what no run can discriminate, and which parameters these runs do not identify."""
     if following := mapping(content.get("next_experiment")):

@@ -42,3 +42,11 @@ def test_calibration_keeps_the_declared_axle(tiny_campaign):
     model = calibrate(campaign).model
     assert model.geometry.driven == "rear"
     assert float(model.speed(900.0)) == pytest.approx(0.32, abs=0.004)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_an_undeclared_driven_axle_is_no_gain_of_speed_in_turns(tiny_campaign, share):
+    found = diagnose(tiny_campaign(Tiny(front_drive_share=share)))
+    assert found.verdict is Verdict.UNKNOWN
+    assert [effect.name for effect in found.effects] == []

@@ -77,6 +77,12 @@ def test_form(cls: type[Effect]) -> None:
 
 
 @each_effect
+def test_it_says_what_to_do_in_the_workshop(cls: type[Effect]) -> None:
+    assert len(cls.remedy.split()) > 5
+    assert not cls.remedy.endswith(".")
+
+
+@each_effect
 def test_without_arguments_it_does_nothing(cls: type[Effect]) -> None:
     assert cls().is_null
     assert cls().values == {p.name: p.null for p in cls.parameters()}

@@ -23,7 +23,7 @@ class CorneringSpeedLossPower(Variant):
     reference: ClassVar[str] = "Bentvelsen 2015, appendix B; the power is agvbench's own"
     limits: ClassVar[str] = "the same power for both axles"
 
-    loss: float = parameter(unit="–", low=-0.5, high=0.9, scale=0.1)
+    loss: float = parameter(unit="–", low=0.0, high=0.9, scale=0.1)
     exponent: float = parameter(unit="–", low=0.3, high=4.0, scale=1.0, null=1.0)
 
     @classmethod

@@ -22,6 +22,7 @@ from agvbench.workflows.diagnosis_files import (
     fit_in_words,
     left_in_words,
     next_in_words,
+    remedies_in_words,
 )
 
 _MOST_DEPENDENCES = 5
@@ -44,7 +45,7 @@ def print_diagnosis(found: Diagnosis, console: Console) -> None:
             console.print(windows_table(windows))
         if found.held_out.worse_on:
             _say([f"Worse than before on: {', '.join(found.held_out.worse_on)}."], console)
-    _say(next_in_words(content), console)
+    _say((*remedies_in_words(content), *next_in_words(content)), console)
 
 
 def _say(lines: Iterable[str], console: Console) -> None:

@@ -66,7 +66,8 @@ def _section(kind: type[Effect]) -> str:
         lines.append(f"| `{p.name}` | {p.unit} | {_number(p.null)} | {_bounds(p)} | {_number(p.scale)} |")
     lines += ["", *([f"- Variant of: {kind.variant_of}"] if issubclass(kind, Variant) else [])]
     lines += [f"- Stage: {kind.stage.value}", f"- Relaxes: {kind.relaxes}", f"- Reference: {kind.reference}"]
-    return "\n".join([*lines, f"- Limits: {kind.limits}", ""])
+    lines += [f"- Limits: {kind.limits}", *([f"- Remedy: {kind.remedy}"] if kind.remedy else [])]
+    return "\n".join([*lines, ""])
 
 
 def _bounds(p: Parameter) -> str:

@@ -37,6 +37,7 @@ from agvbench.workflows.diagnosis_files import (
     mapping,
     next_in_words,
     number,
+    remedies_in_words,
 )
 from agvbench.workflows.report import ReportData
 
@@ -91,7 +92,10 @@ def diagnosis_blocks(shown: ShownDiagnosis) -> list[Block]:
     verdict = plain_sentences(f"{content.get('verdict')}: {provenance.get('why', '')}")
     blocks: list[Block] = [Paragraph(verdict, lead=True)]
     blocks += [table for table in (_effects(content), _errors(content)) if table.rows]
-    said = (*left_in_words(content), *fit_in_words(content), *next_in_words(content), *shown.problems)
+    said = (
+        *left_in_words(content), *fit_in_words(content), *remedies_in_words(content), *next_in_words(content),
+        *shown.problems,
+    )  # fmt: skip
     sentences = [plain_sentences(text) for text in said]
     if sentences:
         blocks.append(Bullets(sentences))
