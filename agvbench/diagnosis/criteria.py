@@ -162,6 +162,9 @@ class ResidualCriteria:
     ``far_above_noise``
         Ratio to the noise above which residuals of windows count as structure. The repeatability of free driving is a
         lower bound, because the variation between repeats is unknown.
+    ``validation_standard_errors``
+        Effects are rejected if the mean squared position error of the validation runs is larger with them by more than
+        this number of its standard errors.
     """
 
     within_repeatability: float = 1.25
@@ -171,6 +174,7 @@ class ResidualCriteria:
     min_share: float = 0.02
     periodic_alpha: float = 5e-3
     far_above_noise: float = 5.0
+    validation_standard_errors: float = 2.0
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,11 @@ class Parameter:
     high: float
     scale: float
 
+    @property
+    def is_direction(self) -> bool:
+        """Whether the value is an angle on the whole circle: its bounds are at least a turn apart."""
+        return self.unit == "rad" and self.high - self.low >= math.tau
+
 
 def parameter(*, unit: str, low: float, high: float, scale: float, null: float = 0.0) -> Any:
     """Declare a field of an effect; its default is its null value. See `Parameter`."""

@@ -31,7 +31,7 @@ class FloorTilt(Effect):
     remedy: ClassVar[str] = "level the floor, or stop the draught; a run in the opposite direction confirms it"
 
     drift_mps: float = parameter(unit="m/s", low=0.0, high=0.2, scale=0.005)
-    direction_rad: float = parameter(unit="rad", low=-math.pi, high=math.pi, scale=0.5)
+    direction_rad: float = parameter(unit="rad", low=-math.tau, high=math.tau, scale=0.5)
 
     @staticmethod
     def drift(state: Floats, drift_mps: float, direction_rad: float) -> None:

@@ -43,4 +43,6 @@ DRIVE_WAIT = 42
 SEEN_LAG = 43
 # Delay of the rear servo's commands relative to those of the front servo.
 REAR_WAIT = 44
-SIZE = 45
+# Steady-state angle of each axle at its last reversal: from there on its commands went one way.
+FRONT_REVERSAL, REAR_REVERSAL = range(45, 47)
+SIZE = 47

@@ -32,6 +32,7 @@ COVARIATES = {
     "x_m": "x [m]",
     "y_m": "y [m]",
     "heading_rad": "heading [rad]",
+    "course_rad": "direction of motion [rad]",
 }
 _BINS, _FEWEST = 16, 8
 _FEW_VALUES = 4

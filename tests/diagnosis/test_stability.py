@@ -11,7 +11,7 @@ from tiny_vehicle import FRONT_M, HEADER, REAR_M, InMemory, Tiny, campaign_runs
 from agvbench.diagnosis import Verdict, diagnose
 from agvbench.diagnosis.checks.consistency import require_consistent_repeats
 from agvbench.diagnosis.data.readings import Readings, read_runs
-from agvbench.diagnosis.discrepancy.campaign_time import columns_by_campaign_time, complement
+from agvbench.diagnosis.discrepancy.campaign_time import columns_by_campaign_time, complement, is_constant
 from agvbench.diagnosis.discrepancy.regression import SteeringTangents
 from agvbench.diagnosis.discrepancy.screening import screen
 from agvbench.diagnosis.discrepancy.stability import stability_test
@@ -54,6 +54,7 @@ def drives(seed: int) -> tuple[Rates, SteeringTangents]:
         "x_m": begin[:, 0],
         "y_m": begin[:, 1],
         "heading_rad": np.mod(heading, 2.0 * np.pi),
+        "course_rad": np.mod(heading, 2.0 * np.pi),
         "time_in_run_s": np.tile(STEP_M / SPEED_MPS * np.arange(STEPS), RUNS),
         "distance_m": np.tile(STEP_M * (np.arange(STEPS) + 0.5), RUNS),
         "sideslip": 0.0 * one,
@@ -65,7 +66,7 @@ def drives(seed: int) -> tuple[Rates, SteeringTangents]:
     value = rng.normal(0.0, 0.01, (RUNS, 3))[run] + rng.normal(0.0, 0.01, (RUNS * STEPS, 3))
     levels = np.column_stack([np.zeros(len(run)), GROUP[run], GROUP[run]]).astype(np.int64)
     rates = Rates(run, value, STEP_M * one, covariates, begin, end, np.tile(np.arange(STEPS), RUNS))
-    return rates, SteeringTangents(tangent, tangent, levels)
+    return rates, SteeringTangents(tangent, tangent, tangent, levels)
 
 
 def change_of(rates: Rates, tangents: SteeringTangents, of: Readings | None = None) -> Dependence | None:
@@ -186,3 +187,12 @@ def test_a_campaign_whose_steering_gain_fades_is_not_adequate():
     assert found.verdict is Verdict.UNKNOWN
     assert found.effects == ()
     assert found.depends_on[0].covariate == "campaign_time_h"
+
+
+@pytest.mark.parametrize(
+    ("course", "constant"),
+    [((0.004, 1e3, 0.0), True), ((0.0, 1e3, 1e-6), True), ((0.5, 1e3, 0.0), False), ((0.0, 1e3, 2.0), False)],
+)
+def test_a_change_that_holds_in_nearly_all_runs_is_none(course, constant):
+    hours = np.linspace(0.0, 1.0, 150)
+    assert is_constant(np.array([0.06, *course]), hours) is constant

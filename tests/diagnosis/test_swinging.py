@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from types import SimpleNamespace
 
@@ -104,3 +105,16 @@ def test_a_gain_is_one_of_fit_and_of_prediction():
 
     assert model(-10.0, -50.0).gain_over(model(-8.0, -20.0)) == 2.0
     assert model(-90.0, -50.0).gain_over(model(-8.0, -20.0)) == 30.0
+
+
+def test_levels_that_are_only_passed_have_no_value_beside_held_ones():
+    runs = [run for run in campaign_runs(Tiny(), steps=False) if run.experiment.startswith("steering")]
+    passed = np.array([1310.0, 1320.0, 1330.0, 1340.0])
+    sweep = Commands(
+        np.array([0.0, 0.4, 0.45, 0.5, 0.55, 2.0]), np.r_[NEUTRAL, np.full(4, 900.0), NEUTRAL],
+        np.r_[1300.0, passed, 1300.0], np.full(6, NEUTRAL),
+    )  # fmt: skip
+    nodes = nodal_maps([*runs, dataclasses.replace(runs[0], commands=sweep)], NEUTRAL).nodes["front"]
+    # The last level is held until the vehicle stops.
+    assert not {*passed[:3]} & {*nodes}
+    assert {1000.0, 1300.0, 1340.0, 1700.0} <= {*nodes}

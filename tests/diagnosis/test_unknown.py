@@ -44,6 +44,7 @@ def drives(seed: int, *, variance_components: float = 0.01) -> Rates:
         "x_m": 0.5 * (begin + end)[:, 0],
         "y_m": 0.5 * (begin + end)[:, 1],
         "heading_rad": np.mod(begin[:, 2], math.tau),
+        "course_rad": np.mod(begin[:, 2] + np.repeat(np.where(np.arange(RUNS) % 2, 0.0, math.pi), STEPS), math.tau),
         "time_in_run_s": distance / 0.3,
         "campaign_time_h": np.repeat(np.linspace(0.0, 1.0, RUNS), STEPS),
         "speed_mps": 0.3 * one,
@@ -57,7 +58,7 @@ def drives(seed: int, *, variance_components: float = 0.01) -> Rates:
 
 def screened(rates: Rates) -> list[Start]:
     straight = np.zeros((len(rates.run), 2))
-    stands = SteeringTangents(straight, straight, np.zeros((len(rates.run), 3), dtype=np.int64))
+    stands = SteeringTangents(straight, straight, straight, np.zeros((len(rates.run), 3), dtype=np.int64))
     return screen(rates, stands, GEOMETRY, GROUP, 0)
 
 
@@ -152,7 +153,8 @@ def test_a_line_that_turns_is_found_where_it_lies():
     rates.value[:, 2] += 0.04 * crossed * rates.covariates["direction"] / rates.weight
     (best, *_) = screened(rates)
     assert best.term is terms.TurnAtLine
-    turn, place, direction = best.values[0]
+    turn, same, place, direction = best.values[0]
+    assert abs(same) < 0.01
     assert direction == pytest.approx(0.0, abs=0.01)
     assert place == pytest.approx(0.2, abs=0.06)
     assert turn == pytest.approx(0.04, rel=0.25)
@@ -218,7 +220,8 @@ def test_a_seam_between_the_directions_tried_is_found_though_one_run_went_astray
     rates = seam(drives(3), turn_rad=0.06, place_m=0.3, direction_rad=-0.14)
     rates.value[100, 2] += 20.0
     found = next(start for start in screened(rates) if start.term is terms.TurnAtLine)
-    turn_rad, place_m, direction_rad = found.values[0]
+    turn_rad, same_rad, place_m, direction_rad = found.values[0]
+    assert abs(same_rad) < 0.02
     if math.cos(direction_rad) < 0.0:
         turn_rad, place_m, direction_rad = -turn_rad, -place_m, direction_rad - math.pi
     assert turn_rad == pytest.approx(0.06, abs=0.02)

@@ -57,12 +57,15 @@ def spoilt(found):
     return replace(selection, chosen=replace(selection.chosen, fit=replace(selection.chosen.fit, parameters=wrong)))
 
 
-def test_of_a_term_it_is_the_model_with_the_term_that_is_asked(found, spoilt):
+def test_a_term_that_makes_it_worse_is_withdrawn_and_the_effects_are_asked_alone(found, spoilt):
     good, kept = found
     wrong = TermSelection(spoilt, SpeedInDisc, good.base, 100.0, 1e-4)
     left, term = validated(good, wrong, kept, lambda _: None)
     assert term is None
-    assert left.chosen is good.base
+    assert left.chosen is good.chosen
+    both_wrong, no_term = validated(spoilt, wrong, kept, lambda _: None)
+    assert no_term is None
+    assert both_wrong.chosen is good.base
     right = TermSelection(good, SpeedInDisc, good.base, 100.0, 1e-4)
     assert validated(spoilt, right, kept, lambda _: None) == (spoilt, right)
 

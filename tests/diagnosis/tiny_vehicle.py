@@ -64,6 +64,14 @@ class Tiny:
     warm_gain: float = 0.0
     warm_h: float = 0.4
     slow_patch: float = 0.0
+    pull_mps: float = 0.0
+    kick_rad: float = 0.0
+    seam_rad: float = 0.0
+    downhill: float = 0.0
+    run_out_rad: float = 0.0
+    slip_pivot_m: float = 0.0
+    wheelbase_m: float = FRONT_M + REAR_M
+    marker_forward_m: float = 0.0
     axle_scatter_rad: float = 0.001
     speed_scatter: float = 0.002
     noise_m: float = 3e-4
@@ -92,7 +100,7 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
     warm = 1.0 + tiny.warm_gain * -math.expm1(-started_s / 3600.0 / tiny.warm_h)
     x, y, heading = start
     front, rear, speed = front_of(NEUTRAL) + f_off, rear_of(NEUTRAL) + r_off, 0.0
-    turning, loose = [0.0, 0.0], [front, rear]
+    turning, loose, driven = [0.0, 0.0], [front, rear], 0.0
     poses, times = [], []
     steps = round((commands.t_s[-1] + _AFTER_S + _BEFORE_S) / _STEP_S)
     for k in range(steps):
@@ -125,23 +133,35 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
         if tiny.play_rad:
             loose = [follow(axle, servo, tiny.play_rad / 2.0) for axle, servo in zip(loose, (f, r), strict=True)]
             f, r = loose
+        f += tiny.run_out_rad * math.sin(math.tau * driven / 0.8)
         df = (f + tiny.front_from_rear * r) * relief * warm
         dr = (r + tiny.rear_from_front * f) * relief * warm
         v = s * (1.0 - tiny.cornering_loss * (abs(math.tan(df)) + abs(math.tan(dr))))
         if math.hypot(x - 0.6, y - 0.3) < 0.7:
             v *= 1.0 - tiny.slow_patch
+        v *= 1.0 + math.copysign(tiny.downhill, v) * math.cos(heading - 1.0)
         share = tiny.front_drive_share
         forward = v * (share * math.cos(df) + (1.0 - share) * (1.0 + tiny.axle_ratio) * math.cos(dr))
-        beta = math.atan((FRONT_M * math.tan(dr) + REAR_M * math.tan(df)) / (FRONT_M + REAR_M))
-        convergence = forward / math.cos(beta)
-        yaw = (
-            forward * (math.tan(df) - math.tan(dr)) / (FRONT_M + REAR_M) / (1.0 + tiny.slip * convergence * convergence)
-        )
+        longer = 0.5 * (tiny.wheelbase_m - FRONT_M - REAR_M)
+        front_m, rear_m = FRONT_M + longer - tiny.marker_forward_m, REAR_M + longer + tiny.marker_forward_m
+        side = forward * (front_m * math.tan(dr) + rear_m * math.tan(df)) / tiny.wheelbase_m
+        kinematic = forward * (math.tan(df) - math.tan(dr)) / tiny.wheelbase_m
+        yaw = kinematic / (1.0 + tiny.slip * (forward**2 + side**2))
+        side += (kinematic - yaw) * tiny.slip_pivot_m
         middle = heading + yaw * _STEP_S / 2.0
         moving = 1.0 if abs(v) > 1e-3 else 0.0
-        x += (convergence * math.cos(middle + beta) + moving * tiny.tilt_mps * math.cos(tiny.tilt_rad)) * _STEP_S
-        y += (convergence * math.sin(middle + beta) + moving * tiny.tilt_mps * math.sin(tiny.tilt_rad)) * _STEP_S
+        c_m, s_m = math.cos(middle), math.sin(middle)
+        to_x, to_y = 0.3 - x, -0.2 - y
+        pull = moving * tiny.pull_mps / math.hypot(to_x, to_y, 0.2)
+        before = x * math.cos(0.7) + y * math.sin(0.7)
+        x += (c_m * forward - s_m * side + moving * tiny.tilt_mps * math.cos(tiny.tilt_rad) + pull * to_x) * _STEP_S
+        y += (s_m * forward + c_m * side + moving * tiny.tilt_mps * math.sin(tiny.tilt_rad) + pull * to_y) * _STEP_S
         heading += yaw * _STEP_S
+        if (before > 0.2) != (x * math.cos(0.7) + y * math.sin(0.7) > 0.2):
+            heading += tiny.seam_rad
+        if driven == 0.0 and s != 0.0:
+            heading += tiny.kick_rad
+        driven += s * _STEP_S
     return seen(tiny, np.array(times), np.array(poses), rng)
 
 

@@ -13,12 +13,13 @@ from agvbench.diagnosis.discrepancy.regression import Columns, GroupedRegression
 from agvbench.diagnosis.residuals.body_rates import Rates
 from agvbench.diagnosis.terms import DiscrepancyTerm
 from agvbench.diagnosis.terms.campaign_time import LATEST_H, LONGEST_H
+from agvbench.diagnosis.terms.campaign_time import course as course_at
 from agvbench.types import Floats
 from agvbench.vehicle.geometry import Geometry
 
 _TIME_CONSTANTS_H = (0.1, 0.2, 0.4, 0.8, 2.0, LONGEST_H)
 _PARTS = 12
-_AT_ONCE_H, _FEW = 1e-3, 0.03
+_AT_ONCE_H, _FEW, _CHANGED_SHARE = 1e-3, 0.03, 0.05
 
 
 @dataclass(frozen=True)
@@ -99,6 +100,16 @@ def complement(values: Floats, hours: Floats) -> Floats | None:
     if np.mean(hours >= ends_h) < _FEW:
         return np.array([*opposite, 0.0, begins_h, 0.0])
     return None
+
+
+def is_constant(values: Floats, hours: Floats) -> bool:
+    """Return whether a term with parameters `values` (p,) has one size in all but a few of the runs.
+
+    Then it is no change with time: it takes the place of an effect that holds all the time. `hours` (R,) are the times
+    at which the runs began.
+    """
+    shares = np.array([course_at(hour, *values[-3:].tolist()) for hour in hours])
+    return bool(np.mean(np.abs(shares - np.median(shares)) > _CHANGED_SHARE) < _FEW)
 
 
 def columns_by_campaign_time(

@@ -28,12 +28,14 @@ Columns = dict[int, Floats]
 class SteeringTangents:
     """Tangents of the steady-state angles of both axles (n, 2) at each residual rate.
 
-    ``previous`` (n, 2): those under the previous steering command; ``levels`` (n, 3): index of the level of drive,
+    ``previous`` (n, 2): those under the previous steering command; ``reversal`` (n, 2): those at which each axle last
+    reversed; ``levels`` (n, 3): index of the level of drive,
     front and rear in force.
     """
 
     tangent: Floats
     previous: Floats
+    reversal: Floats
     levels: NDArray[np.int64]
 
 
@@ -42,13 +44,16 @@ def steering_tangents(batch: Batch, parameters: Floats, rates: Rates) -> Steerin
     where = batch.maps.slices()
     settled = np.column_stack([batch.weights[role] @ parameters[where[role]] for role in ("front", "rear")])
     tangent = np.tan(np.clip(settled, -1.4, 1.4))
-    previous = tangent.copy()
+    previous, reversal = tangent.copy(), tangent.copy()
     for k, role in enumerate(("front", "rear")):
         command = batch.commands[role]
         for row in range(1, len(command)):
             if batch.base.row_runs[row] == batch.base.row_runs[row - 1]:
                 same = command[row] == command[row - 1]
                 previous[row, k] = previous[row - 1, k] if same else tangent[row - 1, k]
+                last = reversal[row - 1, k]
+                reverses = (tangent[row, k] - tangent[row - 1, k]) * (tangent[row - 1, k] - last) < 0.0
+                reversal[row, k] = tangent[row - 1, k] if reverses else last
     rows = np.empty(len(rates.run), dtype=np.int64)
     for r in np.unique(rates.run):
         own = rates.run == r
@@ -57,7 +62,7 @@ def steering_tangents(batch: Batch, parameters: Floats, rates: Rates) -> Steerin
     levels = np.column_stack(
         [np.unique(batch.commands[role], return_inverse=True)[1][rows] for role in ("drive", "front", "rear")]
     )
-    return SteeringTangents(tangent[rows], previous[rows], levels)
+    return SteeringTangents(tangent[rows], previous[rows], reversal[rows], levels)
 
 
 class GroupedRegression:

@@ -28,6 +28,7 @@ _DISC_STEP, _LINE_STEP = 18, 40
 _LINE_DIRECTIONS = 16
 _STRIP_DIRECTIONS, _STRIP_STEP, _WIDTHS_M = 8, 16, (0.3, 0.6, 1.0, 1.6)
 _BLUR_M, _SHARP_M, _BEST_LINES, _FINE_STEPS, _MIN_CROSSINGS = 0.1, 0.01, 4, 9, 5
+_POINT_STEP, _CORES_M = 12, (0.1, 0.5, 2.0)
 _RUN_TIMES_S = (0.4, 0.8, 1.6, 3.2, 6.4)
 _WAVES_M = np.geomspace(0.12, 1.5, 50)
 
@@ -69,18 +70,22 @@ def options(
     yield terms.TurnAtLine, _lines(rates, regression)
     yield terms.BentPicture, _pictures(rates)
     yield terms.SpeedByHeading, iter([({0: sine}, Values())])
+    course = np.column_stack([np.cos(c["course_rad"]), np.sin(c["course_rad"])])
+    yield terms.SpeedByCourse, iter([({0: course}, Values())])
     yield terms.TurnByHeading, iter([({2: sine}, Values())])
+    yield terms.DriftToPoint, _points(rates)
+    yield terms.DriftByPlace, iter([(_drifts(rates, _quadratic(rates.middle)), Values())])
     yield terms.SpeedByRunTime, _run_times(rates)
     yield terms.TwistAtStart, _starts(rates)
     for term, shapes in changes(rates, tangents, geometry, regression):
         yield term, ((columns, course.values) for columns, course in shapes)
     direction = c["direction"]
     yield terms.SteeringByDirection, iter([(by_axle_angles(direction, direction, tangents, geometry), Values())])
-    change = tangents.previous - tangents.tangent
-    angle = np.arctan(tangents.previous) - np.arctan(tangents.tangent)
-    if np.any(change != 0.0):
-        both = by_axle_angles(angle[:, 0], angle[:, 1], tangents, geometry)
-        yield terms.SteeringByHistory, iter([({k: v.sum(axis=1, keepdims=True) for k, v in both.items()}, Values())])
+    angles = [np.arctan(before) - np.arctan(tangents.tangent) for before in (tangents.previous, tangents.reversal)]
+    if np.any(angles[0] != 0.0):
+        both = [by_axle_angles(angle[:, 0], angle[:, 1], tangents, geometry) for angle in angles]
+        columns = {k: np.column_stack([shares[k].sum(axis=1) for shares in both]) for k in both[0]}
+        yield terms.SteeringByHistory, iter([(columns, Values())])
     yield terms.WaveByDistance, _waves(rates)
 
 
@@ -94,15 +99,17 @@ def _starts(rates: Rates) -> Iterator[Option]:
     first = np.r_[True, np.diff(rates.run) != 0] / rates.weight
     zero = np.zeros_like(first)
     lag = -first * rates.covariates["speed_mps"]
-    yield {0: np.column_stack([zero, lag]), 2: np.column_stack([first, zero])}, Values()
+    turns = [first, first * rates.covariates["direction"]]
+    yield {0: np.column_stack([zero, zero, lag]), 2: np.column_stack([*turns, zero])}, Values()
 
 
 def _waves(rates: Rates) -> Iterator[Option]:
     zero = np.zeros((len(rates.run), 2))
     for period in _WAVES_M:
-        angle = math.tau * rates.covariates["distance_m"] / period
+        angle = math.tau * rates.covariates["distance_m"] * rates.covariates["direction"] / period
         wave = np.column_stack([np.cos(angle), np.sin(angle)])
-        yield {0: np.hstack([wave, zero]), 2: np.hstack([zero, wave])}, _Wave(float(period))
+        columns = {0: [wave, zero, zero], 2: [zero, wave, zero], 1: [zero, zero, wave]}
+        yield {feature: np.hstack(parts) for feature, parts in columns.items()}, _Wave(float(period))
 
 
 def _discs(rates: Rates) -> Iterator[Option]:
@@ -128,6 +135,35 @@ def _strips(rates: Rates) -> Iterator[Option]:
                 inside = np.mean(np.abs(across - place) < 0.5 * width, axis=0)
                 if np.count_nonzero(inside) >= 10:
                     yield {0: -inside[:, None]}, Values(float(place), float(direction), width)
+
+
+def _points(rates: Rates) -> Iterator[Option]:
+    low, high = (f(rates.middle, axis=0) for f in (np.min, np.max))
+    step = max(float(np.max(high - low)) / _POINT_STEP, 0.05)
+    for x in np.arange(low[0], high[0] + step, step):
+        for y in np.arange(low[1], high[1] + step, step):
+            way = np.array([x, y]) - rates.middle
+            for core in _CORES_M:
+                towards = way / np.sqrt(np.sum(way * way, axis=1, keepdims=True) + core * core)
+                yield _drifts(rates, towards[:, :, None]), Values(float(x), float(y), core)
+
+
+def _quadratic(place: Floats) -> Floats:
+    """Return the velocities (n, 2, 12) of a quadratic field at each place (n, 2), for coefficients of one."""
+    x, y = place.T
+    shapes = np.column_stack([np.ones_like(x), x, y, x * x, x * y, y * y])
+    velocities = np.zeros((len(place), 2, 2 * shapes.shape[1]))
+    velocities[:, 0, : shapes.shape[1]] = velocities[:, 1, shapes.shape[1] :] = shapes
+    return velocities
+
+
+def _drifts(rates: Rates, velocity: Floats) -> Columns:
+    """Return the regressors of velocities over the floor (n, 2, q) [m/s]."""
+    heading = 0.5 * (rates.begin[:, 2] + rates.end[:, 2])
+    per = (rates.covariates["direction"] / rates.covariates["speed_mps"])[:, None]
+    c, s = np.cos(heading)[:, None] * per, np.sin(heading)[:, None] * per
+    x, y = velocity[:, 0], velocity[:, 1]
+    return {0: c * x + s * y, 1: c * y - s * x}
 
 
 def _lines(rates: Rates, regression: GroupedRegression) -> Iterator[Option]:
@@ -156,12 +192,15 @@ def _normal(direction: float) -> Floats:
 
 
 def _crossed(rates: Rates, direction: float, place: float, blur_m: float) -> Floats | None:
-    """Return the share of a line that each step crosses (n, 1), per metre; None if too few steps cross it."""
+    """Return the share of a line that each step crosses (n, 2), per metre; None if too few steps cross it.
+
+    The first column has the sign of the crossing, the second has none.
+    """
     before, after = ((p[:, :2] @ _normal(direction) - place) / blur_m for p in (rates.begin, rates.end))
     if np.count_nonzero((before > 0.0) != (after > 0.0)) < _MIN_CROSSINGS:
         return None
     part = 0.5 * (np.tanh(after) - np.tanh(before))
-    return np.asarray((part * rates.covariates["direction"] / rates.weight)[:, None])
+    return np.asarray(np.column_stack([part, np.abs(part)]) * (rates.covariates["direction"] / rates.weight)[:, None])
 
 
 def _pictures(rates: Rates) -> Iterator[Option]:

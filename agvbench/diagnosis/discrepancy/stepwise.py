@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from agvbench.diagnosis.criteria import DISCREPANCY
-from agvbench.diagnosis.discrepancy.campaign_time import complement
+from agvbench.diagnosis.criteria import DISCREPANCY, FIT
+from agvbench.diagnosis.discrepancy.campaign_time import complement, is_constant
 from agvbench.diagnosis.discrepancy.regression import steering_tangents
 from agvbench.diagnosis.discrepancy.screening import Start, screen
 from agvbench.diagnosis.estimation.cross_validation import without_best_groups
@@ -25,6 +25,7 @@ from agvbench.diagnosis.selection.variants import (
 from agvbench.diagnosis.selection.with_term import TermSelection, gain_p_value
 from agvbench.diagnosis.terms import TERMS, DiscrepancyTerm
 from agvbench.diagnosis.terms.campaign_time import ByCampaignTime
+from agvbench.types import Floats
 
 ModelWithTerm = tuple[ScoredModel, type[DiscrepancyTerm], dict[str, float], dict[str, dict[str, float]]]
 """A model with a term, the term, the gains of the effects beside it, and the alternatives of these effects."""
@@ -71,9 +72,7 @@ def _with_complement(
     """
     if not issubclass(term, ByCampaignTime):
         return None
-    own = current.fit.effect_values()
-    values = np.array([own[f"{term.name}.{p.name}"] for p in term.parameters()])
-    opposite = complement(values, extended.batch.readings.started_h)
+    opposite = complement(_term_values(current, term), extended.batch.readings.started_h)
     if opposite is None:
         return None
     kind = replace(candidate(term), starts=opposite[None], screened=True, patient=True)
@@ -86,15 +85,19 @@ def _with_complement(
 
 
 def _add_masked_effects(extended: Selector, current: ScoredModel) -> ScoredModel:
-    """Add effects that the unknown cause masked, as long as the residuals show lack of fit.
+    """Add effects that the unknown cause masked, as long as the residuals show lack of fit or one is likely.
 
     An effect without a gain beside the first selection may become significant once the term is in the model. The gain
-    of each effect is predicted, and only the best are fitted.
+    of each effect is predicted, and only the best are fitted. A lack of fit alone would not do: its test allows for the
+    differences between repeats, and these hide an effect that acts on few groups.
     """
-    while has_lack_of_fit(current):
+    while True:
         names = [name for name in extended.candidates if name not in current.names and name not in _TERM_NAMES]
         predicted_gains = {name: extended.predicted_gain(current, name) for name in names}
         best = sorted(predicted_gains, key=lambda name: -predicted_gains[name])[: DISCREPANCY.max_refitted]
+        is_likely = predicted_gains[best[0]] > FIT.large_predicted_gain if best else False
+        if not is_likely and not has_lack_of_fit(current):
+            break
         models = [extended.with_effect(current, name) for name in best if predicted_gains[name] > extended.min_gain]
         accepted = [model for model in models if extended.meets_criterion(current, model)]
         if not accepted:
@@ -203,9 +206,23 @@ def _best_term(
         values = np.clip(start.values, kind.bounds[:, 0], kind.bounds[:, 1])
         screened = replace(kind, starts=values, screened=True, patient=start is starts[0])
         model = extended.with_effect(root, start.term.name, screened)
+        if _is_constant_change(model, start.term):
+            continue
         if extended.meets_criterion(root, model) and (best is None or model.deviance < best[0].deviance):
             best = model, start.term
     return best
+
+
+def _is_constant_change(model: ScoredModel, term: type[DiscrepancyTerm]) -> bool:
+    """Return whether a term of campaign time was fitted to a change that is none."""
+    if not issubclass(term, ByCampaignTime) or not model.is_fitted:
+        return False
+    return is_constant(_term_values(model, term), model.fit.predictor.readings.started_h)
+
+
+def _term_values(model: ScoredModel, term: type[DiscrepancyTerm]) -> Floats:
+    own = model.fit.effect_values()
+    return np.array([own[f"{term.name}.{p.name}"] for p in term.parameters()])
 
 
 def _depends_on_few_groups(selector: Selector, selection: Selection, name: str) -> bool:

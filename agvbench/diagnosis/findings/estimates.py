@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from agvbench.diagnosis.criteria import SELECTION
 from agvbench.diagnosis.estimation.standard_errors import standard_errors
 from agvbench.diagnosis.result import Estimate, NamedEffect
@@ -27,6 +29,7 @@ def named_effects(selection: Selection, bounds: Floats) -> tuple[NamedEffect, ..
         for p in kinds[name].parameters():
             value, error = float(fit.parameters[maps + at]), float(stderr[maps + at])
             note = _note(value, error, bounds[at], p.scale)
+            value = math.remainder(value, math.tau) if p.is_direction else value
             estimates[p.name] = Estimate(value, error, p.unit, note)
             at += 1
         if name in selection.base.names or issubclass(kinds[name], DiscrepancyTerm):

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 FEATURES = ("speed", "sideways", "turning")
 COVARIATES = (
-    "time_in_run_s", "speed_mps", "curvature_per_m", "direction", "campaign_time_h", "x_m", "y_m", "heading_rad"
+    "time_in_run_s", "speed_mps", "curvature_per_m", "direction", "campaign_time_h", "x_m", "y_m", "heading_rad",
+    "course_rad",
 )  # fmt: skip
 
 

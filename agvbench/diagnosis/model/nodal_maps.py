@@ -1,4 +1,4 @@
-"""Nodal maps: static maps with one free value at each driven command level, linear in between."""
+"""Nodal maps: static maps with a free value at each of the driven command levels that are held, linear in between."""
 
 from __future__ import annotations
 
@@ -82,15 +82,14 @@ class NodalMaps:
 
 
 def nodal_maps(runs: Sequence[Run], neutral: float) -> NodalMaps:
-    """Return maps with a node at every driven command level, or at `select_levels` of them if there are too many."""
+    """Return maps with nodes at `select_levels` of the driven commands."""
     nodes = {}
     for role in ROLES:
         driven, held_s = _driven_commands(runs, role, neutral)
         levels, which = np.unique(driven, return_inverse=True)
-        if len(levels) > _MAX_NODES:
-            longest_s = np.zeros(len(levels))
-            np.maximum.at(longest_s, which, held_s)
-            levels = select_levels(levels, longest_s)
+        longest_s = np.zeros(len(levels))
+        np.maximum.at(longest_s, which, held_s)
+        levels = select_levels(levels, longest_s)
         nodes[role] = levels[levels != neutral] if role == "drive" else levels
     return NodalMaps(nodes, neutral)
 
@@ -98,8 +97,9 @@ def nodal_maps(runs: Sequence[Run], neutral: float) -> NodalMaps:
 def select_levels(levels: Floats, longest_s: Floats) -> Floats:
     """Return the levels that were held, and others that fill the gaps between these, ascending.
 
-    A steering oscillation passes many levels, each for about 0.05 s. Nodes at quantiles of the levels would crowd in
-    the range of the oscillation, and an end stop outside of it would lie between two nodes.
+    A steering oscillation passes many levels, each for about 0.05 s. A node at each of them would absorb whatever the
+    model lacks in that instant, by angles that no axle reaches. Nodes at quantiles of the levels would crowd in the
+    range of the oscillation, and an end stop outside of it would lie between two nodes.
 
     Parameters
     ----------

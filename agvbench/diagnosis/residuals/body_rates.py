@@ -73,6 +73,7 @@ def residual_rates(readings: Readings, poses: Floats) -> Rates:
         "x_m": middle[:, 0],
         "y_m": middle[:, 1],
         "heading_rad": np.mod(middle[:, 2], 2.0 * np.pi),
+        "course_rad": np.mod(middle[:, 2] + np.arctan2(steps_p[..., 1][use], steps_p[..., 0][use]), 2.0 * np.pi),
         "time_in_run_s": 0.5 * (t_s[:, 1:] + begin_s)[use],
         "campaign_time_h": readings.started_h[run],
         "speed_mps": size / duration,

@@ -131,7 +131,7 @@ def _features(rates: Rates, covariate: str) -> list[tuple[str, Floats]]:
 
 def _basis(covariate: Floats, name: str) -> Floats:
     """Return a basis (n, q) without constant: sines for an angle, otherwise hat functions at quantiles."""
-    if name == "heading_rad":
+    if name in ("heading_rad", "course_rad"):
         return np.column_stack([np.cos(covariate), np.sin(covariate), np.cos(2 * covariate), np.sin(2 * covariate)])
     knots = np.unique(np.quantile(covariate, np.linspace(0.0, 1.0, _KNOTS)))
     # Curves between nearly coincident knots would fit noise.

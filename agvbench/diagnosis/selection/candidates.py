@@ -23,6 +23,7 @@ ABSORBED_BY_MAPS = frozenset({"steering_saturation", "drive_dead_band"})
 _UNBOUNDED = 1e3
 _STARTS = (0.1, 1.0)
 _LIMIT_STARTS = (0.3, 1.0, 3.0)
+_DIRECTIONS = (0.0, 0.5 * math.pi, math.pi, -0.5 * math.pi)
 
 
 @dataclass(frozen=True)
@@ -60,12 +61,18 @@ def candidates(geometry: Geometry, exclude: Iterable[str] = ()) -> dict[str, Can
 
 
 def candidate(kind: type[Effect]) -> Candidate:
-    """Return the candidate of an effect: initial values are 0.1 and 1 times its scale, with each possible sign."""
+    """Return the candidate of an effect: initial values are 0.1 and 1 times its scale, with each possible sign.
+
+    A direction has four initial values: a fit does not turn by more than a quarter of a turn.
+    """
     parameters = kind.parameters()
     bounds = np.array([[max(p.low, -_UNBOUNDED), min(p.high, _UNBOUNDED)] for p in parameters])
     scale = np.array([p.scale for p in parameters])
     choices = []
     for p, s in zip(parameters, scale, strict=True):
+        if p.is_direction:
+            choices.append([0.0])
+            continue
         shares = _LIMIT_STARTS if math.isinf(p.null) else _STARTS
         signs = (1.0, -1.0) if p.low < p.null else (1.0,)
         choices.append([sign * share * s for share in shares for sign in signs])
@@ -74,6 +81,10 @@ def candidate(kind: type[Effect]) -> Candidate:
     else:
         # Not all combinations: either all parameters are small or all are large, with all signs.
         starts = np.array([row for column in zip(*_by_share(choices), strict=True) for row in product(*column)])
+    for k, p in enumerate(parameters):
+        if p.is_direction:
+            starts = np.repeat(starts, len(_DIRECTIONS), axis=0)
+            starts[:, k] = np.tile(_DIRECTIONS, len(starts) // len(_DIRECTIONS))
     return Candidate(kind.name, bounds, scale, np.clip(starts, bounds[:, 0], bounds[:, 1]))
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis.criteria import RESIDUAL
 from agvbench.diagnosis.data.readings import Readings
+from agvbench.diagnosis.estimation.levenberg_marquardt import FitState, LevenbergMarquardt
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.residuals.repeatability import repeatability, reproducibility
@@ -20,6 +21,8 @@ from agvbench.diagnosis.selection.variants import EXTENDED_LIBRARY
 from agvbench.diagnosis.selection.with_term import TermSelection
 from agvbench.effects.variants import effect_variants
 from agvbench.types import Floats
+
+_REJECTED = "{}: rejected in validation: the validation runs are predicted better without"
 
 
 @dataclass(frozen=True)
@@ -94,10 +97,11 @@ def predictor_for(selection: Selection, term_selection: TermSelection | None, re
 def validated(
     selection: Selection, term_selection: TermSelection | None, kept: Readings, on_progress: Callable[[str], None]
 ) -> tuple[Selection, TermSelection | None]:
-    """Return the selection, or the maps alone if these predict the validation runs better.
+    """Return the selection, or less of it if that predicts the validation runs better.
 
     Cross-validation uses the training runs, and a bias that they share may mislead it. A real cause improves the
-    prediction of unseen runs, too.
+    prediction of unseen runs, too. Less of the selection is the effects without the discrepancy term, then the maps
+    alone.
 
     Parameters
     ----------
@@ -108,19 +112,36 @@ def validated(
     on_progress
         Called with a line if the selection is rejected.
     """
-    chosen = term_selection.selection.chosen if term_selection else selection.chosen
-    if chosen.names == selection.base.names or not len(kept):
+    if term_selection is not None and not _predicts(term_selection.selection.chosen, selection.base, kept):
+        on_progress(_REJECTED.format(" + ".join(term_selection.selection.chosen.names)))
+        term_selection = None
+    if term_selection is not None or _predicts(selection.chosen, selection.base, kept):
         return selection, term_selection
-    fitted = chosen.fit.predictor.batch
-    batch = Batch(kept, fitted.maps, fitted.geometry, kinds=fitted.kinds)
-    if _mean_square(chosen, batch) <= _mean_square(selection.base, batch):
-        return selection, term_selection
-    on_progress(f"{' + '.join(chosen.names)}: rejected in validation: the validation runs are predicted better without")
+    on_progress(_REJECTED.format(" + ".join(selection.chosen.names)))
     rejected = selection.rejected | selection.gains
     return replace(selection, chosen=selection.base, alternatives={}, gains={}, rejected=rejected), None
 
 
-def _mean_square(model: ScoredModel, batch: Batch) -> float:
-    """Return the mean square of a model's position residuals in the runs of `batch` [m²]."""
-    poses = Predictor(batch, model.fit.predictor.effects).predict(model.fit.parameters)
-    return float(np.mean(pose_residuals(batch.readings, poses).squares()["position_rms_mm"]))
+def _predicts(chosen: ScoredModel, base: ScoredModel, kept: Readings) -> bool:
+    """Return whether `chosen` predicts the runs `kept` no worse than `base`.
+
+    Its squared position errors are no larger, or they are larger by no more than chance and the deviance is no larger:
+    most of the error may be the difference between repeats, which no model predicts, and the deviance allows for it.
+    """
+    if chosen.names == base.names or not len(kept):
+        return True
+    fitted = chosen.fit.predictor.batch
+    batch = Batch(kept, fitted.maps, fitted.geometry, kinds=fitted.kinds)
+    (loss, square), (base_loss, base_square) = (_in_batch(model, batch) for model in (chosen, base))
+    worse = square - base_square
+    chance = RESIDUAL.validation_standard_errors * float(np.std(worse)) / np.sqrt(max(len(worse) - 1, 1))
+    return float(np.mean(worse)) <= 0.0 or (loss <= base_loss and float(np.mean(worse)) <= chance)
+
+
+def _in_batch(model: ScoredModel, batch: Batch) -> tuple[float, Floats]:
+    """Return a model's deviance in the runs of `batch`, and its mean squared position error in each (R,) [m²]."""
+    predictor, own = Predictor(batch, model.fit.predictor.effects), model.fit
+    still = np.zeros((len(batch.readings), own.random_effects.shape[1]))
+    state = FitState(own.parameters, still, own.variance_components)
+    loss = LevenbergMarquardt(predictor, np.empty((0, 2))).evaluate(state).loss
+    return loss, pose_residuals(batch.readings, predictor.predict(own.parameters)).squares()["position_rms_mm"]

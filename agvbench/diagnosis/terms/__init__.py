@@ -15,7 +15,8 @@ from agvbench.diagnosis.terms.campaign_time import (
     SteeringByCampaignTime,
     TrimByCampaignTime,
 )
-from agvbench.diagnosis.terms.speed import SpeedByHeading, SpeedByRunTime, SpeedInDisc, SpeedInStrip
+from agvbench.diagnosis.terms.floor import DriftByPlace, DriftToPoint
+from agvbench.diagnosis.terms.speed import SpeedByCourse, SpeedByHeading, SpeedByRunTime, SpeedInDisc, SpeedInStrip
 from agvbench.diagnosis.terms.steering import SteeringByDirection, SteeringByHistory
 from agvbench.diagnosis.terms.turning import TurnAtLine, TurnByHeading, TwistAtStart, WaveByDistance
 
@@ -25,7 +26,10 @@ TERMS: tuple[type[DiscrepancyTerm], ...] = (
     TurnAtLine,
     BentPicture,
     SpeedByHeading,
+    SpeedByCourse,
     TurnByHeading,
+    DriftToPoint,
+    DriftByPlace,
     SpeedByRunTime,
     TwistAtStart,
     SpeedByCampaignTime,
@@ -46,8 +50,11 @@ __all__ = [
     "ClockByCampaignTime",
     "DiscrepancyTerm",
     "DriftByCampaignTime",
+    "DriftByPlace",
+    "DriftToPoint",
     "MarkersByCampaignTime",
     "SpeedByCampaignTime",
+    "SpeedByCourse",
     "SpeedByHeading",
     "SpeedByRunTime",
     "SpeedInDisc",

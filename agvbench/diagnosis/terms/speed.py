@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from agvbench.diagnosis.terms.base import DiscrepancyTerm
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.state import FRONT_SPEED, HEADING, REAR_SPEED, TIME, X, Y
+from agvbench.effects.state import FORWARD, FRONT_SPEED, HEADING, LEFT, REAR_SPEED, TIME, YAW_RATE, X, Y
 from agvbench.types import Floats
 
 _EDGE_M = 0.015
@@ -88,6 +88,36 @@ class SpeedByHeading(DiscrepancyTerm):
             factor = 1.0 + cosine * math.cos(state[HEADING]) + sine * math.sin(state[HEADING])
             state[FRONT_SPEED] *= factor
             state[REAR_SPEED] *= factor
+
+
+@dataclass(frozen=True)
+class SpeedByCourse(DiscrepancyTerm):
+    """The speed depends on the direction of motion over the floor, χ: ``v ← v (1 + a cos χ + b sin χ)``.
+
+    Backward, χ is opposite to the heading: a slope slows the same direction of motion either way.
+    """
+
+    name: ClassVar[str] = "speed_by_course"
+    stage: ClassVar[Stage] = Stage.BODY
+    covariates: ClassVar[tuple[str, ...]] = ("course_rad", "heading_rad")
+    through: ClassVar[str] = "speed"
+    longest_step_s: ClassVar[float] = 0.1
+
+    cosine: float = parameter(unit="–", low=-0.7, high=0.7, scale=0.03)
+    sine: float = parameter(unit="–", low=-0.7, high=0.7, scale=0.03)
+
+    @staticmethod
+    def move(state: Floats, cosine: float, sine: float) -> None:
+        """Scale the motion of the body."""
+        forward, left = state[FORWARD], state[LEFT]
+        speed = math.sqrt(forward * forward + left * left)
+        if (cosine != 0.0 or sine != 0.0) and speed > 0.0:
+            c, s = math.cos(state[HEADING]), math.sin(state[HEADING])
+            along, across = c * forward - s * left, s * forward + c * left
+            factor = 1.0 + (cosine * along + sine * across) / speed
+            state[FORWARD] *= factor
+            state[LEFT] *= factor
+            state[YAW_RATE] *= factor
 
 
 @dataclass(frozen=True)

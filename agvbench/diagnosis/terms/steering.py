@@ -8,7 +8,17 @@ from typing import ClassVar
 
 from agvbench.diagnosis.terms.base import DiscrepancyTerm
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.state import FRONT, FRONT_AIM, FRONT_BEFORE, REAR, REAR_AIM, REAR_BEFORE, SPEED
+from agvbench.effects.state import (
+    FRONT,
+    FRONT_AIM,
+    FRONT_BEFORE,
+    FRONT_REVERSAL,
+    REAR,
+    REAR_AIM,
+    REAR_BEFORE,
+    REAR_REVERSAL,
+    SPEED,
+)
 from agvbench.types import Floats
 
 
@@ -34,9 +44,11 @@ class SteeringByDirection(DiscrepancyTerm):
 
 @dataclass(frozen=True)
 class SteeringByHistory(DiscrepancyTerm):
-    """Axles stop short of their target by a share of the change of angle, the same for both axles.
+    """Axles stop short of their target by shares of a change of angle, the same for both axles.
 
-    Few runs turn an axle back, and often only one of both: two shares would be poorly determined.
+    ``share`` is of the change since the previous command, ``since_reversal`` of that since the axle last reversed, as
+    in hysteresis of a gear. Few runs turn an axle back, and often only one of both: shares by axle would be poorly
+    determined.
     """
 
     name: ClassVar[str] = "steering_by_history"
@@ -45,9 +57,11 @@ class SteeringByHistory(DiscrepancyTerm):
     through: ClassVar[str] = "steering"
 
     share: float = parameter(unit="–", low=-0.5, high=0.7, scale=0.05)
+    since_reversal: float = parameter(unit="–", low=-0.5, high=0.7, scale=0.05)
 
     @staticmethod
-    def aim(state: Floats, share: float) -> None:
-        """Reduce the change of both targets."""
-        state[FRONT_AIM] -= share * (state[FRONT_AIM] - state[FRONT_BEFORE])
-        state[REAR_AIM] -= share * (state[REAR_AIM] - state[REAR_BEFORE])
+    def aim(state: Floats, share: float, since_reversal: float) -> None:
+        """Reduce the changes of both targets."""
+        front, rear = state[FRONT_AIM], state[REAR_AIM]
+        state[FRONT_AIM] -= share * (front - state[FRONT_BEFORE]) + since_reversal * (front - state[FRONT_REVERSAL])
+        state[REAR_AIM] -= share * (rear - state[REAR_BEFORE]) + since_reversal * (rear - state[REAR_REVERSAL])

@@ -20,7 +20,10 @@ _PER_ROOT = 1.0 / math.sqrt(math.tau)
 
 @dataclass(frozen=True)
 class TurnAtLine(DiscrepancyTerm):
-    """A line on the floor turns a vehicle that crosses it, in opposite directions for opposite crossings."""
+    """A line on the floor turns a vehicle that crosses it.
+
+    Opposite crossings turn it by ``turn_rad`` in opposite directions, and by ``same_rad`` in the same direction.
+    """
 
     name: ClassVar[str] = "turn_at_line"
     stage: ClassVar[Stage] = Stage.FLOOR
@@ -29,17 +32,19 @@ class TurnAtLine(DiscrepancyTerm):
     longest_step_s: ClassVar[float] = _EDGE_STEP_S
 
     turn_rad: float = parameter(unit="rad", low=-0.5, high=0.5, scale=0.02)
+    same_rad: float = parameter(unit="rad", low=-0.5, high=0.5, scale=0.02)
     place_m: float = parameter(unit="m", low=-50.0, high=50.0, scale=0.5)
     direction_rad: float = parameter(unit="rad", low=-2.0 * _TURN, high=2.0 * _TURN, scale=0.5)
 
     @staticmethod
-    def drift(state: Floats, turn_rad: float, place_m: float, direction_rad: float) -> None:
+    def drift(state: Floats, turn_rad: float, same_rad: float, place_m: float, direction_rad: float) -> None:
         """Add a yaw rate near the line, in proportion to the crossing speed."""
-        if turn_rad != 0.0:
+        if turn_rad != 0.0 or same_rad != 0.0:
             c, s = math.cos(direction_rad), math.sin(direction_rad)
             beyond = (c * state[X] + s * state[Y] - place_m) / _EDGE_M
             across = c * state[X_RATE] + s * state[Y_RATE]
-            state[YAW_RATE] += turn_rad * across * _PER_ROOT / _EDGE_M * math.exp(-0.5 * beyond * beyond)
+            turned = turn_rad * across + same_rad * abs(across)
+            state[YAW_RATE] += turned * _PER_ROOT / _EDGE_M * math.exp(-0.5 * beyond * beyond)
 
 
 @dataclass(frozen=True)
@@ -65,7 +70,10 @@ class TurnByHeading(DiscrepancyTerm):
 
 @dataclass(frozen=True)
 class TwistAtStart(DiscrepancyTerm):
-    """At the start of motion the vehicle is delayed and turns, with the sign of the driving direction."""
+    """At the start of motion the vehicle is delayed and turns.
+
+    It turns by ``twist_rad`` with the sign of the driving direction, and by ``same_rad`` in the same direction always.
+    """
 
     name: ClassVar[str] = "twist_at_start"
     stage: ClassVar[Stage] = Stage.BODY
@@ -74,12 +82,13 @@ class TwistAtStart(DiscrepancyTerm):
     longest_step_s: ClassVar[float] = 0.025
 
     twist_rad: float = parameter(unit="rad", low=-0.5, high=0.5, scale=0.02)
+    same_rad: float = parameter(unit="rad", low=-0.5, high=0.5, scale=0.02)
     lost_s: float = parameter(unit="s", low=0.0, high=0.8, scale=0.1)
 
     @staticmethod
-    def move(state: Floats, twist_rad: float, lost_s: float) -> None:
+    def move(state: Floats, twist_rad: float, same_rad: float, lost_s: float) -> None:
         """Turn and slow down within the first centimetres, with a total delay of `lost_s`."""
-        if (twist_rad != 0.0 or lost_s != 0.0) and state[SPEED] != 0.0:
+        if (twist_rad != 0.0 or same_rad != 0.0 or lost_s != 0.0) and state[SPEED] != 0.0:
             since = state[DISTANCE] / (abs(state[SPEED]) * _START_S)
             if since < 40.0:
                 held = 1.0 - math.exp(-lost_s / _START_S)
@@ -88,17 +97,20 @@ class TwistAtStart(DiscrepancyTerm):
                 state[FORWARD] *= 1.0 - held * near
                 state[LEFT] *= 1.0 - held * near
                 state[YAW_RATE] *= 1.0 - held * near
-                state[YAW_RATE] += math.copysign(twist_rad * rate * near, state[SPEED])
+                state[YAW_RATE] += (same_rad + math.copysign(twist_rad, twist_rad * state[SPEED])) * rate * near
 
 
 @dataclass(frozen=True)
 class WaveByDistance(DiscrepancyTerm):
-    """Speed and curvature vary periodically with the distance driven in the run."""
+    """Speed, direction of motion and curvature vary periodically with the distance driven in the run.
+
+    The distance is negative backward: a wheel that turns back passes the same angles in reverse order.
+    """
 
     name: ClassVar[str] = "wave_by_distance"
     stage: ClassVar[Stage] = Stage.BODY
     covariates: ClassVar[tuple[str, ...]] = ("distance_modulo_period_m",)
-    through: ClassVar[str] = "speed and turning"
+    through: ClassVar[str] = "speed, lateral motion and turning"
     longest_step_s: ClassVar[float] = 0.05
 
     period_m: float = parameter(unit="m", low=0.0, high=10.0, scale=0.1)
@@ -106,16 +118,26 @@ class WaveByDistance(DiscrepancyTerm):
     speed_sine: float = parameter(unit="–", low=-0.7, high=0.7, scale=0.03)
     turn_cosine: float = parameter(unit="1/m", low=-5.0, high=5.0, scale=0.1)
     turn_sine: float = parameter(unit="1/m", low=-5.0, high=5.0, scale=0.1)
+    side_cosine: float = parameter(unit="–", low=-0.7, high=0.7, scale=0.02)
+    side_sine: float = parameter(unit="–", low=-0.7, high=0.7, scale=0.02)
 
     @staticmethod
     def move(
-        state: Floats, period_m: float, speed_cosine: float, speed_sine: float, turn_cosine: float, turn_sine: float
+        state: Floats,
+        period_m: float,
+        speed_cosine: float,
+        speed_sine: float,
+        turn_cosine: float,
+        turn_sine: float,
+        side_cosine: float,
+        side_sine: float,
     ) -> None:
-        """Modulate speed and yaw rate."""
+        """Modulate speed, lateral velocity and yaw rate."""
         if period_m > 0.0:
-            angle = math.tau * state[DISTANCE] / period_m
+            angle = math.tau * math.copysign(state[DISTANCE], state[SPEED]) / period_m
             c, s = math.cos(angle), math.sin(angle)
+            side = (side_cosine * c + side_sine * s) * state[FORWARD]
             state[YAW_RATE] += (turn_cosine * c + turn_sine * s) * state[FORWARD]
             factor = 1.0 + speed_cosine * c + speed_sine * s
             state[FORWARD] *= factor
-            state[LEFT] *= factor
+            state[LEFT] = factor * state[LEFT] + side

@@ -27,7 +27,7 @@ class FloorTiltPower(Variant):
     limits: ClassVar[str] = "one slope for the whole floor; several speeds and directions are needed"
 
     drift_mps: float = parameter(unit="m/s", low=0.0, high=0.2, scale=0.005)
-    direction_rad: float = parameter(unit="rad", low=-math.pi, high=math.pi, scale=0.5)
+    direction_rad: float = parameter(unit="rad", low=-math.tau, high=math.tau, scale=0.5)
     exponent: float = parameter(unit="–", low=0.1, high=3.0, scale=0.5, null=0.1)
 
     @classmethod

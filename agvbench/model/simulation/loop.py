@@ -26,12 +26,14 @@ from agvbench.effects.state import (
     FRONT_AIM,
     FRONT_BEFORE,
     FRONT_COMMAND,
+    FRONT_REVERSAL,
     HEADING,
     HOURS,
     KNOWN_FRONT,
     REAR_AIM,
     REAR_BEFORE,
     REAR_COMMAND,
+    REAR_REVERSAL,
     REAR_WAIT,
     SEEN_LAG,
     SIZE,
@@ -69,6 +71,12 @@ _STATE = 4
 
 
 @compiled(inner=True)
+def _last_reversal(reversal: float, before: float, now: float) -> float:
+    """Return the angle at which the last change of direction took place, for a change from `before` to `now`."""
+    return before if (now - before) * (before - reversal) < 0.0 else reversal
+
+
+@compiled(inner=True)
 def _obey(
     s: Floats, p: Floats, commands: Floats, settled: Floats, driven: int, front: int, rear: int, lift: float
 ) -> None:
@@ -78,8 +86,10 @@ def _obey(
     """
     if commands[front, 1] != s[FRONT_COMMAND]:
         s[FRONT_BEFORE] = s[FRONT_AIM]
+        s[FRONT_REVERSAL] = _last_reversal(s[FRONT_REVERSAL], settled[front - 1, 0], settled[front, 0])
     if commands[rear, 2] != s[REAR_COMMAND]:
         s[REAR_BEFORE] = s[REAR_AIM]
+        s[REAR_REVERSAL] = _last_reversal(s[REAR_REVERSAL], settled[rear - 1, 1], settled[rear, 1])
     s[DRIVE_COMMAND], s[FRONT_COMMAND], s[REAR_COMMAND] = commands[driven, 0], commands[front, 1], commands[rear, 2]
     s[FRONT_AIM], s[REAR_AIM], s[SPEED_AIM] = settled[front, 0], settled[rear, 1], settled[driven, 2]
     if settled[driven, 2] != 0.0:
@@ -154,6 +164,7 @@ def _drive_run(
     # There is no command before the first one.
     s[FRONT_COMMAND], s[REAR_COMMAND] = commands[first, 1], commands[first, 2]
     s[FRONT_BEFORE], s[REAR_BEFORE] = settled[first, 0], settled[first, 1]
+    s[FRONT_REVERSAL], s[REAR_REVERSAL] = settled[first, 0], settled[first, 1]
     driven = front = rear = first
     while now < math.inf:
         to_front = arrive(s, command_t_s[front + 1], p) if front < last else math.inf

@@ -1,0 +1,56 @@
+"""Causes outside the library are described by a term with their own size, and the test error shows it."""
+
+from __future__ import annotations
+
+import pytest
+from tiny_vehicle import Tiny
+
+from agvbench.diagnosis import Verdict, diagnose
+
+pytestmark = pytest.mark.slow
+
+OUTSIDE = {
+    "pull": (Tiny(pull_mps=0.02), "drift_to_point", {"mps": 0.02, "x_m": 0.3, "y_m": -0.2}, "x_m y_m"),
+    "kick": (Tiny(kick_rad=0.05), "twist_at_start", {"same_rad": 0.05, "twist_rad": 0.0}, "time_in_run_s"),
+    "seam": (Tiny(seam_rad=0.06), "turn_at_line", {"same_rad": 0.06, "turn_rad": 0.0}, "x_m y_m"),
+    "downhill": (Tiny(downhill=0.06), "speed_by_course", {"cosine": 0.0324, "sine": 0.0505}, "course_rad"),
+    "run-out": (Tiny(run_out_rad=0.04), "wave_by_distance", {"turn_sine": 0.1325}, "distance_modulo_period_m"),
+}
+
+
+@pytest.mark.parametrize(("hidden", "term", "sizes", "covariates"), OUTSIDE.values(), ids=OUTSIDE)
+def test_a_cause_outside_the_library_is_described_by_its_term(tiny_campaign, hidden, term, sizes, covariates):
+    found = diagnose(tiny_campaign(hidden))
+    assert found.verdict is Verdict.UNKNOWN
+    assert found.depends_on[0].covariate in covariates.split()
+    empirical = found.provenance["empirical_term"]
+    assert empirical["name"] == term
+    assert {name: empirical["parameters"][name] for name in sizes} == pytest.approx(sizes, rel=0.15, abs=0.006)
+    error = found.held_out.errors["position_rms_mm"]
+    assert error["before"] > 2.0 * error["floor"]
+    assert error["after"] < 1.3 * error["floor"]
+
+
+def test_understeer_about_another_point_is_no_marker_offset(tiny_campaign):
+    found = diagnose(tiny_campaign(Tiny(slip=1.0, slip_pivot_m=0.06)))
+    (effect,) = found.effects
+    assert (effect.name, effect.evidence["form"]) == ("lateral_slip", "lateral_slip_pivot")
+    for name, true in (("gradient", 1.0), ("pivot_m", 0.06)):
+        own = effect.parameters[name]
+        assert own.value == pytest.approx(true, abs=max(3.0 * own.stderr, 0.03 * true))
+
+
+def test_distances_of_both_axles_may_be_wrong(tiny_campaign):
+    found = diagnose(tiny_campaign(Tiny(wheelbase_m=0.310, marker_forward_m=0.015)))
+    (effect,) = found.effects
+    assert "marker_offset" in {effect.name, *effect.confounded_with}
+    assert effect.name in {"marker_offset", "axle_coupling"}
+
+
+@pytest.mark.parametrize("direction", [-3.1, -1.6, 0.0, 1.6, 3.1])
+def test_a_tilt_is_found_in_every_direction(tiny_campaign, direction):
+    found = diagnose(tiny_campaign(Tiny(tilt_mps=0.004, tilt_rad=direction)))
+    (effect,) = found.effects
+    assert effect.name == "floor_tilt"
+    assert effect.parameters["drift_mps"].value == pytest.approx(0.004, rel=0.05)
+    assert effect.parameters["direction_rad"].value == pytest.approx(direction, abs=0.03)
