@@ -114,6 +114,24 @@ def ramped_up(aim: Path, moments: Floats, speeding: float, brake_s: float, end: 
     return lambda t: pieces[max(0, bisect.bisect_right(begins, t) - 1)](max(t, begins[0]))
 
 
+def coasted(aim: Path, moments: Floats, acceleration: float, coast_s: float, end: float) -> Path:
+    """Return the path of a speed that ramps to a powered level and decays exponentially to zero, from rest."""
+    pieces, v = [], 0.0
+    for begin, until in zip(moments.tolist(), [*moments[1:].tolist(), end], strict=True):
+        aimed = float(aim(begin + 1e-9))
+        if aimed == 0.0:
+            piece = partial(lambda t, at, was: was * math.exp((at - t) / coast_s), at=begin, was=v)
+        else:
+            piece = partial(
+                lambda t, at, was, to: was + math.copysign(min(abs(to - was), acceleration * (t - at)), to - was),
+                at=begin, was=v, to=aimed,
+            )  # fmt: skip
+        pieces.append(piece)
+        v = piece(until)
+    begins = moments.tolist()
+    return lambda t: pieces[max(0, bisect.bisect_right(begins, t) - 1)](max(t, begins[0]))
+
+
 def _pieces(equation: Any, aim: Path, state: Floats, moments: Floats, end: float) -> Path:
     found = []
     for begin, until in zip(moments, [*moments[1:], end], strict=True):
@@ -185,6 +203,8 @@ def true_form(name: str, values: dict[str, float], start: tuple[float, float, fl
         speed = ramped(speed, drives, values["acceleration_mps2"], values["braking_mps2"], end)
     if name == "speed_lag_ramp_up":
         speed = ramped_up(speed, drives, values["acceleration_mps2"], values["brake_s"], end)
+    if name == "speed_lag_coasting":
+        speed = coasted(speed, drives, values["acceleration_mps2"], values["coast_s"], end)
     smoothing = values.get("time_constant_s", 0.0) if name == "mocap_latency_smoothing" else 0.0
     seen = times - values.get("latency_s", 0.0)
     return drive(front, rear, speed, np.array(start), seen, np.r_[fronts, rears, drives], smoothing)

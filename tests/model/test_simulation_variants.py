@@ -28,6 +28,7 @@ SIZES = [
     ("steering_rate_limit_acceleration", {"rate_rad_per_s": 3.0, "acceleration_rad_per_s2": 1.5}),
     ("speed_lag_ramp", {"acceleration_mps2": 0.5, "braking_mps2": 0.35}),
     ("speed_lag_ramp_up", {"acceleration_mps2": 0.5, "brake_s": 0.2}),
+    ("speed_lag_coasting", {"acceleration_mps2": 0.5, "coast_s": 0.2}),
     ("mocap_latency_smoothing", {"latency_s": 0.03, "time_constant_s": 0.12}),
     ("mocap_latency_smoothing", {"latency_s": 0.0, "time_constant_s": 0.004}),
     ("mocap_latency_smoothing", {"latency_s": 0.0, "time_constant_s": 1.5}),

@@ -160,10 +160,11 @@ def _same_duration(readings: Readings, runs: NDArray[np.int64], others: NDArray[
 
 
 def _require_single_cluster(readings: Readings, path: Floats, where: str) -> None:
-    """Raise an error if the deviations between repeats have two clusters, and neither time nor place divides the runs.
+    """Raise an error if the deviations between repeats have two clusters that are two vehicles under one name.
 
-    Random errors and wear fill the gap between clusters. Two vehicles under one name, driven in turn, do not. A change
-    during the campaign and a disturbance at a place make two clusters, too: these are evidence for the diagnosis.
+    Random errors and wear fill the gap between clusters. Two vehicles, driven in turn, do not, and the runs of *each*
+    agree with one another. A change during the campaign and a disturbance at a place make two clusters, too, but runs
+    that they affect differ from one another, or time or place divides them. These are evidence for the diagnosis.
     """
     pairs = np.array(
         [
@@ -191,6 +192,7 @@ def _require_single_cluster(readings: Readings, path: Floats, where: str) -> Non
         gaps.max() < _MIN_GAP_RATIO
         or far[0] < _MIN_FAR_DISTANCE
         or np.median(far) < _MIN_CLUSTER_RATIO * np.median(near)
+        or not _are_two_kinds(readings.group, pairs[at:], pairs[:at])
         or _divided_by_time(readings.started_h[pairs], np.arange(count) >= at)
         or _divided_by_place(readings.start[pairs, :2], np.arange(count) >= at)
     ):
@@ -203,6 +205,26 @@ def _require_single_cluster(readings: Readings, path: Floats, where: str) -> Non
         f"{near[-1]:.0%}; {readings.runs[i].run_id} and {readings.runs[j].run_id} differ",
         remedy="see that one vehicle drove them all under one calibration, or diagnose its runs apart",
     )
+
+
+def _are_two_kinds(groups: NDArray[np.int64], far: NDArray[np.int64], near: NDArray[np.int64]) -> bool:
+    """Return whether repeats that differ from the majority of their group agree with one another.
+
+    `far` and `near` (pairs, 2) are repeats that differ and that agree, and `groups` (runs,) are their commands. Groups
+    of two repeats cannot show it; a campaign of these alone is taken for one of two vehicles.
+    """
+    agreements = np.zeros((len(groups), len(groups)), dtype=np.bool_)
+    differences = agreements.copy()
+    agreements[tuple(near.T)] = agreements[tuple(near.T[::-1])] = True
+    differences[tuple(far.T)] = differences[tuple(far.T[::-1])] = True
+    agreeing = differing = 0
+    for group in np.unique(groups[far]):
+        runs = np.flatnonzero(groups == group)
+        majority = runs[np.argmax(agreements[np.ix_(runs, runs)].sum(axis=1))]
+        others = runs[differences[majority, runs]]
+        agreeing += np.count_nonzero(agreements[np.ix_(others, others)]) // 2
+        differing += np.count_nonzero(differences[np.ix_(others, others)]) // 2
+    return agreeing >= _MIN_AGREEMENT * (agreeing + differing)
 
 
 def _divided_by_time(hours: Floats, far: NDArray[np.bool_]) -> bool:
