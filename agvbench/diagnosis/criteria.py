@@ -42,6 +42,24 @@ class DataCriteria:
 
 
 @dataclass(frozen=True)
+class MapCriteria:
+    """How much a static map may bend between its nodes.
+
+    ``slope_change``
+        Standard deviation of the change of slope over half the range of commands, relative to the mean slope. The
+        linkage of a servo changes its slope by a third.
+    ``deviation``
+        Standard deviation of single levels from a smooth map, relative to 45° or the top speed. A servo resolves 0.1°.
+    ``kink_degrees_of_freedom``
+        Degrees of freedom of Student's t distribution of the changes of slope. Few make kinks cheap.
+    """
+
+    slope_change: float = 0.5
+    deviation: float = 0.002
+    kink_degrees_of_freedom: float = 3.0
+
+
+@dataclass(frozen=True)
 class FitCriteria:
     """When a fit is started, continued and ended. Differences are in minus two log likelihood.
 
@@ -199,6 +217,7 @@ class DesignCriteria:
 
 
 DATA = DataCriteria()
+MAPS = MapCriteria()
 FIT = FitCriteria()
 SELECTION = SelectionCriteria()
 FREE_DRIVING = SelectionCriteria(min_relative_change=0.3, best_group_share=0.0)
@@ -215,6 +234,7 @@ def stated_criteria(selection: SelectionCriteria = SELECTION) -> dict[str, dict[
     """Return every criterion with its value, by class, for the provenance of a diagnosis with this `selection`."""
     return {
         "data": asdict(DATA),
+        "maps": asdict(MAPS),
         "fit": asdict(FIT),
         "selection": asdict(selection),
         "variant": asdict(VARIANT),

@@ -11,6 +11,7 @@ from agvbench.diagnosis import criteria, diagnose
 
 CLASSES = (
     criteria.DataCriteria,
+    criteria.MapCriteria,
     criteria.FitCriteria,
     criteria.SelectionCriteria,
     criteria.VariantCriteria,

@@ -9,14 +9,21 @@ import pytest
 from whole_information import every_parameter
 
 from agvbench.diagnosis.estimation.cross_validation import cross_validated
+from agvbench.diagnosis.model.smoothness import PriorTerms
 
 NO_BOUNDS = np.empty((0, 2))
 
 
-def linear_fit(design, measured):
-    """Return what `cross_validated` reads of a fit, of runs whose prediction is linear: design (R, K, P)."""
+def estimated(design, measured, prior):
+    """Return the estimate from runs (R, K, P) whose prediction is linear, with the information of a prior about 0."""
     rows = design.reshape(-1, design.shape[-1])
-    best = np.linalg.lstsq(rows, measured.ravel(), rcond=None)[0]
+    return np.linalg.lstsq(rows.T @ rows + prior, rows.T @ measured.ravel(), rcond=None)[0]
+
+
+def linear_fit(design, measured, prior=None):
+    """Return what `cross_validated` reads of a fit, of runs whose prediction is linear: design (R, K, P)."""
+    prior = np.zeros((design.shape[-1],) * 2) if prior is None else prior
+    best = estimated(design, measured, prior)
     miss = measured - design @ best
     return SimpleNamespace(
         predictor=SimpleNamespace(
@@ -26,17 +33,18 @@ def linear_fit(design, measured):
         loss=np.sum(miss**2, axis=1),
         information=every_parameter(np.einsum("rki,rkj->rij", design, design)),
         gradient=np.einsum("rki,rk->ri", design, miss),
+        prior=PriorTerms(float(best @ prior @ best), prior, -prior @ best),
     )  # fmt: skip
 
 
-def test_a_linear_model_is_foretold_as_if_it_were_fitted_without_the_fold():
+@pytest.mark.parametrize("prior", [np.zeros((3, 3)), np.diag([0.0, 5.0, 0.0]), 3.0 * np.ones((3, 3))])
+def test_a_linear_model_is_foretold_as_if_it_were_fitted_without_the_fold(prior):
     rng = np.random.default_rng(3)
     design, fold = rng.normal(size=(12, 5, 3)), np.repeat([0, 1, 2], 4)
     measured = design @ [1.0, -2.0, 0.5] + rng.normal(size=(12, 5))
-    loss = cross_validated(linear_fit(design, measured), fold, NO_BOUNDS)
+    loss = cross_validated(linear_fit(design, measured, prior), fold, NO_BOUNDS)
     for k in range(3):
-        rest = design[fold != k].reshape(-1, 3)
-        left = np.linalg.lstsq(rest, measured[fold != k].ravel(), rcond=None)[0]
+        left = estimated(design[fold != k], measured[fold != k], prior)
         expected = np.sum((measured - design @ left) ** 2, axis=1)
         assert loss[fold == k] == pytest.approx(expected[fold == k], rel=1e-4)
 

@@ -23,6 +23,7 @@ def fitted(slopes, missed):
         ),
         gradient=(slopes * (missed - slopes * value))[:, None],
         information=every_parameter((slopes**2)[:, None, None]),
+        total_information=np.array([[float(slopes @ slopes)]]),
         covariance=np.array([[1.0 / float(slopes @ slopes)]]),
     ), value
 

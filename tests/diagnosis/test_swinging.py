@@ -101,7 +101,7 @@ def test_some_of_many_levels_reach_from_end_to_end_without_wide_gaps(levels, see
 
 def test_a_gain_is_one_of_fit_and_of_prediction():
     def model(fit, predicted):
-        return ScoredModel((), SimpleNamespace(loss=np.array([fit])), np.array([predicted]))
+        return ScoredModel((), SimpleNamespace(total_loss=fit, prior=SimpleNamespace(loss=0.0)), np.array([predicted]))
 
     assert model(-10.0, -50.0).gain_over(model(-8.0, -20.0)) == 2.0
     assert model(-90.0, -50.0).gain_over(model(-8.0, -20.0)) == 30.0

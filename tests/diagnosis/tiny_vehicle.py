@@ -51,6 +51,7 @@ class Tiny:
     play_rad: float = 0.0
     accelerate_s: float = 0.0
     brake_s: float = 0.0
+    coast_s: float = 0.0
     slip: float = 0.0
     droop_per_hour: float = 0.0
     tilt_mps: float = 0.0
@@ -121,7 +122,7 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
         else:
             front += (front_of(c.front) + f_off - front) * away
             rear += (rear_of(c.rear) + r_off - rear) * away
-        lag = tiny.accelerate_s if abs(told) > abs(speed) else tiny.brake_s
+        lag = tiny.accelerate_s if abs(told) > abs(speed) else (tiny.coast_s if told == 0.0 else 0.0) or tiny.brake_s
         speed += (told - speed) * (1.0 - math.exp(-_STEP_S / lag) if lag else 1.0)
         relief = 1.0 + tiny.reverse_gain if speed < 0.0 else 1.0
         f, r, s = (

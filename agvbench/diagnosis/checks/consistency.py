@@ -222,8 +222,8 @@ def _are_two_kinds(groups: NDArray[np.int64], far: NDArray[np.int64], near: NDAr
         runs = np.flatnonzero(groups == group)
         majority = runs[np.argmax(agreements[np.ix_(runs, runs)].sum(axis=1))]
         others = runs[differences[majority, runs]]
-        agreeing += np.count_nonzero(agreements[np.ix_(others, others)]) // 2
-        differing += np.count_nonzero(differences[np.ix_(others, others)]) // 2
+        agreeing += int(np.count_nonzero(agreements[np.ix_(others, others)])) // 2
+        differing += int(np.count_nonzero(differences[np.ix_(others, others)])) // 2
     return agreeing >= _MIN_AGREEMENT * (agreeing + differing)
 
 

@@ -68,7 +68,7 @@ def swapped(chosen: Fit, name: str, other: str, candidates: Mapping[str, Candida
             iterations=_FEW_ITERATIONS,
         )
 
-    best = min((fitted(start) for start in candidates[other].starts), key=lambda f: float(f.loss.sum()))
+    best = min((fitted(start) for start in candidates[other].starts), key=lambda f: f.total_loss)
     return fit(
         predictor,
         best.parameters,

@@ -22,7 +22,8 @@ def cross_validated(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Flo
     Directions in parameter space for which the other folds hold less than 5 % of the information are fitted to the
     fold itself, because the other folds cannot predict them: a misfit elsewhere would be amplified twentyfold. One
     example is a command level that is driven in no other fold, which is calibration. Another is a backlash that a
-    single group traverses in both directions, while the nodal values compensate for it in all other groups.
+    single group traverses in both directions, while the nodal values compensate for it in all other groups. The prior
+    of the maps counts as information of the other folds, but not as a share: it says less than a single run.
     """
     if fitted.predictor.readings.initial_states is not None:
         return _cross_validated_windows(fitted, fold, bounds)
@@ -32,6 +33,7 @@ def cross_validated(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Flo
     free[maps:] = (effects > bounds[:, 0]) & (effects < bounds[:, 1])
     among = np.ix_(free, free)
     gradient = fitted.gradient[:, free]
+    prior, prior_gradient = fitted.prior.information[among], fitted.prior.gradient[free]
     total = fitted.information.total[among]
     weak = 1e-6 * np.diag(np.diagonal(total) + 1.0)
     whiten = np.linalg.inv(np.linalg.cholesky(total + weak)).T
@@ -41,14 +43,14 @@ def cross_validated(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Flo
         # In coordinates in which the total information is the identity, the fold holds what the others lack.
         share, turn = np.linalg.eigh(whiten.T @ (fitted.information.total_of(~out)[among] + weak) @ whiten)
         turn = whiten @ turn
-        others, own = (turn.T @ gradient[chosen].sum(axis=0) for chosen in (~out, out))
         known = share > _MIN_SHARE
+        by_prior = turn.T @ prior @ turn
+        others, own = (turn.T @ (gradient[chosen].sum(axis=0) + prior_gradient) for chosen in (~out, out))
+        along = own / (np.maximum(1.0 - share, _MIN_SHARE) + np.diagonal(by_prior))
+        matrix = np.diag(share[known]) + by_prior[np.ix_(known, known)]
+        along[known] = np.linalg.solve(matrix, others[known])
         move = np.zeros(len(free))
-        move[free] = turn @ np.where(
-            known,
-            others / np.maximum(share, _MIN_SHARE),
-            own / np.maximum(1.0 - share, _MIN_SHARE),
-        )
+        move[free] = turn @ along
         loss[out] += (fitted.information.along(move) - 2.0 * fitted.gradient @ move)[out]
     return loss
 

@@ -21,6 +21,7 @@ from agvbench.diagnosis.estimation.variance import (
     window_variance_components,
 )
 from agvbench.diagnosis.model.predictor import Linearised, Predictor
+from agvbench.diagnosis.model.smoothness import PriorTerms
 from agvbench.types import Floats
 
 _ITERATIONS = 8
@@ -32,8 +33,8 @@ class Fit:
 
     ``parameters`` (P,), the nodal values first; ``random_effects`` (R, 6) of each run; ``variance_components``;
     ``loss`` (R,): minus two log likelihood of each run; ``information`` and ``gradient`` (R, P): the quadratic
-    approximation of the loss at the parameters; ``residual`` (R, K, 3): measured minus predicted poses, with the random
-    effects; ``linear``: the derivatives at the parameters.
+    approximation of the loss at the parameters; ``prior``: that of the maps; ``residual`` (R, K, 3): measured minus
+    predicted poses, with the random effects; ``linear``: the derivatives at the parameters.
     """
 
     predictor: Predictor
@@ -43,19 +44,35 @@ class Fit:
     loss: Floats
     information: Information
     gradient: Floats
+    prior: PriorTerms
     residual: Floats
     linear: Linearised
 
     @property
+    def total_loss(self) -> float:
+        """Minus two log posterior: the loss of all runs and of the maps' prior."""
+        return float(self.loss.sum()) + self.prior.loss
+
+    @property
+    def total_information(self) -> Floats:
+        """The information of all runs and of the priors (P, P)."""
+        return self.information.total + ridge(self.predictor) + self.prior.information
+
+    @property
     def covariance(self) -> Floats:
         """Covariance of the parameters (P, P)."""
-        return np.asarray(np.linalg.pinv(self.information.total + ridge(self.predictor), hermitian=True))
+        return np.asarray(np.linalg.pinv(self.total_information, hermitian=True))
 
     @cached_property
     def linearisation_point(self) -> LinearisationPoint:
         """The point at which the predicted gain of every larger model is linearised."""
         return LinearisationPoint.of(
-            self.predictor, self.linear, self.information, self.variance_components, self.random_effects, self.residual
+            self.predictor,
+            self.linear,
+            self.total_information,
+            self.variance_components,
+            self.random_effects,
+            self.residual,
         )
 
     def effect_values(self) -> dict[str, float]:
@@ -116,7 +133,7 @@ def fit(
     terms = evaluation.terms
     return Fit(
         predictor, state.parameters, state.random_effects, state.variance_components,
-        terms.loss, terms.information, terms.gradient, evaluation.residual, evaluation.linear,
+        terms.loss, terms.information, terms.gradient, evaluation.prior, evaluation.residual, evaluation.linear,
     )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from agvbench.diagnosis.criteria import FIT
 from agvbench.diagnosis.estimation.likelihood import Terms, objective, residual_of, ridge, terms_of
 from agvbench.diagnosis.estimation.variance import VarianceComponents, update_variance_components
 from agvbench.diagnosis.model.predictor import Linearised, Predictor
+from agvbench.diagnosis.model.smoothness import PriorTerms
 from agvbench.types import Floats
 
 _STEP_LENGTHS = (1.0, 0.4, 0.16, 0.064)
@@ -42,7 +43,7 @@ class StepSolver:
         poorly determined parameters from making the whole step fail. If no damped step qualifies, the point is returned
         unchanged.
         """
-        now, (matrix, gradient) = self._objective(point), self._normal_equations(terms)
+        now, (matrix, gradient) = self._objective(point), self._normal_equations(point, terms)
         for damping in _DAMPINGS:
             damped = matrix + damping * np.diag(np.diagonal(matrix))
             move, move_random_effects = self._move(point, terms, damped, gradient)
@@ -54,7 +55,7 @@ class StepSolver:
 
     def full(self, point: Point, terms: Terms) -> Point:
         """Return the point after a full step, even if its objective is larger."""
-        return self._at(point, *self._move(point, terms, *self._normal_equations(terms)))
+        return self._at(point, *self._move(point, terms, *self._normal_equations(point, terms)))
 
     def _at(self, point: Point, move: Floats, move_random_effects: Floats) -> Point:
         maps = self.predictor.maps.size
@@ -65,10 +66,13 @@ class StepSolver:
         )
 
     def _objective(self, point: Point) -> float:
-        return objective(self.predictor, point.residual, point.random_effects, self.variance_components)
+        prior = self.predictor.batch.smoothness.loss(point.parameters)
+        return prior + objective(self.predictor, point.residual, point.random_effects, self.variance_components)
 
-    def _normal_equations(self, terms: Terms) -> tuple[Floats, Floats]:
-        return terms.information.total + ridge(self.predictor), terms.gradient.sum(axis=0)
+    def _normal_equations(self, point: Point, terms: Terms) -> tuple[Floats, Floats]:
+        prior = self.predictor.batch.smoothness.terms(point.parameters)
+        matrix = terms.information.total + ridge(self.predictor) + prior.information
+        return matrix, terms.gradient.sum(axis=0) + prior.gradient
 
     def _move(self, point: Point, terms: Terms, matrix: Floats, gradient: Floats) -> tuple[Floats, Floats]:
         move = self._bounded(matrix, gradient, point.parameters)
@@ -103,16 +107,20 @@ class FitState:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """The model evaluated at a state: derivatives, ``residual`` (R, K, 3), and the terms of the likelihood."""
+    """The model evaluated at a state.
+
+    Derivatives, ``residual`` (R, K, 3), the terms of the likelihood, and those of the maps' ``prior``.
+    """
 
     linear: Linearised
     residual: Floats
     terms: Terms
+    prior: PriorTerms
 
     @property
     def loss(self) -> float:
-        """Minus two log likelihood of all runs."""
-        return float(self.terms.loss.sum())
+        """Minus two log posterior: of all runs and of the maps."""
+        return float(self.terms.loss.sum()) + self.prior.loss
 
 
 class Convergence(Enum):
@@ -135,7 +143,7 @@ class LevenbergMarquardt:
         linear = self.predictor.linearise(state.parameters, state.random_effects, near)
         residual = residual_of(self.predictor, linear.poses)
         terms = terms_of(self.predictor, residual, linear, state.random_effects, state.variance_components)
-        return Evaluation(linear, residual, terms)
+        return Evaluation(linear, residual, terms, self.predictor.batch.smoothness.terms(state.parameters))
 
     def iterate(self, state: FitState, iterations: int, near: Linearised | None = None) -> tuple[FitState, Convergence]:
         """Return the state after at most `iterations` steps, and the state of convergence.

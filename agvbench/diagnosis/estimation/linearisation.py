@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.diagnosis.estimation.likelihood import WEAK, Information, inner_inverse, ridge
+from agvbench.diagnosis.estimation.likelihood import WEAK, inner_inverse
 from agvbench.diagnosis.estimation.variance import VarianceComponents, priors, weights
 from agvbench.diagnosis.model.predictor import Linearised, Predictor
 from agvbench.types import Floats
@@ -40,12 +40,12 @@ class LinearisationPoint:
         cls,
         predictor: Predictor,
         linear: Linearised,
-        information: Information,
+        information: Floats,
         variance_components: VarianceComponents,
         random_effects: Floats,
         residual: Floats,
     ) -> LinearisationPoint:
-        """Return the linearisation point of a fit: its derivatives, information, random effects and residuals."""
+        """Return the linearisation point of a fit: derivatives, total information, random effects and residuals."""
         weight = weights(predictor, variance_components)
         residual = (residual * weight).reshape(len(weight), -1)
         a = (linear.by_random_effects * weight[..., None]).reshape(*residual.shape, -1)
@@ -54,10 +54,9 @@ class LinearisationPoint:
         inverse = inner_inverse(a, prior)[1]
         mixed = inverse @ (a.transpose(0, 2, 1) @ j)
         prior_gradient = random_effects / prior**2
-        matrix = information.total + ridge(predictor)
-        pull = np.zeros(len(matrix))
+        pull = np.zeros(len(information))
         np.add.at(pull, linear.own, np.einsum("rij,ri->rj", mixed, prior_gradient))
-        covariance = np.asarray(np.linalg.inv(matrix))
+        covariance = np.asarray(np.linalg.inv(information))
         return cls(weight, a, inverse, prior_gradient, linear.own, j - a @ mixed, covariance, pull, residual)
 
     @cached_property
@@ -70,11 +69,14 @@ class LinearisationPoint:
         pull = (self.a.transpose(0, 2, 1) @ e[..., None])[..., 0] - self.prior_gradient
         return float(np.sum(e * e) - np.sum(pull * (self.inverse @ pull[..., None])[..., 0]))
 
-    def predicted_gain(self, residual: Floats, slopes: Floats, start: Floats, bounds: Floats) -> float:
+    def predicted_gain(
+        self, residual: Floats, slopes: Floats, start: Floats, bounds: Floats, prior_gradient: Floats
+    ) -> float:
         """Return the predicted reduction of the loss, to first order, from the larger model's linearisation.
 
         `residual` (R, K, 3) is that of the larger model at `start` (q,). `slopes` (R, K, 3, q) are the derivatives by
-        its new parameters, and `bounds` (q, 2) their bounds.
+        its new parameters, and `bounds` (q, 2) their bounds. `prior_gradient` (P,) is that of the maps' prior at the
+        nodal values of the larger model.
         """
         e = (residual * self.weight).reshape(len(residual), -1)
         new = (slopes * self.weight[..., None]).reshape(*e.shape, -1)
@@ -82,7 +84,7 @@ class LinearisationPoint:
         # The prior of the random effects contributes to the gradient, too.
         pull = np.einsum("rnq,rn->q", projected, e) + np.einsum("rnq,rn->q", new, self._prior_change)
         products = self._products(np.concatenate([e[..., None], new], axis=-1))
-        old_pull, shared = products[:, 0] + self.pull, products[:, 1:]
+        old_pull, shared = products[:, 0] + self.pull + prior_gradient, products[:, 1:]
         own = np.einsum("rnp,rnq->pq", new, projected) + WEAK * np.eye(len(start))
         # The existing parameters are eliminated (Schur complement): the new parameters remain.
         along = self.covariance @ shared

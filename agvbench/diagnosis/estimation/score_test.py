@@ -35,7 +35,9 @@ def first_order_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floa
     poses, slopes = larger.by_last(parameters, fitted.random_effects, len(start))
     residual = residual_of(larger, poses)
     if larger.readings.initial_states is None:
-        return fitted.linearisation_point.predicted_gain(residual, slopes, start, bounds)
+        prior = larger.batch.smoothness.terms(parameters[: len(fitted.parameters)])
+        gain = fitted.linearisation_point.predicted_gain(residual, slopes, start, bounds, prior.gradient)
+        return gain + fitted.prior.loss - prior.loss
     terms = terms_of(
         larger, residual, fitted.linear.with_last(slopes), fitted.random_effects, fitted.variance_components
     )

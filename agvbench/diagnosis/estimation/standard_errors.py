@@ -8,7 +8,6 @@ from scipy import special  # scipy.stats takes a second to import
 
 from agvbench.diagnosis.estimation.cross_validation import by_group, clustered_covariance
 from agvbench.diagnosis.estimation.fit import Fit
-from agvbench.diagnosis.estimation.likelihood import ridge
 from agvbench.types import Floats
 
 _MIN_GROUPS = 4.0
@@ -51,7 +50,7 @@ def _jackknife(fitted: Fit, group: NDArray[np.int64]) -> tuple[Floats, Floats]:
     """Return the jackknife standard errors (P,), and the effective number of groups behind each of them (P,)."""
     scores, information = by_group(fitted.gradient, group), by_group(fitted.information.dense(), group)
     groups = len(scores)
-    rest = information.sum(axis=0) + ridge(fitted.predictor) - information
+    rest = fitted.total_information - information
     squares = np.array([np.linalg.lstsq(rest[g], scores[g], rcond=1e-12)[0] for g in range(groups)]) ** 2
     counts = squares.sum(axis=0) ** 2 / np.maximum((squares**2).sum(axis=0), 1e-300)
     return np.sqrt((groups - 1) / groups * squares.sum(axis=0)), counts

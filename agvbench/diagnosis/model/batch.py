@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.model.nodal_maps import ROLES, NodalMaps
+from agvbench.diagnosis.model.smoothness import SmoothnessPrior
 from agvbench.effects import Effect
 from agvbench.model.simulation.simulation import Simulation
 from agvbench.types import Floats
@@ -77,8 +78,8 @@ class Batch:
     Each command level of a run is perturbed by itself. This gives the derivatives by the nodal values and by the run's
     random effects. If the runs have more command levels than nodal values, the nodal values are perturbed instead
     (``by_node``). One batch serves every set of effects, including ``kinds`` outside the library.
-    ``nodal_deviation`` is that of `Simulation.predict`. ``autocorrelation_time`` is the number of windows that are
-    worth one independent window.
+    ``smoothness`` is the prior of the nodal values. ``nodal_deviation`` is that of `Simulation.predict`.
+    ``autocorrelation_time`` is the number of windows that are worth one independent window.
     """
 
     def __init__(
@@ -96,6 +97,7 @@ class Batch:
             autocorrelation_time,
             tuple(kinds),
         )
+        self.smoothness = SmoothnessPrior.of(maps, readings)
         runs = readings.simulated()
         self.base = Simulation(geometry, maps.neutral, runs, kinds=kinds)
         self.commands: dict[str, Floats] = {role: getattr(self.base, role) for role in ROLES}

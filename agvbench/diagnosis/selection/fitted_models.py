@@ -55,8 +55,11 @@ class ScoredModel:
 
     @property
     def deviance(self) -> float:
-        """The cross-validated deviance: the loss of all runs."""
-        return float(self.loss.sum())
+        """The cross-validated deviance: the loss of all runs, and of the maps' prior.
+
+        The prior is the prediction of nodal values from their neighbours, which no other fold makes.
+        """
+        return float(self.loss.sum()) + self.fit.prior.loss
 
     def gain_over(self, other: ScoredModel) -> float:
         """Return the gain in cross-validated deviance or in deviance of the fit, whichever is smaller.
@@ -64,7 +67,7 @@ class ScoredModel:
         If few runs determine a nodal value, predictions without them are unreliable, and the cross-validated deviance
         may differ by a hundred. A gain that does not show in the fit itself does not count.
         """
-        return min(other.deviance - self.deviance, float(other.fit.loss.sum() - self.fit.loss.sum()))
+        return min(other.deviance - self.deviance, other.fit.total_loss - self.fit.total_loss)
 
 
 @dataclass
@@ -154,7 +157,7 @@ class FittedModels:
         # A large predicted gain may need a worse fit first: maps that absorbed a cause must give it back.
         if (
             predicted_gain < FIT.large_predicted_gain
-            and float(now.loss.sum() - preliminary.loss.sum()) < FIT.min_predicted_gain
+            and now.total_loss - preliminary.total_loss < FIT.min_predicted_gain
         ):
             self.tried += 1
             tried = ScoredModel(names, preliminary, cross_validated(preliminary, self._fold, bounds), starts)
@@ -175,13 +178,13 @@ class FittedModels:
         """
         fits = [self._first_steps(current, predictor, starts[0], bounds)]
         iterations = FIT.few_steps if least is None else FIT.steps
-        if current.fit.loss.sum() - fits[0].loss.sum() <= (-FIT.max_increase if least is None else least):
+        if current.fit.total_loss - fits[0].total_loss <= (-FIT.max_increase if least is None else least):
             for start in starts[: FIT.max_starts]:
                 held = bounds.copy()
                 held[-len(start) :] = start[:, None]
                 conditional = self._first_steps(current, predictor, start, held, iterations=iterations)
                 fits.append(self._first_steps(current, predictor, start, bounds, conditional, iterations=iterations))
-        return min(fits, key=lambda one: float(one.loss.sum()))
+        return min(fits, key=lambda one: one.total_loss)
 
     @staticmethod
     def _first_steps(

@@ -78,15 +78,13 @@ class Selector(FittedModels):
 
         An effect that is one `of_group` need not change the prediction noticeably: others of its group take its place.
         """
-        gain = without.loss - with_it.loss
+        gain, group = without.loss - with_it.loss, self.batch.readings.group
+        by_maps = without.fit.prior.loss - with_it.fit.prior.loss
         return bool(
             with_it.gain_over(without) > self.min_gain
-            and without_best_groups(gain, self.batch.readings.group, self.criteria.best_group_share) > 0.0
+            and by_maps + without_best_groups(gain, group, self.criteria.best_group_share) > 0.0
             and (of_group or self._changes_prediction(without, with_it))
-            and all(
-                differs_from_null(with_it.fit, name, self.batch.readings.group)
-                for name in set(with_it.names) - set(without.names)
-            )
+            and all(differs_from_null(with_it.fit, name, group) for name in set(with_it.names) - set(without.names))
         )
 
     def _changes_prediction(self, without: ScoredModel, with_it: ScoredModel) -> bool:

@@ -143,5 +143,5 @@ def _in_batch(model: ScoredModel, batch: Batch) -> tuple[float, Floats]:
     predictor, own = Predictor(batch, model.fit.predictor.effects), model.fit
     still = np.zeros((len(batch.readings), own.random_effects.shape[1]))
     state = FitState(own.parameters, still, own.variance_components)
-    loss = LevenbergMarquardt(predictor, np.empty((0, 2))).evaluate(state).loss
-    return loss, pose_residuals(batch.readings, predictor.predict(own.parameters)).squares()["position_rms_mm"]
+    loss = LevenbergMarquardt(predictor, np.empty((0, 2))).evaluate(state).terms.loss.sum()
+    return float(loss), pose_residuals(batch.readings, predictor.predict(own.parameters)).squares()["position_rms_mm"]

@@ -160,7 +160,7 @@ def _is_new(replacement: _Replacement, current: ScoredModel) -> bool:
 
 def _fit_gain(without: ScoredModel, model: ScoredModel) -> float:
     """Return the gain of `model` in deviance of the fit, whatever its cross-validated gain."""
-    return float(without.fit.loss.sum() - model.fit.loss.sum())
+    return without.fit.total_loss - model.fit.total_loss
 
 
 def _starts_of(variant: type[Variant], model: ScoredModel) -> Floats:
@@ -220,7 +220,7 @@ def _swapped(extended: Selector, current: ScoredModel, out: set[str], variant: C
         )
         for start in variant.starts
     ]  # fmt: skip
-    best = min(fits, key=lambda one: float(one.loss.sum()))
+    best = min(fits, key=lambda one: one.total_loss)
     return extended.score(names, best.parameters, best, starts=starts)
 
 
