@@ -11,8 +11,10 @@ from tiny_vehicle import FRONT_M, HEADER, NEUTRAL, REAR_M, Tiny
 from agvbench.calibration import measure_run
 from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.discrepancy import stepwise as empirical
+from agvbench.diagnosis.estimation.levenberg_marquardt import Convergence, FitState, LevenbergMarquardt
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.nodal_maps import ROLES, nodal_maps, start_values
+from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection import variants as forms
 from agvbench.diagnosis.selection.candidates import candidates, default_candidate
 from agvbench.diagnosis.selection.initial_steering import under_other_initial_steering
@@ -91,3 +93,23 @@ def test_a_term_that_is_worth_nothing_alone_leaves_the_explanation_as_it_is(sele
     monkeypatch.setattr(empirical, "add_term", lambda *_: term_selection)
     named = Selection(base, selector.with_effect(base, "lateral_slip"), {}, {"lateral_slip": 20.0}, {}, 1)
     assert empirical.add_term_and_reconsider(named, selector) == (named, term_selection, selector)
+
+
+def test_a_step_to_where_the_model_cannot_be_evaluated_ends_the_iteration(selector, monkeypatch):
+    base = selector.base()
+    solver = LevenbergMarquardt(base.fit.predictor, np.empty((0, 2)))
+    start = FitState(base.fit.parameters + 0.05, base.fit.random_effects, base.fit.variance_components)
+    calls, linearise = [], Predictor.linearise
+
+    def fails_the_third_time(self, *arguments):
+        calls.append(arguments)
+        linear = linearise(self, *arguments)
+        return replace(linear, by_own=linear.by_own * np.nan) if len(calls) == 3 else linear
+
+    monkeypatch.setattr(Predictor, "linearise", fails_the_third_time)
+    state, convergence = solver.iterate(start, 8)
+    assert (len(calls), convergence) == (3, Convergence.CONVERGED)
+    assert np.isfinite(solver.evaluate(state).loss)
+    calls[:] = [(), ()]
+    with pytest.raises(np.linalg.LinAlgError, match="cannot be evaluated"):
+        solver.iterate(start, 8)

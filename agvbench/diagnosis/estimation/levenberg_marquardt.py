@@ -139,20 +139,36 @@ class LevenbergMarquardt:
     bounds: Floats
 
     def evaluate(self, state: FitState, near: Linearised | None = None) -> Evaluation:
-        """Evaluate the model at `state`; `near` supplies the derivatives by the nodal values if given."""
+        """Evaluate the model at `state`; `near` supplies the derivatives by the nodal values if given.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            If a prediction or one of its derivatives is not finite: parameters far from the truth divide by zero.
+        """
         linear = self.predictor.linearise(state.parameters, state.random_effects, near)
         residual = residual_of(self.predictor, linear.poses)
-        terms = terms_of(self.predictor, residual, linear, state.random_effects, state.variance_components)
+        with np.errstate(over="ignore", invalid="ignore"):
+            terms = terms_of(self.predictor, residual, linear, state.random_effects, state.variance_components)
+        if not (np.isfinite(terms.gradient).all() and np.isfinite(terms.information.blocks).all()):
+            raise np.linalg.LinAlgError("the model cannot be evaluated")
         return Evaluation(linear, residual, terms, self.predictor.batch.smoothness.terms(state.parameters))
 
     def iterate(self, state: FitState, iterations: int, near: Linearised | None = None) -> tuple[FitState, Convergence]:
         """Return the state after at most `iterations` steps, and the state of convergence.
 
-        The first steps use the derivatives by the nodal values from `near` if given.
+        The first steps use the derivatives by the nodal values from `near` if given. A step to where the model cannot
+        be evaluated is undone, and ends the iteration.
         """
-        before, full_step = np.inf, True
+        before, full_step, known = np.inf, True, state
         for step in range(iterations):
-            evaluation = self.evaluate(state, near)
+            try:
+                evaluation = self.evaluate(state, near)
+            except np.linalg.LinAlgError:
+                if known is state:
+                    raise
+                return known, Convergence.CONVERGED
+            known = state
             state, full_step = self._step(state, evaluation)
             if near is not None and (before - evaluation.loss < FIT.nearly_converged or step >= iterations // 2):
                 near = None
@@ -211,7 +227,10 @@ class LevenbergMarquardt:
         point = self._step_solver(state, evaluation).full(self._point(state, evaluation), evaluation.terms)
         now = self._updated(point, state, evaluation)
         for _ in range(FIT.non_monotone_steps):
-            evaluation = self.evaluate(now, near)
+            try:
+                evaluation = self.evaluate(now, near)
+            except np.linalg.LinAlgError:
+                return None
             if evaluation.loss < start - FIT.min_reduction:
                 return now
             now, _ = self._step(now, evaluation)

@@ -250,7 +250,10 @@ class FittedModels:
         kept = [value for key, value in own.items() if key.partition(".")[0] != name]
         parameters = np.r_[current.fit.parameters[: self.batch.maps.size], kept]
         starts = without.starts | {(f"refitted without {name}", parameters.tobytes())}
-        refitted = self.score(without.names, parameters, current.fit, starts=starts, patient=True)
+        try:
+            refitted = self.score(without.names, parameters, current.fit, starts=starts, patient=True)
+        except np.linalg.LinAlgError:
+            return without  # the fit diverged
         return min(without, refitted, key=lambda model: model.deviance)
 
     def _predictor(self, names: tuple[str, ...]) -> Predictor:

@@ -178,7 +178,10 @@ def _values(model: ScoredModel, name: str) -> dict[str, float]:
 def _swapped_models(extended: Selector, current: ScoredModel, replacement: _Replacement) -> list[ScoredModel]:
     """Return `current` with a variant in place of its effect, also with one more effect removed."""
     variant = replace(candidate(replacement.variant), starts=replacement.starts)
-    swapped = _swapped(extended, current, {replacement.replaced}, variant)
+    try:
+        swapped = _swapped(extended, current, {replacement.replaced}, variant)
+    except np.linalg.LinAlgError:
+        return []  # the fit diverged
     # A model with fewer effects fits no better: nothing is removed from one that fits much worse already.
     if _fit_gain(current, swapped) < -VARIANT.max_fit_loss:
         return [swapped]
