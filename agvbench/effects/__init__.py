@@ -25,6 +25,7 @@ from agvbench.effects.steering_lag import SteeringLag
 from agvbench.effects.steering_rate_limit import SteeringRateLimit
 from agvbench.effects.steering_saturation import SteeringSaturation
 from agvbench.effects.wheel_diameter_mismatch import WheelDiameterMismatch
+from agvbench.effects.wheelbase_error import WheelbaseError
 
 __all__ = [
     "HOOKS",
@@ -52,6 +53,7 @@ __all__ = [
     "SteeringRateLimit",
     "SteeringSaturation",
     "WheelDiameterMismatch",
+    "WheelbaseError",
     "effect_from_toml",
     "effect_kinds",
     "parameter",

@@ -47,6 +47,7 @@ CONTRACT = {
     "marker_offset": ["forward_m", "left_m"],
     "heading_misalignment": ["angle_rad"],
     "mocap_scale": ["scale"],
+    "wheelbase_error": ["longer"],
 }
 # Forward through changing turns, backward, stop; both axles beyond the typical size of an end stop.
 TIMES = np.array([0.0, 1.0, 2.0, 3.0, 4.0])

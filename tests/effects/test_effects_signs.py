@@ -21,13 +21,13 @@ RIGHT = (-0.3, 0.3, 0.3)
 STRAIGHT = (0.0, 0.0, 0.3)
 
 
-def drive(row, effect=None, *, seconds=2.0, started_h=0.0, then=None, **values):
+def drive(row, effect=None, *, seconds=2.0, started_h=0.0, then=None, geometry=GEOMETRY, **values):
     """Drive one command, then perhaps another, each for some seconds; return the pose at the end."""
     rows = [row] if then is None else [row, then]
     times = seconds * np.arange(float(len(rows)))
     commands = Commands(times, *(1500.0 + 100.0 * np.array(rows).T[[2, 0, 1]]))
     run = SimulatedRun(commands, np.array([0.0, seconds * len(rows)]), started_h)
-    simulation = Simulation(GEOMETRY, 1500.0, [run])
+    simulation = Simulation(geometry, 1500.0, [run])
     effects = [] if effect is None else [effect_kinds()[effect](**values)]
     settled = np.vstack([[0.0, 0.0, 0.0], *rows])
     return simulation.predict(settled, simulation.parameters(effects), np.zeros((1, 4)))[-1]
@@ -60,6 +60,7 @@ def test_braking_late_means_further():
         ("steering_saturation", {"front_rad": 0.2}),
         ("steering_saturation", {"rear_rad": 0.2}),
         ("lateral_slip", {"gradient": 1.0}),
+        ("wheelbase_error", {"longer": 0.1}),
         ("axle_coupling", {"front_from_rear": 0.1}),
         ("axle_coupling", {"rear_from_front": 0.1}),
     ],
@@ -115,6 +116,11 @@ def test_markers_ahead_go_round_in_front():
     assert ahead == pytest.approx([0.1 * (math.cos(heading) - 1.0), 0.1 * math.sin(heading), 0.0], abs=1e-7)
     left = drive(LEFT, "marker_offset", left_m=0.1) - drive(LEFT)
     assert left == pytest.approx([-0.1 * math.sin(heading), 0.1 * (math.cos(heading) - 1.0), 0.0], abs=1e-7)
+
+
+def test_with_a_longer_wheelbase_each_axle_is_half_of_it_farther_away():
+    longer, turn = Geometry(GEOMETRY.front_axle_m + 0.015, GEOMETRY.rear_axle_m + 0.015), (0.3, 0.1, 0.3)
+    assert drive(turn, "wheelbase_error", longer=0.1) == pytest.approx(drive(turn, geometry=longer))
 
 
 def test_a_misaligned_heading_drives_to_the_other_side():

@@ -34,6 +34,7 @@ SIZES: Mapping[str, Mapping[str, float]] = {
     "marker_offset": {"forward_m": 0.02, "left_m": -0.015},
     "heading_misalignment": {"angle_rad": 0.04},
     "mocap_scale": {"scale": 0.03},
+    "wheelbase_error": {"longer": 0.05},
 }
 
 # Forward, steering changed on the way, backward at once, stop.
@@ -149,13 +150,17 @@ def _equations(get, aims, axles, servos, begin):  # type: ignore[no-untyped-def]
         vf *= 1.0 - get("battery_droop", "per_hour") * (STARTED_H + t / 3600.0)
         vr = (1.0 + get("axle_speed_mismatch", "ratio")) * vf
         # Eq. 5.6–5.10 as printed, with the two corrections.
-        beta = math.atan((LF * math.tan(dr) + LR * math.tan(df)) / (LF + LR))
+        longer = 0.5 * get("wheelbase_error", "longer") * (LF + LR)
+        lf, lr = LF + longer, LR + longer
+        beta = math.atan((lf * math.tan(dr) + lr * math.tan(df)) / (lf + lr))
         along = sorted([vf * math.cos(df), vr * math.cos(dr)], key=abs)
         stiff = 1.0 + get("axle_overrun", "excess")
         speed = (stiff * along[0] + along[1]) / ((stiff + 1.0) * math.cos(beta))
-        curvature = math.cos(beta) * (math.tan(df) - math.tan(dr)) / (LF + LR)
-        curvature /= 1.0 + get("lateral_slip", "gradient") * speed**2
-        curvature += get("wheel_diameter_mismatch", "curvature_per_m")
+        curvature = math.cos(beta) * (math.tan(df) - math.tan(dr)) / (lf + lr)
+        # Effects of the body act in the order of the library: the wheelbase comes after slip and wheels.
+        slipping = speed * math.cos(beta) * math.hypot(1.0, (LF * math.tan(dr) + LR * math.tan(df)) / (LF + LR))
+        curvature /= 1.0 + get("lateral_slip", "gradient") * slipping**2
+        curvature += get("wheel_diameter_mismatch", "curvature_per_m") / (1.0 + get("wheelbase_error", "longer"))
         drift = get("floor_tilt", "drift_mps") * (1.0 - math.exp(-((speed / 0.003) ** 2)))
         slope = get("floor_tilt", "direction_rad")
         growing = v * aims[2] >= 0.0 and abs(aims[2]) > abs(v)

@@ -36,6 +36,9 @@ _REQUIRED_FOR_PAIR: dict[frozenset[str], str] = {
         "the vehicle turned on a jig about a known point, or tight circles both ways, which need a floor that is "
         "large enough"
     ),
+    frozenset(
+        {"mocap_scale", "wheelbase_error"}
+    ): "the wheelbase measured with a tape, or two markers at a known distance",
     frozenset({"mocap_scale", "axle_speed_mismatch"}): "two markers at a known distance, or a tape along a straight",
 }
 _CLOCK = "a reference beside cameras and commands, such as an encoder on board"

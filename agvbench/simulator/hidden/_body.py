@@ -14,6 +14,7 @@ from agvbench.simulator.hidden.constants import (
     FRONT_AXLE,
     FRONT_FROM_REAR,
     FRONT_TRIM,
+    LONGER,
     LOSS_SQUARE,
     LOSS_TANGENT,
     NAP,
@@ -83,7 +84,8 @@ def motion(
     No axle moves laterally: ``V + lf r = U tan δf`` and ``V − lr r = U tan δr`` with U ahead, V to the left, r the yaw
     rate; U is the mean of what both axles' wheels give along the body.
     """
-    lf, lr = p[FRONT_AXLE], p[REAR_AXLE]
+    longer = 0.5 * p[LONGER] * (p[FRONT_AXLE] + p[REAR_AXLE])
+    lf, lr = p[FRONT_AXLE] + longer, p[REAR_AXLE] + longer
     tan_front, tan_rear = math.tan(front), math.tan(rear)
     left_of_speed = _grip(p, x, y, heading, front, rear)
     longitudinal = speed * left_of_speed * _shared(p, math.cos(front), (1.0 + p[AXLE_RATIO]) * math.cos(rear))

@@ -237,8 +237,12 @@ CHANGING = (
 )  # fmt: skip
 
 
+# Effects of the library that came later: `make_plant` does not draw them, so that its seeds keep their plants.
+LATER = (_library("wheelbase_error", {"longer": Size(0.01, 0.04, signed=True)}, True, None, longer="longer"),)
+
+
 CATALOGUE: Mapping[str, Recipe] = MappingProxyType(
-    {r.name: r for r in (*LIBRARY, *OTHER_VARIANTS, *OUTSIDE, *CHANGING)}
+    {r.name: r for r in (*LIBRARY, *OTHER_VARIANTS, *OUTSIDE, *CHANGING, *LATER)}
 )
 NOTHING = "nothing"
 AND = "_and_"

@@ -42,7 +42,7 @@ NULL: dict[str, float] = {
     "latency_s": 0.0, "smoothing_s": 0.0, "marker_forward": 0.0, "marker_left": 0.0, "turned": 0.0, "scale": 0.0,
     "lens": 0.0,
     # wheels, again: what is added comes last, because compiled code keeps the places that it was compiled with
-    "overrun": 0.0, "front_trim": 0.0,
+    "overrun": 0.0, "front_trim": 0.0, "longer": 0.0,
 }  # fmt: skip
 """Every mechanism's constants at their null."""
 
@@ -62,7 +62,7 @@ NAMES = (*BASE, *NULL)
     DRIFT, DRIFT_SHARE, DRIFT_DIRECTION, PATCH_LOSS, PATCH_X, PATCH_Y, PATCH_RADIUS,
     SEAM_KICK, SEAM_PLACE, SEAM_DIRECTION, NAP, NAP_DIRECTION,
     LATENCY_S, SMOOTHING_S, MARKER_FORWARD, MARKER_LEFT, TURNED, SCALE, LENS,
-    OVERRUN, FRONT_TRIM,
+    OVERRUN, FRONT_TRIM, LONGER,
 ) = range(len(NAMES))  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from agvbench.simulator.hidden.base_vehicle import BaseVehicle, sample_vehicle
-from agvbench.simulator.hidden.catalogue import AND, CATALOGUE, NOTHING, recipes
+from agvbench.simulator.hidden.catalogue import AND, CATALOGUE, LATER, NOTHING, recipes
 from agvbench.simulator.hidden.plant import HiddenPlant
 from agvbench.simulator.hidden.recipe import Recipe, Values
 from agvbench.simulator.hidden.separation import Separation, SeparationStudy, separation
@@ -58,8 +58,9 @@ def vehicle_of(seed: int) -> BaseVehicle:
 def sampled_spec(seed: int) -> str:
     """Return what `make_plant` hides for a seed: nothing in a fifth of cases, two effects in a fifth, else one."""
     rng = np.random.default_rng([0x5EA1, seed % _SEEDS])
-    # Effects that change came later: what earlier seeds drew has been published.
-    share, names = rng.random(), [name for name, recipe in CATALOGUE.items() if not recipe.changes]
+    # Effects that change, and others, came later: what earlier seeds drew has been published.
+    later = {recipe.name for recipe in LATER}
+    share, names = rng.random(), [n for n, recipe in CATALOGUE.items() if not recipe.changes and n not in later]
     if share < 0.2:
         return NOTHING
     chosen = rng.choice(len(names), size=2, replace=False)

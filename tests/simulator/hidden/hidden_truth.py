@@ -40,11 +40,12 @@ def poses(plant, rows, start=START, dt=0.02):
     )
 
 
-def motion(front, rear, v_front, v_rear, bend=lambda curvature, speed: curvature):
+def motion(front, rear, v_front, v_rear, bend=lambda curvature, speed: curvature, axles=(LF, LR)):
     """Speed, sideslip and yaw rate; `bend` changes the path's curvature."""
-    sideslip = math.atan((LR * math.tan(front) + LF * math.tan(rear)) / (LF + LR))
+    lf, lr = axles
+    sideslip = math.atan((lr * math.tan(front) + lf * math.tan(rear)) / (lf + lr))
     speed = (v_front * math.cos(front) + v_rear * math.cos(rear)) / (2.0 * math.cos(sideslip))
-    curvature = math.cos(sideslip) * (math.tan(front) - math.tan(rear)) / (LF + LR)
+    curvature = math.cos(sideslip) * (math.tan(front) - math.tan(rear)) / (lf + lr)
     return speed, sideslip, speed * bend(curvature, speed)
 
 
@@ -58,6 +59,7 @@ def integrate(
     bend=lambda c, v: c,
     extra=lambda v: (0.0, 0.0),
     loss=None,
+    axles=(LF, LR),
     start=START,
     dt=0.02,
 ):
@@ -67,7 +69,7 @@ def integrate(
         f, r, w = front(t), rear(t), speed(t)
         if loss is not None:
             w *= loss(pose, f, r)
-        v, sideslip, yaw = motion(f, r, w, ratio * w, bend)
+        v, sideslip, yaw = motion(f, r, w, ratio * w, bend, axles)
         x, y = extra(v)
         return [v * math.cos(pose[2] + sideslip) + x, v * math.sin(pose[2] + sideslip) + y, yaw]
 

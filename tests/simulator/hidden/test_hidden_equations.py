@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hidden_truth import FULL_MPS, HALF_MPS, START, integrate, motion, poses, quiet
+from hidden_truth import FULL_MPS, HALF_MPS, LF, LR, START, integrate, motion, poses, quiet
 
 from agvbench.simulator.hidden.catalogue import CATALOGUE
 
@@ -195,6 +195,11 @@ def test_curvature_effects(name, size, bend):
     check(poses(planted(name, **size), TURN), turn_truth(bend=bend))
     found = poses(planted(name, **size), [(1.0, -0.5, A, 0.0)])
     check(found, integrate((1.0,), constant(A), constant(0.0), constant(-HALF_MPS), bend=bend))
+
+
+def test_a_wheelbase_that_is_longer_has_each_axle_half_of_it_farther_away():
+    axles = (LF + 0.05 * (LF + LR), LR + 0.05 * (LF + LR))
+    check(poses(planted("wheelbase_error", longer=0.1), TURN), turn_truth(axles=axles))
 
 
 def test_axle_speed_mismatch_is_in_equation_5_6():
