@@ -41,6 +41,8 @@ ALSO_TRUE: Mapping[str, frozenset[str]] = {
     "slow_evening": frozenset({"battery_droop"}),
 }
 """Effects of the library that describe a cause of another name in part, and are no wrong name."""
+ALWAYS_TRUE = ("wheelbase_error",)
+"""The axle distances in campaign.toml are wrong by a millimetre or two, as those that a lab measures."""
 
 
 @dataclass(frozen=True)
@@ -130,7 +132,8 @@ def judged(trial: Trial, known: Mapping[str, str], found: Diagnosis, seconds: fl
     """Hold a diagnosis against the causes."""
     named = {effect.name: {effect.name, *effect.confounded_with} for effect in found.effects}
     said = frozenset().union(*named.values()) if named else frozenset()
-    true = frozenset(trial.causes).union(*(ALSO_TRUE.get(cause, frozenset()) for cause in trial.causes))
+    also = (ALSO_TRUE.get(cause, frozenset()) for cause in trial.causes)
+    true = frozenset({*trial.causes, *ALWAYS_TRUE}).union(*also)
     inside = [cause for cause in trial.causes if known[cause] == "inside"]
     errors = dict(found.held_out.errors["end_position_mm"]) if found.held_out is not None else {}
     return Answer(
