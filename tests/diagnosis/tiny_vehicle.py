@@ -71,6 +71,7 @@ class Tiny:
     downhill: float = 0.0
     run_out_rad: float = 0.0
     slip_pivot_m: float = 0.0
+    creep_s: float = 0.0
     wheelbase_m: float = FRONT_M + REAR_M
     marker_forward_m: float = 0.0
     axle_scatter_rad: float = 0.001
@@ -148,7 +149,7 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
         side = forward * (front_m * math.tan(dr) + rear_m * math.tan(df)) / tiny.wheelbase_m
         kinematic = forward * (math.tan(df) - math.tan(dr)) / tiny.wheelbase_m
         yaw = kinematic / (1.0 + tiny.slip * (forward**2 + side**2))
-        side += (kinematic - yaw) * tiny.slip_pivot_m
+        side += (kinematic - yaw) * tiny.slip_pivot_m - tiny.creep_s * forward * yaw
         middle = heading + yaw * _STEP_S / 2.0
         moving = 1.0 if abs(v) > 1e-3 else 0.0
         c_m, s_m = math.cos(middle), math.sin(middle)

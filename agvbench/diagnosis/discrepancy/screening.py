@@ -73,6 +73,7 @@ def options(
     course = np.column_stack([np.cos(c["course_rad"]), np.sin(c["course_rad"])])
     yield terms.SpeedByCourse, iter([({0: course}, Values())])
     yield terms.TurnByHeading, iter([({2: sine}, Values())])
+    yield terms.SlipByYawRate, iter([(_slips(rates), Values())])
     yield terms.DriftToPoint, _points(rates)
     yield terms.DriftByPlace, iter([(_drifts(rates, _quadratic(rates.middle)), Values())])
     yield terms.SpeedByRunTime, _run_times(rates)
@@ -101,6 +102,14 @@ def _starts(rates: Rates) -> Iterator[Option]:
     lag = -first * rates.covariates["speed_mps"]
     turns = [first, first * rates.covariates["direction"]]
     yield {0: np.column_stack([zero, zero, lag]), 2: np.column_stack([*turns, zero])}, Values()
+
+
+def _slips(rates: Rates) -> Columns:
+    """Return the regressors of a lateral velocity and of a loss of yaw rate, both in proportion to the yaw rate."""
+    curvature, zero = rates.covariates["curvature_per_m"], np.zeros(len(rates.run))
+    yaw_rate = curvature * rates.covariates["speed_mps"]
+    side = rates.covariates["direction"] * yaw_rate
+    return {1: np.column_stack([side, zero]), 2: np.column_stack([zero, -np.abs(yaw_rate) * curvature])}
 
 
 def _waves(rates: Rates) -> Iterator[Option]:

@@ -18,7 +18,7 @@ from agvbench.diagnosis.terms.campaign_time import (
 from agvbench.diagnosis.terms.floor import DriftByPlace, DriftToPoint
 from agvbench.diagnosis.terms.speed import SpeedByCourse, SpeedByHeading, SpeedByRunTime, SpeedInDisc, SpeedInStrip
 from agvbench.diagnosis.terms.steering import SteeringByDirection, SteeringByHistory
-from agvbench.diagnosis.terms.turning import TurnAtLine, TurnByHeading, TwistAtStart, WaveByDistance
+from agvbench.diagnosis.terms.turning import SlipByYawRate, TurnAtLine, TurnByHeading, TwistAtStart, WaveByDistance
 
 TERMS: tuple[type[DiscrepancyTerm], ...] = (
     SpeedInDisc,
@@ -28,6 +28,7 @@ TERMS: tuple[type[DiscrepancyTerm], ...] = (
     SpeedByHeading,
     SpeedByCourse,
     TurnByHeading,
+    SlipByYawRate,
     DriftToPoint,
     DriftByPlace,
     SpeedByRunTime,
@@ -53,6 +54,7 @@ __all__ = [
     "DriftByPlace",
     "DriftToPoint",
     "MarkersByCampaignTime",
+    "SlipByYawRate",
     "SpeedByCampaignTime",
     "SpeedByCourse",
     "SpeedByHeading",

@@ -69,6 +69,30 @@ class TurnByHeading(DiscrepancyTerm):
 
 
 @dataclass(frozen=True)
+class SlipByYawRate(DiscrepancyTerm):
+    """The vehicle slides out of a turn, and turns less, the faster it turns.
+
+    The lateral velocity changes by ``side_s`` times the lateral acceleration ``v ψ̇``, as with equal slip angles of both
+    axles. The yaw rate is reduced by the share ``turn_s |ψ̇|``.
+    """
+
+    name: ClassVar[str] = "slip_by_yaw_rate"
+    stage: ClassVar[Stage] = Stage.BODY
+    covariates: ClassVar[tuple[str, ...]] = ("curvature_per_m", "speed_mps")
+    through: ClassVar[str] = "sideways"
+
+    side_s: float = parameter(unit="s", low=-2.0, high=2.0, scale=0.1)
+    turn_s: float = parameter(unit="s", low=-2.0, high=2.0, scale=0.1)
+
+    @staticmethod
+    def move(state: Floats, side_s: float, turn_s: float) -> None:
+        """Add the lateral velocity, and reduce the yaw rate."""
+        if side_s != 0.0 or turn_s != 0.0:
+            state[LEFT] += side_s * state[FORWARD] * state[YAW_RATE]
+            state[YAW_RATE] *= 1.0 - turn_s * abs(state[YAW_RATE])
+
+
+@dataclass(frozen=True)
 class TwistAtStart(DiscrepancyTerm):
     """At the start of motion the vehicle is delayed and turns.
 
