@@ -39,6 +39,7 @@ ALSO_TRUE: Mapping[str, frozenset[str]] = {
     "run_out": frozenset({"speed_lag"}),
     "battery_change": frozenset({"battery_droop"}),
     "slow_evening": frozenset({"battery_droop"}),
+    "warm_up": frozenset({"steering_lag", "speed_lag"}),  # a lag that decays
 }
 """Effects of the library that describe a cause of another name in part, and are no wrong name."""
 ALWAYS_TRUE = ("wheelbase_error",)
