@@ -79,7 +79,7 @@ class SlipByYawRate(DiscrepancyTerm):
     name: ClassVar[str] = "slip_by_yaw_rate"
     stage: ClassVar[Stage] = Stage.BODY
     covariates: ClassVar[tuple[str, ...]] = ("curvature_per_m", "speed_mps")
-    through: ClassVar[str] = "sideways"
+    through: ClassVar[str] = "drift"
 
     side_s: float = parameter(unit="s", low=-2.0, high=2.0, scale=0.1)
     turn_s: float = parameter(unit="s", low=-2.0, high=2.0, scale=0.1)
