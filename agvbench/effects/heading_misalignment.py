@@ -22,7 +22,7 @@ class HeadingMisalignment(Effect):
         "equal offsets of both axles' maps make the same paths: only the neutral of the vehicle file distinguishes them"
     )
     remedy: ClassVar[str] = (
-        "define the rigid body of the motion capture system again, with its x axis along the vehicle "
+        "define the rigid body of the motion capture system again, with its x axis along the vehicle"
     )
 
     angle_rad: float = parameter(unit="rad", low=-0.5, high=0.5, scale=0.02)

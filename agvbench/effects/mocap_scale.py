@@ -22,7 +22,7 @@ class MocapScale(Effect):
         "a scale of all speeds and of the vehicle's own lengths: only turning distinguishes it from the drive's map"
     )
     remedy: ClassVar[str] = (
-        "calibrate the motion capture system with its wand; a measured distance on the floor confirms it "
+        "calibrate the motion capture system with its wand; a measured distance on the floor confirms it"
     )
 
     scale: float = parameter(unit="–", low=-0.2, high=0.2, scale=0.02)

@@ -25,7 +25,7 @@ class SpeedLag(Effect):
     reference: ClassVar[str] = "Bentvelsen 2015, section 8.1"
     limits: ClassVar[str] = "ramps limited by force look like a longer lag at larger steps of speed"
     remedy: ClassVar[str] = (
-        "plan with the distances of acceleration and braking, or change the ramps of the motor controller "
+        "plan with the distances of acceleration and braking, or change the ramps of the motor controller"
     )
 
     accelerate_s: float = parameter(unit="s", low=0.0, high=10.0, scale=0.2)

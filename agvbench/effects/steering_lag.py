@@ -22,7 +22,7 @@ class SteeringLag(Effect):
         "invisible where steering is set before the vehicle moves; a servo of second order looks like lag and delay"
     )
     remedy: ClassVar[str] = (
-        "let the servos settle before driving off, limit steps of steering in the plan, or fit faster servos "
+        "let the servos settle before driving off, limit steps of steering in the plan, or fit faster servos"
     )
 
     time_constant_s: float = parameter(unit="s", low=0.0, high=5.0, scale=0.1)

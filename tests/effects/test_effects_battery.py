@@ -80,7 +80,7 @@ def test_form(cls: type[Effect]) -> None:
 @each_effect
 def test_it_says_what_to_do_in_the_workshop(cls: type[Effect]) -> None:
     assert len(cls.remedy.split()) > 5
-    assert not cls.remedy.endswith(".")
+    assert not cls.remedy.endswith((".", " "))
 
 
 @each_effect
