@@ -119,7 +119,7 @@ class Effect:
     steer
         Called at every time of evaluation, as all hooks below; may change ``FRONT`` and ``REAR``.
     drive
-        May change ``FRONT_SPEED`` and ``REAR_SPEED``; knows the tangents of the angles.
+        May change ``FRONT_SPEED``, ``REAR_SPEED`` and ``DRAGGED``; knows the tangents of the angles.
     move
         May change ``FORWARD``, ``LEFT`` and ``YAW_RATE``.
     drift

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from agvbench.effects.base import Effect, Stage, parameter
-from agvbench.effects.state import FRONT_SPEED, REAR_SPEED, TAN_FRONT, TAN_REAR
+from agvbench.effects.state import DRAGGED, FRONT_SPEED, REAR_SPEED, TAN_FRONT, TAN_REAR
 from agvbench.types import Floats
 
 
@@ -31,3 +31,4 @@ class CorneringSpeedLoss(Effect):
         factor = 1.0 - loss * (abs(state[TAN_FRONT]) + abs(state[TAN_REAR]))
         state[FRONT_SPEED] *= factor
         state[REAR_SPEED] *= factor
+        state[DRAGGED] *= factor

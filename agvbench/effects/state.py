@@ -45,4 +45,10 @@ SEEN_LAG = 43
 REAR_WAIT = 44
 # Steady-state angle of each axle at its last reversal: from there on its commands went one way.
 FRONT_REVERSAL, REAR_REVERSAL = range(45, 47)
-SIZE = 47
+# An elastic drive train without power: v̇ = −v / brake lag − spring w, where w winds up with v and relaxes.
+COAST_SPRING, COAST_RELAXATION = range(47, 49)
+# Share of the axle speeds that the drag of turned wheels leaves.
+DRAGGED = 49
+# Lag and τ of the rear servo over those of the front servo.
+REAR_LAG_RATIO = 50
+SIZE = 51

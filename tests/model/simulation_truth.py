@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from agvbench.types import Floats
 
@@ -119,6 +120,17 @@ def _aims(get: _Sizes, row: int) -> tuple[float, float, float]:
     return float(np.clip(front, -front_limit, front_limit)), float(np.clip(rear, -rear_limit, rear_limit)), float(speed)
 
 
+def _balanced(along: list[float], drag: float, stiff: float) -> float:
+    """Return the speed at which two axles that pull towards their own speed, or brake more stiffly, balance a drag."""
+    sign, speeds = math.copysign(1.0, sum(along)), [abs(speed) for speed in along]
+
+    def force(speed: float) -> float:
+        pulls = [(own - speed) * (1.0 if own >= speed else stiff) for own in speeds]
+        return sum(pulls) - drag * sum(speeds)
+
+    return float(sign * brentq(force, min(speeds) - drag * sum(speeds) - 1e-3, max(speeds) + 1e-3, xtol=1e-13))
+
+
 def _equations(get, aims, axles, servos, begin):  # type: ignore[no-untyped-def]
     lag, rate = get("steering_lag", "time_constant_s"), get("steering_rate_limit", "rate_rad_per_s")
     half = get("steering_backlash", "width_rad") / 2.0
@@ -146,16 +158,15 @@ def _equations(get, aims, axles, servos, begin):  # type: ignore[no-untyped-def]
                 (1.0 + get("reverse_steering_gain", "gain")) * df,
                 (1.0 + get("reverse_steering_gain", "gain")) * dr,
             )
-        vf = v * (1.0 - get("cornering_speed_loss", "loss") * (abs(math.tan(df)) + abs(math.tan(dr))))
-        vf *= 1.0 - get("battery_droop", "per_hour") * (STARTED_H + t / 3600.0)
+        drag = get("cornering_speed_loss", "loss") * (abs(math.tan(df)) + abs(math.tan(dr)))
+        vf = v * (1.0 - get("battery_droop", "per_hour") * (STARTED_H + t / 3600.0))
         vr = (1.0 + get("axle_speed_mismatch", "ratio")) * vf
         # Eq. 5.6–5.10 as printed, with the two corrections.
         longer = 0.5 * get("wheelbase_error", "longer") * (LF + LR)
         lf, lr = LF + longer, LR + longer
         beta = math.atan((lf * math.tan(dr) + lr * math.tan(df)) / (lf + lr))
-        along = sorted([vf * math.cos(df), vr * math.cos(dr)], key=abs)
-        stiff = 1.0 + get("axle_overrun", "excess")
-        speed = (stiff * along[0] + along[1]) / ((stiff + 1.0) * math.cos(beta))
+        speed = _balanced([vf * math.cos(df), vr * math.cos(dr)], drag, 1.0 + get("axle_overrun", "excess"))
+        speed /= math.cos(beta)
         curvature = math.cos(beta) * (math.tan(df) - math.tan(dr)) / (lf + lr)
         # Effects of the body act in the order of the library: the wheelbase comes after slip and wheels.
         slipping = speed * math.cos(beta) * math.hypot(1.0, (LF * math.tan(dr) + LR * math.tan(df)) / (LF + LR))

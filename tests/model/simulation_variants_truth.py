@@ -34,6 +34,11 @@ def second_order(aim: Path, rest: float, moments: Floats, lag: float, tau: float
     return _pieces(equation, aim, np.array([rest, 0.0]), moments, end)
 
 
+def first_order(aim: Path, rest: float, moments: Floats, lag: float, end: float) -> Path:
+    """Return the path of a servo without inertia: lag δ̇ = aim − δ."""
+    return _pieces(lambda aimed: lambda _, y: [(aimed - y[0]) / lag], aim, np.array([rest]), moments, end)
+
+
 def limited(aim: Path, rest: float, moments: Floats, rate: float, acceleration: float, end: float) -> Path:
     """Return the path of a servo that speeds up until it has its rate or must brake, and stops on its aim."""
     times, states = [moments[0]], [np.array([rest, 0.0])]
@@ -132,6 +137,36 @@ def coasted(aim: Path, moments: Floats, acceleration: float, coast_s: float, end
     return lambda t: pieces[max(0, bisect.bisect_right(begins, t) - 1)](max(t, begins[0]))
 
 
+def sprung(aim: Path, moments: Floats, values: dict[str, float], end: float) -> Path:
+    """Return the path of a speed that ramps under power, and that friction and a relaxing spring brake without."""
+
+    def equation(aimed: float) -> Callable[[float, Floats], list[float]]:
+        def slopes(_: float, y: Floats) -> list[float]:
+            v, w = y
+            if aimed != 0.0:
+                return [0.0, -w / values["relaxation_s"]]
+            return [-v / values["coast_s"] - values["spring_per_s2"] * w, v - w / values["relaxation_s"]]
+
+        return slopes
+
+    pieces, state = [], np.zeros(2)
+    for begin, until in zip(moments.tolist(), [*moments[1:].tolist(), end], strict=True):
+        aimed = float(aim(begin + 1e-9))
+        found = solve_ivp(equation(aimed), (begin, until), state, dense_output=True, **_TIGHT)
+        limit = values["forward_mps2" if aimed > 0.0 else "backward_mps2"]
+        piece = partial(_sprung_speed, found.sol, aimed, begin, state[0], limit)
+        pieces.append(piece)
+        state = np.array([piece(until), found.y[1, -1]])
+    begins = moments.tolist()
+    return lambda t: pieces[max(0, bisect.bisect_right(begins, t) - 1)](max(t, begins[0]))
+
+
+def _sprung_speed(sol: Any, aimed: float, begin: float, was: float, acceleration: float, t: float) -> float:
+    if aimed == 0.0:
+        return float(sol(t)[0])
+    return was + math.copysign(min(abs(aimed - was), acceleration * (t - begin)), aimed - was)
+
+
 def _pieces(equation: Any, aim: Path, state: Floats, moments: Floats, end: float) -> Path:
     found = []
     for begin, until in zip(moments, [*moments[1:], end], strict=True):
@@ -175,8 +210,14 @@ def aims(channel: int, moments: Floats) -> Path:
 def servo_path(name: str, values: dict[str, float], channel: int, moments: Floats, end: float) -> Path:
     """Return the path of a servo of second order, channel 0 (front) or 1 (rear)."""
     aim, rest = aims(channel, moments), REST[channel]
-    if name == "steering_lag_inertia":
-        return second_order(aim, rest, moments, values["time_constant_s"], values["inertia_s"], end)
+    if name in ("steering_lag_inertia", "steering_lag_uneven"):
+        ratio = values.get("rear_ratio", 1.0) if channel == 1 else 1.0
+        lag, inertia = ratio * values["time_constant_s"], ratio * values["inertia_s"]
+        return (
+            second_order(aim, rest, moments, lag, inertia, end)
+            if inertia
+            else first_order(aim, rest, moments, lag, end)
+        )
     return limited(aim, rest, moments, values["rate_rad_per_s"], values["acceleration_rad_per_s2"], end)
 
 
@@ -197,7 +238,7 @@ def true_form(name: str, values: dict[str, float], start: tuple[float, float, fl
     late = {"front_s": values.get("steering_s", 0.0), "rear_s": values.get("steering_s", 0.0), **values}
     fronts, rears, drives = (RUN_TIMES + late.get(f"{channel}_s", 0.0) for channel in ("front", "rear", "drive"))
     front, rear, speed = aims(0, fronts), aims(1, rears), aims(2, drives)
-    if name in ("steering_lag_inertia", "steering_rate_limit_acceleration"):
+    if name in ("steering_lag_inertia", "steering_lag_uneven", "steering_rate_limit_acceleration"):
         front, rear = (servo_path(name, values, channel, RUN_TIMES, end) for channel in (0, 1))
     if name == "speed_lag_ramp":
         speed = ramped(speed, drives, values["acceleration_mps2"], values["braking_mps2"], end)
@@ -205,6 +246,8 @@ def true_form(name: str, values: dict[str, float], start: tuple[float, float, fl
         speed = ramped_up(speed, drives, values["acceleration_mps2"], values["brake_s"], end)
     if name == "speed_lag_coasting":
         speed = coasted(speed, drives, values["acceleration_mps2"], values["coast_s"], end)
+    if name == "speed_lag_spring_back":
+        speed = sprung(speed, drives, values, end)
     smoothing = values.get("time_constant_s", 0.0) if name == "mocap_latency_smoothing" else 0.0
     seen = times - values.get("latency_s", 0.0)
     return drive(front, rear, speed, np.array(start), seen, np.r_[fronts, rears, drives], smoothing)

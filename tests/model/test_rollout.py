@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from rollout_truth import Truth
 
@@ -51,6 +51,9 @@ truths = st.builds(
 
 
 @settings(max_examples=40, deadline=None)
+# A drive that reverses: near rest the yaw rate is small and bounds no step.
+@example(truth=Truth(0.5, 0.5, 0.0, 0.0, 0.0, 0.02), seed=0, scale=3.0, count=4)
+@example(truth=Truth(0.25, 0.25, 0.0, 0.0, 1.0, 0.0), seed=0, scale=3.0, count=4)
 @given(
     truth=truths,
     seed=st.integers(0, 2**32 - 1),

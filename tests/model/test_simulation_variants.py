@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from simulation_truth import COMMANDS, FRAMES, LF, LR, REST, RUN_TIMES, SETTLED
-from simulation_variants_truth import aims, drive, servo_path, true_form, with_play
+from simulation_variants_truth import aims, at_once, drive, servo_path, sprung, true_form, with_play
 
 from agvbench.effects import effect_kinds
 from agvbench.effects.variants import effect_variants
@@ -24,11 +24,21 @@ SIZES = [
     ("steering_lag_inertia", {"time_constant_s": 0.2, "inertia_s": 0.1}),
     ("steering_lag_inertia", {"time_constant_s": 0.12, "inertia_s": 0.15}),
     ("steering_lag_inertia", {"time_constant_s": 0.4, "inertia_s": 0.1}),
+    ("steering_lag_uneven", {"time_constant_s": 0.2, "inertia_s": 0.1, "rear_ratio": 0.6}),
+    ("steering_lag_uneven", {"time_constant_s": 0.12, "inertia_s": 0.0, "rear_ratio": 1.7}),
     ("steering_rate_limit_acceleration", {"rate_rad_per_s": 0.7, "acceleration_rad_per_s2": 4.0}),
     ("steering_rate_limit_acceleration", {"rate_rad_per_s": 3.0, "acceleration_rad_per_s2": 1.5}),
     ("speed_lag_ramp", {"acceleration_mps2": 0.5, "braking_mps2": 0.35}),
     ("speed_lag_ramp_up", {"acceleration_mps2": 0.5, "brake_s": 0.2}),
     ("speed_lag_coasting", {"acceleration_mps2": 0.5, "coast_s": 0.2}),
+    (
+        "speed_lag_spring_back",
+        {"forward_mps2": 0.5, "backward_mps2": 0.9, "coast_s": 0.4, "spring_per_s2": 2.5, "relaxation_s": 0.5},
+    ),
+    (
+        "speed_lag_spring_back",
+        {"forward_mps2": 0.5, "backward_mps2": 0.9, "coast_s": 0.1, "spring_per_s2": 1.0, "relaxation_s": 0.5},
+    ),
     ("mocap_latency_smoothing", {"latency_s": 0.03, "time_constant_s": 0.12}),
     ("mocap_latency_smoothing", {"latency_s": 0.0, "time_constant_s": 0.004}),
     ("mocap_latency_smoothing", {"latency_s": 0.0, "time_constant_s": 1.5}),
@@ -76,7 +86,10 @@ def test_a_window_of_smoothed_poses_begins_as_in_a_steady_motion():
     [
         (("steering_lag_inertia", (0.15, 0.0)), ("steering_lag", (0.15,))),
         (("steering_lag_inertia", (0.15, 1e-3)), ("steering_lag", (0.15,))),
+        (("steering_lag_uneven", (0.15, 0.08, 1.0)), ("steering_lag_inertia", (0.15, 0.08))),
         (("steering_rate_limit_acceleration", (1.2, math.inf)), ("steering_rate_limit", (1.2,))),
+        (("speed_lag_spring_back", (0.5, 0.5, 0.2, 0.0, 0.5)), ("speed_lag_coasting", (0.5, 0.2))),
+        (("speed_lag_spring_back", (0.5, 0.5, 0.2, 1e-6, 0.5)), ("speed_lag_coasting", (0.5, 0.2))),
         (("mocap_latency_smoothing", (0.07, 0.0)), ("mocap_latency", (0.07,))),
         (("mocap_latency_smoothing", (0.0, 1e-4)), ("mocap_latency", (1e-4,))),
         (("actuation_delay_servos", (0.07, 0.07)), ("actuation_delay", (0.07,))),
@@ -85,13 +98,33 @@ def test_a_window_of_smoothed_poses_begins_as_in_a_steady_motion():
 )
 def test_it_has_the_librarys_law_for_a_limit(form, library):
     ours = simulated([effect_variants()[form[0]](*form[1])])
-    np.testing.assert_allclose(ours, simulated([effect_kinds()[library[0]](*library[1])]), atol=1e-4)
+    kinds = {**effect_kinds(), **effect_variants()}
+    np.testing.assert_allclose(ours, simulated([kinds[library[0]](*library[1])]), atol=1e-4)
 
 
 def test_an_axle_that_swings_faster_than_anybody_sees_costs_no_more_than_one_that_does_not():
     """Swing by swing, 8 s of a thousandth of this inertia would be millions of steps."""
     ours = simulated([effect_variants()["steering_lag_inertia"](0.0, 1e-6)])
     np.testing.assert_allclose(ours, simulated([]), atol=1e-4)
+
+
+def test_the_windup_lasts_over_commands_without_power_and_relaxes_under_power():
+    """The vehicle coasts, steers while it coasts, drives on before the windup has relaxed, and coasts again."""
+    values = {"forward_mps2": 0.8, "backward_mps2": 0.5, "coast_s": 0.4, "spring_per_s2": 3.0, "relaxation_s": 0.7}
+    moments = np.array([0.1, 1.2, 1.5, 1.9, 2.3])
+    settled = np.array([[0.2, 0.0, 0.3], [0.2, 0.0, 0.0], [-0.1, 0.1, 0.0], [0.0, 0.2, -0.25], [0.0, 0.2, 0.0]])
+    frames = np.arange(0.0, 5.0, 0.04)
+    ids = np.arange(1.0, 6.0)
+    run = SimulatedRun(Commands(moments, 1500.0 + ids, 1500.0 + ids, 1500.0 + ids), frames)
+    kinds = tuple(effect_variants().values())
+    simulation = Simulation(Geometry(LF, LR), 1500.0, [run], kinds=kinds)
+    law = effect_variants()["speed_lag_spring_back"](**values)
+    rows = np.vstack([[*REST, 0.0], settled])
+    predicted = simulation.predict(rows, simulation.parameters([law]), INITIAL)
+    front, rear = (at_once(np.r_[REST[i], settled[:, i]], moments) for i in (0, 1))
+    speed = sprung(at_once(np.r_[0.0, settled[:, 2]], moments), moments, values, 6.0)
+    truth = drive(front, rear, speed, np.array(START), frames, moments, 0.0)
+    np.testing.assert_allclose(predicted, truth, atol=3e-6)
 
 
 def test_critical_damping_is_no_edge():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from agvbench.effects.state import FRONT, FRONT_SPEED, REAR, REAR_SPEED
+from agvbench.effects.state import DRAGGED, FRONT, FRONT_SPEED, REAR, REAR_SPEED
 from agvbench.effects.variants.cornering_speed_loss_power import CorneringSpeedLossPower
 from agvbench.types import Floats
 
@@ -23,3 +23,4 @@ class CorneringSpeedLossAngle(CorneringSpeedLossPower):
             factor = 1.0 - loss * (abs(state[FRONT]) ** exponent + abs(state[REAR]) ** exponent)
             state[FRONT_SPEED] *= factor
             state[REAR_SPEED] *= factor
+            state[DRAGGED] *= factor

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.state import FRONT_SPEED, REAR_SPEED, TAN_FRONT, TAN_REAR
+from agvbench.effects.state import DRAGGED, FRONT_SPEED, REAR_SPEED, TAN_FRONT, TAN_REAR
 from agvbench.effects.variants.base import Variant
 from agvbench.types import Floats
 
@@ -38,3 +38,4 @@ class CorneringSpeedLossPower(Variant):
             factor = 1.0 - loss * (abs(state[TAN_FRONT]) ** exponent + abs(state[TAN_REAR]) ** exponent)
             state[FRONT_SPEED] *= factor
             state[REAR_SPEED] *= factor
+            state[DRAGGED] *= factor

@@ -30,7 +30,7 @@ class LateralSlipPivot(Variant):
     limits: ClassVar[str] = "steady turning; at one speed it is a scale of the steering and marker_offset"
 
     gradient: float = parameter(unit="s²/m²", low=-0.2, high=20.0, scale=0.5)
-    pivot_m: float = parameter(unit="m", low=-1.0, high=1.0, scale=0.05)
+    pivot_m: float = parameter(unit="m", low=-0.5, high=0.5, scale=0.05)
 
     @classmethod
     def starts(cls, fitted: Mapping[str, float]) -> list[tuple[float, ...]]:

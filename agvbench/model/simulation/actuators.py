@@ -4,7 +4,8 @@
 A servo obeys δ̇ = (aim − δ) / lag within ± rate: it ramps while the rate limit is active, and then its gap decays. Its
 motion is monotone, so that the position of the axle behind a backlash follows from the initial positions. Servos of
 second order are in `agvbench.model.simulation.servos`. The drive obeys v̇ = (aim − v) / lag within limits of v̇, as a
-servo does; to reverse it brakes to rest first. An array, the *plan*, holds all of this.
+servo does; to reverse it brakes to rest first. An elastic drive train without power obeys an equation of second order
+in v, that of a servo with inertia. An array, the *plan*, holds all of this.
 """
 
 from __future__ import annotations
@@ -17,10 +18,13 @@ from agvbench.effects.state import (
     BACKLASH,
     BRAKE_LAG,
     BRAKING_LIMIT,
+    COAST_RELAXATION,
+    COAST_SPRING,
     FRONT,
     FRONT_AIM,
     REAR,
     REAR_AIM,
+    REAR_LAG_RATIO,
     SPEED,
     SPEED_AIM,
     STEERING_ACCELERATION,
@@ -39,6 +43,7 @@ from agvbench.model.simulation.servos import (
     TURNS_EVERY_S,
     TURNS_S,
     WAY_SIZE,
+    closes_s,
     longest_step,
     plan_inert,
     plan_limited,
@@ -59,13 +64,16 @@ _FIRST = 2 * _SERVO_SIZE
 _SECOND = _FIRST + 6
 _SPEED_AIM, _SPEED_DIRECTION, _RESTS_S = range(_SECOND + 6, _SECOND + 9)
 _HALF_BACKLASH, _ORDER = range(_SECOND + 9, _SECOND + 11)
-_EVENTS = _SECOND + 11
+# An elastic drive train without power: whether it is the drive's equation, its windup and constants, its response.
+_SPRINGS, _WINDUP, _SPRING, _COAST_LAG, _RELAXATION = range(_SECOND + 11, _SECOND + 16)
+_COAST = _SECOND + 16
+_EVENTS = _COAST + WAY_SIZE
 _EVENT_COUNT = 11
 PLAN_SIZE = _EVENTS + _EVENT_COUNT
 
 # Servos and drive between commands: positions of the servos and of their axles, the drive's speed and that which
-# commands have made it recently, the servos' rates.
-SERVOS_SIZE = 8
+# commands have made it recently, the servos' rates, the windup of the drive train [m].
+SERVOS_SIZE = 9
 
 # Below this gap [rad, m/s] an actuator counts as settled.
 _SETTLED = 1e-7
@@ -131,13 +139,14 @@ def _plan_servo(plan: Floats, servo: int, position: float, axle: float, aim: flo
 
 @compiled(inner=True)
 def _plan_second_order(
-    plan: Floats, servo: int, position: float, turning: float, axle: float, aim: float, state: Floats
+    plan: Floats, servo: int, position: float, turning: float, axle: float, aim: float, ratio: float, state: Floats
 ) -> None:
     events = _EVENTS + 4 * (servo > 0)
     plan[servo + _AIM], plan[servo + _AXLE] = aim, axle
     plan[events] = plan[events + 2] = math.inf
     if plan[_ORDER] == INERT:
-        plan_inert(plan, servo, aim - position, -turning, state[STEERING_LAG], state[STEERING_INERTIA])
+        lag, inertia = ratio * state[STEERING_LAG], max(_LEAST_INERTIA_S, ratio * state[STEERING_INERTIA])
+        plan_inert(plan, servo, aim - position, -turning, lag, inertia)
     else:
         limit = state[STEERING_ACCELERATION]
         plan_limited(plan, servo, aim - position, -turning, state[STEERING_RATE], limit)
@@ -163,21 +172,43 @@ def _plan_drive(
 
 
 @compiled(inner=True)
+def _plan_coasting(plan: Floats, speed: float, windup: float, state: Floats) -> None:
+    """Compute v̈ + (1 / T + 1 / R) v̇ + (1 / (T R) + k) v = 0 from v̇ = −v / T − k w and ẇ = v − w / R."""
+    lag, spring, relaxation = state[BRAKE_LAG], state[COAST_SPRING], state[COAST_RELAXATION]
+    plan[_WINDUP], plan[_RELAXATION], plan[_SPRING], plan[_COAST_LAG] = windup, relaxation, spring, lag
+    plan[_SPRINGS] = 1.0 if spring > 0.0 and lag > 0.0 and state[SPEED_AIM] == 0.0 else 0.0
+    if plan[_SPRINGS] > 0.0:
+        stiffness = 1.0 / (lag * relaxation) + spring
+        damping = (1.0 / lag + 1.0 / relaxation) / stiffness
+        plan_inert(plan, _COAST, speed, -speed / lag - spring * windup, damping, 1.0 / math.sqrt(stiffness))
+        plan[_EVENTS + 8], plan[_EVENTS + 9] = closes_s(plan, _COAST), plan[_COAST + SETTLED_S]
+
+
+@compiled(inner=True)
+def _windup(plan: Floats, tau: float) -> float:
+    if plan[_SPRINGS] == 0.0:  # it relaxes under power
+        return plan[_WINDUP] * math.exp(-tau / plan[_RELAXATION]) if plan[_RELAXATION] < math.inf else 0.0
+    speed, rate = way_at(plan, _COAST, INERT, tau)
+    return -(rate + speed / plan[_COAST_LAG]) / plan[_SPRING]
+
+
+@compiled(inner=True)
 def plan_command(plan: Floats, state: Floats, servos: Floats) -> None:
     """Compute the plan of servos and drive from their states `servos` to the aims in `state`."""
     plan[_HALF_BACKLASH], plan[_ORDER] = 0.5 * state[BACKLASH], FIRST_ORDER
-    inert = state[STEERING_INERTIA] >= _LEAST_INERTIA_S
+    inert, ratio = state[STEERING_INERTIA] >= _LEAST_INERTIA_S, state[REAR_LAG_RATIO]
     if inert or state[STEERING_ACCELERATION] < math.inf:
         plan[_ORDER] = INERT if inert else LIMITED
-        _plan_second_order(plan, _FRONT, servos[0], servos[6], servos[2], state[FRONT_AIM], state)
-        _plan_second_order(plan, _REAR, servos[1], servos[7], servos[3], state[REAR_AIM], state)
+        _plan_second_order(plan, _FRONT, servos[0], servos[6], servos[2], state[FRONT_AIM], 1.0, state)
+        _plan_second_order(plan, _REAR, servos[1], servos[7], servos[3], state[REAR_AIM], ratio, state)
     else:
         lag, rate = state[STEERING_LAG], state[STEERING_RATE]
         _plan_servo(plan, _FRONT, servos[0], servos[2], state[FRONT_AIM], lag, rate)
-        _plan_servo(plan, _REAR, servos[1], servos[3], state[REAR_AIM], lag, rate)
+        _plan_servo(plan, _REAR, servos[1], servos[3], state[REAR_AIM], ratio * lag, rate)
     accelerate, brake = state[ACCELERATE_LAG], state[BRAKE_LAG]
     speeding, braking = state[ACCELERATION_LIMIT], state[BRAKING_LIMIT]
     _plan_drive(plan, servos[4], state[SPEED_AIM], accelerate, brake, speeding, braking)
+    _plan_coasting(plan, servos[4], servos[8], state)
 
 
 @compiled(inner=True)
@@ -217,6 +248,11 @@ def _speed(plan: Floats, tau: float) -> float:
 
 
 @compiled(inner=True)
+def _speed_any_order(plan: Floats, tau: float) -> float:
+    return way_at(plan, _COAST, INERT, tau)[0] if plan[_SPRINGS] > 0.0 else _speed(plan, tau)
+
+
+@compiled(inner=True)
 def actuate(plan: Floats, tau: float, state: Floats) -> None:
     """Put the axles' angles and the drive's speed into `state`, `tau` seconds after the command took effect."""
     state[FRONT] = _follow(plan, plan[_FRONT + _AXLE], _position(plan, _FRONT, tau))
@@ -226,23 +262,18 @@ def actuate(plan: Floats, tau: float, state: Floats) -> None:
 
 @compiled(inner=True)
 def actuate_any_order(plan: Floats, tau: float, state: Floats) -> None:
-    """Do as `actuate`, also for servos of second order; separate, because the branch would cost the others a tenth."""
+    """Do as `actuate`, also for actuators of second order; separate, because branches would cost the others a tenth."""
     if plan[_ORDER] == FIRST_ORDER:
         actuate(plan, tau, state)
     else:
-        _actuate_second(plan, tau, state)
-
-
-@compiled(inner=True)
-def _actuate_second(plan: Floats, tau: float, state: Floats) -> None:
-    state[FRONT], state[REAR] = _way_axle(plan, _FRONT, tau), _way_axle(plan, _REAR, tau)
-    state[SPEED] = _speed(plan, tau)
+        state[FRONT], state[REAR] = _way_axle(plan, _FRONT, tau), _way_axle(plan, _REAR, tau)
+    state[SPEED] = _speed_any_order(plan, tau)
 
 
 @compiled(inner=True)
 def leave_command(plan: Floats, tau: float, servos: Floats) -> None:
     """Put positions, rates and speed at `tau`, where another command takes effect, into `servos`."""
-    servos[4] = _speed(plan, tau)
+    servos[4], servos[8] = _speed_any_order(plan, tau), _windup(plan, tau)
     if plan[_ORDER] == FIRST_ORDER:
         servos[0], servos[1] = _position(plan, _FRONT, tau), _position(plan, _REAR, tau)
         servos[2] = _follow(plan, plan[_FRONT + _AXLE], servos[0])
@@ -285,10 +316,12 @@ def step_length(plan: Floats, tau: float, longest: float) -> float:
         step = _within_gap(plan, _REAR, tau, _within_gap(plan, _FRONT, tau, longest))
     else:
         step = _within_way(plan, _REAR, tau, _within_way(plan, _FRONT, tau, longest))
-    gap, since = _FIRST, tau
-    if tau >= plan[_RESTS_S]:
-        gap, since = _SECOND, tau - plan[_RESTS_S]
-    step = _within_gap(plan, gap, since, step)
+    if plan[_SPRINGS] > 0.0:
+        step = max(_SHORTEST_S, longest_step(plan, _COAST, INERT, tau, step))
+    elif tau >= plan[_RESTS_S]:
+        step = _within_gap(plan, _SECOND, tau - plan[_RESTS_S], step)
+    else:
+        step = _within_gap(plan, _FIRST, tau, step)
     for i in range(_EVENT_COUNT):
         to_event = plan[_EVENTS + i] - tau
         if _TOGETHER < to_event < step:

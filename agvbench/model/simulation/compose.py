@@ -31,7 +31,7 @@ from agvbench.model.simulation import step as simulation_step
 _PARTS = (simulation_frames, simulation_step, simulation_level, simulation_loop)
 _INSIDE = {simulation_stages.__name__, *(part.__name__ for part in _PARTS)}
 _ACTUATE, _ACTUATE_ANY_ORDER = "actuate", "actuate_any_order"
-_SECOND_ORDER = {"STEERING_INERTIA", "STEERING_ACCELERATION"}
+_SECOND_ORDER = {"STEERING_INERTIA", "STEERING_ACCELERATION", "COAST_SPRING"}
 
 
 @cache
@@ -79,7 +79,7 @@ def _is_inside(node: ast.Import | ast.ImportFrom) -> bool:
 
 
 def _chosen(node: ast.Import | ast.ImportFrom, second_order: bool) -> ast.Import | ast.ImportFrom:
-    """Return the import with servos of any order in place of those of first order, if an effect needs them."""
+    """Return the import with actuators of any order in place of those of first order, if an effect needs them."""
     for alias in node.names:
         if alias.name == _ACTUATE and second_order:
             alias.name, alias.asname = _ACTUATE_ANY_ORDER, _ACTUATE

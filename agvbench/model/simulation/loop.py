@@ -20,6 +20,8 @@ from agvbench.effects.state import (
     BACKLASH,
     BRAKE_LAG,
     BRAKING_LIMIT,
+    COAST_RELAXATION,
+    COAST_SPRING,
     DISTANCE,
     DRIVE_COMMAND,
     DRIVE_WAIT,
@@ -33,10 +35,12 @@ from agvbench.effects.state import (
     REAR_AIM,
     REAR_BEFORE,
     REAR_COMMAND,
+    REAR_LAG_RATIO,
     REAR_REVERSAL,
     REAR_WAIT,
     SEEN_LAG,
     SIZE,
+    SPEED,
     SPEED_AIM,
     STEERING_ACCELERATION,
     STEERING_INERTIA,
@@ -95,8 +99,9 @@ def _obey(
     if settled[driven, 2] != 0.0:
         s[SPEED_AIM] += lift
     s[STEERING_LAG], s[STEERING_RATE], s[BACKLASH], s[ACCELERATE_LAG], s[BRAKE_LAG] = 0.0, math.inf, 0.0, 0.0, 0.0
-    s[STEERING_INERTIA], s[STEERING_ACCELERATION] = 0.0, math.inf
+    s[STEERING_INERTIA], s[STEERING_ACCELERATION], s[REAR_LAG_RATIO] = 0.0, math.inf, 1.0
     s[ACCELERATION_LIMIT] = s[BRAKING_LIMIT] = math.inf
+    s[COAST_SPRING], s[COAST_RELAXATION] = 0.0, math.inf
     aim(s, p)
 
 
@@ -132,8 +137,11 @@ def _hold(
         if is_last:
             break
         tau += length
-        turning = min(max(abs(work[TURN + COUNT - 1]), _TURN_PER_STEP), _FASTEST_TURN)
-        longest = min(vehicle[LONGEST_STEP], _TURN_PER_STEP / turning)
+        turning, speed = abs(work[TURN + COUNT - 1]), abs(s[SPEED])
+        if speed > 0.0:
+            # The drive may still speed up, or have come to rest to reverse.
+            turning *= max(1.0, abs(s[SPEED_AIM]) / speed)
+        longest = min(vehicle[LONGEST_STEP], _TURN_PER_STEP / min(max(turning, _TURN_PER_STEP), _FASTEST_TURN))
     return k
 
 
@@ -176,7 +184,7 @@ def _drive_run(
             # At rest with settled axles before the first command.
             servos[0] = servos[2] = s[FRONT_AIM]
             servos[1] = servos[3] = s[REAR_AIM]
-            servos[4] = servos[5] = servos[6] = servos[7] = 0.0
+            servos[4] = servos[5] = servos[6] = servos[7] = servos[8] = 0.0
             now = min(begin, end)
         elif now < begin:
             until = min(begin, end)

@@ -51,17 +51,28 @@ def _plan_turns(plan: Floats, way: int) -> None:
     tau, square = plan[way + _TAU], plan[way + _SQUARE]
     rate = plan[way + GAP_RATE]
     against = plan[way + _DECAY] * rate + plan[way + GAP] / (tau * tau)
-    plan[way + TURNS_S] = plan[way + TURNS_EVERY_S] = math.inf
+    plan[way + TURNS_S] = _first_root(rate, against, square)
+    plan[way + TURNS_EVERY_S] = math.pi / math.sqrt(square) if square > 0.0 else math.inf
+
+
+@compiled(inner=True)
+def _first_root(cosine: float, sine: float, square: float) -> float:
+    """Return the first t > 0 at which `cosine` c(t) = `sine` s(t), in the notation of `_plan_turns`; ∞ if none is."""
     frequency = math.sqrt(abs(square))
     if square > 0.0:
-        angle = math.atan2(rate * frequency, against)
-        if angle <= 0.0:
-            angle += math.pi
-        plan[way + TURNS_S] = angle / frequency
-        plan[way + TURNS_EVERY_S] = math.pi / frequency
-    elif against != 0.0 and rate / against > 0.0 and frequency * rate / against < 1.0:
-        share = rate / against
-        plan[way + TURNS_S] = math.atanh(frequency * share) / frequency if frequency > 0.0 else share
+        angle = math.atan2(cosine * frequency, sine)
+        return (angle if angle > 0.0 else angle + math.pi) / frequency
+    if sine == 0.0 or cosine / sine <= 0.0 or frequency * cosine / sine >= 1.0:
+        return math.inf
+    share = cosine / sine
+    return math.atanh(frequency * share) / frequency if frequency > 0.0 else share
+
+
+@compiled(inner=True)
+def closes_s(plan: Floats, way: int) -> float:
+    """Return when the gap of a response with inertia is first zero, c g + s (g′ + decay g) = 0; ∞ if it never is."""
+    gap = plan[way + GAP]
+    return _first_root(gap, -plan[way + GAP_RATE] - plan[way + _DECAY] * gap, plan[way + _SQUARE])
 
 
 @compiled(inner=True)

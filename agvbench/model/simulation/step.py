@@ -12,6 +12,7 @@ from agvbench.effects.state import (
     COS_FRONT,
     COS_REAR,
     DISTANCE,
+    DRAGGED,
     FORWARD,
     FRONT,
     FRONT_SPEED,
@@ -65,6 +66,7 @@ def set_motion(s: Floats, p: Floats, vehicle: Floats) -> None:
         s[COS_FRONT], s[COS_REAR] = math.cos(front), math.cos(rear)
         s[TAN_FRONT], s[TAN_REAR] = math.sin(front) / s[COS_FRONT], math.sin(rear) / s[COS_REAR]
     s[FRONT_SPEED] = s[REAR_SPEED] = s[SPEED]
+    s[DRAGGED] = 1.0
     drive(s, p)
     front_axle_m, rear_axle_m, share = vehicle[FRONT_AXLE], vehicle[REAR_AXLE], vehicle[FRONT_DRIVE_SHARE]
     forward = share * s[FRONT_SPEED] * s[COS_FRONT] + (1.0 - share) * s[REAR_SPEED] * s[COS_REAR]
