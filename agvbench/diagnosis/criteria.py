@@ -79,6 +79,8 @@ class FitCriteria:
         A fit that gains less than this share of the prediction has ended in a local minimum, and starts elsewhere.
     ``max_starts``, ``max_increase``
         Initial values that are tried, and the increase of the loss in a preliminary fit that starts elsewhere.
+    ``large_loss_of_removal``
+        If the removal of an effect increases the loss by more, the maps are also fitted from those of the base model.
     """
 
     few_steps: int = 3
@@ -93,6 +95,7 @@ class FitCriteria:
     min_share_of_predicted_gain: float = 0.5
     max_starts: int = 2
     max_increase: float = 20.0
+    large_loss_of_removal: float = 500.0
 
 
 @dataclass(frozen=True)
@@ -152,6 +155,8 @@ class DiscrepancyCriteria:
         Effects that are reconsidered beside a term in one step.
     ``few_groups_share``
         An effect that gains nothing without this share of the groups rests on few of them. A term may take its place.
+    ``min_share_of_effects``
+        A term takes the place of effects, or of one of them, only if it gains this share of what they gain without it.
     """
 
     min_predicted_gain: float = 4.0
@@ -159,6 +164,7 @@ class DiscrepancyCriteria:
     max_starts: int = 3
     max_refitted: int = 3
     few_groups_share: float = 0.1
+    min_share_of_effects: float = 0.2
 
 
 @dataclass(frozen=True)

@@ -21,9 +21,10 @@ from agvbench.diagnosis.method import Method
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.nodal_maps import ROLES, NodalMaps, nodal_maps, start_values
 from agvbench.diagnosis.result import Diagnosis
-from agvbench.diagnosis.selection.actuators import prefer_actuators
+from agvbench.diagnosis.selection.actuators import prefer_actuators, separate_lag_from_delay
 from agvbench.diagnosis.selection.candidates import given_effects
 from agvbench.diagnosis.selection.initial_steering import choose_initial_steering, reconsider_initial_steering
+from agvbench.diagnosis.selection.sequential_replacement import replace_sequentially
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.subsampling import refit_to_all, subsample_repeats
 from agvbench.diagnosis.selection.validation import validated
@@ -72,7 +73,9 @@ class RunsFromRest(Method[SelectedFromRest]):
         selector = self.selector(searched)
         chosen, selector = reconsider_initial_steering(selector.select(), selector)
         library, selector = select_variants_and_reconsider(chosen, selector)
-        library = prefer_actuators(library, selector)
+        library = separate_lag_from_delay(prefer_actuators(library, selector), selector)
+        if library.chosen.names != chosen.chosen.names:
+            library = replace_sequentially(library, selector)
         library, with_term, selector = add_term_and_reconsider(library, selector)
         if len(searched) < len(fitted):
             self.on_progress(f"effects were selected in {len(searched)} runs; they are refitted to all {len(fitted)}")

@@ -10,7 +10,8 @@ from tiny_vehicle import HEADER, Tiny, campaign_runs
 from agvbench.diagnosis.context import DiagnosisContext
 from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.runs_from_rest import RunsFromRest
-from agvbench.diagnosis.selection.actuators import CAMERA, prefer_actuators
+from agvbench.diagnosis.selection.actuators import CAMERA, prefer_actuators, separate_lag_from_delay
+from agvbench.diagnosis.selection.sequential_replacement import replace_sequentially
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.variants import with_extended_library
 from agvbench.effects.variants import cause_of
@@ -51,3 +52,52 @@ def test_without_a_latency_of_the_camera_nothing_is_fitted():
     tried = selector.tried
     assert prefer_actuators(selection, selector) is selection
     assert selector.tried == tried
+
+
+@pytest.mark.slow
+def test_servos_of_which_one_is_slower_have_a_lag_each_and_a_common_delay():
+    selection, selector = selected(replace(SLOW, rear_lag_ratio=1.8), "speed_lag", "actuation_delay_uneven")
+    found = separate_lag_from_delay(selection, selector)
+    assert {*found.chosen.names} == {"speed_lag", "actuation_delay", "steering_lag_uneven"}
+    values = found.chosen.fit.effect_values()
+    assert values["actuation_delay.delay_s"] == pytest.approx(0.06, abs=0.01)
+    assert values["steering_lag_uneven.time_constant_s"] == pytest.approx(0.1, abs=0.02)
+    assert values["steering_lag_uneven.rear_ratio"] == pytest.approx(1.8, rel=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("tiny", "names"),
+    [
+        (Tiny(delay_s=0.1), ("actuation_delay",)),
+        (Tiny(steering_lag_s=0.15), ("steering_lag",)),
+    ],
+)
+def test_a_delay_or_a_lag_alone_stays_what_it_is(tiny, names):
+    selection, selector = selected(tiny, *names)
+    found = separate_lag_from_delay(selection, selector)
+    assert found.chosen.names == selection.chosen.names
+    assert not any(found.alternatives.values())
+
+
+@pytest.mark.slow
+def test_an_effect_that_another_explains_better_is_replaced():
+    selection, selector = selected(Tiny(cornering_loss=0.15), "axle_overrun")
+    found = replace_sequentially(selection, selector)
+    assert found.chosen.names == ("cornering_speed_loss",)
+    assert found.chosen.deviance < selection.chosen.deviance
+
+
+@pytest.mark.slow
+def test_maps_that_an_effect_distorted_are_fitted_again_without_it():
+    tiny = Tiny(accelerate_s=0.2, brake_s=0.2, cornering_loss=0.15)
+    selection, selector = selected(tiny, "speed_lag", "cornering_speed_loss")
+    extended = with_extended_library(selector)
+    chosen, base = selection.chosen, selection.base
+    parameters = chosen.fit.parameters.copy()
+    speeds = extended.batch.maps.slices()[2]
+    parameters[speeds] *= 20.0
+    distorted = replace(chosen, fit=replace(chosen.fit, parameters=parameters), starts=frozenset({("else", b"1")}))
+    without = extended.without_effect(base, distorted, "cornering_speed_loss")
+    wanted = extended.with_effect(base, "speed_lag")
+    assert without.fit.total_loss == pytest.approx(wanted.fit.total_loss, abs=1.0)

@@ -25,3 +25,26 @@ def test_a_servo_of_second_order_is_a_steering_lag(tiny_campaign):
     assert again.model.effect("steering_lag_inertia").inertia_s == pytest.approx(known.inertia_s, rel=0.02)
     position = again.held_out.errors["position_rms_mm"]
     assert position["before"] == pytest.approx(position["after"], rel=0.05)
+
+
+@pytest.mark.slow
+def test_an_elastic_drive_train_is_a_speed_lag_with_its_force_in_each_direction(tiny_campaign):
+    found = diagnose(
+        tiny_campaign(
+            Tiny(ramp_forward_mps2=0.9, ramp_backward_mps2=0.6, coast_s=0.4, spring_per_s2=2.5, relaxation_s=0.5)
+        )
+    )
+    assert found.verdict is Verdict.NAMED
+    (effect,) = found.effects
+    assert (effect.name, effect.evidence["form"]) == ("speed_lag", "speed_lag_spring_back")
+    for key, value in (("forward_mps2", 0.9), ("backward_mps2", 0.6), ("coast_s", 0.4), ("spring_per_s2", 2.5)):
+        assert effect.parameters[key].value == pytest.approx(value, rel=0.1)
+
+
+@pytest.mark.slow
+def test_an_axle_that_brakes_and_the_drag_of_turned_wheels_are_both_measured(tiny_campaign):
+    """Drag acts against both axles at once: where it is large, none of them brakes."""
+    found = diagnose(tiny_campaign(Tiny(overrun=2.0, cornering_loss=0.08)))
+    values = {effect.name: effect.parameters for effect in found.effects}
+    assert values["axle_overrun"]["excess"].value == pytest.approx(2.0, rel=0.15)
+    assert values["cornering_speed_loss"]["loss"].value == pytest.approx(0.08, rel=0.1)

@@ -48,10 +48,15 @@ class Tiny:
     delay_s: float = 0.0
     steering_lag_s: float = 0.0
     steering_inertia_s: float = 0.0
+    rear_lag_ratio: float = 1.0
     play_rad: float = 0.0
     accelerate_s: float = 0.0
     brake_s: float = 0.0
     coast_s: float = 0.0
+    ramp_forward_mps2: float = 0.0
+    ramp_backward_mps2: float = 0.0
+    spring_per_s2: float = 0.0
+    relaxation_s: float = 0.5
     slip: float = 0.0
     droop_per_hour: float = 0.0
     tilt_mps: float = 0.0
@@ -59,6 +64,7 @@ class Tiny:
     front_from_rear: float = 0.0
     rear_from_front: float = 0.0
     cornering_loss: float = 0.0
+    overrun: float = 0.0
     reverse_gain: float = 0.0
     axle_ratio: float = 0.0
     front_drive_share: float = 0.5
@@ -102,7 +108,7 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
     warm = 1.0 + tiny.warm_gain * -math.expm1(-started_s / 3600.0 / tiny.warm_h)
     x, y, heading = start
     front, rear, speed = front_of(NEUTRAL) + f_off, rear_of(NEUTRAL) + r_off, 0.0
-    turning, loose, driven = [0.0, 0.0], [front, rear], 0.0
+    turning, loose, driven, windup = [0.0, 0.0], [front, rear], 0.0, 0.0
     poses, times = [], []
     steps = round((commands.t_s[-1] + _AFTER_S + _BEFORE_S) / _STEP_S)
     for k in range(steps):
@@ -113,7 +119,8 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
         row = int(np.searchsorted(commands.t_s, t - tiny.delay_s + 1e-12, side="right")) - 1
         c = commands.at(row) if row >= 0 else Command(NEUTRAL, NEUTRAL, NEUTRAL)
         told = speed_of(c.drive) * gain
-        away = 1.0 - math.exp(-_STEP_S / tiny.steering_lag_s) if tiny.steering_lag_s else 1.0
+        lags = tiny.steering_lag_s, tiny.rear_lag_ratio * tiny.steering_lag_s
+        away = [1.0 - math.exp(-_STEP_S / lag) if lag else 1.0 for lag in lags]
         was = front, rear, speed
         if tiny.steering_inertia_s:
             for axle, aim, at in ((0, front_of(c.front) + f_off, front), (1, rear_of(c.rear) + r_off, rear)):
@@ -121,10 +128,10 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
                 turning[axle] += push * _STEP_S
             front, rear = front + turning[0] * _STEP_S, rear + turning[1] * _STEP_S
         else:
-            front += (front_of(c.front) + f_off - front) * away
-            rear += (rear_of(c.rear) + r_off - rear) * away
+            front += (front_of(c.front) + f_off - front) * away[0]
+            rear += (rear_of(c.rear) + r_off - rear) * away[1]
         lag = tiny.accelerate_s if abs(told) > abs(speed) else (tiny.coast_s if told == 0.0 else 0.0) or tiny.brake_s
-        speed += (told - speed) * (1.0 - math.exp(-_STEP_S / lag) if lag else 1.0)
+        speed, windup = driven_speed(tiny, told, lag, speed, windup)
         relief = 1.0 + tiny.reverse_gain if speed < 0.0 else 1.0
         f, r, s = (
             (old + new) / 2.0 if lagged else new
@@ -138,12 +145,15 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
         f += tiny.run_out_rad * math.sin(math.tau * driven / 0.8)
         df = (f + tiny.front_from_rear * r) * relief * warm
         dr = (r + tiny.rear_from_front * f) * relief * warm
-        v = s * (1.0 - tiny.cornering_loss * (abs(math.tan(df)) + abs(math.tan(dr))))
+        drag = tiny.cornering_loss * (abs(math.tan(df)) + abs(math.tan(dr)))
+        v = s * (1.0 - drag)
         if math.hypot(x - 0.6, y - 0.3) < 0.7:
             v *= 1.0 - tiny.slow_patch
         v *= 1.0 + math.copysign(tiny.downhill, v) * math.cos(heading - 1.0)
         share = tiny.front_drive_share
         forward = v * (share * math.cos(df) + (1.0 - share) * (1.0 + tiny.axle_ratio) * math.cos(dr))
+        if tiny.overrun:
+            forward = balanced(s * math.cos(df), s * math.cos(dr), drag, tiny.overrun)
         longer = 0.5 * (tiny.wheelbase_m - FRONT_M - REAR_M)
         front_m, rear_m = FRONT_M + longer - tiny.marker_forward_m, REAR_M + longer + tiny.marker_forward_m
         side = forward * (front_m * math.tan(dr) + rear_m * math.tan(df)) / tiny.wheelbase_m
@@ -174,6 +184,27 @@ def seen(tiny: Tiny, t_s: np.ndarray, p: np.ndarray, rng: np.random.Generator) -
     p[:, 2] += rng.normal(0.0, tiny.noise_rad, n)
     nan = np.full(n, np.nan)
     return Frames(t_s, p[:, 0], p[:, 1], p[:, 2], np.ones(n, dtype=bool), np.full(n, -1), nan, nan)
+
+
+def driven_speed(tiny: Tiny, told: float, lag: float, speed: float, windup: float) -> tuple[float, float]:
+    """Return speed and windup of the drive train one step later."""
+    if told == 0.0 and tiny.spring_per_s2:
+        speed -= (speed / tiny.coast_s + tiny.spring_per_s2 * windup) * _STEP_S
+        return speed, windup + (speed - windup / tiny.relaxation_s) * _STEP_S
+    if told != 0.0 and tiny.ramp_forward_mps2:
+        ramp = (tiny.ramp_forward_mps2 if told > 0.0 else tiny.ramp_backward_mps2) * _STEP_S
+        return min(max(told, speed - ramp), speed + ramp), windup * (1.0 - _STEP_S / tiny.relaxation_s)
+    return speed + (told - speed) * (1.0 - math.exp(-_STEP_S / lag) if lag else 1.0), windup
+
+
+def balanced(front: float, rear: float, drag: float, overrun: float) -> float:
+    """Return the speed at which the axles' forces balance the drag, where an axle brakes more stiffly than it pulls."""
+    low, high = sorted((abs(front), abs(rear)))
+    force = drag * (low + high)
+    speed = ((1.0 + overrun) * low + high - force) / (2.0 + overrun)
+    if speed < low:  # no axle brakes
+        speed = (low + high - force) / 2.0
+    return math.copysign(speed, front)
 
 
 def follow(axle: float, servo: float, half: float) -> float:

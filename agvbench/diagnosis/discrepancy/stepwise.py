@@ -134,8 +134,9 @@ def add_term(selection: Selection, selector: Selector) -> TermSelection | None:
         else:
             found.append(_best_term(extended, selection.chosen, starts))
             if found[0] is None and selection.gains:
+                alone = first or _best_term(extended, selection.base, starts_alone)
                 found += [
-                    first or _best_term(extended, selection.base, starts_alone),
+                    alone if alone is not None and _may_be_mimicked(selection, alone[0]) else None,
                     _term_in_place_of_effect(extended, selection),
                 ]
     elif any(_depends_on_few_groups(selector, selection, name) for name in selection.gains):
@@ -220,6 +221,12 @@ def _is_constant_change(model: ScoredModel, term: type[DiscrepancyTerm]) -> bool
     return is_constant(_term_values(model, term), model.fit.predictor.readings.started_h)
 
 
+def _may_be_mimicked(selection: Selection, with_term: ScoredModel) -> bool:
+    """Return whether a term alone gains a noticeable share of what all effects gain, as if they only mimicked it."""
+    gain = selection.base.deviance - with_term.deviance
+    return gain > DISCREPANCY.min_share_of_effects * (selection.base.deviance - selection.chosen.deviance)
+
+
 def _term_values(model: ScoredModel, term: type[DiscrepancyTerm]) -> Floats:
     own = model.fit.effect_values()
     return np.array([own[f"{term.name}.{p.name}"] for p in term.parameters()])
@@ -245,9 +252,11 @@ def _term_in_place_of_effect(
     do not depend on the position are fitted, because their simulation is as fast as that of effects.
     """
     best: tuple[ScoredModel, type[DiscrepancyTerm]] | None = None
-    for name in selection.gains:
+    for name, gain in selection.gains.items():
         without = extended.without_effect(selection.base, selection.chosen, name)
         for term in (term for term in TERMS if term.longest_step_s == math.inf):
+            if extended.predicted_gain(without, term.name) < DISCREPANCY.min_share_of_effects * gain:
+                continue
             model = extended.with_effect(without, term.name)
             if model.deviance < (best[0] if best else selection.chosen).deviance and extended.meets_criterion(
                 without, model

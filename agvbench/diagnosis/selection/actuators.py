@@ -1,13 +1,17 @@
-"""Delays of the camera against delays of the actuators: a model of all actuators in place of a latency of the camera.
+"""Delays of the camera and of each actuator: a model of all actuators in place of an effect that resembles several.
 
 Servos and drive follow a command late, each in its own way. A latency of the camera with a filter resembles all of them
 at once, so that a selection of one effect at a time takes the filter. It is a claim about a documented instrument, and
-is kept only if the actuators do not explain the runs as well.
+is kept only if the actuators do not explain the runs as well. A delay of the servos likewise resembles their lag.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
+
+import numpy as np
 
 from agvbench.diagnosis.criteria import DISCREPANCY, SELECTION
 from agvbench.diagnosis.residuals.body_rates import residual_rates
@@ -20,6 +24,105 @@ from agvbench.effects.variants import cause_of
 
 CAMERA = "mocap_latency"
 ACTUATORS = ("actuation_delay", "steering_lag", "speed_lag")
+SERVOS = ("actuation_delay", "steering_lag", "steering_rate_limit")
+_DELAY, _EVEN, _UNEVEN = "actuation_delay", "steering_lag_inertia", "steering_lag_uneven"
+# Of a response of second order with critical damping: its inertia over its lag.
+_CRITICAL = 0.5
+_LEAST_LAG_S = 0.02
+
+
+def separate_lag_from_delay(selection: Selection, selector: Selector) -> Selection:
+    """Return the selection with a common delay and a lag of the servos, if they explain a slow response better.
+
+    A selection of one effect at a time takes what resembles the whole response, and neither a delay of each servo nor a
+    rate limit leaves a gain to the other causes. If both descriptions predict equally, the lag becomes an alternative.
+    """
+    chosen = selection.chosen
+    slow = [name for name in chosen.names if cause_of(name) in SERVOS and name not in selector.given]
+    if not slow or {*SERVOS} & {cause_of(name) for name in selector.given}:
+        return selection
+    extended = with_extended_library(selector)
+    separate = _with_lag_and_delay(extended, chosen, slow)
+    if separate is None or {*separate.names} == {*chosen.names}:
+        return selection
+    difference = separate.deviance - chosen.deviance
+    gains_clearly = difference < -selector.min_gain * max(len(separate.names) - len(chosen.names), 1)
+    if gains_clearly:
+        replaced = _replaced(selection, selector, extended, separate)
+        if {*replaced.chosen.names} != {*chosen.names}:
+            return replaced
+    if difference > SELECTION.alternative_margin:
+        return selection
+    present = {cause_of(name) for name in chosen.names}
+    absent = [name for name in separate.names if cause_of(name) in SERVOS and cause_of(name) not in present]
+    # A gain that rests on few runs selects no lag, but leaves it possible.
+    others = {
+        cause_of(name): difference
+        for name in absent
+        if gains_clearly
+        or extended.meets_criterion(extended.without_effect(selection.base, separate, name), separate, of_group=True)
+    }
+    alternatives = {name: selection.alternatives.get(name, {}) | others for name in slow}
+    return replace(selection, alternatives=selection.alternatives | alternatives)
+
+
+def _with_lag_and_delay(extended: Selector, chosen: ScoredModel, slow: list[str]) -> ScoredModel | None:
+    """Return the model with a delay and a lag of second order in place of the effects `slow`; None if it diverges.
+
+    Servos of which one is slower than the other have a lag each.
+    """
+    own = chosen.fit.effect_values()
+    front, rear, drive = _responses_s(own, slow)
+    delay = min(drive, front, rear)
+    lags = max(front - delay, _LEAST_LAG_S), max(rear - delay, _LEAST_LAG_S)
+    kept = [value for key, value in own.items() if key.partition(".")[0] not in slow]
+    others = tuple(name for name in chosen.names if name not in slow)
+    maps = chosen.fit.parameters[: extended.batch.maps.size]
+    mean = 0.5 * sum(lags)
+    responses = {_EVEN: [mean, _CRITICAL * mean], _UNEVEN: [lags[0], _CRITICAL * lags[0], lags[1] / lags[0]]}
+    found = []
+    for response, values in responses.items():
+        start = np.r_[maps, kept, delay, values]
+        starts = frozenset(one for one in chosen.starts if one[0] not in slow) | {("lag and delay", start.tobytes())}
+        with suppress(np.linalg.LinAlgError):  # the fit diverged
+            found.append(extended.score((*others, _DELAY, response), start, chosen.fit, starts=starts))
+    if len(found) == len(responses) and found[0].deviance < found[1].deviance + extended.min_gain:
+        return found[0]
+    return found[-1] if found else None
+
+
+def _responses_s(own: Mapping[str, float], slow: list[str]) -> tuple[float, float, float]:
+    """Return the time after which front servo, rear servo and drive respond, by the effects `slow` [s]."""
+    values = {key.partition(".")[2]: value for key, value in own.items() if key.partition(".")[0] in slow}
+    common, lag = values.get("delay_s", 0.0), values.get("time_constant_s", 0.0)
+    steering = values.get("steering_s", common)
+    rear_lag = lag * values.get("rear_ratio", 1.0)
+    return (
+        values.get("front_s", steering) + lag,
+        values.get("rear_s", steering) + rear_lag,
+        values.get("drive_s", common),
+    )
+
+
+def _replaced(selection: Selection, selector: Selector, extended: Selector, model: ScoredModel) -> Selection:
+    """Return the selection with `model` in place of the chosen one, less the effects that it does not need."""
+    current, gains = extended.backward_elimination(selection.base, model, SERVOS)
+    gain = selection.chosen.deviance - current.deviance
+    if gain > 0.0:
+        selector.on_progress(f"{' + '.join(current.names)}: lag and delay separately gain {gain:.0f}")
+    causes = {cause_of(name) for name in current.names}
+    selector.candidates |= {n: c for n, c in variant_candidates().items() if n in current.names}
+    return replace(
+        selection,
+        chosen=current,
+        alternatives={
+            name: {other: more for other, more in selection.alternatives.get(name, {}).items() if other not in causes}
+            for name in gains
+        },
+        gains=gains,
+        rejected={name: gain for name, gain in selection.rejected.items() if name not in causes},
+        tried=selection.tried + extended.tried,
+    )
 
 
 def prefer_actuators(selection: Selection, selector: Selector) -> Selection:

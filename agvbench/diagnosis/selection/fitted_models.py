@@ -107,15 +107,27 @@ class FittedModels:
         return self._known.get(Request(frozenset(names)))
 
     def without_effect(self, base: ScoredModel, current: ScoredModel, name: str) -> ScoredModel:
-        """Return the model without the effect called `name`."""
+        """Return the model without the effect called `name`.
+
+        Its maps are fitted from those of `current`. If that is much worse, the effect may have distorted them, and they
+        are also fitted from those of `base`.
+        """
         names = tuple(n for n in current.names if n != name)
         if names == self.given:
             return base
         own = current.fit.effect_values()
         kept = [value for key, value in own.items() if key.partition(".")[0] != name]
-        maps = current.fit.parameters[: self.batch.maps.size]
         starts = frozenset(start for start in current.starts if start[0] != name)
-        return self.score(names, np.r_[maps, kept], current.fit, starts=starts)
+        maps, base_maps = (model.fit.parameters[: self.batch.maps.size] for model in (current, base))
+        without = self.score(names, np.r_[maps, kept], current.fit, starts=starts)
+        if without.fit.total_loss - current.fit.total_loss < FIT.large_loss_of_removal:
+            return without
+        again = starts | {(f"maps without {name}", base_maps.tobytes())}
+        try:
+            from_base = self.score(names, np.r_[base_maps, kept], base.fit, starts=again)
+        except np.linalg.LinAlgError:
+            return without  # the fit diverged
+        return min(without, from_base, key=lambda model: model.fit.total_loss)
 
     def with_effect(self, current: ScoredModel, name: str, candidate: Candidate | None = None) -> ScoredModel:
         """Return `current` with the effect called `name`, fitted from the best of its initial values.

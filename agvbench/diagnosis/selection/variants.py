@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -80,9 +82,9 @@ def select_variants(selection: Selection, selector: Selector) -> Selection:
     ]
     tried: list[tuple[_Replacement, ScoredModel]] = []
     for name in effects:
-        for replacement in replacements:
-            if replacement.replaced == name and name in current.names and _is_new(replacement, current):
-                tried += [(replacement, model) for model in _swapped_models(extended, current, replacement)]
+        if name in current.names:
+            own = [one for one in replacements if one.replaced == name and _is_new(one, current)]
+            tried += _swapped_models(extended, current, own)
         current = _best_replacement(
             extended, current, [model for replacement, model in tried if replacement.replaced == name]
         )
@@ -175,19 +177,33 @@ def _values(model: ScoredModel, name: str) -> dict[str, float]:
     return {key.partition(".")[2]: value for key, value in own.items() if key.partition(".")[0] == name}
 
 
-def _swapped_models(extended: Selector, current: ScoredModel, replacement: _Replacement) -> list[ScoredModel]:
-    """Return `current` with a variant in place of its effect, also with one more effect removed."""
-    variant = replace(candidate(replacement.variant), starts=replacement.starts)
-    try:
-        swapped = _swapped(extended, current, {replacement.replaced}, variant)
-    except np.linalg.LinAlgError:
-        return []  # the fit diverged
-    # A model with fewer effects fits no better: nothing is removed from one that fits much worse already.
-    if _fit_gain(current, swapped) < -VARIANT.max_fit_loss:
-        return [swapped]
-    # Another effect may only compensate for the wrong equation.
-    others = [other for other in current.names if other != replacement.replaced and other not in extended.given]
-    return [swapped, *(_swapped(extended, current, {replacement.replaced, other}, variant) for other in others)]
+def _swapped_models(
+    extended: Selector, current: ScoredModel, replacements: list[_Replacement]
+) -> list[tuple[_Replacement, ScoredModel]]:
+    """Return `current` with each variant in place of its effect; with the best ones also without one more effect.
+
+    Another effect may only compensate for the wrong equation.
+    """
+    swapped: list[tuple[_Replacement, ScoredModel]] = []
+    for one in replacements:
+        with suppress(np.linalg.LinAlgError):  # the fit diverged
+            swapped.append((one, _swapped(extended, current, {one.replaced}, _variant_candidate(one))))
+    least = min((model.deviance for _, model in swapped), default=math.inf)
+    smaller = []
+    for one, model in swapped:
+        # A model with fewer effects fits no better: nothing is removed from one that fits much worse already.
+        if _fit_gain(current, model) < -VARIANT.max_fit_loss or model.deviance > least + extended.min_gain:
+            continue
+        others = [name for name in current.names if name != one.replaced and name not in extended.given]
+        with suppress(np.linalg.LinAlgError):
+            smaller += [
+                (one, _swapped(extended, current, {one.replaced, other}, _variant_candidate(one))) for other in others
+            ]
+    return swapped + smaller
+
+
+def _variant_candidate(replacement: _Replacement) -> Candidate:
+    return replace(candidate(replacement.variant), starts=replacement.starts)
 
 
 def _best_replacement(extended: Selector, current: ScoredModel, models: list[ScoredModel]) -> ScoredModel:

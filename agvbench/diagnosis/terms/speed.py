@@ -131,7 +131,8 @@ class SpeedByRunTime(DiscrepancyTerm):
     longest_step_s: ClassVar[float] = 0.2
 
     share: float = parameter(unit="–", low=-0.9, high=0.9, scale=0.05)
-    time_constant_s: float = parameter(unit="s", low=0.0, high=60.0, scale=2.0)
+    # A shorter one would be a factor of every speed, which the map absorbs.
+    time_constant_s: float = parameter(unit="s", low=0.3, high=60.0, scale=2.0, null=2.0)
 
     @staticmethod
     def drive(state: Floats, share: float, time_constant_s: float) -> None:
