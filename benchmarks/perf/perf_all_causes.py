@@ -61,6 +61,7 @@ def causes(vehicle: SimulatedVehicle) -> dict[str, Cause]:
     stiff = replace(drive_train, stiffness_per_s=250.0, brake_per_s=250.0, windup_per_s2=0.0, backlash_m=0.0)
     centred = replace(body, front_axle_m=NOMINAL_FRONT_M, rear_axle_m=NOMINAL_REAR_M, marker_left_m=0.0)
     without: dict[str, tuple[SimulatedVehicle, set[str]]] = {
+        # The pulse frame delays a command by half its length on average, so that every vehicle has a delay.
         "delay": (replace(vehicle, delay_frames=0.0), {"actuation_delay", "mocap_latency"}),
         "servos": (replace(vehicle, front=axle("front"), rear=axle("rear")), {"steering_lag", "steering_rate_limit"}),
         "speed": (replace(vehicle, drive=stiff, **fast), {"speed_lag"}),
@@ -75,7 +76,11 @@ def causes(vehicle: SimulatedVehicle) -> dict[str, Cause]:
         "reverse": (replace(vehicle, body=replace(body, reverse_relief=0.0)), {"reverse_steering_gain"}),
         "battery": (replace(vehicle, battery=replace(vehicle.battery, droop=0.0)), {"battery_droop"}),
     }
-    return {name: Cause(reduced, frozenset(names)) for name, (reduced, names) in without.items() if reduced != vehicle}
+    return {
+        name: Cause(reduced, frozenset(names))
+        for name, (reduced, names) in without.items()
+        if name == "delay" or reduced != vehicle
+    }
 
 
 def end_positions(vehicle: SimulatedVehicle, runs: list[Run]) -> Floats:
