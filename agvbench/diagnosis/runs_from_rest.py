@@ -74,7 +74,7 @@ class RunsFromRest(Method[SelectedFromRest]):
         chosen, selector = reconsider_initial_steering(selector.select(), selector)
         library, selector = select_variants_and_reconsider(chosen, selector)
         library = separate_lag_from_delay(prefer_actuators(library, selector), selector)
-        if library.chosen.names != chosen.chosen.names:
+        if library.gains:
             library = replace_sequentially(library, selector)
         library, with_term, selector = add_term_and_reconsider(library, selector)
         if len(searched) < len(fitted):

@@ -95,9 +95,9 @@ def test_maps_that_an_effect_distorted_are_fitted_again_without_it():
     extended = with_extended_library(selector)
     chosen, base = selection.chosen, selection.base
     parameters = chosen.fit.parameters.copy()
-    speeds = extended.batch.maps.slices()[2]
+    speeds = extended.batch.maps.slices()["drive"]
     parameters[speeds] *= 20.0
     distorted = replace(chosen, fit=replace(chosen.fit, parameters=parameters), starts=frozenset({("else", b"1")}))
     without = extended.without_effect(base, distorted, "cornering_speed_loss")
     wanted = extended.with_effect(base, "speed_lag")
-    assert without.fit.total_loss == pytest.approx(wanted.fit.total_loss, abs=1.0)
+    assert without.fit.total_loss == pytest.approx(wanted.fit.total_loss, abs=5.0)

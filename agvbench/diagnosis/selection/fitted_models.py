@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.diagnosis.criteria import FIT
+from agvbench.diagnosis.criteria import FIT, SELECTION
 from agvbench.diagnosis.data.splits import folds
 from agvbench.diagnosis.data.window_splits import fold_groups
 from agvbench.diagnosis.estimation.cross_validation import FOLDS, cross_validated
@@ -68,6 +68,10 @@ class ScoredModel:
         may differ by a hundred. A gain that does not show in the fit itself does not count.
         """
         return min(other.deviance - self.deviance, other.fit.total_loss - self.fit.total_loss)
+
+    def is_matched_by(self, other: ScoredModel) -> bool:
+        """Return whether `other` predicts as well: by the margin of alternatives this model gains nothing over it."""
+        return self.gain_over(other) < SELECTION.alternative_margin
 
 
 @dataclass

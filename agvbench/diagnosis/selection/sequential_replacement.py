@@ -12,7 +12,7 @@ from agvbench.diagnosis.criteria import SELECTION, VARIANT
 from agvbench.diagnosis.selection.actuators import CAMERA
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
-from agvbench.diagnosis.selection.variants import with_extended_library
+from agvbench.diagnosis.selection.variants import variant_candidates, with_extended_library
 from agvbench.effects.variants import cause_of, effect_variants
 
 _MAX_ROUNDS = 3
@@ -27,28 +27,29 @@ def replace_sequentially(selection: Selection, selector: Selector) -> Selection:
         alternatives = {
             name: _kept(selection.alternatives.get(name, {}), others)
             | {
-                other: model.deviance - current.deviance
+                cause_of(other): model.deviance - current.deviance
                 for other, model in others.items()
-                if model.deviance - current.deviance < SELECTION.alternative_margin
+                if current.is_matched_by(model)
             }
             for name, others in found.items()
         }
         # Actuators are preferred to a latency of the camera, even where they predict a little worse.
-        models = [model for others in found.values() for other, model in others.items() if other != CAMERA]
+        models = [model for others in found.values() for other, model in others.items() if cause_of(other) != CAMERA]
         best = min(models, key=lambda model: model.deviance, default=current)
         if best.gain_over(current) < SELECTION.alternative_margin:
             break
         names = " + ".join(best.names)
         extended.on_progress(f"{names}: a replacement gains {current.deviance - best.deviance:.0f}")
         current, gains = extended.backward_elimination(selection.base, best, map(cause_of, best.names))
+    selector.candidates |= {name: one for name, one in variant_candidates().items() if name in current.names}
     rejected = {name: gain for name, gain in selection.rejected.items() if name not in current.names}
     tried = selection.tried + extended.tried
     return replace(selection, chosen=current, gains=gains, alternatives=alternatives, rejected=rejected, tried=tried)
 
 
 def _kept(known: dict[str, float], others: dict[str, ScoredModel]) -> dict[str, float]:
-    """Return the known alternatives that were not fitted again: other equations, and effects outside the candidates."""
-    return {other: difference for other, difference in known.items() if other not in others}
+    """Return the known alternatives that were not fitted again."""
+    return {other: difference for other, difference in known.items() if other not in map(cause_of, others)}
 
 
 def _in_place_of(extended: Selector, base: ScoredModel, current: ScoredModel, name: str) -> dict[str, ScoredModel]:
@@ -56,10 +57,10 @@ def _in_place_of(extended: Selector, base: ScoredModel, current: ScoredModel, na
     without = extended.without_effect(base, current, name)
     causes = {cause_of(present) for present in current.names}
     likely = VARIANT.min_gain_share * (without.fit.total_loss - current.fit.total_loss)
-    others = [other for other in extended.candidates if other not in causes and other not in effect_variants()]
+    others = [other for other in {*extended.candidates, *effect_variants()} if cause_of(other) not in causes]
     models = {
         other: extended.with_effect(without, other)
-        for other in others
+        for other in sorted(others)
         if extended.predicted_gain(without, other) >= likely
     }
     return {other: model for other, model in models.items() if model.is_fitted}

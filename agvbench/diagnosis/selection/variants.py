@@ -261,5 +261,5 @@ def _other_causes(current: ScoredModel, name: str, tried: list[tuple[_Replacemen
         for replacement, model in tried
         if {*model.names} - {replacement.variant.name} == others
         and replacement.variant.variant_of != cause_of(name)
-        and model.deviance - current.deviance < SELECTION.alternative_margin
+        and current.is_matched_by(model)
     }
