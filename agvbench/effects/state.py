@@ -14,8 +14,8 @@ X, Y, HEADING = range(3, 6)
 DRIVE_COMMAND, FRONT_COMMAND, REAR_COMMAND = range(6, 9)
 # Its steady state by the static maps: axle angles and speed.
 FRONT_AIM, REAR_AIM, SPEED_AIM = range(9, 12)
-# Dynamics: servos obey δ̇ = (aim − δ) / lag within ± rate, and the axle follows with a backlash of this width.
-STEERING_LAG, STEERING_RATE, BACKLASH = range(12, 15)
+# Dynamics: servos obey δ̇ = (aim − δ) / lag within ± rate, and the front axle follows with a backlash of this width.
+STEERING_LAG, STEERING_RATE, FRONT_BACKLASH = range(12, 15)
 # The drive obeys v̇ = (aim − v) / lag, one lag for |v| growing, one for |v| falling.
 ACCELERATE_LAG, BRAKE_LAG = range(15, 17)
 # Angles of the axles, speed of the drive.
@@ -51,4 +51,6 @@ COAST_SPRING, COAST_RELAXATION = range(47, 49)
 DRAGGED = 49
 # Lag and τ of the rear servo over those of the front servo.
 REAR_LAG_RATIO = 50
-SIZE = 51
+# Width of the backlash of the rear axle.
+REAR_BACKLASH = 51
+SIZE = 52

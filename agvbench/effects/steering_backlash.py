@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from agvbench.effects.base import Effect, Stage, parameter
-from agvbench.effects.state import BACKLASH
+from agvbench.effects.state import FRONT_BACKLASH, REAR_BACKLASH
 from agvbench.types import Floats
 
 
@@ -42,5 +42,6 @@ class SteeringBacklash(Effect):
 
     @staticmethod
     def aim(state: Floats, width_rad: float) -> None:
-        """Set the width of the backlash."""
-        state[BACKLASH] = width_rad
+        """Set the width of the backlash of both axles."""
+        state[FRONT_BACKLASH] = width_rad
+        state[REAR_BACKLASH] = width_rad

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from tiny_vehicle import Tiny
+from tiny_vehicle import InMemory, Tiny, campaign_runs
 
 from agvbench.diagnosis import Verdict, diagnose
 
@@ -25,6 +25,17 @@ def test_a_servo_of_second_order_is_a_steering_lag(tiny_campaign):
     assert again.model.effect("steering_lag_inertia").inertia_s == pytest.approx(known.inertia_s, rel=0.02)
     position = again.held_out.errors["position_rms_mm"]
     assert position["before"] == pytest.approx(position["after"], rel=0.05)
+
+
+@pytest.mark.slow
+def test_a_backlash_has_a_width_at_each_axle():
+    """With one width for both, the maps take up the difference, and other runs are predicted worse."""
+    found = diagnose(InMemory(campaign_runs(Tiny(play_rad=0.04, rear_play_ratio=1.8), rear_steps=True)))
+    assert found.verdict is Verdict.NAMED
+    (effect,) = found.effects
+    assert (effect.name, effect.evidence["form"]) == ("steering_backlash", "steering_backlash_uneven")
+    assert effect.parameters["front_width_rad"].value == pytest.approx(0.04, rel=0.1)
+    assert effect.parameters["rear_width_rad"].value == pytest.approx(0.072, rel=0.1)
 
 
 @pytest.mark.slow

@@ -50,6 +50,7 @@ class Tiny:
     steering_inertia_s: float = 0.0
     rear_lag_ratio: float = 1.0
     play_rad: float = 0.0
+    rear_play_ratio: float = 1.0
     accelerate_s: float = 0.0
     brake_s: float = 0.0
     coast_s: float = 0.0
@@ -140,8 +141,10 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
             )
         )
         if tiny.play_rad:
-            loose = [follow(axle, servo, tiny.play_rad / 2.0) for axle, servo in zip(loose, (f, r), strict=True)]
-            f, r = loose
+            f, r = loose = [
+                follow(loose[0], f, tiny.play_rad / 2.0),
+                follow(loose[1], r, tiny.rear_play_ratio * tiny.play_rad / 2.0),
+            ]
         f += tiny.run_out_rad * math.sin(math.tau * driven / 0.8)
         df = (f + tiny.front_from_rear * r) * relief * warm
         dr = (r + tiny.rear_from_front * f) * relief * warm
@@ -231,7 +234,7 @@ def switched(drive_us: float, fronts: list[float], rears: list[float], seconds: 
     )
 
 
-def experiments(*, steps: bool = True) -> Iterator[tuple[str, Commands, int]]:
+def experiments(*, steps: bool = True, rear_steps: bool = False) -> Iterator[tuple[str, Commands, int]]:
     """Yield (experiment, commands, repeats) of a whole small campaign."""
     n = NEUTRAL
     levels = (1000.0, 1150.0, 1300.0, 1400.0, 1500.0, 1600.0, 1700.0, 1850.0, 2000.0)
@@ -254,19 +257,24 @@ def experiments(*, steps: bool = True) -> Iterator[tuple[str, Commands, int]]:
         for c in (900.0, 2100.0, 1350.0):
             yield "step", switched(c, [1300.0, 1700.0, 1300.0, 1700.0, 1500.0], [n] * 5, 1.2), 3
             yield "step", switched(c, [1500.0, 1300.0, 1700.0, 1400.0], [1500.0, 1700.0, 1300.0, 1600.0], 1.5), 3
+    if rear_steps:
+        for c in (900.0, 2100.0):
+            yield "step", switched(c, [n] * 5, [1300.0, 1700.0, 1300.0, 1700.0, 1500.0], 1.2), 3
 
 
-def campaign_runs(tiny: Tiny, *, seed: int = 0, steps: bool = True, hours: float = 1.0) -> list[Run]:
+def campaign_runs(
+    tiny: Tiny, *, seed: int = 0, steps: bool = True, rear_steps: bool = False, hours: float = 1.0
+) -> list[Run]:
     """Return a campaign: repeats interleaved, start poses at random."""
-    return list(_driven(tiny, seed, steps, hours))
+    return list(_driven(tiny, seed, steps, rear_steps, hours))
 
 
 @functools.cache
-def _driven(tiny: Tiny, seed: int, steps: bool, hours: float) -> tuple[Run, ...]:
+def _driven(tiny: Tiny, seed: int, steps: bool, rear_steps: bool, hours: float) -> tuple[Run, ...]:
     rng = np.random.default_rng(seed)
     plan = [
         (name, commands, repeat, k)
-        for k, (name, commands, repeats) in enumerate(experiments(steps=steps))
+        for k, (name, commands, repeats) in enumerate(experiments(steps=steps, rear_steps=rear_steps))
         for repeat in range(1, repeats + 1)
     ]
     plan.sort(key=lambda row: (row[2], rng.random()))

@@ -19,6 +19,9 @@ _TIGHT: dict[str, Any] = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-12}
 Path = Callable[[float], float]
 
 
+AXLES = ("front", "rear")
+
+
 def at_once(values: Floats, moments: Floats) -> Path:
     """Return the path of what jumps to `values` at `moments`; `values` begins with where it was before."""
     steps, levels = moments.tolist(), values.tolist()
@@ -232,6 +235,14 @@ def with_play(servo: Path, rest: float, width: float, end: float) -> Path:
     return lambda t: float(np.interp(t, times, followed))
 
 
+def jumps_with_play(channel: int, width: float) -> Path:
+    """Return the path of an axle behind a play whose servo, channel 0 (front) or 1 (rear), obeys at once."""
+    angles = [float(REST[channel])]
+    for position in SETTLED[:, channel].tolist():
+        angles.append(min(max(angles[-1], position - width / 2.0), position + width / 2.0))
+    return at_once(np.array(angles), RUN_TIMES)
+
+
 def true_form(name: str, values: dict[str, float], start: tuple[float, float, float], times: Floats) -> Floats:
     """Return (n, 3) measured poses with one law."""
     end = times[-1] + 2.0
@@ -240,6 +251,8 @@ def true_form(name: str, values: dict[str, float], start: tuple[float, float, fl
     front, rear, speed = aims(0, fronts), aims(1, rears), aims(2, drives)
     if name in ("steering_lag_inertia", "steering_lag_uneven", "steering_rate_limit_acceleration"):
         front, rear = (servo_path(name, values, channel, RUN_TIMES, end) for channel in (0, 1))
+    if name == "steering_backlash_uneven":
+        front, rear = (jumps_with_play(channel, values[f"{axle}_width_rad"]) for channel, axle in enumerate(AXLES))
     if name == "speed_lag_ramp":
         speed = ramped(speed, drives, values["acceleration_mps2"], values["braking_mps2"], end)
     if name == "speed_lag_ramp_up":

@@ -15,15 +15,16 @@ import math
 from agvbench.effects.state import (
     ACCELERATE_LAG,
     ACCELERATION_LIMIT,
-    BACKLASH,
     BRAKE_LAG,
     BRAKING_LIMIT,
     COAST_RELAXATION,
     COAST_SPRING,
     FRONT,
     FRONT_AIM,
+    FRONT_BACKLASH,
     REAR,
     REAR_AIM,
+    REAR_BACKLASH,
     REAR_LAG_RATIO,
     SPEED,
     SPEED_AIM,
@@ -55,18 +56,19 @@ from agvbench.types import Floats
 # A gap closes by a ramp and a decay: initial size, rate of the ramp, time constant of the decay, end of the ramp with
 # the gap left there, settling time.
 _GAP, _RATE, _LAG, _RAMPED_S, _RAMPED_GAP, _SETTLED_S = range(6)
-# A servo: such a gap, or a response of second order in the same place; then aim, direction and axle position.
-_AIM, _DIRECTION, _AXLE = range(WAY_SIZE, WAY_SIZE + 3)
-_SERVO_SIZE = WAY_SIZE + 3
+# A servo: such a gap, or a response of second order in the same place; then aim, direction and half the
+# backlash and the position of its axle.
+_AIM, _DIRECTION, _HALF_BACKLASH, _AXLE = range(WAY_SIZE, WAY_SIZE + 4)
+_SERVO_SIZE = WAY_SIZE + 4
 _FRONT, _REAR = 0, _SERVO_SIZE
 # The drive: its initial gap, and if it reverses the gap from rest.
 _FIRST = 2 * _SERVO_SIZE
 _SECOND = _FIRST + 6
 _SPEED_AIM, _SPEED_DIRECTION, _RESTS_S = range(_SECOND + 6, _SECOND + 9)
-_HALF_BACKLASH, _ORDER = range(_SECOND + 9, _SECOND + 11)
+_ORDER = _SECOND + 9
 # An elastic drive train without power: whether it is the drive's equation, its windup and constants, its response.
-_SPRINGS, _WINDUP, _SPRING, _COAST_LAG, _RELAXATION = range(_SECOND + 11, _SECOND + 16)
-_COAST = _SECOND + 16
+_SPRINGS, _WINDUP, _SPRING, _COAST_LAG, _RELAXATION = range(_SECOND + 10, _SECOND + 15)
+_COAST = _SECOND + 15
 _EVENTS = _COAST + WAY_SIZE
 _EVENT_COUNT = 11
 PLAN_SIZE = _EVENTS + _EVENT_COUNT
@@ -129,7 +131,7 @@ def _kink(plan: Floats, at: int) -> float:
 def _plan_servo(plan: Floats, servo: int, position: float, axle: float, aim: float, lag: float, rate: float) -> None:
     _plan_gap(plan, servo, abs(aim - position), lag, rate)
     plan[servo + _AIM], plan[servo + _DIRECTION], plan[servo + _AXLE] = aim, math.copysign(1.0, aim - position), axle
-    events, direction, half = _EVENTS + 4 * (servo > 0), plan[servo + _DIRECTION], plan[_HALF_BACKLASH]
+    events, direction, half = _EVENTS + 4 * (servo > 0), plan[servo + _DIRECTION], plan[servo + _HALF_BACKLASH]
     plan[events] = _kink(plan, servo)
     plan[events + 1] = plan[servo + _SETTLED_S]
     # The axle begins to follow; the axle passes the middle.
@@ -195,7 +197,11 @@ def _windup(plan: Floats, tau: float) -> float:
 @compiled(inner=True)
 def plan_command(plan: Floats, state: Floats, servos: Floats) -> None:
     """Compute the plan of servos and drive from their states `servos` to the aims in `state`."""
-    plan[_HALF_BACKLASH], plan[_ORDER] = 0.5 * state[BACKLASH], FIRST_ORDER
+    plan[_FRONT + _HALF_BACKLASH], plan[_REAR + _HALF_BACKLASH] = (
+        0.5 * state[FRONT_BACKLASH],
+        0.5 * state[REAR_BACKLASH],
+    )
+    plan[_ORDER] = FIRST_ORDER
     inert, ratio = state[STEERING_INERTIA] >= _LEAST_INERTIA_S, state[REAR_LAG_RATIO]
     if inert or state[STEERING_ACCELERATION] < math.inf:
         plan[_ORDER] = INERT if inert else LIMITED
@@ -212,8 +218,8 @@ def plan_command(plan: Floats, state: Floats, servos: Floats) -> None:
 
 
 @compiled(inner=True)
-def _follow(plan: Floats, axle: float, position: float) -> float:
-    half = plan[_HALF_BACKLASH]
+def _follow(plan: Floats, servo: int, axle: float, position: float) -> float:
+    half = plan[servo + _HALF_BACKLASH]
     return min(max(axle, position - half), position + half)
 
 
@@ -231,12 +237,12 @@ def _way_position(plan: Floats, servo: int, tau: float) -> float:
 def _way_axle(plan: Floats, servo: int, tau: float) -> float:
     """Return the position of the axle behind a servo of second order, with its reversals."""
     axle = plan[servo + _AXLE]
-    if plan[_HALF_BACKLASH] > 0.0:
+    if plan[servo + _HALF_BACKLASH] > 0.0:
         turns = plan[servo + TURNS_S]
         while turns < min(tau, plan[servo + SETTLED_S]):
-            axle = _follow(plan, axle, _way_position(plan, servo, turns))
+            axle = _follow(plan, servo, axle, _way_position(plan, servo, turns))
             turns += plan[servo + TURNS_EVERY_S]
-    return _follow(plan, axle, _way_position(plan, servo, tau))
+    return _follow(plan, servo, axle, _way_position(plan, servo, tau))
 
 
 @compiled(inner=True)
@@ -255,8 +261,8 @@ def _speed_any_order(plan: Floats, tau: float) -> float:
 @compiled(inner=True)
 def actuate(plan: Floats, tau: float, state: Floats) -> None:
     """Put the axles' angles and the drive's speed into `state`, `tau` seconds after the command took effect."""
-    state[FRONT] = _follow(plan, plan[_FRONT + _AXLE], _position(plan, _FRONT, tau))
-    state[REAR] = _follow(plan, plan[_REAR + _AXLE], _position(plan, _REAR, tau))
+    state[FRONT] = _follow(plan, _FRONT, plan[_FRONT + _AXLE], _position(plan, _FRONT, tau))
+    state[REAR] = _follow(plan, _REAR, plan[_REAR + _AXLE], _position(plan, _REAR, tau))
     state[SPEED] = _speed(plan, tau)
 
 
@@ -276,8 +282,8 @@ def leave_command(plan: Floats, tau: float, servos: Floats) -> None:
     servos[4], servos[8] = _speed_any_order(plan, tau), _windup(plan, tau)
     if plan[_ORDER] == FIRST_ORDER:
         servos[0], servos[1] = _position(plan, _FRONT, tau), _position(plan, _REAR, tau)
-        servos[2] = _follow(plan, plan[_FRONT + _AXLE], servos[0])
-        servos[3] = _follow(plan, plan[_REAR + _AXLE], servos[1])
+        servos[2] = _follow(plan, _FRONT, plan[_FRONT + _AXLE], servos[0])
+        servos[3] = _follow(plan, _REAR, plan[_REAR + _AXLE], servos[1])
         return
     servos[0], servos[1] = _way_position(plan, _FRONT, tau), _way_position(plan, _REAR, tau)
     servos[2], servos[3] = _way_axle(plan, _FRONT, tau), _way_axle(plan, _REAR, tau)
@@ -305,7 +311,7 @@ def _within_gap(plan: Floats, at: int, tau: float, longest: float) -> float:
 def _within_way(plan: Floats, servo: int, tau: float, longest: float) -> float:
     if tau >= plan[servo + SETTLED_S]:
         return longest
-    step = min(longest, _RAMP_STEP_S if plan[_HALF_BACKLASH] == 0.0 else _BACKLASH_STEP_S)
+    step = min(longest, _RAMP_STEP_S if plan[servo + _HALF_BACKLASH] == 0.0 else _BACKLASH_STEP_S)
     return max(_SHORTEST_S, longest_step(plan, servo, plan[_ORDER], tau, step))
 
 

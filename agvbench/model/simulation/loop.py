@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from agvbench.effects.state import (
     ACCELERATE_LAG,
     ACCELERATION_LIMIT,
-    BACKLASH,
     BRAKE_LAG,
     BRAKING_LIMIT,
     COAST_RELAXATION,
@@ -26,6 +25,7 @@ from agvbench.effects.state import (
     DRIVE_COMMAND,
     DRIVE_WAIT,
     FRONT_AIM,
+    FRONT_BACKLASH,
     FRONT_BEFORE,
     FRONT_COMMAND,
     FRONT_REVERSAL,
@@ -33,6 +33,7 @@ from agvbench.effects.state import (
     HOURS,
     KNOWN_FRONT,
     REAR_AIM,
+    REAR_BACKLASH,
     REAR_BEFORE,
     REAR_COMMAND,
     REAR_LAG_RATIO,
@@ -98,7 +99,8 @@ def _obey(
     s[FRONT_AIM], s[REAR_AIM], s[SPEED_AIM] = settled[front, 0], settled[rear, 1], settled[driven, 2]
     if settled[driven, 2] != 0.0:
         s[SPEED_AIM] += lift
-    s[STEERING_LAG], s[STEERING_RATE], s[BACKLASH], s[ACCELERATE_LAG], s[BRAKE_LAG] = 0.0, math.inf, 0.0, 0.0, 0.0
+    s[STEERING_LAG], s[STEERING_RATE], s[ACCELERATE_LAG], s[BRAKE_LAG] = 0.0, math.inf, 0.0, 0.0
+    s[FRONT_BACKLASH] = s[REAR_BACKLASH] = 0.0
     s[STEERING_INERTIA], s[STEERING_ACCELERATION], s[REAR_LAG_RATIO] = 0.0, math.inf, 1.0
     s[ACCELERATION_LIMIT] = s[BRAKING_LIMIT] = math.inf
     s[COAST_SPRING], s[COAST_RELAXATION] = 0.0, math.inf
