@@ -110,8 +110,9 @@ class SelectionCriteria:
     ``min_relative_change``
         Least change of the prediction by an effect, relative to the residual that remains with it. A smaller change is
         not noticeable, however significant.
-    ``best_group_share``
-        Share of the groups of runs with the largest gains, without which an effect must still gain.
+    ``trimmed_share``
+        Share of the groups of runs with the largest gains, and of those with the smallest, without which an effect must
+        still gain.
     ``wald_alpha``
         Level at which the parameters of an effect must differ from their null values, with errors clustered by group.
     ``camera_share``
@@ -124,7 +125,7 @@ class SelectionCriteria:
     min_gain: float = 12.0
     alternative_margin: float = 10.0
     min_relative_change: float = 0.15
-    best_group_share: float = 0.05
+    trimmed_share: float = 0.05
     wald_alpha: float = 1e-4
     camera_share: float = 0.1
     min_gain_of_initial_steering: float = 20.0
@@ -154,7 +155,8 @@ class DiscrepancyCriteria:
     ``max_refitted``
         Effects that are reconsidered beside a term in one step.
     ``few_groups_share``
-        An effect that gains nothing without this share of the groups rests on few of them. A term may take its place.
+        An effect of which this share of the groups makes up more than half of the gain rests on few of them. A term may
+        take its place.
     ``min_share_of_effects``
         A term takes the place of effects, or of one of them, only if it gains this share of what they gain without it.
     """
@@ -226,9 +228,9 @@ DATA = DataCriteria()
 MAPS = MapCriteria()
 FIT = FitCriteria()
 SELECTION = SelectionCriteria()
-FREE_DRIVING = SelectionCriteria(min_relative_change=0.3, best_group_share=0.0)
+FREE_DRIVING = SelectionCriteria(min_relative_change=0.3, trimmed_share=0.0)
 """Criteria for windows of free driving. Their residuals are mostly systematic, so that a small change of the prediction
-is no evidence; blocks of fast driving may be few, so that only the block with the largest gain is excluded."""
+is no evidence; blocks of fast driving may be few, so that only one block is left out at each end."""
 
 VARIANT = VariantCriteria()
 DISCREPANCY = DiscrepancyCriteria()

@@ -104,9 +104,9 @@ PARTS: dict[str, Part] = {
     "a noticeable change of the prediction": Part(
         f"{_SELECTION}stepwise", "Selector._changes_prediction", lambda *_: True, _is_false
     ),
-    "a gain without the best groups of runs": Part(
+    "a gain without the extreme groups of runs": Part(
         f"{_SELECTION}stepwise",
-        "without_best_groups",
+        "trimmed_gain",
         lambda gain, *_: float(np.sum(gain)),
         lambda found, gain, *_: found <= 0.0 < float(np.sum(gain)),
     ),

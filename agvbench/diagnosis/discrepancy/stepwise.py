@@ -11,7 +11,7 @@ from agvbench.diagnosis.criteria import DISCREPANCY, FIT
 from agvbench.diagnosis.discrepancy.campaign_time import complement, is_constant
 from agvbench.diagnosis.discrepancy.regression import steering_tangents
 from agvbench.diagnosis.discrepancy.screening import Start, screen
-from agvbench.diagnosis.estimation.cross_validation import without_best_groups
+from agvbench.diagnosis.estimation.cross_validation import by_group
 from agvbench.diagnosis.residuals.body_rates import residual_rates
 from agvbench.diagnosis.selection.candidates import candidate
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
@@ -239,8 +239,9 @@ def _depends_on_few_groups(selector: Selector, selection: Selection, name: str) 
     without = selection.base if names == selection.base.names else selector.known(names)
     if without is None:
         return False
-    gain, group = without.loss - chosen.loss, selector.batch.readings.group
-    return without_best_groups(gain, group, DISCREPANCY.few_groups_share) < 0.5 * float(gain.sum())
+    gains = np.sort(by_group(without.loss - chosen.loss, selector.batch.readings.group))
+    few = max(1, round(DISCREPANCY.few_groups_share * len(gains)))
+    return float(gains[-few:].sum()) > 0.5 * float(gains.sum())
 
 
 def _term_in_place_of_effect(

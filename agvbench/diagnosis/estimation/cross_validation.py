@@ -78,15 +78,20 @@ def _cross_validated_windows(fitted: Fit, fold: NDArray[np.int64], bounds: Float
     return loss
 
 
-def without_best_groups(gain: Floats, group: NDArray[np.int64], share: float = SELECTION.best_group_share) -> float:
-    """Return the total of `gain` (R,) without the `share` of groups with the largest gain, at least one group.
+def trimmed_gain(gain: Floats, group: NDArray[np.int64], share: float = SELECTION.trimmed_share) -> float:
+    """Return the total of `gain` (R,) without the `share` of groups with the largest gain and that with the smallest.
 
-    A true cause improves the prediction of all groups on which it acts. A gain in a single group is an artefact of
-    that group.
+    At least one group is left out at each end. A true cause improves the prediction of all groups on which it acts,
+    whereas a gain in a single group is an artefact of that group. So may be a loss in a single group: its nodal values
+    then compensate for a cause that is still missing. The mean trimmed at both ends is a robust estimate of location;
+    trimmed at the upper end alone it is biased towards a loss (Wilcox, Introduction to Robust Estimation and Hypothesis
+    Testing, 2012, section 3.3).
+
+    With fewer than three groups the result is 0.
     """
-    gains = by_group(gain, group)
-    best = np.sort(gains)[::-1][: max(1, round(share * len(gains)))]
-    return float(gains.sum() - best.sum())
+    gains = np.sort(by_group(gain, group))
+    out = max(1, round(share * len(gains)))
+    return float(gains[out:-out].sum())
 
 
 def clustered_covariance(fitted: Fit, group: NDArray[np.int64]) -> Floats:

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from agvbench.diagnosis.criteria import SELECTION, SelectionCriteria
-from agvbench.diagnosis.estimation.cross_validation import differs_from_null, without_best_groups
+from agvbench.diagnosis.estimation.cross_validation import differs_from_null, trimmed_gain
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.residuals.residuals import pose_residuals
 from agvbench.diagnosis.selection.fitted_models import FittedModels, ScoredModel
@@ -82,7 +82,7 @@ class Selector(FittedModels):
         by_maps = without.fit.prior.loss - with_it.fit.prior.loss
         return bool(
             with_it.gain_over(without) > self.min_gain
-            and by_maps + without_best_groups(gain, group, self.criteria.best_group_share) > 0.0
+            and by_maps + trimmed_gain(gain, group, self.criteria.trimmed_share) > 0.0
             and (of_group or self._changes_prediction(without, with_it))
             and all(differs_from_null(with_it.fit, name, group) for name in set(with_it.names) - set(without.names))
         )
