@@ -13,6 +13,7 @@ from agvbench.diagnosis.discrepancy.campaign_time import columns_by_campaign_tim
 from agvbench.diagnosis.discrepancy.regression import steering_tangents
 from agvbench.diagnosis.discrepancy.stability import stability_test
 from agvbench.diagnosis.findings.corrected_vehicle import corrected_vehicle
+from agvbench.diagnosis.findings.effect_states import effect_states
 from agvbench.diagnosis.findings.estimates import named_effects
 from agvbench.diagnosis.findings.map_structure import map_effects
 from agvbench.diagnosis.findings.residual_table import with_residuals
@@ -90,6 +91,7 @@ def conclude(
         | {"lack_of_fit_p_value": tested.lack_of_fit}
         | {"lack_of_fit_runs": {"tested": int(split.test.sum()), "repeats": int(np.sum(~split.training))}}
         | ({"empirical_term": term_entry(term_selection)} if term_selection else {}),
+        states=effect_states(fit, effects),
     )
     found = with_residuals(found, readings, split.test, before, poses)
     if term_selection or has_variants:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from agvbench.diagnosis.result import Diagnosis
 
 _EFFECTS = ("effect", "parameter", "value", "stderr", "unit", "confounded_with")
+_STATES = ("effect", "state", "parameter", "lower_bound", "upper_bound", "unit", "indistinguishable_from")
 _ERRORS = ("quantity", "before", "after", "floor", "reproducibility")
 
 
@@ -25,6 +26,21 @@ def effects_frame(found: Diagnosis) -> pd.DataFrame:
         for name, estimate in effect.parameters.items()
     ]
     return pd.DataFrame(rows, columns=list(_EFFECTS))
+
+
+def states_frame(found: Diagnosis) -> pd.DataFrame:
+    """Return one row per effect, and per bounded parameter of absent ones; see `Diagnosis.states_frame`."""
+    import pandas as pd
+
+    rows = []
+    for name, effect in found.states.items():
+        others = ", ".join(effect.indistinguishable_from)
+        for parameter, bound in effect.bounds.items():
+            low, high = (bound.value, None) if bound.is_limit else (None, bound.value)
+            rows.append((name, str(effect.state), parameter, low, high, bound.unit, others))
+        if not effect.bounds:
+            rows.append((name, str(effect.state), "", None, None, "", others))
+    return pd.DataFrame(rows, columns=list(_STATES)).astype({"lower_bound": float, "upper_bound": float})
 
 
 def errors_frame(found: Diagnosis) -> pd.DataFrame:

@@ -56,6 +56,38 @@ class NamedEffect:
     evidence: Mapping[str, float | str]
 
 
+class State(StrEnum):
+    """The state of an effect in a campaign."""
+
+    PRESENT = "present"
+    ABSENT = "absent"
+    NOT_IDENTIFIABLE = "not_identifiable"
+
+
+@dataclass(frozen=True)
+class Bound:
+    """The largest value in magnitude, or the smallest of a limit, that the runs leave possible (95 %), in ``unit``."""
+
+    value: float
+    unit: str
+    is_limit: bool = False
+
+
+@dataclass(frozen=True)
+class EffectState:
+    """The state of one effect of the library.
+
+    ``bounds``: of an absent effect, by parameter; a parameter that the runs do not determine has none.
+    ``indistinguishable_from``: effects that were selected and that it could replace. ``why``: the reason if it is not
+    identifiable.
+    """
+
+    state: State
+    bounds: Mapping[str, Bound] = field(default_factory=dict)
+    indistinguishable_from: tuple[str, ...] = ()
+    why: str = ""
+
+
 @dataclass(frozen=True)
 class HeldOut:
     """Errors in the test runs: by quantity (``end_position_mm`` …) ``before``, ``after``, and the spread of repeats.
@@ -78,8 +110,8 @@ class Diagnosis:
     residual; ``significant``: whether the residual shows structure. ``held_out``: errors in the test runs, None if
     nothing could be predicted. ``model``: the vehicle with refitted maps and the selected effects. ``rejected``: gains
     of effects that do not meet the criterion. ``provenance``. ``next_experiment``: the run that discriminates
-    alternatives or identifies parameters, or None. ``residuals``: the table of
-    `agvbench.diagnosis.findings.residual_table`, for figures.
+    alternatives or identifies parameters, or None. ``states``: the state of each effect of the library.
+    ``residuals``: the table of `agvbench.diagnosis.findings.residual_table`, for figures.
     """
 
     verdict: Verdict
@@ -92,6 +124,7 @@ class Diagnosis:
     rejected: Mapping[str, float] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     next_experiment: NextExperiment | None = None
+    states: Mapping[str, EffectState] = field(default_factory=dict)
     residuals: pd.DataFrame | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -108,6 +141,16 @@ class Diagnosis:
         from agvbench.diagnosis.notebook import effects_frame
 
         return effects_frame(self)
+
+    def states_frame(self) -> pd.DataFrame:
+        """Return one row per effect of the library, and per bounded parameter of those that are absent.
+
+        Columns: ``effect``, ``state``, ``parameter``, ``lower_bound``, ``upper_bound`` (95 %, of the magnitude) in
+        ``unit``, ``indistinguishable_from`` (names, with commas between).
+        """
+        from agvbench.diagnosis.notebook import states_frame
+
+        return states_frame(self)
 
     def errors_frame(self) -> pd.DataFrame:
         """Return one row per quantity, predicted for the test runs; without any where nothing could be predicted.
@@ -146,6 +189,7 @@ class Diagnosis:
                 "worse_on": list(self.held_out.worse_on) if self.held_out else [],
             },
             "next_experiment": None if self.next_experiment is None else self.next_experiment.to_table(),
+            "states": {name: _state(state) for name, state in self.states.items()},
             "provenance": {"why": self.why, **self.provenance, "rejected": dict(self.rejected)},
         }
         return dict(_finite(content))
@@ -165,6 +209,19 @@ def _effect(effect: NamedEffect) -> dict[str, Any]:
         "confounded_with": list(effect.confounded_with),
         "evidence": dict(effect.evidence),
         "remedy": effect_kinds()[effect.name].remedy if effect.name in effect_kinds() else "",
+    }
+
+
+def _state(effect: EffectState) -> dict[str, Any]:
+    bounds: dict[str, dict[str, Any]] = {}
+    for name, bound in effect.bounds.items():
+        side = "lower_bound" if bound.is_limit else "upper_bound"
+        bounds.setdefault(side, {})[name] = {"value": bound.value, "unit": bound.unit}
+    return {
+        "state": str(effect.state),
+        **bounds,
+        **({"indistinguishable_from": list(effect.indistinguishable_from)} if effect.indistinguishable_from else {}),
+        **({"why": effect.why} if effect.why else {}),
     }
 
 

@@ -15,9 +15,7 @@ from agvbench.workflows.output_files import write_file
 if TYPE_CHECKING:
     import pandas as pd
 
-    from agvbench.diagnosis import Diagnosis
-if TYPE_CHECKING:
-    from agvbench.diagnosis import NamedEffect
+    from agvbench.diagnosis import Diagnosis, NamedEffect
 
 JSON, RESIDUALS = "diagnosis.json", "residuals.parquet"
 _NUMBERS = (
@@ -147,6 +145,22 @@ def remedies_in_words(content: Mapping[str, Any]) -> Iterator[str]:
     for effect in map(mapping, items(content.get("effects"))):
         if remedy := effect.get("remedy"):
             yield f"Remedy of {effect.get('name')}: {remedy}."
+
+
+def states_in_words(content: Mapping[str, Any]) -> Iterator[str]:
+    """Yield how many effects of the library are absent."""
+    states = [mapping(state).get("state") for state in mapping(content.get("states")).values()]
+    if absent := states.count("absent"):
+        yield f"Absent: {absent} of {len(states)} effects; their 95 % bounds are in the report and the JSON (states)."
+
+
+def bounds_in_words(state: Mapping[str, Any]) -> str:
+    """Return the bounds of an absent effect: ``width_rad ≤ 0.006 rad``; of a limit, ``rate_rad_per_s ≥ 6 rad/s``."""
+    return ", ".join(
+        f"{name} {sign} {number(mapping(bound).get('value')):.2g} {mapping(bound).get('unit', '')}".removesuffix(" –")
+        for key, sign in (("upper_bound", "≤"), ("lower_bound", "≥"))
+        for name, bound in mapping(state.get(key)).items()
+    )
 
 
 def next_in_words(content: Mapping[str, Any]) -> Iterator[str]:

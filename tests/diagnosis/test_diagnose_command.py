@@ -34,7 +34,7 @@ def test_json_and_vehicle_of_a_whole_command(adequate, tmp_path, capsys):
     assert content["schema"] == 1
     assert content["verdict"] == "ADEQUATE"
     assert set(content) == {
-        "schema", "verdict", "effects", "unexplained", "held_out", "next_experiment", "provenance"
+        "schema", "verdict", "effects", "unexplained", "held_out", "next_experiment", "states", "provenance"
     }  # fmt: skip
     assert content["unexplained"] == {"significant": False, "depends_on": []}
     end_pose = ["end_position_mm", "end_position_median_mm", "along_mm", "across_mm", "delta_heading_deg", "delta_s_mm"]

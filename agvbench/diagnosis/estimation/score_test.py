@@ -1,11 +1,13 @@
-"""Score test: the predicted gain of a larger model, to first order, from some simulations in place of a fit."""
+"""Score test: gain and estimate of one more effect, predicted to first order from some simulations without a fit."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from agvbench.diagnosis.estimation.cross_validation import by_group
 from agvbench.diagnosis.estimation.fit import Fit
-from agvbench.diagnosis.estimation.likelihood import residual_of, ridge, terms_of
+from agvbench.diagnosis.estimation.likelihood import Terms, residual_of, ridge, terms_of
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.effects import effect_kinds
 from agvbench.types import Floats
@@ -38,9 +40,7 @@ def first_order_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floa
         prior = larger.batch.smoothness.terms(parameters[: len(fitted.parameters)])
         gain = fitted.linearisation_point.predicted_gain(residual, slopes, start, bounds, prior.gradient)
         return gain + fitted.prior.loss - prior.loss
-    terms = terms_of(
-        larger, residual, fitted.linear.with_last(slopes), fitted.random_effects, fitted.variance_components
-    )
+    terms = _terms(fitted, larger, residual, slopes)
     gradient, matrix = terms.gradient.sum(axis=0), terms.information.total + ridge(larger)
     move = np.linalg.lstsq(matrix, gradient, rcond=1e-12)[0]
     # Parameters beyond a bound are set to it, and the others are solved for again.
@@ -52,3 +52,37 @@ def first_order_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floa
         move = np.r_[rest, clipped - start]
     saved = 2.0 * gradient @ move - move @ matrix @ move
     return float(fitted.loss.sum() - terms.loss.sum() + saved)
+
+
+def one_step_estimate(
+    fitted: Fit, larger: Predictor, start: Floats, free: NDArray[np.bool_], group: NDArray[np.int64]
+) -> tuple[Floats, Floats]:
+    """Return estimates (q,) of the last effect's parameters and their standard errors (q,), without a fit.
+
+    The estimate is one Newton step from `start` (q,), with all other parameters refitted; parameters that are not
+    `free` (q,) keep their start, and have a standard error of zero. A standard error is the larger of those of the
+    likelihood and of the sandwich estimator with groups of runs (R,) as clusters (Liang and Zeger 1986).
+    """
+    parameters = initial_parameters(fitted, larger, start)
+    poses, slopes = larger.by_last(parameters, fitted.random_effects, len(start))
+    terms = _terms(fitted, larger, residual_of(larger, poses), slopes)
+    known = len(fitted.parameters)
+    matrix, gradient = terms.information.total + ridge(larger), terms.gradient.sum(axis=0)
+    if larger.readings.initial_states is None:
+        prior = larger.batch.smoothness.terms(parameters[:known])
+        matrix[:known, :known] += prior.information
+        gradient[:known] += prior.gradient
+    at = np.flatnonzero(np.r_[np.ones(known, dtype=np.bool_), free])
+    own = np.linalg.pinv(matrix[np.ix_(at, at)], hermitian=True)
+    scores = by_group(terms.gradient, group)[:, at]
+    robust = own @ (scores.T @ scores) @ own * len(scores) / max(len(scores) - 1, 1)
+    estimate, stderr = start.astype(np.float64), np.zeros(len(start))
+    estimate[free] += (own @ gradient[at])[known:]
+    stderr[free] = np.sqrt(np.maximum(np.diagonal(own), np.diagonal(robust)))[known:]
+    return estimate, stderr
+
+
+def _terms(fitted: Fit, larger: Predictor, residual: Floats, slopes: Floats) -> Terms:
+    """Return the likelihood of residuals (R, K, 3) with `slopes` (R, K, 3, q) beside the derivatives of `fitted`."""
+    linear = fitted.linear.with_last(slopes)
+    return terms_of(larger, residual, linear, fitted.random_effects, fitted.variance_components)

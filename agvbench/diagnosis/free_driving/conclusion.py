@@ -14,6 +14,7 @@ from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.data.windows import SUPPORT_S, Horizon
 from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.findings.corrected_vehicle import corrected_vehicle
+from agvbench.diagnosis.findings.effect_states import effect_states
 from agvbench.diagnosis.findings.estimates import named_effects
 from agvbench.diagnosis.free_driving.errors import QUANTITIES, by_recording, repeatability_squares, rms, squares
 from agvbench.diagnosis.free_driving.predictors import change_by_speed_error, constant_velocity, prior_model, speed_held
@@ -78,6 +79,7 @@ class WindowConclusion:
             corrected_vehicle(context.header, context.geometry, chosen.fit, chosen.fit.predictor.maps, context.seed),
             self.selection.rejected,
             context.provenance(self.readings) | self._fit_provenance(horizon, predicted, perturbed),
+            states=effect_states(chosen.fit, effects),
         )
 
     def _fit_provenance(self, horizon: Horizon, predicted: dict[str, Floats], perturbed: Floats) -> dict[str, object]:

@@ -23,6 +23,7 @@ from agvbench.workflows.diagnosis_files import (
     left_in_words,
     next_in_words,
     remedies_in_words,
+    states_in_words,
 )
 
 _MOST_DEPENDENCES = 5
@@ -45,7 +46,7 @@ def print_diagnosis(found: Diagnosis, console: Console) -> None:
             console.print(windows_table(windows))
         if found.held_out.worse_on:
             _say([f"Worse than before on: {', '.join(found.held_out.worse_on)}."], console)
-    _say((*remedies_in_words(content), *next_in_words(content)), console)
+    _say((*states_in_words(content), *remedies_in_words(content), *next_in_words(content)), console)
 
 
 def _say(lines: Iterable[str], console: Console) -> None:

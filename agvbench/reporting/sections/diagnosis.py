@@ -31,6 +31,7 @@ from agvbench.workflows.diagnosis_files import (
     DEFINITIONS,
     QUANTITIES,
     ShownDiagnosis,
+    bounds_in_words,
     fit_in_words,
     items,
     left_in_words,
@@ -91,7 +92,7 @@ def diagnosis_blocks(shown: ShownDiagnosis) -> list[Block]:
     provenance = mapping(content.get("provenance"))
     verdict = plain_sentences(f"{content.get('verdict')}: {provenance.get('why', '')}")
     blocks: list[Block] = [Paragraph(verdict, lead=True)]
-    blocks += [table for table in (_effects(content), _errors(content)) if table.rows]
+    blocks += [table for table in (_effects(content), _errors(content), _states(content)) if table.rows]
     said = (
         *left_in_words(content), *fit_in_words(content), *remedies_in_words(content), *next_in_words(content),
         *shown.problems,
@@ -116,6 +117,18 @@ def _effects(content: Mapping[str, Any]) -> Table:
             rows.append([str(effect.get("name")), str(name), f"{value} ± {stderr}", str(e.get("unit", "")), others])
     columns = ("effect", "parameter", "estimate", "unit", "or instead")
     return Table("effects", "Effects found.", [Column(c.replace(" ", "_"), c) for c in columns], rows)
+
+
+def _states(content: Mapping[str, Any]) -> Table:
+    rows: list[list[Value]] = []
+    for name, value in mapping(content.get("states")).items():
+        state = mapping(value)
+        others = ", ".join(map(str, items(state.get("indistinguishable_from"))))
+        reason = f"not distinguishable from {others}" if others else str(state.get("why", ""))
+        if state.get("state") != "present":
+            rows.append([str(name), str(state.get("state")).replace("_", " "), bounds_in_words(state) or reason])
+    columns = [Column("effect", "effect"), Column("state", "state"), Column("bound", "95 % bound, or reason")]
+    return Table("states", "Effects of the library that were not selected.", columns, rows)
 
 
 def _errors(content: Mapping[str, Any]) -> Table:

@@ -1,0 +1,101 @@
+"""The state of every effect of the library: present, absent with a bound, or not identifiable.
+
+A selection states which effects a model needs, not how large the others may be. An effect that these runs cannot show
+is another answer than one that they exclude, and decides whether a laboratory repairs something or drives other runs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agvbench.diagnosis.criteria import SELECTION
+from agvbench.diagnosis.estimation.fit import Fit
+from agvbench.diagnosis.estimation.score_test import first_order_gain, one_step_estimate
+from agvbench.diagnosis.model.predictor import Predictor
+from agvbench.diagnosis.result import Bound, EffectState, NamedEffect, State
+from agvbench.diagnosis.selection.candidates import ABSORBED_BY_MAPS, candidates
+from agvbench.effects import Effect, effect_kinds
+from agvbench.effects.variants import cause_of
+from agvbench.types import Floats
+
+_NORMAL_95 = 1.96
+_ABSORBED = "the maps absorb it: without a nominal vehicle.toml it is calibration"
+_FLAT = "no run shows it: its standard error exceeds its usual size"
+_NEVER_REACHED = "no run comes near a limit of this size"
+_LIMIT_SIZES = np.geomspace(0.03, 3.0, 7)
+
+
+def effect_states(chosen: Fit, effects: Iterable[NamedEffect]) -> dict[str, EffectState]:
+    """Return the state of each effect of the library that applies to the vehicle, by name.
+
+    Absent effects are estimated by one Newton step beside the chosen model, with maps, other effects and random effects
+    refitted. The bound of a parameter is the far end of its 95 % interval. It holds for the chosen model: if structure
+    remains in the residual, it holds as far as that structure does not resemble the effect.
+    """
+    named = {effect.name: effect for effect in effects}
+    readings, geometry = chosen.predictor.readings, chosen.predictor.batch.geometry
+    given = {cause_of(name) for name in chosen.predictor.effects}
+    states = {name: EffectState(State.PRESENT) for name in (*named, *(given & effect_kinds().keys()))}
+    kinds = {name: effect_kinds()[name] for name in candidates(geometry)}
+    for name, kind in kinds.items():
+        if name in states:
+            continue
+        replaced = tuple(sorted(effect.name for effect in named.values() if name in effect.confounded_with))
+        if replaced:
+            states[name] = EffectState(State.NOT_IDENTIFIABLE, indistinguishable_from=replaced)
+        else:
+            states[name] = _absent(kind, _bounds(chosen, kind, readings.group))
+    absorbed = {name: EffectState(State.NOT_IDENTIFIABLE, why=_ABSORBED) for name in ABSORBED_BY_MAPS - states.keys()}
+    return dict(sorted((states | absorbed).items()))
+
+
+def _absent(kind: type[Effect], bounds: Mapping[str, Bound]) -> EffectState:
+    if bounds:
+        return EffectState(State.ABSENT, bounds)
+    is_limit = any(math.isinf(p.null) for p in kind.parameters())
+    return EffectState(State.NOT_IDENTIFIABLE, why=_NEVER_REACHED if is_limit else _FLAT)
+
+
+def _bounds(chosen: Fit, kind: type[Effect], group: NDArray[np.int64]) -> dict[str, Bound]:
+    """Return the bound of each parameter that the runs determine, by name."""
+    larger = Predictor(chosen.predictor.batch, (*chosen.predictor.effects, kind.name))
+    if any(math.isinf(p.null) for p in kind.parameters()):
+        return _bounds_of_limits(chosen, larger, kind)
+    parameters = kind.parameters()
+    free = np.array([not p.is_direction for p in parameters])
+    estimates = [one_step_estimate(chosen, larger, start, free, group) for start in _small_starts(kind)]
+    found = {}
+    for k in np.flatnonzero(free):
+        p = parameters[k]
+        # The direction of an absent effect is unknown: the bound holds in every direction.
+        if all(stderr[k] <= p.scale for _, stderr in estimates):
+            most = max(abs(estimate[k] - p.null) + _NORMAL_95 * stderr[k] for estimate, stderr in estimates)
+            found[p.name] = Bound(float(most), p.unit)
+    return found
+
+
+def _small_starts(kind: type[Effect]) -> list[Floats]:
+    """Return the initial values (q,) near null about which an effect is linearised: one for each direction."""
+    small = [0.0 if p.is_direction else p.null + 0.1 * p.scale for p in kind.parameters()]
+    directions = (0.0, 0.5 * math.pi, math.pi, -0.5 * math.pi)
+    at = [k for k, p in enumerate(kind.parameters()) if p.is_direction]
+    starts = [np.array(small) for _ in (directions if at else directions[:1])]
+    for start, direction in zip(starts, directions, strict=False):
+        start[at] = direction
+    return starts
+
+
+def _bounds_of_limits(chosen: Fit, larger: Predictor, kind: type[Effect]) -> dict[str, Bound]:
+    """Return the smallest limits that the runs leave possible: smaller ones would be predicted clearly worse."""
+    scale = np.array([p.scale for p in kind.parameters()])
+    excluded = 0.0
+    for size in _LIMIT_SIZES:
+        start = size * scale
+        if first_order_gain(chosen, larger, start, np.column_stack([start, start])) > -SELECTION.alternative_margin:
+            break
+        excluded = float(size)
+    return {p.name: Bound(excluded * p.scale, p.unit, is_limit=True) for p in kind.parameters()} if excluded else {}
