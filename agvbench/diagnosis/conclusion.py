@@ -25,6 +25,7 @@ from agvbench.diagnosis.residuals.periodic import periodic_disturbance
 from agvbench.diagnosis.residuals.residuals import MEDIAN, end_covariance
 from agvbench.diagnosis.result import Diagnosis, HeldOut, NamedEffect, Verdict
 from agvbench.diagnosis.selection.candidates import bounds_of
+from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection
 from agvbench.diagnosis.selection.validation import Assessment, assess, predictor_for
 from agvbench.diagnosis.selection.with_term import TermSelection, term_entry, with_term_first
@@ -32,6 +33,7 @@ from agvbench.effects.variants import effect_variants
 from agvbench.model import VehicleModel
 from agvbench.types import Floats
 
+_FOUND_AXLE = '; the {0} axle alone drives the vehicle: declare driven = "{0}" in campaign.toml and vehicle.toml'
 _REMAINS = "structure remains that no effect explains: "
 
 
@@ -41,6 +43,7 @@ def conclude(
     split: Split,
     library: Selection,
     term_selection: TermSelection | None,
+    static: ScoredModel | None,
     searched: int,
 ) -> Diagnosis:
     """Return the diagnosis; the test runs are opened here, and nothing is selected afterwards.
@@ -53,6 +56,8 @@ def conclude(
         Training, validation and test runs.
     library, term_selection
         The selection from the library, and the one with a discrepancy term if there is one.
+    static
+        The maps without effects and with both axles driven, if the selection has one driven axle.
     searched
         Number of runs used in the selection.
     """
@@ -60,7 +65,10 @@ def conclude(
     fit = selection.chosen.fit
     every = predictor_for(library, term_selection, readings)
     batch, has_variants = every.batch, bool(effect_variants().keys() & set(selection.chosen.names))
-    poses, before = every.predict(fit.parameters), _predicted_before(context.vehicle, batch, selection)
+    poses, before = (
+        every.predict(fit.parameters),
+        _predicted_before(context.vehicle, readings, static or selection.base),
+    )
     covariance = end_covariance(every, fit)
     # The validation runs influenced the selection, and are not tested; the repeatability depends on no selection.
     tested = assess(readings, split.test, before, poses, covariance, repeats=~split.training)
@@ -73,6 +81,8 @@ def conclude(
     effects = named_effects(selection, bounds_of(selection.chosen.names)) + map_effects(fit, context.vehicle)
     significant = term_selection is not None or tested.has_lack_of_fit or bool(rest)
     verdict, why = _verdict(effects, significant, rest, term_selection)
+    if static is not None:
+        why += _FOUND_AXLE.format(batch.geometry.driven)
     if significant and not rest and likely:
         rest, why = likely, f"{_REMAINS}it is likely to depend on {likely[0].covariate}"
     found = Diagnosis(
@@ -90,6 +100,7 @@ def conclude(
         | {"validation_runs": int(split.validation.sum())}
         | {"lack_of_fit_p_value": tested.lack_of_fit}
         | {"lack_of_fit_runs": {"tested": int(split.test.sum()), "repeats": int(np.sum(~split.training))}}
+        | ({"driven_axle": batch.geometry.driven} if static is not None else {})
         | ({"empirical_term": term_entry(term_selection)} if term_selection else {}),
         states=effect_states(fit, effects),
     )
@@ -99,11 +110,12 @@ def conclude(
     return with_next_experiment(found, selection, readings, context.header, context.seed)
 
 
-def _predicted_before(vehicle: VehicleModel | None, batch: Batch, selection: Selection) -> Floats:
+def _predicted_before(vehicle: VehicleModel | None, readings: Readings, static: ScoredModel) -> Floats:
     """Return the poses that the nominal vehicle predicts; without one, those of the static maps."""
     if vehicle is None:
-        return Predictor(batch, selection.base.names).predict(selection.base.fit.parameters)
-    readings = batch.readings
+        fitted = static.fit.predictor.batch
+        batch = Batch(readings, fitted.maps, fitted.geometry, kinds=fitted.kinds)
+        return Predictor(batch, static.names).predict(static.fit.parameters)
     return np.array(vehicle.rollout([run.commands for run in readings.runs], readings.start, list(readings.t_s)))
 
 

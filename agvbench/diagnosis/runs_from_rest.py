@@ -23,6 +23,8 @@ from agvbench.diagnosis.model.nodal_maps import ROLES, NodalMaps, nodal_maps, st
 from agvbench.diagnosis.result import Diagnosis
 from agvbench.diagnosis.selection.actuators import prefer_actuators, separate_lag_from_delay
 from agvbench.diagnosis.selection.candidates import given_effects
+from agvbench.diagnosis.selection.driven_axle import UNDECLARED, better_driven_axle
+from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.initial_steering import choose_initial_steering, reconsider_initial_steering
 from agvbench.diagnosis.selection.sequential_replacement import replace_sequentially
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
@@ -33,16 +35,20 @@ from agvbench.diagnosis.selection.with_term import TermSelection
 from agvbench.errors import FitError
 from agvbench.model import nominal_model
 from agvbench.types import Floats, Run
-from agvbench.vehicle.geometry import Geometry
+from agvbench.vehicle.geometry import Driven, Geometry
 
 
 @dataclass(frozen=True)
 class SelectedFromRest:
-    """The selection from the library, that with a discrepancy term if there is one, and its selector."""
+    """The selection from the library, that with a discrepancy term if there is one, and its selector.
+
+    ``static`` are the maps without effects and with both axles driven, if the selection has one driven axle.
+    """
 
     library: Selection
     with_term: TermSelection | None
     selector: Selector
+    static: ScoredModel | None = None
 
 
 class RunsFromRest(Method[SelectedFromRest]):
@@ -70,22 +76,45 @@ class RunsFromRest(Method[SelectedFromRest]):
         fitted, validation = readings.select(split.training), int(split.validation.sum())
         self.on_progress(f"{len(fitted)} training runs, {validation} validation runs, {split.test.sum()} test runs")
         searched = fitted.select(subsample_repeats(fitted.group, DATA.max_selection_runs))
-        selector = self.selector(searched)
-        chosen, selector = reconsider_initial_steering(selector.select(), selector)
-        library, selector = select_variants_and_reconsider(chosen, selector)
-        library = separate_lag_from_delay(prefer_actuators(library, selector), selector)
-        if library.gains:
-            library = replace_sequentially(library, selector)
+        library, selector = self._selected_effects(self.selector(searched))
+        static = None
+        if axle := self._undeclared_axle(library, selector, searched):
+            self.on_progress(f"driven by the {axle} axle: predicts better")
+            static = library.base
+            library, selector = self._selected_effects(self._under(axle).selector(searched))
         library, with_term, selector = add_term_and_reconsider(library, selector)
         if len(searched) < len(fitted):
             self.on_progress(f"effects were selected in {len(searched)} runs; they are refitted to all {len(fitted)}")
-        return self._refitted_and_validated(SelectedFromRest(library, with_term, selector), readings, split)
+        return self._refitted_and_validated(SelectedFromRest(library, with_term, selector, static), readings, split)
+
+    @staticmethod
+    def _selected_effects(selector: Selector) -> tuple[Selection, Selector]:
+        """Return the effects of the library with their variants, and the selector with their initial steering."""
+        chosen, selector = reconsider_initial_steering(selector.select(), selector)
+        library, selector = select_variants_and_reconsider(chosen, selector)
+        library = separate_lag_from_delay(prefer_actuators(library, selector), selector)
+        return (replace_sequentially(library, selector) if library.gains else library), selector
+
+    def _under(self, axle: Driven) -> RunsFromRest:
+        """Return this method for a vehicle that one axle drives."""
+        geometry = replace(self.context.geometry, driven=axle)
+        return RunsFromRest(replace(self.context, geometry=geometry), self.on_progress)
+
+    def _undeclared_axle(self, library: Selection, selector: Selector, readings: Readings) -> Driven | None:
+        """Return the axle that alone drives the vehicle, if no file declares it and the runs show it."""
+        if self.context.geometry.driven != UNDECLARED or self.context.vehicle is not None:
+            return None
+        preset = replace(readings, preset=selector.batch.readings.preset)
+        return better_driven_axle(library, selector, lambda axle: self._under(axle).selector_of(preset))
 
     def conclude(self, readings: Readings, split: Split, selected: SelectedFromRest) -> Diagnosis:
         """Open the test runs, and return the diagnosis."""
         batch = selected.selector.batch
         readings = replace(readings, preset=batch.readings.preset)
-        return conclude(self.context, readings, split, selected.library, selected.with_term, len(batch.readings))
+        context = replace(self.context, geometry=batch.geometry)
+        return conclude(
+            context, readings, split, selected.library, selected.with_term, selected.static, len(batch.readings)
+        )
 
     def _refitted_and_validated(self, selected: SelectedFromRest, readings: Readings, split: Split) -> SelectedFromRest:
         """Return the selection refitted to all training runs, or the maps alone if validation rejects it."""
@@ -94,10 +123,14 @@ class RunsFromRest(Method[SelectedFromRest]):
         if len(selector.batch.readings) < len(fitted):
             library, with_term = refit_to_all(library, with_term, selector, fitted)
         library, with_term = validated(library, with_term, readings.select(split.validation), self.on_progress)
-        return SelectedFromRest(library, with_term, selector)
+        return replace(selected, library=library, with_term=with_term)
 
     def selector(self, readings: Readings) -> Selector:
         """Return the selector for these runs, with the better of both initial states of the steering."""
+        return choose_initial_steering(self.selector_of(readings))
+
+    def selector_of(self, readings: Readings) -> Selector:
+        """Return the selector for these runs, with the initial state of the steering that they state."""
         context = self.context
         maps = nodal_maps(readings.runs, context.header.neutral)
         measured = _measurements(readings.runs, context.geometry, context.header.neutral)
@@ -105,7 +138,7 @@ class RunsFromRest(Method[SelectedFromRest]):
         tried, kinds = candidates_for(context.vehicle, context.geometry)
         batch = Batch(readings, maps, context.geometry, kinds=kinds)
         given = given_effects(context.vehicle, tried)
-        return choose_initial_steering(Selector(batch, tried, start, context.seed, self.on_progress, *given))
+        return Selector(batch, tried, start, context.seed, self.on_progress, *given)
 
 
 def _measurements(runs: tuple[Run, ...], geometry: Geometry, neutral: float) -> list[RunMeasurement]:

@@ -45,8 +45,29 @@ def test_calibration_keeps_the_declared_axle(tiny_campaign):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("share", [0.0, 1.0])
-def test_an_undeclared_driven_axle_is_no_gain_of_speed_in_turns(tiny_campaign, share):
+@pytest.mark.parametrize(("share", "axle"), [(0.0, "rear"), (1.0, "front")])
+def test_an_undeclared_driven_axle_is_found(tiny_campaign, share, axle):
     found = diagnose(tiny_campaign(Tiny(front_drive_share=share)))
-    assert found.verdict is Verdict.UNKNOWN
-    assert [effect.name for effect in found.effects] == []
+    assert found.verdict is Verdict.ADEQUATE
+    assert f'declare driven = "{axle}"' in found.why
+    assert found.model.geometry.driven == axle
+    assert found.to_json()["provenance"]["driven_axle"] == axle
+    position = found.held_out.errors["position_rms_mm"]
+    assert position["before"] > 2.0 * position["after"]
+
+
+@pytest.mark.slow
+def test_a_cause_beside_an_undeclared_driven_axle_is_named_with_its_size(tiny_campaign):
+    found = diagnose(tiny_campaign(Tiny(front_drive_share=0.0, steering_lag_s=0.15)))
+    assert [effect.name for effect in found.effects] == ["steering_lag"]
+    assert found.effects[0].parameters["time_constant_s"].value == pytest.approx(0.15, rel=0.03)
+    assert found.model.geometry.driven == "rear"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tiny", [Tiny(cornering_loss=0.05), Tiny(overrun=0.6)])
+def test_a_loss_of_speed_in_turns_is_no_driven_axle(tiny_campaign, tiny):
+    found = diagnose(tiny_campaign(tiny))
+    assert found.model.geometry.driven == "both"
+    assert "driven_axle" not in found.to_json()["provenance"]
+    assert {effect.name for effect in found.effects} & {"cornering_speed_loss", "axle_overrun"}

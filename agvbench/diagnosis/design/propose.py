@@ -29,8 +29,8 @@ def with_next_experiment(
     ``provenance["inseparable"]`` lists the pairs that no run can discriminate, with the required measurement;
     ``provenance["not_identifiable"]`` the parameters that these data do not identify.
     """
-    tried = candidates(header.geometry)
     chosen = selection.chosen.fit
+    tried = candidates(chosen.predictor.batch.geometry)
     workspace = covered_workspace(readings, chosen.predictor.batch.geometry)
     unit = header.command_unit
     alternatives = {e.name: {name: 0.0 for name in e.confounded_with if name in tried} for e in found.effects}

@@ -14,10 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from agvbench.diagnosis.criteria import DISCREPANCY, SELECTION
-from agvbench.diagnosis.residuals.body_rates import residual_rates
-from agvbench.diagnosis.residuals.covariate_test import dependences
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
-from agvbench.diagnosis.selection.lack_of_fit import has_lack_of_fit
+from agvbench.diagnosis.selection.lack_of_fit import has_structure
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.variants import variant_candidates, with_extended_library
 from agvbench.effects.variants import cause_of
@@ -141,7 +139,7 @@ def prefer_actuators(selection: Selection, selector: Selector) -> Selection:
     every = _with_actuators(extended, without)
     difference, gain = every.deviance - chosen.deviance, without.deviance - chosen.deviance
     margin = SELECTION.alternative_margin
-    if difference > (max(margin, SELECTION.camera_share * gain) if _has_structure(chosen, selector.seed) else margin):
+    if difference > (max(margin, SELECTION.camera_share * gain) if has_structure(chosen, selector.seed) else margin):
         return selection
     current, gains = extended.backward_elimination(selection.base, every, ACTUATORS)
     selector.on_progress(f"{' + '.join(current.names)}: actuators in place of {CAMERA} gain {-difference:.0f}")
@@ -163,15 +161,6 @@ def prefer_actuators(selection: Selection, selector: Selector) -> Selection:
         rejected=rejected,
         tried=selection.tried + extended.tried,
     )
-
-
-def _has_structure(model: ScoredModel, seed: int) -> bool:
-    """Return whether the residuals in the training runs show lack of fit, or depend on a covariate."""
-    if has_lack_of_fit(model):
-        return True
-    readings = model.fit.predictor.readings
-    rates = residual_rates(readings, model.fit.predictor.predict(model.fit.parameters))
-    return bool(dependences(rates, readings.group, seed, readings.start))
 
 
 def _with_actuators(extended: Selector, current: ScoredModel) -> ScoredModel:

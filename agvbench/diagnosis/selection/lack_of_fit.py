@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from agvbench.diagnosis.criteria import RESIDUAL
+from agvbench.diagnosis.residuals.body_rates import residual_rates
+from agvbench.diagnosis.residuals.covariate_test import dependences
 from agvbench.diagnosis.residuals.repeatability import repeatability
 from agvbench.diagnosis.residuals.residuals import lack_of_fit, pose_residuals
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
@@ -20,3 +22,12 @@ def has_lack_of_fit(model: ScoredModel) -> bool:
         residuals.rms()[name] > RESIDUAL.within_repeatability * least[name]
         for name in ("position_rms_mm", "heading_rms_deg")
     )
+
+
+def has_structure(model: ScoredModel, seed: int) -> bool:
+    """Return whether the residuals in the training runs show lack of fit, or depend on a covariate."""
+    if has_lack_of_fit(model):
+        return True
+    readings = model.fit.predictor.readings
+    rates = residual_rates(readings, model.fit.predictor.predict(model.fit.parameters))
+    return bool(dependences(rates, readings.group, seed, readings.start))
