@@ -24,7 +24,7 @@ from agvbench.diagnosis.result import Diagnosis
 from agvbench.diagnosis.selection.actuators import prefer_actuators, separate_lag_from_delay
 from agvbench.diagnosis.selection.candidates import given_effects
 from agvbench.diagnosis.selection.initial_steering import choose_initial_steering, reconsider_initial_steering
-from agvbench.diagnosis.selection.sequential_replacement import replace_sequentially
+from agvbench.diagnosis.selection.sequential_replacement import excluded_by_priors, replace_sequentially
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.subsampling import refit_to_all, subsample_repeats
 from agvbench.diagnosis.selection.validation import validated
@@ -51,8 +51,8 @@ class RunsFromRest(Method[SelectedFromRest]):
     no_test: ClassVar[str] = "no run can be spared for the test: drive repeats, or commands in more combinations"
 
     def read(self, runs: Sequence[Run]) -> Readings:
-        """Return the poses of the runs."""
-        return read_runs(runs, self.context.header.neutral)
+        """Return the poses of the runs, and the priors of the vehicle file."""
+        return replace(read_runs(runs, self.context.header.neutral), priors=self.context.priors)
 
     def insufficient_data(self, readings: Readings) -> str:
         """Return why the campaign cannot be diagnosed, or an empty string."""
@@ -75,7 +75,7 @@ class RunsFromRest(Method[SelectedFromRest]):
         library, selector = select_variants_and_reconsider(chosen, selector)
         library = separate_lag_from_delay(prefer_actuators(library, selector), selector)
         if library.gains:
-            library = replace_sequentially(library, selector)
+            library = excluded_by_priors(replace_sequentially(library, selector), selector)
         library, with_term, selector = add_term_and_reconsider(library, selector)
         if len(searched) < len(fitted):
             self.on_progress(f"effects were selected in {len(searched)} runs; they are refitted to all {len(fitted)}")
