@@ -33,9 +33,8 @@ class Fit:
 
     ``parameters`` (P,), the nodal values first; ``random_effects`` (R, 6) of each run; ``variance_components``;
     ``loss`` (R,): minus two log likelihood of each run; ``information`` and ``gradient`` (R, P): the quadratic
-    approximation of the loss at the parameters; ``prior``: that of the maps and of the
-    effects; ``residual`` (R, K, 3): measured minus
-    predicted poses, with the random effects; ``linear``: the derivatives at the parameters.
+    approximation of the loss at the parameters; ``prior``: that of maps and effects; ``residual`` (R, K, 3): measured
+    minus predicted poses, with the random effects; ``linear``: the derivatives at the parameters.
     """
 
     predictor: Predictor
