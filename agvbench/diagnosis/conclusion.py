@@ -16,6 +16,7 @@ from agvbench.diagnosis.findings.corrected_vehicle import corrected_vehicle
 from agvbench.diagnosis.findings.effect_states import effect_states
 from agvbench.diagnosis.findings.estimates import named_effects
 from agvbench.diagnosis.findings.map_structure import map_effects
+from agvbench.diagnosis.findings.prior_checks import check_priors, provenance_of, with_contradictions, with_evidence
 from agvbench.diagnosis.findings.residual_table import with_residuals
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
@@ -28,6 +29,7 @@ from agvbench.diagnosis.selection.candidates import bounds_of
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection
 from agvbench.diagnosis.selection.validation import Assessment, assess, predictor_for
+from agvbench.diagnosis.selection.variants import candidates_for
 from agvbench.diagnosis.selection.with_term import TermSelection, term_entry, with_term_first
 from agvbench.effects.variants import effect_variants
 from agvbench.model import VehicleModel
@@ -79,17 +81,20 @@ def conclude(
         at = int(term_selection is not None)
         rest = [*rest[:at], change, *rest[at:]]
     effects = named_effects(selection, bounds_of(selection.chosen.names)) + map_effects(fit, context.vehicle)
+    checks = check_priors(selection, candidates_for(context.vehicle, context.geometry)[0])
+    effects = with_evidence(effects, checks)
     significant = term_selection is not None or tested.has_lack_of_fit or bool(rest)
     verdict, why = _verdict(effects, significant, rest, term_selection)
-    if static is not None:
-        why += _FOUND_AXLE.format(batch.geometry.driven)
     if significant and not rest and likely:
         rest, why = likely, f"{_REMAINS}it is likely to depend on {likely[0].covariate}"
+    if static is not None:
+        why += _FOUND_AXLE.format(batch.geometry.driven)
+    verdict, why = with_contradictions(verdict, why, checks)
     found = Diagnosis(
         verdict,
         why,
         effects,
-        significant,
+        significant or any(check.contradicted for check in checks),
         tuple(rest),
         _held_out(readings.select(split.test), tested),
         corrected_vehicle(context.header, context.geometry, fit, fit.predictor.maps, context.seed),
@@ -101,7 +106,8 @@ def conclude(
         | {"lack_of_fit_p_value": tested.lack_of_fit}
         | {"lack_of_fit_runs": {"tested": int(split.test.sum()), "repeats": int(np.sum(~split.training))}}
         | ({"driven_axle": batch.geometry.driven} if static is not None else {})
-        | ({"empirical_term": term_entry(term_selection)} if term_selection else {}),
+        | ({"empirical_term": term_entry(term_selection)} if term_selection else {})
+        | provenance_of(checks),
         states=effect_states(fit, effects),
     )
     found = with_residuals(found, readings, split.test, before, poses)

@@ -11,6 +11,7 @@ from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.result import Diagnosis, Verdict
 from agvbench.errors import CampaignError
 from agvbench.model import VehicleModel
+from agvbench.model.priors import Prior
 from agvbench.vehicle.geometry import Geometry
 
 
@@ -30,6 +31,11 @@ class DiagnosisContext:
     vehicle: VehicleModel | None
     seed: int
 
+    @property
+    def priors(self) -> tuple[Prior, ...]:
+        """The priors of the vehicle file."""
+        return self.vehicle.priors if self.vehicle else ()
+
     def not_identifiable(self, readings: Readings, why: str) -> Diagnosis:
         """Return a diagnosis with the verdict NOT_IDENTIFIABLE and its reason."""
         return Diagnosis(Verdict.NOT_IDENTIFIABLE, why, provenance=self.provenance(readings))
@@ -47,5 +53,5 @@ class DiagnosisContext:
             "runs_used": len(driven),
             "runs_refused": dict(Counter(readings.refused.values())),
             **({"windows_used": len(readings)} if windows else {}),
-            "criteria": stated_criteria(FREE_DRIVING if windows else SELECTION),
+            "criteria": stated_criteria(FREE_DRIVING if windows else SELECTION, with_priors=bool(self.priors)),
         }

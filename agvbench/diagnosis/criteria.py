@@ -224,6 +224,20 @@ class DesignCriteria:
     identified: float = 0.5
 
 
+@dataclass(frozen=True)
+class PriorCriteria:
+    """When a campaign contradicts a prior of an effect; stated only if the vehicle file has priors.
+
+    ``max_conflict``
+        Largest distance between prior and campaign in combined standard deviations; one of 370 true priors exceeds it.
+    ``max_leverage``
+        Largest share of the prior in the information about its quantity. Beyond it the campaign alone says nothing.
+    """
+
+    max_conflict: float = 3.0
+    max_leverage: float = 0.999
+
+
 DATA = DataCriteria()
 MAPS = MapCriteria()
 FIT = FitCriteria()
@@ -236,9 +250,12 @@ VARIANT = VariantCriteria()
 DISCREPANCY = DiscrepancyCriteria()
 RESIDUAL = ResidualCriteria()
 DESIGN = DesignCriteria()
+PRIOR = PriorCriteria()
 
 
-def stated_criteria(selection: SelectionCriteria = SELECTION) -> dict[str, dict[str, float]]:
+def stated_criteria(
+    selection: SelectionCriteria = SELECTION, *, with_priors: bool = False
+) -> dict[str, dict[str, float]]:
     """Return every criterion with its value, by class, for the provenance of a diagnosis with this `selection`."""
     return {
         "data": asdict(DATA),
@@ -249,4 +266,5 @@ def stated_criteria(selection: SelectionCriteria = SELECTION) -> dict[str, dict[
         "discrepancy": asdict(DISCREPANCY),
         "residual": asdict(RESIDUAL),
         "design": asdict(DESIGN),
+        **({"prior": asdict(PRIOR)} if with_priors else {}),
     }

@@ -48,12 +48,13 @@ class NamedEffect:
 
     ``parameters``: estimates by name. ``confounded_with``: indistinguishable alternatives. ``evidence``: increase of
     the cross-validated deviance (minus two log likelihood) without the effect, and with each alternative in its place.
+    ``prior``: the priors of its parameters. ``excluded_by_priors``: further alternatives without priors.
     """
 
     name: str
     parameters: Mapping[str, Estimate]
     confounded_with: tuple[str, ...]
-    evidence: Mapping[str, float | str]
+    evidence: Mapping[str, object]
 
 
 class State(StrEnum):

@@ -26,7 +26,7 @@ from agvbench.diagnosis.selection.candidates import given_effects
 from agvbench.diagnosis.selection.driven_axle import UNDECLARED, better_driven_axle
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.initial_steering import choose_initial_steering, reconsider_initial_steering
-from agvbench.diagnosis.selection.sequential_replacement import replace_sequentially
+from agvbench.diagnosis.selection.sequential_replacement import excluded_by_priors, replace_sequentially
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.subsampling import refit_to_all, subsample_repeats
 from agvbench.diagnosis.selection.validation import validated
@@ -57,8 +57,8 @@ class RunsFromRest(Method[SelectedFromRest]):
     no_test: ClassVar[str] = "no run can be spared for the test: drive repeats, or commands in more combinations"
 
     def read(self, runs: Sequence[Run]) -> Readings:
-        """Return the poses of the runs."""
-        return read_runs(runs, self.context.header.neutral)
+        """Return the poses of the runs, and the priors of the vehicle file."""
+        return replace(read_runs(runs, self.context.header.neutral), priors=self.context.priors)
 
     def insufficient_data(self, readings: Readings) -> str:
         """Return why the campaign cannot be diagnosed, or an empty string."""
@@ -93,7 +93,9 @@ class RunsFromRest(Method[SelectedFromRest]):
         chosen, selector = reconsider_initial_steering(selector.select(), selector)
         library, selector = select_variants_and_reconsider(chosen, selector)
         library = separate_lag_from_delay(prefer_actuators(library, selector), selector)
-        return (replace_sequentially(library, selector) if library.gains else library), selector
+        if library.gains:
+            library = excluded_by_priors(replace_sequentially(library, selector), selector)
+        return library, selector
 
     def _under(self, axle: Driven) -> RunsFromRest:
         """Return this method for a vehicle that one axle drives."""

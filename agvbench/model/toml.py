@@ -27,6 +27,11 @@
     name = "steering_lag"
     time_constant_s = 0.12
 
+    [priors.mocap_latency.latency_s]   # as many as are documented or were measured; see `agvbench.model.priors`
+    value = 0.008
+    standard_deviation = 0.001
+    source = "data sheet"
+
     [provenance]                   # free
 """
 
@@ -44,6 +49,7 @@ import tomli_w
 
 from agvbench.effects import Effect, effect_from_toml
 from agvbench.errors import FileError, VehicleError
+from agvbench.model.priors import priors_from_toml, priors_to_toml
 from agvbench.text_files import read_toml
 from agvbench.vehicle.fields import check_keys, from_table, number, to_table
 from agvbench.vehicle.geometry import Geometry
@@ -55,7 +61,7 @@ if TYPE_CHECKING:
 SCHEMA = 1
 _UNITS = {"front": "rad", "rear": "rad", "drive": "m/s"}
 _REQUIRED = ("schema", "name", "command_unit", "neutral", "geometry", "maps")
-_OPTIONAL = ("effects", "provenance")
+_OPTIONAL = ("effects", "priors", "provenance")
 
 
 def read_vehicle(path: Path) -> dict[str, Any]:
@@ -115,6 +121,8 @@ def vehicle_to_toml(model: VehicleModel) -> dict[str, Any]:
     }
     if model.effects:
         content["effects"] = [effect.to_toml() for effect in model.effects]
+    if model.priors:
+        content["priors"] = priors_to_toml(model.priors)
     if model.provenance:
         content["provenance"] = dict(model.provenance)
     return content
@@ -137,6 +145,7 @@ def vehicle_fields(content: Mapping[str, Any]) -> dict[str, Any]:
         "neutral": number(content["neutral"], where="neutral"),
         **_maps_from_toml(_table(content, "maps")),
         "effects": _effects_from_toml(content.get("effects", [])),
+        "priors": priors_from_toml(_table(content, "priors")) if "priors" in content else (),
         "provenance": _provenance_from_toml(content),
     }
 

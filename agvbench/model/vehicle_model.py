@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from agvbench.effects import Effect
 from agvbench.errors import VehicleError
+from agvbench.model.priors import Prior
 from agvbench.model.toml import naming_file, physics_digest, read_vehicle, write_vehicle
 from agvbench.notebook_html import heading_html, table_html
 from agvbench.types import Command, Commands, CommandUnit, Floats
@@ -45,6 +46,8 @@ class VehicleModel:
         Further effects, each at most once; they act in the order of their stages.
     provenance
         Origin of the model; not part of the physics.
+    priors
+        Stated values of parameters of effects, each at most once: evidence for a diagnosis, not part of the physics.
 
     Raises
     ------
@@ -61,6 +64,7 @@ class VehicleModel:
     drive: StaticMap
     effects: tuple[Effect, ...] = ()
     provenance: Mapping[str, str | float | int] = field(default_factory=dict, hash=False)
+    priors: tuple[Prior, ...] = ()
 
     def __post_init__(self) -> None:
         coerce_float(self, "neutral")
@@ -69,7 +73,12 @@ class VehicleModel:
         if self.command_unit not in get_args(CommandUnit):
             limit = " or ".join(get_args(CommandUnit))
             raise VehicleError("unknown unit", where="command_unit", value=repr(self.command_unit), limit=limit)
+        object.__setattr__(self, "priors", tuple(self.priors))
         self._check_angles()
+        stated = [prior.name for prior in self.priors]
+        for name in stated:
+            if stated.count(name) > 1:
+                raise VehicleError("a prior may be given once", where="priors", value=name)
         names = [effect.name for effect in self.effects]
         for name in names:
             if names.count(name) > 1:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 def calibrated(directory: str, *, maps: str = "default", session: str | None = None) -> Calibration:
     """Return the calibration from the campaign in `directory`; a terminal shows that something goes on.
 
+    The model keeps the priors of the campaign's ``vehicle.toml``.
+
     Raises
     ------
     CampaignError, FitError, VehicleError
@@ -33,20 +35,31 @@ def calibrated(directory: str, *, maps: str = "default", session: str | None = N
     """
     from agvbench.calibration import calibrate  # only here: reports read curves, and numba takes seconds to import
 
-    errors = Console(stderr=True)
+    errors, campaign = Console(stderr=True), Campaign.open(directory)
     with errors.status("measuring runs and fitting maps") if errors.is_terminal else nullcontext():
-        return calibrate(Campaign.open(directory), maps=maps, session=session)
+        found = calibrate(campaign, maps=maps, session=session)
+    return replace(found, model=_with_priors_of(found.model, campaign.path / VEHICLE))
 
 
 def save(calibration: Calibration, path: Path) -> None:
-    """Write the calibrated vehicle.
+    """Write the calibrated vehicle, with its priors or else those of the vehicle file that it replaces.
 
     Raises
     ------
     FileError
         If the file cannot be written.
     """
-    write_file("--out", path, calibration.model.save)
+    write_file("--out", path, _with_priors_of(calibration.model, path).save)
+
+
+def _with_priors_of(model: VehicleModel, path: Path) -> VehicleModel:
+    """Return `model` with the priors of the vehicle file `path`, if it has none; a file that is no vehicle has none."""
+    if model.priors or not path.is_file():
+        return model
+    try:
+        return replace(model, priors=VehicleModel.load(path).priors)
+    except AgvbenchError:
+        return model
 
 
 def firmware_header(model: VehicleModel) -> str:

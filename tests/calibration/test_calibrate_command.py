@@ -11,7 +11,7 @@ from test_calibrate import PLAN, STEPS, drive_all, front, rear, speed
 
 from agvbench.campaign import CampaignHeader, CampaignWriter
 from agvbench.cli import main
-from agvbench.model import VehicleModel
+from agvbench.model import Prior, VehicleModel, thesis_vehicle
 
 HEADER = CampaignHeader(1, "tonight", "agv1", FRONT_M, REAR_M, "us", 1500.0, 60.0)
 
@@ -44,6 +44,20 @@ def test_prints_both_fits_and_what_was_left_out_and_writes_the_vehicle(campaign,
     model = VehicleModel.load(out)
     assert model.calibration_hash in printed
     assert float(model.front(1400.0)) == pytest.approx(front(1400.0), abs=0.005)
+
+
+def test_priors_of_the_campaign_and_of_a_replaced_vehicle_file_are_kept(runs, campaign, tmp_path, capsys):
+    latency = Prior("mocap_latency", "latency_s", 0.008, 0.001, "data sheet")
+    out = tmp_path / "vehicle.toml"
+    replace(thesis_vehicle(), priors=(latency,)).save(out)
+    assert main(["calibrate", str(campaign), "--out", str(out)]) == 0
+    assert VehicleModel.load(out).priors == (latency,)
+    assert VehicleModel.load(out).name == "agv1"
+    own = written(tmp_path / "own", runs)
+    scale = Prior("mocap_scale", "scale", 0.0, 0.0005, "wand")
+    replace(thesis_vehicle(), priors=(scale,)).save(own / "vehicle.toml")
+    assert main(["calibrate", str(own), "--out", str(out)]) == 0
+    assert VehicleModel.load(out).priors == (scale,)
 
 
 def test_maps_of_the_thesis_on_request(campaign, tmp_path, capsys):

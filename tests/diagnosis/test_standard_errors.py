@@ -25,6 +25,7 @@ def fitted(slopes, missed):
         information=every_parameter((slopes**2)[:, None, None]),
         total_information=np.array([[float(slopes @ slopes)]]),
         covariance=np.array([[1.0 / float(slopes @ slopes)]]),
+        covariance_by_priors=np.zeros((1, 1)),
     ), value
 
 

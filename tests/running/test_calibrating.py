@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from agvbench.errors import FitError, LinkError
-from agvbench.model import VehicleModel, thesis_vehicle
+from agvbench.model import Prior, VehicleModel, thesis_vehicle
+from agvbench.running.configuration.vehicles import uncalibrated_vehicle
 from agvbench.running.execution.calibration import RUNS_DIGEST, VEHICLE_FILE
 from agvbench.running.session.opening import open_session
 from agvbench.running.session.session import BenchSession, NotDrivenError
@@ -19,8 +21,8 @@ RUNS = {f"{axle}{share}": (axle, share) for axle in ("front", "rear", "drive") f
 
 
 @contextmanager
-def session(path: Path, mocap: str = "sim", runs: Iterable[str] = RUNS) -> Iterator[BenchSession]:
-    given = {"vehicle": "", "seed": 3, "mocap": mocap}
+def session(path: Path, mocap: str = "sim", runs: Iterable[str] = RUNS, vehicle: str = "") -> Iterator[BenchSession]:
+    given = {"vehicle": vehicle, "seed": 3, "mocap": mocap}
     plan = [
         {"run_id": name, "experiment": experiment(name), "trajectory": "", "condition": "", "repeat": 1}
         for name in runs
@@ -76,6 +78,16 @@ def test_after_a_stop_in_mid_calibration_the_resumed_session_calibrates_from_all
     now, before = (VehicleModel.load(where / VEHICLE_FILE).provenance for where in (path, undisturbed))
     for entry in ("runs_used", RUNS_DIGEST):
         assert now[entry] == before[entry]
+
+
+def test_the_calibrated_vehicle_keeps_the_priors_of_the_nominal_one(tmp_path: Path) -> None:
+    nominal = uncalibrated_vehicle()
+    latency = Prior("mocap_latency", "latency_s", 0.008, 0.001, "data sheet")
+    replace(nominal, priors=(latency,)).save(tmp_path / "nominal.toml")
+    with session(tmp_path / "campaign", vehicle=str(tmp_path / "nominal.toml")) as opened:
+        calibrate(opened)
+        assert opened.model("calibrated").priors == (latency,)
+    assert VehicleModel.load(tmp_path / "campaign" / VEHICLE_FILE).priors == (latency,)
 
 
 def test_a_calibration_that_runs_were_driven_with_is_kept(undisturbed: Path) -> None:

@@ -14,6 +14,7 @@ from agvbench.diagnosis.data.initial_pose import frame_noise, initial_pose, shif
 from agvbench.diagnosis.data.splits import group_runs, with_common_levels
 from agvbench.diagnosis.data.windows import Horizon, InitialStates, blocks, cut_windows, recording_of
 from agvbench.errors import FitError
+from agvbench.model.priors import Prior
 from agvbench.model.simulation.simulation import SimulatedRun
 from agvbench.types import Commands, Floats, Frames, Run
 
@@ -38,7 +39,8 @@ class Readings:
     frames at rest. ``started_h`` (R,) [h] is the time since the session began. ``group`` (R,) is the same number for
     runs with the same commands, and for windows of one block. ``refused`` maps the id of each excluded run to the
     reason. ``initial_states`` are those of windows; None for runs from rest. ``preset`` is True if the axles had
-    settled at each run's first steering command before it was given, and False if they were at neutral.
+    settled at each run's first steering command before it was given, and False if they were at neutral. ``priors`` are
+    separate measurements of the effects' parameters, which belong to the evidence of every model.
     """
 
     runs: tuple[Run, ...]
@@ -51,6 +53,7 @@ class Readings:
     refused: dict[str, str]
     initial_states: InitialStates | None = None
     preset: bool = False
+    priors: tuple[Prior, ...] = ()
 
     def __len__(self) -> int:
         return len(self.runs)
@@ -80,6 +83,7 @@ class Readings:
             self.refused,
             None if self.initial_states is None else self.initial_states.select(chosen),
             self.preset,
+            self.priors,
         )
 
     def simulated(self) -> list[SimulatedRun]:

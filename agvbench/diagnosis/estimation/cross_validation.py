@@ -23,7 +23,8 @@ def cross_validated(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Flo
     fold itself, because the other folds cannot predict them: a misfit elsewhere would be amplified twentyfold. One
     example is a command level that is driven in no other fold, which is calibration. Another is a backlash that a
     single group traverses in both directions, while the nodal values compensate for it in all other groups. The prior
-    of the maps counts as information of the other folds, but not as a share: it says less than a single run.
+    of the maps counts as information of the other folds, but not as a share: it says less than a single run. So do the
+    priors of effects, which are observations that belong to no fold.
     """
     if fitted.predictor.readings.initial_states is not None:
         return _cross_validated_windows(fitted, fold, bounds)
@@ -65,11 +66,13 @@ def _cross_validated_windows(fitted: Fit, fold: NDArray[np.int64], bounds: Float
     loss = fitted.loss.copy()
     if maps == count:
         return loss
-    total = fitted.information.total + np.eye(count)
+    total = fitted.information.total + fitted.prior.information + np.eye(count)
     for k in np.unique(fold):
         out = fold == k
-        others = fitted.information.total_of(~out) + np.eye(count) * np.r_[np.ones(maps), np.full(count - maps, 1e-4)]
-        step = np.linalg.lstsq(others, fitted.gradient[~out].sum(axis=0), rcond=1e-12)[0]
+        weak = np.eye(count) * np.r_[np.ones(maps), np.full(count - maps, 1e-4)]
+        others = fitted.information.total_of(~out) + fitted.prior.information + weak
+        gradient = fitted.gradient[~out].sum(axis=0) + fitted.prior.gradient
+        step = np.linalg.lstsq(others, gradient, rcond=1e-12)[0]
         moved = fitted.parameters.copy()
         moved[maps:] = np.clip(moved[maps:] + step[maps:], bounds[:, 0], bounds[:, 1])
         change = moved[maps:] - fitted.parameters[maps:]
@@ -98,12 +101,13 @@ def clustered_covariance(fitted: Fit, group: NDArray[np.int64]) -> Floats:
     """Return the cluster-robust covariance of the parameters (P, P), with groups of runs as clusters.
 
     It allows for correlation between the samples of a run and between repeats of a command (sandwich estimator, Liang
-    and Zeger 1986). No standard error is smaller than that of the likelihood.
+    and Zeger 1986). The priors of effects are independent observations. No standard error is smaller than that of the
+    likelihood.
     """
     scores, own = by_group(fitted.gradient, group), fitted.covariance
     maps = fitted.predictor.maps.size
     spare = max(len(group) - maps, 1)
-    robust = own @ (scores.T @ scores * len(group) / spare) @ own
+    robust = own @ (scores.T @ scores * len(group) / spare) @ own + fitted.covariance_by_priors
     widen = np.sqrt(np.maximum(np.diagonal(robust) / np.maximum(np.diagonal(own), 1e-300), 1.0))
     return np.asarray(own * widen[:, None] * widen[None, :])
 

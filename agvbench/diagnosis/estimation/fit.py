@@ -33,8 +33,8 @@ class Fit:
 
     ``parameters`` (P,), the nodal values first; ``random_effects`` (R, 6) of each run; ``variance_components``;
     ``loss`` (R,): minus two log likelihood of each run; ``information`` and ``gradient`` (R, P): the quadratic
-    approximation of the loss at the parameters; ``prior``: that of the maps; ``residual`` (R, K, 3): measured minus
-    predicted poses, with the random effects; ``linear``: the derivatives at the parameters.
+    approximation of the loss at the parameters; ``prior``: that of maps and effects; ``residual`` (R, K, 3): measured
+    minus predicted poses, with the random effects; ``linear``: the derivatives at the parameters.
     """
 
     predictor: Predictor
@@ -50,7 +50,7 @@ class Fit:
 
     @property
     def total_loss(self) -> float:
-        """Minus two log posterior: the loss of all runs and of the maps' prior."""
+        """Minus two log posterior: the loss of all runs and of the priors."""
         return float(self.loss.sum()) + self.prior.loss
 
     @property
@@ -62,6 +62,13 @@ class Fit:
     def covariance(self) -> Floats:
         """Covariance of the parameters (P, P)."""
         return np.asarray(np.linalg.pinv(self.total_information, hermitian=True))
+
+    @property
+    def covariance_by_priors(self) -> Floats:
+        """The part of the covariance (P, P) that the priors of the effects' parameters contribute as observations."""
+        own = self.parameters[self.predictor.maps.size :]
+        information = self.predictor.physical.terms(own, self.predictor.maps.size).information
+        return np.asarray(self.covariance @ information @ self.covariance)
 
     @cached_property
     def linearisation_point(self) -> LinearisationPoint:

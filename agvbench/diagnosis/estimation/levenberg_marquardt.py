@@ -66,11 +66,11 @@ class StepSolver:
         )
 
     def _objective(self, point: Point) -> float:
-        prior = self.predictor.batch.smoothness.loss(point.parameters)
+        prior = self.predictor.prior_loss(point.parameters)
         return prior + objective(self.predictor, point.residual, point.random_effects, self.variance_components)
 
     def _normal_equations(self, point: Point, terms: Terms) -> tuple[Floats, Floats]:
-        prior = self.predictor.batch.smoothness.terms(point.parameters)
+        prior = self.predictor.prior(point.parameters)
         matrix = terms.information.total + ridge(self.predictor) + prior.information
         return matrix, terms.gradient.sum(axis=0) + prior.gradient
 
@@ -109,7 +109,7 @@ class FitState:
 class Evaluation:
     """The model evaluated at a state.
 
-    Derivatives, ``residual`` (R, K, 3), the terms of the likelihood, and those of the maps' ``prior``.
+    Derivatives, ``residual`` (R, K, 3), the terms of the likelihood, and those of the ``prior`` of maps and effects.
     """
 
     linear: Linearised
@@ -119,7 +119,7 @@ class Evaluation:
 
     @property
     def loss(self) -> float:
-        """Minus two log posterior: of all runs and of the maps."""
+        """Minus two log posterior: of all runs and of the priors."""
         return float(self.terms.loss.sum()) + self.prior.loss
 
 
@@ -152,7 +152,7 @@ class LevenbergMarquardt:
             terms = terms_of(self.predictor, residual, linear, state.random_effects, state.variance_components)
         if not (np.isfinite(terms.gradient).all() and np.isfinite(terms.information.blocks).all()):
             raise np.linalg.LinAlgError("the model cannot be evaluated")
-        return Evaluation(linear, residual, terms, self.predictor.batch.smoothness.terms(state.parameters))
+        return Evaluation(linear, residual, terms, self.predictor.prior(state.parameters))
 
     def iterate(self, state: FitState, iterations: int, near: Linearised | None = None) -> tuple[FitState, Convergence]:
         """Return the state after at most `iterations` steps, and the state of convergence.

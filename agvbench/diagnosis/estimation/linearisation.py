@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from agvbench.diagnosis.estimation.likelihood import WEAK, inner_inverse
 from agvbench.diagnosis.estimation.variance import VarianceComponents, priors, weights
 from agvbench.diagnosis.model.predictor import Linearised, Predictor
+from agvbench.diagnosis.model.smoothness import PriorTerms
 from agvbench.types import Floats
 
 
@@ -70,13 +71,13 @@ class LinearisationPoint:
         return float(np.sum(e * e) - np.sum(pull * (self.inverse @ pull[..., None])[..., 0]))
 
     def predicted_gain(
-        self, residual: Floats, slopes: Floats, start: Floats, bounds: Floats, prior_gradient: Floats
+        self, residual: Floats, slopes: Floats, start: Floats, bounds: Floats, prior: PriorTerms
     ) -> float:
         """Return the predicted reduction of the loss, to first order, from the larger model's linearisation.
 
         `residual` (R, K, 3) is that of the larger model at `start` (q,). `slopes` (R, K, 3, q) are the derivatives by
-        its new parameters, and `bounds` (q, 2) their bounds. `prior_gradient` (P,) is that of the maps' prior at the
-        nodal values of the larger model.
+        its new parameters, and `bounds` (q, 2) their bounds. `prior` is that of all P + q parameters of the larger
+        model, at the linearisation.
         """
         e = (residual * self.weight).reshape(len(residual), -1)
         new = (slopes * self.weight[..., None]).reshape(*e.shape, -1)
@@ -84,8 +85,10 @@ class LinearisationPoint:
         # The prior of the random effects contributes to the gradient, too.
         pull = np.einsum("rnq,rn->q", projected, e) + np.einsum("rnq,rn->q", new, self._prior_change)
         products = self._products(np.concatenate([e[..., None], new], axis=-1))
-        old_pull, shared = products[:, 0] + self.pull + prior_gradient, products[:, 1:]
-        own = np.einsum("rnp,rnq->pq", new, projected) + WEAK * np.eye(len(start))
+        known = len(self.pull)
+        old_pull = products[:, 0] + self.pull + prior.gradient[:known]
+        shared, pull = products[:, 1:] + prior.information[:known, known:], pull + prior.gradient[known:]
+        own = np.einsum("rnp,rnq->pq", new, projected) + WEAK * np.eye(len(start)) + prior.information[known:, known:]
         # The existing parameters are eliminated (Schur complement): the new parameters remain.
         along = self.covariance @ shared
         matrix, rest = own - shared.T @ along, pull - along.T @ old_pull

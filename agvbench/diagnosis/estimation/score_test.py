@@ -36,12 +36,13 @@ def first_order_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floa
     parameters = initial_parameters(fitted, larger, start)
     poses, slopes = larger.by_last(parameters, fitted.random_effects, len(start))
     residual = residual_of(larger, poses)
+    prior = larger.prior(parameters)
     if larger.readings.initial_states is None:
-        prior = larger.batch.smoothness.terms(parameters[: len(fitted.parameters)])
-        gain = fitted.linearisation_point.predicted_gain(residual, slopes, start, bounds, prior.gradient)
+        gain = fitted.linearisation_point.predicted_gain(residual, slopes, start, bounds, prior)
         return gain + fitted.prior.loss - prior.loss
     terms = _terms(fitted, larger, residual, slopes)
-    gradient, matrix = terms.gradient.sum(axis=0), terms.information.total + ridge(larger)
+    gradient = terms.gradient.sum(axis=0) + prior.gradient
+    matrix = terms.information.total + ridge(larger) + prior.information
     move = np.linalg.lstsq(matrix, gradient, rcond=1e-12)[0]
     # Parameters beyond a bound are set to it, and the others are solved for again.
     known = len(fitted.parameters)
@@ -51,7 +52,7 @@ def first_order_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floa
         rest = np.linalg.lstsq(matrix[:known, :known], (gradient - matrix @ fixed)[:known], rcond=1e-12)[0]
         move = np.r_[rest, clipped - start]
     saved = 2.0 * gradient @ move - move @ matrix @ move
-    return float(fitted.loss.sum() - terms.loss.sum() + saved)
+    return float(fitted.total_loss - terms.loss.sum() - prior.loss + saved)
 
 
 def one_step_estimate(
@@ -66,12 +67,9 @@ def one_step_estimate(
     parameters = initial_parameters(fitted, larger, start)
     poses, slopes = larger.by_last(parameters, fitted.random_effects, len(start))
     terms = _terms(fitted, larger, residual_of(larger, poses), slopes)
-    known = len(fitted.parameters)
-    matrix, gradient = terms.information.total + ridge(larger), terms.gradient.sum(axis=0)
-    if larger.readings.initial_states is None:
-        prior = larger.batch.smoothness.terms(parameters[:known])
-        matrix[:known, :known] += prior.information
-        gradient[:known] += prior.gradient
+    known, prior = len(fitted.parameters), larger.prior(parameters)
+    gradient = terms.gradient.sum(axis=0) + prior.gradient
+    matrix = terms.information.total + ridge(larger) + prior.information
     at = np.flatnonzero(np.r_[np.ones(known, dtype=np.bool_), free])
     own = np.linalg.pinv(matrix[np.ix_(at, at)], hermitian=True)
     scores = by_group(terms.gradient, group)[:, at]

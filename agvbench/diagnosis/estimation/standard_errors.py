@@ -26,7 +26,8 @@ def standard_errors(fitted: Fit, group: NDArray[np.int64]) -> Floats:
     Student's t for the effective number of groups widens the standard error, so that ± 1.96 standard errors are a 95 %
     interval. If fewer than four groups determine a parameter, their standard deviation is not informative. Its standard
     error is then the larger of those of the likelihood and of the jackknife over runs. Windows of free driving come in
-    few sessions; their standard errors are those of `clustered_covariance`.
+    few sessions; their standard errors are those of `clustered_covariance`. No jackknife leaves out a prior of an
+    effect: its standard deviation is added, as far as the estimate depends on it.
 
     Parameters
     ----------
@@ -39,11 +40,11 @@ def standard_errors(fitted: Fit, group: NDArray[np.int64]) -> Floats:
         return np.asarray(np.sqrt(np.diagonal(clustered_covariance(fitted, group))))
     of_groups, counts = _jackknife(fitted, group)
     of_runs, _ = _jackknife(fitted, np.arange(len(group)))
-    own = np.sqrt(np.diagonal(fitted.covariance))
+    own, by_priors = np.sqrt(np.diagonal(fitted.covariance)), np.sqrt(np.diagonal(fitted.covariance_by_priors))
     # For normal deviations of n groups with equal variance the effective number is n/3.
     widening = special.stdtrit(3.0 * counts, _LEVEL) / special.ndtri(_LEVEL)
-    widened = np.maximum(of_groups, of_runs) * widening
-    return np.asarray(np.where(counts >= _MIN_GROUPS, widened, np.maximum(own, of_runs)))
+    widened = np.hypot(np.maximum(of_groups, of_runs) * widening, by_priors)
+    return np.asarray(np.where(counts >= _MIN_GROUPS, widened, np.maximum(own, np.hypot(of_runs, by_priors))))
 
 
 def _jackknife(fitted: Fit, group: NDArray[np.int64]) -> tuple[Floats, Floats]:

@@ -18,7 +18,7 @@ _DIGITS = 9
 
 
 def corrected_vehicle(header: HeaderLike, geometry: Geometry, fitted: Fit, maps: NodalMaps, seed: int) -> VehicleModel:
-    """Return the vehicle of `fitted`; its maps are tables, made monotone by isotonic regression."""
+    """Return the vehicle of `fitted` with its priors; its maps are tables, made monotone by isotonic regression."""
     where = maps.slices()
     weight = np.maximum(np.diagonal(fitted.information.total), 1e-6)
     values = {role: fitted.parameters[own] for role, own in where.items()}
@@ -39,6 +39,7 @@ def corrected_vehicle(header: HeaderLike, geometry: Geometry, fitted: Fit, maps:
         drive=drive,
         effects=_effects(fitted),
         provenance={"campaign": header.name, "method": "diagnose", "seed": seed},
+        priors=fitted.predictor.readings.priors,
     )
 
 

@@ -45,6 +45,7 @@ def named_effects(selection: Selection, bounds: Floats) -> tuple[NamedEffect, ..
                     "rival_margin": SELECTION.alternative_margin,
                     **({"form": name} if name in effect_variants() else {}),
                     **{f"{alternative}_instead": worse for alternative, worse in alternatives},
+                    **({"excluded_by_priors": sorted(selection.excluded[name])} if name in selection.excluded else {}),
                 },
             )
         )

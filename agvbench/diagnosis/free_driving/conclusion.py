@@ -16,6 +16,7 @@ from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.findings.corrected_vehicle import corrected_vehicle
 from agvbench.diagnosis.findings.effect_states import effect_states
 from agvbench.diagnosis.findings.estimates import named_effects
+from agvbench.diagnosis.findings.prior_checks import check_priors, provenance_of, with_contradictions, with_evidence
 from agvbench.diagnosis.free_driving.errors import QUANTITIES, by_recording, repeatability_squares, rms, squares
 from agvbench.diagnosis.free_driving.predictors import change_by_speed_error, constant_velocity, prior_model, speed_held
 from agvbench.diagnosis.free_driving.selection import WindowSelector
@@ -63,22 +64,25 @@ class WindowConclusion:
         perturbed = change_by_speed_error(
             Predictor(self._assessed, chosen.fit.predictor.effects), chosen.fit.parameters
         )
-        effects = named_effects(self.selection, bounds_of(chosen.names))
+        checks = check_priors(self.selection, self.selector.candidates)
+        effects = with_evidence(named_effects(self.selection, bounds_of(chosen.names)), checks)
         held_out = self._held_out(before, poses, perturbed)
         # Many windows make even small structure significant: within repeatability it needs no cause.
         rest = self._dependences(poses) if _above(held_out, RESIDUAL.within_repeatability) else []
         far = _above(held_out, RESIDUAL.far_above_noise)
-        verdict, why = _verdict(effects, rest, far)
+        verdict, why = with_contradictions(*_verdict(effects, rest, far), checks)
         return Diagnosis(
             verdict,
             why,
             effects,
-            far or bool(rest),
+            far or bool(rest) or any(check.contradicted for check in checks),
             tuple(rest),
             held_out,
             corrected_vehicle(context.header, context.geometry, chosen.fit, chosen.fit.predictor.maps, context.seed),
             self.selection.rejected,
-            context.provenance(self.readings) | self._fit_provenance(horizon, predicted, perturbed),
+            context.provenance(self.readings)
+            | self._fit_provenance(horizon, predicted, perturbed)
+            | provenance_of(checks),
             states=effect_states(chosen.fit, effects),
         )
 

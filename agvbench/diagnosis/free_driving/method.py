@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -52,8 +52,8 @@ class FreeDriving(Method[SelectedFromWindows]):
     horizon: Horizon
 
     def read(self, runs: Sequence[Run]) -> Readings:
-        """Return the poses of the windows."""
-        return read_windows(runs, self.horizon, self.context.header.neutral)
+        """Return the poses of the windows, and the priors of the vehicle file."""
+        return replace(read_windows(runs, self.horizon, self.context.header.neutral), priors=self.context.priors)
 
     def insufficient_data(self, readings: Readings) -> str:
         """Return why the campaign cannot be diagnosed, or an empty string."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +14,7 @@ from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.model.nodal_maps import ROLES, NodalMaps
 from agvbench.diagnosis.model.smoothness import SmoothnessPrior
 from agvbench.effects import Effect
+from agvbench.model.priors import Prior
 from agvbench.model.simulation.simulation import Simulation
 from agvbench.types import Floats
 from agvbench.vehicle.geometry import Geometry
@@ -121,6 +123,12 @@ class Batch:
         self.perturbed = self._grouped(np.array(kind), np.array(row))
         self.rows = np.concatenate([rows_of_run[i] for i in run])
         self.row_change = np.concatenate(changed)
+
+    def with_priors(self, priors: tuple[Prior, ...]) -> Batch:
+        """Return this batch with other priors of the effects' parameters; both share the packed runs."""
+        other = copy(self)
+        other.readings = replace(self.readings, priors=priors)
+        return other
 
     def _active(self, rows_of_run: list[NDArray[np.int64]]) -> NDArray[np.int64]:
         """Return the indices of each run's active nodal values (R, m), padded with inactive ones."""

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.nodal_maps import ROLES
+from agvbench.diagnosis.model.physical_priors import PhysicalPriors
+from agvbench.diagnosis.model.smoothness import PriorTerms
 from agvbench.types import Floats
 
 
@@ -60,7 +62,7 @@ _MAX_ANGLE_RAD = 1.4
 class Predictor:
     """Predicts runs with nodal maps and some effects; the parameters are the nodal values, then those of the effects.
 
-    Each derivative is a forward difference of two simulations.
+    ``physical`` are the priors of the effects' parameters. Each derivative is a forward difference of two simulations.
     """
 
     def __init__(self, batch: Batch, effects: tuple[str, ...] = ()) -> None:
@@ -69,8 +71,20 @@ class Predictor:
         self._own = np.concatenate([np.empty(0, dtype=np.int64), *(batch.base.indices(name) for name in effects)])
         self.parameter_names: list[str] = [batch.base.parameter_names[i] for i in self._own]
         self.nulls: Floats = batch.base.nulls[self._own]
+        self.physical = PhysicalPriors.of(self.readings.priors, effects, self.parameter_names, self.nulls)
         self._steps = _STEP_SHARE * batch.base.scales[self._own]
         self._last: tuple[tuple[bytes, ...], Floats] = (), np.empty(0)
+
+    def prior(self, parameters: Floats) -> PriorTerms:
+        """Return the priors of the maps and of the effects at `parameters` (P,)."""
+        of_maps = self.batch.smoothness.terms(parameters)
+        if not len(self.physical):
+            return of_maps
+        return of_maps + self.physical.terms(parameters[self.maps.size :], self.maps.size)
+
+    def prior_loss(self, parameters: Floats) -> float:
+        """Return minus two log density of the priors at `parameters` (P,)."""
+        return self.batch.smoothness.loss(parameters) + self.physical.loss(parameters[self.maps.size :])
 
     def settled(self, parameters: Floats) -> tuple[Floats, Floats]:
         """Return steady-state angles and speed of every row (rows, 3), and initial states (R, 5)."""

@@ -26,15 +26,25 @@ _FAST_QUANTILE = 0.95
 
 @dataclass(frozen=True)
 class PriorTerms:
-    """The prior at some nodal values: its ``loss`` (minus two log density), ``information`` and ``gradient``.
+    """A prior at some parameters: its ``loss`` (minus two log density), ``information`` and ``gradient``.
 
-    ``information`` (P, P) and ``gradient`` (P,) are of all parameters, and zero for those of effects. The gradient is
-    minus half the derivative of the loss, as that of the likelihood.
+    ``information`` (P, P) and ``gradient`` (P,) are of all parameters; those of the maps' prior are zero for parameters
+    of effects. The gradient is minus half the derivative of the loss, as that of the likelihood. ``of_effects`` is the
+    part of the loss that belongs to priors of effects.
     """
 
     loss: float
     information: Floats
     gradient: Floats
+    of_effects: float = 0.0
+
+    def __add__(self, other: PriorTerms) -> PriorTerms:
+        return PriorTerms(
+            self.loss + other.loss,
+            self.information + other.information,
+            self.gradient + other.gradient,
+            self.of_effects + other.of_effects,
+        )
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,9 @@ import numpy as np
 
 from agvbench.diagnosis.terms import TERMS
 from agvbench.effects import Effect, effect_kinds
-from agvbench.effects.variants import effect_variants
+from agvbench.effects.variants import cause_of, effect_variants
 from agvbench.model import VehicleModel
+from agvbench.model.priors import is_limit
 from agvbench.types import Floats
 from agvbench.vehicle.geometry import Geometry
 
@@ -99,8 +100,10 @@ def _by_share(choices: list[list[float]]) -> list[list[list[float]]]:
 
 def given_effects(vehicle: VehicleModel | None, tried: Iterable[str]) -> tuple[tuple[str, ...], Floats]:
     """Return names and parameters (p,) of the effects that a vehicle is known to have, restricted to `tried`."""
-    known = {*tried}
-    given = [e for e in (vehicle.effects if vehicle else ()) if e.name in known and not e.is_null]
+    known, effects, priors = {*tried}, vehicle.effects if vehicle else (), vehicle.priors if vehicle else ()
+    # A null effect with a prior is a quantity that was measured, and may deviate by its error.
+    measured = {prior.effect for prior in priors if not is_limit(prior)}
+    given = [e for e in effects if e.name in known and not (e.is_null and cause_of(e.name) not in measured)]
     return tuple(e.name for e in given), np.array([value for e in given for value in e.values.values()])
 
 

@@ -55,9 +55,10 @@ class ScoredModel:
 
     @property
     def deviance(self) -> float:
-        """The cross-validated deviance: the loss of all runs, and of the maps' prior.
+        """The cross-validated deviance: the loss of all runs, and of the priors of maps and effects.
 
-        The prior is the prediction of nodal values from their neighbours, which no other fold makes.
+        The prior of the maps is the prediction of nodal values from their neighbours, which no other fold makes. Those
+        of effects are observations of their own, whether the model has the effect or lacks it.
         """
         return float(self.loss.sum()) + self.fit.prior.loss
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 from agvbench.diagnosis.criteria import SELECTION, VARIANT
 from agvbench.diagnosis.selection.actuators import CAMERA
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
-from agvbench.diagnosis.selection.stepwise import Selection, Selector
+from agvbench.diagnosis.selection.stepwise import ExcludedAlternative, Selection, Selector
 from agvbench.diagnosis.selection.variants import variant_candidates, with_extended_library
 from agvbench.effects.variants import cause_of, effect_variants
 
@@ -45,6 +45,51 @@ def replace_sequentially(selection: Selection, selector: Selector) -> Selection:
     rejected = {name: gain for name, gain in selection.rejected.items() if name not in current.names}
     tried = selection.tried + extended.tried
     return replace(selection, chosen=current, gains=gains, alternatives=alternatives, rejected=rejected, tried=tried)
+
+
+def excluded_by_priors(selection: Selection, selector: Selector) -> Selection:
+    """Return the selection with the alternatives of each effect that predict as well, but contradict a prior.
+
+    They are fitted without priors, so that a diagnosis states where a prior decided and not the campaign.
+    """
+    stated = {prior.effect for prior in selector.batch.readings.priors}
+    if not stated:
+        return selection
+    extended, chosen = with_extended_library(selector), selection.chosen
+    bare = extended.for_batch(extended.batch.with_priors(()))
+    of_priors = chosen.fit.prior.of_effects
+    excluded = {}
+    for name in selection.gains:
+        known = selection.alternatives.get(name, {})
+        compared = {
+            cause_of(other): (model, chosen.deviance - of_priors - model.deviance)
+            for other, model in _without_priors(bare, chosen, name, stated).items()
+            if model.is_fitted and cause_of(other) not in known
+        }
+        excluded[name] = {
+            other: ExcludedAlternative(gain, model.fit)
+            for other, (model, gain) in compared.items()
+            if -max(gain, chosen.fit.total_loss - of_priors - model.fit.total_loss) < SELECTION.alternative_margin
+        }
+    return replace(selection, excluded={name: found for name, found in excluded.items() if found})
+
+
+def _without_priors(bare: Selector, chosen: ScoredModel, name: str, stated: set[str]) -> dict[str, ScoredModel]:
+    """Return the models with another effect in the place of `name`: each of the `stated` ones, and all if it is one.
+
+    An effect that the model has already is fitted anew: its prior may be what makes the other one necessary. An effect
+    that only its prior makes necessary is replaced by nothing.
+    """
+    base, cause = bare.base(), cause_of(name)
+    without = bare.without_effect(base, chosen, name)
+    is_needed = without.deviance > chosen.deviance - chosen.fit.prior.of_effects + SELECTION.alternative_margin
+    models = _in_place_of(bare, base, chosen, name) if cause in stated and is_needed else {}
+    for other in sorted((stated & bare.candidates.keys()) - {cause}):
+        present = next((n for n in without.names if cause_of(n) == other), None)
+        if present not in bare.given:
+            rest = without if present is None else bare.without_effect(base, without, present)
+            models[other] = bare.with_effect(rest, other)
+    return models
 
 
 def _kept(known: dict[str, float], others: dict[str, ScoredModel]) -> dict[str, float]:

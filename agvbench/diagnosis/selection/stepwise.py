@@ -11,10 +11,19 @@ import numpy as np
 
 from agvbench.diagnosis.criteria import SELECTION, SelectionCriteria
 from agvbench.diagnosis.estimation.cross_validation import differs_from_null, trimmed_gain
+from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.residuals.residuals import pose_residuals
 from agvbench.diagnosis.selection.fitted_models import FittedModels, ScoredModel
 from agvbench.effects.variants import cause_of
+
+
+@dataclass(frozen=True)
+class ExcludedAlternative:
+    """An alternative that predicts as well without the priors of effects: its ``gain`` in deviance, and its ``fit``."""
+
+    gain: float
+    fit: Fit
 
 
 @dataclass(frozen=True)
@@ -23,8 +32,9 @@ class Selection:
 
     ``base`` is the model with the given effects only. ``chosen`` is the model with all effects that meet the selection
     criterion. ``alternatives`` maps each selected effect to those that predict as well in its place, with their
-    difference in deviance. ``gains`` are the increases of deviance when a selected effect is removed. ``rejected`` are
-    the gains of effects that do not meet the criterion. ``tried`` counts the fitted models.
+    difference in deviance, and ``excluded`` to those that would without the priors of effects. ``gains`` are the
+    increases of deviance when a selected effect is removed. ``rejected`` are the gains of effects that do not meet the
+    criterion. ``tried`` counts the fitted models.
     """
 
     base: ScoredModel
@@ -33,6 +43,7 @@ class Selection:
     gains: dict[str, float]
     rejected: dict[str, float]
     tried: int
+    excluded: dict[str, dict[str, ExcludedAlternative]] = field(default_factory=dict)
 
 
 @dataclass
@@ -77,15 +88,20 @@ class Selector(FittedModels):
         """Return whether the effects in `with_it` but not in `without` meet the selection criterion.
 
         An effect that is one `of_group` need not change the prediction noticeably: others of its group take its place.
+        Nor need one that a prior states: the same prediction by other effects contradicts the prior.
         """
         gain, group = without.loss - with_it.loss, self.batch.readings.group
-        by_maps = without.fit.prior.loss - with_it.fit.prior.loss
+        by_priors = without.fit.prior.loss - with_it.fit.prior.loss
         return bool(
             with_it.gain_over(without) > self.min_gain
-            and by_maps + trimmed_gain(gain, group, self.criteria.trimmed_share) > 0.0
-            and (of_group or self._changes_prediction(without, with_it))
+            and by_priors + trimmed_gain(gain, group, self.criteria.trimmed_share) > 0.0
+            and (of_group or self._is_stated(without, with_it) or self._changes_prediction(without, with_it))
             and all(differs_from_null(with_it.fit, name, group) for name in set(with_it.names) - set(without.names))
         )
+
+    def _is_stated(self, without: ScoredModel, with_it: ScoredModel) -> bool:
+        """Return whether the priors of effects alone gain enough to add the effects."""
+        return without.fit.prior.of_effects - with_it.fit.prior.of_effects > self.min_gain
 
     def _changes_prediction(self, without: ScoredModel, with_it: ScoredModel) -> bool:
         """Return whether the change of the prediction is large enough relative to the larger model's residuals."""

@@ -26,6 +26,9 @@ class ActuationDelayServos(Variant):
     limits: ClassVar[str] = (
         "what all delays have in common cannot be distinguished from mocap_latency where runs begin at rest"
     )
+    equivalents: ClassVar[Mapping[str, Mapping[str, float]]] = {
+        "actuation_delay.delay_s": {"steering_s": 0.5, "drive_s": 0.5}
+    }
 
     steering_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.05)
     drive_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.05)

@@ -26,6 +26,9 @@ class ActuationDelayUneven(Variant):
     limits: ClassVar[str] = (
         "what all delays have in common cannot be distinguished from mocap_latency where runs begin at rest"
     )
+    equivalents: ClassVar[Mapping[str, Mapping[str, float]]] = {
+        "actuation_delay.delay_s": {"front_s": 1 / 3, "rear_s": 1 / 3, "drive_s": 1 / 3}
+    }
 
     front_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.05)
     rear_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.05)

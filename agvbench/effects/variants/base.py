@@ -18,9 +18,18 @@ class Variant(Effect, ABC):
     """Another equation for the effect ``variant_of`` of the library; vehicle files contain its own name.
 
     A variant with an exponent represents a family of equations. A diagnosis starts from the library's exponent.
+
+    Attributes
+    ----------
+    variant_of
+        The effect of the library.
+    equivalents
+        The library's parameters, as ``effect.parameter``, that are weighted sums of the variant's own: the weights by
+        name. A prior on such a parameter holds for the sum. Parameters of the same name need no entry.
     """
 
     variant_of: ClassVar[str]
+    equivalents: ClassVar[Mapping[str, Mapping[str, float]]] = MappingProxyType({})
 
     @classmethod
     @abstractmethod
@@ -39,3 +48,24 @@ def cause_of(name: str) -> str:
     """Return the name of the effect that `name` is a variant of, or `name` itself."""
     variant = effect_variants().get(name)
     return name if variant is None else variant.variant_of
+
+
+def weights_in(name: str, quantity: str) -> Mapping[str, float]:
+    """Return the weights of the parameters of the effect or variant `name` in a `quantity` of the library.
+
+    Examples
+    --------
+    >>> weights_in("mocap_latency", "mocap_latency.latency_s")
+    {'latency_s': 1.0}
+    >>> weights_in("actuation_delay_servos", "actuation_delay.delay_s")
+    {'steering_s': 0.5, 'drive_s': 0.5}
+    >>> weights_in("steering_lag", "mocap_latency.latency_s")
+    {}
+    """
+    variant = effect_variants().get(name)
+    if variant is not None and quantity in variant.equivalents:
+        return dict(variant.equivalents[quantity])
+    effect, _, parameter = quantity.partition(".")
+    if cause_of(name) != effect or (variant and parameter not in {p.name for p in variant.parameters()}):
+        return {}
+    return {parameter: 1.0}

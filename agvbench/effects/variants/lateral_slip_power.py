@@ -24,6 +24,9 @@ class LateralSlipPower(Variant):
     relaxes: ClassVar[str] = "slip is negligible (3.2)"
     reference: ClassVar[str] = "Gillespie 1992, ch. 6, for p = 2; the power is agvbench's own"
     limits: ClassVar[str] = "several speeds are needed: at one speed it is a scale of the steering"
+    equivalents: ClassVar[Mapping[str, Mapping[str, float]]] = {
+        "lateral_slip.gradient": {"loss": 1.0 / _TYPICAL_MPS**2}
+    }
 
     loss: float = parameter(unit="–", low=-0.3, high=3.0, scale=0.1)
     exponent: float = parameter(unit="–", low=0.2, high=4.0, scale=1.0, null=2.0)

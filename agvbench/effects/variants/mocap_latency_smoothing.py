@@ -27,6 +27,10 @@ class MocapLatencySmoothing(Variant):
     limits: ClassVar[str] = (
         "at a constant speed it cannot be distinguished from mocap_latency; a moving average looks like both"
     )
+    equivalents: ClassVar[Mapping[str, Mapping[str, float]]] = {
+        # A slow motion is seen later by both.
+        "mocap_latency.latency_s": {"latency_s": 1.0, "time_constant_s": 1.0}
+    }
 
     latency_s: float = parameter(unit="s", low=-0.5, high=2.0, scale=0.05)
     time_constant_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.05)

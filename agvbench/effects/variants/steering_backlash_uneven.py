@@ -24,6 +24,9 @@ class SteeringBacklashUneven(Variant):
         "Tao and Kokotović 1996, Adaptive Control of Systems with Actuator and Sensor Nonlinearities (play)"
     )
     limits: ClassVar[str] = "the width of an axle is visible only where its commands reach an angle from both sides"
+    equivalents: ClassVar[Mapping[str, Mapping[str, float]]] = {
+        "steering_backlash.width_rad": {"front_width_rad": 0.5, "rear_width_rad": 0.5}
+    }
 
     front_width_rad: float = parameter(unit="rad", low=0.0, high=0.5, scale=0.03)
     rear_width_rad: float = parameter(unit="rad", low=0.0, high=0.5, scale=0.03)

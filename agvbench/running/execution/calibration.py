@@ -11,6 +11,7 @@ from agvbench.campaign import Campaign, CampaignWriter
 from agvbench.campaign.manifest import PLANNED_TABLE
 from agvbench.errors import AgvbenchError, FitError, VehicleError
 from agvbench.model import VehicleModel
+from agvbench.model.priors import Prior
 from agvbench.running.configuration.provenance import recorded_rows
 from agvbench.running.execution.run_records import attempts_by_run
 from agvbench.types import Outcome, Run
@@ -21,11 +22,14 @@ RUNS_DIGEST = "calibration_runs_sha256"
 """The entry of a model's provenance that says from which runs a bench calibrated it."""
 
 
-def calibrate_campaign(writer: CampaignWriter, *, maps: str, awaited: Collection[str] = ()) -> VehicleModel:
+def calibrate_campaign(
+    writer: CampaignWriter, *, maps: str, awaited: Collection[str] = (), priors: tuple[Prior, ...] = ()
+) -> VehicleModel:
     """Fit the static maps from what `writer` recorded so far; keep model and measurements beside the campaign.
 
     ``awaited`` are calibration runs of the session that are still to be driven: there must be none. A model that was
-    kept is taken if it was fitted from the very runs that the campaign has, or if runs were driven with it.
+    kept is taken if it was fitted from the very runs that the campaign has, or if runs were driven with it. A fitted
+    model has the ``priors`` of the nominal vehicle.
 
     Raises
     ------
@@ -58,7 +62,7 @@ def calibrate_campaign(writer: CampaignWriter, *, maps: str, awaited: Collection
             where=writer.path,
             remedy="drive bench_calibration.py too, or begin a session with --calibration FILE",
         ) from None
-    model = replace(calibration.model, provenance={**calibration.model.provenance, RUNS_DIGEST: digest})
+    model = replace(calibration.model, provenance={**calibration.model.provenance, RUNS_DIGEST: digest}, priors=priors)
     writer.write_table(MEASUREMENTS_TABLE, calibration.measurements)
     writer.write_beside(VEHICLE_FILE, model.save)
     return model

@@ -201,7 +201,10 @@ def _bench(
     on_progress: Callable[[str], None],
 ) -> Bench:
     def calibrated(awaited: Collection[str]) -> VehicleModel:
-        return models.get("calibrated") or calibrate_campaign(writer, maps=settings.maps, awaited=awaited)
+        priors = models["uncalibrated"].priors
+        return models.get("calibrated") or calibrate_campaign(
+            writer, maps=settings.maps, awaited=awaited, priors=priors
+        )
 
     return Bench(
         settings,
