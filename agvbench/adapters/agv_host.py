@@ -133,7 +133,7 @@ class AgvHost(Host):
         self._closed, self._left = threading.Event(), False
         self._outdated: dict[int, int] = {}  # by source: the last command sent before the vehicle was placed anew
         self._reported_hanging = False
-        adapter.start(self)
+        self._start_adapter(adapter, lambda: adapter.start(self))
         self._run("commands", self._serve_commands)
         if not self._lock_step:
             self._run("watchdog", self._watch)

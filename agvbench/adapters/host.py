@@ -8,10 +8,13 @@ from __future__ import annotations
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from typing import Any
 
 from msgspec.structs import replace
 
+from agvbench.adapters.contract import AgvAdapter, MocapAdapter
+from agvbench.adapters.thread_failures import report_thread_failures
 from agvbench.bus.clock import Clock
 from agvbench.bus.counters import Sequence
 from agvbench.bus.keys import IDENTITY, TIME, Keys
@@ -54,6 +57,7 @@ class Host(ABC):
         self._lock = threading.RLock()
         self._events, self._reporting = Sequence(), threading.Lock()
         self._threads: list[threading.Thread] = []
+        self._watching = ExitStack()
         self._queryable = session.declare_queryable(
             keys.queryable(role, "*"), zenoh.handlers.FifoChannel(_QUERIES_WAITING)
         )
@@ -124,12 +128,27 @@ class Host(ABC):
             # The session is closed, or just being closed by another thread: there is no receiver any more.
             return
 
+    def _start_adapter(self, adapter: AgvAdapter | MocapAdapter, start: Callable[[], None]) -> None:
+        """Start the adapter, whose threads are watched until it is closed; one that cannot start is closed at once."""
+        self._watching.enter_context(report_thread_failures(adapter, self.failed))
+        try:
+            start()
+        except BaseException as error:
+            self._watching.close()
+            with suppress(Exception):
+                adapter.close()
+            if isinstance(error, Exception):
+                raise as_agvbench_error(error, self._role) from error
+            raise
+
     def _close_adapter(self, close: Callable[[], None]) -> None:
         """Release the adapter; what it raises names it."""
         try:
             close()
         except (Exception, SystemExit) as error:
             raise as_agvbench_error(error, self._role) from error
+        finally:
+            self._watching.close()
 
     def close(self) -> None:
         """Leave the bus."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from agvbench.adapters.contract import MocapAdapter
+from agvbench.adapters.frame_recorder import FrameRecorder
 from agvbench.adapters.host import Host
 from agvbench.bus.clock import Clock
 from agvbench.bus.counters import LossCounter, Sequence
@@ -34,10 +35,19 @@ class MocapHost(Host):
         Driven by this host alone; closed with it.
     listens_for_truth
         Whether true poses come over the bus; otherwise `see` is called in this process, or nothing is simulated.
+    recorder
+        Also receives what the adapter reports.
     """
 
     def __init__(
-        self, session: Any, keys: Keys, adapter: MocapAdapter, clock: Clock, *, listens_for_truth: bool
+        self,
+        session: Any,
+        keys: Keys,
+        adapter: MocapAdapter,
+        clock: Clock,
+        *,
+        listens_for_truth: bool,
+        recorder: FrameRecorder | None = None,
     ) -> None:
         import zenoh
 
@@ -60,7 +70,8 @@ class MocapHost(Host):
         if listens_for_truth:
             self._subscriber = session.declare_subscriber(keys.truth, zenoh.handlers.FifoChannel(_TRUTHS_WAITING))
             self._run("truth", self._serve_truth)
-        adapter.start(self)
+        reports = self if recorder is None else recorder.before(self)
+        self._start_adapter(adapter, lambda: adapter.start(reports))
         self._announce()
 
     def _identity(self) -> bytes:
