@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
 from typing import NamedTuple
 
-from agvbench.adapters.contract import AdapterOptions
+from agvbench.adapters.contract import AdapterOptions, MocapAdapter
 from agvbench.adapters.frame_recorder import FrameRecorder, StreamSummary, listen
+from agvbench.adapters.host import as_agvbench_error, checked_identity
 from agvbench.adapters.registry import open_mocap
 from agvbench.adapters.thread_failures import report_thread_failures
 from agvbench.bus.bus_config import BusConfig
@@ -33,27 +35,46 @@ class SeenCamera(NamedTuple):
     summary: StreamSummary | None
 
 
+def identify_here(spec: str, options: AdapterOptions) -> MocapIdentity:
+    """Open the camera `spec`, and return its identity.
+
+    Raises
+    ------
+    AgvbenchError
+        If one of the two fails.
+    """
+    with _opened(spec, options) as camera:
+        return checked_identity(camera, MOCAP, MocapIdentity)
+
+
 def listen_here(spec: str, options: AdapterOptions) -> SeenCamera:
     """Open the camera `spec`, listen to it for a second, and close it.
 
     Raises
     ------
     AgvbenchError
-        If it cannot be opened, or reports an error.
+        If it cannot be opened or started, or reports an error.
     """
-    camera, recorder = open_mocap(spec, options), FrameRecorder(options.clock)
-    try:
-        identity = camera.identity()
+    recorder = FrameRecorder(options.clock)
+    with _opened(spec, options) as camera, report_thread_failures(camera, recorder.failed):
+        identity = checked_identity(camera, MOCAP, MocapIdentity)
         if identity.simulated:
             return SeenCamera(identity, None)
-        with report_thread_failures(camera, recorder.failed):
-            camera.start(recorder)
-            summary = listen(recorder, options.clock, WATCHED_S, FIRST_FRAME_LIMIT_S)
-    finally:
-        camera.close()
-    if error := recorder.take_error():
-        raise error
+        camera.start(recorder)
+        summary = listen(recorder, options.clock, WATCHED_S, FIRST_FRAME_LIMIT_S)
+        if error := recorder.take_error():
+            raise error
     return SeenCamera(identity, summary)
+
+
+@contextmanager
+def _opened(spec: str, options: AdapterOptions) -> Iterator[MocapAdapter]:
+    """Give the camera, and close it; what its methods raise names it."""
+    try:
+        with closing(open_mocap(spec, options)) as camera:
+            yield camera
+    except Exception as error:
+        raise as_agvbench_error(error, MOCAP) from error
 
 
 def listen_on_bus(connect: Sequence[str], lab: str, vehicle: str, config: BusConfig | None = None) -> SeenCamera:

@@ -9,7 +9,7 @@ import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
-from typing import Any
+from typing import Any, TypeVar
 
 from msgspec.structs import replace
 
@@ -20,6 +20,7 @@ from agvbench.bus.counters import Sequence
 from agvbench.bus.keys import IDENTITY, TIME, Keys
 from agvbench.bus.messages.codec import ENCODING, encode
 from agvbench.bus.messages.event import Event, Level
+from agvbench.bus.messages.identity import AgvIdentity, MocapIdentity
 from agvbench.bus.messages.request import TimeMessage
 from agvbench.bus.queries import refusal
 from agvbench.errors import AgvbenchError, LinkError
@@ -32,6 +33,27 @@ def as_agvbench_error(error: BaseException, role: str) -> AgvbenchError:
     if isinstance(error, AgvbenchError):
         return error
     return LinkError(f"the {role} adapter failed", value=f"{type(error).__name__}: {error}")
+
+
+_Identity = TypeVar("_Identity", AgvIdentity, MocapIdentity)
+
+
+def checked_identity(adapter: AgvAdapter | MocapAdapter, role: str, kind: type[_Identity]) -> _Identity:
+    """Return the identity of `adapter`.
+
+    Raises
+    ------
+    AgvbenchError
+        If that fails, or it is not of this kind.
+    """
+    try:
+        identity: object = adapter.identity()
+    except Exception as error:
+        raise as_agvbench_error(error, role) from error
+    if not isinstance(identity, kind):
+        remedy = f"return one; agvbench {role} ADAPTER --check says what else is wrong"
+        raise LinkError(f"identity is no {kind.__name__}", where=f"{role} adapter", value=repr(identity), remedy=remedy)
+    return identity
 
 
 class Host(ABC):
@@ -135,6 +157,9 @@ class Host(ABC):
             start()
         except BaseException as error:
             self._watching.close()
+            with suppress(Exception):
+                if isinstance(adapter, AgvAdapter):
+                    adapter.stop()
             with suppress(Exception):
                 adapter.close()
             if isinstance(error, Exception):

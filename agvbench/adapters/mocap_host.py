@@ -9,12 +9,13 @@ import numpy as np
 
 from agvbench.adapters.contract import MocapAdapter
 from agvbench.adapters.frame_recorder import FrameRecorder
-from agvbench.adapters.host import Host
+from agvbench.adapters.host import Host, checked_identity
 from agvbench.bus.clock import Clock
 from agvbench.bus.counters import LossCounter, Sequence
 from agvbench.bus.keys import MOCAP, RESET, Keys
 from agvbench.bus.messages.codec import ENCODING, MAX_ROWS, encode
 from agvbench.bus.messages.frames import FrameClock, FramesFlags, FramesMessage, pack_columns, pack_row
+from agvbench.bus.messages.identity import MocapIdentity
 from agvbench.bus.messages.request import decode_reset
 from agvbench.bus.messages.truth import Truth, decode_truth
 from agvbench.errors import LinkError, MessageError
@@ -56,7 +57,7 @@ class MocapHost(Host):
         sequence = Sequence()
         self._source, self._take, self._now = sequence.source, sequence.take, clock.now
         self._truth_loss = LossCounter()
-        self._identity_bytes = encode(adapter.identity())
+        self._identity_bytes = encode(checked_identity(adapter, MOCAP, MocapIdentity))
         self._answers |= {RESET: self._reset}
         self._publisher = session.declare_publisher(
             keys.report,

@@ -199,6 +199,18 @@ def test_a_camera_of_a_lab_is_listened_to(tmp_path: Path) -> None:
     assert checks["adapters"][1] == "labcam is opened, nominal rate 100 Hz "
 
 
+def test_a_broken_camera_of_a_lab_is_said(tmp_path: Path) -> None:
+    file = tmp_path / "labcam.py"
+    file.write_text(CAMERA + "    def start(self, reports): raise KeyError('cable')\n")
+    state, said = found(lab(tmp_path, mocap=str(file)), "mocap")["mocap"]
+    assert (state, said) == (FindingState.BAD, "the mocap adapter failed: KeyError: 'cable' ")
+    file.write_text(CAMERA + "    def identity(self): return 5\n")
+    for state, said in found(lab(tmp_path, mocap=str(file)), "adapters", "mocap").values():
+        assert (state, said.startswith("mocap adapter: identity is no MocapIdentity: 5; return one")) == (
+            FindingState.BAD, True,
+        )  # fmt: skip
+
+
 @pytest.mark.real_time
 def test_a_camera_on_the_bus_is_listened_to_without_a_vehicle(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -163,4 +163,4 @@ def _close_running(camera: MocapAdapter, recorder: FrameRecorder, options: Adapt
     call("close", camera.close)
     _require_quiet(recorder, options)
     call("close again", camera.close)
-    return "while frames arrive; nothing is reported after it"
+    return "nothing is reported after it"

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import closing
 
-from agvbench.adapters.registry import open_agv, open_mocap
+from agvbench.adapters.camera_link import identify_here
+from agvbench.adapters.registry import open_agv
 from agvbench.bus.messages.identity import AgvIdentity, Identity, MocapIdentity
 from agvbench.model import VehicleModel
 from agvbench.running.configuration.settings import BenchSettings
@@ -37,8 +38,7 @@ class AdaptersCheck(Check):
 def _camera_alone(settings: BenchSettings, models: Mapping[str, VehicleModel]) -> str:
     if settings.connect:
         return "the camera is looked for on the bus, without a vehicle"
-    with closing(open_mocap(settings.mocap, adapter_options(settings, models))) as camera:
-        return _camera(camera.identity())
+    return _camera(identify_here(settings.mocap, adapter_options(settings, models)))
 
 
 def _vehicle_alone(settings: BenchSettings, models: Mapping[str, VehicleModel]) -> str:
