@@ -175,7 +175,7 @@ class MocapAdapter(ABC):
     scheme: ClassVar[str]
     """What users write before the colon: ``natnet:192.168.0.2`` is scheme ``natnet``, address ``192.168.0.2``."""
     option_names: ClassVar[tuple[str, ...]] = ()
-    """Which names ``--camera NAME=VALUE`` may have; their values are in ``options.camera``. All others are refused."""
+    """Which names ``--camera NAME=VALUE`` may have, for `check`; their values are in ``options.camera``."""
 
     @classmethod
     @abstractmethod

@@ -17,6 +17,9 @@ from typing import NamedTuple
 from agvbench.adapters.contract import AgvAdapter, MocapAdapter
 from agvbench.errors import AgvbenchError, LinkError
 
+_PACKAGES = "agvbench.adapters.natnet."
+"""Whose threads are those of the shipped adapters, which lie in another folder."""
+
 Report = Callable[[Exception], None]
 
 
@@ -77,7 +80,7 @@ def report_thread_failures(adapter: object, report: Report) -> Iterator[None]:
 
 
 def _folders(adapter: object) -> Iterator[Path]:
-    """Give the folders of the files that define the adapter's class, and of adapters that it holds.
+    """Give the folders of the files that define the adapter's class, and what it holds of adapters and their packages.
 
     The contract itself, which all of them derive from, does not count.
     """
@@ -87,6 +90,8 @@ def _folders(adapter: object) -> Iterator[Path]:
     for held in vars(adapter).values():
         if isinstance(held, (AgvAdapter, MocapAdapter)):
             yield from _folders(held)
+        elif type(held).__module__.startswith(_PACKAGES):
+            yield _folder(inspect.getfile(type(held)))
 
 
 def _folder(file: str) -> Path:
