@@ -125,7 +125,7 @@ class StreamSummary:
         if self.pose is None:
             return said
         x_m, y_m, heading_rad = self.pose
-        return f"{said}, last pose x = {x_m:.3f} m, y = {y_m:.3f} m, heading {math.degrees(heading_rad):.1f}°"
+        return f"{said}, last pose x = {x_m:z.3f} m, y = {y_m:z.3f} m, heading {math.degrees(heading_rad):z.1f}°"
 
 
 def summarise(frames: Frames, duration_s: float) -> StreamSummary:

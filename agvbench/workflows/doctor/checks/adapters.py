@@ -25,20 +25,16 @@ class AdaptersCheck(Check):
         """Say which adapters answer, and in which unit."""
         settings = lab.settings
         models = known_models(settings)
+        if lab.names_camera_alone and settings.connect:
+            return Finding(FindingState.IDLE, "the camera on the bus is examined alone: see mocap")
         if lab.names_camera_alone:
-            return Finding(FindingState.GOOD, _camera_alone(settings, models))
+            return Finding(FindingState.GOOD, _camera(identify_here(settings.mocap, adapter_options(settings, models))))
         if lab.names_vehicle_alone:
             return Finding(FindingState.GOOD, _vehicle_alone(settings, models))
         with open_session_rig(settings, models) as link:
             identity = link.identity()
         choose_placer(settings.place, simulated=identity.simulated)
         return Finding(FindingState.GOOD, f"{_vehicle(identity.agv)}; {_camera(identity.mocap)}")
-
-
-def _camera_alone(settings: BenchSettings, models: Mapping[str, VehicleModel]) -> str:
-    if settings.connect:
-        return "the camera is looked for on the bus, without a vehicle"
-    return _camera(identify_here(settings.mocap, adapter_options(settings, models)))
 
 
 def _vehicle_alone(settings: BenchSettings, models: Mapping[str, VehicleModel]) -> str:
