@@ -8,13 +8,14 @@ from collections.abc import Callable
 from typing import Any
 
 from agvbench.adapters.contract import SILENCE_LIMIT_S, AgvAdapter
-from agvbench.adapters.host import Host
+from agvbench.adapters.host import Host, checked_identity
 from agvbench.bus.clock import Clock
 from agvbench.bus.counters import LossCounter, RateLimitedCounter, Sequence
 from agvbench.bus.keys import AGV, CLAIM, RELEASE, REPLAY, RESET, Keys
 from agvbench.bus.messages.codec import encode
 from agvbench.bus.messages.command import CommandFlags, CommandMessage, decode_command
 from agvbench.bus.messages.event import COMMANDS_LATE, COMMANDS_LOST, RUNNER_SILENT, Level
+from agvbench.bus.messages.identity import AgvIdentity
 from agvbench.bus.messages.request import decode_claim, decode_replay, decode_reset
 from agvbench.bus.messages.truth import Truth, TruthFlags
 from agvbench.errors import AdapterGoneError, LinkError, MessageError, RunStoppedError
@@ -119,9 +120,8 @@ class AgvHost(Host):
         self.loss = LossCounter()
         self.malformed, self.reordered = RateLimitedCounter(), RateLimitedCounter(first=_REORDERED_REPORTED)
         self._heard_s: float | None = None
-        self._identity_bytes = encode(adapter.identity())
-        self._lock_step = adapter.identity().lock_step
-        neutral = adapter.identity().neutral
+        identity = checked_identity(adapter, AGV, AgvIdentity)
+        self._identity_bytes, self._lock_step, neutral = encode(identity), identity.lock_step, identity.neutral
         self._neutral_drive, self._neutral = neutral, Command(neutral, neutral, neutral)
         self._gap_limit_s = min(adapter.watchdog_s, SILENCE_LIMIT_S)
         self._rest()
@@ -133,7 +133,7 @@ class AgvHost(Host):
         self._closed, self._left = threading.Event(), False
         self._outdated: dict[int, int] = {}  # by source: the last command sent before the vehicle was placed anew
         self._reported_hanging = False
-        adapter.start(self)
+        self._start_adapter(adapter, lambda: adapter.start(self))
         self._run("commands", self._serve_commands)
         if not self._lock_step:
             self._run("watchdog", self._watch)

@@ -7,6 +7,7 @@ with one subclass and its ``scheme``; it is found by name and inherits the tests
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 import math
 from abc import ABC, abstractmethod
@@ -49,7 +50,9 @@ class AdapterOptions:
     calibration_hash
         Of the vehicle model that the bench uses, for provenance.
     camera
-        Options of a simulated camera by name (`agvbench.simulator.Camera.from_options`).
+        Options of the camera by name (``--camera NAME=VALUE``); values of a command line are texts. Which there are is
+        the mocap adapter's `MocapAdapter.option_names`; those of a simulated camera are the parameters of
+        `agvbench.simulator.Camera`.
     clock
         Real time, for whatever waits.
     """
@@ -171,15 +174,28 @@ class MocapAdapter(ABC):
 
     scheme: ClassVar[str]
     """What users write before the colon: ``natnet:192.168.0.2`` is scheme ``natnet``, address ``192.168.0.2``."""
+    option_names: ClassVar[tuple[str, ...]] = ()
+    """Which names ``--camera NAME=VALUE`` may have, for `check`; their values are in ``options.camera``."""
 
     @classmethod
     @abstractmethod
     def open(cls, address: str, options: AdapterOptions) -> Self:
         """Connect to what is at `address` (``""`` if the user gave none)."""
 
-    @classmethod  # noqa: B027  (an adapter need not say it earlier)
+    @classmethod
     def check(cls, address: str, options: AdapterOptions) -> None:
-        """Raise what `open` would raise of `address` and `options` alone, and open nothing."""
+        """Raise what can be said of `address` and `options` without opening anything; called before `open`.
+
+        The default refuses camera options that are not in `option_names`; an adapter that checks more calls it first.
+
+        Raises
+        ------
+        FlagError
+            If there is no such option.
+        """
+        for name in options.camera:
+            if name not in cls.option_names:
+                raise _no_such_option(name, cls.option_names, cls.scheme)
 
     @abstractmethod
     def identity(self) -> MocapIdentity:
@@ -199,7 +215,16 @@ class MocapAdapter(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Release what was opened; called once."""
+        """Release what was opened, and report nothing any more; before or just after `start`, and again, too."""
+
+
+def _no_such_option(name: str, known: tuple[str, ...], scheme: str) -> FlagError:
+    close = difflib.get_close_matches(name, known, n=1)
+    remedy = f"did you mean '{close[0]}'?" if close else "leave it out, or declare it in option_names of the adapter"
+    return FlagError(
+        f"not an option of the camera {scheme}", where="--camera", value=repr(name),
+        limit=" ".join(known) or "it has no options", remedy=remedy,
+    )  # fmt: skip
 
 
 NO_POSES = np.empty((0, 3))

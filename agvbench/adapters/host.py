@@ -8,15 +8,19 @@ from __future__ import annotations
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any
+from contextlib import ExitStack, suppress
+from typing import Any, TypeVar
 
 from msgspec.structs import replace
 
+from agvbench.adapters.contract import AgvAdapter, MocapAdapter
+from agvbench.adapters.thread_failures import report_thread_failures
 from agvbench.bus.clock import Clock
 from agvbench.bus.counters import Sequence
 from agvbench.bus.keys import IDENTITY, TIME, Keys
 from agvbench.bus.messages.codec import ENCODING, encode
 from agvbench.bus.messages.event import Event, Level
+from agvbench.bus.messages.identity import AgvIdentity, MocapIdentity
 from agvbench.bus.messages.request import TimeMessage
 from agvbench.bus.queries import refusal
 from agvbench.errors import AgvbenchError, LinkError
@@ -29,6 +33,27 @@ def as_agvbench_error(error: BaseException, role: str) -> AgvbenchError:
     if isinstance(error, AgvbenchError):
         return error
     return LinkError(f"the {role} adapter failed", value=f"{type(error).__name__}: {error}")
+
+
+_Identity = TypeVar("_Identity", AgvIdentity, MocapIdentity)
+
+
+def checked_identity(adapter: AgvAdapter | MocapAdapter, role: str, kind: type[_Identity]) -> _Identity:
+    """Return the identity of `adapter`.
+
+    Raises
+    ------
+    AgvbenchError
+        If that fails, or it is not of this kind.
+    """
+    try:
+        identity: object = adapter.identity()
+    except Exception as error:
+        raise as_agvbench_error(error, role) from error
+    if not isinstance(identity, kind):
+        remedy = f"return one; agvbench {role} ADAPTER --check says what else is wrong"
+        raise LinkError(f"identity is no {kind.__name__}", where=f"{role} adapter", value=repr(identity), remedy=remedy)
+    return identity
 
 
 class Host(ABC):
@@ -54,6 +79,7 @@ class Host(ABC):
         self._lock = threading.RLock()
         self._events, self._reporting = Sequence(), threading.Lock()
         self._threads: list[threading.Thread] = []
+        self._watching = ExitStack()
         self._queryable = session.declare_queryable(
             keys.queryable(role, "*"), zenoh.handlers.FifoChannel(_QUERIES_WAITING)
         )
@@ -124,12 +150,30 @@ class Host(ABC):
             # The session is closed, or just being closed by another thread: there is no receiver any more.
             return
 
+    def _start_adapter(self, adapter: AgvAdapter | MocapAdapter, start: Callable[[], None]) -> None:
+        """Start the adapter, whose threads are watched until it is closed; one that cannot start is closed at once."""
+        self._watching.enter_context(report_thread_failures(adapter, self.failed))
+        try:
+            start()
+        except BaseException as error:
+            self._watching.close()
+            with suppress(Exception):
+                if isinstance(adapter, AgvAdapter):
+                    adapter.stop()
+            with suppress(Exception):
+                adapter.close()
+            if isinstance(error, Exception):
+                raise as_agvbench_error(error, self._role) from error
+            raise
+
     def _close_adapter(self, close: Callable[[], None]) -> None:
         """Release the adapter; what it raises names it."""
         try:
             close()
         except (Exception, SystemExit) as error:
             raise as_agvbench_error(error, self._role) from error
+        finally:
+            self._watching.close()
 
     def close(self) -> None:
         """Leave the bus."""

@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 
 from agvbench.adapters.contract import MocapAdapter
-from agvbench.adapters.host import Host
+from agvbench.adapters.frame_recorder import FrameRecorder
+from agvbench.adapters.host import Host, checked_identity
 from agvbench.bus.clock import Clock
 from agvbench.bus.counters import LossCounter, Sequence
 from agvbench.bus.keys import MOCAP, RESET, Keys
 from agvbench.bus.messages.codec import ENCODING, MAX_ROWS, encode
 from agvbench.bus.messages.frames import FrameClock, FramesFlags, FramesMessage, pack_columns, pack_row
+from agvbench.bus.messages.identity import MocapIdentity
 from agvbench.bus.messages.request import decode_reset
 from agvbench.bus.messages.truth import Truth, decode_truth
 from agvbench.errors import LinkError, MessageError
@@ -34,10 +36,19 @@ class MocapHost(Host):
         Driven by this host alone; closed with it.
     listens_for_truth
         Whether true poses come over the bus; otherwise `see` is called in this process, or nothing is simulated.
+    recorder
+        Also receives what the adapter reports.
     """
 
     def __init__(
-        self, session: Any, keys: Keys, adapter: MocapAdapter, clock: Clock, *, listens_for_truth: bool
+        self,
+        session: Any,
+        keys: Keys,
+        adapter: MocapAdapter,
+        clock: Clock,
+        *,
+        listens_for_truth: bool,
+        recorder: FrameRecorder | None = None,
     ) -> None:
         import zenoh
 
@@ -46,7 +57,7 @@ class MocapHost(Host):
         sequence = Sequence()
         self._source, self._take, self._now = sequence.source, sequence.take, clock.now
         self._truth_loss = LossCounter()
-        self._identity_bytes = encode(adapter.identity())
+        self._identity_bytes = encode(checked_identity(adapter, MOCAP, MocapIdentity))
         self._answers |= {RESET: self._reset}
         self._publisher = session.declare_publisher(
             keys.report,
@@ -60,7 +71,8 @@ class MocapHost(Host):
         if listens_for_truth:
             self._subscriber = session.declare_subscriber(keys.truth, zenoh.handlers.FifoChannel(_TRUTHS_WAITING))
             self._run("truth", self._serve_truth)
-        adapter.start(self)
+        reports = self if recorder is None else recorder.before(self)
+        self._start_adapter(adapter, lambda: adapter.start(reports))
         self._announce()
 
     def _identity(self) -> bytes:

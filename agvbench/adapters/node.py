@@ -10,6 +10,7 @@ from msgspec.structs import replace
 
 from agvbench.adapters.agv_host import AgvHost
 from agvbench.adapters.contract import AdapterOptions
+from agvbench.adapters.frame_recorder import FrameRecorder
 from agvbench.adapters.mocap_host import MocapHost
 from agvbench.adapters.registry import open_agv, open_mocap
 from agvbench.bus.clock import Clock
@@ -22,7 +23,13 @@ from agvbench.errors import AdapterGoneError
 
 @contextmanager
 def host_adapters(
-    session: Any, lab: str, options: AdapterOptions, *, agv: str | None, mocap: str | None
+    session: Any,
+    lab: str,
+    options: AdapterOptions,
+    *,
+    agv: str | None,
+    mocap: str | None,
+    recorder: FrameRecorder | None = None,
 ) -> Iterator[None]:
     """Put adapters on the bus while the context lasts; on the way out the vehicle is stopped first.
 
@@ -39,6 +46,8 @@ def host_adapters(
         For both adapters.
     agv, mocap
         Adapter specifications (``"sim"``); None where another node hosts that adapter.
+    recorder
+        Also receives what the camera reports.
 
     Raises
     ------
@@ -50,7 +59,7 @@ def host_adapters(
         camera = None
         if mocap is not None:
             adapter = open_mocap(mocap, options)
-            camera = MocapHost(session, keys, adapter, options.clock, listens_for_truth=agv is None)
+            camera = MocapHost(session, keys, adapter, options.clock, listens_for_truth=agv is None, recorder=recorder)
             stack.callback(camera.close)
         if agv is not None:
             vehicle = open_agv(agv, options)

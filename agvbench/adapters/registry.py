@@ -49,12 +49,20 @@ def parse_spec(spec: str) -> tuple[str, str]:
 
 def open_agv(spec: str, options: AdapterOptions) -> AgvAdapter:
     """Open the AGV adapter that `spec` names, or raise `LinkError`."""
-    return _opened("agv", spec, options, agv_adapters(), AgvAdapter)  # type: ignore[type-abstract]
+    return _opened(_named("agv", spec, agv_adapters(), AgvAdapter), spec, options)  # type: ignore[type-abstract]
 
 
 def open_mocap(spec: str, options: AdapterOptions) -> MocapAdapter:
-    """Open the mocap adapter that `spec` names, or raise `LinkError`."""
-    return _opened("mocap", spec, options, mocap_adapters(), MocapAdapter)  # type: ignore[type-abstract]
+    """Open the mocap adapter that `spec` names.
+
+    Raises
+    ------
+    AgvbenchError
+        If there is none, it does not have such options, or it cannot be opened.
+    """
+    adapter = _named("mocap", spec, mocap_adapters(), MocapAdapter)  # type: ignore[type-abstract]
+    adapter.check(parse_spec(spec)[1], options)
+    return _opened(adapter, spec, options)
 
 
 def check_specs(agv: str, mocap: str, options: AdapterOptions) -> None:
@@ -74,11 +82,8 @@ def check_mocap(spec: str, options: AdapterOptions) -> None:
     adapter.check(parse_spec(spec)[1], options)
 
 
-def _opened(
-    role: str, spec: str, options: AdapterOptions, known: dict[str, type[_Adapter]], base: type[_Adapter]
-) -> _Adapter:
+def _opened(adapter: type[_Adapter], spec: str, options: AdapterOptions) -> _Adapter:
     scheme, address = parse_spec(spec)
-    adapter = _named(role, spec, known, base)
     return open_plug_in(adapter, scheme, address, options) if is_file(scheme) else adapter.open(address, options)
 
 

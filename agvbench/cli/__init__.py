@@ -22,7 +22,8 @@ from agvbench.errors import AgvbenchError, FlagError
 
 _EPILOG = """\
 exit codes: 0 done; 1 the answer is "no" (compare: a regression,
-diagnose --check: not adequate, bench: a run failed, doctor: not ready);
+diagnose --check: not adequate, bench: a run failed, doctor: not ready,
+mocap --check, agv --check: the adapter breaks its contract);
 130, 143, 129 ended by Ctrl-C, SIGTERM, SIGHUP, the vehicle stopped first;
 2 bad input or set-up, with one line that says what to do;
 3 inconclusive (compare: a campaign is incomplete or not comparable);

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 from agvbench.running.configuration.session_options import number, whole_number
+
+if TYPE_CHECKING:
+    from agvbench.adapters.contract import AdapterOptions
+    from agvbench.adapters.contract_checks import CheckResult
 
 AGV_ENDPOINT = "tcp/127.0.0.1:7447"
 MOCAP_ENDPOINT = "tcp/127.0.0.1:7448"
@@ -50,13 +55,13 @@ def add_vehicle_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what a simulated camera needs."""
+    """Declare the options of the camera itself."""
     parser.add_argument(
         "--camera",
         action="append",
         default=[],
         metavar="NAME=VALUE",
-        help="set a parameter of the simulated camera, such as rate_hz=240 or lost=0; several with commas, or again",
+        help="set an option of the camera, such as rate_hz=240 of a simulated one; several with commas, or again",
     )
 
 
@@ -65,6 +70,28 @@ def add_seed_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed", type=whole_number, default=0, help="of the simulation; the same as the bench's (default: 0)"
     )
+
+
+def add_check_argument(parser: argparse.ArgumentParser, what: str) -> None:
+    """Declare the option that checks an adapter."""
+    parser.add_argument(
+        "--check", action="store_true", help=f"open the adapter and check it against the contract, {what}; run nothing"
+    )
+
+
+def print_checks(results: Iterator[CheckResult]) -> int:
+    """Print the results of contract checks; return the exit code, 1 if one failed."""
+    from agvbench.reporting.console.contract_checks import print_check
+
+    failed = [result for result in results if not print_check(result)]
+    return 1 if failed else 0
+
+
+def adapter_options(arguments: argparse.Namespace, options: dict[str, Any]) -> AdapterOptions:
+    """Return the options of adapters, as the arguments and `options` say."""
+    from agvbench.adapters.contract import AdapterOptions
+
+    return AdapterOptions(vehicle=arguments.vehicle_name, seed=arguments.seed, **options)
 
 
 def endpoints(arguments: argparse.Namespace, default_listen: str) -> dict[str, list[str]]:
@@ -87,14 +114,19 @@ def camera_options(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def run_with(
-    arguments: argparse.Namespace, default_listen: str, options: dict[str, Any], *, agv: str | None, mocap: str | None
+    arguments: argparse.Namespace,
+    default_listen: str,
+    options: dict[str, Any],
+    *,
+    agv: str | None,
+    mocap: str | None,
+    status_s: float | None = None,
 ) -> int:
-    """Run adapters as the arguments and the adapters' `options` say."""
-    from agvbench.adapters.contract import AdapterOptions
+    """Run adapters as the arguments and the adapters' `options` say; `status_s` is that of `run_adapters`."""
     from agvbench.workflows.adapter_process import run_adapters
 
     return run_adapters(
-        AdapterOptions(vehicle=arguments.vehicle_name, seed=arguments.seed, **options),
-        agv=agv, mocap=mocap, lab=arguments.lab, bus_config=arguments.bus_config,
+        adapter_options(arguments, options),
+        agv=agv, mocap=mocap, lab=arguments.lab, bus_config=arguments.bus_config, status_s=status_s,
         **endpoints(arguments, default_listen),
     )  # fmt: skip

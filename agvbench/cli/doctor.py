@@ -6,7 +6,8 @@ trajectories that it would drive are planned for its vehicle. The exit code is 1
 examples:
   agvbench doctor                                                  what a simulation needs
   agvbench doctor --agv serial:/dev/ttyACM0 --mocap natnet:192.168.0.2   the lab
-  agvbench doctor --mocap natnet:192.168.0.2 --camera body=blue
+  agvbench doctor --mocap natnet:192.168.0.2 --camera body=blue   a camera alone
+  agvbench doctor --connect tcp/192.168.0.3:7448 --mocap           a camera alone, hosted by 'agvbench mocap' there
   agvbench doctor --vehicle car.toml --plant my_plant.py:make_plant      another vehicle than vehicle.toml here
 """
 
@@ -14,8 +15,10 @@ from __future__ import annotations
 
 import argparse
 
+from agvbench.errors import FlagError
 from agvbench.running.configuration.session_options import OPTIONS, destination
 
+_ON_THE_BUS = "on the bus"
 HELP = "look whether vehicle, cameras and this machine are ready"
 _OF_THE_RIG = (
     "--agv", "--mocap", "--camera", "--plant", "--steering", "--vehicle", "--calibration", "--corrected", "--seed",
@@ -26,7 +29,10 @@ _OF_THE_RIG = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments: those of ``agvbench bench`` that say with what is driven."""
     for flag, keywords, text in OPTIONS:
-        if flag in _OF_THE_RIG:
+        if flag == "--mocap":
+            said = f"{text}; without ADAPTER, beside --connect: the camera on the bus, alone"
+            parser.add_argument(flag, nargs="?", const=_ON_THE_BUS, help=said, **keywords)
+        elif flag in _OF_THE_RIG:
             parser.add_argument(flag, help=text, **keywords)
 
 
@@ -43,7 +49,10 @@ def run(arguments: argparse.Namespace) -> int:
     settings = BenchSettings.given(
         {"vehicle": lab_vehicle()} | {name: value for name, value in given.items() if value is not None}
     )
-    camera = camera_options([settings.camera])
-    check_specs(settings.agv, settings.mocap, AdapterOptions(vehicle=settings.vehicle_name, camera=camera))
+    if not settings.connect:
+        if settings.mocap == _ON_THE_BUS:
+            raise FlagError("no camera is named", where="--mocap", remedy="add --connect ENDPOINT, or name an adapter")
+        options = AdapterOptions(vehicle=settings.vehicle_name, camera=camera_options([settings.camera]))
+        check_specs(settings.agv, settings.mocap, options)
     states = [print_finding(name, finding) for name, finding in examine(Lab(settings))]
     return 1 if FindingState.BAD in states else 0

@@ -3,6 +3,8 @@
 examples:
   agvbench mocap sim --connect tcp/127.0.0.1:7447      a simulated camera for the vehicle of 'agvbench agv sim'
   agvbench mocap sim --camera rate_hz=240 --camera lost=0.01
+  agvbench mocap my_lab.py:5006 --check               whether an adapter of your own keeps the contract, a line a check
+  agvbench mocap my_lab.py:5006                       frames per second, tracked share and last pose, every second
   agvbench mocap --decode stream.pcapng               what a captured NatNet stream says, a JSON line a packet
   agvbench mocap --decode frame.bin --natnet-version 4.1
   agvbench mocap --emulate                            a NatNet server on loopback, with a simulated vehicle in view
@@ -12,19 +14,25 @@ examples:
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 from agvbench.cli import _adapter_arguments as shared
 from agvbench.errors import FlagError
 from agvbench.running.configuration.session_options import whole_number
 
-HELP = "run a motion capture adapter as its own process; decode or emulate a NatNet stream"
+HELP = "run a motion capture adapter as its own process, or check it; decode or emulate a NatNet stream"
+_TERMINAL_S, _VERBOSE_S = 1.0, 10.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument(
         "adapter", metavar="ADAPTER", nargs="?", help="SCHEME[:ADDRESS], such as sim, or FILE.py[:ADDRESS]"
+    )
+    shared.add_check_argument(parser, "watching its frames for a second")
+    parser.add_argument(
+        "--verbose", action="store_true", help="print the status of the stream every 10 s also where no terminal is"
     )
     parser.add_argument(
         "--decode",
@@ -54,11 +62,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run until a signal ends it, or decode; return the exit code."""
+    """Run until a signal ends it, check the adapter, or decode; return the exit code."""
     if (arguments.adapter is not None) + (arguments.decode is not None) + arguments.emulate != 1:
         raise FlagError(
             "either an adapter runs, a file is decoded or a stream emulated", remedy="name one of the three"
         )
+    if arguments.check and arguments.adapter is None:
+        raise FlagError("only an adapter can be checked", where="--check", remedy="write mocap ADAPTER --check")
     if arguments.emulate:
         from agvbench.adapters.contract import AdapterOptions, camera_options
         from agvbench.workflows.adapter_process import emulate
@@ -74,4 +84,11 @@ def run(arguments: argparse.Namespace) -> int:
         print_packets(arguments.decode, arguments.natnet_version)
         return 0
     given = {"plant": arguments.plant} | shared.camera_options(arguments)
-    return shared.run_with(arguments, shared.MOCAP_ENDPOINT, given, agv=None, mocap=arguments.adapter)
+    if arguments.check:
+        from agvbench.adapters.contract_checks import check_camera
+
+        return shared.print_checks(check_camera(arguments.adapter, shared.adapter_options(arguments, given)))
+    status_s = _TERMINAL_S if sys.stdout.isatty() else _VERBOSE_S if arguments.verbose else None
+    return shared.run_with(
+        arguments, shared.MOCAP_ENDPOINT, given, agv=None, mocap=arguments.adapter, status_s=status_s
+    )

@@ -11,6 +11,7 @@ from contextlib import contextmanager, suppress
 import numpy as np
 
 from agvbench.adapters.contract import AdapterOptions
+from agvbench.adapters.frame_recorder import FrameRecorder, summarise
 from agvbench.adapters.natnet.axes import bodies_of
 from agvbench.adapters.natnet.channel import DATA_PORT
 from agvbench.adapters.natnet.emulator import Emulator, Settings
@@ -21,7 +22,7 @@ from agvbench.adapters.natnet.protocol.encode import Model
 from agvbench.adapters.natnet.protocol.frame import FrameOfData
 from agvbench.adapters.node import host_adapters
 from agvbench.bus.bus_config import BusConfig
-from agvbench.bus.clock import WallClock, wait_until
+from agvbench.bus.clock import Clock, WallClock, wait_until
 from agvbench.bus.session import bus_session, is_open_to_all
 from agvbench.simulator import Camera, load_plant
 from agvbench.types import Command, Frames
@@ -39,8 +40,11 @@ def run_adapters(
     listen: Sequence[str],
     connect: Sequence[str],
     bus_config: str | None = None,
+    status_s: float | None = None,
 ) -> int:
     """Host adapters until SIGINT, SIGTERM or SIGHUP; stop the vehicle first, then leave the bus.
+
+    Every `status_s` [s] a line says what arrives from the camera; None: no line.
 
     Raises
     ------
@@ -49,18 +53,53 @@ def run_adapters(
     """
     config = BusConfig.load(bus_config) if bus_config else None
     _warn_of_remote_access(listen, config)
+    recorder = None if status_s is None else FrameRecorder(options.clock)
     with (
         stop_signal() as stopped,
         bus_session(listen=listen, connect=connect, allow_remote=True, config=config) as session,
-        host_adapters(session, lab, options, agv=agv, mocap=mocap),
+        host_adapters(session, lab, options, agv=agv, mocap=mocap, recorder=recorder),
     ):
         what = " and ".join(f"{role} {spec}" for role, spec in (("agv", agv), ("mocap", mocap)) if spec is not None)
         where = " ".join([*(f"listens on {e}" for e in listen), *(f"connected to {e}" for e in connect)])
         print(f"ready: {what} of {lab}/{options.vehicle}, {where}; stop with Ctrl-C", flush=True)
+        status = None if recorder is None or status_s is None else StreamStatus(recorder, options.clock, status_s)
         while not stopped:
             time.sleep(_POLL_S)
+            if status is not None:
+                status.print_if_due()
     say_stopped()
     return 0
+
+
+class StreamStatus:
+    """Prints what arrives from a camera every `period_s` [s]: on a terminal over the line before."""
+
+    def __init__(self, recorder: FrameRecorder, clock: Clock, period_s: float) -> None:
+        self._recorder, self._clock, self._period_s = recorder, clock, period_s
+        self._printed_s = self._frame_s = clock.now()
+
+    def print_if_due(self) -> None:
+        """Print a line if the last one is old enough; an error of the adapter stands on a line of its own."""
+        now_s = self._clock.now()
+        passed_s = now_s - self._printed_s
+        if passed_s < self._period_s:
+            return
+        frames = Frames.concatenate([batch.frames for batch in self._recorder.take()])
+        if error := self._recorder.take_error():
+            self._print(f"failed: {error}", replaced=False)
+        if len(frames):
+            self._frame_s = now_s
+            self._print(str(summarise(frames, passed_s)), replaced=True)
+        else:
+            self._print(f"no frame for {now_s - self._frame_s:.0f} s", replaced=True)
+        self._printed_s = now_s
+
+    @staticmethod
+    def _print(text: str, *, replaced: bool) -> None:
+        to_terminal = sys.stdout.isatty()
+        start = "\r\x1b[K" if to_terminal else ""
+        with suppress(OSError):
+            print(f"{start}{text}", end="" if to_terminal and replaced else "\n", flush=True)
 
 
 def _warn_of_remote_access(listen: Sequence[str], config: BusConfig | None) -> None:
@@ -75,7 +114,7 @@ def _warn_of_remote_access(listen: Sequence[str], config: BusConfig | None) -> N
 def say_stopped() -> None:
     """Say that everything is stopped, unless the terminal itself was closed."""
     with suppress(OSError):
-        print("stopped", flush=True)
+        print("\r\x1b[Kstopped" if sys.stdout.isatty() else "stopped", flush=True)
 
 
 @contextmanager

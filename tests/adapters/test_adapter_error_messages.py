@@ -93,6 +93,45 @@ def a_configuration_that_listens() -> None:
         BusConfig.load(path)
 
 
+CAMERA = """
+import threading
+from agvbench.adapters import MocapAdapter, MocapIdentity
+
+class Camera(MocapAdapter):
+    option_names = ("body",)
+    @classmethod
+    def open(cls, address, options):
+        return cls()
+    def identity(self):
+        return MocapIdentity(adapter="labcam", rate_hz=100.0, simulated=False)
+    def start(self, reports):
+        self.go = threading.Event()
+        self.thread = threading.Thread(target=self.run, name="frames")
+        self.thread.start()
+    def run(self):
+        if self.go.wait(0.3) is False:
+            {}["x"]
+    def close(self):
+        self.go.set()
+"""
+
+
+def camera_file(change: str = "") -> str:
+    """Return the path of a camera in a file, with other methods if `change` contains some."""
+    file = Path(tempfile.mkdtemp()) / "labcam.py"
+    file.write_text(CAMERA + change, encoding="utf-8")
+    return str(file)
+
+
+def own_camera(change: str = "", *options: str) -> Callable[[], int]:
+    return lambda: main(["mocap", camera_file(change), *options])
+
+
+def a_thread_that_ends() -> None:
+    with open_rig(f"{Path(__file__).with_name('still_vehicle.py')}", camera_file()) as link:
+        link.control_cycle(NEUTRAL, t_s=0.0, hold_s=10.0)
+
+
 COMMAND = encode(CommandMessage(1, 0.0, NEUTRAL, 0.1))
 FRAMES = encode(FramesMessage(1, 0, b""))
 NAN_TIME = pack_columns(Frames(*(np.full(1, np.nan),) * 4, np.ones(1, bool), np.zeros(1, int), *(np.zeros(1),) * 2))
@@ -113,6 +152,13 @@ MISTAKES: dict[str, Callable[[], object]] = {
     "no such mocap adapter": command_line("mocap", "optitrak:192.0.2.7"),
     "address for a simulated camera": command_line("mocap", "sim:192.0.2.7"),
     "camera option without value": command_line("sim", "--camera", "lost"),
+    "unknown option of a camera in a file": own_camera("", "--camera", "bdy=1"),
+    "option of a camera without options": own_camera("    option_names = ()\n", "--camera", "body=1"),
+    "identity of another type": own_camera("    def identity(self): return 5\n"),
+    "start raises": own_camera("    def start(self, reports): raise KeyError('cable')\n"),
+    "exception in a thread of an adapter": a_thread_that_ends,
+    "check without an adapter": command_line("mocap", "--check", "--emulate"),
+    "doctor: camera is not named": command_line("doctor", "--mocap"),
     "unknown plant": command_line("sim", "--plant", "my_plant.py"),
     "no camera on the bus": without_a_camera,
     "another seed": another_seed,

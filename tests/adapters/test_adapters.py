@@ -32,6 +32,7 @@ RESET = Reset("a", START, Sampling(120.0, 0.001))
 # Adapters that need nothing but this machine; others need hardware, and are held to the contract where it is.
 NEED_NOTHING = (".sim", ".live", ".simavr", ".simavr_live")
 AGV_HERE = [scheme for scheme, adapter in agv_adapters().items() if adapter.__module__.endswith(NEED_NOTHING)]
+# What every camera must do, simulated or not, is in test_contract_checks.py.
 MOCAP_HERE = [scheme for scheme, adapter in mocap_adapters().items() if adapter.__module__.endswith(".sim")]
 
 

@@ -15,7 +15,9 @@ from rig_driving import NEUTRAL
 from tiny_plant import TinyPlant
 
 from agvbench.adapters import AdapterOptions, check_specs, open_rig
+from agvbench.adapters.frame_recorder import FrameRecorder
 from agvbench.adapters.registry import open_agv, open_mocap
+from agvbench.bus.clock import WallClock
 from agvbench.cli import main
 from agvbench.errors import LinkError
 from agvbench.types import Command
@@ -98,6 +100,68 @@ def test_faults_stand_in_front_of_it_too(file: Path) -> None:
     camera = open_mocap(f"impaired:frozen@1/2:{file}:0", AdapterOptions())
     assert camera.identity().adapter == "my_lab"
     camera.close()
+
+
+def send(port: int, *lines: dict[str, object]) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for line in lines:
+            sender.sendto(json.dumps(line).encode(), ("127.0.0.1", port))
+
+
+POSE: dict[str, object] = {"x": 1.0, "y": 2.0, "yaw": 0.5}
+
+
+def test_the_how_tos_cameras_choose_a_body_and_need_no_number(file: Path, lab: Lab) -> None:
+    lab.close()
+    camera = open_mocap(f"{file}:{lab.camera_port}", AdapterOptions(camera={"body": "blue"}))
+    recorder = FrameRecorder(WallClock())
+    camera.start(recorder)
+    send(lab.camera_port, {"body": "red", **POSE}, {"body": "blue", "n": 7, **POSE}, {"body": "blue", **POSE})
+    deadline_s, frames = time.monotonic() + 10.0, []
+    while len(frames) < 2 and time.monotonic() < deadline_s:
+        frames += [int(batch.frames.frame[0]) for batch in recorder.take()]
+        time.sleep(0.01)
+    camera.close()
+    assert frames == [7, -1]
+
+
+@pytest.mark.parametrize("line", ['{"n": 1}', "[1]", "{", '{"x": "a", "y": 1, "yaw": 1}'])
+def test_a_wrong_line_of_the_how_tos_cameras_is_said(line: str, file: Path, lab: Lab) -> None:
+    lab.close()
+    with open_rig(f"{file}:127.0.0.1:9", f"{file}:{lab.camera_port}") as link:
+        link.control_cycle(NEUTRAL, t_s=0.0, hold_s=0.01)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            sender.sendto(line.encode(), ("127.0.0.1", lab.camera_port))
+        with pytest.raises(LinkError, match="mocap adapter: not a line of my cameras: "):
+            link.control_cycle(NEUTRAL, t_s=0.1, hold_s=10.0)
+
+
+@pytest.mark.parametrize("impaired", ["", "impaired:lost=0:"])
+def test_a_thread_that_an_exception_ends_is_said(impaired: str, file: Path, lab: Lab) -> None:
+    source = file.read_text(encoding="utf-8").replace("KeyError, TypeError, AttributeError", "TypeError")
+    file.write_text(source, encoding="utf-8")
+    lab.close()
+    before = threading.excepthook
+    with open_rig(f"{file}:127.0.0.1:9", f"{impaired}{file}:{lab.camera_port}") as link:
+        link.control_cycle(NEUTRAL, t_s=0.0, hold_s=0.01)
+        send(lab.camera_port, {"n": 1})
+        with pytest.raises(LinkError) as caught:
+            link.control_cycle(NEUTRAL, t_s=0.1, hold_s=10.0)
+    number = 1 + next(n for n, text in enumerate(source.splitlines()) if 'seen = said["x"]' in text)
+    assert str(caught.value) == (
+        "mocap adapter: my-cameras: an exception ended a thread of the adapter: KeyError: 'x'; "
+        f"catch it and call reports.failed; look at my_lab.py, line {number}"
+    )
+    assert threading.excepthook is before
+
+
+def test_a_camera_that_cannot_start_is_one_line_and_closed(file: Path) -> None:
+    source = file.read_text(encoding="utf-8").replace(
+        "        self.thread.start()\n", "        raise KeyError('start')\n"
+    )
+    file.write_text(source, encoding="utf-8")
+    with pytest.raises(LinkError, match="the mocap adapter failed: KeyError: 'start'"), open_rig("live", f"{file}:0"):
+        pass
 
 
 BODY = "    def open(cls, address, options): pass\n"

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import pty
+import re
+import select
 import signal
 import socket
 import subprocess
@@ -10,19 +14,26 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
+from natnet_server import natnet_server
 from rig_driving import HANGING, NEUTRAL, START, TINY, digest, drive_run, process
 
 from agvbench.adapters import AdapterOptions, host_adapters, open_rig
+from agvbench.adapters.frame_recorder import FrameRecorder
+from agvbench.bus.clock import SimulatedClock
 from agvbench.bus.link import VehicleLink
+from agvbench.bus.messages.frames import FrameClock
 from agvbench.bus.session import open_bus_session
 from agvbench.errors import AdapterGoneError, LinkError
+from agvbench.workflows.adapter_process import StreamStatus
 
 pytestmark = pytest.mark.real_time
 
 KEYS = ("a", "b")
+PROGRAM = "from agvbench.cli import main; raise SystemExit(main())"
 SEED = ("--seed", "11")
 
 
@@ -62,6 +73,40 @@ def test_same_frames_from_a_vehicle_and_a_camera_process(expected: list[str], en
         open_rig(connect=endpoint, seed=11) as link,
     ):
         assert [digest(drive_run(link, key)) for key in KEYS] == expected
+
+
+def test_a_camera_process_says_what_arrives(endpoint: str, tmp_path: Path) -> None:
+    """With --verbose also where no terminal is; at a terminal every second."""
+    with natnet_server() as spec:
+        here, there = pty.openpty()
+        command = [sys.executable, "-c", PROGRAM, "mocap", spec, "--listen", endpoint]
+        child = subprocess.Popen(command, stdout=there, stderr=there)
+        os.close(there)
+        said = b""
+        while b"heading" not in said and select.select([here], [], [], 30.0)[0]:
+            said += os.read(here, 4096)
+        child.send_signal(signal.SIGTERM)
+        assert child.wait(20.0) == 0
+        os.close(here)
+    assert re.search(r"\d+\.\d frames/s, 100 % tracked, last pose x = 1.000 m, y = 2.000 m, heading", said.decode())
+
+
+def test_the_status_of_a_stream_is_printed_when_it_is_due(capsys: pytest.CaptureFixture[str]) -> None:
+    clock = SimulatedClock()
+    recorder = FrameRecorder(clock)
+    status = StreamStatus(recorder, clock, 10.0)
+    recorder.frame(0.0, 1.0, 2.0, 0.0, clock=FrameClock.ADAPTER)
+    status.print_if_due()
+    clock.sleep(10.0)
+    status.print_if_due()
+    recorder.failed(LinkError("the cable is out"))
+    clock.sleep(10.0)
+    status.print_if_due()
+    assert capsys.readouterr().out.splitlines() == [
+        "0.1 frames/s, 100 % tracked, last pose x = 1.000 m, y = 2.000 m, heading 0.0°",
+        "failed: the cable is out",
+        "no frame for 10 s",
+    ]
 
 
 def killing(child: subprocess.Popen[str]) -> subprocess.Popen[bytes]:

@@ -15,7 +15,7 @@ import pytest
 
 from agvbench.adapters import open_rig
 from agvbench.errors import LinkError
-from agvbench.running.positioning.start_pose import wait_for_start
+from agvbench.running.positioning.start_pose import wait_for_start, wait_until_seen
 from agvbench.types import Command, Pose
 
 pytestmark = pytest.mark.real_time
@@ -43,6 +43,19 @@ def test_patience_ends() -> None:
         link.reset(Pose(0.5, -0.45, 1.0), run_key="a")
         with pytest.raises(LinkError, match=r"was not put at the start: it is 50 mm and 0.\d° off \(limit: 1 s\)"):
             wait_for_start(link, NEUTRAL, START, patience_s=1.0, on_progress=lambda _: None)
+
+
+@pytest.mark.parametrize(("fault", "said"), [
+    ("silent", r"waiting for agv1: no frame arrived from sim; start its stream, or see address, port and firewall"),
+    ("untracked", r"waiting for agv1: it is not seen: \d+ frames/s arrive from sim, but without the vehicle"),
+])  # fmt: skip
+def test_a_missing_stream_is_distinguished_from_a_vehicle_out_of_view(fault: str, said: str) -> None:
+    told: list[str] = []
+    with open_rig("live", f"impaired:{fault}:sim", seed=1) as link:
+        link.reset(Pose(0.0, 0.0, 0.0), run_key="a")
+        wait_until_seen(link, NEUTRAL, patience_s=1.0, on_progress=told.append)
+    assert told
+    assert all(re.fullmatch(said, line) for line in told), told
 
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "write-an-adapter.md"
@@ -74,8 +87,8 @@ def test_an_operator_at_a_terminal_is_told_where_to_put_the_vehicle_and_of_a_pau
     session = subprocess.Popen(command, cwd=tmp_path, stdin=there, stdout=there, stderr=there)
     os.close(there)
     try:
-        said = read_until(here, "it is not seen")
-        assert "put agv1 at x = -0.054 m, y = -0.000 m, heading 0.0°: it is not seen" in said
+        said = read_until(here, "no frame arrived")
+        assert "put agv1 at x = -0.054 m, y = -0.000 m, heading 0.0°: no frame arrived from my_lab; start its " in said
         session.send_signal(signal.SIGTSTP)
         said = read_until(here, "Ctrl-Z again")
         assert "pausing when this run is finished; Ctrl-Z again" in said

@@ -82,7 +82,7 @@ def wait_until_seen(
 def _wait(
     link: RunnerLink,
     neutral: Command,
-    check: Callable[[Frames, float], _StartCheck],
+    check: Callable[[Frames, float, str], _StartCheck],
     asked: str,
     *,
     patience_s: float,
@@ -94,7 +94,7 @@ def _wait(
         # The run's clock begins anew at its first exchange, which is before any of these.
         frames = link.control_cycle(neutral, t_s=waited_s, hold_s=LOOK_S)
         waited_s += LOOK_S
-        place = check(frames, waited_s)
+        place = check(frames, waited_s, link.identity().mocap.adapter)
         if place.good:
             break
         if waited_s - reported_s >= PROGRESS_S:
@@ -103,14 +103,24 @@ def _wait(
     return place
 
 
-def _anywhere(frames: Frames, now_s: float) -> _StartCheck:
-    return _StartCheck("it is not seen", good=pose_before(frames, now_s) is not None)
+def _unseen(frames: Frames, camera: str) -> str:
+    """Say why there is no pose: a stream that is missing has other remedies than a vehicle out of view."""
+    if not len(frames):
+        return f"no frame arrived from {camera}; start its stream, or see address, port and firewall"
+    rate_hz = len(frames) / LOOK_S
+    return f"it is not seen: {rate_hz:.0f} frames/s arrive from {camera}, but without the vehicle"
 
 
-def _place(frames: Frames, now_s: float, start: Pose, limits: QualityLimits) -> _StartCheck:
+def _anywhere(frames: Frames, now_s: float, camera: str) -> _StartCheck:
+    if pose_before(frames, now_s) is None:
+        return _StartCheck(_unseen(frames, camera), False)
+    return _StartCheck("it is seen", True)
+
+
+def _place(frames: Frames, now_s: float, camera: str, start: Pose, limits: QualityLimits) -> _StartCheck:
     found = pose_before(frames, now_s)
     if found is None:
-        return _StartCheck("it is not seen", False)
+        return _StartCheck(_unseen(frames, camera), False)
     off_m = math.dist(found[:2], start[:2])
     off_rad = abs(wrap_angle(found.heading_rad - start.heading_rad))
     said = f"it is {off_m * 1e3:.0f} mm and {math.degrees(off_rad):.1f}° off"

@@ -10,6 +10,9 @@ from typing import ClassVar
 
 from agvbench.running.configuration.settings import BenchSettings
 
+SIM = BenchSettings().agv
+"""What is driven, and what sees it, where nothing is named."""
+
 
 class FindingState(Enum):
     """How a check ended."""
@@ -35,6 +38,17 @@ class Lab:
 
     settings: BenchSettings = field(default_factory=BenchSettings)
     folder: Path = Path()
+
+    @property
+    def names_camera_alone(self) -> bool:
+        """Whether a camera is named, and no vehicle."""
+        return self.settings.mocap != SIM and self.settings.agv == SIM
+
+    @property
+    def names_vehicle_alone(self) -> bool:
+        """Whether a vehicle is named that this process opens, and no camera."""
+        settings = self.settings
+        return not settings.connect and settings.agv != SIM and settings.mocap == SIM
 
 
 class Check(ABC):

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import closing
 
-from agvbench.adapters.registry import open_agv, open_mocap
+from agvbench.adapters.camera_link import identify_here
+from agvbench.adapters.registry import open_agv
 from agvbench.bus.messages.identity import AgvIdentity, Identity, MocapIdentity
 from agvbench.model import VehicleModel
 from agvbench.running.configuration.settings import BenchSettings
@@ -13,8 +14,6 @@ from agvbench.running.configuration.vehicles import known_models
 from agvbench.running.positioning.placers import choose_placer
 from agvbench.running.session.rig_checks import adapter_options, check_commands, open_session_rig
 from agvbench.workflows.doctor.finding import Check, Finding, FindingState, Lab
-
-_SIM = BenchSettings().agv
 
 
 class AdaptersCheck(Check):
@@ -26,21 +25,20 @@ class AdaptersCheck(Check):
         """Say which adapters answer, and in which unit."""
         settings = lab.settings
         models = known_models(settings)
-        if not settings.connect and (settings.agv == _SIM) != (settings.mocap == _SIM):
-            return Finding(FindingState.GOOD, _alone(settings, models))
+        if lab.names_camera_alone and settings.connect:
+            return Finding(FindingState.IDLE, "the camera on the bus is examined alone: see mocap")
+        if lab.names_camera_alone:
+            return Finding(FindingState.GOOD, _camera(identify_here(settings.mocap, adapter_options(settings, models))))
+        if lab.names_vehicle_alone:
+            return Finding(FindingState.GOOD, _vehicle_alone(settings, models))
         with open_session_rig(settings, models) as link:
             identity = link.identity()
         choose_placer(settings.place, simulated=identity.simulated)
         return Finding(FindingState.GOOD, f"{_vehicle(identity.agv)}; {_camera(identity.mocap)}")
 
 
-def _alone(settings: BenchSettings, models: Mapping[str, VehicleModel]) -> str:
-    options = adapter_options(settings, models)
-    if settings.mocap != _SIM:
-        with closing(open_mocap(settings.mocap, options)) as camera:
-            camera.start(_Unheard())
-            return _camera(camera.identity())
-    with closing(open_agv(settings.agv, options)) as vehicle:
+def _vehicle_alone(settings: BenchSettings, models: Mapping[str, VehicleModel]) -> str:
+    with closing(open_agv(settings.agv, adapter_options(settings, models))) as vehicle:
         vehicle.start(_Unheard())
         vehicle.stop()
         identity = vehicle.identity()
@@ -53,10 +51,6 @@ class _Unheard:
 
     def truth(self, *_: object, **__: object) -> None: ...
 
-    def frames(self, *_: object, **__: object) -> None: ...
-
-    def frame(self, *_: object, **__: object) -> None: ...
-
     def event(self, *_: object, **__: object) -> None: ...
 
     def failed(self, *_: object, **__: object) -> None: ...
@@ -67,4 +61,4 @@ def _vehicle(identity: AgvIdentity | Identity) -> str:
 
 
 def _camera(identity: MocapIdentity) -> str:
-    return f"{identity.adapter} sees it at {identity.rate_hz:g} Hz"
+    return f"{identity.adapter} is opened, nominal rate {identity.rate_hz:g} Hz"
