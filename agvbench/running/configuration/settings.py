@@ -83,7 +83,12 @@ class BenchSettings:
         "", "end-pose bias of the corrected model, by trajectory (agvbench loop writes it)", metavar="FILE"
     )
     maps: str = _option("default", "maps to calibrate: default, or the thesis' line and cubic", choices=MAPS)
-    repeats: int = _option(0, "repeats of each trajectory and condition (default: 10)", metavar="N")
+    repeats: int = _option(
+        0,
+        "repeats of each trajectory and condition (default: 10); calibration, step_response, free_driving and endurance"
+        " declare a number of their own",
+        metavar="N",
+    )
     order: str = _option(
         "interleaved", "order of runs (default: interleaved; the thesis drove blocked)", choices=ORDERS
     )
