@@ -94,6 +94,10 @@ class Diagnosis:
     next_experiment: NextExperiment | None = None
     residuals: pd.DataFrame | None = field(default=None, compare=False, repr=False)
 
+    def __repr__(self) -> str:
+        found = ", ".join(effect.name for effect in self.effects) or "none"
+        return f"<Diagnosis {self.verdict}: effects {found}; {self.why}>"
+
     @property
     def adequate(self) -> bool:
         """Whether the static maps are sufficient."""
