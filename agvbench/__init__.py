@@ -21,13 +21,15 @@ if TYPE_CHECKING:
     from agvbench.model.simulation.simulation import SimulatedRun, Simulation
     from agvbench.planning import Trajectory, plan
     from agvbench.reporting import write_report
-    from agvbench.statistics import compare, pose_errors
+    from agvbench.statistics import Comparison, pose_errors, valid
     from agvbench.types import Pose, Run
+    from agvbench.workflows.compare import compare
 
 __version__ = "0.2.0"
 __all__ = [
     "AgvbenchError",
     "Campaign",
+    "Comparison",
     "Diagnosis",
     "Pose",
     "PoseNoise",
@@ -45,6 +47,7 @@ __all__ = [
     "plot",
     "pose_errors",
     "simulate",
+    "valid",
     "write_report",
 ]
 
@@ -59,8 +62,9 @@ if not TYPE_CHECKING:  # mypy would take any name for an attribute of a module w
         "model.simulation.simulation": ("SimulatedRun", "Simulation"),
         "planning": ("Trajectory", "plan"),
         "reporting": ("write_report",),
-        "statistics": ("compare", "pose_errors"),
+        "statistics": ("Comparison", "pose_errors", "valid"),
         "types": ("Pose", "Run"),
+        "workflows.compare": ("compare",),
     }
     _HOMES = {name: package for package, names in _PACKAGES.items() for name in names}
 

@@ -26,7 +26,7 @@ from numba.core import event
 F = TypeVar("F", bound=Callable[..., Any])
 
 _LOCK = threading.Lock()
-COMPILING = "compiling the simulation to machine code (once per machine; takes some seconds) …"
+COMPILING = "compiling the simulation to machine code (once per machine; takes up to a minute) …"
 
 
 def cached_njit(**options: Any) -> Callable[[F], F]:
@@ -52,7 +52,7 @@ def cached_njit(**options: Any) -> Callable[[F], F]:
 
 @contextmanager
 def announcing_compilation(on_progress: Callable[[str], None]) -> Iterator[None]:
-    """Have `on_progress` say once that agvbench is compiled, where no machine code is kept: it takes some seconds."""
+    """Have `on_progress` say once that agvbench is compiled, where no machine code is kept: it takes up to a minute."""
     with event.install_listener("numba:compile", _FirstCompilation(on_progress)):
         yield
 

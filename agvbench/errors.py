@@ -25,6 +25,8 @@ A message names *what* is wrong, *where*, the *value*, the *limit* with its unit
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 INTERNAL_ERROR_EXIT_CODE = 70
 """Of an error in agvbench itself, as in ``sysexits.h``: neither bad input (2) nor a failed run (1)."""
 
@@ -36,6 +38,20 @@ def visible(text: str) -> str:
     slalom\x1b[2J
     """
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+class OneOf:
+    """The names of which a value must be one, as the limit of an error.
+
+    >>> print(InputError("unknown maps", value="'spline'", limit=OneOf(["default", "thesis"])))
+    unknown maps: 'spline' (one of: default, thesis)
+    """
+
+    def __init__(self, names: Iterable[object]) -> None:
+        self._names = tuple(map(str, names))
+
+    def __str__(self) -> str:
+        return ", ".join(self._names) or "none"
 
 
 class AgvbenchError(Exception):
@@ -50,7 +66,7 @@ class AgvbenchError(Exception):
     value
         The offending value, with its unit.
     limit
-        The limit it breaks, with its unit.
+        The limit it breaks, with its unit; `OneOf` the names that are allowed.
     remedy
         What to do about it, as an imperative.
 
@@ -80,7 +96,7 @@ class AgvbenchError(Exception):
         if self.value is not None:
             line += f": {self.value}"
         if self.limit is not None:
-            line += f" (limit: {self.limit})"
+            line += f" ({'one of' if isinstance(self.limit, OneOf) else 'limit'}: {self.limit})"
         if self.remedy is not None:
             line += f"; {self.remedy}"
         return visible(" ".join(line.split()))

@@ -5,12 +5,12 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable, Sequence
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import msgspec
 from msgspec import inspect
 
-from agvbench.errors import CampaignError, FileError
+from agvbench.errors import CampaignError, FileError, OneOf
 
 T = TypeVar("T")
 
@@ -56,7 +56,7 @@ def convert(
         raise error(fields.pop("what"), **fields, remedy=advice or None) from None
 
 
-def _fields(message: str, table: object, kind: type, where: str) -> dict[str, str]:
+def _fields(message: str, table: object, kind: type, where: str) -> dict[str, Any]:
     """Return the fields of the error for a message of msgspec."""
     match = _AT.fullmatch(message)
     what, path = (match["what"], match["path"] or "") if match else (message, "")
@@ -68,7 +68,7 @@ def _fields(message: str, table: object, kind: type, where: str) -> dict[str, st
     if found := _MISSING.fullmatch(what):
         return {"what": f"key '{found[1]}' is missing", "where": place}
     if found := _VALUE.fullmatch(what):
-        return {"what": "value is not known", "where": place, "value": found[1], "limit": _either(_values(types))}
+        return {"what": "value is not known", "where": place, "value": found[1], "limit": OneOf(_values(types))}
     if found := _EXPECTED.fullmatch(what):
         limit = _expected(found["type"], found["rest"])
         return {"what": "value cannot be used", "where": place, "value": _shown(value), "limit": limit}
@@ -122,10 +122,6 @@ def suggest(key: str, known: list[str]) -> str:
     """Return a remedy for a misspelt `key`: the one that was probably meant, and all that are known."""
     near = difflib.get_close_matches(key, known, n=1)
     return (f"did you mean '{near[0]}'? " if near else "") + f"known: {', '.join(known)}"
-
-
-def _either(values: list[str]) -> str:
-    return ", ".join(values[:-1]) + " or " + values[-1] if len(values) > 1 else "".join(values)
 
 
 def _expected(kind: str, rest: str) -> str:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from agvbench.bus.bus_config import BusConfig
 from agvbench.bus.certificates import why_not
 from agvbench.bus.messages.codec import MAX_MESSAGE_BYTES
-from agvbench.errors import LinkError
+from agvbench.errors import LinkError, OneOf
 
 if TYPE_CHECKING:
     import zenoh
@@ -45,9 +45,7 @@ def parse_endpoint(endpoint: str, where: str = "endpoint") -> tuple[str, str, in
         raise LinkError("not an endpoint", where=where, value=repr(endpoint), remedy=f"write {_LIKELY}")
     protocol, host, port = match["protocol"], match["host"].strip("[]"), int(match["port"])
     if protocol not in _PROTOCOLS:
-        raise LinkError(
-            "protocol cannot be used", where=f"{where} {endpoint}", value=protocol, limit=" ".join(_PROTOCOLS)
-        )
+        raise LinkError("protocol cannot be used", where=f"{where} {endpoint}", value=protocol, limit=OneOf(_PROTOCOLS))
     if not 0 < port < 65536:
         raise LinkError("port is out of range", where=f"{where} {endpoint}", value=port, limit="1 to 65535")
     return protocol, host, port

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from os import PathLike
 from typing import TYPE_CHECKING, Literal
 
 from agvbench.calibration.arc_samples import CALIBRATION_EXPERIMENTS, arc_samples, described, measure_runs
@@ -22,7 +23,8 @@ from agvbench.calibration.maps.selection import (
     steering_fitters,
 )
 from agvbench.calibration.samples import ROLES, CurvePoints, Role, Sample, points_of
-from agvbench.errors import FitError, InputError
+from agvbench.campaign.arguments import as_campaign
+from agvbench.errors import FitError, InputError, OneOf
 from agvbench.model import VehicleModel
 from agvbench.types import Run
 from agvbench.vehicle.geometry import Geometry
@@ -54,7 +56,9 @@ class Calibration:
     warnings: list[str] = field(default_factory=list)
 
 
-def calibrate(campaign: CampaignLike, *, maps: Maps | str = "default", session: str | None = None) -> Calibration:
+def calibrate(
+    campaign: CampaignLike | str | PathLike[str], *, maps: Maps | str = "default", session: str | None = None
+) -> Calibration:
     """Fit the static maps of a vehicle from its calibration runs.
 
     Runs of the experiments ``steering_front``, ``steering_rear``, ``steering_opposite`` and ``drive`` hold one
@@ -65,7 +69,7 @@ def calibrate(campaign: CampaignLike, *, maps: Maps | str = "default", session: 
     Parameters
     ----------
     campaign
-        Header and runs.
+        A campaign, or its directory.
     maps
         ``"thesis"``: lines without the outermost pulse, a cubic up to saturation. ``"default"``: for each role the kind
         that predicts left-out commands best.
@@ -77,15 +81,16 @@ def calibrate(campaign: CampaignLike, *, maps: Maps | str = "default", session: 
     FitError
         If there are no runs to calibrate from, none can be measured, or they vary a command too little.
     InputError
-        If `maps` is unknown or no run belongs to `session`.
+        If `campaign` is no campaign, `maps` is unknown or no run belongs to `session`.
     VehicleError
         If the header describes no vehicle.
     """
     if maps not in ("default", "thesis"):
-        raise InputError("unknown maps", where="maps", value=repr(maps), limit="default, thesis")
-    header = campaign.header
+        raise InputError("unknown maps", where="maps", value=repr(maps), limit=OneOf(("default", "thesis")))
+    opened = as_campaign(campaign)
+    header = opened.header
     geometry = header.geometry
-    runs = [run for run in campaign if run.split not in {"held_out", "validation"} and session in (None, run.session)]
+    runs = [run for run in opened if run.split not in {"held_out", "validation"} and session in (None, run.session)]
     if session is not None and not runs:
         raise InputError("no run belongs to this session", where=f"campaign {header.name}", value=repr(session))
     dedicated = [run for run in runs if run.experiment in CALIBRATION_EXPERIMENTS]

@@ -14,6 +14,7 @@ import pyarrow as pa
 
 from agvbench.campaign.header import FILE_NAME, CampaignHeader
 from agvbench.campaign.manifest import Manifest
+from agvbench.campaign.names import as_texts
 from agvbench.campaign.tables.consistency import check_commands, check_poses, check_runs
 from agvbench.campaign.tables.motion_checks import check_motion
 from agvbench.campaign.tables.schema import COMMANDS, POSES, RUNS, TABLES
@@ -149,13 +150,18 @@ class Campaign:
     def _index(self) -> dict[str, int]:
         return {run_id: index for index, run_id in enumerate(self.run_ids)}
 
+    def __repr__(self) -> str:
+        return f"<Campaign {self.header.name!r} in {str(self.path)!r}: {self._summary()}>"
+
+    def _summary(self) -> str:
+        counts = sum(status == RUN_OK for status in self._runs["status"].to_pylist())
+        return f"vehicle {self.header.vehicle_name}, {len(self)} runs, {counts} of them count"
+
     def _repr_html_(self) -> str:
-        counts = int((self.runs["status"] == RUN_OK).sum())
-        line = f"vehicle {self.header.vehicle_name}, {len(self.runs)} runs, {counts} of them count"
         conditions = _in_order(self.runs["condition"])
         columns = ["experiment", "trajectory", *conditions]
         table = table_html("runs that count", columns, _rows(self.runs, conditions))
-        return heading_html(self.header.name, line) + table
+        return heading_html(self.header.name, self._summary()) + table
 
     def run(self, run_id: str) -> Run:
         """Return one run.
@@ -187,14 +193,16 @@ class Campaign:
         split: str | Collection[str] | None = None,
         ok_only: bool = True,
     ) -> list[Run]:
-        """Return the runs that have one of the given values in every given column; by default only those that count."""
+        """Return the runs that have one of the given values in every given column; by default only those that count.
+
+        Raises
+        ------
+        InputError
+            If a value is not text: trajectories are named ``"5"``, not 5.
+        """
         wanted = {"experiment": experiment, "condition": condition, "trajectory": trajectory}
         wanted |= {"session": session, "split": split, "status": "ok" if ok_only else None}
-        tests = {
-            name: {value} if isinstance(value, str) else set(value)
-            for name, value in wanted.items()
-            if value is not None
-        }
+        tests = {name: as_texts(value, where=name) for name, value in wanted.items() if value is not None}
         return [
             self._run(index)
             for index, row in enumerate(self._rows)

@@ -51,20 +51,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Compare, print the comparison, and return its exit code."""
+    from agvbench.campaign import Campaign
     from agvbench.reporting.console.tables import print_comparison, print_warnings, wide_console
     from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
-    from agvbench.workflows.compare import comparability, compare_campaigns, exit_code, write_json
+    from agvbench.statistics.quantities import END_POSE, QUANTITIES
+    from agvbench.workflows.comparability import comparability
+    from agvbench.workflows.compare import compare, exit_code, write_json
 
     console = wide_console()
-    known = comparability(arguments.a, arguments.b, across_vehicles=arguments.across_vehicles)
+    a = Campaign.open(arguments.a)
+    b = None if arguments.b is None else Campaign.open(arguments.b)
+    known = comparability(a, b, across_vehicles=arguments.across_vehicles)
     print_warnings(console, known.sentences)
-    comparison = compare_campaigns(
-        arguments.a,
-        arguments.b,
+    comparison = compare(
+        a,
+        b,
         conditions=tuple(arguments.conditions) if arguments.conditions else None,
         margin_mm=MARGIN_MM if arguments.margin_mm is None else arguments.margin_mm,
         margin_deg=MARGIN_DEG if arguments.margin_deg is None else arguments.margin_deg,
-        distance_decides=arguments.with_delta_s,
+        deciding=QUANTITIES if arguments.with_delta_s else END_POSE,
+        across_vehicles=arguments.across_vehicles,
     )
     if arguments.json:
         write_json(comparison, arguments.json, known)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from os import PathLike
+
 from agvbench.calibration.campaign_protocol import CampaignLike
+from agvbench.campaign.arguments import as_campaign
 from agvbench.diagnosis.checks.consistency import require_plausible_units
 from agvbench.diagnosis.context import DiagnosisContext
 from agvbench.diagnosis.data.windows import horizon_of
@@ -14,7 +17,7 @@ from agvbench.model import VehicleModel
 
 
 def diagnose(
-    campaign: CampaignLike,
+    campaign: CampaignLike | str | PathLike[str],
     *,
     vehicle: VehicleModel | None = None,
     seed: int = 0,
@@ -25,8 +28,8 @@ def diagnose(
     Parameters
     ----------
     campaign
-        Header and runs. If the header has a prediction horizon, or most runs do not begin at rest, they are cut into
-        windows.
+        A campaign, or its directory. If the header has a prediction horizon, or most runs do not begin at rest, runs
+        are cut into windows.
     vehicle
         The vehicle model before. Effects that it has remain in every model, and are not reported. By default it is
         static maps fitted to the campaign's runs.
@@ -37,10 +40,13 @@ def diagnose(
 
     Raises
     ------
+    InputError
+        If `campaign` is no campaign.
     CampaignError, FitError
-        If the campaign is too small, or its tables are inconsistent.
+        If the campaign cannot be read, is too small, or its tables are inconsistent.
     """
-    header, runs = campaign.header, list(campaign)
+    opened = as_campaign(campaign)
+    header, runs = opened.header, list(opened)
     context = DiagnosisContext(header, header.geometry, vehicle, seed)
     require_plausible_units(runs, header)
     if (horizon := horizon_of(header, runs)) is not None:

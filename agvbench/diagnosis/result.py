@@ -128,6 +128,10 @@ class Diagnosis:
     states: Mapping[str, EffectState] = field(default_factory=dict)
     residuals: pd.DataFrame | None = field(default=None, compare=False, repr=False)
 
+    def __repr__(self) -> str:
+        found = ", ".join(effect.name for effect in self.effects) or "none"
+        return f"<Diagnosis {self.verdict}: effects {found}; {self.why}>"
+
     @property
     def adequate(self) -> bool:
         """Whether the static maps are sufficient."""

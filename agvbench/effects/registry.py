@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from agvbench.effects.base import Effect
-from agvbench.errors import VehicleError
+from agvbench.errors import OneOf, VehicleError
 from agvbench.registry import classes_by_file
 
 
@@ -42,5 +42,5 @@ def effect_from_toml(table: object, *, where: str = "effect") -> Effect:
     if name is None:
         raise VehicleError("a key is missing", where=where, value="name", remedy=f'add name = "{next(iter(kinds))}"')
     if not isinstance(name, str) or name not in kinds:
-        raise VehicleError("unknown effect", where=f"{where}.name", value=repr(name), limit=", ".join(kinds))
+        raise VehicleError("unknown effect", where=f"{where}.name", value=repr(name), limit=OneOf(kinds))
     return kinds[name].from_toml(table, where=where)

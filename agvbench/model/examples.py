@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from agvbench.errors import VehicleError
+from agvbench.errors import OneOf, VehicleError
 from agvbench.model.vehicle_model import VehicleModel
 
 _DATA = Path(__file__).parent / "data"
@@ -23,7 +23,7 @@ def example_names() -> tuple[str, ...]:
 def example_path(name: str) -> Path:
     """Return the file of a shipped vehicle, to copy and edit; raise `VehicleError` if there is none of that name."""
     if name not in example_names():
-        raise VehicleError("no vehicle of this name ships with agvbench", value=name, limit=", ".join(example_names()))
+        raise VehicleError("no vehicle of this name ships with agvbench", value=name, limit=OneOf(example_names()))
     return _DATA / f"{name}.toml"
 
 

@@ -11,7 +11,7 @@ from typing import get_args
 from numpy.typing import ArrayLike
 
 from agvbench.effects import Effect
-from agvbench.errors import VehicleError
+from agvbench.errors import OneOf, VehicleError
 from agvbench.model.priors import Prior
 from agvbench.model.toml import naming_file, physics_digest, read_vehicle, write_vehicle
 from agvbench.notebook_html import heading_html, table_html
@@ -71,7 +71,7 @@ class VehicleModel:
         object.__setattr__(self, "effects", tuple(self.effects))
         object.__setattr__(self, "provenance", dict(self.provenance))
         if self.command_unit not in get_args(CommandUnit):
-            limit = " or ".join(get_args(CommandUnit))
+            limit = OneOf(get_args(CommandUnit))
             raise VehicleError("unknown unit", where="command_unit", value=repr(self.command_unit), limit=limit)
         object.__setattr__(self, "priors", tuple(self.priors))
         self._check_angles()

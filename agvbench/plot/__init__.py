@@ -3,7 +3,7 @@
 ::
 
     figure, axes = plt.subplots()
-    agvbench.plot.end_poses(axes, agvbench.pose_errors(campaign), trajectory="5")
+    agvbench.plot.end_poses(axes, campaign, trajectory="5")
 
 Nothing here makes a figure, shows one, or changes matplotlib's settings. Colours and markers of conditions are those
 of the report, and colour-blind readers can distinguish them.

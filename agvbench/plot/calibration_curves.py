@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.errors import InputError
-from agvbench.plot.style import ON_WHITE, Ink, colour, label
+from agvbench.errors import InputError, OneOf
+from agvbench.plot.style import ON_WHITE, Ink, colour, label, require_result
 from agvbench.types import Floats
 
 if TYPE_CHECKING:
@@ -38,12 +38,13 @@ def calibration_curve(axes: Axes, calibration: Calibration, axle: Literal["front
     Raises
     ------
     InputError
-        If there is no such axle, or nothing was measured of it.
+        If `calibration` is none, there is no such axle, or nothing was measured of it.
     """
+    require_result(calibration, "measurements", where="calibration", made_by="agvbench.calibrate")
     table = calibration.measurements
     rows = table[table["axle"] == axle]
     if rows.empty:
-        raise InputError("nothing was measured", where="axle", value=repr(axle), limit=", ".join(_LABELS))
+        raise InputError("nothing was measured", where="axle", value=repr(axle), limit=OneOf(_LABELS))
     model = calibration.model
     command, value, stderr = (rows[name].to_numpy(dtype=float) for name in ("command", "value", "stderr"))
     at = np.linspace(command.min(), command.max(), _CURVE_POINTS)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from os import PathLike
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from agvbench.campaign.arguments import as_runs
 from agvbench.errors import InputError
-from agvbench.plot.style import ON_WHITE, Ink, colour, condition_numbers, label, literal
+from agvbench.plot.style import ON_WHITE, Ink, colour, condition_numbers, label, literal, trajectory_title
 from agvbench.types import Floats, Frames, Pose, Run
 
 if TYPE_CHECKING:
@@ -23,7 +25,7 @@ _NEIGHBOURS = 5
 _FEWEST_POINTS, _MOST_POINTS, _POINTS_PER_M = 80, 600, 20.0
 
 
-def paths(axes: Axes, runs: Iterable[Run], plan: Plan | None = None) -> Axes:
+def paths(axes: Axes, runs: Iterable[Run] | Run | str | PathLike[str], plan: Plan | None = None) -> Axes:
     """Draw the paths that `runs` drove in their start frame, by condition, and beside them what was planned.
 
     The hollow mark is the start, the filled one the target with its heading.
@@ -33,20 +35,20 @@ def paths(axes: Axes, runs: Iterable[Run], plan: Plan | None = None) -> Axes:
     axes
         Where to draw [m].
     runs
-        Runs of one trajectory, such as ``campaign.select(trajectory="5")``.
+        Runs of one trajectory, such as ``campaign.select(trajectory="5")``, or one run.
     plan
         What `agvbench.plan` returned; its expected path is dashed.
 
     Raises
     ------
     InputError
-        If no run has frames to draw.
+        If `runs` are none, or no run has frames to draw.
     """
-    driven = [(run, path) for run in runs if len(path := drawn_path(run.frames)) > 1]
+    driven = [(run, path) for run in as_runs(runs) if len(path := drawn_path(run.frames)) > 1]
     if not driven:
         raise InputError("no run has frames to draw", remedy="choose runs with campaign.select")
     numbers = condition_numbers(list(dict.fromkeys(run.condition for run, _ in driven)))
-    label(axes, x="x [m]", y="y [m]", title=driven[0][0].trajectory)
+    label(axes, x="x [m]", y="y [m]", title=trajectory_title(driven[0][0].trajectory))
     for name, number in numbers.items():
         group = [from_start(path)[:, 1:3] for run, path in driven if run.condition == name]
         draw_group(axes, group, number, label=literal(name) or "no condition")

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from agvbench.errors import InputError
-from agvbench.plot.style import ON_WHITE, Ink, colour, label, marker
+from agvbench.errors import InputError, OneOf
+from agvbench.plot.style import ON_WHITE, Ink, colour, label, marker, require_result
 from agvbench.types import Floats
 
 if TYPE_CHECKING:
@@ -60,11 +60,12 @@ def residuals(axes: Axes, diagnosis: Diagnosis, *, feature: Feature = "speed", a
     Raises
     ------
     InputError
-        If the diagnosis has no residuals, or there is no such feature or covariate.
+        If `diagnosis` is none or has no residuals, or there is no such feature or covariate.
     """
+    require_result(diagnosis, "residuals", where="diagnosis", made_by="agvbench.diagnose")
     for what, given, known in (("feature", feature, FEATURES), ("against", against, COVARIATES)):
         if given not in known:
-            raise InputError("cannot be drawn", where=what, value=repr(given), limit=", ".join(known))
+            raise InputError("cannot be drawn", where=what, value=repr(given), limit=OneOf(known))
     table = diagnosis.residuals
     if table is None or table.empty:
         raise InputError("the diagnosis has no residuals", value=str(diagnosis.verdict), remedy="see diagnosis.why")

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from agvbench.errors import InputError
 from agvbench.types import CONDITIONS
 
 if TYPE_CHECKING:
@@ -58,6 +59,24 @@ def label(axes: Axes, *, x: str, y: str, title: str = "") -> None:
     axes.set_axisbelow(True)
     if title:
         axes.set_title(literal(title))
+
+
+def trajectory_title(name: str) -> str:
+    """Return the title of axes about one trajectory: many are named by a number alone."""
+    return f"trajectory {name}" if name else ""
+
+
+def require_result(value: object, attribute: str, *, where: str, made_by: str) -> None:
+    """Refuse an argument that is not what the function `made_by` returned, which has this attribute.
+
+    Raises
+    ------
+    InputError
+        If it is not; `where` is the argument's name.
+    """
+    if not hasattr(value, attribute):
+        remedy = f"give what {made_by} returned"
+        raise InputError("cannot be drawn", where=where, value=type(value).__name__, remedy=remedy)
 
 
 def literal(name: str) -> str:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from os import PathLike
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from agvbench.errors import InputError
-from agvbench.plot.style import ON_WHITE, Ink, colour, condition_numbers, label, literal, marker
+from agvbench.campaign.names import as_text
+from agvbench.errors import InputError, OneOf
+from agvbench.plot.style import ON_WHITE, Ink, colour, condition_numbers, label, literal, marker, trajectory_title
 from agvbench.statistics import valid
-from agvbench.types import Floats, Pose
+from agvbench.statistics.run_errors import as_errors
+from agvbench.types import Floats, Pose, Run
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,34 +22,37 @@ if TYPE_CHECKING:
 _POSE = ("x_m", "y_m", "heading_rad")
 
 
-def end_poses(axes: Axes, errors: pd.DataFrame, *, trajectory: str) -> Axes:
+def end_poses(axes: Axes, errors: pd.DataFrame | Iterable[Run] | str | PathLike[str], *, trajectory: str) -> Axes:
     """Draw the end poses of one trajectory in the frame of its target, by condition.
 
     The cross is the target position and the arrow its heading. The short line of each end pose is its heading; large
-    outlined markers are medians.
+    hollow markers are medians.
 
     Parameters
     ----------
     axes
         Where to draw [mm].
     errors
-        What `agvbench.pose_errors` returns; runs that do not count are not drawn.
+        A campaign, its directory, or what `agvbench.pose_errors` returns; runs that do not count are not drawn.
     trajectory
         The trajectory's name.
 
     Raises
     ------
     InputError
-        If no run of this trajectory counts.
+        If `errors` are none, the name is not text, or no run of this trajectory counts.
+    CampaignError
+        If the campaign cannot be read.
     """
-    counted = valid(errors)
+    as_text(trajectory, where="trajectory")
+    counted = valid(as_errors(errors, where="errors"))
     rows = counted[counted["trajectory"] == trajectory]
     if rows.empty:
-        known = ", ".join(map(str, dict.fromkeys(counted["trajectory"]))) or "none"
+        known = OneOf(dict.fromkeys(counted["trajectory"]))
         raise InputError("no run of this trajectory counts", value=repr(trajectory), limit=known)
     numbers = condition_numbers([str(condition) for condition in dict.fromkeys(rows["condition"])])
     ends = {number: in_target_frame(rows[rows["condition"] == name]) for name, number in numbers.items()}
-    label(axes, x="ahead of target [mm]", y="left of target [mm]", title=trajectory)
+    label(axes, x="ahead of target [mm]", y="left of target [mm]", title=trajectory_title(trajectory))
     half = draw_ends(axes, ends, ON_WHITE)
     axes.plot(0.0, 0.0, marker="+", markersize=12, color=ON_WHITE.ink, linestyle="none", label="target")
     axes.annotate("", (0.3 * half, 0.0), (0.0, 0.0), arrowprops={"arrowstyle": "->", "color": ON_WHITE.ink})
@@ -84,10 +90,10 @@ def draw_ends(axes: Axes, ends: Mapping[int, Floats], ink: Ink) -> float:
         axes.plot(
             *middle,
             marker=marker(index),
-            markersize=9,
-            color=colour(index),
-            markeredgecolor=ink.ink,
-            markeredgewidth=1.0,
+            markersize=11,
+            markerfacecolor="none",  # the repeats that it is the median of stay visible
+            markeredgecolor=colour(index),
+            markeredgewidth=1.5,
         )
     axes.set_xlim(-half, half)
     axes.set_ylim(-half, half)

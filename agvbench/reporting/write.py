@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from agvbench.campaign import Campaign
+from agvbench.campaign.arguments import as_campaign
 from agvbench.campaign.atomic_files import made_folder, replace_whole
 from agvbench.diagnosis import Diagnosis
 from agvbench.errors import FileError
@@ -47,19 +49,19 @@ class WrittenReport:
 
 
 def write_report(
-    campaign_path: str | Path,
+    campaign: Campaign | str | Path,
     out: str | Path | None = None,
     *,
     margin_mm: float = MARGIN_MM,
     margin_deg: float = MARGIN_DEG,
     recording: bool = True,
 ) -> WrittenReport:
-    """Write the report of the campaign in `campaign_path` into the directory `out`.
+    """Write the report of `campaign` into the directory `out`.
 
     Parameters
     ----------
-    campaign_path
-        A campaign directory.
+    campaign
+        A campaign, or its directory.
     out
         Made if it is not there; without it, ``report`` in the campaign directory. Files of an earlier report are
         replaced.
@@ -70,13 +72,15 @@ def write_report(
 
     Raises
     ------
+    InputError
+        If `campaign` is neither.
     CampaignError
         If the campaign cannot be read.
     FileError
         If `out` cannot be written.
     """
     data = gather(
-        campaign_path,
+        as_campaign(campaign).path,
         margin_mm=margin_mm,
         margin_deg=margin_deg,
         track=lambda runs, total: track(runs, total, what="reading runs"),

@@ -6,7 +6,7 @@ What an author of plants needs is here: the protocol, and `check_plant`, which h
 from agvbench.simulator.camera import Camera, Tracker
 from agvbench.simulator.checked_plant import CheckedPlant
 from agvbench.simulator.plant_contract import check_plant
-from agvbench.simulator.plant_loading import CheckedFactory, load_plant
+from agvbench.simulator.plant_loading import CheckedFactory, load_plant, seed_samples_vehicle
 from agvbench.simulator.plants import make_plant, random_plant, small_plant
 from agvbench.types import Plant, PlantFactory
 
@@ -24,5 +24,6 @@ __all__ = [
     "load_plant",
     "make_plant",
     "random_plant",
+    "seed_samples_vehicle",
     "small_plant",
 ]

@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from agvbench.errors import InputError
+from agvbench.errors import InputError, OneOf
 from agvbench.types import Floats, Frames
 
 FIVE_MARKERS = ((0.150, 0.040), (0.110, -0.055), (0.010, 0.070), (-0.115, 0.030), (-0.155, -0.085))
@@ -128,7 +128,7 @@ class Camera:
             if name not in known:
                 close = difflib.get_close_matches(name, known, n=1)
                 raise InputError(
-                    "camera: unknown option", value=f"'{name}'", limit=", ".join(known),
+                    "camera: unknown option", value=f"'{name}'", limit=OneOf(known),
                     remedy=f"did you mean '{close[0]}'?" if close else None,
                 )  # fmt: skip
             try:

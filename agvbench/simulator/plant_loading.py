@@ -15,6 +15,7 @@ from agvbench.errors import PlantError
 from agvbench.simulator.checked_plant import CheckedPlant, as_plant_error, raised
 from agvbench.types import PlantFactory
 
+_SAMPLED = ("agvbench.simulator.hidden:", "agvbench.simulator:random_plant", "agvbench.simulator.plants:random_plant")
 _FORM = "write MODULE:FACTORY or path/to/FILE.py:FACTORY"
 
 
@@ -78,6 +79,17 @@ def load_plant(spec: str) -> CheckedFactory:
             remedy="name a function of a seed that returns a plant",
         )  # fmt: skip
     return CheckedFactory(factory, spec)
+
+
+def seed_samples_vehicle(spec: str) -> bool:
+    """Return whether the plant that `spec` names ships with agvbench and is another vehicle for each seed.
+
+    Of a plant of your own nothing is known.
+
+    >>> seed_samples_vehicle("agvbench.simulator.hidden:steering_lag"), seed_samples_vehicle("my_plant.py:make_plant")
+    (True, False)
+    """
+    return spec.startswith(_SAMPLED)
 
 
 def _suggestion(module: ModuleType, attribute: str) -> str:

@@ -1,6 +1,6 @@
 """Errors of runs, their spread, and comparisons."""
 
-from agvbench.statistics.comparison import Comparison, compare
+from agvbench.statistics.comparison import Comparison, compare_errors
 from agvbench.statistics.differences import ComparisonVerdict, Difference
 from agvbench.statistics.end_poses import end_pose_table
 from agvbench.statistics.repeatability import bias_and_spread
@@ -12,7 +12,7 @@ __all__ = [
     "Difference",
     "RunError",
     "bias_and_spread",
-    "compare",
+    "compare_errors",
     "end_pose_table",
     "pose_errors",
     "run_error",

@@ -45,7 +45,9 @@ MARGIN_DEG = 1.0
 class Comparison:
     """All differences between two sets of runs, and what they do and do not mean.
 
-    ``shifts`` say how the mean end position moved; no verdict follows from them.
+    ``shifts`` say how the mean end position moved; no verdict follows from them. ``cautions`` say what is missing from
+    the campaigns and what differs besides the errors (vehicle, plant, camera, trajectories, calibration); ``remarks``
+    what the intervals cover. `notes` are both.
     """
 
     name_a: str
@@ -53,9 +55,20 @@ class Comparison:
     differences: tuple[Difference, ...]
     shifts: tuple[EndShift, ...]
     left_out: tuple[str, ...]
-    notes: tuple[str, ...]
+    remarks: tuple[str, ...]
     alpha: float
     tests: int
+    cautions: tuple[str, ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Return what qualifies the verdicts, as ``agvbench compare`` prints it; the most severe first."""
+        return (*self.cautions, *self.remarks)
+
+    def __repr__(self) -> str:
+        from agvbench.statistics.comparison_summary import headline
+
+        return f"<Comparison of {self.name_b} with {self.name_a}: {headline(self)}>"
 
     @property
     def deciding(self) -> list[Difference]:
@@ -116,6 +129,16 @@ class Comparison:
         Columns: ``trajectory``, ``condition``, ``quantity`` in ``unit``; ``repeats_a``, ``median_a``, ``repeats_b``,
         ``median_b``; ``difference`` of medians, b minus a, with its 95 % interval ``low`` … ``high``; ``margin``;
         ``verdict`` and whether it ``decides``; ``p_worse``, ``p_better`` (corrected) and ``cliffs_delta``.
+
+        Errors are magnitudes, so that a positive ``difference`` is worse. ``cliffs_delta`` is P(b > a) − P(b < a), from
+        −1 to 1; positive is worse, and ``p_worse`` is small then.
+
+        With several trajectories or conditions, each quantity has a row of trajectory ``"all trajectories"`` and
+        condition ``"all"``: all of them tested together. Its medians and its ``difference`` are means over
+        trajectories and conditions; its p-values and ``cliffs_delta`` count in how many pairs of repeats of one
+        trajectory and condition b is larger. Many small increases and few large decreases therefore give a negative
+        ``difference`` with a positive ``cliffs_delta``. A worse or better needs both to agree. To leave these rows out:
+        ``frame[frame["trajectory"] != "all trajectories"]``.
         """
         from agvbench.statistics.comparison_summary import differences_frame
 
@@ -137,7 +160,7 @@ class Comparison:
         return any(d.testable for d in self.deciding) or not self.of(ComparisonVerdict.INCONCLUSIVE)
 
 
-def compare(
+def compare_errors(
     a: pd.DataFrame,
     b: pd.DataFrame,
     *,

@@ -107,7 +107,7 @@ def comparison_to_json(comparison: Comparison) -> dict[str, Any]:
         "differences": [_difference(d, comparison) for d in comparison.differences],
         "end_shifts": [_shift(shift) for shift in comparison.shifts],
         "left_out": list(comparison.left_out),
-        "notes": list(comparison.notes),
+        "notes": list(comparison.remarks),
     }
 
 
@@ -192,4 +192,4 @@ def comparison_html(comparison: Comparison) -> str:
         [*titles, "difference", "from", "to", "verdict"],
         frame.itertuples(index=False),
     )
-    return heading_html(headline(comparison), sides, notes_in_words(comparison)) + table
+    return heading_html(headline(comparison), sides, notes_in_words(comparison), *comparison.notes) + table

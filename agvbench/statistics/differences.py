@@ -118,7 +118,9 @@ class Difference:
     ``interval`` is the difference of medians with its 95 % bootstrap interval, for itself alone; ``p_worse`` and
     ``p_better`` are corrected for all comparisons, ``p_same`` is not; ``testable`` says whether so many repeats could
     reach significance at all, ``minimum_detectable`` about the smallest difference that they find nine times in ten
-    (infinite: none); ``cliffs_delta`` is positive where b is worse. Where it does not `decide`, its verdict is a note.
+    (infinite: none); ``cliffs_delta`` is P(b > a) − P(b < a), positive where b is worse. Of all trajectories together
+    the interval is of the mean difference of medians, while tests and Cliff's delta count pairs: their signs may differ
+    where few large decreases outweigh many small increases. Where it does not `decide`, its verdict is a note.
     """
 
     trajectory: str

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.errors import InputError
+from agvbench.errors import InputError, OneOf
 from agvbench.statistics.quantities import ACROSS, ALONG, QUANTITIES, Quantity
 from agvbench.statistics.run_errors import valid
 from agvbench.types import Floats
@@ -130,7 +130,7 @@ def _of_condition(errors: pd.DataFrame, condition: str, side: str) -> pd.DataFra
             f"{side} has no run under this condition",
             where="--conditions",
             value=condition,
-            limit=f"one of {', '.join(sorted(set(errors['condition'])))}",
+            limit=OneOf(sorted(set(errors["condition"]))),
         )
     return chosen
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from os import PathLike
 from typing import TYPE_CHECKING
 
 from agvbench.errors import FitError, InputError
@@ -22,25 +23,63 @@ COLUMNS = (
     *("position_mm", "along_mm", "across_mm", "heading_deg", "delta_s_mm", "delta_heading_deg", "rotation_deg"),
     *("stderr_position_mm", "stderr_heading_deg"),
 )
+_REQUIRED = ("trajectory", "condition", "status", "problem", "position_mm", "delta_heading_deg", "delta_s_mm")
 
 
-def pose_errors(runs: Iterable[Run]) -> pd.DataFrame:
+def pose_errors(runs: Iterable[Run] | Run | str | PathLike[str]) -> pd.DataFrame:
     """Return one row per run that has a target: what it is, where it ended, and its errors.
 
     Columns: those of the runs table; ``problem`` (why the run has no error, else empty); the target and the end
     pose in the start frame [m, rad]; ``position_mm`` (the end position error, not negative); ``along_mm``,
     ``across_mm``, ``heading_deg``, ``delta_s_mm``, ``delta_heading_deg`` (signed; see `PoseError`; the heading error
     and Δδ are one number); ``rotation_deg`` (the rotation made, positive in the target's sense);
-    ``stderr_position_mm`` and ``stderr_heading_deg``. Runs that were rejected keep their row: choose them with `valid`.
+    ``stderr_position_mm`` and ``stderr_heading_deg``. Runs that were rejected keep their row; `agvbench.valid` returns
+    the rows that count.
+
+    Parameters
+    ----------
+    runs
+        A campaign, its directory, or runs such as ``campaign.select(trajectory="5")``.
+
+    Raises
+    ------
+    InputError
+        If `runs` is none of these.
+    CampaignError
+        If the campaign cannot be read.
     """
     import pandas as pd
 
-    rows = [_row(run) for run in runs if run.target.is_finite]
+    from agvbench.campaign.arguments import as_runs
+
+    rows = [_row(run) for run in as_runs(runs) if run.target.is_finite]
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
+def as_errors(source: pd.DataFrame | Iterable[Run] | str | PathLike[str], *, where: str) -> pd.DataFrame:
+    """Return `source` if it is what `pose_errors` returned, else the errors of the campaign or runs that it is.
+
+    Raises
+    ------
+    InputError
+        If it is neither; `where` is the argument's name.
+    CampaignError
+        If the campaign cannot be read.
+    """
+    import pandas as pd
+
+    from agvbench.campaign.arguments import as_runs
+
+    if not isinstance(source, pd.DataFrame):
+        return pose_errors(as_runs(source, where=where))
+    if missing := [name for name in _REQUIRED if name not in source]:
+        remedy = "give a campaign, its directory, or what agvbench.pose_errors returns"
+        raise InputError("is not a table of errors", where=where, value=f"no column {missing[0]}", remedy=remedy)
+    return source
+
+
 def valid(errors: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows whose run counts (status ``ok``) and has an error."""
+    """Return the rows of what `pose_errors` returned whose run counts (status ``ok``) and has an error."""
     return errors[(errors["status"] == "ok") & (errors["problem"] == "")].reset_index(drop=True)
 
 

@@ -7,7 +7,7 @@ import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from agvbench.errors import FlagError
+from agvbench.errors import FlagError, OneOf
 from agvbench.thesis.section import ThesisSection
 from agvbench.workflows.output_files import write_file
 
@@ -44,7 +44,7 @@ def thesis_sections(names: Sequence[str] = ()) -> Iterator[ThesisSection]:
     """
     for name in names:
         if name not in _MODULES:
-            raise FlagError("unknown section", where="--section", value=name, limit=", ".join(_MODULES))
+            raise FlagError("unknown section", where="--section", value=name, limit=OneOf(_MODULES))
     return (_section(name) for name in _MODULES if not names or name in names)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, Literal, get_args
 
-from agvbench.errors import VehicleError
+from agvbench.errors import OneOf, VehicleError
 from agvbench.vehicle.fields import coerce_float, require_positive
 
 LONGEST_M = 20.0
@@ -56,7 +56,7 @@ class Geometry:
                 )
         if self.driven not in get_args(Driven):
             raise VehicleError(
-                "unknown driven axle", where="driven", value=repr(self.driven), limit=", ".join(get_args(Driven))
+                "unknown driven axle", where="driven", value=repr(self.driven), limit=OneOf(get_args(Driven))
             )
 
     @property

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from agvbench.errors import InputError
+from agvbench.errors import InputError, OneOf
 from agvbench.types import Floats, wrap_angle
 
 Up = Literal["y", "z"]
@@ -59,7 +59,7 @@ def quaternion_to_heading(
     90.0
     """
     if up not in ("y", "z"):
-        raise InputError("unknown vertical axis", where="up", value=repr(up), limit="'y' or 'z'")
+        raise InputError("unknown vertical axis", where="up", value=repr(up), limit=OneOf("yz"))
     x, y, z, w = np.broadcast_arrays(*(np.asarray(q, dtype=np.float64) for q in (qx, qy, qz, qw)))
     quaternion = np.stack([x, y, z, w], axis=-1)
     heading = heading_of(quaternion, "x", "x", "-z" if up == "y" else "y", least_sine=_POLE_SINE)

@@ -1,191 +1,155 @@
-"""``agvbench compare``: two campaigns or conditions against each other, and whether they are comparable."""
+"""``agvbench compare`` and `agvbench.compare`: two campaigns, or two conditions of one, against each other."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import replace
+from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
 
 from agvbench.campaign import Campaign
-from agvbench.campaign.completeness import Completeness
-from agvbench.errors import AgvbenchError, FlagError
-from agvbench.running.configuration.provenance import INPUTS_TABLE
-from agvbench.running.configuration.settings import BenchSettings
-from agvbench.statistics import Comparison, ComparisonVerdict, compare, pose_errors
+from agvbench.campaign.arguments import as_campaign
+from agvbench.campaign.names import as_text
+from agvbench.errors import FlagError, InputError
+from agvbench.statistics import Comparison, ComparisonVerdict, compare_errors
 from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
 from agvbench.statistics.comparison_summary import comparison_to_json
-from agvbench.statistics.quantities import END_POSE, QUANTITIES
+from agvbench.statistics.differences import ALPHA
+from agvbench.statistics.intervals import RESAMPLES
+from agvbench.statistics.quantities import END_POSE, Quantity
+from agvbench.statistics.run_errors import as_errors
+from agvbench.workflows.comparability import NOTHING_KNOWN, Comparability, comparability, is_same_campaign
 from agvbench.workflows.output_files import write_file
 
-_GEOMETRY = {"front_axle_m": "m", "rear_axle_m": "m"}
-_CAMERA = ("mocap", "camera")
-_DIGITS = 12
-"""Of a hash, as versions are known by theirs; the JSON has them whole."""
+if TYPE_CHECKING:
+    import pandas as pd
 
+    from agvbench.types import Run
 
-@dataclass(frozen=True)
-class Comparability:
-    """``incomplete`` and ``incomparable`` forbid a conclusion, ``notes`` qualify it; sentences of one line each.
-
-    ``calibrations`` are the hashes of both sides' vehicle files, "" where there is none.
-    """
-
-    incomplete: tuple[str, ...] = ()
-    incomparable: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
-    calibrations: tuple[str, ...] = ()
-
-    @property
-    def sentences(self) -> tuple[str, ...]:
-        """All sentences, the most severe first."""
-        return (*self.incomparable, *self.incomplete, *self.notes)
-
-
-NOTHING_KNOWN = Comparability()
-
-
-def comparability(a: str | Path, b: str | Path | None, *, across_vehicles: bool = False) -> Comparability:
-    """Return what to know before campaign `b` is compared with `a`, or two conditions of `a` (`b` None).
-
-    With ``across_vehicles`` vehicles of different units are compared on purpose.
-
-    Raises
-    ------
-    CampaignError
-        If a table cannot be read.
-    """
-    sides = [Campaign.open(side) for side in (a, b) if side is not None]
-    incomplete = tuple(_incomplete(side) for side in sides if (done := Completeness.of(side)) and not done.is_complete)
-    if b is None or Path(a).resolve() == Path(b).resolve():
-        return Comparability(incomplete)
-    units, *notes = (tuple(find(*sides)) for find in (_units, _vehicles, _cameras, _trajectories, _calibrations))
-    qualified = tuple(sentence for found in notes for sentence in found)
-    hashes = tuple(_calibration_hash(side.path) for side in sides)
-    if across_vehicles:
-        return Comparability(incomplete, (), (*units, *qualified), hashes)
-    return Comparability(incomplete, units, qualified, hashes)
-
-
-def _incomplete(side: Campaign) -> str:
-    return f"{side.path} is incomplete: {Completeness.of(side)}; agvbench bench --resume --out {side.path} drives them"
-
-
-def _units(a: Campaign, b: Campaign) -> Iterator[str]:
-    if a.header.command_unit != b.header.command_unit:
-        yield (
-            f"The vehicles take commands in different units ({a.header.command_unit} and {b.header.command_unit}): "
-            "they are not one kind of vehicle (compared on purpose: --across-vehicles)."
-        )
-
-
-def _vehicles(a: Campaign, b: Campaign) -> Iterator[str]:
-    found = [(name, getattr(a.header, name), getattr(b.header, name), unit) for name, unit in _GEOMETRY.items()]
-    if a.header.command_unit == b.header.command_unit:
-        found.append(("neutral", a.header.neutral, b.header.neutral, a.header.command_unit))
-    differing = [f"{name} {one:g} and {other:g} {unit}" for name, one, other, unit in found if one != other]
-    if a.header.driven != b.header.driven:
-        differing.append(f"driven axle {a.header.driven} and {b.header.driven}")
-    if differing:
-        yield f"The vehicles differ: {', '.join(differing)}."
-
-
-def _cameras(a: Campaign, b: Campaign) -> Iterator[str]:
-    found = [("rate", f"{a.header.mocap_rate_hz:g} Hz", f"{b.header.mocap_rate_hz:g} Hz")]
-    if (one := _settings(a)) and (other := _settings(b)):
-        found += [(f"--{name}", getattr(one, name) or "none", getattr(other, name) or "none") for name in _CAMERA]
-    differing = [f"{name} {first} and {second}" for name, first, second in found if first != second]
-    if differing:
-        yield f"The cameras differ: {', '.join(differing)}."
-
-
-def _trajectories(a: Campaign, b: Campaign) -> Iterator[str]:
-    one, other = _inputs(a), _inputs(b)
-    shared = [name for name in one if name.startswith("trajectory ") and name in other]
-    differing = [name.removeprefix("trajectory ") for name in shared if one[name] != other[name]]
-    if differing:
-        yield f"The files of trajectories differ: {', '.join(differing)}."
-    modes = [settings.steering for side in (a, b) if (settings := _settings(side))]
-    if len(set(modes)) > 1:
-        yield f"The trajectories were steered differently: --steering {modes[0] or 'none'} and {modes[1] or 'none'}."
-
-
-def _calibrations(a: Campaign, b: Campaign) -> Iterator[str]:
-    hashes = [_calibration_hash(side.path) for side in (a, b)]
-    calibrated = any(set(side.runs["condition"]) - {"uncalibrated", ""} for side in (a, b))
-    if all(hashes) and hashes[0] != hashes[1] and calibrated:
-        yield (
-            f"The calibrations differ ({hashes[0][:_DIGITS]} and {hashes[1][:_DIGITS]}): this is part of every "
-            "difference but the uncalibrated ones. To compare firmware or vehicles alone, drive both with one "
-            "calibration (bench --calibration FILE)."
-        )
-
-
-def _calibration_hash(campaign: Path) -> str:
-    from agvbench.model import VehicleModel
-
-    try:
-        return VehicleModel.load(campaign / "vehicle.toml").calibration_hash
-    except AgvbenchError:
-        return ""
-
-
-def _settings(side: Campaign) -> BenchSettings | None:
-    try:
-        return BenchSettings.load(side.path)
-    except AgvbenchError:
-        return None
-
-
-def _inputs(side: Campaign) -> dict[str, str]:
-    if not side.has_table(INPUTS_TABLE):
-        return {}
-    table = side.table(INPUTS_TABLE)
-    return dict(zip(table["input"], table["sha256"], strict=True))
-
-
+Comparable: TypeAlias = "Campaign | str | PathLike[str] | Iterable[Run] | pd.DataFrame"
 _SAME_CAMPAIGN = "both sides are the same campaign: no difference can be found"
 
 
-def compare_campaigns(
-    a: str | Path,
-    b: str | Path | None = None,
+def compare(
+    a: Comparable,
+    b: Comparable | None = None,
     *,
-    conditions: tuple[str, str] | None = None,
+    conditions: Sequence[str] | None = None,
     margin_mm: float = MARGIN_MM,
     margin_deg: float = MARGIN_DEG,
-    distance_decides: bool = False,
+    deciding: Collection[Quantity] = END_POSE,
+    names: tuple[str, str] | None = None,
+    same_campaign: bool = False,
+    across_vehicles: bool = False,
+    alpha: float = ALPHA,
+    resamples: int = RESAMPLES,
+    seed: int = 0,
 ) -> Comparison:
-    """Compare campaign `b` with campaign `a`, or two conditions of `a` with each other.
+    """Compare the errors of `b` with those of `a`, or two conditions of `a`: end position, heading and |Δs|.
 
-    With ``distance_decides`` |Δs| counts as end position error and heading error do, instead of being a note.
+    ``Comparison.notes`` are those that ``agvbench compare`` prints: whether vehicles, plants, cameras, trajectories and
+    calibrations differ, and what the intervals cover. They change no verdict.
+
+    Parameters
+    ----------
+    a, b
+        Campaigns, their directories, runs, or what `agvbench.pose_errors` returns. Without `b`, two conditions of `a`
+        are compared. Runs that were rejected or could not be measured do not count. Runs and tables of errors contain
+        nothing about vehicle, camera and calibration; only campaigns give notes on these.
+    conditions
+        Compare the first condition of `a` with the second of `b` (of `a` without `b`); by default equal conditions are
+        compared.
+    margin_mm, margin_deg
+        The noise band, of end position error and |Δs|, and of the heading error: median differences within it are no
+        regression, however significant.
+    deciding
+        The quantities that decide whether something is worse (`agvbench.statistics.quantities`); the others are notes.
+    names
+        What to call the two sides; by default their directories, or the conditions.
+    same_campaign
+        Two tables of errors come from the same campaign, so that runs are compared within its sessions.
+    across_vehicles
+        Vehicles that take commands in different units are compared on purpose.
+    alpha
+        The chance of reporting any regression where there is none, over all trajectories and the quantities that
+        decide; notes have the same chance of their own.
+    resamples, seed
+        Of the bootstrap.
 
     Raises
     ------
-    AgvbenchError
-        If a campaign cannot be read, there is nothing to compare, or a margin cannot be used.
+    InputError
+        If a side is neither a campaign, nor runs, nor a table of errors, there is nothing in common, or a side has no
+        run that counts.
+    CampaignError
+        If a campaign cannot be read.
+    FlagError
+        If a margin is negative or not finite, or there is nothing to compare with.
     """
-    if b is None and conditions is None:
-        raise FlagError(
-            "one campaign has nothing to be compared with",
-            value=a,
-            remedy="give a second campaign, or two conditions with --conditions",
-        )
-    errors_a = pose_errors(Campaign.open(a))
-    errors_b = errors_a if b is None else pose_errors(Campaign.open(b))
-    comparison = compare(
+    one, other = _side(a, "a"), None if b is None else _side(b, "b")
+    pair = _checked(conditions)
+    if other is None and pair is None:
+        raise _alone(one)
+    errors_a = as_errors(one, where="a")
+    compared = compare_errors(
         errors_a,
-        errors_b,
+        errors_a if other is None else as_errors(other, where="b"),
         margin_mm=margin_mm,
         margin_deg=margin_deg,
-        conditions=conditions,
-        same_campaign=b is None,
-        deciding=QUANTITIES if distance_decides else END_POSE,
-        names=_names(Path(a), None if b is None else Path(b), conditions),
+        conditions=pair,
+        same_campaign=same_campaign or other is None,
+        deciding=deciding,
+        names=names or _names(one, other, pair),
+        alpha=alpha,
+        resamples=resamples,
+        seed=seed,
     )
-    if b is None or Path(a).resolve() != Path(b).resolve():
-        return comparison
-    return replace(comparison, notes=(*comparison.notes, _SAME_CAMPAIGN))
+    return _with_notes(compared, one, other, across_vehicles=across_vehicles)
+
+
+def _side(side: Comparable, where: str) -> Campaign | pd.DataFrame:
+    if isinstance(side, Campaign | str | PathLike):
+        return as_campaign(side)
+    return as_errors(side, where=where)
+
+
+def _checked(conditions: Sequence[str] | None) -> tuple[str, str] | None:
+    if conditions is None:
+        return None
+    if isinstance(conditions, str) or len(conditions) != 2:
+        remedy = 'give that of each side, such as ("uncalibrated", "calibrated")'
+        raise InputError("must be two names", where="conditions", value=repr(conditions), remedy=remedy)
+    first, second = (as_text(condition, where="conditions") for condition in conditions)
+    return first, second
+
+
+def _alone(side: Campaign | pd.DataFrame) -> FlagError:
+    return FlagError(
+        "one campaign has nothing to be compared with",
+        value=side.path if isinstance(side, Campaign) else "a table of errors",
+        remedy="give a second campaign, or two conditions with --conditions",
+    )
+
+
+def _with_notes(
+    compared: Comparison, a: Campaign | pd.DataFrame, b: Campaign | pd.DataFrame | None, *, across_vehicles: bool
+) -> Comparison:
+    if not isinstance(a, Campaign) or not isinstance(b, Campaign | None):
+        return compared
+    known = comparability(a, b, across_vehicles=across_vehicles)
+    same = [_SAME_CAMPAIGN] if b is not None and is_same_campaign(a, b) else []
+    return replace(compared, cautions=known.sentences, remarks=(*compared.remarks, *same))
+
+
+def _names(
+    a: Campaign | pd.DataFrame, b: Campaign | pd.DataFrame | None, conditions: tuple[str, str] | None
+) -> tuple[str, str]:
+    if b is None and conditions is not None:
+        return conditions
+    first, second = (str(side.path) if isinstance(side, Campaign) else letter for side, letter in ((a, "A"), (b, "B")))
+    return (first, second) if conditions is None else (f"{first} ({conditions[0]})", f"{second} ({conditions[1]})")
 
 
 def exit_code(comparison: Comparison, fail_on: str, known: Comparability = NOTHING_KNOWN) -> int:
@@ -221,12 +185,3 @@ def write_json(comparison: Comparison, path: str | Path, known: Comparability = 
     }
     text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
     write_file("--json", Path(path), lambda file: file.write_text(f"{text}\n", encoding="utf-8"))
-
-
-def _names(a: Path, b: Path | None, conditions: tuple[str, str] | None) -> tuple[str, str]:
-    sides = (a, a if b is None else b)
-    if conditions is None:
-        return str(sides[0]), str(sides[1])
-    if b is None:
-        return conditions
-    return f"{sides[0]} ({conditions[0]})", f"{sides[1]} ({conditions[1]})"

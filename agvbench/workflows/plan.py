@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from agvbench.errors import FlagError
+from agvbench.errors import FlagError, OneOf
 from agvbench.model import VehicleModel
 from agvbench.planning import (
     DryRun,
@@ -68,5 +68,5 @@ def _no_condition(trajectories: Sequence[Trajectory], conditions: Sequence[str])
         f"trajectory {', '.join(t.name for t in trajectories)} is not driven under this condition",
         where="--condition",
         value=", ".join(conditions),
-        limit=", ".join(has),
+        limit=OneOf(has),
     )

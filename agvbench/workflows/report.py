@@ -13,7 +13,7 @@ import numpy as np
 
 from agvbench.campaign import Campaign, CampaignHeader
 from agvbench.errors import InputError
-from agvbench.statistics import Comparison, bias_and_spread, compare, end_pose_table, pose_errors, valid
+from agvbench.statistics import Comparison, bias_and_spread, compare_errors, end_pose_table, pose_errors, valid
 from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM, checked_margins
 from agvbench.statistics.end_poses import in_order
 from agvbench.types import Frames, Run
@@ -147,7 +147,7 @@ def _between_conditions(
     for pair in pairwise(in_order(valid(errors)["condition"])):
         try:
             comparisons.append(
-                compare(
+                compare_errors(
                     errors,
                     errors,
                     margin_mm=margin_mm,

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import subprocess
 import sys
 
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
 import agvbench
 from agvbench.errors import InputError
@@ -49,7 +51,7 @@ def points(axes):
 
 def drawn(axes):
     """Render the figure, where a name that is taken for a formula would raise."""
-    axes.figure.canvas.draw()
+    axes.figure.draw_without_rendering()
     return axes
 
 
@@ -62,7 +64,7 @@ def test_end_poses_are_seen_from_the_target_in_mm(axes, errors, hostile):
 
 
 def test_a_trajectory_that_was_not_driven_is_named_with_those_that_were(axes, errors):
-    with pytest.raises(InputError, match=r"no run of this trajectory counts: '9' \(limit: <script>"):
+    with pytest.raises(InputError, match=r"no run of this trajectory counts: '9' \(one of: <script>"):
         agvbench.plot.end_poses(axes, errors, trajectory="9")
 
 
@@ -125,6 +127,40 @@ def test_a_comparison_shows_interval_margin_and_verdict(axes, compared, hostile)
     assert axes.get_xlabel() == "end position error [mm]"
     with pytest.raises(InputError, match="quantity: was not compared: 'luck'"):
         agvbench.plot.comparison(axes, compared, quantity="luck")
+
+
+@pytest.fixture(scope="module")
+def seventeen(compared):
+    """Eight trajectories under two conditions, and all of them."""
+    first = compared.differences[0]
+    cells = [(str(n), condition) for n in range(1, 9) for condition in ("uncalibrated", "calibrated")]
+    rows = [dataclasses.replace(first, trajectory=t, condition=c) for t, c in [*cells, ("all trajectories", "all")]]
+    return dataclasses.replace(compared, differences=tuple(rows))
+
+
+def test_seventeen_comparisons_are_readable_at_the_default_size(seventeen):
+    axes = Figure(layout="constrained").add_subplot()
+    agvbench.plot.comparison(axes, seventeen)
+    drawn(axes)
+    names = axes.get_yticklabels()
+    assert [name.get_text() for name in names][-2:] == ["8, calibrated", "all trajectories"]
+    assert min(text.get_fontsize() for text in [*names, *axes.texts]) > 7.0
+    for column in (names, axes.texts):
+        boxes = sorted((text.get_window_extent() for text in column), key=lambda box: box.y0)
+        assert len(boxes) == 17
+        assert all(below.y1 <= above.y0 for below, above in itertools.pairwise(boxes))
+        page = axes.figure.bbox
+        assert all(page.x0 <= box.x0 and box.x1 <= page.x1 for box in boxes)
+
+
+def test_medians_are_hollow_and_the_title_says_what_the_number_is(axes, errors, campaign):
+    renamed = errors.assign(trajectory="5")
+    agvbench.plot.end_poses(axes, renamed, trajectory="5")
+    assert axes.get_title() == "trajectory 5"
+    medians = [line for line in axes.get_lines() if len(line.get_xdata()) == 1 and line.get_marker() in {"o", "s"}]
+    assert [line.get_markerfacecolor() for line in medians] == ["none", "none"]
+    runs = [dataclasses.replace(run, trajectory="5") for run in campaign.select(experiment="trajectory")]
+    assert agvbench.plot.paths(Figure().add_subplot(), runs).get_title() == "trajectory 5"
 
 
 def test_matplotlib_is_imported_by_whoever_makes_the_axes():

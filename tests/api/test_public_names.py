@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -15,7 +16,7 @@ import agvbench
 EXPORTED = (
     *("Campaign", "Run", "Pose", "VehicleModel", "Trajectory", "plan", "simulate", "calibrate", "identify", "diagnose"),
     *("Diagnosis", "Verdict", "compare", "pose_errors", "write_report", "AgvbenchError", "plot"),
-    *("PoseNoise", "SimulatedRun", "Simulation"),
+    *("PoseNoise", "SimulatedRun", "Simulation", "Comparison", "valid"),
 )
 
 
@@ -23,6 +24,12 @@ def test_what_notebooks_need_is_exported_and_listed():
     assert sorted(agvbench.__all__) == sorted(EXPORTED)
     assert set(EXPORTED) <= set(dir(agvbench))
     assert not [name for name in EXPORTED if getattr(agvbench, name) is None]
+
+
+def test_the_page_of_the_api_has_one_line_for_every_name():
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "api.md").read_text(encoding="utf-8")
+    rows = [line for line in page.splitlines() if line.startswith("| `") and "agvbench" not in line.split("|")[1]]
+    assert sorted(name for row in rows for name in re.findall(r"`(\w+)`", row.split("|")[1])) == sorted(EXPORTED)
 
 
 def test_importing_agvbench_imports_no_heavy_library():

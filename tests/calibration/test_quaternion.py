@@ -68,5 +68,5 @@ def test_untracked_bodies_have_no_heading():
 
 
 def test_unknown_vertical_axis_is_one_clear_line():
-    with pytest.raises(InputError, match=r"unknown vertical axis: 'x' \(limit: 'y' or 'z'\)"):
+    with pytest.raises(InputError, match=r"unknown vertical axis: 'x' \(one of: y, z\)"):
         quaternion_to_heading(0, 0, 0, 1, up="x")  # type: ignore[arg-type]

@@ -153,7 +153,7 @@ def test_values_out_of_bounds_are_refused(cls: type[Effect]) -> None:
     ("table", "message"),
     [
         ({}, "effect: a key is missing: name"),
-        ({"name": "gremlins"}, "effect.name: unknown effect: 'gremlins' (limit: actuation_delay, "),
+        ({"name": "gremlins"}, "effect.name: unknown effect: 'gremlins' (one of: actuation_delay, "),
         ({"name": "steering_lag", "time_constant": 0.1}, "effect: unknown key: time_constant; did you mean time_const"),
         ("steering_lag", "effect: must be a table"),
     ],

@@ -11,6 +11,7 @@ import pytest
 from conftest import TWO
 from report_samples import make_campaign
 
+import agvbench
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
 from agvbench.cli import main
 from agvbench.running.configuration.settings import BenchSettings
@@ -180,7 +181,61 @@ def test_what_differs_between_the_sides_is_said_first(copies, capsys):
     BenchSettings(steering="crab").save(paths[1])
     code, out, _ = run(capsys, "compare", paths[0], paths[1])
     assert code == 0
-    assert "The vehicles differ: rear_axle_m" in out
+    assert "The vehicles differ: rear_axle_m 0.121 m and 0.2 m." in out
     assert "The cameras differ: rate 120 Hz and 60 Hz, --mocap natnet:lab and sim." in out
     assert "The files of trajectories differ: 2." in out
     assert out.index("The trajectories were steered differently: --steering none and crab.") < out.index("worst first")
+
+
+HIDDEN = "agvbench.simulator.hidden:steering_lag"
+SAMPLED = "The simulated vehicles differ: {} samples another vehicle for each seed (--seed 0 and 1)."
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "said"),
+    [
+        ({"plant": HIDDEN}, {"plant": HIDDEN, "seed": 1}, SAMPLED.format(HIDDEN)),
+        (
+            {"plant": "agvbench.simulator:random_plant"},
+            {"plant": "agvbench.simulator:random_plant", "seed": 1},
+            SAMPLED.format("agvbench.simulator:random_plant"),
+        ),
+        ({"plant": HIDDEN}, {"plant": "my.py:cart"}, f"The vehicles differ: --plant {HIDDEN} and my.py:cart."),
+        ({"agv": "simavr"}, {"seed": 1}, "The vehicles differ: --agv simavr and sim."),
+    ],
+)
+def test_other_plants_and_sampled_vehicles_are_noted_by_command_and_python_alike(copies, capsys, one, other, said):
+    paths, _ = copies
+    for path, options in zip(paths, (one, other), strict=False):
+        BenchSettings(**options).save(path)
+    code, out, _ = run(capsys, "compare", paths[0], paths[1])
+    assert code == 0
+    assert said in out
+    notes = agvbench.compare(*paths[:2]).notes
+    assert notes[0].startswith(said)
+    assert all(" ".join(note.split()) in out for note in notes)
+
+
+@pytest.mark.parametrize("plant", ["agvbench.simulator:make_plant", "my.py:cart"])
+def test_another_seed_of_one_vehicle_is_another_evening_without_a_note(copies, plant):
+    paths, _ = copies
+    for seed, path in enumerate(paths):
+        BenchSettings(plant=plant, seed=seed).save(path)
+    (note,) = agvbench.compare(*paths[:2]).notes
+    assert note.startswith("Each side is one session")
+
+
+def test_another_name_is_another_vehicle(copies):
+    paths, _ = copies
+    changed(paths[1], vehicle_name="truck")
+    assert agvbench.compare(*paths[:2]).notes[0] == "The vehicles differ: name thesis AGV and truck."
+
+
+def test_notes_in_python_tell_separate_calibrations(tmp_path):
+    make = {"repeats": 8, "rate_hz": 30.0, "trajectories": ("1_forward",), "conditions": ("calibrated",)}
+    a, b = (make_campaign(tmp_path / name, seed=seed, **make) for seed, name in enumerate("ab"))
+    text = (b / "vehicle.toml").read_text(encoding="utf-8")
+    (b / "vehicle.toml").write_text(text.replace("neutral = 1500.0", "neutral = 1510.0"), encoding="utf-8")
+    compared = agvbench.compare(a, Campaign.open(b))
+    assert compared.notes[0].startswith("The calibrations differ")
+    assert "The calibrations differ" in compared._repr_html_()

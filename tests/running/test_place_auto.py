@@ -74,7 +74,7 @@ def test_who_can_place_what() -> None:
     assert choose_placer("", simulated=True) is PLACERS["teleport"]
     assert choose_placer("", simulated=False) is PLACERS["operator"]
     assert choose_placer("auto", simulated=True) is choose_placer("auto", simulated=False)
-    with pytest.raises(FlagError, match=r"--place: a real vehicle cannot be placed so: teleport \(limit: auto or oper"):
+    with pytest.raises(FlagError, match=r"--place: a real vehicle cannot be placed so: teleport \(one of: auto, oper"):
         choose_placer("teleport", simulated=False)
 
 

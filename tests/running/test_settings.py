@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from pathlib import Path
 from typing import get_args
 
 import pytest
@@ -123,3 +124,11 @@ def test_every_option_is_a_field_with_help():
         f"--{f.name.replace('_', '-')}" for f in fields(BenchSettings) if f.name not in {"benchmarks", "only"}
     ]
     assert all(text for _, _, text in OPTIONS)
+
+
+@pytest.mark.parametrize("file", sorted((Path(__file__).parents[2] / "benchmarks").glob("bench_*.py")), ids=str)
+def test_the_help_of_repeats_names_the_benchmarks_that_declare_their_own(file):
+    (option,) = (option for option in fields(BenchSettings) if option.name == "repeats")
+    declares = "@pytest.mark.repeats(" in file.read_text(encoding="utf-8")
+    exceptions = option.metadata["help"].partition(";")[2]
+    assert (file.stem.removeprefix("bench_") in exceptions) is declares

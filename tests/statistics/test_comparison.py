@@ -8,7 +8,7 @@ import pytest
 from statistics_samples import TARGETS, error_table
 
 from agvbench.errors import FlagError, InputError
-from agvbench.statistics import ComparisonVerdict, compare
+from agvbench.statistics import ComparisonVerdict, compare_errors
 from agvbench.statistics.comparison_summary import comparison_to_json, describe, headline
 from agvbench.statistics.differences import ALL
 from agvbench.statistics.quantities import QUANTITIES
@@ -41,7 +41,7 @@ def alarms(draw, repeats, conditions):
     bias = {(t, c): (12.0, 1.0) for t in TARGETS for c in conditions}
     make = {"repeats": repeats, "conditions": conditions, "shift": bias}
     pairs = ((error_table(draw, **make), error_table(draw, **make)) for _ in range(PAIRS))
-    return sum(compare(a, b, margin_mm=0.0, margin_deg=0.0, resamples=2).is_regression for a, b in pairs)
+    return sum(compare_errors(a, b, margin_mm=0.0, margin_deg=0.0, resamples=2).is_regression for a, b in pairs)
 
 
 @pytest.mark.parametrize("repeats", [5, 10])
@@ -65,7 +65,7 @@ def test_a_shift_of_three_sd_in_one_of_twenty_eight_comparisons_is_found(noise, 
     worse = base | {("6_forward_right", "calibrated"): (35.0, 2.0)}
     found = 0
     for _ in range(PAIRS // 4):
-        comparison = compare(
+        comparison = compare_errors(
             error_table(draw, repeats=10, shift=base), error_table(draw, repeats=10, shift=worse), resamples=2
         )
         found += find(comparison, "6_forward_right", condition="calibrated").verdict is ComparisonVerdict.WORSE
@@ -79,7 +79,7 @@ def test_a_shift_of_three_sd_everywhere_is_always_found(repeats):
     worse = {(t, "calibrated"): (35.0, 2.0) for t in TARGETS}
     make = {"repeats": repeats, "conditions": ("calibrated",)}
     found = sum(
-        compare(
+        compare_errors(
             error_table(draw, shift=base, **make), error_table(draw, shift=worse, **make), resamples=2
         ).is_regression
         for _ in range(20)
@@ -95,7 +95,7 @@ def test_the_four_verdicts_and_their_words():
 
     def against(mm, **options):
         b = error_table(normal(rng, 2.0), shift={("1_forward", "calibrated"): (50.0 + mm, 5.0)}, **make)
-        comparison = compare(a, b, **options)
+        comparison = compare_errors(a, b, **options)
         d = find(comparison, "1_forward")
         return d.verdict, describe(d, comparison)
 
@@ -123,7 +123,7 @@ def test_runs_that_end_further_left_are_a_regression_although_distance_and_headi
     b["along_mm"] += 2000.0 * (math.cos(arc) - 1.0)
     b["across_mm"] += 2000.0 * math.sin(arc)
     b["position_mm"] = np.hypot(b["along_mm"], b["across_mm"])
-    comparison = compare(a, b)
+    comparison = compare_errors(a, b)
     assert comparison.is_regression
     verdicts = {d.quantity.column: d.verdict for d in comparison.differences}
     assert [column for column, verdict in verdicts.items() if verdict is ComparisonVerdict.WORSE] == ["position_mm"]
@@ -144,7 +144,7 @@ def further_along_and_less_across():
 
 
 def test_distance_worse_alone_is_a_note_and_no_regression():
-    comparison = compare(*further_along_and_less_across())
+    comparison = compare_errors(*further_along_and_less_across())
     verdicts = {d.quantity.column: d.verdict for d in comparison.differences if d.trajectory == "parallel_park"}
     assert (verdicts["position_mm"], verdicts["delta_s_mm"]) == (ComparisonVerdict.BETTER, ComparisonVerdict.WORSE)
     assert not comparison.is_regression
@@ -157,7 +157,7 @@ def test_distance_worse_alone_is_a_note_and_no_regression():
 
 
 def test_distance_counts_where_it_is_asked_to_and_shares_the_chance_of_a_false_alarm():
-    comparison = compare(*further_along_and_less_across(), deciding=QUANTITIES)
+    comparison = compare_errors(*further_along_and_less_across(), deciding=QUANTITIES)
     assert comparison.is_regression
     assert comparison.verdicts["parallel_park", "calibrated"] is ComparisonVerdict.WORSE
     assert comparison.tests == 9
@@ -171,7 +171,7 @@ def test_the_other_side_of_the_target_is_no_regression_and_is_shown():
         error_table(normal(rng, 2.0), shift={("1_forward", "calibrated"): (0.0, 0.0, across)}, **make)
         for across in (-30.0, 30.0)
     )
-    comparison = compare(right, left)
+    comparison = compare_errors(right, left)
     assert not comparison.is_regression
     made = comparison_to_json(comparison)["end_shifts"][0]
     assert made["trajectory"] == "1_forward"
@@ -183,7 +183,7 @@ def test_rows_come_by_trajectory_the_worst_first_with_the_end_position_before_ot
     rng = np.random.default_rng(48)
     shift = {("2_backward", "calibrated"): (40.0, 0.0), ("5_forward_left", "calibrated"): (80.0, 0.0)}
     make = {"repeats": 10, "trajectories": ("1_forward", "2_backward", "5_forward_left"), "conditions": ("calibrated",)}
-    comparison = compare(error_table(normal(rng), **make), error_table(normal(rng), shift=shift, **make))
+    comparison = compare_errors(error_table(normal(rng), **make), error_table(normal(rng), shift=shift, **make))
     rows = [d for d in comparison.worst_first if d.trajectory != ALL]
     assert [d.trajectory for d in rows] == ["5_forward_left"] * 3 + ["2_backward"] * 3 + ["1_forward"] * 3
     assert [d.quantity.column for d in rows] == ["position_mm", "delta_heading_deg", "delta_s_mm"] * 3
@@ -196,8 +196,8 @@ def test_where_repeats_are_few_the_distance_is_not_tested_before_the_end_pose():
     rng = np.random.default_rng(49)
     make = {"repeats": 5, "trajectories": ("1_forward",), "conditions": ("calibrated",)}
     a, b = (error_table(normal(rng), **make) for _ in range(2))
-    assert all(d.testable for d in compare(a, b).differences)  # |Δs| is a note, which costs the others nothing
-    comparison = compare(a, b, deciding=QUANTITIES)
+    assert all(d.testable for d in compare_errors(a, b).differences)  # |Δs| is a note, which costs the others nothing
+    comparison = compare_errors(a, b, deciding=QUANTITIES)
     assert {d.quantity.column: d.testable for d in comparison.differences} == {
         "position_mm": True, "delta_heading_deg": True, "delta_s_mm": False,
     }  # fmt: skip
@@ -209,7 +209,7 @@ def test_too_few_repeats_are_said_aloud():
     make = {"repeats": 3, "trajectories": ("1_forward",), "conditions": ("calibrated",)}
     a = error_table(normal(rng), **make)
     b = error_table(normal(rng), shift={("1_forward", "calibrated"): (500.0, 0.0)}, **make)
-    comparison = compare(a, b)
+    comparison = compare_errors(a, b)
     assert not comparison.could_compare
     assert not comparison.is_regression
     assert headline(comparison) == (
@@ -222,8 +222,8 @@ def test_a_difference_within_the_margin_is_no_regression_however_significant():
     make = {"repeats": 60, "trajectories": ("1_forward",), "conditions": ("calibrated",)}
     a = error_table(normal(rng, 1.0), shift={("1_forward", "calibrated"): (50.0, 5.0)}, **make)
     b = error_table(normal(rng, 1.0), shift={("1_forward", "calibrated"): (53.0, 5.0)}, **make)
-    assert compare(a, b, margin_mm=1.0).is_regression
-    wide = compare(a, b, margin_mm=6.0)
+    assert compare_errors(a, b, margin_mm=1.0).is_regression
+    wide = compare_errors(a, b, margin_mm=6.0)
     assert not wide.is_regression
     assert find(wide, "1_forward").verdict is ComparisonVerdict.SAME
 
@@ -233,7 +233,7 @@ def test_a_small_change_everywhere_shows_in_all_trajectories_together():
     conditions = ("calibrated",)
     base = {(t, "calibrated"): (30.0, 3.0) for t in TARGETS}
     worse = {(t, "calibrated"): (34.0, 3.0) for t in TARGETS}
-    comparison = compare(
+    comparison = compare_errors(
         error_table(normal(rng), repeats=10, conditions=conditions, shift=base),
         error_table(normal(rng), repeats=10, conditions=conditions, shift=worse),
         margin_mm=2.0,
@@ -247,7 +247,7 @@ def test_outliers_are_named_and_not_dropped():
     a = error_table(normal(rng), **make)
     b = a.copy()
     b.loc[0, "delta_s_mm"] = 400.0
-    d = find(compare(a, b), "1_forward")
+    d = find(compare_errors(a, b), "1_forward")
     assert d.b.outliers == "1 high severe"
     assert d.b.repeats == 10
     assert d.a.outliers == "none"
@@ -260,21 +260,40 @@ def test_conditions_are_compared_within_the_sessions_that_they_share():
     table = error_table(normal(rng, 1.0), shift={("1_forward", "calibrated"): (6.0, 0.0)}, **make)
     table["session"] = [f"s{repeat % 3}" for repeat in table["repeat"]]
     table["delta_s_mm"] += 200.0 + 100.0 * (table["repeat"] % 3)
-    blind = compare(table, table, conditions=("uncalibrated", "calibrated"))
+    blind = compare_errors(table, table, conditions=("uncalibrated", "calibrated"))
     assert find(blind, "1_forward").verdict is ComparisonVerdict.INCONCLUSIVE
-    seen = compare(table, table, conditions=("uncalibrated", "calibrated"), same_campaign=True)
+    seen = compare_errors(table, table, conditions=("uncalibrated", "calibrated"), same_campaign=True)
     assert find(seen, "1_forward").verdict is ComparisonVerdict.WORSE
     assert find(seen, "1_forward").condition == "uncalibrated → calibrated"
+
+
+def test_of_all_together_many_small_increases_outnumber_few_large_decreases():
+    rng = np.random.default_rng(41)
+    base = {(t, "calibrated"): (40.0, 4.0) for t in TARGETS}
+    changed = dict.fromkeys(base, (43.0, 4.3)) | {("1_forward", "calibrated"): (5.0, 0.5)}
+    a, b = (error_table(normal(rng, 0.2), repeats=8, conditions=("calibrated",), shift=s) for s in (base, changed))
+    comparison = compare_errors(a, b, margin_mm=0.5, resamples=9)
+    together = find(comparison, ALL, "position_mm")
+    assert together.interval.estimate < -1.0
+    assert together.cliffs_delta > 0.5
+    assert together.p_worse < 0.001
+    assert together.verdict not in {ComparisonVerdict.WORSE, ComparisonVerdict.BETTER}
+    frame = comparison.differences_frame()
+    alone = frame[(frame["trajectory"] != "all trajectories") & (frame["quantity"] == "position_mm")]
+    assert (np.sign(alone["difference"]) == np.sign(alone["cliffs_delta"])).all()
+    worse = alone["difference"] > 0
+    assert (alone["p_worse"] < alone["p_better"])[worse].all()
+    assert (alone["p_worse"] > alone["p_better"])[~worse].all()
 
 
 def test_notes_say_what_the_interval_means():
     rng = np.random.default_rng(39)
     a, b = (error_table(normal(rng), repeats=6) for _ in range(2))
-    assert "Each side is one session" in compare(a, b, resamples=2).notes[0]
-    assert "in the same campaign" in compare(a, b, same_campaign=True, resamples=2).notes[0]
+    assert "Each side is one session" in compare_errors(a, b, resamples=2).notes[0]
+    assert "in the same campaign" in compare_errors(a, b, same_campaign=True, resamples=2).notes[0]
     a["session"] = [f"s{repeat % 2}" for repeat in a["repeat"]]
     a.loc[a["repeat"] % 2 == 1, "delta_s_mm"] += 1000.0
-    note = compare(a, b, resamples=2).notes[0]
+    note = compare_errors(a, b, resamples=2).notes[0]
     assert "Medians of sessions of one and the same side have a standard deviation of" in note
     assert ", 70" in note
 
@@ -283,7 +302,7 @@ def test_what_only_one_side_has_is_left_out_and_said():
     rng = np.random.default_rng(40)
     a = error_table(normal(rng), repeats=6, trajectories=("1_forward", "2_backward"), conditions=("calibrated",))
     b = error_table(normal(rng), repeats=6, trajectories=("1_forward", "5_forward_left"), conditions=("calibrated",))
-    comparison = compare(a, b)
+    comparison = compare_errors(a, b)
     assert comparison.left_out == ("2_backward calibrated: only in A", "5_forward_left calibrated: only in B")
     assert {d.trajectory for d in comparison.differences} == {"1_forward"}
 
@@ -293,15 +312,15 @@ def test_nothing_in_common_is_an_error_and_no_verdict():
     a = error_table(normal(rng), repeats=6, trajectories=("1_forward",), conditions=("calibrated",))
     b = error_table(normal(rng), repeats=6, trajectories=("1_forward",), conditions=("corrected",))
     with pytest.raises(InputError, match=r"nothing to compare.*A has 1_forward calibrated; B has 1_forward corrected"):
-        compare(a, b)
-    assert compare(a, b, conditions=("calibrated", "corrected")).differences
+        compare_errors(a, b)
+    assert compare_errors(a, b, conditions=("calibrated", "corrected")).differences
     with pytest.raises(InputError, match="--conditions: B has no run under this condition: nominal"):
-        compare(a, b, conditions=("calibrated", "nominal"))
+        compare_errors(a, b, conditions=("calibrated", "nominal"))
     moved = a.assign(target_x_m=2.5)
     with pytest.raises(InputError, match="nothing to compare"):
-        compare(a, moved)
+        compare_errors(a, moved)
     with pytest.raises(InputError, match="B has no run that counts: none of 6 runs with a target is ok"):
-        compare(a, a.assign(status="rejected: gap"))
+        compare_errors(a, a.assign(status="rejected: gap"))
 
 
 @pytest.mark.parametrize("margin", [-1.0, math.nan, math.inf])
@@ -309,13 +328,13 @@ def test_margins_that_cannot_be_used(margin):
     rng = np.random.default_rng(42)
     a = error_table(normal(rng), repeats=3)
     with pytest.raises(FlagError, match="--margin-mm: margin cannot be used"):
-        compare(a, a, margin_mm=margin)
+        compare_errors(a, a, margin_mm=margin)
 
 
 def test_json_has_no_number_that_json_lacks():
     rng = np.random.default_rng(43)
     a, b = (error_table(normal(rng), repeats=2) for _ in range(2))
-    made = json.loads(json.dumps(comparison_to_json(compare(a, b)), allow_nan=False))
+    made = json.loads(json.dumps(comparison_to_json(compare_errors(a, b)), allow_nan=False))
     assert made["schema"] == 1
     assert made["could_compare"] is True
     assert made["differences"][0]["interval"]["low"] is None
@@ -327,4 +346,4 @@ def test_json_has_no_number_that_json_lacks():
 def test_the_same_inputs_give_the_same_comparison():
     rng = np.random.default_rng(44)
     a, b = (error_table(heavy_tailed(rng), repeats=7) for _ in range(2))
-    assert comparison_to_json(compare(a, b)) == comparison_to_json(compare(a, b))
+    assert comparison_to_json(compare_errors(a, b)) == comparison_to_json(compare_errors(a, b))

@@ -124,7 +124,7 @@ def test_toml_mistakes_are_told_in_one_line_with_their_place(static_map: StaticM
     ("table", "message"),
     [
         ({"slope": 1.0}, "map: a key is missing: kind"),
-        ({"kind": "spline"}, "map.kind: unknown kind of map: 'spline' (limit: cubic, "),
+        ({"kind": "spline"}, "map.kind: unknown kind of map: 'spline' (one of: cubic, "),
         ({"kind": ["line"]}, "map.kind: unknown kind of map"),
         (3.0, "map: must be a table: 3.0"),
         ({"kind": "line", "slope": 1.0}, "map: a key is missing: intercept; add intercept = …"),

@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from agvbench.errors import MessageError
+from agvbench.errors import MessageError, OneOf
 
 VERSION = 4
 ENCODING = "application/msgpack"
@@ -119,7 +119,7 @@ def _refusal(payload: bytes, names: str, error: Exception) -> MessageError:
             "message of another encoding", value=version, limit=VERSION, remedy="install the same agvbench on both ends"
         )
     if kind is not None and kind not in names.split(" or "):
-        return MessageError("message of another kind", value=repr(kind[:_MAX_QUOTED]), limit=names)
+        return MessageError("message of another kind", value=repr(kind[:_MAX_QUOTED]), limit=OneOf(names.split(" or ")))
     return MessageError(
         f"{names} message cannot be decoded",
         value=str(error).replace("`", "'")[:_MAX_QUOTED],

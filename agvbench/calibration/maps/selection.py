@@ -14,7 +14,7 @@ from agvbench.calibration.maps.map_fit import MapFit
 from agvbench.calibration.maps.polynomial import fit_cubic, fit_line
 from agvbench.calibration.maps.table import fit_monotone_table, fit_refined
 from agvbench.calibration.samples import CurvePoints
-from agvbench.errors import FitError, InputError
+from agvbench.errors import FitError, InputError, OneOf
 
 Fitter = Callable[[CurvePoints], MapFit]
 
@@ -122,7 +122,7 @@ def _fit(points: CurvePoints, kind: str, fitters: dict[str, Fitter]) -> MapFit:
         order = STEERING_KINDS if "line_with_end_stops" in fitters else DRIVE_KINDS
         return preferred(compare_maps(points, {name: fitters[name] for name in order}), order)
     if kind not in fitters:
-        raise InputError("unknown kind of fit", where="kind", value=repr(kind), limit=", ".join(("default", *fitters)))
+        raise InputError("unknown kind of fit", where="kind", value=repr(kind), limit=OneOf(("default", *fitters)))
     return fitters[kind](points)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from agvbench.calibration.measurement import _circle_kernel as kernel
-from agvbench.errors import InputError, NotAnArcError
+from agvbench.errors import InputError, NotAnArcError, OneOf
 from agvbench.types import Floats
 
 CircleMethod = Literal["default", "landau_smith"]
@@ -134,7 +134,8 @@ def fit_circles(batch: ArrayLike | Sequence[ArrayLike], method: CircleMethod = "
         If `batch` has another shape or `method` is unknown.
     """
     if method not in ("default", "landau_smith"):
-        raise InputError("unknown circle fit", where="method", value=repr(method), limit="default, landau_smith")
+        known = OneOf(("default", "landau_smith"))
+        raise InputError("unknown circle fit", where="method", value=repr(method), limit=known)
     rows = kernel.fit_batch(*_flatten(batch), method == "landau_smith")
     reason = tuple(_complaints(rows))
     fits = rows[:, : kernel.ARC + 1].copy()

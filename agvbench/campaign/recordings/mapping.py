@@ -13,7 +13,7 @@ import msgspec
 
 from agvbench.campaign import header
 from agvbench.campaign.header import SCHEMA, CampaignHeader
-from agvbench.errors import FileError, InputError
+from agvbench.errors import FileError, InputError, OneOf
 from agvbench.text_files import read_toml
 from agvbench.validation import convert
 from agvbench.vehicle.quaternion import Axis
@@ -234,7 +234,7 @@ def _check(mapping: Mapping, path: Path) -> None:
     if mapping.csv.delimiter not in _DELIMITERS:
         raise FileError(
             "csv.delimiter cannot separate cells", where=path, value=repr(mapping.csv.delimiter),
-            limit="one of " + " ".join(map(repr, _DELIMITERS)), remedy="save the recording with one of these",
+            limit=OneOf(map(repr, _DELIMITERS)), remedy="save the recording with one of these",
         )  # fmt: skip
     if columns.quaternion and columns.quaternion.floor_x[-1] == columns.quaternion.floor_y[-1]:
         where = f"{path}: columns.quaternion"
@@ -257,4 +257,4 @@ def factor(unit: str, units: dict[str, float], where: object) -> float:
         return units[unit]
     close = difflib.get_close_matches(unit.lower(), units, 1)
     remedy = f"give {close[0]}" if close else "give one of these"
-    raise InputError("unit is unknown", where=where, value=repr(unit), limit=", ".join(units), remedy=remedy)
+    raise InputError("unit is unknown", where=where, value=repr(unit), limit=OneOf(units), remedy=remedy)

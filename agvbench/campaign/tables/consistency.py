@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from agvbench.campaign.tables.schema import SPLITS
 from agvbench.campaign.tables.timed_table import TimedTable
-from agvbench.errors import CampaignError
+from agvbench.errors import CampaignError, OneOf
 from agvbench.types import RUN_OK, CommandUnit, Floats, RunStatus
 
 FIRST_COMMAND_TOLERANCE_S = 60.0
@@ -57,7 +57,7 @@ def _has_whole_target(row: Mapping[str, Any]) -> bool:
     return all(map(math.isfinite, values)) or all(map(math.isnan, values))
 
 
-_RUN_RULES: tuple[tuple[str, Callable[[Mapping[str, Any]], bool], str, str], ...] = (
+_RUN_RULES: tuple[tuple[str, Callable[[Mapping[str, Any]], bool], str | OneOf, str], ...] = (
     (
         "status",
         lambda row: _is_status(row["status"]),
@@ -77,7 +77,7 @@ _RUN_RULES: tuple[tuple[str, Callable[[Mapping[str, Any]], bool], str, str], ...
         "three finite numbers, or three NaN where there is no target",
         "correct " + ", ".join(_TARGET),
     ),
-    ("split", lambda row: (row.get("split") or "fit") in SPLITS, " or ".join(SPLITS), "correct it, or leave it empty"),
+    ("split", lambda row: (row.get("split") or "fit") in SPLITS, OneOf(SPLITS), "correct it, or leave it empty"),
 )
 
 

@@ -83,7 +83,7 @@ class Trajectory(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, 
         given = [shape for shape in SHAPES if getattr(self, shape) is not None]
         if len(given) != 1:
             raise ValueError(
-                f"exactly one shape is needed: {', '.join(given) or 'none'} given (limit: one of {', '.join(SHAPES)})"
+                f"exactly one shape is needed: {', '.join(given) or 'none'} given (one of: {', '.join(SHAPES)})"
             )
 
     @property

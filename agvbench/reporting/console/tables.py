@@ -195,7 +195,7 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
     console.print(Text(f"{DEFINITIONS} {COMPONENT_DEFINITIONS}", style="dim"))
     for line in comparison.left_out:
         console.print(Text(f"left out: {plain(line)}", style="dim"))
-    for note in comparison.notes:
+    for note in comparison.remarks:
         console.print(Text(note, style="dim"))
     console.print(Text(_legend(comparison), style="dim"))
     console.print(Text(headline(comparison), style="bold"))

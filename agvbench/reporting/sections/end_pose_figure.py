@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _POSE = ("x_m", "y_m", "heading_rad")
 _CAPTION = (
     "Where runs ended, seen from the target: ahead to the right, left upwards. Each line points along the heading "
-    "reached (horizontal is right); large outlined markers are medians."
+    "reached (horizontal is right); large hollow markers are medians."
 )
 
 

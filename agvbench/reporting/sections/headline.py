@@ -99,4 +99,4 @@ def _details(comparison: Comparison) -> Iterator[str]:
             yield f"{lead}, {pair}: {named}{more}."
     if note := note_of(comparison):
         yield plain_sentences(f"{pair}: {note}")
-    yield from comparison.notes
+    yield from comparison.remarks

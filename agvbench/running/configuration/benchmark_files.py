@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from agvbench.errors import FlagError
+from agvbench.errors import FlagError, OneOf
 from agvbench.resources import resource_directory
 
 
@@ -22,7 +22,7 @@ def find_benchmark(name: str) -> Path:
         if (path := _file(folder, name)).is_file():
             return path
     known = sorted({p.stem.removeprefix("bench_") for folder in _folders() for p in folder.glob("bench_*.py")})
-    raise FlagError("no such benchmark", value=name, limit=", ".join(known), remedy="name one of these, or a file")
+    raise FlagError("no such benchmark", value=name, limit=OneOf(known), remedy="name one of these, or a file")
 
 
 def benchmark_name(file: str) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 
 import tomli_w
 
-from agvbench.errors import FileError, FlagError
+from agvbench.errors import FileError, FlagError, OneOf
 from agvbench.running.supervision.limits import DEFAULT_SAFETY
 from agvbench.text_files import read_toml
 
@@ -83,7 +83,12 @@ class BenchSettings:
         "", "end-pose bias of the corrected model, by trajectory (agvbench loop writes it)", metavar="FILE"
     )
     maps: str = _option("default", "maps to calibrate: default, or the thesis' line and cubic", choices=MAPS)
-    repeats: int = _option(0, "repeats of each trajectory and condition (default: 10)", metavar="N")
+    repeats: int = _option(
+        0,
+        "repeats of each trajectory and condition (default: 10); calibration, step_response, free_driving and endurance"
+        " declare a number of their own",
+        metavar="N",
+    )
     order: str = _option(
         "interleaved", "order of runs (default: interleaved; the thesis drove blocked)", choices=ORDERS
     )
@@ -138,7 +143,7 @@ class BenchSettings:
             choices = option.metadata.get("keywords", {}).get("choices")
             if choices:
                 value, allowed = getattr(self, option.name), (option.default, *choices)
-                _check(value in allowed, f"--{option.name}", value, ", ".join(choices), "choose one of these")
+                _check(value in allowed, f"--{option.name}", value, OneOf(choices), "choose one of these")
 
     @classmethod
     def given(cls, options: Mapping[str, Any]) -> BenchSettings:
@@ -248,6 +253,6 @@ def _without_faults(name: str, value: str) -> str:
     return without_packet_faults(value) if name == "camera" else unimpaired(value)
 
 
-def _check(condition: bool, flag: str, value: object, limit: str, remedy: str) -> None:
+def _check(condition: bool, flag: str, value: object, limit: str | OneOf, remedy: str) -> None:
     if not condition:
         raise FlagError("value cannot be used", where=flag, value=value, limit=limit, remedy=remedy)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from agvbench.errors import FlagError, PlacingError, RunStoppedError
+from agvbench.errors import FlagError, OneOf, PlacingError, RunStoppedError
 from agvbench.model import VehicleModel
 from agvbench.planning import Workspace
 from agvbench.running.links import RunnerLink
@@ -154,7 +154,7 @@ def choose_placer(name: str, *, simulated: bool) -> type[Placer]:
     chosen = name or ("teleport" if simulated else "operator")
     if chosen not in usable:
         vehicle = "a simulated vehicle" if simulated else "a real vehicle"
-        raise FlagError(f"{vehicle} cannot be placed so", where="--place", value=chosen, limit=" or ".join(usable))
+        raise FlagError(f"{vehicle} cannot be placed so", where="--place", value=chosen, limit=OneOf(usable))
     return PLACERS[chosen]
 
 

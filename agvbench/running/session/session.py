@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from agvbench.errors import FitError, FlagError, PlanError
+from agvbench.errors import FitError, FlagError, OneOf, PlanError
 from agvbench.model import VehicleModel
 from agvbench.planning import (
     NO_BIAS,
@@ -226,7 +226,7 @@ class Driver:
             If the bus or hardware failed.
         """
         if condition not in CONDITIONS:
-            raise FlagError("unknown condition", value=condition, limit=", ".join(CONDITIONS), where=self._run_id)
+            raise FlagError("unknown condition", value=condition, limit=OneOf(CONDITIONS), where=self._run_id)
         trajectory = self._session.trajectory(name)
         with self._planning():
             planned = self._session.plan(trajectory, condition)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from agvbench.errors import PlantError
+from agvbench.errors import OneOf, PlantError
 from agvbench.simulator.hidden.recipe import Constants, Recipe, Size, Values
 
 _DEG = math.pi / 180.0
@@ -268,6 +268,6 @@ def recipes(spec: str) -> tuple[Recipe, ...]:
     if unknown is not None or len(set(names)) < len(names):
         raise PlantError(
             "no such hidden effect" if unknown is not None else "an effect is hidden twice", value=unknown or spec,
-            limit=f"{NOTHING}, {', '.join(CATALOGUE)}; two joined by {AND}",
+            limit=OneOf([NOTHING, *CATALOGUE, f"two joined by {AND}"]),
         )  # fmt: skip
     return tuple(CATALOGUE[name] for name in names)

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from agvbench.errors import VehicleError
+from agvbench.errors import OneOf, VehicleError
 from agvbench.registry import classes_by_file
 from agvbench.types import Floats
 from agvbench.vehicle.fields import from_table, to_table
@@ -133,5 +133,5 @@ def map_from_toml(table: object, *, where: str = "map") -> StaticMap:
     if kind is None:
         raise VehicleError("a key is missing", where=where, value="kind", remedy=f'add kind = "{next(iter(kinds))}"')
     if not isinstance(kind, str) or kind not in kinds:
-        raise VehicleError("unknown kind of map", where=f"{where}.kind", value=repr(kind), limit=", ".join(kinds))
+        raise VehicleError("unknown kind of map", where=f"{where}.kind", value=repr(kind), limit=OneOf(kinds))
     return kinds[kind].from_toml(table, where=where)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 
-from agvbench.errors import VehicleError
+from agvbench.errors import OneOf, VehicleError
 from agvbench.types import Floats
 from agvbench.vehicle.maps.base import StaticMap
 from agvbench.vehicle.maps.solve import solve_monotone
@@ -56,7 +56,7 @@ class MonotoneTable(StaticMap):
             object.__setattr__(self, name, tuple(points.tolist()))
         self._check_points()
         if self.interpolation not in _INTERPOLATIONS:
-            limit = " or ".join(_INTERPOLATIONS)
+            limit = OneOf(_INTERPOLATIONS)
             raise VehicleError("unknown interpolation", where="interpolation", value=self.interpolation, limit=limit)
 
     def _check_points(self) -> None:

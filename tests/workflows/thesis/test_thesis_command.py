@@ -34,7 +34,7 @@ def test_files(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["--section", "appendix_z"], "--section: unknown section: appendix_z (limit: steering, drive,"),
+        (["--section", "appendix_z"], "--section: unknown section: appendix_z (one of: steering, drive,"),
         (
             ["--section", "battery", "--json", "{file}/t.json"],
             "t.json: cannot be written: File exists; give --json a place",
