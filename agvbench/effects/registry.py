@@ -1,4 +1,4 @@
-"""Registry of effects: every module of this package that defines an `Effect` registers it by its name."""
+"""Registry of effects: every module of this package, or of the user's own folder, registers the effect it defines."""
 
 from __future__ import annotations
 
@@ -8,15 +8,32 @@ from types import MappingProxyType
 from typing import Any
 
 from agvbench.effects.base import Effect
-from agvbench.errors import VehicleError
+from agvbench.effects.own_folder import own_effects
+from agvbench.errors import FileError, VehicleError
 from agvbench.registry import classes_by_file
 
 
 @cache
 def effect_kinds() -> Mapping[str, type[Effect]]:
-    """Return every effect's class by its name, in alphabetical order."""
-    kinds = {cls.name: cls for cls in classes_by_file("agvbench.effects", Effect)}
-    return MappingProxyType(dict(sorted(kinds.items())))
+    """Return every effect's class by its name, in alphabetical order; own effects follow in the same order.
+
+    Own effects are those of the folder ``effects`` in the current folder; see `agvbench.effects.own_folder`.
+
+    Raises
+    ------
+    FileError
+        If the name of an own effect is taken.
+    """
+    found, own = classes_by_file("agvbench.effects", Effect), own_effects()
+    kinds = {cls.name: cls for cls in sorted(found, key=_name)}
+    for cls in sorted(own, key=_name):
+        if kinds.setdefault(cls.name, cls) is not cls:
+            raise FileError("there is an effect of this name", where=cls.__module__, value=cls.name, remedy="rename it")
+    return MappingProxyType(kinds)
+
+
+def _name(kind: type[Effect]) -> str:
+    return kind.name
 
 
 def effect_from_toml(table: object, *, where: str = "effect") -> Effect:
