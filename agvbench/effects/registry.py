@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from agvbench.effects.base import Effect
-from agvbench.effects.own_folder import own_effects
+from agvbench.effects.declaration import check_declaration, import_error, source_of
+from agvbench.effects.own_folder import FOLDER, own_effects
 from agvbench.errors import FileError, VehicleError
 from agvbench.registry import classes_by_file
 
@@ -22,13 +24,18 @@ def effect_kinds() -> Mapping[str, type[Effect]]:
     Raises
     ------
     FileError
-        If the name of an own effect is taken.
+        If a file cannot be imported, the class in it is incomplete, or its name is taken.
     """
-    found, own = classes_by_file("agvbench.effects", Effect), own_effects()
+    try:
+        found, own = classes_by_file("agvbench.effects", Effect), own_effects()
+    except Exception as error:
+        raise import_error(error, [str(Path(__file__).parent), str(Path(FOLDER).absolute())]) from error
+    for cls in (*found, *own):
+        check_declaration(cls)
     kinds = {cls.name: cls for cls in sorted(found, key=_name)}
     for cls in sorted(own, key=_name):
         if kinds.setdefault(cls.name, cls) is not cls:
-            raise FileError("there is an effect of this name", where=cls.__module__, value=cls.name, remedy="rename it")
+            raise FileError("there is an effect of this name", where=source_of(cls), value=cls.name, remedy="rename it")
     return MappingProxyType(kinds)
 
 
