@@ -5,16 +5,15 @@ from __future__ import annotations
 import pytest
 from own_effect import PROGRAM, python, write
 
+from agvbench.effects import SteeringLag
 from agvbench.effects.own_folder import own_files
-from agvbench.effects.registry import effect_kinds
 from agvbench.errors import FileError
 
 
 def test_a_name_of_the_library_is_taken(own, tmp_path):
     write(tmp_path, '"lateral_load_loss"', '"steering_lag"')
-    library = [effect_kinds()["steering_lag"]]
     with pytest.raises(FileError, match=r"there is an effect of this name: steering_lag; rename it$"):
-        own(library)
+        own([SteeringLag])
 
 
 def test_only_effects_are_executed_and_nothing_in_a_campaign(tmp_path, monkeypatch):
