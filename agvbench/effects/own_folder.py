@@ -1,7 +1,7 @@
 """Effects of the user: the files of the folder ``effects`` in the current folder that import `agvbench.effects`.
 
 Files of other projects' folders of this name are not executed, and nothing in a campaign directory is: a campaign may
-come from somebody else. The log says which files were loaded; without a configuration of logging, on stderr.
+come from another lab. The log says which files were loaded; without a configuration of logging, on stderr.
 """
 
 from __future__ import annotations
