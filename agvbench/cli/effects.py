@@ -1,14 +1,15 @@
 """List the physical effects that a vehicle model may have, or begin a new one.
 
-An effect is one file of agvbench/effects/: parameters with their bounds, and hooks that say what it does. A new
-file is simulated, tested, listed and fitted without another line elsewhere.
+An effect is one file of agvbench/effects/ or of the folder effects/ of a lab: parameters with their bounds, and hooks
+that say what it does. A new file is simulated, tested, listed and fitted without another line elsewhere. A hook that
+cannot be compiled is reported with its line.
 
 examples:
   agvbench effects                         name, stage, parameters, and the assumption that each relaxes
   agvbench effects --markdown              the same at length, as in the documentation
   agvbench effects new servo_warm_up       write agvbench/effects/servo_warm_up.py, to be edited
   agvbench effects new scrub --hook move   with the stage, imports and arguments of the hook move (default: drive)
-  agvbench effects new seam --dir /tmp     write it elsewhere
+  agvbench effects new seam --dir effects  write it into the folder effects/ of your lab
 
 The how-to docs/how-to/write-an-effect.md takes an effect from the file to the diagnosis that names it.
 """
