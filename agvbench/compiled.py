@@ -32,13 +32,13 @@ COMPILING = "compiling the simulation to machine code (once per machine; takes u
 def cached_njit(**options: Any) -> Callable[[F], F]:
     """Return ``numba.njit(cache=True, **options)`` for a function at module level.
 
-    It is compiled again when its file changes, or one of the same package that this imports at its top, directly or
-    not.
+    It is compiled again when its file changes, or one of the same package or of agvbench that this imports at its top,
+    directly or not.
     """
 
     def decorate(function: F) -> F:
         text = Path(inspect.getfile(function)).read_text(encoding="utf-8")
-        digest = source_digest(text, function.__module__.partition(".")[0], module=function.__module__)
+        digest = source_digest(text, "agvbench", function.__module__.partition(".")[0], module=function.__module__)
         with _LOCK:
             before, config.CACHE_DIR = config.CACHE_DIR, str(Path(config.CACHE_DIR or cache_directory()) / digest)
             try:

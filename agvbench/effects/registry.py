@@ -1,22 +1,46 @@
-"""Registry of effects: every module of this package that defines an `Effect` registers it by its name."""
+"""Registry of effects: every module of this package, or of the user's own folder, registers the effect it defines."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from agvbench.effects.base import Effect
-from agvbench.errors import OneOf, VehicleError
+from agvbench.effects.declaration import check_declaration, import_error, source_of
+from agvbench.effects.own_folder import FOLDER, own_effects
+from agvbench.errors import FileError, OneOf, VehicleError
 from agvbench.registry import classes_by_file
 
 
 @cache
 def effect_kinds() -> Mapping[str, type[Effect]]:
-    """Return every effect's class by its name, in alphabetical order."""
-    kinds = {cls.name: cls for cls in classes_by_file("agvbench.effects", Effect)}
-    return MappingProxyType(dict(sorted(kinds.items())))
+    """Return every effect's class by its name, in alphabetical order; own effects follow in the same order.
+
+    Own effects are those of the folder ``effects`` in the current folder; see `agvbench.effects.own_folder`.
+
+    Raises
+    ------
+    FileError
+        If a file cannot be imported, the class in it is incomplete, or its name is taken.
+    """
+    try:
+        found, own = classes_by_file("agvbench.effects", Effect), own_effects()
+    except Exception as error:
+        raise import_error(error, [str(Path(__file__).parent), str(Path(FOLDER).absolute())]) from error
+    for cls in (*found, *own):
+        check_declaration(cls)
+    kinds = {cls.name: cls for cls in sorted(found, key=_name)}
+    for cls in sorted(own, key=_name):
+        if kinds.setdefault(cls.name, cls) is not cls:
+            raise FileError("there is an effect of this name", where=source_of(cls), value=cls.name, remedy="rename it")
+    return MappingProxyType(kinds)
+
+
+def _name(kind: type[Effect]) -> str:
+    return kind.name
 
 
 def effect_from_toml(table: object, *, where: str = "effect") -> Effect:

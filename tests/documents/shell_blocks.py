@@ -62,6 +62,19 @@ def shell(page: Path, *, without: tuple[str, ...] = ()) -> list[Block]:
     return [b for b in blocks(page) if b.language == "sh" and not any(f"agvbench {name}" in b.text for name in without)]
 
 
+def write_files(page: Path, folder: Path) -> None:
+    """Write the files of `page` into `folder`."""
+    for block in blocks(page):
+        if block.file:
+            _write(block, folder)
+
+
+def _write(block: Block, folder: Path) -> None:
+    path = folder / block.file
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(block.text)
+
+
 def execute(
     page: Path, folder: Path, *, options: dict[str, str], without: tuple[str, ...] = ()
 ) -> list[tuple[list[str], int]]:
@@ -84,8 +97,7 @@ def execute(
     chosen = shell(page, without=without)
     for block in blocks(page):
         if block.file:
-            (here / block.file).parent.mkdir(parents=True, exist_ok=True)
-            (here / block.file).write_text(block.text)
+            _write(block, here)
         elif block in chosen:
             program = f"set -euo pipefail\npip() {{ :; }}\n{block.text}\npwd > {folder / 'here'}"
             done = subprocess.run(

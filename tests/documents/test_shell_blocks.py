@@ -14,11 +14,18 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from shell_blocks import execute, shell
+from shell_blocks import execute, shell, write_files
 
 ROOT = Path(__file__).parents[2]
 QUICK = ("docs/tutorial.md", "docs/how-to/nightly.md", "docs/how-to/write-a-trajectory.md")
-SLOW = ("docs/how-to/bring-your-own-plant.md", "docs/how-to/close-the-loop.md", "docs/how-to/set-up-a-lab.md")
+SLOW = (
+    "docs/how-to/bring-your-own-plant.md",
+    "docs/how-to/close-the-loop.md",
+    "docs/how-to/set-up-a-lab.md",
+    "docs/how-to/write-an-effect.md",
+)
+FILES_OF = {"docs/how-to/write-an-effect.md": "docs/how-to/bring-your-own-plant.md"}
+"""The page whose files the reader of a page has already."""
 ELSEWHERE = {"docs/how-to/import-your-csv.md": "tests/campaign/test_campaign_how_to.py"}
 QUICK_WITHOUT = ("diagnose",)
 FULL = os.environ.get("AGVBENCH_DOCUMENTS") == "full"
@@ -35,6 +42,8 @@ def _options() -> dict[str, str]:
 @pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=takes_minutes) for name in SLOW)])
 def test_every_shell_block_of_a_page_runs(name, tmp_path):
     page, without = ROOT / name, () if EVERY_BLOCK else QUICK_WITHOUT
+    if name in FILES_OF:
+        write_files(ROOT / FILES_OF[name], tmp_path)
     called = execute(page, tmp_path, options=_options(), without=without)
     stated = [line for block in shell(page, without=without) for line in block.text.splitlines()]
     assert len(called) == sum(len(re.findall(r"\bagvbench \w", line.partition("#")[0])) for line in stated) > 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+import sys
 import tomllib
 from pathlib import Path
 
@@ -15,10 +16,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import agvbench.effects as effects_package
-from agvbench.effects import Effect, effect_from_toml, effect_kinds
+from agvbench.effects import HOOKS, Effect, effect_from_toml, effect_kinds
+from agvbench.effects.declaration import check_declaration
 from agvbench.errors import VehicleError
 from agvbench.model import VehicleModel, example_vehicle
+from agvbench.model.simulation.hook_errors import check_hooks
 from agvbench.model.simulation.simulation import SimulatedRun, Simulation
+from agvbench.registry import own_classes
 from agvbench.reporting.console.effects import reference_page
 from agvbench.types import Commands
 from agvbench.vehicle.geometry import Geometry
@@ -64,7 +68,7 @@ def simulation() -> Simulation:
 
 def test_every_file_of_the_package_adds_an_effect() -> None:
     files = {path.stem for path in Path(effects_package.__file__).parent.glob("*.py")}
-    assert files - {"__init__", "base", "registry", "state"} == set(KINDS)
+    assert files - {"__init__", "base", "declaration", "own_folder", "registry", "state"} == set(KINDS)
 
 
 def test_names_and_parameters_are_the_contract() -> None:
@@ -74,6 +78,7 @@ def test_names_and_parameters_are_the_contract() -> None:
 
 @each_effect
 def test_form(cls: type[Effect]) -> None:
+    check_declaration(cls)
     check_form(cls)
 
 
@@ -164,13 +169,18 @@ def test_registry_errors(table: object, message: str) -> None:
     assert str(caught.value).startswith(message)
 
 
-def test_the_template_passes_the_checks_of_form(tmp_path: Path) -> None:
-    path = tmp_path / "servo_warm_up.py"
-    path.write_text(template_text("servo_warm_up"), encoding="utf-8")
-    cls = load(path).ServoWarmUp
+@pytest.mark.parametrize("hook", HOOKS)
+def test_the_template_passes_the_checks_of_form(hook: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / f"servo_warm_up_{hook}.py"
+    path.write_text(template_text(path.stem, hook), encoding="utf-8")
+    monkeypatch.setitem(sys.modules, path.stem, None)  # removed again at the end
+    cls = next(cls for cls in own_classes(load(path), Effect))
+    check_declaration(cls)
     check_form(cls)
     check_null_hooks(cls)
-    assert cls.name == "servo_warm_up"
+    check_hooks([cls])
+    assert list(cls.hooks()) == [hook]
+    assert cls.name == path.stem
 
 
 def test_the_reference_page_is_up_to_date() -> None:
@@ -180,8 +190,6 @@ def test_the_reference_page_is_up_to_date() -> None:
 
 
 def load(path: Path):  # type: ignore[no-untyped-def]
-    import sys
-
     spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None
     assert spec.loader is not None

@@ -30,6 +30,20 @@ def test_new_writes_a_file_once(tmp_path, capsys):
     )
 
 
+def test_new_writes_the_hook_that_is_asked_for(tmp_path, capsys):
+    command = ["effects", "new", "made_up_by_a_test", "--dir", str(tmp_path), "--hook"]
+    assert main([*command, "moves"]) == 2
+    assert capsys.readouterr().err == (
+        "agvbench effects: --hook: no such hook: moves (limit: arrive, aim, steer, drive, move, drift, capture, see)\n"
+    )
+    assert main([*command, "move"]) == 0
+    text = (tmp_path / "made_up_by_a_test.py").read_text(encoding="utf-8")
+    assert "from agvbench.effects.state import FORWARD, LEFT\n" in text
+    assert "Stage.BODY" in text
+    assert "def move(state: Floats, gain: float) -> None:" in text
+    assert "docs/how-to/write-an-effect.md" in capsys.readouterr().out
+
+
 def test_names_that_cannot_be(tmp_path, capsys):
     for name in ("Warm", "warm-up", "class", "", "steering_lag"):
         assert main(["effects", "new", name, "--dir", str(tmp_path)]) == 2

@@ -1,7 +1,9 @@
 """Every effect is recovered from a vehicle that shares no code with it, and told apart from the others.
 
-The vehicle is a hidden plant: its own equations and integrator, its maps known here by their formulas. A new effect
-needs a mechanism there (`agvbench/simulator/hidden`): without an independent vehicle nobody knows whether it is right.
+The vehicle is a hidden plant: its own equations and integrator, its maps known here by their formulas. An effect that
+`agvbench.effects` exports belongs to the library and has a mechanism there (`agvbench/simulator/hidden`): without an
+independent vehicle nobody knows whether its equation is right. Any other effect is compared with an independent
+integration of its own hooks (`test_effects_plain.py`), and is skipped here.
 """
 
 from __future__ import annotations
@@ -13,9 +15,10 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+import agvbench.effects as library
 from agvbench.effects import effect_kinds
 from agvbench.model.simulation.simulation import SimulatedRun, Simulation
-from agvbench.simulator.hidden import HiddenPlant
+from agvbench.simulator.hidden import CATALOGUE, HiddenPlant
 from agvbench.simulator.hidden.constants import BASE
 from agvbench.simulator.hidden.plant import TURNAROUND_S
 from agvbench.simulator.hidden.reference_drives import path, reference_drives
@@ -27,6 +30,14 @@ SEED = 7
 NOISE = np.array([2e-4, 2e-4, 1e-3])
 LEVER_M = 0.15
 KINDS = effect_kinds()
+WITHOUT_MECHANISM = {
+    name for name, kind in KINDS.items() if name not in CATALOGUE and kind.__name__ not in library.__all__
+}
+NO_MECHANISM = (
+    "no mechanism in the hidden plants; to make it part of the blind trials, add its recipe to "
+    "agvbench/simulator/hidden/catalogue.py, its constants with their nulls to constants.py, and its equation to "
+    "_actuators.py, _body.py or _kernel.py"
+)
 # What maps with values of their own take up leaves nothing to tell apart.
 IN_THE_MAPS = {"steering_saturation", "drive_dead_band"}
 TOLD_APART = 0.1
@@ -107,6 +118,8 @@ def test_the_vehicle_without_effects_is_predicted_to_the_noise(quiet):
 
 @pytest.mark.parametrize("name", KINDS)
 def test_a_planted_value_is_recovered(name):
+    if name in WITHOUT_MECHANISM:
+        pytest.skip(f"{name} has {NO_MECHANISM}")
     data = Data(name)
     parameters = KINDS[name].parameters()
     truth = np.array([data.parameters[p.name] for p in parameters])

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from agvbench.effects import Effect, effect_kinds
 from agvbench.errors import InputError, VehicleError
 from agvbench.model.simulation.compose import kernel
+from agvbench.model.simulation.hook_errors import check_hooks
 from agvbench.types import Commands, Floats
 from agvbench.vehicle.geometry import Geometry
 
@@ -221,12 +222,14 @@ class Simulation:
         ------
         InputError
             If a number is NaN.
+        FileError
+            If a hook of an effect cannot be compiled.
         """
         for what, values in (("parameters", parameters), ("settled", settled), ("initial", initial[:, :3])):
             if np.isnan(values).any():
                 raise InputError("is not a number", where=what, value="NaN")
         poses = np.full((len(self.t_s), 3), np.nan) if out is None else out
-        self._kernel(
+        arguments = (
             np.array(
                 [
                     self.geometry.front_axle_m,
@@ -250,7 +253,16 @@ class Simulation:
             self._all_runs if runs is None else np.asarray(runs, dtype=np.int64),
             poses,
         )
+        self._simulate(arguments)
         return poses
+
+    def _simulate(self, arguments: tuple[Floats | Integers, ...]) -> None:
+        """Call the kernel; an error of compilation names the hook that it comes from."""
+        try:
+            self._kernel(*arguments)
+        except Exception:
+            check_hooks(self.kinds[::-1])  # the user's own ones first
+            raise
 
     def _longest_step(self, parameters: Floats) -> float:
         return float(np.min(self._steps_s[parameters != self.nulls], initial=np.inf))

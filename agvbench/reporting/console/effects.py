@@ -24,7 +24,8 @@ time_constant_s = 0.12
 The chain is command → transport → servo and drive → wheels → body → floor → camera. Angles are counter-clockwise
 positive. An effect whose parameters have their null values does not change the motion. `agvbench effects` lists all
 effects. `agvbench effects new NAME` writes the file of a new one; agvbench then simulates, tests, lists and fits it
-without further registration ([Write an effect](../how-to/write-an-effect.md)).
+without further registration ([Write an effect](../how-to/write-an-effect.md)). It may lie in the folder `effects/` of a
+lab.
 """
 _VARIANTS = """\
 # Model variants

@@ -269,5 +269,6 @@ def recipes(spec: str) -> tuple[Recipe, ...]:
         raise PlantError(
             "no such hidden effect" if unknown is not None else "an effect is hidden twice", value=unknown or spec,
             limit=OneOf([NOTHING, *CATALOGUE, f"two joined by {AND}"]),
+            remedy="choose one, or add its recipe and equation to agvbench/simulator/hidden",
         )  # fmt: skip
     return tuple(CATALOGUE[name] for name in names)
