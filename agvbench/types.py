@@ -175,13 +175,21 @@ class Frames:
         return Frames(*(getattr(self, f.name)[mask] for f in fields(self)))
 
 
+class TimeSeries(NamedTuple):
+    """A quantity that was logged with the poses of a run: ``t_s`` (n,) [s] and ``value`` (n,), NaN where unknown."""
+
+    t_s: Floats
+    value: Floats
+
+
 @dataclass(frozen=True)
 class Run:
     """One drive of one experiment under one condition: a row of ``runs`` with its commands and poses.
 
     ``target`` is in the start frame (`NO_TARGET` where there is none); ``started_s`` [s] counts from the
     beginning of the campaign; ``status`` is ``"ok"``, ``"rejected: WHY"`` or ``"aborted: WHY"``.
-    ``extra`` holds further columns of the runs table, kept as they are.
+    ``extra`` holds further columns of the runs table, kept as they are; ``logged`` further numeric columns of the poses
+    table, on the clock of the run.
     """
 
     run_id: str
@@ -198,6 +206,7 @@ class Run:
     session: str | None = None
     split: str | None = None
     extra: Mapping[str, object] = field(default_factory=dict)
+    logged: Mapping[str, TimeSeries] = field(default_factory=dict)
 
     @property
     def is_ok(self) -> bool:

@@ -17,17 +17,18 @@ from agvbench.campaign.manifest import Manifest
 from agvbench.campaign.names import as_texts
 from agvbench.campaign.tables.consistency import check_commands, check_poses, check_runs
 from agvbench.campaign.tables.motion_checks import check_motion
-from agvbench.campaign.tables.schema import COMMANDS, POSES, RUNS, TABLES
+from agvbench.campaign.tables.schema import COMMANDS, POSES, RUNS, TABLES, numbers
 from agvbench.campaign.tables.source import SUFFIXES, Source
 from agvbench.campaign.tables.timed_table import TimedTable, blank_untracked
 from agvbench.errors import CampaignError
 from agvbench.notebook_html import heading_html, table_html
-from agvbench.types import CONDITIONS, RUN_OK, Commands, Frames, Pose, Run
+from agvbench.types import CONDITIONS, RUN_OK, Commands, Floats, Frames, Pose, Run, TimeSeries
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _KNOWN = frozenset(column.name for column in RUNS)
+_KNOWN_OF_POSES = frozenset(column.name for column in POSES)
 _FRAME_COLUMNS = tuple(field.name for field in fields(Frames))
 
 
@@ -107,6 +108,13 @@ class Campaign:
         check_poses(table, self._runs["status"].to_pylist(), last_s)
         check_motion(self.header, self._runs, self._commands, table)
         return table
+
+    @cached_property
+    def _logged(self) -> dict[str, Floats]:
+        """The further columns of the poses table that are numbers (rows,), by name; NaN where a cell is empty."""
+        table = self._poses.table
+        further = {name: numbers(table[name]) for name in table.column_names if name not in _KNOWN_OF_POSES}
+        return {name: values for name, values in further.items() if values is not None}
 
     @cached_property
     def runs(self) -> pd.DataFrame:
@@ -212,6 +220,7 @@ class Campaign:
     def _run(self, index: int) -> Run:
         row, commands, poses = self._rows[index], self._commands, self._poses
         when, seen = commands.rows(index), poses.rows(index)
+        t_s = poses.column("t_s")[seen]
         return Run(
             **{name: row[name] for name in ("run_id", "experiment", "trajectory", "condition", "repeat")},
             **{name: row[name] for name in ("started_s", "status", "firmware")},
@@ -221,6 +230,7 @@ class Campaign:
             session=row.get("session") or None,
             split=row.get("split") or None,
             extra={name: value for name, value in row.items() if name not in _KNOWN and value is not None},
+            logged={name: TimeSeries(t_s, values[seen]) for name, values in self._logged.items()},
         )
 
 

@@ -77,9 +77,8 @@ def conclude(
     if tested is None:
         return context.not_identifiable(readings, "there are no repeats among the runs, and so no repeatability")
     rest, likely = _remaining_dependences(batch, poses, term_selection, context.seed)
-    if (change := _change(batch, fit.parameters, poses, context.seed)) is not None:
-        at = int(term_selection is not None)
-        rest = [*rest[:at], change, *rest[at:]]
+    if changes := _changes(batch, fit.parameters, poses, context.seed):
+        rest = _with_changes(rest, changes, int(term_selection is not None), is_logged=bool(readings.logged.columns))
     effects = named_effects(selection, bounds_of(selection.chosen.names)) + map_effects(fit, context.vehicle)
     checks = check_priors(selection, candidates_for(context.vehicle, context.geometry)[0])
     effects = with_evidence(effects, checks)
@@ -145,8 +144,16 @@ def _remaining_dependences(
     return (rest if term_selection is None else with_term_first(rest, term_selection)), likely
 
 
-def _change(batch: Batch, parameters: Floats, poses: Floats, seed: int) -> Dependence | None:
-    """Return on what repeats depend that were driven at different times, or None."""
+def _with_changes(rest: list[Dependence], changes: list[Dependence], at: int, *, is_logged: bool) -> list[Dependence]:
+    """Return the dependences with those of repeats after the first `at`; a logged column is listed once."""
+    listed = {d.covariate for d in rest[:at]} if is_logged else set()
+    changes = [d for d in changes if d.covariate not in listed]
+    named = {d.covariate for d in changes} if is_logged else set()
+    return [*rest[:at], *changes, *(d for d in rest[at:] if d.covariate not in named)]
+
+
+def _changes(batch: Batch, parameters: Floats, poses: Floats, seed: int) -> list[Dependence]:
+    """Return on what repeats depend that were driven at different times or under other conditions."""
     rates = residual_rates(batch.readings, poses)
     tangents = steering_tangents(batch, parameters, rates)
     return stability_test(rates, columns_by_campaign_time(rates, tangents, batch.geometry), batch.readings, seed)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from agvbench.calibration.campaign_protocol import HeaderLike
-from agvbench.diagnosis.criteria import FREE_DRIVING, SELECTION, stated_criteria
+from agvbench.diagnosis.criteria import FREE_DRIVING, LOGGED, SELECTION, stated_criteria
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.result import Diagnosis, Verdict
 from agvbench.errors import CampaignError
@@ -45,6 +45,10 @@ class DiagnosisContext:
         from agvbench import __version__
 
         windows = readings.initial_states is not None
+        criteria = stated_criteria(FREE_DRIVING if windows else SELECTION, with_priors=bool(self.priors))
+        logged: dict[str, object] = {}
+        if stated := readings.logged.stated():
+            criteria["logged"], logged = asdict(LOGGED), {"logged_columns": stated}
         driven = {run.run_id.rpartition("@")[0] if windows else run.run_id for run in readings.runs}
         return {
             "agvbench": __version__,
@@ -53,5 +57,6 @@ class DiagnosisContext:
             "runs_used": len(driven),
             "runs_refused": dict(Counter(readings.refused.values())),
             **({"windows_used": len(readings)} if windows else {}),
-            "criteria": stated_criteria(FREE_DRIVING if windows else SELECTION, with_priors=bool(self.priors)),
+            **logged,
+            "criteria": criteria,
         }

@@ -204,6 +204,34 @@ class ResidualCriteria:
 
 
 @dataclass(frozen=True)
+class LoggedCriteria:
+    """Which columns that a lab logged are covariates.
+
+    ``max_regressors``
+        Numbers per run that enter tests and terms: one for a column of numbers, and one for each level of a text (one
+        for two levels). Each is tested against every feature. Sixteen raise the number of tests by less than half, and
+        with it the size that a dependence needs to be significant.
+    ``max_levels``
+        Levels of a text. A text with more is a remark or an identifier.
+    ``min_runs``
+        Runs (or windows) with a value. It is the least size of a campaign.
+    ``min_level_runs``
+        Runs of a level of a text; a level with fewer counts as missing. Fewer runs give it no repeatability.
+    ``same_as_time``
+        Squared correlation with campaign time above which the order of runs is no covariate of its own.
+    ``max_standardised``
+        Largest standardised number in a term: a typing error must not decide its size.
+    """
+
+    max_regressors: int = 16
+    max_levels: int = 8
+    min_runs: int = 20
+    min_level_runs: int = 3
+    same_as_time: float = 0.9
+    max_standardised: float = 4.0
+
+
+@dataclass(frozen=True)
 class DesignCriteria:
     """When a next experiment is proposed. Differences are expected ones in minus two log likelihood.
 
@@ -249,6 +277,7 @@ is no evidence; blocks of fast driving may be few, so that only one block is lef
 VARIANT = VariantCriteria()
 DISCREPANCY = DiscrepancyCriteria()
 RESIDUAL = ResidualCriteria()
+LOGGED = LoggedCriteria()
 DESIGN = DesignCriteria()
 PRIOR = PriorCriteria()
 

@@ -53,4 +53,6 @@ DRAGGED = 49
 REAR_LAG_RATIO = 50
 # Width of the backlash of the rear axle.
 REAR_BACKLASH = 51
-SIZE = 52
+# What the lab logged about the run, each column standardised; 0 where nothing was logged.
+LOGGED, LOGGED_COUNT = 52, 16
+SIZE = LOGGED + LOGGED_COUNT

@@ -21,7 +21,7 @@ CLASSES = (
 )
 
 
-@pytest.mark.parametrize("kind", CLASSES)
+@pytest.mark.parametrize("kind", [*CLASSES, criteria.LoggedCriteria])
 def test_every_criterion_has_a_reason(kind):
     assert kind.__doc__ is not None
     assert [field.name for field in fields(kind) if f"``{field.name}``" not in kind.__doc__] == []

@@ -71,7 +71,8 @@ def drives(seed: int) -> tuple[Rates, SteeringTangents]:
 
 
 def change_of(rates: Rates, tangents: SteeringTangents, of: Readings | None = None) -> Dependence | None:
-    return stability_test(rates, columns_by_campaign_time(rates, tangents, GEOMETRY), of or readings(), 0)
+    found = stability_test(rates, columns_by_campaign_time(rates, tangents, GEOMETRY), of or readings(), 0)
+    return found[0] if found else None
 
 
 def changed(rates: Rates, tangents: SteeringTangents, through: str, share: np.ndarray, size: float = 0.02) -> Rates:

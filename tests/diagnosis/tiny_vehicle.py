@@ -81,6 +81,9 @@ class Tiny:
     creep_s: float = 0.0
     wheelbase_m: float = FRONT_M + REAR_M
     marker_forward_m: float = 0.0
+    speed_factor: float = 1.0
+    steering_factor: float = 1.0
+    front_trim_rad: float = 0.0
     axle_scatter_rad: float = 0.001
     speed_scatter: float = 0.002
     noise_m: float = 3e-4
@@ -105,7 +108,7 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
     """Return 60 Hz frames of one run, from rest to rest."""
     f_off, r_off = rng.normal(0.0, tiny.axle_scatter_rad, 2)
     gain = 1.0 + rng.normal(0.0, tiny.speed_scatter)
-    gain *= 1.0 - tiny.droop_per_hour * started_s / 3600.0
+    gain *= tiny.speed_factor * (1.0 - tiny.droop_per_hour * started_s / 3600.0)
     warm = 1.0 + tiny.warm_gain * -math.expm1(-started_s / 3600.0 / tiny.warm_h)
     x, y, heading = start
     front, rear, speed = front_of(NEUTRAL) + f_off, rear_of(NEUTRAL) + r_off, 0.0
@@ -146,8 +149,8 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
                 follow(loose[1], r, tiny.rear_play_ratio * tiny.play_rad / 2.0),
             ]
         f += tiny.run_out_rad * math.sin(math.tau * driven / 0.8)
-        df = (f + tiny.front_from_rear * r) * relief * warm
-        dr = (r + tiny.rear_from_front * f) * relief * warm
+        df = (f + tiny.front_from_rear * r) * relief * warm * tiny.steering_factor + tiny.front_trim_rad
+        dr = (r + tiny.rear_from_front * f) * relief * warm * tiny.steering_factor
         drag = tiny.cornering_loss * (abs(math.tan(df)) + abs(math.tan(dr)))
         v = s * (1.0 - drag)
         if math.hypot(x - 0.6, y - 0.3) < 0.7:

@@ -10,16 +10,19 @@ from effect_checks import check_form, check_null_hooks
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agvbench.diagnosis.terms import TERMS, DiscrepancyTerm
+from agvbench.diagnosis.criteria import LOGGED
+from agvbench.diagnosis.terms import TERMS, ByLoggedColumn, DiscrepancyTerm
 from agvbench.diagnosis.terms.campaign_time import ByCampaignTime, course
 from agvbench.effects import TIME_HOOKS, effect_kinds
 from agvbench.effects import state as s
+from agvbench.errors import InputError
 from agvbench.model.simulation.simulation import SimulatedRun, Simulation
 from agvbench.types import Commands
 from agvbench.vehicle.geometry import Geometry
 
 each_term = pytest.mark.parametrize("term", TERMS, ids=[term.name for term in TERMS])
 OF_TIME = [term for term in TERMS if issubclass(term, ByCampaignTime)]
+OF_COLUMN = [term for term in TERMS if issubclass(term, ByLoggedColumn)]
 WHEN = {"begins_h", "ends_h", "time_constant_h"}
 TIMES = np.array([0.0, 1.0, 2.0, 3.0])
 COMMANDS = Commands(TIMES, np.array([900.0, 900.0, 2100.0, 1500.0]), np.full(4, 1400.0), np.full(4, 1600.0))
@@ -49,6 +52,28 @@ def test_a_change_holds_in_its_part_of_the_campaign_only(term: type[DiscrepancyT
     before, during, after = moved.reshape(3, -1).max(axis=1)
     assert before == after == 0.0
     assert during > 1e-3
+
+
+@pytest.mark.parametrize("term", OF_COLUMN, ids=[term.name for term in OF_COLUMN])
+def test_a_change_is_in_proportion_to_its_column_only(term: type[DiscrepancyTerm]) -> None:
+    logged = ((0.0, 0.0, 5.0), (-3.0, 0.01, 0.0), (0.0, 0.02, 5.0), ())
+    runs = [SimulatedRun(COMMANDS, np.linspace(0.2, 4.0, 40), logged=values) for values in logged]
+    simulation = Simulation(Geometry(0.18, 0.12), 1500.0, runs, kinds=(term,))
+    nothing = simulation.parameters()
+    second = nothing.copy()
+    second[simulation.indices(term.name)] = [p.scale for p in term.parameters()]
+    rows, starts = np.tile(ROWS, (4, 1)), np.tile([0.5, 0.2, 0.3, 0.0], (4, 1))
+    moved = (simulation.predict(rows, second, starts) - simulation.predict(rows, nothing, starts)).reshape(4, -1)
+    assert np.all(moved[[0, 3]] == 0.0)
+    assert np.abs(moved[1]).max() > 1e-5
+    np.testing.assert_allclose(moved[2], 2.0 * moved[1], rtol=0.02, atol=1e-8)
+
+
+def test_more_columns_than_the_simulation_holds_are_refused() -> None:
+    assert LOGGED.max_regressors <= s.LOGGED_COUNT
+    run = SimulatedRun(COMMANDS, np.linspace(0.2, 4.0, 4), logged=(0.0,) * (s.LOGGED_COUNT + 1))
+    with pytest.raises(InputError, match="too many logged values"):
+        Simulation(Geometry(0.18, 0.12), 1500.0, [run])
 
 
 @given(hours=st.floats(0.0, 20.0), begin=st.floats(0.0, 5.0), end=st.floats(0.0, 10.0), constant=st.floats(0.0, 6.0))

@@ -44,7 +44,7 @@ def run_id_of(part: Path) -> str:
 def parts_of(run: Run) -> dict[str, pa.Table]:
     """Return the run's parts in the order in which they are to be written: the row of ``runs`` makes it exist.
 
-    Raise `CampaignError` if an extra column has the name of a known one.
+    Raise `CampaignError` if an extra or logged column has the name of a known one.
     """
     return {"poses": _poses_part(run), "commands": _commands_part(run), "runs": _runs_part(run)}
 
@@ -84,15 +84,20 @@ def _commands_part(run: Run) -> pa.Table:
 def _poses_part(run: Run) -> pa.Table:
     """Return the run's rows of the poses table."""
     frames = run.frames
-    return pa.table(
-        {
-            "run_id": pa.repeat(run.run_id, len(frames)),
-            **{name: _floats(getattr(frames, name)) for name in ("t_s", "x_m", "y_m", "heading_rad")},
-            "tracked": pa.array(np.asarray(frames.tracked, np.bool_)),
-            "frame": pa.array(np.asarray(frames.frame, np.int64)),
-            **{name: _floats(getattr(frames, name)) for name in ("mean_error_m", "received_s")},
-        }
-    )
+    columns = {
+        "run_id": pa.repeat(run.run_id, len(frames)),
+        **{name: _floats(getattr(frames, name)) for name in ("t_s", "x_m", "y_m", "heading_rad")},
+        "tracked": pa.array(np.asarray(frames.tracked, np.bool_)),
+        "frame": pa.array(np.asarray(frames.frame, np.int64)),
+        **{name: _floats(getattr(frames, name)) for name in ("mean_error_m", "received_s")},
+    }
+    if taken := columns.keys() & run.logged.keys():
+        raise CampaignError(
+            "logged column has a known name", where=f"run {run.run_id}", value=min(taken), remedy="rename it"
+        )
+    # A series with other times than the frames has no place in their table.
+    same = {name: series.value for name, series in run.logged.items() if np.array_equal(series.t_s, frames.t_s)}
+    return pa.table(columns | {name: _floats(value) for name, value in same.items()})
 
 
 def _floats(values: object) -> pa.Array:

@@ -6,10 +6,12 @@ import difflib
 from collections.abc import Callable, Sequence
 from typing import Any, Literal, NamedTuple
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from agvbench.errors import CampaignError
+from agvbench.types import Floats
 
 Kind = Literal["text", "number", "count", "flag"]
 
@@ -88,6 +90,20 @@ def fill_columns(table: pa.Table, columns: Sequence[ColumnSpec], where: object) 
             if table.column(index).null_count:
                 table = table.set_column(index, column.name, _fill(table.column(index), column, where))
     return table
+
+
+def numbers(values: pa.ChunkedArray) -> Floats | None:
+    """Return an unknown column as float64 (rows,), NaN where it is empty; None if it does not consist of numbers."""
+    kind = values.type
+    try:
+        if pa.types.is_string(kind) or pa.types.is_large_string(kind):
+            trimmed = pc.utf8_trim_whitespace(values)
+            values = pc.if_else(pc.equal(trimmed, ""), None, trimmed)
+        elif not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)):
+            return None
+        return np.asarray(values.cast(pa.float64(), safe=False).fill_null(np.nan).to_numpy(), dtype=np.float64)
+    except pa.ArrowException:
+        return None
 
 
 def _absent(name: str, names: Sequence[str], where: object) -> CampaignError:

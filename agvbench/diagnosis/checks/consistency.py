@@ -164,7 +164,8 @@ def _require_single_cluster(readings: Readings, path: Floats, where: str) -> Non
 
     Random errors and wear fill the gap between clusters. Two vehicles, driven in turn, do not, and the runs of *each*
     agree with one another. A change during the campaign and a disturbance at a place make two clusters, too, but runs
-    that they affect differ from one another, or time or place divides them. These are evidence for the diagnosis.
+    that they affect differ from one another, or time, a logged text or place divides them. These are evidence for the
+    diagnosis.
     """
     pairs = np.array(
         [
@@ -194,6 +195,7 @@ def _require_single_cluster(readings: Readings, path: Floats, where: str) -> Non
         or np.median(far) < _MIN_CLUSTER_RATIO * np.median(near)
         or not _are_two_kinds(readings.group, pairs[at:], pairs[:at])
         or _divided_by_time(readings.started_h[pairs], np.arange(count) >= at)
+        or any(_divided_by_time(column[pairs], np.arange(count) >= at) for column in readings.logged.texts.T)
         or _divided_by_place(readings.start[pairs, :2], np.arange(count) >= at)
     ):
         return

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from agvbench.calibration import inspect_frames
 from agvbench.campaign.campaign import session_starts
 from agvbench.diagnosis.data.initial_pose import frame_noise, initial_pose, shift_commands_half_a_row, unwrapped_poses
+from agvbench.diagnosis.data.logged import NO_LOGGED_COLUMNS, LoggedColumns, logged_columns
 from agvbench.diagnosis.data.splits import group_runs, with_common_levels
 from agvbench.diagnosis.data.windows import Horizon, InitialStates, blocks, cut_windows, recording_of
 from agvbench.errors import FitError
@@ -40,7 +41,8 @@ class Readings:
     runs with the same commands, and for windows of one block. ``refused`` maps the id of each excluded run to the
     reason. ``initial_states`` are those of windows; None for runs from rest. ``preset`` is True if the axles had
     settled at each run's first steering command before it was given, and False if they were at neutral. ``priors`` are
-    separate measurements of the effects' parameters, which belong to the evidence of every model.
+    separate measurements of the effects' parameters, which belong to the evidence of every model. ``logged`` are the
+    columns that the lab logged.
     """
 
     runs: tuple[Run, ...]
@@ -54,6 +56,7 @@ class Readings:
     initial_states: InitialStates | None = None
     preset: bool = False
     priors: tuple[Prior, ...] = ()
+    logged: LoggedColumns = NO_LOGGED_COLUMNS
 
     def __len__(self) -> int:
         return len(self.runs)
@@ -84,14 +87,22 @@ class Readings:
             None if self.initial_states is None else self.initial_states.select(chosen),
             self.preset,
             self.priors,
+            self.logged.select(chosen),
         )
 
     def simulated(self) -> list[SimulatedRun]:
         """Return the runs for simulation, at the times of the samples."""
         initial_states = [None] * len(self) if self.initial_states is None else self.initial_states.t_s.tolist()
         return [
-            SimulatedRun(run.commands, t, float(h), b, self._preset(run.commands))
-            for run, t, h, b in zip(self.runs, self.t_s, self.started_h, initial_states, strict=True)
+            SimulatedRun(run.commands, t, float(h), b, self._preset(run.commands), tuple(logged))
+            for run, t, h, b, logged in zip(
+                self.runs,
+                self.t_s,
+                self.started_h,
+                initial_states,
+                self.logged.standardised(len(self)).tolist(),
+                strict=True,
+            )
         ]
 
     def _preset(self, commands: Commands) -> tuple[float, float] | None:
@@ -123,7 +134,8 @@ def read_runs(runs: Iterable[Run], neutral: float | None = None) -> Readings:
             kept.append(run)
     started_h = np.array([(run.started_s - began[run.session]) / 3600.0 for run in kept])
     t_s, poses, start, stderr = (np.array([row[i] for row in rows]) for i in range(4))
-    return Readings(tuple(kept), t_s, poses, start, stderr, started_h, group_runs(kept), refused)
+    logged = logged_columns(kept, np.column_stack([np.zeros(len(kept)), t_s]), started_h) if kept else NO_LOGGED_COLUMNS
+    return Readings(tuple(kept), t_s, poses, start, stderr, started_h, group_runs(kept), refused, None, logged=logged)
 
 
 def read_windows(runs: Iterable[Run], horizon: Horizon, neutral: float) -> Readings:
@@ -152,7 +164,9 @@ def read_windows(runs: Iterable[Run], horizon: Horizon, neutral: float) -> Readi
         np.array([getattr(w, name) for w in windows]) for name in ("t_s", "poses", "start", "start_stderr")
     )
     group = blocks(windows, horizon)
-    return Readings(tuple(w.run for w in windows), t_s, poses, start, stderr, started_h, group, refused, initial_states)
+    cut = tuple(w.run for w in windows)
+    logged = logged_columns(cut, np.column_stack([initial_states.t_s, t_s]), started_h) if cut else NO_LOGGED_COLUMNS
+    return Readings(cut, t_s, poses, start, stderr, started_h, group, refused, initial_states, logged=logged)
 
 
 def _read(run: Run, neutral: float | None) -> tuple[Floats, Floats, Floats, Floats]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis import terms
 from agvbench.diagnosis.data.splits import folds
-from agvbench.diagnosis.discrepancy.campaign_time import by_axle_angles, changes
+from agvbench.diagnosis.discrepancy.campaign_time import by_axle_angles, changes, columns_by_campaign_time
 from agvbench.diagnosis.discrepancy.regression import FOLDS, Columns, GroupedRegression, SteeringTangents
 from agvbench.diagnosis.residuals.body_rates import Rates
 from agvbench.diagnosis.terms import DiscrepancyTerm
@@ -80,6 +80,7 @@ def options(
     yield terms.TwistAtStart, _starts(rates)
     for term, shapes in changes(rates, tangents, geometry, regression):
         yield term, ((columns, course.values) for columns, course in shapes)
+    yield from _logged(rates, tangents, geometry)
     direction = c["direction"]
     yield terms.SteeringByDirection, iter([(by_axle_angles(direction, direction, tangents, geometry), Values())])
     angles = [np.arctan(before) - np.arctan(tangents.tangent) for before in (tangents.previous, tangents.reversal)]
@@ -88,6 +89,29 @@ def options(
         columns = {k: np.column_stack([shares[k].sum(axis=1) for shares in both]) for k in both[0]}
         yield terms.SteeringByHistory, iter([(columns, Values())])
     yield terms.WaveByDistance, _waves(rates)
+
+
+_BY_LOGGED_COLUMN: dict[type[DiscrepancyTerm], type[terms.ByLoggedColumn]] = {
+    terms.SpeedByCampaignTime: terms.SpeedByLoggedColumn,
+    terms.SteeringByCampaignTime: terms.SteeringByLoggedColumn,
+    terms.TrimByCampaignTime: terms.TrimByLoggedColumn,
+}
+
+
+def _logged(
+    rates: Rates, tangents: SteeringTangents, geometry: Geometry
+) -> Iterator[tuple[type[terms.DiscrepancyTerm], Iterator[Option]]]:
+    """Yield the terms of logged columns: the regressors of a change with time, in proportion to each column."""
+    if not rates.standardised.shape[1]:
+        return
+    for of_time, columns in columns_by_campaign_time(rates, tangents, geometry):
+        if of_time in _BY_LOGGED_COLUMN:
+            yield _BY_LOGGED_COLUMN[of_time], _in_proportion(columns, rates.standardised)
+
+
+def _in_proportion(columns: Columns, standardised: Floats) -> Iterator[Option]:
+    for number, z in enumerate(standardised.T):
+        yield {k: z[:, None] * column for k, column in columns.items()}, Values(float(number))
 
 
 def _run_times(rates: Rates) -> Iterator[Option]:

@@ -23,7 +23,7 @@ from agvbench.diagnosis.selection.variants import (
     with_extended_library,
 )
 from agvbench.diagnosis.selection.with_term import TermSelection, gain_p_value
-from agvbench.diagnosis.terms import TERMS, DiscrepancyTerm
+from agvbench.diagnosis.terms import TERMS, ByLoggedColumn, DiscrepancyTerm
 from agvbench.diagnosis.terms.campaign_time import ByCampaignTime
 from agvbench.types import Floats
 
@@ -250,12 +250,15 @@ def _term_in_place_of_effect(
     """Return the term that predicts better in the place of a selected effect, or None.
 
     An effect that few runs determine is fitted to them, so that no residual is left for a regression. Only terms that
-    do not depend on the position are fitted, because their simulation is as fast as that of effects.
+    do not depend on the position are fitted, because their simulation is as fast as that of effects. The column of a
+    term of a logged column comes from the regression only.
     """
     best: tuple[ScoredModel, type[DiscrepancyTerm]] | None = None
     for name, gain in selection.gains.items():
         without = extended.without_effect(selection.base, selection.chosen, name)
-        for term in (term for term in TERMS if term.longest_step_s == math.inf):
+        for term in TERMS:
+            if term.longest_step_s < math.inf or issubclass(term, ByLoggedColumn):
+                continue
             if extended.predicted_gain(without, term.name) < DISCREPANCY.min_share_of_effects * gain:
                 continue
             model = extended.with_effect(without, term.name)

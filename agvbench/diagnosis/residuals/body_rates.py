@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +16,21 @@ FEATURES = ("speed", "sideways", "turning")
 _MIN_STEP_M = 0.01
 
 
+class LoggedSteps(NamedTuple):
+    """A logged column at n steps: ``value`` (n,), NaN where missing; the number of a level if it is a text."""
+
+    value: Floats
+    is_text: bool
+
+
 @dataclass(frozen=True)
 class Rates:
     """The residual per metre driven of n steps between successive samples.
 
     ``run`` (n,): index of the run; ``value`` (n, 3): longitudinal and lateral residual as a share of the distance, and
     residual of curvature [1/m]; ``weight`` (n,): distance [m]; ``covariates``: (n,) by name; ``begin`` and ``end``
-    (n, 3): measured poses; ``step`` (n,): index of the sample at the end of the step, the same in repeats.
+    (n, 3): measured poses; ``step`` (n,): index of the sample at the end of the step, the same in repeats. ``logged``:
+    the columns that the lab logged, by name; ``standardised`` (n, S): the regressors of the run of each step.
     """
 
     run: NDArray[np.int64]
@@ -30,6 +40,8 @@ class Rates:
     begin: Floats
     end: Floats
     step: NDArray[np.int64]
+    logged: Mapping[str, LoggedSteps] = field(default_factory=dict)
+    standardised: Floats = field(default_factory=lambda: np.empty((0, 0)))
 
     @property
     def middle(self) -> Floats:
@@ -82,7 +94,15 @@ def residual_rates(readings: Readings, poses: Floats) -> Rates:
         "sideslip": direction * steps_p[..., 1][use] / size,
         "distance_m": driven,
     }
-    return Rates(run, value, size, covariates, begin[use], measured[:, 1:][use], step)
+    logged = {
+        # Without a sample at the beginning of the step, `last` is the one before.
+        column.name: LoggedSteps(
+            0.5 * (column.values[rows, last[:, :-1]] + column.values[:, 1:])[use], bool(column.levels)
+        )
+        for column in readings.logged.columns
+    }
+    standardised = readings.logged.standardised(len(readings))[run]
+    return Rates(run, value, size, covariates, begin[use], measured[:, 1:][use], step, logged, standardised)
 
 
 def _body_steps(begin: Floats, end: Floats) -> Floats:

@@ -45,8 +45,10 @@ def dependences(
     """Return the significant dependences of the residual, the one with the largest share first.
 
     Each feature is regressed on each covariate by a smooth curve; the drift in the floor frame is regressed on the
-    position only. The score statistic has the group of runs as unit, so that errors within a group may be correlated in
-    any way. The share is the variance predicted in groups left out. Distance enters modulo the best of several periods.
+    position only. Logged columns are covariates, too: a curve over numbers, or a mean for each level of a text, at the
+    steps where there is a value. The score statistic has the group of runs as unit, so that errors within a group may
+    be correlated in any way. The share is the variance predicted in groups left out. Distance enters modulo the best of
+    several periods.
 
     The p-value is the share of bootstrap samples in which the largest statistic of all tests is at least as large as
     the observed one (wild bootstrap with random signs of the groups' scores; maximum statistic of Westfall and Young
@@ -86,6 +88,13 @@ def dependences(
                     best, strongest = basis, strength
             if best is not None:
                 found.append((label, feature, strongest, _share(best, value, rates.weight, fold)))
+    for name, column in rates.logged.items():
+        used = np.isfinite(column.value)
+        basis = _level_means(column.value[used]) if column.is_text else _basis(column.value[used], name)
+        for feature, value in zip(FEATURES, rates.value[used].T, strict=True) if basis.shape[1] else ():
+            strength, bootstrapped = _strength(basis, value, rates.weight[used], groups.at(used))
+            np.maximum(most, bootstrapped, out=most)
+            found.append((name, feature, strength, _share(basis, value, rates.weight[used], fold[used])))
     significant = [
         Dependence(label, feature, p_value, share)
         for label, feature, strength, share in found
@@ -111,6 +120,10 @@ class _Units:
         _, of = np.unique(names, return_inverse=True)
         signs = np.asarray(rng.integers(0, 2, (_FLIPS, int(of.max()) + 1)) * 2 - 1, dtype=np.float64)
         return cls(of, signs)
+
+    def at(self, used: NDArray[np.bool_]) -> _Units:
+        """Return the same units for the steps `used` (n,) only."""
+        return _Units(self.of[used], self.signs)
 
 
 def _by_start(group: NDArray[np.int64], starts: Floats) -> NDArray[np.int64]:
@@ -142,6 +155,11 @@ def _basis(covariate: Floats, name: str) -> Floats:
         return np.empty((len(covariate), 0))
     hats = np.column_stack([np.interp(covariate, knots, row) for row in np.eye(len(knots))])
     return np.asarray(hats[:, 1:])
+
+
+def _level_means(level: Floats) -> Floats:
+    """Return a basis (n, levels − 1) without constant: whether a step has each level but the first."""
+    return np.asarray((level[:, None] == np.unique(level)[None, 1:]).astype(np.float64))
 
 
 def _waves(distance: Floats, period: float) -> Floats:

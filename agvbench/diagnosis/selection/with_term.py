@@ -7,15 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.diagnosis.data.logged import Regressor
 from agvbench.diagnosis.estimation.cross_validation import by_group
 from agvbench.diagnosis.estimation.likelihood import residual_of
 from agvbench.diagnosis.residuals.covariate_test import Dependence
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection
-from agvbench.diagnosis.terms import DiscrepancyTerm
+from agvbench.diagnosis.terms import ByLoggedColumn, DiscrepancyTerm
 from agvbench.types import Floats
 
-_FLIPS = 9999
+_FLIPS, _LONGEST_LEVEL = 9999, 40
 
 
 @dataclass(frozen=True)
@@ -39,17 +40,40 @@ class TermSelection:
         own = self.selection.chosen.fit.effect_values()
         return {p.name: own[f"{self.term.name}.{p.name}"] for p in self.term.parameters()}
 
+    @property
+    def regressor(self) -> Regressor | None:
+        """The number per run on which a term of a logged column depends; None for other terms."""
+        if not issubclass(self.term, ByLoggedColumn):
+            return None
+        regressors = self.without.fit.predictor.readings.logged.regressors
+        return regressors[min(round(self.values["column"]), len(regressors) - 1)]
+
+    @property
+    def covariates(self) -> tuple[str, ...]:
+        """The covariates of the term, the main one first."""
+        return self.term.covariates if self.regressor is None else (self.regressor.column,)
+
 
 def term_entry(term_selection: TermSelection) -> dict[str, object]:
     """Return the entry of a discrepancy term in the provenance."""
     return {
         "name": term_selection.term.name,
-        "covariate": term_selection.term.covariates[0],
+        "covariate": term_selection.covariates[0],
         "through": term_selection.term.through,
-        "parameters": term_selection.values,
+        "parameters": _parameters(term_selection),
         "gain": term_selection.gain,
         "p_value": term_selection.p_value,
     }
+
+
+def _parameters(term_selection: TermSelection) -> dict[str, object]:
+    """Return the parameters of a term; for a logged column with its mean and deviation in place of its number."""
+    values: dict[str, object] = {**term_selection.values}
+    if (regressor := term_selection.regressor) is not None:
+        del values["column"]
+        values |= {"mean": regressor.mean, "deviation": regressor.deviation}
+        values |= {} if regressor.level is None else {"level": regressor.level[:_LONGEST_LEVEL]}
+    return values
 
 
 def with_term_first(rest: list[Dependence], term_selection: TermSelection) -> list[Dependence]:
@@ -57,14 +81,14 @@ def with_term_first(rest: list[Dependence], term_selection: TermSelection) -> li
 
     If a term has several covariates (x and y), the dependence is that with the larger share in the covariate test.
     """
-    own = [d for d in rest if d.covariate in term_selection.term.covariates]
+    own = [d for d in rest if d.covariate in term_selection.covariates]
     if own:
         first = replace(own[0], p_value=min(own[0].p_value, term_selection.p_value))
         return [first, *(d for d in rest if d is not own[0])]
     with_term, without = (_sum_of_squares(model) for model in (term_selection.selection.chosen, term_selection.without))
     share = 1.0 - with_term / max(without, 1e-300)
     return [
-        Dependence(term_selection.term.covariates[0], term_selection.term.through, term_selection.p_value, share),
+        Dependence(term_selection.covariates[0], term_selection.term.through, term_selection.p_value, share),
         *rest,
     ]
 

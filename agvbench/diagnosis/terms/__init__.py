@@ -16,6 +16,12 @@ from agvbench.diagnosis.terms.campaign_time import (
     TrimByCampaignTime,
 )
 from agvbench.diagnosis.terms.floor import DriftByPlace, DriftToPoint
+from agvbench.diagnosis.terms.logged import (
+    ByLoggedColumn,
+    SpeedByLoggedColumn,
+    SteeringByLoggedColumn,
+    TrimByLoggedColumn,
+)
 from agvbench.diagnosis.terms.speed import SpeedByCourse, SpeedByHeading, SpeedByRunTime, SpeedInDisc, SpeedInStrip
 from agvbench.diagnosis.terms.steering import SteeringByDirection, SteeringByHistory
 from agvbench.diagnosis.terms.turning import SlipByYawRate, TurnAtLine, TurnByHeading, TwistAtStart, WaveByDistance
@@ -39,6 +45,9 @@ TERMS: tuple[type[DiscrepancyTerm], ...] = (
     DriftByCampaignTime,
     MarkersByCampaignTime,
     ClockByCampaignTime,
+    SpeedByLoggedColumn,
+    SteeringByLoggedColumn,
+    TrimByLoggedColumn,
     SteeringByDirection,
     SteeringByHistory,
     WaveByDistance,
@@ -48,6 +57,7 @@ TERMS: tuple[type[DiscrepancyTerm], ...] = (
 __all__ = [
     "TERMS",
     "BentPicture",
+    "ByLoggedColumn",
     "ClockByCampaignTime",
     "DiscrepancyTerm",
     "DriftByCampaignTime",
@@ -58,13 +68,16 @@ __all__ = [
     "SpeedByCampaignTime",
     "SpeedByCourse",
     "SpeedByHeading",
+    "SpeedByLoggedColumn",
     "SpeedByRunTime",
     "SpeedInDisc",
     "SpeedInStrip",
     "SteeringByCampaignTime",
     "SteeringByDirection",
     "SteeringByHistory",
+    "SteeringByLoggedColumn",
     "TrimByCampaignTime",
+    "TrimByLoggedColumn",
     "TurnAtLine",
     "TurnByHeading",
     "TwistAtStart",

@@ -32,6 +32,7 @@ from agvbench.effects.state import (
     HEADING,
     HOURS,
     KNOWN_FRONT,
+    LOGGED,
     REAR_AIM,
     REAR_BACKLASH,
     REAR_BEFORE,
@@ -220,6 +221,7 @@ def simulate(
     initial: Floats,
     begins_s: Floats,
     started_h: Floats,
+    logged: Floats,
     commands: Floats,
     settled: Floats,
     command_t_s: Floats,
@@ -246,6 +248,8 @@ def simulate(
         (runs,): time stamp of the initial pose; NaN for runs that are at rest until their first command.
     started_h
         (runs,): start of each run, in hours since the session began.
+    logged
+        (runs, LOGGED_COUNT): what was logged about each run, standardised.
     commands, settled
         (rows, 3): commands (drive, front, rear) from neutral; steady-state values (front, rear, speed).
     command_t_s, command_starts
@@ -268,6 +272,8 @@ def simulate(
         vehicle[STARTED] = started_h[run]
         s[X_RATE] = s[Y_RATE] = s[YAW_RATE] = s[TIME] = s[DISTANCE] = 0.0
         s[HOURS] = started_h[run]
+        for i in range(logged.shape[1]):
+            s[LOGGED + i] = logged[run, i]
         start_run(s, p, initial, run)
         start[0], start[1], start[2], start[3] = s[X], s[Y], s[HEADING], 0.0
         start[4], start[5], start[6] = initial[run, 0], initial[run, 1], initial[run, 2]

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agvbench.effects import Effect, effect_kinds
+from agvbench.effects.state import LOGGED_COUNT
 from agvbench.errors import InputError, VehicleError
 from agvbench.model.simulation.compose import kernel
 from agvbench.model.simulation.hook_errors import check_hooks
@@ -50,6 +51,8 @@ class SimulatedRun:
         for a run from rest, where the vehicle is at rest at the initial pose until its first command takes effect.
     preset
         Front and rear command at which the axles had settled before the first command; by default neutral.
+    logged
+        What was logged about the run, such as a temperature, standardised; at most `LOGGED_COUNT` numbers.
     """
 
     commands: Commands
@@ -57,6 +60,7 @@ class SimulatedRun:
     started_h: float = 0.0
     begins_s: float | None = None
     preset: tuple[float, float] | None = None
+    logged: tuple[float, ...] = ()
 
     def before(self, neutral: float) -> dict[str, float]:
         """Return the command that held before the first one, by channel."""
@@ -102,7 +106,7 @@ class Simulation:
     Raises
     ------
     InputError
-        If there is no run, or a run has no command, or times that are not finite or go back.
+        If there is no run, or a run has no command, or times that are not finite or go back, or too much was logged.
     """
 
     def __init__(
@@ -139,6 +143,7 @@ class Simulation:
         self._command_t_s = np.insert(command_t_s, starts[:-1], -np.inf)
         self._from_neutral = np.column_stack([self.drive, self.front, self.rear]) - neutral
         self._started_h = np.array([run.started_h for run in runs], dtype=np.float64)
+        self._logged = _logged(runs)
         self._begins_s = np.array([np.nan if run.begins_s is None else run.begins_s for run in runs])
         self._steps_s = np.array([kind.longest_step_s for kind in self.kinds for _ in kind.parameters()])
         self._all_runs = np.arange(len(runs))
@@ -244,6 +249,7 @@ class Simulation:
             np.ascontiguousarray(initial, dtype=np.float64),
             self._begins_s,
             self._started_h,
+            self._logged,
             self._from_neutral,
             np.ascontiguousarray(settled, dtype=np.float64),
             self._command_t_s,
@@ -270,6 +276,18 @@ class Simulation:
     def split(self, frames: Floats) -> list[Floats]:
         """Return an array over all frames as one per run."""
         return [frames[a:b] for a, b in pairwise(self.frame_starts.tolist())]
+
+
+def _logged(runs: Sequence[SimulatedRun]) -> Floats:
+    """Return what was logged about each run (runs, LOGGED_COUNT), filled up with zeros."""
+    values = np.zeros((len(runs), LOGGED_COUNT))
+    for i, run in enumerate(runs):
+        if len(run.logged) > LOGGED_COUNT:
+            raise InputError(
+                "too many logged values", where=f"run {i}: logged", value=len(run.logged), limit=LOGGED_COUNT
+            )
+        values[i, : len(run.logged)] = run.logged
+    return values
 
 
 def _starts(counts: Sequence[int]) -> Integers:
