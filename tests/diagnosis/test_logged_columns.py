@@ -13,7 +13,8 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from logged_drives import by_battery, by_operator, by_temperature, by_time, logged_runs
+from free_drives import FREE_HEADER, free_runs
+from logged_drives import by_battery, by_chance, by_operator, by_temperature, by_time, logged_runs
 from tiny_vehicle import InMemory, Tiny, campaign_runs
 
 from agvbench.campaign import Campaign
@@ -21,9 +22,10 @@ from agvbench.diagnosis import Verdict, diagnose, terms
 from agvbench.diagnosis.checks.consistency import require_consistent_repeats
 from agvbench.diagnosis.criteria import LOGGED
 from agvbench.diagnosis.data.logged import LoggedColumns, logged_columns
-from agvbench.diagnosis.data.readings import Readings, read_runs
+from agvbench.diagnosis.data.readings import Readings, read_runs, read_windows
+from agvbench.diagnosis.data.windows import Horizon
 from agvbench.diagnosis.discrepancy.stability import stability_test
-from agvbench.diagnosis.residuals.body_rates import LoggedSteps, Rates
+from agvbench.diagnosis.residuals.body_rates import LoggedSteps, Rates, residual_rates
 from agvbench.diagnosis.residuals.covariate_test import Dependence, dependences
 from agvbench.errors import CampaignError
 from agvbench.types import Run, TimeSeries
@@ -131,7 +133,7 @@ def test_what_is_no_covariate_is_left_out_with_the_reason(name, cells, reason):
 def test_a_name_that_cannot_be_printed_is_left_out(name):
     (reason,) = read({name: NUMBERS}).left_out.values()
     assert reason == "its name is empty, longer than 60 characters or not printable"
-    assert all(len(label) < 70 for label in read({name: NUMBERS}).left_out)
+    assert all(label.isprintable() and len(label) < 70 for label in read({name: NUMBERS}).left_out)
 
 
 def test_columns_that_agvbench_writes_are_no_covariates():
@@ -244,10 +246,36 @@ def test_a_logged_column_that_matters_is_named_first_and_reduces_the_error(condi
 
 
 @pytest.mark.slow
+def test_columns_that_do_not_matter_change_no_verdict():
+    found = diagnose(InMemory(logged_runs(by_chance)))
+    assert found.verdict is Verdict.ADEQUATE
+    assert found.depends_on == ()
+    assert len(found.to_json()["provenance"]["logged_columns"]["covariates"]) == 5
+
+
+@pytest.mark.slow
 def test_where_only_time_matters_it_is_named_though_a_column_was_logged():
     found = diagnose(InMemory(logged_runs(by_time)))
     assert found.verdict is Verdict.UNKNOWN
     assert [d.covariate for d in found.depends_on] == ["campaign_time_h"]
+
+
+def test_windows_of_free_driving_have_the_columns_of_their_run():
+    runs = [
+        dataclasses.replace(
+            run,
+            extra={"battery_V": 7.0 + 0.1 * (5 * k % 12)},
+            logged={"motor_C": TimeSeries(run.frames.t_s, 30.0 + run.frames.t_s)},
+        )
+        for k, run in enumerate(free_runs(Tiny()))
+    ]
+    readings = read_windows(runs, Horizon(), FREE_HEADER.neutral)
+    assert names(readings.logged) == ["battery_V", "motor_C", "run_order"]
+    rates = residual_rates(readings, readings.poses + 0.001)
+    steps = rates.logged["motor_C"].value - 30.0
+    np.testing.assert_allclose(steps, rates.covariates["time_in_run_s"], atol=1e-6)
+    few = readings.select(np.arange(0, len(readings), 7))
+    np.testing.assert_array_equal(few.logged.columns[0].per_run, readings.logged.columns[0].per_run[::7])
 
 
 COMMANDS, REPEATS, STEPS = 30, 4, 12

@@ -118,7 +118,8 @@ def logged_columns(runs: Sequence[Run], t_s: Floats, started_h: Floats) -> Logge
     order = np.unique([run.started_s for run in runs], return_inverse=True)[1].astype(np.float64)
     room = LOGGED.max_regressors
     for name, column in _columns(runs, t_s):
-        label = name if len(name) <= _LONGEST_NAME else f"{name[:_LONGEST_NAME]}…"
+        shown = name if name.isprintable() else ascii(name)
+        label = shown if len(shown) <= _LONGEST_NAME else f"{shown[:_LONGEST_NAME]}…"
         try:
             if isinstance(column, str):
                 raise _LeftOutError(column)
@@ -126,8 +127,7 @@ def logged_columns(runs: Sequence[Run], t_s: Floats, started_h: Floats) -> Logge
             if _size(column) > room:
                 raise _LeftOutError(f"more than {LOGGED.max_regressors} regressors: delete columns that cannot matter")
         except _LeftOutError as reason:
-            if not (name == _FIRMWARE and label not in left_out):
-                left_out[label] = str(reason)
+            left_out[label] = str(reason)
             continue
         used.append(column)
         room -= _size(column)
@@ -199,7 +199,7 @@ def _finite(values: Floats) -> Floats:
 def _of_texts(name: str, cells: list[str | None], samples: int) -> LoggedColumn:
     """Return a column of texts; a level that few runs have is a missing value."""
     count = Counter(cell for cell in cells if cell is not None)
-    if len(count) > LOGGED.max_levels and not name == _FIRMWARE and sum(count.values()) < 2 * len(count):
+    if len(count) > LOGGED.max_levels and sum(count.values()) < 2 * len(count):
         raise _LeftOutError("an identifier or a remark: most texts differ")
     levels = sorted(level for level, runs in count.items() if runs >= LOGGED.min_level_runs)
     if len(levels) > LOGGED.max_levels:
