@@ -6,6 +6,8 @@ effect that depends on place, heading, distance or time and states no `longest_s
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -66,4 +68,5 @@ def test_the_simulation_is_the_integral_of_the_plain_hooks(cls: type[Effect], sp
     simulated = simulation.predict(settled, simulation.parameters([effect]), np.array([[*START, 0.0]]))
     span, start = (0.0, FRAMES_S[-1]), [*START, 0.0]
     integrated = solve_ivp(rates, span, start, t_eval=FRAMES_S, rtol=1e-9, atol=1e-10, args=(effect, angles, speed))
-    np.testing.assert_allclose(simulated, integrated.y[:3].T, atol=2e-5)
+    # Between two steps the simulation extrapolates the pose on which a hook may depend.
+    np.testing.assert_allclose(simulated, integrated.y[:3].T, atol=2e-5 if math.isinf(cls.longest_step_s) else 2e-3)
