@@ -24,7 +24,7 @@ from agvbench.bus.messages.frames import FrameClock
 from agvbench.bus.messages.identity import AgvIdentity, MocapIdentity
 from agvbench.bus.messages.request import Replay, Reset, Sampling
 from agvbench.bus.messages.truth import Truth, TruthFlags
-from agvbench.errors import FlagError, LinkError
+from agvbench.errors import FlagError, LinkError, OneOf
 from agvbench.types import CommandUnit, Floats, Frames
 
 DEFAULT_PLANT = "agvbench.simulator:make_plant"
@@ -223,7 +223,7 @@ def _no_such_option(name: str, known: tuple[str, ...], scheme: str) -> FlagError
     remedy = f"did you mean '{close[0]}'?" if close else "leave it out, or declare it in option_names of the adapter"
     return FlagError(
         f"not an option of the camera {scheme}", where="--camera", value=repr(name),
-        limit=" ".join(known) or "it has no options", remedy=remedy,
+        limit=OneOf(known) if known else "it has no options", remedy=remedy,
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from agvbench.adapters.contract import AdapterOptions, AgvAdapter, MocapAdapter
-from agvbench.errors import AgvbenchError, LinkError
+from agvbench.errors import AgvbenchError, LinkError, OneOf
 from agvbench.registry import classes_by_file, own_classes
 from agvbench.simulator.checked_plant import as_plant_error
 from agvbench.simulator.plant_loading import import_file
@@ -99,7 +99,7 @@ def _choose(role: str, scheme: str, known: dict[str, type[_Adapter]]) -> type[_A
     raise LinkError(
         f"no such {role} adapter",
         value=repr(scheme),
-        limit=" ".join(known),
+        limit=OneOf(known),
         remedy=f"did you mean '{close[0]}'?" if close else "write SCHEME or SCHEME:ADDRESS",
     )
 

@@ -9,7 +9,7 @@ import traceback
 from pathlib import Path
 
 from agvbench.effects.base import HOOKS, TIME_HOOKS, Effect, Hook
-from agvbench.errors import FileError
+from agvbench.errors import FileError, OneOf
 
 MANDATORY = ("name", "stage", "relaxes", "reference", "limits")
 _HOW_TO = "see docs/how-to/write-an-effect.md"
@@ -42,7 +42,7 @@ def check_declaration(kind: type[Effect]) -> None:
 def _check_hook(kind: type[Effect], name: str, hook: Hook) -> None:
     if kind.stage not in HOOKS[name]:
         where = f"{source_of(kind)}: hook {name}"
-        raise FileError("is no hook of the effect's stage", where=where, value=kind.stage, limit=", ".join(HOOKS[name]))
+        raise FileError("is no hook of the effect's stage", where=where, value=kind.stage, limit=OneOf(HOOKS[name]))
     if not isinstance(inspect.getattr_static(kind, name), staticmethod):
         raise _error(kind, "is no static method", f"hook {name}", "write @staticmethod above it")
     time = ("time_s",) if name in TIME_HOOKS else ()

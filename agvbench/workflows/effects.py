@@ -11,7 +11,7 @@ from string import Template
 
 import agvbench.effects
 from agvbench.effects import HOOKS, TIME_HOOKS, effect_kinds
-from agvbench.errors import FileError, FlagError
+from agvbench.errors import FileError, FlagError, OneOf
 
 _TEMPLATE = Path(__file__).parent / "effect_template.py.txt"
 _NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
@@ -89,7 +89,7 @@ def template_text(name: str, hook: str = DEFAULT_HOOK) -> str:
         If there is no such hook.
     """
     if hook not in HOOKS:
-        raise FlagError("no such hook", where="--hook", value=hook, limit=", ".join(HOOKS))
+        raise FlagError("no such hook", where="--hook", value=hook, limit=OneOf(HOOKS))
     words = {"name": name, "class_name": "".join(word.capitalize() for word in name.split("_"))}
     words |= {"hook": hook, "stage": HOOKS[hook][0].name, "equation": _STUBS[hook].equation}
     words |= _time_hook(hook) if hook in TIME_HOOKS else _state_hook(_STUBS[hook])

@@ -160,7 +160,7 @@ def test_an_option_that_a_camera_does_not_declare_is_one_line(tmp_path: Path) ->
     file.write_text(CAMERA, encoding="utf-8")
     with pytest.raises(AgvbenchError) as caught:
         list(check_camera(str(file), AdapterOptions(camera={"bdy": "1"})))
-    assert str(caught.value) == ("--camera: not an option of the camera own: 'bdy' (limit: body); did you mean 'body'?")
+    assert str(caught.value) == "--camera: not an option of the camera own: 'bdy' (one of: body); did you mean 'body'?"
 
 
 def test_a_vehicle_is_checked_without_a_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -39,7 +39,7 @@ def test_a_hook_that_cannot_be_compiled_is_named_with_its_line(own, tmp_path, ol
     [
         ("loss: float) -> None", "los: float) -> None", (":28: hook move: has other arguments than its effect: state, "
          "los; write def move(state, loss)")),
-        ("Stage.BODY", "Stage.WHEELS", ": hook move: is no hook of the effect's stage: wheels (limit: body)"),
+        ("Stage.BODY", "Stage.WHEELS", ": hook move: is no hook of the effect's stage: wheels (one of: body)"),
         ("    limits:", "    limit:", ": a class attribute is missing: limits; add it; see docs/"),
         ("def move", "def moves", ": has no hook: moves; write one of arrive, aim, "),
         ("    @staticmethod\n", "", ": is no static method: hook move; write @staticmethod above it"),

@@ -95,8 +95,8 @@ def test_the_camera_may_speak_natnet() -> None:
 @pytest.mark.parametrize(
     ("spec", "options", "line"),
     [
-        ("simavr:3", AdapterOptions(plant=PLANT), "simavr: no such firmware: '3' (limit: 1 or 2)"),
-        ("simavr:1,9", AdapterOptions(plant=PLANT), "simavr: no such firmware: '9' (limit: 1 or 2)"),
+        ("simavr:3", AdapterOptions(plant=PLANT), "simavr: no such firmware: '3' (one of: 1, 2)"),
+        ("simavr:1,9", AdapterOptions(plant=PLANT), "simavr: no such firmware: '9' (one of: 1, 2)"),
         ("simavr:2,phase_ms=20", AdapterOptions(plant=PLANT), "phase_ms=20 (limit: 0 to below 20 ms)"),
         ("simavr:2,phase_ms=x", AdapterOptions(plant=PLANT), "no such phase of the servo frame: phase_ms=x"),
         ("simavr", AdapterOptions(plant=PLANT, command_unit="normalised"), "takes microseconds"),

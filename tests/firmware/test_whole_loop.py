@@ -53,5 +53,5 @@ def test_a_firmware_that_does_not_exist_is_one_line_and_exit_code_2(tmp_path: Pa
     thesis_vehicle().save(vehicle)
     done = bench(tmp_path / "none", vehicle, "--agv=simavr:9")
     assert done.returncode == 2
-    assert "no such firmware: '9' (limit: 1 or 2)" in done.stderr
+    assert "no such firmware: '9' (one of: 1, 2)" in done.stderr
     assert "Traceback" not in done.stderr + done.stdout

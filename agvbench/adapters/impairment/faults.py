@@ -12,7 +12,7 @@ import numpy as np
 
 from agvbench.adapters.contract import run_seed
 from agvbench.adapters.impairment.spec import SCHEME, Impairment
-from agvbench.errors import LinkError
+from agvbench.errors import LinkError, OneOf
 from agvbench.registry import classes_by_file
 from agvbench.types import Command, Frames
 
@@ -118,7 +118,7 @@ def _make(impairment: Impairment, package: str) -> Fault:
         return known[impairment.name](impairment.value)
     close = difflib.get_close_matches(impairment.name, known, n=1)
     raise LinkError(
-        "no such fault", where=SCHEME, value=repr(impairment.name), limit=" ".join(sorted(known)),
+        "no such fault", where=SCHEME, value=repr(impairment.name), limit=OneOf(sorted(known)),
         remedy=f"did you mean '{close[0]}'?" if close else None,
     )  # fmt: skip
 

@@ -6,7 +6,7 @@ import random
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
-from agvbench.errors import FlagError
+from agvbench.errors import FlagError, OneOf
 
 _PREFIX = "packet_"
 
@@ -44,7 +44,7 @@ class PacketFaults:
 def _share(name: str, value: str | float) -> float:
     known = [_PREFIX + field.name for field in fields(PacketFaults)]
     if name not in known:
-        raise FlagError("no such fault of packets", where="--camera", value=name, limit=" ".join(known))
+        raise FlagError("no such fault of packets", where="--camera", value=name, limit=OneOf(known))
     try:
         share = float(value)
     except ValueError:

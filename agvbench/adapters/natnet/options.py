@@ -8,7 +8,7 @@ from ipaddress import IPv4Address
 
 from agvbench.adapters.natnet.channel import COMMAND_PORT, Connection
 from agvbench.adapters.natnet.protocol.bitstream import Version
-from agvbench.errors import FlagError
+from agvbench.errors import FlagError, OneOf
 from agvbench.vehicle.quaternion import Up
 
 _NAMES = ("body", "data_port", "local", "multicast", "rate_hz", "up", "version")
@@ -38,9 +38,7 @@ class NatNetOptions:
         """
         for name in camera:
             if name not in _NAMES:
-                raise FlagError(
-                    "not an option of a NatNet camera", where="--camera", value=name, limit=" ".join(_NAMES)
-                )
+                raise FlagError("not an option of a NatNet camera", where="--camera", value=name, limit=OneOf(_NAMES))
         host, _, port = address.partition(":")
         if not host:
             raise FlagError("NatNet server has no address", where="natnet", remedy="write natnet:HOST")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple, Self
 
 from agvbench.adapters.simavr.firmware_files import VERSIONS
-from agvbench.errors import LinkError
+from agvbench.errors import LinkError, OneOf
 
 FRAME_S = 0.02
 """How often servo pulses come."""
@@ -46,7 +46,7 @@ class FirmwareAddress(NamedTuple):
                 version = part
             else:
                 raise LinkError(
-                    "no such firmware", where=where, value=repr(part), limit=" or ".join(VERSIONS),
+                    "no such firmware", where=where, value=repr(part), limit=OneOf(VERSIONS),
                     remedy=f"write {where}:2 or {where}:2,{_PHASE}0",
                 )  # fmt: skip
         return cls(version, phase_s)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from agvbench.adapters.simavr.firmware_files import HOST, VERSIONS, built
-from agvbench.errors import AdapterGoneError, LinkError
+from agvbench.errors import AdapterGoneError, LinkError, OneOf
 
 CYCLES_PER_S = 16e6
 
@@ -53,7 +53,7 @@ class SimavrHost:
 
     def __init__(self, version: str = "2", *, live: bool = False) -> None:
         if version not in VERSIONS:
-            raise LinkError("no such firmware", where="simavr", value=repr(version), limit=" or ".join(VERSIONS))
+            raise LinkError("no such firmware", where="simavr", value=repr(version), limit=OneOf(VERSIONS))
         program, firmware = built(HOST), built(f"agv{version}.elf")
         self._ended: AdapterGoneError | None = None
         self.process = _start(program, firmware, *(["--live"] if live else []))
