@@ -78,7 +78,7 @@ class RunsFromRest(Method[SelectedFromRest]):
         searched = fitted.select(subsample_repeats(fitted.group, DATA.max_selection_runs))
         library, selector = self._selected_effects(self.selector(searched))
         static = None
-        if axle := self._undeclared_axle(library, selector, searched):
+        if axle := self._undeclared_axle(library, selector):
             self.on_progress(f"driven by the {axle} axle: predicts better")
             static = library.base
             library, selector = self._selected_effects(self._under(axle).selector(searched))
@@ -102,12 +102,9 @@ class RunsFromRest(Method[SelectedFromRest]):
         geometry = replace(self.context.geometry, driven=axle)
         return RunsFromRest(replace(self.context, geometry=geometry), self.on_progress)
 
-    def _undeclared_axle(self, library: Selection, selector: Selector, readings: Readings) -> Driven | None:
+    def _undeclared_axle(self, library: Selection, selector: Selector) -> Driven | None:
         """Return the axle that alone drives the vehicle, if no file declares it and the runs show it."""
-        if self.context.geometry.driven != UNDECLARED or self.context.vehicle is not None:
-            return None
-        preset = replace(readings, preset=selector.batch.readings.preset)
-        return better_driven_axle(library, selector, lambda axle: self._under(axle).selector_of(preset))
+        return better_driven_axle(library, selector) if self.context.geometry.driven == UNDECLARED else None
 
     def conclude(self, readings: Readings, split: Split, selected: SelectedFromRest) -> Diagnosis:
         """Open the test runs, and return the diagnosis."""
@@ -129,10 +126,6 @@ class RunsFromRest(Method[SelectedFromRest]):
 
     def selector(self, readings: Readings) -> Selector:
         """Return the selector for these runs, with the better of both initial states of the steering."""
-        return choose_initial_steering(self.selector_of(readings))
-
-    def selector_of(self, readings: Readings) -> Selector:
-        """Return the selector for these runs, with the initial state of the steering that they state."""
         context = self.context
         maps = nodal_maps(readings.runs, context.header.neutral)
         measured = _measurements(readings.runs, context.geometry, context.header.neutral)
@@ -140,7 +133,7 @@ class RunsFromRest(Method[SelectedFromRest]):
         tried, kinds = candidates_for(context.vehicle, context.geometry)
         batch = Batch(readings, maps, context.geometry, kinds=kinds)
         given = given_effects(context.vehicle, tried)
-        return Selector(batch, tried, start, context.seed, self.on_progress, *given)
+        return choose_initial_steering(Selector(batch, tried, start, context.seed, self.on_progress, *given))
 
 
 def _measurements(runs: tuple[Run, ...], geometry: Geometry, neutral: float) -> list[RunMeasurement]:

@@ -57,6 +57,14 @@ def test_an_undeclared_driven_axle_is_found(tiny_campaign, share, axle):
 
 
 @pytest.mark.slow
+def test_an_undeclared_driven_axle_is_found_beside_a_vehicle_file(tiny_campaign):
+    calibrated = calibrate(tiny_campaign(Tiny())).model
+    found = diagnose(tiny_campaign(Tiny(front_drive_share=0.0)), vehicle=calibrated)
+    assert found.verdict is Verdict.ADEQUATE
+    assert found.model.geometry.driven == "rear"
+
+
+@pytest.mark.slow
 def test_a_cause_beside_an_undeclared_driven_axle_is_named_with_its_size(tiny_campaign):
     found = diagnose(tiny_campaign(Tiny(front_drive_share=0.0, steering_lag_s=0.15)))
     assert [effect.name for effect in found.effects] == ["steering_lag"]

@@ -31,3 +31,14 @@ def has_structure(model: ScoredModel, seed: int) -> bool:
     readings = model.fit.predictor.readings
     rates = residual_rates(readings, model.fit.predictor.predict(model.fit.parameters))
     return bool(dependences(rates, readings.group, seed, readings.start))
+
+
+def may_have_structure(model: ScoredModel, seed: int) -> bool:
+    """Return whether the residuals in the training runs show lack of fit or a dependence, at the likely level."""
+    readings = model.fit.predictor.readings
+    poses = model.fit.predictor.predict(model.fit.parameters)
+    p_value = lack_of_fit(pose_residuals(readings, poses), readings.group)
+    if p_value is not None and p_value < RESIDUAL.likely_alpha:
+        return True
+    rates = residual_rates(readings, poses)
+    return bool(dependences(rates, readings.group, seed, readings.start, alpha=RESIDUAL.likely_alpha))
