@@ -83,7 +83,7 @@ class Real(ContinuousLink):
 
     def identity(self) -> Any:
         """Return who drives."""
-        return SimpleNamespace(simulated=False, vehicle="agv1")
+        return SimpleNamespace(simulated=False, vehicle="agv1", mocap=SimpleNamespace(adapter="sim"))
 
 
 def test_an_operator_is_asked_where_a_real_vehicle_does_not_come() -> None:
