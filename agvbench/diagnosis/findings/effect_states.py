@@ -23,7 +23,7 @@ from agvbench.effects.variants import cause_of
 from agvbench.types import Floats
 
 _NORMAL_95 = 1.96
-_ABSORBED = "the maps absorb it: without a nominal vehicle.toml it is calibration"
+_ABSORBED = "maps absorb it as calibration; it is named only where a nominal vehicle.toml lacks it"
 _FLAT = "no run shows it: its standard error exceeds its usual size"
 _NEVER_REACHED = "no run comes near a limit of this size"
 _LIMIT_SIZES = np.geomspace(0.03, 3.0, 7)
