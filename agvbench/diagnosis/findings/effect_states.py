@@ -17,7 +17,7 @@ from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.estimation.score_test import first_order_gain, one_step_estimate
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.result import Bound, EffectState, NamedEffect, State
-from agvbench.diagnosis.selection.candidates import ABSORBED_BY_MAPS, candidates
+from agvbench.diagnosis.selection.candidates import ABSORBED_BY_MAPS, DIRECTIONS, candidates
 from agvbench.effects import Effect, effect_kinds
 from agvbench.effects.variants import cause_of
 from agvbench.types import Floats
@@ -81,10 +81,9 @@ def _bounds(chosen: Fit, kind: type[Effect], group: NDArray[np.int64]) -> dict[s
 def _small_starts(kind: type[Effect]) -> list[Floats]:
     """Return the initial values (q,) near null about which an effect is linearised: one for each direction."""
     small = [0.0 if p.is_direction else p.null + 0.1 * p.scale for p in kind.parameters()]
-    directions = (0.0, 0.5 * math.pi, math.pi, -0.5 * math.pi)
     at = [k for k, p in enumerate(kind.parameters()) if p.is_direction]
-    starts = [np.array(small) for _ in (directions if at else directions[:1])]
-    for start, direction in zip(starts, directions, strict=False):
+    starts = [np.array(small) for _ in (DIRECTIONS if at else DIRECTIONS[:1])]
+    for start, direction in zip(starts, DIRECTIONS, strict=False):
         start[at] = direction
     return starts
 

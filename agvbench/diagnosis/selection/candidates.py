@@ -24,7 +24,8 @@ ABSORBED_BY_MAPS = frozenset({"steering_saturation", "drive_dead_band"})
 _UNBOUNDED = 1e3
 _STARTS = (0.1, 1.0)
 _LIMIT_STARTS = (0.3, 1.0, 3.0)
-_DIRECTIONS = (0.0, 0.5 * math.pi, math.pi, -0.5 * math.pi)
+DIRECTIONS = (0.0, 0.5 * math.pi, math.pi, -0.5 * math.pi)
+"""Initial values of a direction [rad]: a fit does not turn by more than a quarter of a turn."""
 
 
 @dataclass(frozen=True)
@@ -84,8 +85,8 @@ def candidate(kind: type[Effect]) -> Candidate:
         starts = np.array([row for column in zip(*_by_share(choices), strict=True) for row in product(*column)])
     for k, p in enumerate(parameters):
         if p.is_direction:
-            starts = np.repeat(starts, len(_DIRECTIONS), axis=0)
-            starts[:, k] = np.tile(_DIRECTIONS, len(starts) // len(_DIRECTIONS))
+            starts = np.repeat(starts, len(DIRECTIONS), axis=0)
+            starts[:, k] = np.tile(DIRECTIONS, len(starts) // len(DIRECTIONS))
     return Candidate(kind.name, bounds, scale, np.clip(starts, bounds[:, 0], bounds[:, 1]))
 
 
