@@ -139,17 +139,22 @@ def _compared(stream: Stream, seen: Frames) -> str:
     return f", {off_m * 1e3:.1f} mm from the true poses"
 
 
+def _require_in_order(what: str, share: float, remedy: str) -> None:
+    """Raise if the `share` of frames in which something increases is too small."""
+    if share < _SHARE_IN_ORDER:
+        raise CheckFailedError(
+            f"{what} increase in {100.0 * share:.0f} % of the frames (limit: {100.0 * _SHARE_IN_ORDER:g} %)", remedy
+        )
+
+
 def _times(stream: Stream) -> str:
     t_s = stream.frames.t_s
     if not np.isfinite(t_s).all():
         raise CheckFailedError("a capture time is not finite", "give the time of the exposure, or that of the arrival")
     steps_s = np.diff(t_s)
     share = float(np.mean(steps_s > 0.0)) if len(steps_s) else 0.0
-    if share < _SHARE_IN_ORDER:
-        raise CheckFailedError(
-            f"capture times increase in {100.0 * share:.0f} % of the frames (limit: {100.0 * _SHARE_IN_ORDER:g} %)",
-            "give each frame the time of its own exposure, and publish frames once and in order",
-        )
+    remedy = "give each frame the time of its own exposure, and publish frames once and in order"
+    _require_in_order("capture times", share, remedy)
     return f"increase, by {np.median(steps_s) * 1e3:.2f} ms from frame to frame"
 
 
@@ -177,11 +182,7 @@ def _numbers(frames: Frames) -> str:
         return "unknown (−1): frames that are lost cannot be counted"
     steps = np.diff(frames.frame)
     share = float(np.mean(steps > 0)) if len(steps) else 1.0
-    if share < _SHARE_IN_ORDER:
-        raise CheckFailedError(
-            f"frame numbers increase in {100.0 * share:.0f} % of the frames (limit: {100.0 * _SHARE_IN_ORDER:g} %)",
-            "give the camera's own count, or −1 where it has none",
-        )
+    _require_in_order("frame numbers", share, "give the camera's own count, or −1 where it has none")
     return f"increase from {frames.frame[0]} to {frames.frame[-1]}; {int(np.sum(np.maximum(steps - 1, 0)))} missing"
 
 
