@@ -16,6 +16,7 @@ from agvbench.diagnosis.findings.corrected_vehicle import corrected_vehicle
 from agvbench.diagnosis.findings.effect_states import effect_states
 from agvbench.diagnosis.findings.estimates import named_effects
 from agvbench.diagnosis.findings.map_structure import map_effects
+from agvbench.diagnosis.findings.omitted_effects import omitted_effects
 from agvbench.diagnosis.findings.prior_checks import check_priors, provenance_of, with_contradictions, with_evidence
 from agvbench.diagnosis.findings.residual_table import with_residuals
 from agvbench.diagnosis.model.batch import Batch
@@ -79,7 +80,8 @@ def conclude(
     rest, likely = _remaining_dependences(batch, poses, term_selection, context.seed)
     if changes := _changes(batch, fit.parameters, poses, context.seed):
         rest = _with_changes(rest, changes, int(term_selection is not None), is_logged=bool(readings.logged.columns))
-    effects = named_effects(selection, bounds_of(selection.chosen.names)) + map_effects(fit, context.vehicle)
+    omitted = omitted_effects(fit)
+    effects = named_effects(selection, bounds_of(selection.chosen.names), omitted) + map_effects(fit, context.vehicle)
     checks = check_priors(selection, candidates_for(context.vehicle, context.geometry)[0])
     effects = with_evidence(effects, checks)
     significant = term_selection is not None or tested.has_lack_of_fit or bool(rest)
@@ -107,7 +109,7 @@ def conclude(
         | ({"driven_axle": batch.geometry.driven} if static is not None else {})
         | ({"empirical_term": term_entry(term_selection)} if term_selection else {})
         | provenance_of(checks),
-        states=effect_states(fit, effects),
+        states=effect_states(fit, effects, omitted),
     )
     found = with_residuals(found, readings, split.test, before, poses)
     if term_selection or has_variants:

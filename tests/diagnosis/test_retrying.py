@@ -107,9 +107,9 @@ def test_a_step_to_where_the_model_cannot_be_evaluated_ends_the_iteration(select
         return replace(linear, by_own=linear.by_own * np.nan) if len(calls) == 3 else linear
 
     monkeypatch.setattr(Predictor, "linearise", fails_the_third_time)
-    state, convergence = solver.iterate(start, 8)
-    assert (len(calls), convergence) == (3, Convergence.CONVERGED)
-    assert np.isfinite(solver.evaluate(state).loss)
+    iterated = solver.iterate(start, 8)
+    assert (len(calls), iterated.convergence) == (3, Convergence.CONVERGED)
+    assert np.isfinite(solver.evaluate(iterated.state).loss)
     calls[:] = [(), ()]
     with pytest.raises(np.linalg.LinAlgError, match="cannot be evaluated"):
         solver.iterate(start, 8)

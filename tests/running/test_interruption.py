@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -17,7 +18,8 @@ from agvbench.running.configuration.campaign_directory import has_session
 
 pytestmark = pytest.mark.real_time
 
-KILLS = 30
+KILLS = int(os.environ.get("AGVBENCH_KILLS", "8"))
+"""Number of kills, each some seconds; AGVBENCH_KILLS=30 for a thorough test."""
 PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
 # Calibration and the eight trajectories, so that resuming in the middle of either is met.
 OPTIONS = ["--repeats=1", "--seed=11", "--no-report"]
@@ -68,7 +70,7 @@ def uninterrupted(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_killed_thirty_times_nothing_finished_is_lost_and_the_end_is_the_same(uninterrupted, tmp_path):
+def test_killed_many_times_nothing_finished_is_lost_and_the_end_is_the_same(uninterrupted, tmp_path):
     rng = np.random.default_rng(20150621)
     directory = tmp_path / "campaign"
     finished: set[str] = set()
@@ -87,7 +89,7 @@ def test_killed_thirty_times_nothing_finished_is_lost_and_the_end_is_the_same(un
         if finished:
             campaign = Campaign.open(directory).check()
             assert len(campaign) == len(finished)
-    assert len(finished) > 10, "kills must fall into driving, not only before it"
+    assert len(finished) > KILLS / 4, "kills must fall into driving, not only before it"
     finish(start(directory, "--resume"))
     assert parts(directory) == uninterrupted
 

@@ -7,7 +7,7 @@ run would count as independent observations, and a small backlash of a servo wou
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -127,14 +127,12 @@ def fit(
         else window_variance_components(readings)
     )
     solver = LevenbergMarquardt(predictor, bounds)
-    state, convergence = solver.iterate(
-        FitState(parameters.copy(), random_effects, variance_components), iterations, near
-    )
+    iterated = solver.iterate(FitState(parameters.copy(), random_effects, variance_components), iterations, near)
     # A fit with few steps is a preliminary one, which need not converge.
     to_convergence = iterations > _ITERATIONS
-    state, evaluation = solver.converge(
-        state, convergence if to_convergence else Convergence.CONVERGED, iterations, patient=patient
-    )
+    if not to_convergence:
+        iterated = replace(iterated, convergence=Convergence.CONVERGED)
+    state, evaluation = solver.converge(iterated, iterations, patient=patient)
     if to_convergence:
         state, evaluation = solver.leave_plateaus(state, evaluation, iterations, patient=patient)
     terms = evaluation.terms

@@ -8,13 +8,15 @@ from enum import Enum, auto
 import numpy as np
 
 from agvbench.diagnosis.criteria import FIT
-from agvbench.diagnosis.estimation.likelihood import Terms, objective, residual_of, ridge, terms_of
+from agvbench.diagnosis.estimation.likelihood import Terms, objective, random_effects_step, residual_of, ridge, terms_of
 from agvbench.diagnosis.estimation.variance import VarianceComponents, update_variance_components
 from agvbench.diagnosis.model.predictor import Linearised, Predictor
 from agvbench.diagnosis.model.smoothness import PriorTerms
 from agvbench.types import Floats
 
 _STEP_LENGTHS = (1.0, 0.4, 0.16, 0.064)
+# Updates of the variance components, and the relative change below which they have converged.
+_UPDATES, _SETTLED = 40, 1e-3
 _DAMPINGS = (0.0, 0.1, 3.0)
 
 
@@ -28,6 +30,19 @@ class Point:
 
 
 @dataclass(frozen=True)
+class Step:
+    """The ``point`` that a step led to, whether it was ``full`` and undamped, and the reduction that was predicted.
+
+    This ``decrement`` (Newton decrement, squared: Boyd and Vandenberghe, Convex Optimization, 2004, section 9.5) is
+    that of a full step by the quadratic approximation of the objective.
+    """
+
+    point: Point
+    full: bool
+    decrement: float
+
+
+@dataclass(frozen=True)
 class StepSolver:
     """Solves for one step at fixed derivatives, variance components and ``bounds`` (effects' parameters, 2)."""
 
@@ -36,22 +51,24 @@ class StepSolver:
     variance_components: VarianceComponents
     bounds: Floats
 
-    def step(self, point: Point, terms: Terms) -> tuple[Point, bool]:
-        """Return a point whose objective is no larger, and whether a full undamped step reached it.
+    def step(self, point: Point, terms: Terms) -> Step:
+        """Return a step to a point whose objective is no larger.
 
         If no fraction of the Gauss–Newton step qualifies, the step is damped (Levenberg and Marquardt). Damping keeps
         poorly determined parameters from making the whole step fail. If no damped step qualifies, the point is returned
         unchanged.
         """
         now, (matrix, gradient) = self._objective(point), self._normal_equations(point, terms)
+        decrement = np.inf
         for damping in _DAMPINGS:
             damped = matrix + damping * np.diag(np.diagonal(matrix))
             move, move_random_effects = self._move(point, terms, damped, gradient)
+            decrement = min(decrement, float(gradient @ move))
             for length in _STEP_LENGTHS:
                 tried = self._at(point, length * move, length * move_random_effects)
                 if self._objective(tried) <= now:
-                    return tried, not damping and length == 1.0
-        return point, False
+                    return Step(tried, not damping and length == 1.0, decrement)
+        return Step(point, False, decrement)
 
     def full(self, point: Point, terms: Terms) -> Point:
         """Return the point after a full step, even if its objective is larger."""
@@ -132,6 +149,15 @@ class Convergence(Enum):
 
 
 @dataclass(frozen=True)
+class Iterated:
+    """The result of an iteration: the last ``state``, its ``convergence``, and the derivatives of the last step."""
+
+    state: FitState
+    convergence: Convergence
+    linear: Linearised | None
+
+
+@dataclass(frozen=True)
 class LevenbergMarquardt:
     """Minimises the loss of one model; ``bounds`` (effects' parameters, 2)."""
 
@@ -139,7 +165,7 @@ class LevenbergMarquardt:
     bounds: Floats
 
     def evaluate(self, state: FitState, near: Linearised | None = None) -> Evaluation:
-        """Evaluate the model at `state`; `near` supplies the derivatives by the nodal values if given.
+        """Evaluate the model at `state`; `near` supplies the derivatives that it has if given.
 
         Raises
         ------
@@ -154,47 +180,76 @@ class LevenbergMarquardt:
             raise np.linalg.LinAlgError("the model cannot be evaluated")
         return Evaluation(linear, residual, terms, self.predictor.prior(state.parameters))
 
-    def iterate(self, state: FitState, iterations: int, near: Linearised | None = None) -> tuple[FitState, Convergence]:
-        """Return the state after at most `iterations` steps, and the state of convergence.
+    def iterate(self, state: FitState, iterations: int, near: Linearised | None = None) -> Iterated:
+        """Return the state after at most `iterations` steps.
 
-        The first steps use the derivatives by the nodal values from `near` if given. A step to where the model cannot
-        be evaluated is undone, and ends the iteration.
+        The first steps use the derivatives from `near` if given. Once a step can reduce the objective by little, the
+        model is nearly linear over the remaining steps, and these use the derivatives of that step (chord method). The
+        last step has derivatives of its own: where residuals are large, others lead to another point. A step to where
+        the model cannot be evaluated is undone, and ends the iteration.
         """
-        before, full_step, known = np.inf, True, state
+        before, known, own = np.inf, state, None
         for step in range(iterations):
             try:
-                evaluation = self.evaluate(state, near)
+                evaluation = self.evaluate(state, own if near is None else near)
             except np.linalg.LinAlgError:
                 if known is state:
                     raise
-                return known, Convergence.CONVERGED
-            known = state
-            state, full_step = self._step(state, evaluation)
-            if near is not None and (before - evaluation.loss < FIT.nearly_converged or step >= iterations // 2):
-                near = None
-            elif abs(before - evaluation.loss) < FIT.converged:
-                return state, Convergence.CONVERGED
+                return Iterated(known, Convergence.CONVERGED, None)
+            known, reduction = state, before - evaluation.loss
+            state, taken = self._step(state, evaluation)
             before = evaluation.loss
-        return state, Convergence.FAST if full_step else Convergence.SLOW
+            if near is not None:
+                if reduction < FIT.nearly_converged or step >= iterations // 2:
+                    near = None
+            elif taken.decrement < FIT.converged or abs(reduction) < FIT.converged:
+                if own is None:
+                    return Iterated(state, Convergence.CONVERGED, evaluation.linear)
+                own = None
+            else:
+                own = evaluation.linear if taken.decrement < FIT.nearly_converged else None
+        return Iterated(state, Convergence.FAST if taken.full else Convergence.SLOW, evaluation.linear)
 
-    def converge(
-        self, state: FitState, convergence: Convergence, iterations: int, *, patient: bool
-    ) -> tuple[FitState, Evaluation]:
+    def settled(self, state: FitState, evaluation: Evaluation) -> tuple[FitState, Evaluation]:
+        """Return the state with variance components and random effects at the fixed point of their updates.
+
+        Their updates converge slowly and do not minimise the loss, so that fits with different numbers of updates could
+        not be compared. Neither changes the parameters. The prediction is linear in random effects of their size, and
+        is not simulated for each update.
+        """
+        linear, residual, seen = evaluation.linear, evaluation.residual, self.predictor.readings.seen[..., None]
+        for _ in range(_UPDATES):
+            move, inverse = random_effects_step(
+                self.predictor, residual, linear, state.random_effects, state.variance_components
+            )
+            residual = residual - np.einsum("rkcm,rm->rkc", linear.by_random_effects, move) * seen
+            point = Point(state.parameters, state.random_effects + move, residual)
+            before, state = state.variance_components, self._updated(point, state, inverse)
+            if before.change_to(state.variance_components) < _SETTLED:
+                break
+        return state, self.evaluate(state, linear)
+
+    def converge(self, iterated: Iterated, iterations: int, *, patient: bool) -> tuple[FitState, Evaluation]:
         """Iterate further, and return the final state with its evaluation.
 
         A fit that converges slowly tries non-monotone steps. A `patient` fit continues even if they fail, and adds
         rounds of `iterations` steps as long as each round reduces the loss enough.
         """
-        evaluation = self.evaluate(state)
+        evaluation = self._evaluate_last(iterated)
         for _ in range(FIT.rounds if patient else 1):
+            state, convergence = iterated.state, iterated.convergence
             beyond = self.non_monotone_steps(state, evaluation) if convergence is Convergence.SLOW else None
             if convergence is Convergence.CONVERGED or (beyond is None and not patient):
                 break
-            state, convergence = self.iterate(state if beyond is None else beyond, iterations)
-            before, evaluation = evaluation.loss, self.evaluate(state)
+            iterated = self.iterate(state if beyond is None else beyond, iterations)
+            before, evaluation = evaluation.loss, self._evaluate_last(iterated)
             if before - evaluation.loss < FIT.min_reduction:
                 break
-        return state, evaluation
+        return self.settled(iterated.state, evaluation)
+
+    def _evaluate_last(self, iterated: Iterated) -> Evaluation:
+        """Evaluate the model at the end of an iteration; if it converged, with the derivatives of its last step."""
+        return self.evaluate(iterated.state, iterated.linear if iterated.convergence is Convergence.CONVERGED else None)
 
     def leave_plateaus(
         self, state: FitState, evaluation: Evaluation, iterations: int, *, patient: bool
@@ -211,8 +266,8 @@ class LevenbergMarquardt:
         if not unobserved.any():
             return state, evaluation
         parameters = np.r_[maps.interpolated(state.parameters[: maps.size], unobserved), state.parameters[maps.size :]]
-        first, convergence = self.iterate(replace(state, parameters=parameters), iterations)
-        final, evaluated = self.converge(first, convergence, iterations, patient=patient)
+        first = self.iterate(replace(state, parameters=parameters), iterations)
+        final, evaluated = self.converge(first, iterations, patient=patient)
         return (final, evaluated) if evaluated.loss < evaluation.loss else (state, evaluation)
 
     def non_monotone_steps(self, state: FitState, evaluation: Evaluation) -> FitState | None:
@@ -223,9 +278,9 @@ class LevenbergMarquardt:
         the loss increases at first (watchdog technique: Chamberlain et al., Mathematical Programming Study 16, 1982).
         The variance components grow with the residual, which widens the valley.
         """
-        start, near = evaluation.loss, evaluation.linear
+        start, near = evaluation.loss, evaluation.linear.by_first(self.predictor.maps.size)
         point = self._step_solver(state, evaluation).full(self._point(state, evaluation), evaluation.terms)
-        now = self._updated(point, state, evaluation)
+        now = self._updated(point, state, evaluation.terms.inner_inverse)
         for _ in range(FIT.non_monotone_steps):
             try:
                 evaluation = self.evaluate(now, near)
@@ -236,10 +291,10 @@ class LevenbergMarquardt:
             now, _ = self._step(now, evaluation)
         return None
 
-    def _step(self, state: FitState, evaluation: Evaluation) -> tuple[FitState, bool]:
-        """Return the state after a step that does not increase the objective, and whether the step was a full one."""
-        point, full_step = self._step_solver(state, evaluation).step(self._point(state, evaluation), evaluation.terms)
-        return self._updated(point, state, evaluation), full_step
+    def _step(self, state: FitState, evaluation: Evaluation) -> tuple[FitState, Step]:
+        """Return the state after a step that does not increase the objective, and the step."""
+        taken = self._step_solver(state, evaluation).step(self._point(state, evaluation), evaluation.terms)
+        return self._updated(taken.point, state, evaluation.terms.inner_inverse), taken
 
     def _step_solver(self, state: FitState, evaluation: Evaluation) -> StepSolver:
         return StepSolver(self.predictor, evaluation.linear, state.variance_components, self.bounds)
@@ -248,12 +303,12 @@ class LevenbergMarquardt:
     def _point(state: FitState, evaluation: Evaluation) -> Point:
         return Point(state.parameters, state.random_effects, evaluation.residual)
 
-    def _updated(self, point: Point, state: FitState, evaluation: Evaluation) -> FitState:
+    def _updated(self, point: Point, state: FitState, inner_inverse: Floats) -> FitState:
         variance_components = update_variance_components(
             self.predictor,
             point.residual,
             point.random_effects,
-            evaluation.terms.inner_inverse,
+            inner_inverse,
             state.variance_components,
         )
         return FitState(point.parameters, point.random_effects, variance_components)

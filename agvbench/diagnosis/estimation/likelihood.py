@@ -123,6 +123,22 @@ def terms_of(
     return Terms(squares + logs, information, gradient, inverse, mixed, pull)
 
 
+def random_effects_step(
+    predictor: Predictor,
+    residual: Floats,
+    linear: Linearised,
+    random_effects: Floats,
+    variance_components: VarianceComponents,
+) -> tuple[Floats, Floats]:
+    """Return the step of the random effects (R, 6) to their best values, and their covariance (R, 6, 6)."""
+    weight, prior = weights(predictor, variance_components), priors(predictor, variance_components)
+    e = (residual * weight).reshape(len(residual), -1)
+    a = (linear.by_random_effects * weight[..., None]).reshape(*e.shape, -1)
+    _, inverse = inner_inverse(a, prior)
+    pull = (a.transpose(0, 2, 1) @ e[..., None])[..., 0] - random_effects / prior**2
+    return np.einsum("rij,rj->ri", inverse, pull), inverse
+
+
 def inner_inverse(a: Floats, prior: Floats) -> tuple[Floats, Floats]:
     """Return the information about each run's random effects (R, 6, 6), with its inverse."""
     inner = a.transpose(0, 2, 1) @ a

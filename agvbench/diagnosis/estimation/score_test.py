@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +13,18 @@ from agvbench.diagnosis.estimation.likelihood import Terms, residual_of, ridge, 
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.effects import effect_kinds
 from agvbench.types import Floats
+
+
+@dataclass(frozen=True)
+class OneStepEstimate:
+    """One more effect beside a fit: ``estimate`` and ``stderr`` (q,) of its parameters.
+
+    ``influence`` (P, q) is by how much the parameters of the fit change per unit of each, if they are refitted.
+    """
+
+    estimate: Floats
+    stderr: Floats
+    influence: Floats
 
 
 def initial_parameters(fitted: Fit, larger: Predictor, start: Floats) -> Floats:
@@ -57,8 +71,8 @@ def first_order_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floa
 
 def one_step_estimate(
     fitted: Fit, larger: Predictor, start: Floats, free: NDArray[np.bool_], group: NDArray[np.int64]
-) -> tuple[Floats, Floats]:
-    """Return estimates (q,) of the last effect's parameters and their standard errors (q,), without a fit.
+) -> OneStepEstimate:
+    """Return the estimate of the last effect's parameters, without a fit.
 
     The estimate is one Newton step from `start` (q,), with all other parameters refitted; parameters that are not
     `free` (q,) keep their start, and have a standard error of zero. A standard error is the larger of those of the
@@ -77,10 +91,12 @@ def one_step_estimate(
     estimate, stderr = start.astype(np.float64), np.zeros(len(start))
     estimate[free] += (own @ gradient[at])[known:]
     stderr[free] = np.sqrt(np.maximum(np.diagonal(own), np.diagonal(robust)))[known:]
-    return estimate, stderr
+    influence = np.zeros((known, len(start)))
+    influence[:, free] = -np.linalg.lstsq(matrix[:known, :known], matrix[:known, at[known:]], rcond=1e-12)[0]
+    return OneStepEstimate(estimate, stderr, influence)
 
 
 def _terms(fitted: Fit, larger: Predictor, residual: Floats, slopes: Floats) -> Terms:
     """Return the likelihood of residuals (R, K, 3) with `slopes` (R, K, 3, q) beside the derivatives of `fitted`."""
-    linear = fitted.linear.with_last(slopes)
+    linear = fitted.linear.with_last(slopes, larger.parameter_names[len(fitted.linear.effects) :])
     return terms_of(larger, residual, linear, fitted.random_effects, fitted.variance_components)

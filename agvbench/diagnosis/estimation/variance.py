@@ -39,6 +39,13 @@ class VarianceComponents:
     random_effects: Floats
     growth: Floats = field(default_factory=lambda: np.ones(1))
 
+    def change_to(self, other: VarianceComponents) -> float:
+        """Return the largest relative change of a standard deviation."""
+        own, theirs = (
+            np.r_[v.position_m, v.heading_rad, v.random_effects, v.position_m * v.growth] for v in (self, other)
+        )
+        return float(np.max(np.abs(theirs / own - 1.0)))
+
 
 def initial_variance_components() -> VarianceComponents:
     """Return large initial values."""

@@ -10,17 +10,16 @@ import math
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agvbench.diagnosis.criteria import SELECTION
 from agvbench.diagnosis.estimation.fit import Fit
-from agvbench.diagnosis.estimation.score_test import first_order_gain, one_step_estimate
+from agvbench.diagnosis.estimation.score_test import first_order_gain
+from agvbench.diagnosis.findings.omitted_effects import OmittedEffect
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.result import Bound, EffectState, NamedEffect, State
-from agvbench.diagnosis.selection.candidates import ABSORBED_BY_MAPS, DIRECTIONS, candidates
+from agvbench.diagnosis.selection.candidates import ABSORBED_BY_MAPS, candidates
 from agvbench.effects import Effect, effect_kinds
 from agvbench.effects.variants import cause_of
-from agvbench.types import Floats
 
 _NORMAL_95 = 1.96
 _ABSORBED = "maps absorb it as calibration; it is named only where a nominal vehicle.toml lacks it"
@@ -29,15 +28,17 @@ _NEVER_REACHED = "no run comes near a limit of this size"
 _LIMIT_SIZES = np.geomspace(0.03, 3.0, 7)
 
 
-def effect_states(chosen: Fit, effects: Iterable[NamedEffect]) -> dict[str, EffectState]:
+def effect_states(
+    chosen: Fit, effects: Iterable[NamedEffect], omitted: Mapping[str, OmittedEffect]
+) -> dict[str, EffectState]:
     """Return the state of each effect of the library that applies to the vehicle, by name.
 
-    Absent effects are estimated by one Newton step beside the chosen model, with maps, other effects and random effects
-    refitted. The bound of a parameter is the far end of its 95 % interval. It holds for the chosen model: if structure
-    remains in the residual, it holds as far as that structure does not resemble the effect.
+    Absent effects are the `omitted` ones, estimated beside the chosen model. The bound of a parameter is the far end of
+    its 95 % interval. It holds for the chosen model: if structure remains in the residual, it holds as far as that
+    structure does not resemble the effect.
     """
     named = {effect.name: effect for effect in effects}
-    readings, geometry = chosen.predictor.readings, chosen.predictor.batch.geometry
+    geometry = chosen.predictor.batch.geometry
     given = {cause_of(name) for name in chosen.predictor.effects}
     states = {name: EffectState(State.PRESENT) for name in (*named, *(given & effect_kinds().keys()))}
     kinds = {name: effect_kinds()[name] for name in candidates(geometry)}
@@ -48,7 +49,7 @@ def effect_states(chosen: Fit, effects: Iterable[NamedEffect]) -> dict[str, Effe
         if replaced:
             states[name] = EffectState(State.NOT_IDENTIFIABLE, indistinguishable_from=replaced)
         else:
-            states[name] = _absent(kind, _bounds(chosen, kind, readings.group))
+            states[name] = _absent(kind, _bounds(chosen, kind, omitted.get(name)))
     absorbed = {name: EffectState(State.NOT_IDENTIFIABLE, why=_ABSORBED) for name in ABSORBED_BY_MAPS - states.keys()}
     return dict(sorted((states | absorbed).items()))
 
@@ -60,32 +61,18 @@ def _absent(kind: type[Effect], bounds: Mapping[str, Bound]) -> EffectState:
     return EffectState(State.NOT_IDENTIFIABLE, why=_NEVER_REACHED if is_limit else _FLAT)
 
 
-def _bounds(chosen: Fit, kind: type[Effect], group: NDArray[np.int64]) -> dict[str, Bound]:
-    """Return the bound of each parameter that the runs determine, by name."""
-    larger = Predictor(chosen.predictor.batch, (*chosen.predictor.effects, kind.name))
-    if any(math.isinf(p.null) for p in kind.parameters()):
+def _bounds(chosen: Fit, kind: type[Effect], omitted: OmittedEffect | None) -> dict[str, Bound]:
+    """Return the bound of each parameter that the runs determine, by name; a limit has no estimate."""
+    if omitted is None:
+        larger = Predictor(chosen.predictor.batch, (*chosen.predictor.effects, kind.name))
         return _bounds_of_limits(chosen, larger, kind)
-    parameters = kind.parameters()
-    free = np.array([not p.is_direction for p in parameters])
-    estimates = [one_step_estimate(chosen, larger, start, free, group) for start in _small_starts(kind)]
     found = {}
-    for k in np.flatnonzero(free):
-        p = parameters[k]
+    for k, p in enumerate(kind.parameters()):
         # The direction of an absent effect is unknown: the bound holds in every direction.
-        if all(stderr[k] <= p.scale for _, stderr in estimates):
-            most = max(abs(estimate[k] - p.null) + _NORMAL_95 * stderr[k] for estimate, stderr in estimates)
+        if not p.is_direction and all(one.stderr[k] <= p.scale for one in omitted.estimates):
+            most = max(abs(one.estimate[k] - p.null) + _NORMAL_95 * one.stderr[k] for one in omitted.estimates)
             found[p.name] = Bound(float(most), p.unit)
     return found
-
-
-def _small_starts(kind: type[Effect]) -> list[Floats]:
-    """Return the initial values (q,) near null about which an effect is linearised: one for each direction."""
-    small = [0.0 if p.is_direction else p.null + 0.1 * p.scale for p in kind.parameters()]
-    at = [k for k, p in enumerate(kind.parameters()) if p.is_direction]
-    starts = [np.array(small) for _ in (DIRECTIONS if at else DIRECTIONS[:1])]
-    for start, direction in zip(starts, DIRECTIONS, strict=False):
-        start[at] = direction
-    return starts
 
 
 def _bounds_of_limits(chosen: Fit, larger: Predictor, kind: type[Effect]) -> dict[str, Bound]:

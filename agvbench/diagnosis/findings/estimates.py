@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+
+import numpy as np
 
 from agvbench.diagnosis.criteria import SELECTION
 from agvbench.diagnosis.estimation.standard_errors import standard_errors
+from agvbench.diagnosis.findings.omitted_effects import OmittedEffect, contributed_stderr
 from agvbench.diagnosis.result import Estimate, NamedEffect
 from agvbench.diagnosis.selection.stepwise import Selection
 from agvbench.diagnosis.terms import TERMS, DiscrepancyTerm
@@ -16,11 +20,18 @@ from agvbench.types import Floats
 _MAX_RELATIVE_STDERR = 3.0
 
 
-def named_effects(selection: Selection, bounds: Floats) -> tuple[NamedEffect, ...]:
-    """Return the selected effects, with estimates and the standard errors of `standard_errors`."""
+def named_effects(
+    selection: Selection, bounds: Floats, omitted: Mapping[str, OmittedEffect]
+) -> tuple[NamedEffect, ...]:
+    """Return the selected effects, with estimates and their standard uncertainties.
+
+    These combine the standard errors of `standard_errors` with what the effects that the model omits contribute.
+    """
     fit = selection.chosen.fit
     maps = fit.predictor.maps.size
-    stderr = standard_errors(fit, fit.predictor.readings.group)
+    stderr = np.hypot(
+        standard_errors(fit, fit.predictor.readings.group), contributed_stderr(omitted.values(), len(fit.parameters))
+    )
     kinds: dict[str, type[Effect]] = {**effect_kinds(), **effect_variants(), **{term.name: term for term in TERMS}}
     at = 0
     found = []

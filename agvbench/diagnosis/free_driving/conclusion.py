@@ -16,6 +16,7 @@ from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.findings.corrected_vehicle import corrected_vehicle
 from agvbench.diagnosis.findings.effect_states import effect_states
 from agvbench.diagnosis.findings.estimates import named_effects
+from agvbench.diagnosis.findings.omitted_effects import omitted_effects
 from agvbench.diagnosis.findings.prior_checks import check_priors, provenance_of, with_contradictions, with_evidence
 from agvbench.diagnosis.free_driving.errors import QUANTITIES, by_recording, repeatability_squares, rms, squares
 from agvbench.diagnosis.free_driving.predictors import change_by_speed_error, constant_velocity, prior_model, speed_held
@@ -65,7 +66,8 @@ class WindowConclusion:
             Predictor(self._assessed, chosen.fit.predictor.effects), chosen.fit.parameters
         )
         checks = check_priors(self.selection, self.selector.candidates)
-        effects = with_evidence(named_effects(self.selection, bounds_of(chosen.names)), checks)
+        omitted = omitted_effects(chosen.fit)
+        effects = with_evidence(named_effects(self.selection, bounds_of(chosen.names), omitted), checks)
         held_out = self._held_out(before, poses, perturbed)
         # Many windows make even small structure significant: within repeatability it needs no cause.
         rest = self._dependences(poses) if _above(held_out, RESIDUAL.within_repeatability) else []
@@ -83,7 +85,7 @@ class WindowConclusion:
             context.provenance(self.readings)
             | self._fit_provenance(horizon, predicted, perturbed)
             | provenance_of(checks),
-            states=effect_states(chosen.fit, effects),
+            states=effect_states(chosen.fit, effects, omitted),
         )
 
     def _fit_provenance(self, horizon: Horizon, predicted: dict[str, Floats], perturbed: Floats) -> dict[str, object]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +20,8 @@ class Linearised:
     """Predicted poses and their derivatives, stored for each run's active parameters only.
 
     ``poses`` (R, K, 3); ``own`` (R, m): indices of each run's active parameters, out of ``count`` (P); ``by_own``
-    (R, K, 3, m): derivatives by these; ``by_random_effects`` (R, K, 3, 6).
+    (R, K, 3, m): derivatives by these; ``by_random_effects`` (R, K, 3, 6). ``effects``: names of the effects'
+    parameters, which are the last of the active ones in every run.
     """
 
     poses: Floats
@@ -27,6 +29,7 @@ class Linearised:
     by_own: Floats
     by_random_effects: Floats
     count: int
+    effects: tuple[str, ...] = ()
 
     @property
     def by_parameters(self) -> Floats:
@@ -35,20 +38,22 @@ class Linearised:
         np.put_along_axis(out, self.own[:, None, None, :], self.by_own, axis=-1)
         return out
 
-    def with_last(self, slopes: Floats) -> Linearised:
-        """Return this linearisation with derivatives (R, K, 3, q) by further parameters, which come last."""
+    def with_last(self, slopes: Floats, names: Sequence[str]) -> Linearised:
+        """Return this linearisation with derivatives (R, K, 3, q) by further parameters of effects, which come last."""
         more = np.arange(self.count, self.count + slopes.shape[-1])
         own = np.concatenate([self.own, np.broadcast_to(more, (len(self.own), len(more)))], axis=1)
         by_own = np.concatenate([self.by_own, slopes], axis=-1)
-        return replace(self, own=own, by_own=by_own, count=self.count + len(more))
+        return replace(self, own=own, by_own=by_own, count=self.count + len(more), effects=(*self.effects, *names))
 
     def by_first(self, count: int) -> Linearised:
-        """Return this linearisation with derivatives by the first `count` parameters only: the nodal values, or none.
-
-        In ``own`` the effects' parameters come last, and all of them are active in every run.
-        """
+        """Return this linearisation with derivatives by the first `count` parameters only: the maps', or none."""
         kept = self.own.shape[1] - (self.count - count) if count else 0
-        return replace(self, own=self.own[:, :kept], by_own=self.by_own[..., :kept], count=count)
+        return replace(self, own=self.own[:, :kept], by_own=self.by_own[..., :kept], count=count, effects=())
+
+    def by_effects(self) -> dict[str, Floats]:
+        """Return the derivatives (R, K, 3) by the parameters of effects, by name."""
+        first = self.own.shape[1] - len(self.effects)
+        return {name: self.by_own[..., first + k] for k, name in enumerate(self.effects)}
 
 
 RANDOM_EFFECTS = ("x_m", "y_m", "heading_rad", "front_rad", "rear_rad", "log_speed")
@@ -135,14 +140,15 @@ class Predictor:
     def linearise(self, parameters: Floats, random_effects: Floats, near: Linearised | None = None) -> Linearised:
         """Return poses and derivatives about parameters (P,) and random effects (R, 6).
 
-        If `near` is given, it supplies the derivatives by the nodal values and by the random effects.
+        If `near` is given, it supplies the derivatives by the nodal values, by the random effects, and by those
+        parameters of effects that it has.
         """
         base, inputs = self.predict(parameters, random_effects), self._inputs(parameters, random_effects)
         if near is None:
-            by_maps = self._by_maps(parameters, random_effects, base, *inputs)
+            by_maps, known = self._by_maps(parameters, random_effects, base, *inputs), {}
         else:
-            by_maps = replace(near.by_first(self.maps.size), poses=base)
-        return by_maps.with_last(self._slopes(parameters, base, *inputs, len(parameters) - self.maps.size))
+            by_maps, known = replace(near.by_first(self.maps.size), poses=base), near.by_effects()
+        return by_maps.with_last(self._slopes(parameters, base, *inputs, known), self.parameter_names)
 
     def _by_maps(
         self, parameters: Floats, random_effects: Floats, base: Floats, settled: Floats, initial: Floats
@@ -184,13 +190,29 @@ class Predictor:
     def by_last(self, parameters: Floats, random_effects: Floats, count: int) -> tuple[Floats, Floats]:
         """Return poses (R, K, 3), and their derivatives by the last `count` parameters (R, K, 3, count)."""
         base = self.predict(parameters, random_effects)
-        return base, self._slopes(parameters, base, *self._inputs(parameters, random_effects), count)
+        return base, self._slopes(parameters, base, *self._inputs(parameters, random_effects), {}, count)
 
-    def _slopes(self, parameters: Floats, base: Floats, settled: Floats, initial: Floats, count: int) -> Floats:
-        """Return the derivatives (R, K, 3, count) of poses `base` by the last `count` of the effects' parameters."""
+    def _slopes(
+        self,
+        parameters: Floats,
+        base: Floats,
+        settled: Floats,
+        initial: Floats,
+        known: Mapping[str, Floats],
+        count: int | None = None,
+    ) -> Floats:
+        """Return the derivatives (R, K, 3, q) of poses `base` by all, or the last `count`, parameters of effects.
+
+        Those in `known` are taken from there.
+        """
         own = parameters[self.maps.size :]
-        slopes = np.empty((*base.shape, count))
-        for column, k in enumerate(range(len(own) - count, len(own))):
+        chosen = range(len(own) - (len(own) if count is None else count), len(own))
+        slopes = np.empty((*base.shape, len(chosen)))
+        for column, k in enumerate(chosen):
+            name = self.parameter_names[k]
+            if name in known:
+                slopes[..., column] = known[name]
+                continue
             moved = own.copy()
             moved[k] += self._steps[k]
             slopes[..., column] = (self._simulate(settled, moved, initial) - base) / self._steps[k]

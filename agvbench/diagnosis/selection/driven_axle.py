@@ -32,6 +32,9 @@ def better_driven_axle(selection: Selection, selector: Selector) -> Driven | Non
     The hypotheses are fitted if the residual of the selected model may have structure, or if it has an effect on the
     speed in turns. The models with one driven axle lack the effects that they may make unnecessary, so that they have
     fewer parameters. A vehicle file with such an effect declares that both axles drive.
+
+    Two driven axles lie between the front and the rear one. If one axle alone drives the vehicle, the other one alone
+    therefore predicts worse than both; if it does not, the residual has another cause.
     """
     chosen = selection.chosen
     if any(map(_is_of_turns, selector.given)):
@@ -39,8 +42,9 @@ def better_driven_axle(selection: Selection, selector: Selector) -> Driven | Non
     if not (any(map(_is_of_turns, chosen.names)) or may_have_structure(chosen, selector.seed)):
         return None
     models = {axle: _with_driven_axle(chosen, selector, axle) for axle in _AXLES if axle != UNDECLARED}
-    best = min(models, key=lambda axle: models[axle].deviance)
-    return best if models[best].deviance < chosen.deviance - SELECTION.min_gain else None
+    best, other = sorted(models, key=lambda axle: models[axle].deviance)
+    is_better = models[best].deviance < chosen.deviance - SELECTION.min_gain
+    return best if is_better and models[other].deviance > chosen.deviance + SELECTION.min_gain else None
 
 
 def _is_of_turns(name: str) -> bool:

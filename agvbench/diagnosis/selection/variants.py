@@ -235,7 +235,7 @@ def _swapped(extended: Selector, current: ScoredModel, out: set[str], variant: C
         fit(
             Predictor(extended.batch, names), np.r_[maps, kept, start], bounds_of(names),
             random_effects=near.random_effects, variance_components=near.variance_components,
-            iterations=FIT.few_steps,
+            iterations=FIT.few_steps, near=near.linear,
         )
         for start in variant.starts
     ]  # fmt: skip
