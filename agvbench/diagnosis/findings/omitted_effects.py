@@ -1,6 +1,6 @@
 """Effects that a chosen model omits: how large they may be, and how uncertain that makes its parameters.
 
-A selection omits an effect that gains too little, and another one takes up a part of it. The standard errors of the
+A selection omits an effect that gains too little, and another one absorbs a part of it. The standard errors of the
 chosen model do not know of this: they hold if every omitted effect is exactly null. Its contribution to the standard
 uncertainty is a systematic one (type B of the GUM, JCGM 100:2008, section 4.3).
 """
