@@ -17,7 +17,7 @@ from agvbench.vehicle.geometry import Geometry
 def omitted(*directions: tuple[float, float, float]) -> OmittedEffect:
     """Return an effect of one parameter, with null 0, by (estimate, standard error, influence) in each direction."""
     one = (OneStepEstimate(np.array([e]), np.array([s]), np.array([[i]])) for e, s, i in directions)
-    return OmittedEffect(np.zeros(1), tuple(one))
+    return OmittedEffect(np.zeros(1), np.full(1, 10.0), tuple(one))
 
 
 def test_an_effect_that_may_be_null_adds_nothing():
@@ -31,6 +31,10 @@ def test_an_effect_counts_by_its_least_size_and_its_influence():
 
 def test_the_direction_that_contributes_most_counts():
     assert omitted((0.0, 1.0, 0.5), (3.96, 1.0, 0.5)).contribution() == pytest.approx(1.0)
+
+
+def test_an_effect_counts_by_no_more_than_its_typical_size():
+    assert omitted((1000.0, 1.0, 0.5)).contribution() == pytest.approx(25.0)
 
 
 def test_contributions_of_several_effects_add_up_as_variances():

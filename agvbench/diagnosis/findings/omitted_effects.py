@@ -26,22 +26,23 @@ _NORMAL_95 = 1.96
 
 @dataclass(frozen=True)
 class OmittedEffect:
-    """An effect that the model omits: ``nulls`` (q,), and an estimate for each possible direction."""
+    """An effect that the model omits: ``nulls``, typical sizes (q,), and an estimate for each possible direction."""
 
     nulls: Floats
+    scales: Floats
     estimates: tuple[OneStepEstimate, ...]
 
     def contribution(self) -> Floats:
         """Return the variance (P,) that the effect contributes to the parameters of the chosen model.
 
         The effect counts by the size that it has at least: the near end of its 95 % interval, and nothing if that
-        contains the null value. It is that of the direction that contributes most.
+        contains the null value. A single Newton step may lead far beyond the typical size, which is the limit. The
+        direction counts that contributes most.
         """
-        by_direction = [
-            one.influence**2 @ np.maximum(np.abs(one.estimate - self.nulls) - _NORMAL_95 * one.stderr, 0.0) ** 2
-            for one in self.estimates
-        ]
-        return np.asarray(np.max(by_direction, axis=0))
+        return np.asarray(np.max([one.influence**2 @ self._least_size(one) ** 2 for one in self.estimates], axis=0))
+
+    def _least_size(self, one: OneStepEstimate) -> Floats:
+        return np.clip(np.abs(one.estimate - self.nulls) - _NORMAL_95 * one.stderr, 0.0, self.scales)
 
 
 def omitted_effects(chosen: Fit) -> dict[str, OmittedEffect]:
@@ -62,7 +63,7 @@ def omitted_effects(chosen: Fit) -> dict[str, OmittedEffect]:
         group = predictor.readings.group
         estimates = tuple(one_step_estimate(chosen, larger, start, free, group) for start in _small_starts(kind))
         nulls = np.where(free, [p.null for p in parameters], estimates[0].estimate)
-        found[name] = OmittedEffect(nulls, estimates)
+        found[name] = OmittedEffect(nulls, np.array([p.scale for p in parameters]), estimates)
     return found
 
 
