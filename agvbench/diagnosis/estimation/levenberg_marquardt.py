@@ -201,11 +201,12 @@ class LevenbergMarquardt:
             before = evaluation.loss
             if near is not None:
                 if reduction < FIT.nearly_converged or step >= iterations // 2:
-                    near = None
+                    # That a step by other derivatives gained nothing is no sign of convergence.
+                    near, before = None, np.inf
             elif taken.decrement < FIT.converged or abs(reduction) < FIT.converged:
                 if own is None:
                     return Iterated(state, Convergence.CONVERGED, evaluation.linear)
-                own = None
+                own, before = None, np.inf
             else:
                 own = evaluation.linear if taken.decrement < FIT.nearly_converged else None
         return Iterated(state, Convergence.FAST if taken.full else Convergence.SLOW, evaluation.linear)
@@ -271,7 +272,7 @@ class LevenbergMarquardt:
         return (final, evaluated) if evaluated.loss < evaluation.loss else (state, evaluation)
 
     def non_monotone_steps(self, state: FitState, evaluation: Evaluation) -> FitState | None:
-        """Return a state with a clearly smaller loss, reached by full steps, or None; `evaluation` is that of `state`.
+        """Return a state with a smaller loss, reached by full steps, or None; `evaluation` is that of `state`.
 
         Maps that have absorbed an effect release it along a curved, narrow valley of the loss: every full step leaves
         the valley, and short steps make little progress. A limited number of full steps is therefore accepted although
@@ -289,7 +290,7 @@ class LevenbergMarquardt:
             if evaluation.loss < start - FIT.min_reduction:
                 return now
             now, _ = self._step(now, evaluation)
-        return None
+        return now if evaluation.loss < start - FIT.nearly_converged else None
 
     def _step(self, state: FitState, evaluation: Evaluation) -> tuple[FitState, Step]:
         """Return the state after a step that does not increase the objective, and the step."""
