@@ -36,11 +36,11 @@ def find(comparison, trajectory, quantity="delta_s_mm", condition=None):
     )
 
 
-def alarms(draw, repeats, conditions, number=PAIRS):
-    """Count the regressions that a number of pairs of campaigns of one vehicle report."""
+def alarms(draw, repeats, conditions):
+    """Count the regressions that pairs of campaigns of one vehicle report."""
     bias = {(t, c): (12.0, 1.0) for t in TARGETS for c in conditions}
     make = {"repeats": repeats, "conditions": conditions, "shift": bias}
-    pairs = ((error_table(draw, **make), error_table(draw, **make)) for _ in range(number))
+    pairs = ((error_table(draw, **make), error_table(draw, **make)) for _ in range(PAIRS))
     return sum(compare_errors(a, b, margin_mm=0.0, margin_deg=0.0, resamples=2).is_regression for a, b in pairs)
 
 
@@ -55,7 +55,7 @@ def test_two_campaigns_of_the_same_vehicle_report_a_regression_in_at_most_two_pe
 @pytest.mark.parametrize("noise", [normal, heavy_tailed, with_outliers])
 def test_so_do_two_campaigns_under_two_conditions_each(noise, repeats):
     draw = noise(np.random.default_rng(50 + repeats))
-    assert alarms(draw, repeats, ("uncalibrated", "calibrated"), PAIRS // 2) <= 0.02 * PAIRS // 2
+    assert alarms(draw, repeats, ("uncalibrated", "calibrated")) <= 0.02 * PAIRS
 
 
 @pytest.mark.parametrize(("noise", "least"), [(normal, 0.9), pytest.param(heavy_tailed, 0.85, marks=pytest.mark.slow)])
