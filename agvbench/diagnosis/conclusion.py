@@ -102,10 +102,7 @@ def conclude(
         selection.rejected,
         context.provenance(readings)
         | _fit_provenance(selection, readings)
-        | {"fit_runs": int(split.training.sum()), "searched_runs": searched}
-        | {"validation_runs": int(split.validation.sum())}
-        | {"lack_of_fit_p_value": tested.lack_of_fit}
-        | {"lack_of_fit_runs": {"tested": int(split.test.sum()), "repeats": int(np.sum(~split.training))}}
+        | _split_provenance(split, searched, tested)
         | ({"driven_axle": batch.geometry.driven} if static is not None else {})
         | ({"empirical_term": term_entry(term_selection)} if term_selection else {})
         | provenance_of(checks),
@@ -171,6 +168,16 @@ def _fit_provenance(selection: Selection, readings: Readings) -> dict[str, objec
             "rear_deg": float(np.degrees(random_effects[2])),
             "speed_percent": 100.0 * float(random_effects[3]),
         },
+    }
+
+
+def _split_provenance(split: Split, searched: int, tested: Assessment) -> dict[str, object]:
+    return {
+        "fit_runs": int(split.training.sum()),
+        "searched_runs": searched,
+        "validation_runs": int(split.validation.sum()),
+        "lack_of_fit_p_value": tested.lack_of_fit,
+        "lack_of_fit_runs": {"tested": int(split.test.sum()), "repeats": int(np.sum(~split.training))},
     }
 
 

@@ -66,8 +66,8 @@ class FitCriteria:
     ``few_steps``, ``steps``
         Steps of a preliminary fit, which only ranks initial values, and of a round of a fit to convergence.
     ``converged``, ``nearly_converged``
-        Reduction per step below which a fit ends. Below the other, derivatives of a similar model are replaced by own
-        ones, and own ones are kept for the remaining steps.
+        Reduction by a step below which a fit has converged, and below which it nearly has. It then computes
+        its own derivatives in place of those of a similar model, or keeps its own for the remaining steps.
     ``min_reduction``
         Least reduction for which a fit that converges slowly goes on. It is below the margin of alternatives.
     ``rounds``, ``non_monotone_steps``

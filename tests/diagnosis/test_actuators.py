@@ -5,27 +5,21 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from tiny_vehicle import HEADER, Tiny, campaign_runs
+from tiny_selector import selector_of
+from tiny_vehicle import Tiny, campaign_runs
 
-from agvbench.diagnosis.context import DiagnosisContext
-from agvbench.diagnosis.data.readings import read_runs
-from agvbench.diagnosis.runs_from_rest import RunsFromRest
 from agvbench.diagnosis.selection.actuators import CAMERA, prefer_actuators, separate_lag_from_delay
 from agvbench.diagnosis.selection.sequential_replacement import replace_sequentially
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.variants import with_extended_library
 from agvbench.effects.variants import cause_of
-from agvbench.vehicle.geometry import Geometry
 
 SLOW = Tiny(delay_s=0.06, steering_lag_s=0.1, accelerate_s=0.15, brake_s=0.25)
 
 
 def selected(tiny: Tiny, *names: str) -> tuple[Selection, Selector]:
     """Return a selection of the effects `names`, fitted to the runs of a vehicle, with its selector."""
-    geometry = Geometry(HEADER.front_axle_m, HEADER.rear_axle_m)
-    method = RunsFromRest(DiagnosisContext(HEADER, geometry, None, 0), lambda line: None)
-    runs = list(campaign_runs(tiny))
-    selector = method.selector(read_runs(runs, HEADER.neutral))
+    selector = selector_of(campaign_runs(tiny))
     extended = with_extended_library(selector)
     base = current = extended.base()
     for name in names:

@@ -6,16 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tiny_vehicle import HEADER, Tiny
+from tiny_selector import selector_of
+from tiny_vehicle import Tiny
 
-from agvbench.diagnosis.context import DiagnosisContext
-from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.estimation.fit import Fit, fit
 from agvbench.diagnosis.model.predictor import Predictor
-from agvbench.diagnosis.runs_from_rest import RunsFromRest
 from agvbench.diagnosis.selection.candidates import bounds_of
 from agvbench.diagnosis.selection.fitted_models import FittedModels
-from agvbench.vehicle.geometry import Geometry
 
 NAMES = ("steering_lag", "speed_lag")
 STEPS = 12
@@ -23,10 +20,7 @@ STEPS = 12
 
 @pytest.fixture(scope="module")
 def selector(tiny_campaign):
-    geometry = Geometry(HEADER.front_axle_m, HEADER.rear_axle_m)
-    method = RunsFromRest(DiagnosisContext(HEADER, geometry, None, 0), lambda line: None)
-    tiny = Tiny(steering_lag_s=0.1, accelerate_s=0.15, brake_s=0.15, cornering_loss=0.05)
-    return method.selector(read_runs(list(tiny_campaign(tiny)), HEADER.neutral))
+    return selector_of(tiny_campaign(Tiny(steering_lag_s=0.1, accelerate_s=0.15, brake_s=0.15, cornering_loss=0.05)))
 
 
 @pytest.fixture(scope="module")

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tiny_vehicle import HEADER, Tiny
+from tiny_selector import selector_of
+from tiny_vehicle import Tiny
 
-from agvbench.diagnosis.context import DiagnosisContext
-from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.estimation.score_test import OneStepEstimate
 from agvbench.diagnosis.findings.omitted_effects import OmittedEffect, contributed_stderr, omitted_effects
-from agvbench.diagnosis.runs_from_rest import RunsFromRest
-from agvbench.vehicle.geometry import Geometry
 
 
 def omitted(*directions: tuple[float, float, float]) -> OmittedEffect:
@@ -44,10 +41,7 @@ def test_contributions_of_several_effects_add_up_as_variances():
 
 @pytest.mark.slow
 def test_the_influence_is_by_how_much_the_others_move_once_it_is_added(tiny_campaign):
-    tiny = Tiny(steering_lag_s=0.1, delay_s=0.04)
-    geometry = Geometry(HEADER.front_axle_m, HEADER.rear_axle_m)
-    method = RunsFromRest(DiagnosisContext(HEADER, geometry, None, 0), lambda line: None)
-    selector = method.selector(read_runs(list(tiny_campaign(tiny)), HEADER.neutral))
+    selector = selector_of(tiny_campaign(Tiny(steering_lag_s=0.1, delay_s=0.04)))
     without = selector.with_effect(selector.base(), "steering_lag")
     found = omitted_effects(without.fit)
     assert "steering_lag" not in found

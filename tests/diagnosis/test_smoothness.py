@@ -8,16 +8,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tiny_vehicle import FRONT_M, HEADER, NEUTRAL, REAR_M, InMemory, Tiny, campaign_runs, drive
+from tiny_selector import selector_of
+from tiny_vehicle import NEUTRAL, InMemory, Tiny, campaign_runs, drive
 
 from agvbench.diagnosis import diagnose
-from agvbench.diagnosis.context import DiagnosisContext
 from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.model.nodal_maps import ROLES, NodalMaps
 from agvbench.diagnosis.model.smoothness import SmoothnessPrior, typical_speed_mps
-from agvbench.diagnosis.runs_from_rest import RunsFromRest
 from agvbench.types import Commands, Pose, Run
-from agvbench.vehicle.geometry import Geometry
 
 NODES = np.array([1000.0, 1150.0, 1300.0, 1312.0, 1400.0, 1600.0, 1700.0, 1850.0, 2000.0])
 MAPS = NodalMaps(dict.fromkeys(ROLES, NODES), NEUTRAL)
@@ -89,9 +87,7 @@ def _at_levels_of_their_own(run: Run, tiny: Tiny, rng: np.random.Generator) -> R
 def test_the_prior_shows_a_steering_gain_of_backward_runs_at_commands_of_their_own():
     tiny, rng = Tiny(reverse_gain=-0.05), np.random.default_rng(5)
     runs = [_at_levels_of_their_own(run, tiny, rng) for run in campaign_runs(tiny)]
-    geometry = Geometry(FRONT_M, REAR_M)
-    method = RunsFromRest(DiagnosisContext(HEADER, geometry, None, 0), lambda line: None)
-    selector = method.selector(read_runs(runs, NEUTRAL))
+    selector = selector_of(runs)
     base = selector.base()
     larger = selector.with_effect(base, "reverse_steering_gain")
     assert float(base.fit.loss.sum() - larger.fit.loss.sum()) < 12.0  # the nodal values absorb nearly all of it

@@ -17,11 +17,10 @@ import pytest
 from shell_blocks import execute, shell, write_files
 
 ROOT = Path(__file__).parents[2]
-QUICK = ("docs/tutorial.md", "docs/how-to/write-a-trajectory.md")
+QUICK = ("docs/tutorial.md", "docs/how-to/nightly.md", "docs/how-to/write-a-trajectory.md")
 SLOW = (
     "docs/how-to/bring-your-own-plant.md",
     "docs/how-to/close-the-loop.md",
-    "docs/how-to/nightly.md",
     "docs/how-to/set-up-a-lab.md",
     "docs/how-to/write-an-effect.md",
 )

@@ -116,8 +116,8 @@ def fit(
     patient
         Whether further rounds follow as long as each reduces the loss enough.
     near
-        Derivatives of the same maps at similar parameters. The derivatives by the nodal values take most of the time
-        and change little: the first steps use those of `near`, the last steps and the result are linearised anew.
+        Derivatives of a model with the same maps at similar parameters. Derivatives take most of the time and change
+        little: the first steps use those of `near`, the last step and the result have their own.
     """
     readings = predictor.readings
     random_effects = np.zeros((len(readings), 6)) if random_effects is None else random_effects.copy()

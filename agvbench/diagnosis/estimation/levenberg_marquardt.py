@@ -15,9 +15,9 @@ from agvbench.diagnosis.model.smoothness import PriorTerms
 from agvbench.types import Floats
 
 _STEP_LENGTHS = (1.0, 0.4, 0.16, 0.064)
-# Updates of the variance components, and the relative change below which they have converged.
-_UPDATES, _SETTLED = 40, 1e-3
 _DAMPINGS = (0.0, 0.1, 3.0)
+# Updates of the variance components, and the relative change below which they have converged.
+_UPDATES, _MIN_CHANGE = 40, 1e-3
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Step:
     """The ``point`` that a step led to, whether it was ``full`` and undamped, and the reduction that was predicted.
 
     This ``decrement`` (Newton decrement, squared: Boyd and Vandenberghe, Convex Optimization, 2004, section 9.5) is
-    that of a full step by the quadratic approximation of the objective.
+    that of a full step by the quadratic approximation of the objective, with the largest damping that was tried.
     """
 
     point: Point
@@ -59,11 +59,10 @@ class StepSolver:
         unchanged.
         """
         now, (matrix, gradient) = self._objective(point), self._normal_equations(point, terms)
-        decrement = np.inf
         for damping in _DAMPINGS:
             damped = matrix + damping * np.diag(np.diagonal(matrix))
             move, move_random_effects = self._move(point, terms, damped, gradient)
-            decrement = min(decrement, float(gradient @ move))
+            decrement = float(gradient @ move)
             for length in _STEP_LENGTHS:
                 tried = self._at(point, length * move, length * move_random_effects)
                 if self._objective(tried) <= now:
@@ -211,7 +210,7 @@ class LevenbergMarquardt:
                 own = evaluation.linear if taken.decrement < FIT.nearly_converged else None
         return Iterated(state, Convergence.FAST if taken.full else Convergence.SLOW, evaluation.linear)
 
-    def settled(self, state: FitState, evaluation: Evaluation) -> tuple[FitState, Evaluation]:
+    def at_fixed_point(self, state: FitState, evaluation: Evaluation) -> tuple[FitState, Evaluation]:
         """Return the state with variance components and random effects at the fixed point of their updates.
 
         Their updates converge slowly and do not minimise the loss, so that fits with different numbers of updates could
@@ -226,7 +225,7 @@ class LevenbergMarquardt:
             residual = residual - np.einsum("rkcm,rm->rkc", linear.by_random_effects, move) * seen
             point = Point(state.parameters, state.random_effects + move, residual)
             before, state = state.variance_components, self._updated(point, state, inverse)
-            if before.change_to(state.variance_components) < _SETTLED:
+            if before.change_to(state.variance_components) < _MIN_CHANGE:
                 break
         return state, self.evaluate(state, linear)
 
@@ -246,7 +245,7 @@ class LevenbergMarquardt:
             before, evaluation = evaluation.loss, self._evaluate_last(iterated)
             if before - evaluation.loss < FIT.min_reduction:
                 break
-        return self.settled(iterated.state, evaluation)
+        return self.at_fixed_point(iterated.state, evaluation)
 
     def _evaluate_last(self, iterated: Iterated) -> Evaluation:
         """Evaluate the model at the end of an iteration; if it converged, with the derivatives of its last step."""
@@ -306,10 +305,6 @@ class LevenbergMarquardt:
 
     def _updated(self, point: Point, state: FitState, inner_inverse: Floats) -> FitState:
         variance_components = update_variance_components(
-            self.predictor,
-            point.residual,
-            point.random_effects,
-            inner_inverse,
-            state.variance_components,
+            self.predictor, point.residual, point.random_effects, inner_inverse, state.variance_components
         )
         return FitState(point.parameters, point.random_effects, variance_components)

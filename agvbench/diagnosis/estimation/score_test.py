@@ -14,6 +14,8 @@ from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.effects import effect_kinds
 from agvbench.types import Floats
 
+_NORMAL_95 = 1.96
+
 
 @dataclass(frozen=True)
 class OneStepEstimate:
@@ -25,6 +27,11 @@ class OneStepEstimate:
     estimate: Floats
     stderr: Floats
     influence: Floats
+
+    def sizes_from(self, nulls: Floats) -> tuple[Floats, Floats]:
+        """Return the distances (q,) of the near and the far end of the 95 % intervals from the null values (q,)."""
+        distance, half = np.abs(self.estimate - nulls), _NORMAL_95 * self.stderr
+        return np.maximum(distance - half, 0.0), distance + half
 
 
 def initial_parameters(fitted: Fit, larger: Predictor, start: Floats) -> Floats:

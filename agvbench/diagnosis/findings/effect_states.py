@@ -21,7 +21,6 @@ from agvbench.diagnosis.selection.candidates import ABSORBED_BY_MAPS, candidates
 from agvbench.effects import Effect, effect_kinds
 from agvbench.effects.variants import cause_of
 
-_NORMAL_95 = 1.96
 _ABSORBED = "maps absorb it as calibration; it is named only where a nominal vehicle.toml lacks it"
 _FLAT = "no run shows it: its standard error exceeds its usual size"
 _NEVER_REACHED = "no run comes near a limit of this size"
@@ -70,8 +69,8 @@ def _bounds(chosen: Fit, kind: type[Effect], omitted: OmittedEffect | None) -> d
     for k, p in enumerate(kind.parameters()):
         # The direction of an absent effect is unknown: the bound holds in every direction.
         if not p.is_direction and all(one.stderr[k] <= p.scale for one in omitted.estimates):
-            most = max(abs(one.estimate[k] - p.null) + _NORMAL_95 * one.stderr[k] for one in omitted.estimates)
-            found[p.name] = Bound(float(most), p.unit)
+            most = max(float(one.sizes_from(omitted.nulls)[1][k]) for one in omitted.estimates)
+            found[p.name] = Bound(most, p.unit)
     return found
 
 

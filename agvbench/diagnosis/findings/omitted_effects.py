@@ -21,8 +21,6 @@ from agvbench.effects import Effect, effect_kinds
 from agvbench.effects.variants import cause_of
 from agvbench.types import Floats
 
-_NORMAL_95 = 1.96
-
 
 @dataclass(frozen=True)
 class OmittedEffect:
@@ -39,10 +37,9 @@ class OmittedEffect:
         contains the null value. A single Newton step may lead far beyond the typical size, which is the limit. The
         direction counts that contributes most.
         """
-        return np.asarray(np.max([one.influence**2 @ self._least_size(one) ** 2 for one in self.estimates], axis=0))
-
-    def _least_size(self, one: OneStepEstimate) -> Floats:
-        return np.clip(np.abs(one.estimate - self.nulls) - _NORMAL_95 * one.stderr, 0.0, self.scales)
+        sizes = [np.minimum(one.sizes_from(self.nulls)[0], self.scales) for one in self.estimates]
+        by_direction = [one.influence**2 @ size**2 for one, size in zip(self.estimates, sizes, strict=True)]
+        return np.asarray(np.max(by_direction, axis=0))
 
 
 def omitted_effects(chosen: Fit) -> dict[str, OmittedEffect]:

@@ -148,7 +148,9 @@ class Predictor:
             by_maps, known = self._by_maps(parameters, random_effects, base, *inputs), {}
         else:
             by_maps, known = replace(near.by_first(self.maps.size), poses=base), near.by_effects()
-        return by_maps.with_last(self._slopes(parameters, base, *inputs, known), self.parameter_names)
+        return by_maps.with_last(
+            self._slopes(parameters, base, *inputs, len(self.parameter_names), known), self.parameter_names
+        )
 
     def _by_maps(
         self, parameters: Floats, random_effects: Floats, base: Floats, settled: Floats, initial: Floats
@@ -190,7 +192,7 @@ class Predictor:
     def by_last(self, parameters: Floats, random_effects: Floats, count: int) -> tuple[Floats, Floats]:
         """Return poses (R, K, 3), and their derivatives by the last `count` parameters (R, K, 3, count)."""
         base = self.predict(parameters, random_effects)
-        return base, self._slopes(parameters, base, *self._inputs(parameters, random_effects), {}, count)
+        return base, self._slopes(parameters, base, *self._inputs(parameters, random_effects), count, {})
 
     def _slopes(
         self,
@@ -198,17 +200,16 @@ class Predictor:
         base: Floats,
         settled: Floats,
         initial: Floats,
+        count: int,
         known: Mapping[str, Floats],
-        count: int | None = None,
     ) -> Floats:
-        """Return the derivatives (R, K, 3, q) of poses `base` by all, or the last `count`, parameters of effects.
+        """Return the derivatives (R, K, 3, count) of poses `base` by the last `count` of the effects' parameters.
 
         Those in `known` are taken from there.
         """
         own = parameters[self.maps.size :]
-        chosen = range(len(own) - (len(own) if count is None else count), len(own))
-        slopes = np.empty((*base.shape, len(chosen)))
-        for column, k in enumerate(chosen):
+        slopes = np.empty((*base.shape, count))
+        for column, k in enumerate(range(len(own) - count, len(own))):
             name = self.parameter_names[k]
             if name in known:
                 slopes[..., column] = known[name]

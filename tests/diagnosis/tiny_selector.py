@@ -1,0 +1,19 @@
+"""Selectors for runs of the vehicle of a few lines, without the search for effects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from tiny_vehicle import HEADER
+
+from agvbench.diagnosis.context import DiagnosisContext
+from agvbench.diagnosis.data.readings import read_runs
+from agvbench.diagnosis.runs_from_rest import RunsFromRest
+from agvbench.diagnosis.selection.stepwise import Selector
+from agvbench.types import Run
+
+
+def selector_of(runs: Iterable[Run]) -> Selector:
+    """Return the selector of a diagnosis of all `runs`."""
+    method = RunsFromRest(DiagnosisContext(HEADER, HEADER.geometry, None, 0), lambda line: None)
+    return method.selector(read_runs(list(runs), HEADER.neutral))
