@@ -186,9 +186,9 @@ class ResidualCriteria:
         Smallest share of the variance that a reported dependence predicts.
     ``periodic_alpha``
         Level of the test for a periodic disturbance with random phase. The number of permutations resolves it.
-    ``far_above_noise``
-        Ratio to the noise above which residuals of windows count as structure. The repeatability of free driving is a
-        lower bound, because the variation between repeats is unknown.
+    ``far_above_noise``, ``typical_repeatability``
+        Ratio to the noise above which residuals of windows count as structure. Without repeats the repeatability is
+        unknown, and taken for this share of distance and turn beside the noise of frames.
     ``validation_standard_errors``
         Effects are rejected if the mean squared position error of the validation runs is larger with them by more than
         this number of its standard errors.
@@ -201,6 +201,7 @@ class ResidualCriteria:
     min_share: float = 0.02
     periodic_alpha: float = 5e-3
     far_above_noise: float = 5.0
+    typical_repeatability: float = 0.01
     validation_standard_errors: float = 2.0
 
 

@@ -14,7 +14,7 @@ from tiny_vehicle import HEADER, NEUTRAL, Tiny, campaign_runs
 
 from agvbench.diagnosis.data.readings import Readings, read_windows
 from agvbench.diagnosis.data.window_splits import held_out_windows, thinned
-from agvbench.diagnosis.data.windows import Horizon, Window, cut_windows, horizon_of
+from agvbench.diagnosis.data.windows import Horizon, Window, cut_windows, horizon_of, motion_filter
 from agvbench.diagnosis.free_driving.errors import by_recording, interval, repeatability_squares, squares
 from agvbench.diagnosis.free_driving.maps import smooth_maps, start_values_of_windows
 from agvbench.diagnosis.free_driving.predictors import constant_velocity
@@ -41,6 +41,11 @@ def arc(speed: float, yaw: float, noise_m: float = 0.0, seconds: float = 8.0, ra
     return Run("arc", "free", "", "", 0, NO_TARGET, 0.0, "ok", "", Commands(one, one + 1000.0, one + 1400, one), frames)
 
 
+def cut(run: Run) -> list[Window]:
+    """Return the windows of a run that is a recording of its own."""
+    return cut_windows(run, HORIZON, NEUTRAL, motion_filter([run]))
+
+
 @pytest.fixture(scope="module")
 def readings() -> Readings:
     return read_windows(free_runs(QUIET, sessions=3, runs=1), HORIZON, NEUTRAL)
@@ -48,7 +53,7 @@ def readings() -> Readings:
 
 @given(speed=st.floats(0.1, 2.0), yaw=st.floats(-2.0, 2.0).filter(lambda w: abs(w) > 0.01))
 def test_the_state_on_a_circle_is_that_of_the_circle(speed, yaw):
-    window = next(cut_windows(arc(speed, yaw), HORIZON, NEUTRAL))
+    window = cut(arc(speed, yaw))[0]
     t = window.t0_s
     truth = [speed * math.sin(yaw * t) / yaw, speed * (1.0 - math.cos(yaw * t)) / yaw, yaw * t]
     np.testing.assert_allclose(window.start, truth, atol=2e-4 * (1.0 + speed * yaw * yaw))
@@ -57,7 +62,7 @@ def test_the_state_on_a_circle_is_that_of_the_circle(speed, yaw):
 
 
 def test_the_naive_predictor_goes_on_along_the_circle():
-    windows = list(cut_windows(arc(0.8, 0.9), HORIZON, NEUTRAL))
+    windows = cut(arc(0.8, 0.9))
     read = read_windows([arc(0.8, 0.9)], HORIZON, NEUTRAL)
     assert len(read) == len(windows) > 3
     np.testing.assert_allclose(constant_velocity(read), read.poses, atol=0.003)
@@ -65,26 +70,14 @@ def test_the_naive_predictor_goes_on_along_the_circle():
 
 def test_nothing_after_the_beginning_is_used():
     run = arc(0.5, 0.3, noise_m=1e-3)
-    cut = next(cut_windows(run, HORIZON, NEUTRAL))
-    later = run.frames.t_s > cut.t0_s
+    fitted = motion_filter([run])
+    before = cut_windows(run, HORIZON, NEUTRAL, fitted)[0]
+    later = run.frames.t_s > before.t0_s
     perturbed = dataclasses.replace(run.frames, x_m=run.frames.x_m + 0.01 * later * np.sin(40.0 * run.frames.t_s))
-    again = next(cut_windows(dataclasses.replace(run, frames=perturbed), HORIZON, NEUTRAL))
+    again = cut_windows(dataclasses.replace(run, frames=perturbed), HORIZON, NEUTRAL, fitted)[0]
     for name in ("start", "speed_mps", "recent_speed_mps", "constant_velocity"):
-        np.testing.assert_allclose(getattr(again, name), getattr(cut, name), atol=1e-12)
-    assert not np.allclose(again.poses, cut.poses, atol=1e-3)
-
-
-def test_stated_errors_of_the_beginning_are_those_made():
-    off = []
-    for seed in range(60):
-        run = arc(0.5, 0.3)
-        noise = np.random.default_rng(seed).normal(0.0, 1e-3, (2, len(run.frames)))
-        frames = dataclasses.replace(run.frames, x_m=run.frames.x_m + noise[0], y_m=run.frames.y_m + noise[1])
-        noisy: Window = next(cut_windows(dataclasses.replace(run, frames=frames), HORIZON, NEUTRAL))
-        clean: Window = next(cut_windows(run, HORIZON, NEUTRAL))
-        off.append([*(noisy.start - clean.start)[:2] / noisy.start_stderr[:2]])
-        off[-1].append((noisy.speed_mps - clean.speed_mps) / noisy.speed_stderr)
-    assert np.sqrt(np.mean(np.square(off), axis=0)) == pytest.approx(np.ones(3), rel=0.35)
+        np.testing.assert_allclose(getattr(again, name), getattr(before, name), atol=1e-12)
+    assert not np.allclose(again.poses, before.poses, atol=1e-3)
 
 
 def test_a_tracker_that_jumps_metres_moves_no_window():
@@ -92,7 +85,7 @@ def test_a_tracker_that_jumps_metres_moves_no_window():
     wild = run.frames.x_m.copy()
     wild[[210, 211, 400]] += 9.0
     jumped = dataclasses.replace(run, frames=dataclasses.replace(run.frames, x_m=wild))
-    calm, perturbed = list(cut_windows(run, HORIZON, NEUTRAL)), list(cut_windows(jumped, HORIZON, NEUTRAL))
+    calm, perturbed = cut(run), cut(jumped)
     assert len(perturbed) == len(calm) > 3
     for a, b in zip(calm, perturbed, strict=True):
         assert b.speed_mps == pytest.approx(a.speed_mps, abs=0.01)
@@ -100,6 +93,70 @@ def test_a_tracker_that_jumps_metres_moves_no_window():
         seen = np.isfinite(b.poses)
         np.testing.assert_allclose(b.poses[seen], a.poses[seen], atol=1e-3)
         assert seen.mean() > 0.9
+
+
+def test_a_pose_that_the_tracker_repeats_while_the_vehicle_moves_is_no_measurement():
+    run = arc(0.5, 0.3, rate=50.0)
+    new = np.arange(len(run.frames)) // 4 * 4  # a pose every 0.08 s, in rows every 0.02 s
+    repeated = {name: getattr(run.frames, name)[new] for name in ("x_m", "y_m", "heading_rad")}
+    latched = cut(dataclasses.replace(run, frames=dataclasses.replace(run.frames, **repeated)))
+    for window in latched:
+        assert window.speed_mps == pytest.approx(0.5, rel=0.02)
+        angle = 0.3 * window.t_s
+        seen = np.isfinite(window.poses[:, 0])
+        np.testing.assert_allclose(window.poses[seen, 0], (0.5 / 0.3 * np.sin(angle))[seen], atol=2e-3)
+    assert len(latched) > 3
+
+
+@pytest.mark.parametrize("rate", [5.0, 20.0, 1000.0])
+def test_any_frame_rate_gives_windows_with_known_speed(rate):
+    windows = cut(arc(0.5, 0.3, noise_m=5e-4, seconds=10.0, rate=rate))
+    assert len(windows) >= 6
+    for window in windows:
+        assert abs(window.speed_mps - 0.5) < 4.0 * window.speed_stderr + 1e-3
+        assert np.isfinite(window.poses).all()
+
+
+def _without_commands(run: Run) -> Run:
+    none = np.empty(0)
+    return dataclasses.replace(run, commands=Commands(none, none, none, none))
+
+
+def _at_rest(run: Run) -> Run:
+    still = np.zeros(len(run.frames))
+    return dataclasses.replace(run, frames=dataclasses.replace(run.frames, x_m=still, y_m=still, heading_rad=still))
+
+
+@pytest.mark.parametrize(
+    ("run", "reason"),
+    [
+        (_without_commands(arc(0.5, 0.3)), "has no commands"),
+        (arc(0.5, 0.3, seconds=0.04), "has too few usable frames: 4 (limit: at least 6)"),
+        (arc(0.5, 0.3, rate=2.0), "has too few frames per second: one every 0.5 s (limit: one every 0.25 s"),
+        (arc(0.5, 0.3, seconds=1.8), "is too short: 1.79 s of frames (limit: at least 2.20 s)"),
+        (_at_rest(arc(0.5, 0.3)), "has no window in motion: 0 m/s at most"),
+    ],
+)  # fmt: skip
+def test_a_run_without_windows_says_why_with_figure_and_limit(run, reason):
+    assert read_windows([run], HORIZON, NEUTRAL).refused["arc"].startswith(reason)
+
+
+def test_no_window_begins_before_the_first_command():
+    run = arc(0.5, 0.3)
+    late = dataclasses.replace(run, commands=dataclasses.replace(run.commands, t_s=np.array([3.0])))
+    windows = read_windows([late], HORIZON, NEUTRAL)
+    assert windows.begins_s.min() >= 3.0
+    start = start_values_of_windows(smooth_maps(windows.runs, NEUTRAL, 9, 6), windows, GEOMETRY)
+    assert np.isfinite(start).all()
+
+
+def test_a_direction_that_was_never_driven_mirrors_the_other(readings):
+    maps = smooth_maps(readings.runs, NEUTRAL, 9, 6)
+    assert (maps.nodes["drive"] < NEUTRAL).all()
+    command = NEUTRAL + np.array([-300.0, -50.0, 0.0, 50.0, 300.0])
+    speed = maps.weights("drive", command) @ np.arange(6.0, 0.0, -1.0)
+    np.testing.assert_allclose(speed, -speed[::-1])
+    assert speed[0] > 0.0
 
 
 def test_runs_from_rest_stay_runs_and_free_driving_becomes_windows():

@@ -13,7 +13,15 @@ from agvbench.campaign.campaign import session_starts
 from agvbench.diagnosis.data.initial_pose import frame_noise, initial_pose, shift_commands_half_a_row, unwrapped_poses
 from agvbench.diagnosis.data.logged import NO_LOGGED_COLUMNS, LoggedColumns, logged_columns
 from agvbench.diagnosis.data.splits import group_runs, with_common_levels
-from agvbench.diagnosis.data.windows import Horizon, InitialStates, blocks, cut_windows, recording_of
+from agvbench.diagnosis.data.windows import (
+    Horizon,
+    InitialStates,
+    Window,
+    blocks,
+    cut_windows,
+    motion_filter,
+    recording_of,
+)
 from agvbench.errors import FitError
 from agvbench.model.priors import Prior
 from agvbench.model.simulation.simulation import SimulatedRun
@@ -139,16 +147,22 @@ def read_runs(runs: Iterable[Run], neutral: float | None = None) -> Readings:
 
 
 def read_windows(runs: Iterable[Run], horizon: Horizon, neutral: float) -> Readings:
-    """Cut runs into windows; ``refused`` lists the runs without any window."""
-    every = list(with_common_levels(list(runs)))
+    """Cut runs into windows; ``refused`` lists the runs without any window, with the reason."""
+    every = [shift_commands_half_a_row(run) for run in with_common_levels(list(runs))]
     began = session_starts(every)
-    refused: dict[str, str] = {}
-    windows = []
+    refused = {run.run_id: run.status for run in every if not run.is_ok}
+    usable: dict[str, list[Run]] = {}
     for run in every:
-        own = list(cut_windows(run, horizon, neutral)) if run.is_ok else []
-        if not own:
-            refused[run.run_id] = "no window in motion" if run.is_ok else run.status
-        windows += own
+        if run.is_ok:
+            usable.setdefault(recording_of(run), []).append(run)
+    windows: list[Window] = []
+    for recording in usable.values():
+        fitted = motion_filter(recording)
+        for run in recording:
+            try:
+                windows += cut_windows(run, horizon, neutral, fitted)
+            except FitError as error:
+                refused[run.run_id] = str(error).removeprefix(f"{run.run_id}: ")
     initial_states = InitialStates(
         np.array([w.t0_s for w in windows]),
         np.array([w.speed_mps for w in windows]),

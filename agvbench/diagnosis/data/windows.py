@@ -1,27 +1,30 @@
 """Windows of free driving, with the initial state of each prediction.
 
 Runs are cut into windows of a `Horizon` if they do not begin at rest, or if the campaign requests it. The initial pose
-and speed of a window are estimated from earlier frames only. Commands before the window determine the state of the
-actuators at its beginning.
+and speed of a window come from a `MotionFilter` of its recording, which uses earlier frames only. Commands before the
+window determine the state of the actuators at its beginning.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.calibration import inspect_frames
 from agvbench.calibration.campaign_protocol import HeaderLike
-from agvbench.diagnosis.data.initial_pose import frame_noise, starts_at_rest
+from agvbench.diagnosis.data.initial_pose import starts_at_rest, unwrapped_poses
+from agvbench.diagnosis.data.motion_filter import MotionFilter, MotionStates
+from agvbench.errors import FitError
 from agvbench.model.simulation.loop import RECENT_SPEED_S
 from agvbench.statistics.rest_poses import SPEED_LIMIT_MPS
 from agvbench.types import Commands, Floats, Frames, Run
 
 SUPPORT_S = 0.2
-"""Duration of the frames before a window whose parabolas give its initial pose and speed [s]."""
+"""Least duration of the frames before a window [s]."""
 
 SAMPLES = 8
 """Poses per window, evenly spaced; the last one at the horizon."""
@@ -33,7 +36,10 @@ CONSTANT_VELOCITY_S = 0.1
 """Duration before a window over which the constant-velocity baseline averages velocity and yaw rate [s]."""
 
 _DEFAULT_HORIZON_S, _DEFAULT_STRIDE_S = 2.0, 1.0
-_NEAR_S = 0.04
+# A frame is taken for a sample within this time, and at low frame rates within this share of their interval.
+_NEAR_S, _NEAR_INTERVALS = 0.04, 0.6
+_LATCHED_M = 1e-3
+_MAX_SPEED_STDERR = 0.15
 _RECENT_SPANS = 4.0
 _MIN_FRAMES = 6
 _HELD_S = 1e3
@@ -108,66 +114,155 @@ def horizon_of(header: HeaderLike, runs: Iterable[Run]) -> Horizon | None:
     return Horizon() if usable and resting < 0.5 * len(usable) else None
 
 
-def cut_windows(run: Run, horizon: Horizon, neutral: float) -> Iterator[Window]:
-    """Yield the windows of `run` in which the vehicle drives and is tracked."""
+def motion_filter(runs: Iterable[Run]) -> MotionFilter:
+    """Return the motion filter of one recording, from the usable frames of its `runs`."""
+    tracks = [unwrapped_track(run) for run in runs]
+    return MotionFilter.fitted([(t_s, motion) for t_s, motion in tracks if len(t_s) >= _MIN_FRAMES])
+
+
+def unwrapped_track(run: Run) -> tuple[Floats, Floats]:
+    """Return times (n,) and poses (n, 3), with a continuous heading, of the usable frames of `run`.
+
+    A frame that repeats the pose before it while the vehicle moves is left out: the tracker had no new one.
+    """
     frames, _ = inspect_frames(run.frames)
-    if len(frames) < _MIN_FRAMES or not len(run.commands):
-        return
-    t = frames.t_s
-    motion = np.column_stack([frames.x_m, frames.y_m, np.unwrap(frames.heading_rad)])
-    noise = frame_noise(motion)
-    first = max(float(t[0]) + SUPPORT_S, 0.0 if run.frames.t_s[0] < 0.0 else SUPPORT_S)
-    for begin_s in np.arange(first, float(t[-1]) - horizon.horizon_s + _NEAR_S, horizon.stride_s):
-        last = int(np.searchsorted(t, begin_s + 1e-9, side="right"))
-        state = _state(t[:last], motion[:last], noise)
-        if state is None or begin_s - t[last - 1] > _NEAR_S:
-            continue
-        window = _window(run, horizon, neutral, t, motion, last, state, noise)
-        if window is not None:
-            yield window
+    motion = unwrapped_poses(frames)
+    fresh = np.r_[True, np.any(np.diff(motion, axis=0) != 0.0, axis=1)][: len(frames)]
+    # Of a vehicle at rest every frame is kept: the next pose that differs is near.
+    following = np.searchsorted(np.flatnonzero(fresh), np.arange(len(frames)), side="right")
+    after = np.append(np.flatnonzero(fresh), len(frames) - 1)[following] if len(frames) else following
+    moved = np.hypot(*(motion[after, :2] - motion[:, :2]).T) > _LATCHED_M
+    kept = fresh | ~moved
+    return frames.t_s[kept], motion[kept]
 
 
 @dataclass(frozen=True)
-class _State:
-    pose: Floats
-    pose_stderr: Floats
-    speed_mps: float
-    speed_stderr: float
-    recent_speed_mps: float
-    constant_velocity: Floats
+class _Track:
+    """The frames of a run, n of them, with the states of the motion filter."""
+
+    t_s: Floats
+    motion: Floats
+    states: MotionStates
+    noise: Floats
+
+    @cached_property
+    def near_s(self) -> float:
+        """The largest distance in time of the frame that is taken for a sample [s]."""
+        return max(_NEAR_S, _NEAR_INTERVALS * float(np.median(np.diff(self.t_s))))
+
+    @cached_property
+    def speed(self) -> Floats:
+        """The longitudinal speed after each frame (n,) [m/s]."""
+        return self.states.longitudinal_speed()
+
+    @cached_property
+    def speed_stderr(self) -> Floats:
+        """Its standard error (n,) [m/s]."""
+        return np.asarray(np.hypot(*self.states.velocity_stderr[:, :2].T) / np.sqrt(2.0))
+
+    @cached_property
+    def speed_known(self) -> NDArray[np.bool_]:
+        """Whether the speed is known well enough for a prediction (n,)."""
+        return self.speed_stderr <= np.maximum(self.max_stderr_mps, _MAX_SPEED_STDERR * np.abs(self.speed))
+
+    @cached_property
+    def max_stderr_mps(self) -> float:
+        """The largest standard error of an initial speed of zero [m/s]: a share of the recording's speeds."""
+        typical = float(np.sqrt(np.mean(self.speed[_MIN_FRAMES - 1 :] ** 2)))
+        return _MAX_SPEED_STDERR * max(typical, SPEED_LIMIT_MPS)
 
 
-def _state(t: Floats, motion: Floats, noise: Floats) -> _State | None:
-    """Return the state at the last frame; None if the frames before it have a gap or are too few."""
-    own = t > t[-1] - SUPPORT_S if len(t) else np.empty(0, dtype=np.bool_)
-    u, m = t[own] - t[-1] if len(t) else t, motion[own]
-    if len(u) < _MIN_FRAMES or -u[0] < 0.7 * SUPPORT_S or np.max(np.diff(u)) > SUPPORT_S / 3.0:
-        return None
-    design = np.column_stack([np.ones_like(u), u, u * u])
-    unscaled = np.linalg.inv(design.T @ design)
-    value, slope, _ = unscaled @ design.T @ m
-    value_scale, slope_scale = np.sqrt(unscaled[0, 0]), np.sqrt(unscaled[1, 1])
-    c, s = np.cos(value[2]), np.sin(value[2])
-    recent = u > -CONSTANT_VELOCITY_S
-    recent[-3:] = True
-    line = np.column_stack([np.ones(int(recent.sum())), u[recent]])
-    vx, vy, yaw = np.linalg.lstsq(line, m[recent], rcond=None)[0][1]
-    # The vehicle turns during the last 0.1 s: the mean velocity belongs to the heading in the middle.
-    middle = value[2] + yaw * float(u[recent].mean())
-    cm, sm = np.cos(middle), np.sin(middle)
-    return _State(
-        value,
-        value_scale * noise[[0, 0, 1]],
-        float(c * slope[0] + s * slope[1]),
-        float(slope_scale * noise[0]),
-        _recent_speed(t, motion),
-        np.array([cm * vx + sm * vy, cm * vy - sm * vx, yaw]),
+def cut_windows(run: Run, horizon: Horizon, neutral: float, fitted: MotionFilter) -> list[Window]:
+    """Return the windows of `run` in which the vehicle drives and is tracked; `fitted` is the filter of its recording.
+
+    Raises
+    ------
+    FitError
+        If there is none, with the reason and its figure: few frames or commands, a low frame rate, a short run, an
+        uncertain initial speed, or a vehicle at rest.
+    """
+    t_s, motion = unwrapped_track(run)
+    _require_frames(run, t_s, horizon)
+    track = _Track(t_s, motion, fitted.states(t_s, motion), fitted.noise)
+    first_s = max(float(t_s[0]) + SUPPORT_S, float(t_s[_MIN_FRAMES - 1]), _first_prediction_s(run))
+    begins_s = np.arange(first_s, float(t_s[-1]) - horizon.horizon_s + track.near_s, horizon.stride_s)
+    last = np.searchsorted(t_s, begins_s + 1e-9, side="right") - 1
+    usable = last[track.speed_known[last] & (begins_s - t_s[last] <= track.near_s)]
+    windows = [w for k in usable.tolist() if (w := _window(run, horizon, neutral, track, k)) is not None]
+    if not windows:
+        _raise_no_window(run, horizon, track, first_s, last)
+    return windows
+
+
+def _first_prediction_s(run: Run) -> float:
+    """Return the time of the first command, or zero if the run was recorded from before its first command."""
+    recorded_before = len(run.frames) and run.frames.t_s[0] < 0.0
+    return 0.0 if recorded_before else max(0.0, float(run.commands.t_s[0]))
+
+
+def _require_frames(run: Run, t_s: Floats, horizon: Horizon) -> None:
+    if not len(run.commands):
+        raise FitError("has no commands", where=run.run_id)
+    if len(t_s) < _MIN_FRAMES:
+        raise FitError("has too few usable frames", where=run.run_id, value=len(t_s), limit=f"at least {_MIN_FRAMES}")
+    interval_s, most_s = float(np.median(np.diff(t_s))), horizon.horizon_s / SAMPLES
+    if interval_s > most_s:
+        raise FitError(
+            "has too few frames per second",
+            where=run.run_id,
+            value=f"one every {interval_s:.3g} s",
+            limit=f"one every {most_s:.3g} s to predict {horizon.horizon_s:g} s ahead",
+            remedy="set a longer [prediction] horizon_s in campaign.toml",
+        )
+
+
+def _raise_no_window(run: Run, horizon: Horizon, track: _Track, first_s: float, last: NDArray[np.int64]) -> None:
+    """Raise the error of a run without windows that could have begun at the frames `last`."""
+    fastest = float(np.max(np.abs(track.speed[track.speed_known]), initial=0.0))
+    if not len(last):
+        raise FitError(
+            "is too short",
+            where=run.run_id,
+            value=f"{track.t_s[-1] - track.t_s[0]:.2f} s of frames",
+            limit=f"at least {first_s - track.t_s[0] + horizon.horizon_s:.2f} s",
+            remedy="record for longer, or predict less far ahead ([prediction] horizon_s in campaign.toml)",
+        )
+    if not track.speed_known[last].any():
+        raise FitError(
+            "has no certain initial speed",
+            where=run.run_id,
+            value=f"standard error {np.min(track.speed_stderr[last]):.2g} m/s",
+            limit=f"{track.max_stderr_mps:.2g} m/s, or {_MAX_SPEED_STDERR:.0%} of the speed",
+            remedy="record poses more often",
+        )
+    if fastest < SPEED_LIMIT_MPS:
+        limit = f"faster than {SPEED_LIMIT_MPS:g} m/s"
+        raise FitError("has no window in motion", where=run.run_id, value=f"{fastest:.2g} m/s at most", limit=limit)
+    raise FitError(
+        f"was not tracked {horizon.horizon_s:g} s after any initial state, or stood still where it was",
+        where=run.run_id,
+        value=f"longest gap {np.max(np.diff(track.t_s)):.2f} s",
+        limit=f"a frame within {track.near_s:.2f} s of each sample",
     )
+
+
+def _constant_velocity(t: Floats, motion: Floats) -> Floats:
+    """Return longitudinal and lateral velocity and yaw rate (3,) at the last frame, by lines over the last 0.1 s."""
+    recent = t > t[-1] - CONSTANT_VELOCITY_S
+    recent[-3:] = True
+    u, last = t[recent] - t[-1], motion[recent]
+    line = np.column_stack([np.ones(len(u)), u])
+    (_, _, heading), (vx, vy, yaw) = np.linalg.lstsq(line, last, rcond=None)[0]
+    # The vehicle turns during the last 0.1 s: the mean velocity belongs to the heading in the middle.
+    middle = heading + yaw * float(u.mean())
+    c, s = np.cos(middle), np.sin(middle)
+    return np.array([c * vx + s * vy, c * vy - s * vx, yaw])
 
 
 def _recent_speed(t: Floats, motion: Floats) -> float:
     """Return the longitudinal speed, averaged with weights exp(−age / `RECENT_SPEED_S`)."""
     own = t > t[-1] - _RECENT_SPANS * RECENT_SPEED_S
+    own[-2:] = True
     dt, step = np.diff(t[own]), np.diff(motion[own], axis=0)
     heading = motion[own][1:, 2] - 0.5 * step[:, 2]
     weight = np.exp((t[own][1:] - t[-1]) / RECENT_SPEED_S)
@@ -175,39 +270,32 @@ def _recent_speed(t: Floats, motion: Floats) -> float:
     return float(np.sum(weight * longitudinal) / np.sum(weight * dt))
 
 
-def _window(
-    run: Run,
-    horizon: Horizon,
-    neutral: float,
-    t: Floats,
-    motion: Floats,
-    last: int,
-    state: _State,
-    noise: Floats,
-) -> Window | None:
-    t0 = float(t[last - 1])
+def _window(run: Run, horizon: Horizon, neutral: float, track: _Track, last: int) -> Window | None:
+    """Return the window that begins at the frame `last`; None if its end is not seen or it is at rest as commanded."""
+    t, t0 = track.t_s, float(track.t_s[last])
     sample_s = t0 + horizon.horizon_s * np.arange(1, SAMPLES + 1) / SAMPLES
     nearest = np.clip(np.searchsorted(0.5 * (t[1:] + t[:-1]), sample_s), 0, len(t) - 1)
-    poses, near = motion[nearest].copy(), np.abs(t[nearest] - sample_s) <= _NEAR_S
+    poses, near = track.motion[nearest].copy(), np.abs(t[nearest] - sample_s) <= track.near_s
     if not near[-1] or np.count_nonzero(near) < SAMPLES // 2:
         return None
     poses[~near] = np.nan
     commands = _commands_of_window(run, t0, t0 + horizon.horizon_s)
-    if abs(state.speed_mps) < SPEED_LIMIT_MPS and np.all(commands.drive[commands.t_s > t0 - SUPPORT_S] == neutral):
-        return None  # at rest, as commanded
-    piece = replace(run, run_id=f"{run.run_id}@{t0:.2f}", commands=commands, frames=Frames.empty())
+    at_rest = abs(track.speed[last]) < SPEED_LIMIT_MPS
+    if at_rest and np.all(commands.drive[commands.t_s > t0 - SUPPORT_S] == neutral):
+        return None
+    recent = slice(None, last + 1)
     return Window(
-        piece,
+        replace(run, run_id=f"{run.run_id}@{t0:.2f}", commands=commands, frames=Frames.empty()),
         t0,
-        state.pose,
-        state.pose_stderr,
+        track.states.pose[last],
+        track.states.pose_stderr[last],
         np.where(near, t[nearest], sample_s),
         poses,
-        state.speed_mps,
-        state.speed_stderr,
-        state.recent_speed_mps,
-        state.constant_velocity,
-        noise,
+        float(track.speed[last]),
+        float(track.speed_stderr[last]),
+        _recent_speed(t[recent], track.motion[recent]),
+        _constant_velocity(t[recent], track.motion[recent]),
+        track.noise,
     )
 
 

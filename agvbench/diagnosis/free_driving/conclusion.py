@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from agvbench.diagnosis.context import DiagnosisContext
 from agvbench.diagnosis.criteria import RESIDUAL
 from agvbench.diagnosis.data.readings import Readings
-from agvbench.diagnosis.data.windows import SUPPORT_S, Horizon
+from agvbench.diagnosis.data.windows import Horizon
 from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.findings.corrected_vehicle import corrected_vehicle
 from agvbench.diagnosis.findings.effect_states import effect_states
@@ -71,7 +71,7 @@ class WindowConclusion:
         held_out = self._held_out(before, poses, perturbed)
         # Many windows make even small structure significant: within repeatability it needs no cause.
         rest = self._dependences(poses) if _above(held_out, RESIDUAL.within_repeatability) else []
-        far = _above(held_out, RESIDUAL.far_above_noise)
+        far = self._far_above_noise(held_out)
         verdict, why = with_contradictions(*_verdict(effects, rest, far), checks)
         return Diagnosis(
             verdict,
@@ -97,7 +97,6 @@ class WindowConclusion:
             "windows": {
                 "horizon_s": horizon.horizon_s,
                 "stride_s": horizon.stride_s,
-                "initial_state_from_s": [-SUPPORT_S, 0.0],
                 "level_scatter": float(batch.nodal_deviation),
                 "redundancy": batch.autocorrelation_time,
                 "recordings": by_recording(self.assessment, predicted, perturbed, self.held, self.context.seed),
@@ -130,6 +129,18 @@ class WindowConclusion:
             if change > np.nanmean(least["position_rms_mm"][own]):
                 worse.append(name)
         return HeldOut(len(kept), errors, tuple(worse))
+
+    def _far_above_noise(self, held_out: HeldOut) -> bool:
+        """Return whether an error is far above that of frames and of a vehicle of typical repeatability."""
+        kept = self.assessment.select(self.held)
+        moved = np.abs(kept.poses[:, -1] - kept.start)
+        distance = 1e3 * float(np.sqrt(np.nanmean(moved[:, 0] ** 2 + moved[:, 1] ** 2)))
+        turn = float(np.degrees(np.sqrt(np.nanmean(moved[:, 2] ** 2))))
+        for name, error in held_out.errors.items():
+            typical = RESIDUAL.typical_repeatability * (distance if name.endswith("_mm") else turn)
+            if error["after"] > RESIDUAL.far_above_noise * float(np.hypot(error["floor"], typical)):
+                return True
+        return False
 
     def _effect_errors(self, poses: Floats) -> dict[str, dict[str, object]]:
         """Return for each effect whether it was selected, and the position error with and without it.

@@ -75,18 +75,18 @@ def by_recording(
 ) -> list[dict[str, object]]:
     """Return the position error [mm] of every predictor, by recording and prediction time.
 
-    Each error is a root mean square with its 95 % confidence interval. The bootstrap resamples blocks of the recording,
-    because the residuals of a block are correlated.
+    A recording with training and test windows has a row for each kind. Each error is a root mean square with its 95 %
+    confidence interval. The bootstrap resamples blocks of the recording, because the residuals of a block are
+    correlated.
     """
     initial_states = _initial_states(readings)
     table: list[dict[str, object]] = []
-    for recording in dict.fromkeys(initial_states.recording.tolist()):
-        own = initial_states.recording == recording
-        rows = np.flatnonzero(own)
+    for recording, is_held in dict.fromkeys(zip(initial_states.recording.tolist(), held.tolist(), strict=True)):
+        rows = np.flatnonzero((initial_states.recording == recording) & (held == is_held))
         row: dict[str, object] = {
             "recording": recording,
             "session": str(initial_states.session[rows[0]]),
-            "held_out": bool(held[rows].all()),
+            "held_out": is_held,
             "windows": len(rows),
             "median_speed_mps": float(np.median(np.abs(initial_states.speed_mps[rows]))),
         }

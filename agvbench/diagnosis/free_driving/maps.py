@@ -73,7 +73,8 @@ def start_values_of_windows(maps: NodalMaps, readings: Readings, geometry: Geome
     out = []
     for role in ROLES:
         commanded = np.array([held_command(run.commands, role, t) for run, t in zip(readings.runs, when, strict=True)])
-        use = moving & ((commanded != maps.neutral) if role == "drive" else True)
+        # A command is unknown before the first one of the recording.
+        use = moving & np.isfinite(commanded) & ((commanded != maps.neutral) if role == "drive" else True)
         out.append(_smoothed(maps.nodes[role], maps.weights(role, commanded[use]), value[role][use]))
     return np.concatenate(out)
 

@@ -53,6 +53,12 @@ class NodalMaps:
             return _interpolation(nodes, command)
         # Neutral is a node of the drive with a fixed value of zero, not a parameter.
         place = int(np.searchsorted(nodes, self.neutral))
+        if place in (0, len(nodes)):
+            # A direction that was never driven is taken for the mirror image of the other.
+            mirrored = (command < self.neutral) if place == 0 else (command > self.neutral)
+            reflected = np.where(mirrored, 2.0 * self.neutral - command, command)
+            own = np.delete(_interpolation(np.insert(nodes, place, self.neutral), reflected), place, axis=1)
+            return np.where(mirrored[:, None], -own, own)
         return np.delete(_interpolation(np.insert(nodes, place, self.neutral), command), place, axis=1)
 
     def beside(self, values: Floats, kind: type[Effect], parameters: Floats) -> Floats:
