@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-CommandUnit = Literal["us", "normalised"]
+CommandUnit = Literal["us", "normalised", "si"]
+"""Pulse widths in µs; −1…1; or m/s, and rad of an axle or rad/s of a vehicle that turns by its wheels' speeds."""
 
 RUN_OK = "ok"
 

@@ -15,11 +15,14 @@ from agvbench.errors import CampaignError, FileError
 from agvbench.text_files import read_toml
 from agvbench.types import CommandUnit
 from agvbench.validation import convert
-from agvbench.vehicle.geometry import Driven, Geometry
+from agvbench.vehicle.geometry import Driven, Geometry, Kinematics
 
 SCHEMA = 1
 SCHEMA_OF_DRIVEN_AXLE = 2
 """The schema that knows ``driven``; campaigns of vehicles that both axles drive are written in schema 1."""
+SCHEMA_OF_KINEMATICS = 3
+"""The schema that knows ``kinematics`` and commands in SI units."""
+_SCHEMAS = (SCHEMA, SCHEMA_OF_DRIVEN_AXLE, SCHEMA_OF_KINEMATICS)
 FILE_NAME = "campaign.toml"
 _MAX_BYTES = 1 << 20
 
@@ -28,8 +31,10 @@ FrameRate = Annotated[float, msgspec.Meta(gt=0.0, le=1e6)]
 """Of a camera [Hz]; above, times of frames cannot be distinguished in nanoseconds."""
 
 
-def schema_for(driven: Driven) -> int:
+def schema_for(driven: Driven, kinematics: Kinematics = "two_axle", command_unit: CommandUnit = "us") -> int:
     """Return the lowest schema that describes a vehicle."""
+    if kinematics != "two_axle" or command_unit == "si":
+        return SCHEMA_OF_KINEMATICS
     return SCHEMA if driven == "both" else SCHEMA_OF_DRIVEN_AXLE
 
 
@@ -37,8 +42,9 @@ def schema_for(driven: Driven) -> int:
 class CampaignHeader:
     """What holds for every run of a campaign.
 
-    ``front_axle_m`` and ``rear_axle_m`` [m] are the distances from the markers' centroid to the axles;
-    ``driven`` is the driven axle; ``neutral`` is the command at which the vehicle stands still and steers straight,
+    ``front_axle_m`` and ``rear_axle_m`` [m] are the distances from the markers' centroid to the axles, as in
+    `Geometry`; ``driven`` is the driven axle, ``kinematics`` the kind of kinematics; ``neutral`` is the command at
+    which the vehicle stands still and steers straight,
     in ``command_unit``; ``prediction_horizon_s`` and ``prediction_stride_s`` [s] say how to cut free driving into
     predictions.
 
@@ -59,6 +65,7 @@ class CampaignHeader:
     prediction_horizon_s: float | None = None
     prediction_stride_s: float | None = None
     driven: Driven = "both"
+    kinematics: Kinematics = "two_axle"
 
     def __post_init__(self) -> None:
         _check_schema(self.schema, FILE_NAME)
@@ -68,15 +75,25 @@ class CampaignHeader:
                 raise CampaignError(
                     f"{field.name} is not a finite number", where=FILE_NAME, value=value, remedy="give a number"
                 )
-        if self.driven != "both" and self.schema < SCHEMA_OF_DRIVEN_AXLE:
-            raise CampaignError(
-                "a driven axle needs a newer schema",
-                where=f"{FILE_NAME}: [vehicle]",
-                value=f'driven = "{self.driven}" in schema {self.schema}',
-                limit=f"schema {SCHEMA_OF_DRIVEN_AXLE}",
-                remedy=f"set schema = {SCHEMA_OF_DRIVEN_AXLE}",
+        needed = schema_for(self.driven, self.kinematics, self.command_unit)
+        if self.schema < needed:
+            key, value = next(
+                (key, value)
+                for key, value in (
+                    ("kinematics", self.kinematics),
+                    ("command_unit", self.command_unit),
+                    ("driven", self.driven),
+                )
+                if value not in ("two_axle", "us", "normalised", "both")
             )
-        if self.front_axle_m + self.rear_axle_m <= 0.0:
+            raise CampaignError(
+                f"{key} needs a newer schema",
+                where=f"{FILE_NAME}: [vehicle]",
+                value=f'{key} = "{value}" in schema {self.schema}',
+                limit=f"schema {needed}",
+                remedy=f"set schema = {needed}",
+            )
+        if self.kinematics == "two_axle" and self.front_axle_m + self.rear_axle_m <= 0.0:
             raise CampaignError(
                 "the wheelbase front_axle_m + rear_axle_m is not positive",
                 where=f"{FILE_NAME}: [vehicle]",
@@ -93,7 +110,7 @@ class CampaignHeader:
         VehicleError
             If an axle is not where a vehicle can have it.
         """
-        return Geometry(self.front_axle_m, self.rear_axle_m, self.driven)
+        return Geometry(self.front_axle_m, self.rear_axle_m, self.driven, self.kinematics)
 
     @classmethod
     def load(cls, path: str | Path) -> CampaignHeader:
@@ -127,12 +144,18 @@ class CampaignHeader:
         Without `schema` it is the lowest that describes the vehicle.
         """
         prediction = prediction or Prediction()
+        if vehicle.front_axle_m is None and vehicle.kinematics == "two_axle":
+            raise CampaignError(
+                "key 'front_axle_m' is missing",
+                where=f"{where}: vehicle",
+                remedy='give the distance to the front axle, or kinematics = "differential"',
+            )
         try:
             return cls(
-                schema=schema or schema_for(vehicle.driven),
+                schema=schema or schema_for(vehicle.driven, vehicle.kinematics, vehicle.command_unit),
                 name=name,
                 vehicle_name=vehicle.name,
-                front_axle_m=vehicle.front_axle_m,
+                front_axle_m=vehicle.front_axle_m or 0.0,
                 rear_axle_m=vehicle.rear_axle_m,
                 command_unit=vehicle.command_unit,
                 neutral=vehicle.neutral,
@@ -140,6 +163,7 @@ class CampaignHeader:
                 prediction_horizon_s=prediction.horizon_s,
                 prediction_stride_s=prediction.stride_s or prediction.horizon_s,
                 driven=vehicle.driven,
+                kinematics=vehicle.kinematics,
             )
         except CampaignError as error:
             place = str(error.where).replace(FILE_NAME, str(where), 1)
@@ -161,6 +185,7 @@ class CampaignHeader:
                 "command_unit": self.command_unit,
                 "neutral": self.neutral,
                 **({} if self.driven == "both" else {"driven": self.driven}),
+                **({} if self.kinematics == "two_axle" else {"kinematics": self.kinematics}),
             },
             "mocap": {"rate_hz": self.mocap_rate_hz},
         }
@@ -174,11 +199,12 @@ class Vehicle(msgspec.Struct, frozen=True):
     """The table ``[vehicle]``."""
 
     name: str
-    front_axle_m: float
     rear_axle_m: float
     command_unit: CommandUnit
     neutral: float
+    front_axle_m: float | None = None
     driven: Driven = "both"
+    kinematics: Kinematics = "two_axle"
 
 
 class Mocap(msgspec.Struct, frozen=True):
@@ -222,13 +248,13 @@ def _read_toml(path: Path) -> dict[str, Any]:
 def _check_schema(schema: object, where: object) -> None:
     if schema is None:
         raise CampaignError("has no schema", where=where, remedy=f"add schema = {SCHEMA} at the top")
-    if schema not in (SCHEMA, SCHEMA_OF_DRIVEN_AXLE) or isinstance(schema, bool):
+    if schema not in _SCHEMAS or isinstance(schema, bool):
         newer = isinstance(schema, int) and schema > SCHEMA
         remedy = "install a newer agvbench" if newer else f"set schema = {SCHEMA}"
         raise CampaignError(
             "was written in a schema that this agvbench does not read",
             where=where,
             value=f"schema {schema}",
-            limit=f"schema {SCHEMA} or {SCHEMA_OF_DRIVEN_AXLE}",
+            limit=f"schema {SCHEMA} to {_SCHEMAS[-1]}",
             remedy=remedy,
         )

@@ -23,6 +23,7 @@ class AxleCoupling(Effect):
         "check the steering linkages for a common rod or a twisting frame; measure the axle distances from "
         "the marker centroid again, because a wrong distance looks alike"
     )
+    needs_steered_axles: ClassVar[bool] = True
 
     front_from_rear: float = parameter(unit="–", low=-0.5, high=0.5, scale=0.05)
     rear_from_front: float = parameter(unit="–", low=-0.5, high=0.5, scale=0.05)

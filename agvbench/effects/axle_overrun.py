@@ -29,6 +29,7 @@ class AxleOverrun(Effect):
         "check whether the motor controller of one axle brakes what the other drives; let both coast, or "
         "control both to the same speed of the body"
     )
+    needs_steered_axles: ClassVar[bool] = True
 
     excess: float = parameter(unit="–", low=0.0, high=20.0, scale=1.0)
     needs_both_axles_driven: ClassVar[bool] = True

@@ -23,6 +23,7 @@ class AxleSpeedMismatch(Effect):
     )
     remedy: ClassVar[str] = "match the speeds of both axles: wheel diameters, gears, settings of the motor controllers"
     needs_both_axles_driven: ClassVar[bool] = True
+    needs_steered_axles: ClassVar[bool] = True
 
     ratio: float = parameter(unit="–", low=-0.5, high=0.5, scale=0.05)
 

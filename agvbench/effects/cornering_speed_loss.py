@@ -22,6 +22,7 @@ class CorneringSpeedLoss(Effect):
     remedy: ClassVar[str] = (
         "check wheels for scrub in turns (toe, Ackermann geometry, tyres), or plan turns with the lower speed"
     )
+    needs_steered_axles: ClassVar[bool] = True
 
     loss: float = parameter(unit="–", low=0.0, high=0.7, scale=0.1)
 

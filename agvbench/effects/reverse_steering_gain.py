@@ -22,6 +22,7 @@ class ReverseSteeringGain(Effect):
     )
     limits: ClassVar[str] = "needs runs in both directions; one gain for both axles"
     remedy: ClassVar[str] = "tighten the steering linkage: under load it yields in one direction of travel"
+    needs_steered_axles: ClassVar[bool] = True
 
     gain: float = parameter(unit="–", low=-0.5, high=0.5, scale=0.05)
 

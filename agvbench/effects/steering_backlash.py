@@ -31,6 +31,7 @@ class SteeringBacklash(Effect):
     remedy: ClassVar[str] = (
         "tighten or replace the joints of the steering linkage; until then approach each angle from the same side"
     )
+    needs_steered_axles: ClassVar[bool] = True
 
     width_rad: float = parameter(unit="rad", low=0.0, high=0.5, scale=0.03)
 

@@ -27,6 +27,7 @@ class SteeringRateLimit(Effect):
         "let the servos settle before driving off, limit steps of steering in the plan, or check the supply "
         "voltage of the servos"
     )
+    needs_steered_axles: ClassVar[bool] = True
 
     rate_rad_per_s: float = parameter(unit="rad/s", low=0.01, high=100.0, scale=2.0, null=math.inf)
 

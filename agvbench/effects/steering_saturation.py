@@ -21,6 +21,7 @@ class SteeringSaturation(Effect):
     reference: ClassVar[str] = "Bentvelsen 2015, tables 7.1 and 7.2 (outermost points)"
     limits: ClassVar[str] = "a static map with end stops contains it: use it only beside a linear map"
     remedy: ClassVar[str] = "move the end stops, or plan within the smaller range of angles"
+    needs_steered_axles: ClassVar[bool] = True
 
     front_rad: float = parameter(unit="rad", low=0.01, high=1.5, scale=0.6, null=math.inf)
     rear_rad: float = parameter(unit="rad", low=0.01, high=1.5, scale=0.6, null=math.inf)

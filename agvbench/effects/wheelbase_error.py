@@ -25,6 +25,7 @@ class WheelbaseError(Effect):
         "axle_coupling of both axles turns the vehicle in the same way, and mocap_scale nearly: measure the wheelbase"
     )
     remedy: ClassVar[str] = "measure the distance between the axles, and correct it in campaign.toml"
+    needs_steered_axles: ClassVar[bool] = True
 
     longer: float = parameter(unit="–", low=-0.3, high=0.3, scale=0.02)
 

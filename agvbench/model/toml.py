@@ -4,13 +4,14 @@
 
     schema = 1
     name = "my_vehicle"
-    command_unit = "us"            # or "normalised"
+    command_unit = "us"            # or "normalised", "si"
     neutral = 1500.0
 
     [geometry]
     front_axle_m = 0.181           # marker centroid to axle
     rear_axle_m = 0.121
     driven = "both"                # or "front", "rear"; "both" where it is left out
+    kinematics = "two_axle"        # or "differential", whose front map is command → rad/s; "two_axle" where left out
 
     [maps.front]                   # and [maps.rear]: command → rad, counter-clockwise positive
     kind = "line_with_end_stops"
@@ -60,6 +61,7 @@ if TYPE_CHECKING:
 
 SCHEMA = 1
 _UNITS = {"front": "rad", "rear": "rad", "drive": "m/s"}
+_DEFAULTS = {"driven": "both", "kinematics": "two_axle"}
 _REQUIRED = ("schema", "name", "command_unit", "neutral", "geometry", "maps")
 _OPTIONAL = ("effects", "priors", "provenance")
 
@@ -117,7 +119,7 @@ def vehicle_to_toml(model: VehicleModel) -> dict[str, Any]:
         "command_unit": model.command_unit,
         "neutral": model.neutral,
         "geometry": _geometry_to_toml(model.geometry),
-        "maps": {role: _map_to_toml(getattr(model, role), unit) for role, unit in _UNITS.items()},
+        "maps": {role: _map_to_toml(getattr(model, role), unit) for role, unit in _units(model.geometry).items()},
     }
     if model.effects:
         content["effects"] = [effect.to_toml() for effect in model.effects]
@@ -138,12 +140,13 @@ def vehicle_fields(content: Mapping[str, Any]) -> dict[str, Any]:
     for key in ("name", "command_unit"):
         if not isinstance(content[key], str):
             raise VehicleError("must be a text", where=key, value=repr(content[key]))
+    geometry = from_table(Geometry, _table(content, "geometry"), where="geometry")
     return {
         "name": content["name"],
-        "geometry": from_table(Geometry, _table(content, "geometry"), where="geometry"),
+        "geometry": geometry,
         "command_unit": content["command_unit"],
         "neutral": number(content["neutral"], where="neutral"),
-        **_maps_from_toml(_table(content, "maps")),
+        **_maps_from_toml(_table(content, "maps"), _units(geometry)),
         "effects": _effects_from_toml(content.get("effects", [])),
         "priors": priors_from_toml(_table(content, "priors")) if "priors" in content else (),
         "provenance": _provenance_from_toml(content),
@@ -186,9 +189,12 @@ def _table(content: Mapping[str, Any], key: str) -> Mapping[str, Any]:
 
 
 def _geometry_to_toml(geometry: Geometry) -> dict[str, Any]:
-    """Return the geometry without the default driven axle, so that files and hashes of such vehicles stay."""
-    table = to_table(geometry)
-    return {key: value for key, value in table.items() if (key, value) != ("driven", "both")}
+    """Return the geometry without texts at their defaults, so that files and hashes of such vehicles stay."""
+    return {key: value for key, value in to_table(geometry).items() if _DEFAULTS.get(key) != value}
+
+
+def _units(geometry: Geometry) -> dict[str, str]:
+    return _UNITS | ({"front": "rad/s"} if geometry.is_differential else {})
 
 
 def _map_to_toml(static_map: StaticMap, unit: str) -> dict[str, Any]:
@@ -196,10 +202,10 @@ def _map_to_toml(static_map: StaticMap, unit: str) -> dict[str, Any]:
     return {"kind": table.pop("kind"), "unit": unit, **table}
 
 
-def _maps_from_toml(tables: Mapping[str, Any]) -> dict[str, StaticMap]:
-    check_keys(tables, _UNITS, where="maps")
+def _maps_from_toml(tables: Mapping[str, Any], units: Mapping[str, str]) -> dict[str, StaticMap]:
+    check_keys(tables, units, where="maps")
     maps = {}
-    for role, unit in _UNITS.items():
+    for role, unit in units.items():
         where = f"maps.{role}"
         if role not in tables:
             raise VehicleError("a table is missing", where=where, remedy=f"add [{where}]")

@@ -35,11 +35,12 @@ class VehicleModel:
     geometry
         Positions of the axles.
     command_unit
-        ``"us"`` or ``"normalised"``.
+        ``"us"``, ``"normalised"`` or ``"si"``.
     neutral
         Command at standstill with (about) straight axles, in command units.
     front, rear
-        Command → axle angle [rad], counter-clockwise positive; `Fixed` for an axle that is not steered.
+        Command → axle angle [rad], counter-clockwise positive; `Fixed` for an axle that is not steered. The front map
+        of a differential vehicle is command → yaw rate [rad/s], and its rear map is `Fixed`.
     drive
         Command → speed of the axles along their wheels [m/s].
     effects
@@ -84,6 +85,14 @@ class VehicleModel:
             if names.count(name) > 1:
                 raise VehicleError("an effect may be given once", where="effects", value=name)
         for effect in self.effects:
+            if effect.needs_steered_axles and self.geometry.is_differential and not effect.is_null:
+                raise VehicleError(
+                    "an effect of steered axles, but the vehicle has none",
+                    where="effects",
+                    value=effect.name,
+                    limit='kinematics = "differential"',
+                    remedy="remove the effect, or correct geometry.kinematics",
+                )
             if effect.needs_both_axles_driven and self.geometry.driven != "both" and not effect.is_null:
                 raise VehicleError(
                     "an effect of two driven axles, but one is driven",
@@ -94,7 +103,7 @@ class VehicleModel:
                 )
 
     def _check_angles(self) -> None:
-        for axle in ("front", "rear"):
+        for axle in ("rear",) if self.geometry.is_differential else ("front", "rear"):
             ends = [end for end in getattr(self, axle).output_range if math.isfinite(end)]
             for end in ends:
                 if abs(end) > _LARGEST_ANGLE_RAD:
@@ -203,10 +212,12 @@ _UNITS = {"front": ("°", math.degrees(1.0)), "rear": ("°", math.degrees(1.0)),
 def model_html(model: VehicleModel) -> str:
     """Return geometry, static maps with the range of their outputs, and effects with their parameters, as HTML."""
     geometry = model.geometry
-    line = (
-        f"front axle {geometry.front_axle_m:g} m ahead of the marker centroid, rear axle {geometry.rear_axle_m:g} m "
-        f"behind it; commands in {model.command_unit}, neutral {model.neutral:g}"
-    )
+    axles = f"rear axle {geometry.rear_axle_m:g} m behind it"
+    if geometry.is_differential:
+        axles = f"differential, axle {geometry.rear_axle_m:g} m behind the marker centroid"
+    else:
+        axles = f"front axle {geometry.front_axle_m:g} m ahead of the marker centroid, {axles}"
+    line = f"{axles}; commands in {model.command_unit}, neutral {model.neutral:g}"
     maps = [_map_row(model, role) for role in _UNITS]
     effects = [
         (effect.name, p.name, effect.values[p.name], p.unit) for effect in model.effects for p in effect.parameters()
@@ -220,6 +231,6 @@ def model_html(model: VehicleModel) -> str:
 
 def _map_row(model: VehicleModel, role: str) -> tuple[str, str, float, float, str]:
     static_map = getattr(model, role)
-    unit, scale = _UNITS[role]
+    unit, scale = ("rad/s", 1.0) if role == "front" and model.geometry.is_differential else _UNITS[role]
     low, high = static_map.output_range
     return role, static_map.kind.replace("_", " "), scale * low, scale * high, unit

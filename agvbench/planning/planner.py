@@ -167,7 +167,7 @@ def _command(leg: Leg, model: VehicleModel) -> Command:
 
 
 Row = tuple[float, float, float, float]
-_UNIT_RANGE = {"us": (500.0, 2500.0), "normalised": (-1.0, 1.0)}
+_UNIT_RANGE = {"us": (500.0, 2500.0), "normalised": (-1.0, 1.0), "si": (-20.0, 20.0)}
 """What may be commanded at all: beyond 500 to 2500 µs servos run against their stops."""
 
 

@@ -12,7 +12,7 @@ from agvbench.model import VehicleModel
 from agvbench.types import Command, Commands, CommandUnit
 
 PRESTEER_S = 0.5
-_FULL_COMMAND: dict[CommandUnit, float] = {"us": 600.0, "normalised": 1.0}
+_FULL_COMMAND: dict[CommandUnit, float] = {"us": 600.0, "normalised": 1.0, "si": 1.0}
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,9 @@ contradicts its eq. 5.7; both follow from a rigid body whose axle points move al
 - yaw rate ψ̇ = u (tan δf − tan δr) / (lf + lr)
 
 The other way round, a motion implies the axle angles, and so does an arc (thesis section 6.2.2, appendix A).
+
+A differential vehicle (or a skid-steered one) has commands of forward speed and yaw rate in place of speed and angle.
+Its centroid moves to the left with ψ̇ times its distance ahead of the axle.
 """
 
 from __future__ import annotations
@@ -82,7 +85,7 @@ def wheel_speed(forward_mps: ArrayLike, front_rad: ArrayLike, rear_rad: ArrayLik
     """Return the speed of the drive, along the wheels, that a forward speed of the centroid implies.
 
     The inverse of `body_velocity` for equal speeds of the driven axles: u / cos δ of the driven axle, and
-    2 u / (cos δf + cos δr) if both drive (thesis eq. 5.6).
+    2 u / (cos δf + cos δr) if both drive (thesis eq. 5.6). It is u for a differential vehicle.
 
     Parameters
     ----------
@@ -93,6 +96,8 @@ def wheel_speed(forward_mps: ArrayLike, front_rad: ArrayLike, rear_rad: ArrayLik
     geometry
         Which axle drives.
     """
+    if geometry.is_differential:
+        return np.asarray(forward_mps, dtype=np.float64) + np.zeros_like(np.asarray(front_rad, dtype=np.float64))
     share = geometry.front_drive_share
     return np.asarray(forward_mps, dtype=np.float64) / (share * np.cos(front_rad) + (1.0 - share) * np.cos(rear_rad))
 
@@ -124,6 +129,21 @@ def axle_angles(
     front = np.arctan((left + geometry.front_axle_m * yaw) / forward)
     rear = np.arctan((left - geometry.rear_axle_m * yaw) / forward)
     return front, rear
+
+
+def actuator_values(
+    speed_forward: ArrayLike, speed_left: ArrayLike, yaw_rate: ArrayLike, geometry: Geometry
+) -> tuple[Floats, Floats, Floats]:
+    """Return what the actuators must have for a motion: front and rear angle [rad], and speed of the drive [m/s].
+
+    The front value of a differential vehicle is its yaw rate [rad/s], and the rear one is zero. Parameters are those
+    of `axle_angles`. Values are NaN where the motion does not determine them.
+    """
+    if geometry.is_differential:
+        forward, yaw = np.broadcast_arrays(np.asarray(speed_forward, float), np.asarray(yaw_rate, float))
+        return yaw, np.zeros_like(yaw), forward
+    front, rear = axle_angles(speed_forward, speed_left, yaw_rate, geometry)
+    return front, rear, wheel_speed(speed_forward, front, rear, geometry)
 
 
 def axle_angles_from_arc(

@@ -196,7 +196,7 @@ CASES: Cases = {
     ),
     "head-too-large": ("a `campaign.toml` of 2 MB", _file("campaign.toml", lambda p: p.write_bytes(b"#" * (2 << 20)))),
     "head-without-schema": ("no `schema`", _head("schema", None)),
-    "head-of-the-future": ("`schema = 3`", _head("schema", 3)),
+    "head-of-the-future": ("`schema = 4`", _head("schema", 4)),
     "head-schema-zero": ("`schema = 0`", _head("schema", 0)),
     "head-lacks-key": ("no `vehicle.front_axle_m`", _head("front_axle_m", None, "vehicle")),
     "head-wrong-type": ("text where a number belongs", _head("rear_axle_m", "9 cm", "vehicle")),

@@ -14,7 +14,7 @@ from tiny_vehicle import HEADER, NEUTRAL, Tiny, campaign_runs
 
 from agvbench.diagnosis.data.readings import Readings, read_windows
 from agvbench.diagnosis.data.window_splits import held_out_windows, thinned
-from agvbench.diagnosis.data.windows import Horizon, Window, cut_windows, horizon_of, motion_filter
+from agvbench.diagnosis.data.windows import Horizon, RecordedMotion, Window, cut_windows, horizon_of
 from agvbench.diagnosis.free_driving.errors import by_recording, interval, repeatability_squares, squares
 from agvbench.diagnosis.free_driving.maps import smooth_maps, start_values_of_windows
 from agvbench.diagnosis.free_driving.predictors import constant_velocity
@@ -43,7 +43,7 @@ def arc(speed: float, yaw: float, noise_m: float = 0.0, seconds: float = 8.0, ra
 
 def cut(run: Run) -> list[Window]:
     """Return the windows of a run that is a recording of its own."""
-    return cut_windows(run, HORIZON, NEUTRAL, motion_filter([run]))
+    return cut_windows(run, HORIZON, NEUTRAL, RecordedMotion.of([run]))
 
 
 @pytest.fixture(scope="module")
@@ -70,11 +70,11 @@ def test_the_naive_predictor_goes_on_along_the_circle():
 
 def test_nothing_after_the_beginning_is_used():
     run = arc(0.5, 0.3, noise_m=1e-3)
-    fitted = motion_filter([run])
-    before = cut_windows(run, HORIZON, NEUTRAL, fitted)[0]
+    recorded = RecordedMotion.of([run])
+    before = cut_windows(run, HORIZON, NEUTRAL, recorded)[0]
     later = run.frames.t_s > before.t0_s
     perturbed = dataclasses.replace(run.frames, x_m=run.frames.x_m + 0.01 * later * np.sin(40.0 * run.frames.t_s))
-    again = cut_windows(dataclasses.replace(run, frames=perturbed), HORIZON, NEUTRAL, fitted)[0]
+    again = cut_windows(dataclasses.replace(run, frames=perturbed), HORIZON, NEUTRAL, recorded)[0]
     for name in ("start", "speed_mps", "recent_speed_mps", "constant_velocity"):
         np.testing.assert_allclose(getattr(again, name), getattr(before, name), atol=1e-12)
     assert not np.allclose(again.poses, before.poses, atol=1e-3)

@@ -80,7 +80,7 @@ MISTAKES = {
     "no name": (drop("name"), "top level: a key is missing: name"),
     "name is a number": (put("name", value=3), "name: must be a text: 3"),
     "no unit": (drop("command_unit"), "top level: a key is missing: command_unit"),
-    "bad unit": (put("command_unit", value="ms"), "command_unit: unknown unit: 'ms' (one of: us, normalised)"),
+    "bad unit": (put("command_unit", value="ms"), "command_unit: unknown unit: 'ms' (one of: us, normalised, si)"),
     "neutral is a text": (put("neutral", value="1500"), "neutral: must be a number: '1500'"),
     "neutral is NaN": (put("neutral", value=math.nan), "neutral: must be a number: NaN"),
     "neutral is infinite": (put("neutral", value=math.inf), "neutral: must be a finite number: inf"),

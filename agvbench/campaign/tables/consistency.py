@@ -33,7 +33,8 @@ class _Limits(NamedTuple):
 
 _COMMAND_LIMITS: dict[CommandUnit, _Limits] = {
     "us": _Limits(100.0, 10_000.0, 'pulse widths are in µs; is command_unit "normalised"?'),
-    "normalised": _Limits(-2.0, 2.0, 'commands are −1…1; is command_unit "us"?'),
+    "normalised": _Limits(-2.0, 2.0, 'commands are −1…1; is command_unit "us" or "si"?'),
+    "si": _Limits(-100.0, 100.0, 'commands are in m/s, rad or rad/s; is command_unit "us"?'),
 }
 
 

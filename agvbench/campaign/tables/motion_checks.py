@@ -144,7 +144,8 @@ def _usual_speed(steps: _Steps) -> Floats:
 
 def _check_speed(steps: _Steps, usual: Floats, header: CampaignHeader, poses: TimedTable) -> None:
     wheelbase_m = header.front_axle_m + header.rear_axle_m
-    limit = min(_FASTEST_MPS, _FASTEST_WHEELBASES * wheelbase_m)
+    has_wheelbase = header.kinematics == "two_axle"
+    limit = min(_FASTEST_MPS, _FASTEST_WHEELBASES * wheelbase_m) if has_wheelbase else _FASTEST_MPS
     enough = steps.counts >= _FEWEST_STEPS
     fast: Mask = enough & (usual > limit)
     if np.count_nonzero(fast) > _SOME * np.count_nonzero(enough):
@@ -152,7 +153,7 @@ def _check_speed(steps: _Steps, usual: Floats, header: CampaignHeader, poses: Ti
             "x_m and y_m are not in metres",
             where=_where(poses, steps, fast),
             value=f"vehicle drives at {usual[fast][0]:.3g} m/s{_as_in(fast, enough)}",
-            limit=f"{limit:.3g} m/s, for a wheelbase of {wheelbase_m:.3g} m",
+            limit=f"{limit:.3g} m/s" + (f", for a wheelbase of {wheelbase_m:.3g} m" if has_wheelbase else ""),
             remedy="convert them to metres",
         )
 

@@ -16,10 +16,10 @@ from agvbench.diagnosis.data.splits import group_runs, with_common_levels
 from agvbench.diagnosis.data.windows import (
     Horizon,
     InitialStates,
+    RecordedMotion,
     Window,
     blocks,
     cut_windows,
-    motion_filter,
     recording_of,
 )
 from agvbench.errors import FitError
@@ -146,7 +146,7 @@ def read_runs(runs: Iterable[Run], neutral: float | None = None) -> Readings:
     return Readings(tuple(kept), t_s, poses, start, stderr, started_h, group_runs(kept), refused, None, logged=logged)
 
 
-def read_windows(runs: Iterable[Run], horizon: Horizon, neutral: float) -> Readings:
+def read_windows(runs: Iterable[Run], horizon: Horizon, neutral: float, *, turns_on_the_spot: bool = False) -> Readings:
     """Cut runs into windows; ``refused`` lists the runs without any window, with the reason."""
     every = [shift_commands_half_a_row(run) for run in with_common_levels(list(runs))]
     began = session_starts(every)
@@ -157,10 +157,10 @@ def read_windows(runs: Iterable[Run], horizon: Horizon, neutral: float) -> Readi
             usable.setdefault(recording_of(run), []).append(run)
     windows: list[Window] = []
     for recording in usable.values():
-        fitted = motion_filter(recording)
+        recorded = RecordedMotion.of(recording)
         for run in recording:
             try:
-                windows += cut_windows(run, horizon, neutral, fitted)
+                windows += cut_windows(run, horizon, neutral, recorded, turns_on_the_spot=turns_on_the_spot)
             except FitError as error:
                 refused[run.run_id] = str(error).removeprefix(f"{run.run_id}: ")
     initial_states = InitialStates(

@@ -36,10 +36,10 @@ CONSTANT_VELOCITY_S = 0.1
 """Duration before a window over which the constant-velocity baseline averages velocity and yaw rate [s]."""
 
 _DEFAULT_HORIZON_S, _DEFAULT_STRIDE_S = 2.0, 1.0
-# A frame is taken for a sample within this time, and at low frame rates within this share of their interval.
-_NEAR_S, _NEAR_INTERVALS = 0.04, 0.6
+# A frame is taken for a sample within this time, and at low frame rates within this share of most of their intervals.
+_NEAR_S, _NEAR_INTERVALS, _USUAL_INTERVALS = 0.04, 0.6, 0.9
 _LATCHED_M = 1e-3
-_MAX_SPEED_STDERR = 0.15
+_MAX_SPEED_STDERR = 0.25
 _RECENT_SPANS = 4.0
 _MIN_FRAMES = 6
 _HELD_S = 1e3
@@ -106,18 +106,34 @@ class Window:
 
 
 def horizon_of(header: HeaderLike, runs: Iterable[Run]) -> Horizon | None:
-    """Return the horizon of the windows; None if the campaign declares none and most of its runs begin at rest."""
+    """Return the horizon of the windows; None if the campaign declares none and most of its runs begin at rest.
+
+    The runs of a differential vehicle are always cut into windows.
+    """
     if header.prediction_horizon_s is not None:
         return Horizon(header.prediction_horizon_s, header.prediction_stride_s or header.prediction_horizon_s)
+    if header.geometry.is_differential:
+        return Horizon()
     usable = [run for run in runs if run.is_ok and len(run.frames)]
     resting = sum(starts_at_rest(run, header.neutral) for run in usable)
     return Horizon() if usable and resting < 0.5 * len(usable) else None
 
 
-def motion_filter(runs: Iterable[Run]) -> MotionFilter:
-    """Return the motion filter of one recording, from the usable frames of its `runs`."""
-    tracks = [unwrapped_track(run) for run in runs]
-    return MotionFilter.fitted([(t_s, motion) for t_s, motion in tracks if len(t_s) >= _MIN_FRAMES])
+@dataclass(frozen=True)
+class RecordedMotion:
+    """What the runs of one recording have in common: the motion ``filter`` and the ``typical_speed_mps``."""
+
+    filter: MotionFilter
+    typical_speed_mps: float
+
+    @classmethod
+    def of(cls, runs: Iterable[Run]) -> RecordedMotion:
+        """Return it from the usable frames of the `runs` of a recording."""
+        tracks = [track for track in map(unwrapped_track, runs) if len(track[0]) >= _MIN_FRAMES]
+        fitted = MotionFilter.fitted(tracks)
+        speeds = [fitted.states(*track).longitudinal_speed()[_MIN_FRAMES - 1 :] for track in tracks]
+        typical = float(np.sqrt(np.mean(np.concatenate(speeds) ** 2))) if speeds else 0.0
+        return cls(fitted, max(typical, SPEED_LIMIT_MPS))
 
 
 def unwrapped_track(run: Run) -> tuple[Floats, Floats]:
@@ -144,11 +160,12 @@ class _Track:
     motion: Floats
     states: MotionStates
     noise: Floats
+    typical_speed_mps: float
 
     @cached_property
     def near_s(self) -> float:
         """The largest distance in time of the frame that is taken for a sample [s]."""
-        return max(_NEAR_S, _NEAR_INTERVALS * float(np.median(np.diff(self.t_s))))
+        return max(_NEAR_S, _NEAR_INTERVALS * float(np.quantile(np.diff(self.t_s), _USUAL_INTERVALS)))
 
     @cached_property
     def speed(self) -> Floats:
@@ -168,12 +185,15 @@ class _Track:
     @cached_property
     def max_stderr_mps(self) -> float:
         """The largest standard error of an initial speed of zero [m/s]: a share of the recording's speeds."""
-        typical = float(np.sqrt(np.mean(self.speed[_MIN_FRAMES - 1 :] ** 2)))
-        return _MAX_SPEED_STDERR * max(typical, SPEED_LIMIT_MPS)
+        return _MAX_SPEED_STDERR * self.typical_speed_mps
 
 
-def cut_windows(run: Run, horizon: Horizon, neutral: float, fitted: MotionFilter) -> list[Window]:
-    """Return the windows of `run` in which the vehicle drives and is tracked; `fitted` is the filter of its recording.
+def cut_windows(
+    run: Run, horizon: Horizon, neutral: float, recorded: RecordedMotion, *, turns_on_the_spot: bool = False
+) -> list[Window]:
+    """Return the windows of `run` in which the vehicle drives and is tracked; `recorded` is that of its recording.
+
+    A differential vehicle `turns_on_the_spot`, so that its front command moves it, too.
 
     Raises
     ------
@@ -183,12 +203,14 @@ def cut_windows(run: Run, horizon: Horizon, neutral: float, fitted: MotionFilter
     """
     t_s, motion = unwrapped_track(run)
     _require_frames(run, t_s, horizon)
-    track = _Track(t_s, motion, fitted.states(t_s, motion), fitted.noise)
+    fitted = recorded.filter
+    track = _Track(t_s, motion, fitted.states(t_s, motion), fitted.noise, recorded.typical_speed_mps)
     first_s = max(float(t_s[0]) + SUPPORT_S, float(t_s[_MIN_FRAMES - 1]), _first_prediction_s(run))
     begins_s = np.arange(first_s, float(t_s[-1]) - horizon.horizon_s + track.near_s, horizon.stride_s)
     last = np.searchsorted(t_s, begins_s + 1e-9, side="right") - 1
     usable = last[track.speed_known[last] & (begins_s - t_s[last] <= track.near_s)]
-    windows = [w for k in usable.tolist() if (w := _window(run, horizon, neutral, track, k)) is not None]
+    windows = [w for k in usable.tolist() if (w := _window(run, horizon, track, k)) is not None]
+    windows = [w for w in windows if not _stands(w, neutral, turns_on_the_spot=turns_on_the_spot)]
     if not windows:
         _raise_no_window(run, horizon, track, first_s, last)
     return windows
@@ -270,8 +292,16 @@ def _recent_speed(t: Floats, motion: Floats) -> float:
     return float(np.sum(weight * longitudinal) / np.sum(weight * dt))
 
 
-def _window(run: Run, horizon: Horizon, neutral: float, track: _Track, last: int) -> Window | None:
-    """Return the window that begins at the frame `last`; None if its end is not seen or it is at rest as commanded."""
+def _stands(window: Window, neutral: float, *, turns_on_the_spot: bool) -> bool:
+    """Return whether the vehicle stands at the beginning of a window, and is commanded to."""
+    c = window.run.commands
+    recent = c.t_s > window.t0_s - SUPPORT_S
+    moved = np.any(c.drive[recent] != neutral) or (turns_on_the_spot and np.any(c.front[recent] != neutral))
+    return bool(abs(window.speed_mps) < SPEED_LIMIT_MPS and not moved)
+
+
+def _window(run: Run, horizon: Horizon, track: _Track, last: int) -> Window | None:
+    """Return the window that begins at the frame `last`; None if its end is not seen."""
     t, t0 = track.t_s, float(track.t_s[last])
     sample_s = t0 + horizon.horizon_s * np.arange(1, SAMPLES + 1) / SAMPLES
     nearest = np.clip(np.searchsorted(0.5 * (t[1:] + t[:-1]), sample_s), 0, len(t) - 1)
@@ -280,9 +310,6 @@ def _window(run: Run, horizon: Horizon, neutral: float, track: _Track, last: int
         return None
     poses[~near] = np.nan
     commands = _commands_of_window(run, t0, t0 + horizon.horizon_s)
-    at_rest = abs(track.speed[last]) < SPEED_LIMIT_MPS
-    if at_rest and np.all(commands.drive[commands.t_s > t0 - SUPPORT_S] == neutral):
-        return None
     recent = slice(None, last + 1)
     return Window(
         replace(run, run_id=f"{run.run_id}@{t0:.2f}", commands=commands, frames=Frames.empty()),

@@ -22,21 +22,20 @@ def corrected_vehicle(header: HeaderLike, geometry: Geometry, fitted: Fit, maps:
     where = maps.slices()
     weight = np.maximum(np.diagonal(fitted.information.total), 1e-6)
     values = {role: fitted.parameters[own] for role, own in where.items()}
-    front, rear = (_table(maps.nodes[r], values[r], weight[where[r]]) for r in ("front", "rear"))
-    place = int(np.searchsorted(maps.nodes["drive"], maps.neutral))
-    drive = _table(
-        np.insert(maps.nodes["drive"], place, maps.neutral),
-        np.insert(values["drive"], place, 0.0),
-        np.insert(weight[where["drive"]], place, 1e12),
-    )
+    tables: dict[str, StaticMap] = {}
+    for role, own in where.items():
+        nodes, value, of_role = maps.nodes[role], values[role], weight[own]
+        if role in maps.zero_at_neutral:
+            place = int(np.searchsorted(nodes, maps.neutral))
+            nodes, value = np.insert(nodes, place, maps.neutral), np.insert(value, place, 0.0)
+            of_role = np.insert(of_role, place, 1e12)
+        tables[role] = _table(nodes, value, of_role) if len(nodes) else Fixed(command=maps.neutral)
     return VehicleModel(
         name=header.vehicle_name,
         geometry=geometry,
         command_unit=header.command_unit,
         neutral=header.neutral,
-        front=front,
-        rear=rear,
-        drive=drive,
+        **tables,
         effects=_effects(fitted),
         provenance={"campaign": header.name, "method": "diagnose", "seed": seed},
         priors=fitted.predictor.readings.priors,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.model.nodal_maps import ROLES, NodalMaps, nodal_maps
 from agvbench.types import Floats, Run
 from agvbench.vehicle.geometry import Geometry
-from agvbench.vehicle.kinematics import axle_angles, wheel_speed
+from agvbench.vehicle.kinematics import actuator_values
 
 NODES = ((9, 6), (13, 10), (19, 15))
 """Numbers of nodes of steering and drive maps, for commands with many levels."""
@@ -22,25 +23,32 @@ _STIFFNESS = 0.3
 _MIN_SPEED_MPS = 0.05
 
 
-def smooth_maps(runs: Sequence[Run], neutral: float, steering: int, drive: int) -> NodalMaps:
+def smooth_maps(
+    runs: Sequence[Run], neutral: float, steering: int, drive: int, *, is_differential: bool = False
+) -> NodalMaps:
     """Return nodal maps with a node at every level, or with evenly spaced nodes if there are many levels.
 
     Nodes are evenly spaced and not at quantiles, because driving on another day may use other levels more often.
     """
-    nodes = dict(nodal_maps(runs, neutral).nodes)
+    found = nodal_maps(runs, neutral, is_differential=is_differential)
+    nodes = dict(found.nodes)
     for role in ROLES:
         commanded = np.concatenate([getattr(run.commands, role) for run in runs])
-        if role == "drive":
+        if not len(nodes[role]):
+            continue
+        if role in found.zero_at_neutral:
             commanded = commanded[commanded != neutral]
-        if len(np.unique(commanded)) > _MANY_LEVELS:
-            nodes[role] = _even(commanded, drive if role == "drive" else steering, neutral, role)
-    return NodalMaps(nodes, neutral)
+        if len(np.unique(commanded)) <= _MANY_LEVELS:
+            continue
+        if role not in found.zero_at_neutral:
+            nodes[role] = np.linspace(commanded.min(), commanded.max(), steering)
+        else:
+            nodes[role] = _on_each_side(commanded, drive if role == "drive" else (steering + 1) // 2, neutral)
+    return replace(found, nodes=nodes)
 
 
-def _even(commanded: Floats, count: int, neutral: float, role: str) -> Floats:
-    if role != "drive":
-        return np.linspace(commanded.min(), commanded.max(), count)
-    # Each direction has its own nodes; the speed at neutral, between them, is zero.
+def _on_each_side(commanded: Floats, count: int, neutral: float) -> Floats:
+    """Return `count` nodes for each direction; the value at neutral, between them, is zero."""
     sides = [commanded[commanded < neutral], commanded[commanded > neutral]]
     return np.concatenate([_side(side, count, neutral) for side in sides if len(side)])
 
@@ -66,21 +74,25 @@ def start_values_of_windows(maps: NodalMaps, readings: Readings, geometry: Geome
     per_s = 1.0 / (np.sinc(0.5 * turn / np.pi) * dt)
     forward = (np.cos(middle) * step[..., 0] + np.sin(middle) * step[..., 1]) * per_s
     left = (np.cos(middle) * step[..., 1] - np.sin(middle) * step[..., 0]) * per_s
-    front, rear = axle_angles(forward, left, turn / dt, geometry)
-    value = {"front": front, "rear": rear, "drive": wheel_speed(forward, front, rear, geometry)}
+    front, rear, speed = actuator_values(forward, left, turn / dt, geometry)
+    value = {"front": front, "rear": rear, "drive": speed}
     when = 0.5 * (time[:, 1:] + time[:, :-1]) - _TYPICAL_DELAY_S
-    moving = np.isfinite(front + rear) & (np.abs(forward) > _MIN_SPEED_MPS)
+    moving = np.isfinite(front + rear) & ((np.abs(forward) > _MIN_SPEED_MPS) | geometry.is_differential)
     out = []
     for role in ROLES:
         commanded = np.array([held_command(run.commands, role, t) for run, t in zip(readings.runs, when, strict=True)])
         # A command is unknown before the first one of the recording.
-        use = moving & np.isfinite(commanded) & ((commanded != maps.neutral) if role == "drive" else True)
+        use = moving & np.isfinite(commanded)
+        if role in maps.zero_at_neutral:
+            use &= commanded != maps.neutral
         out.append(_smoothed(maps.nodes[role], maps.weights(role, commanded[use]), value[role][use]))
     return np.concatenate(out)
 
 
 def _smoothed(nodes: Floats, weights: Floats, value: Floats) -> Floats:
     """Return the nodal values of a robust smoothing curve through `value`."""
+    if not len(nodes) or not len(value):
+        return np.zeros(len(nodes))
     second_differences = np.diff(np.eye(len(nodes)), 2, axis=0) if len(nodes) > 2 else np.empty((0, len(nodes)))
     weight: Floats = np.ones(len(value))
     fitted: Floats = np.zeros(len(nodes))

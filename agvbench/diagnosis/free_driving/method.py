@@ -30,6 +30,9 @@ from agvbench.errors import CampaignError
 from agvbench.types import Run
 from agvbench.vehicle.geometry import Geometry
 
+ABSORBED_IN_WINDOWS = frozenset({"mocap_scale"})
+"""Effects that the maps absorb where no distance is known but by the camera."""
+
 
 @dataclass(frozen=True)
 class SelectedFromWindows:
@@ -53,7 +56,9 @@ class FreeDriving(Method[SelectedFromWindows]):
 
     def read(self, runs: Sequence[Run]) -> Readings:
         """Return the poses of the windows, and the priors of the vehicle file."""
-        return replace(read_windows(runs, self.horizon, self.context.header.neutral), priors=self.context.priors)
+        is_differential = self.context.geometry.is_differential
+        read = read_windows(runs, self.horizon, self.context.header.neutral, turns_on_the_spot=is_differential)
+        return replace(read, priors=self.context.priors)
 
     def insufficient_data(self, readings: Readings) -> str:
         """Return why the campaign cannot be diagnosed, or an empty string."""
@@ -106,6 +111,7 @@ class FreeDriving(Method[SelectedFromWindows]):
         context, fitted, maps = self.context, static.predictor.readings, static.predictor.maps
         test = readings.select(thinned(np.flatnonzero(split.test), DATA.max_fitted_windows))
         tried, kinds = candidates_for(context.vehicle, context.geometry)
+        tried = {name: one for name, one in tried.items() if name not in ABSORBED_IN_WINDOWS}
         given = given_effects(context.vehicle, tried)
         has_sessions = len(np.unique(readings.initial_states.session)) > 1 if readings.initial_states else False
         deviation = nodal_deviation(static.predictor, static.parameters) if has_sessions else np.inf
@@ -128,7 +134,7 @@ def _static(fitted: Readings, geometry: Geometry, neutral: float) -> Fit:
     """Return the static maps fitted to the windows, with the number of nodes by Schwarz's criterion."""
     best: tuple[float, Fit] | None = None
     for steering, drive in NODES:
-        maps = smooth_maps(fitted.runs, neutral, steering, drive)
+        maps = smooth_maps(fitted.runs, neutral, steering, drive, is_differential=geometry.is_differential)
         start = start_values_of_windows(maps, fitted, geometry)
         found = fit(Predictor(Batch(fitted, maps, geometry)), start, np.empty((0, 2)))
         total = float(found.loss.sum()) + maps.size * float(np.log(len(fitted)))

@@ -23,13 +23,16 @@ _MIN_SPEED_MPS = 0.02
 
 @dataclass(frozen=True)
 class NodalMaps:
-    """The nodes of the static maps: ``nodes[role]`` are commands, ascending; the drive has no node at neutral.
+    """The nodes of the static maps: ``nodes[role]`` are commands, ascending.
 
-    One vector holds all nodal values, in the order front, rear, drive. The drive's speed at neutral is zero.
+    One vector holds all nodal values, in the order front, rear, drive. Roles in ``zero_at_neutral`` have no node at
+    neutral, where their value is zero: the speed of the drive, and the yaw rate of a differential vehicle, which has no
+    nodes of a rear axle.
     """
 
     nodes: dict[str, Floats]
     neutral: float
+    zero_at_neutral: frozenset[str] = frozenset({"drive"})
 
     @property
     def size(self) -> int:
@@ -49,10 +52,12 @@ class NodalMaps:
     def weights(self, role: str, command: Floats) -> Floats:
         """Return the interpolation weights (n, nodes) of the nodal values of `role` at `command` (n,)."""
         nodes = self.nodes[role]
-        if role != "drive":
+        if role not in self.zero_at_neutral:
             return _interpolation(nodes, command)
-        # Neutral is a node of the drive with a fixed value of zero, not a parameter.
+        # Neutral is a node with a fixed value of zero, not a parameter.
         place = int(np.searchsorted(nodes, self.neutral))
+        if not len(nodes):
+            return np.empty((len(command), 0))
         if place in (0, len(nodes)):
             # A direction that was never driven is taken for the mirror image of the other.
             mirrored = (command < self.neutral) if place == 0 else (command > self.neutral)
@@ -79,7 +84,7 @@ class NodalMaps:
         for role, own in self.slices().items():
             nodes, observed = self.nodes[role], ~unobserved[own]
             at, known = nodes[observed], values[own][observed]
-            if role == "drive":
+            if role in self.zero_at_neutral:
                 place = int(np.searchsorted(at, self.neutral))
                 at, known = np.insert(at, place, self.neutral), np.insert(known, place, 0.0)
             if len(at):
@@ -87,17 +92,21 @@ class NodalMaps:
         return filled
 
 
-def nodal_maps(runs: Sequence[Run], neutral: float) -> NodalMaps:
-    """Return maps with nodes at `select_levels` of the driven commands."""
+def nodal_maps(runs: Sequence[Run], neutral: float, *, is_differential: bool = False) -> NodalMaps:
+    """Return maps with nodes at `select_levels` of the driven commands; `is_differential` as in `Geometry`."""
     nodes = {}
+    zero_at_neutral = frozenset({"drive", "front"} if is_differential else {"drive"})
     for role in ROLES:
-        driven, held_s = _driven_commands(runs, role, neutral)
+        if role == "rear" and is_differential:
+            nodes[role] = np.empty(0)
+            continue
+        driven, held_s = _driven_commands(runs, role, neutral, on_the_spot=is_differential)
         levels, which = np.unique(driven, return_inverse=True)
         longest_s = np.zeros(len(levels))
         np.maximum.at(longest_s, which, held_s)
         levels = select_levels(levels, longest_s)
-        nodes[role] = levels[levels != neutral] if role == "drive" else levels
-    return NodalMaps(nodes, neutral)
+        nodes[role] = levels[levels != neutral] if role in zero_at_neutral else levels
+    return NodalMaps(nodes, neutral, zero_at_neutral)
 
 
 def select_levels(levels: Floats, longest_s: Floats) -> Floats:
@@ -130,11 +139,15 @@ def _add_farthest(nodes: Floats, levels: Floats, near: float, most: int) -> Floa
     return np.sort(nodes)
 
 
-def _driven_commands(runs: Sequence[Run], role: str, neutral: float) -> tuple[Floats, Floats]:
-    """Return every command (n,) under which the vehicle was driven, and the time for which each was held [s]."""
+def _driven_commands(runs: Sequence[Run], role: str, neutral: float, *, on_the_spot: bool) -> tuple[Floats, Floats]:
+    """Return every command (n,) under which the vehicle was driven, and the time for which each was held [s].
+
+    A vehicle that turns `on_the_spot` is driven by its front command, too.
+    """
     commands, held_s = [], []
     for run in runs:
-        values, t_s, driven = getattr(run.commands, role), run.commands.t_s, _driven_rows(run.commands, neutral)
+        values, t_s = getattr(run.commands, role), run.commands.t_s
+        driven = _driven_rows(run.commands, neutral) | (on_the_spot & (run.commands.front != neutral))
         # A row begins where any command changes, so that one command may be held over many rows.
         changes = np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
         ends_s = np.append(t_s[changes[1:]], max(float(np.max(run.frames.t_s, initial=-np.inf)), t_s[-1]))
@@ -181,6 +194,8 @@ def _implied(role: str, m: RunMeasurement, geometry: Geometry) -> float:
 
 def _interpolation(nodes: Floats, command: Floats) -> Floats:
     out = np.zeros((len(command), len(nodes)))
+    if not len(nodes):
+        return out
     if len(nodes) < 2:
         out[:, :] = 1.0
         return out

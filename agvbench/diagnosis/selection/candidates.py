@@ -52,14 +52,21 @@ class Candidate:
 def candidates(geometry: Geometry, exclude: Iterable[str] = ()) -> dict[str, Candidate]:
     """Return every effect of the library, by name, except those that nodal maps absorb and those in `exclude`.
 
-    Effects of two driven axles are no candidates if one is driven.
+    Effects of two driven axles are no candidates if one is driven, and those of axle angles if none is steered.
     """
     excluded = {*exclude, *ABSORBED_BY_MAPS}
     return {
         name: candidate(kind)
         for name, kind in effect_kinds().items()
-        if name not in excluded and (geometry.driven == "both" or not kind.needs_both_axles_driven)
+        if name not in excluded and applies(kind, geometry)
     }
+
+
+def applies(kind: type[Effect], geometry: Geometry) -> bool:
+    """Return whether a vehicle of this geometry can have an effect."""
+    if geometry.is_differential and kind.needs_steered_axles:
+        return False
+    return geometry.driven == "both" or not kind.needs_both_axles_driven
 
 
 def candidate(kind: type[Effect]) -> Candidate:

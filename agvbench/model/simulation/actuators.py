@@ -74,8 +74,9 @@ _EVENT_COUNT = 11
 PLAN_SIZE = _EVENTS + _EVENT_COUNT
 
 # Servos and drive between commands: positions of the servos and of their axles, the drive's speed and that which
-# commands have made it recently, the servos' rates, the windup of the drive train [m].
-SERVOS_SIZE = 9
+# commands have made it recently, the servos' rates, the windup of the drive train [m], and the mean square of the speed
+# that commands have made recently.
+SERVOS_SIZE = 10
 
 # Below this gap [rad, m/s] an actuator counts as settled.
 _SETTLED = 1e-7

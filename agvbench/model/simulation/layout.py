@@ -21,7 +21,7 @@ WORK_SIZE = SMOOTH + SMOOTH_SIZE
 # Where a step starts: pose, distance driven, and the pose that a smoothing camera reports.
 START_SIZE = 7
 
-# Numbers of the vehicle: axles, the front axle's share of the drive, longest step, when the run began in hours, and the
-# deviation of the drive's level.
-FRONT_AXLE, REAR_AXLE, FRONT_DRIVE_SHARE, LONGEST_STEP, STARTED, NODAL_DEVIATION = range(6)
+# Numbers of the vehicle: axles, the front axle's share of the drive, longest step, when the run began in hours, the
+# deviation of the drive's level, and whether it is differential.
+FRONT_AXLE, REAR_AXLE, FRONT_DRIVE_SHARE, LONGEST_STEP, STARTED, NODAL_DEVIATION, DIFFERENTIAL = range(7)
 SECONDS_PER_HOUR = 3600.0

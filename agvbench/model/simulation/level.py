@@ -42,12 +42,17 @@ def drive_speed(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: floa
 def level_lift(
     s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, recent_speed: float, speed: float
 ) -> float:
-    """Return the difference of the drive speed to the commanded one, weighted by its significance."""
+    """Return the difference of the drive speed to the commanded one, weighted by its significance.
+
+    The means of a speed that changed recently do not tell the level: their ratio counts the less, the larger the
+    variance of the commanded speed was.
+    """
     deviation = vehicle[NODAL_DEVIATION]
     if deviation == math.inf:
         return 0.0
     commanded = _longitudinal_speed(s, p, vehicle, servos, now, servos[5])
-    factor = (commanded * recent_speed + _LEVEL_MPS**2) / (commanded * commanded + _LEVEL_MPS**2)
+    uncertain = _LEVEL_MPS**2 + max(servos[9] - servos[5] * servos[5], 0.0)
+    factor = (commanded * recent_speed + uncertain) / (commanded * commanded + uncertain)
     log_ratio = math.log(factor) if factor > 0.0 else 0.0
     if log_ratio == 0.0:
         return 0.0

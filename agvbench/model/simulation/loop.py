@@ -187,13 +187,15 @@ def _drive_run(
             # At rest with settled axles before the first command.
             servos[0] = servos[2] = s[FRONT_AIM]
             servos[1] = servos[3] = s[REAR_AIM]
-            servos[4] = servos[5] = servos[6] = servos[7] = servos[8] = 0.0
+            servos[4] = servos[5] = servos[6] = servos[7] = servos[8] = servos[9] = 0.0
             now = min(begin, end)
         elif now < begin:
             until = min(begin, end)
             plan_command(plan, s, servos)
             leave_command(plan, until - now, servos)
-            servos[5] += (servos[4] - servos[5]) * -math.expm1((now - until) / RECENT_SPEED_S)
+            recent = -math.expm1((now - until) / RECENT_SPEED_S)
+            servos[5] += (servos[4] - servos[5]) * recent
+            servos[9] += (servos[4] * servos[4] - servos[9]) * recent
             now = until
         if now < end:
             if now == begin:
@@ -236,9 +238,10 @@ def simulate(
     Parameters
     ----------
     vehicle
-        (5,): distances of front and rear axle from the marker centroid, longest step, a working value of the loop, and
-        the standard deviation of the logarithm of the initial speed over the speed that earlier commands result in:
-        a larger deviation indicates another drive level (∞: never).
+        (7,): distances of front and rear axle from the marker centroid, the front axle's share of the drive, longest
+        step, a working value of the loop, the standard deviation of the logarithm of the initial speed over the speed
+        that earlier commands result in (a larger deviation indicates another drive level; ∞: never), and 1 for a
+        differential vehicle.
     p
         Every effect's parameters.
     initial

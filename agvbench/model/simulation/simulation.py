@@ -243,6 +243,7 @@ class Simulation:
                     self._longest_step(parameters),
                     0.0,
                     nodal_deviation,
+                    float(self.geometry.is_differential),
                 ]
             ),
             np.ascontiguousarray(parameters, dtype=np.float64),

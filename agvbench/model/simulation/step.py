@@ -39,6 +39,7 @@ from agvbench.model.simulation.layout import (
     ALONG_X,
     ALONG_Y,
     COUNT,
+    DIFFERENTIAL,
     FRONT_AXLE,
     FRONT_DRIVE_SHARE,
     LATERAL,
@@ -58,8 +59,21 @@ from agvbench.types import Floats
 
 @compiled(inner=True, fast=True)
 def set_motion(s: Floats, p: Floats, vehicle: Floats) -> None:
-    """Turn angles and speed in `s` into the body's motion (thesis eq. 5.6–5.8, corrected)."""
+    """Turn angles and speed in `s` into the body's motion (thesis eq. 5.6–5.8, corrected).
+
+    The front value of a differential vehicle is its yaw rate.
+    """
     steer(s, p)
+    if vehicle[DIFFERENTIAL] != 0.0:
+        s[FRONT_SPEED] = s[REAR_SPEED] = s[SPEED]
+        s[COS_FRONT] = s[COS_REAR] = s[DRAGGED] = 1.0
+        s[TAN_FRONT] = s[TAN_REAR] = 0.0
+        drive(s, p)
+        # What slips and what differs left and right acts at the axle, and the centroid turns with it.
+        s[FORWARD], s[LEFT], s[YAW_RATE] = s[FRONT_SPEED], 0.0, s[FRONT]
+        move(s, p)
+        s[LEFT] += vehicle[REAR_AXLE] * s[YAW_RATE]
+        return
     front, rear = s[FRONT], s[REAR]
     if front != s[KNOWN_FRONT] or rear != s[KNOWN_REAR]:
         s[KNOWN_FRONT], s[KNOWN_REAR] = front, rear

@@ -1,0 +1,76 @@
+"""Differential vehicles: what a plant of a few lines hides is named, and where nothing is hidden nothing is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from differential_vehicle import Campaign, Differential
+
+from agvbench.diagnosis import Diagnosis, Verdict, diagnose
+from agvbench.effects import effect_kinds
+from agvbench.model import VehicleModel
+
+CURVATURE = 2.0 * 0.03 / (2.03 * 0.4)  # the right wheel is 3 % larger, on a track of 0.4 m
+
+
+def found(diagnosis: Diagnosis) -> dict[str, float]:
+    """Return every parameter that was found, by effect and name."""
+    return {f"{e.name}.{name}": p.value for e in diagnosis.effects for name, p in e.parameters.items()}
+
+
+@pytest.mark.parametrize(
+    ("truth", "expected", "tolerance"),
+    [
+        ({"yaw_lag_s": 0.3}, {"steering_lag.time_constant_s": 0.3}, 0.01),
+        ({"speed_lag_s": 0.3}, {"speed_lag.accelerate_s": 0.3, "speed_lag.brake_s": 0.3}, 0.01),
+        ({"right_wheel": 1.03}, {"wheel_diameter_mismatch.curvature_per_m": CURVATURE}, 0.003),
+        ({"marker_ahead_m": 0.13}, {"marker_offset.forward_m": 0.03}, 0.002),
+        ({"slip_by_speed": 1.0}, {"lateral_slip.gradient": 1.0}, 0.03),
+    ],
+)
+def test_one_cause_is_named_with_its_size(truth, expected, tolerance):
+    diagnosis = diagnose(Campaign(Differential(**truth)))
+    assert diagnosis.verdict is Verdict.NAMED
+    values = found(diagnosis)
+    for name, value in expected.items():
+        assert values[name] == pytest.approx(value, abs=tolerance)
+    # A larger wheel shifts the centre of rotation, too, which is the same as markers off the centre line.
+    assert {name.partition(".")[0] for name in values} <= {*(n.partition(".")[0] for n in expected), "marker_offset"}
+    errors = diagnosis.held_out.errors["position_rms_mm"]
+    assert errors["after"] < 0.5 * errors["before"]
+
+
+def test_a_delay_is_left_open_between_command_and_camera():
+    diagnosis = diagnose(Campaign(Differential(delay_s=0.12)))
+    assert diagnosis.verdict is Verdict.AMBIGUOUS
+    assert {diagnosis.effects[0].name, *diagnosis.effects[0].confounded_with} == {"actuation_delay", "mocap_latency"}
+    assert next(iter(found(diagnosis).values())) == pytest.approx(0.12, abs=0.005)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_nothing_is_found_where_nothing_is_hidden(seed):
+    assert diagnose(Campaign(Differential(), seed=seed)).verdict is Verdict.ADEQUATE
+
+
+def test_five_causes_at_once_are_found_together(tmp_path):
+    truth = Differential(yaw_lag_s=0.3, speed_lag_s=0.25, delay_s=0.1, right_wheel=1.02, marker_ahead_m=0.12)
+    diagnosis = diagnose(Campaign(truth))
+    values = found(diagnosis)
+    assert values["steering_lag.time_constant_s"] == pytest.approx(0.3, abs=0.01)
+    assert values["speed_lag.brake_s"] == pytest.approx(0.25, abs=0.01)
+    assert values["marker_offset.forward_m"] == pytest.approx(0.02, abs=0.003)
+    assert diagnosis.held_out.errors["position_rms_mm"]["after"] < 6.0
+    assert diagnosis.held_out.errors["position_rms_mm"]["before"] > 60.0
+    corrected = diagnosis.model
+    corrected.save(tmp_path / "vehicle.toml")
+    again = VehicleModel.load(tmp_path / "vehicle.toml")
+    assert again.calibration_hash == corrected.calibration_hash
+    assert again.geometry.is_differential
+    np.testing.assert_allclose(again.front(np.array([0.6, -0.6])), [0.7 * 0.6, -0.7 * 0.6], atol=0.02)
+
+
+def test_no_effect_of_steered_axles_is_tried():
+    diagnosis = diagnose(Campaign(Differential(), sessions=3))
+    tried = diagnosis.provenance["windows"]["effects"]
+    assert tried
+    assert not any(effect_kinds()[name].needs_steered_axles for name in tried if name in effect_kinds())

@@ -1,0 +1,131 @@
+"""Differential vehicles: rollouts against DOP853 on equations written out here, files, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from agvbench.campaign import CampaignHeader
+from agvbench.effects import CorneringSpeedLoss, SpeedLag, SteeringLag, WheelDiameterMismatch
+from agvbench.errors import CampaignError, VehicleError
+from agvbench.model import VehicleModel
+from agvbench.types import Commands, Floats
+from agvbench.vehicle.geometry import Geometry
+from agvbench.vehicle.kinematics import actuator_values
+from agvbench.vehicle.maps import Fixed, Line
+
+GEOMETRY = Geometry(0.0, 0.15, kinematics="differential")
+
+
+def turtle(lag_s: float = 0.0, speed_lag_s: float = 0.0, curvature: float = 0.0) -> VehicleModel:
+    """A vehicle whose commands are its speed [m/s] and yaw rate [rad/s]."""
+    return VehicleModel(
+        name="turtle", geometry=GEOMETRY, command_unit="si", neutral=0.0,
+        front=Line(1.0, 0.0), rear=Fixed(command=0.0), drive=Line(1.0, 0.0),
+        effects=(SteeringLag(lag_s), SpeedLag(speed_lag_s, speed_lag_s), WheelDiameterMismatch(curvature)),
+    )  # fmt: skip
+
+
+def truth(t_s: Floats, times: Floats, told: Floats, lag_s: float, speed_lag_s: float, curvature: float) -> Floats:
+    """Return poses (n, 3) of the centroid, which is 0.15 m ahead of the axle; `told` (m, 2) are speed and yaw rate."""
+
+    def rate(_: float, s: Floats, v_aim: float, w_aim: float) -> list[float]:
+        v, w = s[3] if speed_lag_s else v_aim, s[4] if lag_s else w_aim
+        yaw = w + curvature * v
+        dv = (v_aim - s[3]) / speed_lag_s if speed_lag_s else 0.0
+        dw = (w_aim - s[4]) / lag_s if lag_s else 0.0
+        return [v * np.cos(s[2]), v * np.sin(s[2]), yaw, dv, dw]
+
+    state, out = np.array([-0.15, 0.0, 0.0, 0.0, 0.0]), np.empty((len(t_s), 3))
+    ends = np.append(times[1:], t_s[-1] + 1.0)
+    for begin, end, (v_aim, w_aim) in zip(times, ends, told, strict=True):
+        own = (t_s >= begin) & (t_s < end)
+        solved = solve_ivp(
+            rate, (begin, end), state, "DOP853", t_eval=np.append(t_s[own], end), args=(v_aim, w_aim), rtol=1e-10,
+            atol=1e-12,
+        )  # fmt: skip
+        out[own], state = solved.y[:3, :-1].T, solved.y[:, -1]
+    return np.column_stack([out[:, 0] + 0.15 * np.cos(out[:, 2]), out[:, 1] + 0.15 * np.sin(out[:, 2]), out[:, 2]])
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    lag_s=st.sampled_from((0.0, 0.1, 0.8)),
+    speed_lag_s=st.sampled_from((0.0, 0.2, 1.0)),
+    curvature=st.sampled_from((0.0, 0.1)),
+)
+def test_rollouts_agree_with_dop853(seed: int, lag_s: float, speed_lag_s: float, curvature: float) -> None:
+    rng = np.random.default_rng(seed)
+    times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.05, 1.0, 6))])
+    told = rng.uniform(-1.0, 1.0, (7, 2)) * [0.8, 1.5]
+    told[rng.random(7) < 0.3, 0] = 0.0  # turns on the spot
+    t = np.linspace(0.0, times[-1] + 1.0, 120)
+    commands = Commands(times, told[:, 0], told[:, 1], np.zeros(7))
+    ours = turtle(lag_s, speed_lag_s, curvature).rollout([commands], [(0.0, 0.0, 0.0)], [t])[0]
+    expected = truth(t, times, told, lag_s, speed_lag_s, curvature)
+    np.testing.assert_allclose(ours, expected, rtol=0.0, atol=5e-5)
+
+
+@given(forward=st.floats(-2.0, 2.0), yaw=st.floats(-5.0, 5.0))
+def test_the_actuators_have_speed_and_yaw_rate(forward: float, yaw: float) -> None:
+    assert [float(v) for v in actuator_values(forward, 0.15 * yaw, yaw, GEOMETRY)] == [yaw, 0.0, forward]
+
+
+def test_a_vehicle_file_keeps_its_kinematics(tmp_path) -> None:
+    path = tmp_path / "vehicle.toml"
+    turtle(0.1).save(path)
+    assert VehicleModel.load(path) == turtle(0.1)
+    assert 'unit = "rad/s"' in path.read_text(encoding="utf-8")
+    path.write_text(path.read_text(encoding="utf-8").replace("rad/s", "rad"), encoding="utf-8")
+    with pytest.raises(VehicleError, match=r"maps\.front\.unit: wrong unit: 'rad' \(limit: rad/s\)"):
+        VehicleModel.load(path)
+
+
+def test_an_effect_of_steered_axles_is_refused() -> None:
+    with pytest.raises(
+        VehicleError, match="an effect of steered axles, but the vehicle has none: cornering_speed_loss"
+    ):
+        turtle().with_effects(CorneringSpeedLoss(0.1))
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ((0.1, 0.1, "both", "differential"), "a differential vehicle has no front axle: 0.1 m"),
+        ((0.1, 0.1, "both", "hover"), "unknown kinematics: 'hover' .one of: two_axle, differential"),
+        ((0.0, -21.0, "both", "differential"), "rear_axle_m is longer than any vehicle"),
+        ((0.1, -0.1, "both", "two_axle"), "rear_axle_m: must be greater than zero"),
+    ],
+)
+def test_a_geometry_that_cannot_be_is_refused(values, message) -> None:
+    with pytest.raises(VehicleError, match=message):
+        Geometry(*values)
+
+
+HEADER = CampaignHeader(3, "c", "turtle", 0.0, -0.05, "si", 0.0, 50.0, kinematics="differential")
+
+
+def test_a_campaign_keeps_its_kinematics(tmp_path) -> None:
+    HEADER.save(tmp_path / "campaign.toml")
+    assert CampaignHeader.load(tmp_path / "campaign.toml") == HEADER
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"schema": 2}, r'kinematics needs a newer schema: kinematics = "differential" in schema 2 .limit: schema 3'),
+        (
+            {"schema": 1, "kinematics": "two_axle", "front_axle_m": 0.1, "rear_axle_m": 0.1},
+            "command_unit needs a newer",
+        ),
+    ],
+)
+def test_an_older_schema_knows_no_kinematics(change, message) -> None:
+    with pytest.raises(CampaignError, match=message):
+        replace(HEADER, **change)
