@@ -206,6 +206,21 @@ class ResidualCriteria:
 
 
 @dataclass(frozen=True)
+class DriveLevelCriteria:
+    """When sessions of free driving differ in the level of the drive.
+
+    ``alpha``
+        Level of the test, for all sessions together.
+    ``min_deviation``
+        Least difference of the logarithm of the speed. A battery and the temperature of tyres change it by a few
+        percent within a session.
+    """
+
+    alpha: float = 1e-3
+    min_deviation: float = 0.05
+
+
+@dataclass(frozen=True)
 class LoggedCriteria:
     """Which columns that a lab logged are covariates.
 
@@ -282,6 +297,7 @@ RESIDUAL = ResidualCriteria()
 LOGGED = LoggedCriteria()
 DESIGN = DesignCriteria()
 PRIOR = PriorCriteria()
+FREE_DRIVING_LEVEL = DriveLevelCriteria()
 
 
 def stated_criteria(

@@ -81,15 +81,18 @@ def drive(truth: Differential, seconds: float, rng: np.random.Generator) -> tupl
 
 
 class Campaign:
-    """Drives of one truth, in sessions."""
+    """Drives of one truth, in sessions; ``session_changes`` are what differs in the last of them."""
 
     header = HEADER
 
-    def __init__(self, truth: Differential, *, seed: int = 0, sessions: int = 4, seconds: float = 60.0) -> None:
+    def __init__(
+        self, truth: Differential, *, seed: int = 0, sessions: int = 4, seconds: float = 60.0, **session_changes: float
+    ) -> None:
         rng = np.random.default_rng([0xD1F, seed])
         self.runs = []
         for session in range(sessions):
-            commands, frames = drive(truth, seconds, rng)
+            own = dataclasses.replace(truth, **session_changes) if session == sessions - 1 else truth
+            commands, frames = drive(own, seconds, rng)
             run = Run(f"{session}-0", "free", "", "", 0, NO_TARGET, 3600.0 * session, "ok", "", commands, frames)
             self.runs.append(dataclasses.replace(run, session=f"day {session}"))
 

@@ -148,7 +148,7 @@ def read_runs(runs: Iterable[Run], neutral: float | None = None) -> Readings:
 
 def read_windows(runs: Iterable[Run], horizon: Horizon, neutral: float, *, turns_on_the_spot: bool = False) -> Readings:
     """Cut runs into windows; ``refused`` lists the runs without any window, with the reason."""
-    every = [shift_commands_half_a_row(run) for run in with_common_levels(list(runs))]
+    every = list(with_common_levels(list(runs)))
     began = session_starts(every)
     refused = {run.run_id: run.status for run in every if not run.is_ok}
     usable: dict[str, list[Run]] = {}

@@ -16,8 +16,9 @@ from agvbench.diagnosis.data.window_splits import held_out_windows, thinned
 from agvbench.diagnosis.data.windows import Horizon
 from agvbench.diagnosis.estimation.fit import Fit, fit
 from agvbench.diagnosis.free_driving.conclusion import WindowConclusion
+from agvbench.diagnosis.free_driving.drive_level import nodal_deviation, sessions_differ
 from agvbench.diagnosis.free_driving.maps import NODES, smooth_maps, start_values_of_windows
-from agvbench.diagnosis.free_driving.predictors import autocorrelation_time, nodal_deviation
+from agvbench.diagnosis.free_driving.predictors import autocorrelation_time
 from agvbench.diagnosis.free_driving.selection import WindowSelector
 from agvbench.diagnosis.method import Method
 from agvbench.diagnosis.model.batch import Batch
@@ -107,14 +108,20 @@ class FreeDriving(Method[SelectedFromWindows]):
         ).diagnosis(self.horizon)
 
     def _selector(self, readings: Readings, split: Split, static: Fit) -> WindowSelector:
-        """Return the selector for the training windows of `static`."""
+        """Return the selector for the training windows of `static`, with the level of the drive if sessions differ."""
+        test = thinned(np.flatnonzero(split.test), DATA.max_fitted_windows)
+        trained = thinned(np.flatnonzero(split.training), DATA.max_fitted_windows)
+        every = readings.select(np.sort(np.r_[trained, test]))
+        differ = _has_sessions(every) and sessions_differ(every, static.predictor, static.parameters)
+        deviation = nodal_deviation(static.predictor, static.parameters) if differ else np.inf
+        return self._selector_with(deviation, readings.select(test), static)
+
+    def _selector_with(self, deviation: float, test: Readings, static: Fit) -> WindowSelector:
+        """Return the selector for a given deviation of the level; see `Simulation.predict`."""
         context, fitted, maps = self.context, static.predictor.readings, static.predictor.maps
-        test = readings.select(thinned(np.flatnonzero(split.test), DATA.max_fitted_windows))
         tried, kinds = candidates_for(context.vehicle, context.geometry)
         tried = {name: one for name, one in tried.items() if name not in ABSORBED_IN_WINDOWS}
         given = given_effects(context.vehicle, tried)
-        has_sessions = len(np.unique(readings.initial_states.session)) > 1 if readings.initial_states else False
-        deviation = nodal_deviation(static.predictor, static.parameters) if has_sessions else np.inf
         fitted_maps = fit(
             Predictor(Batch(fitted, maps, context.geometry, deviation)), static.parameters, np.empty((0, 2))
         )
@@ -128,6 +135,10 @@ class FreeDriving(Method[SelectedFromWindows]):
             *given,
             test_batch=Batch(test, maps, context.geometry, deviation, kinds=kinds),
         )
+
+
+def _has_sessions(readings: Readings) -> bool:
+    return readings.initial_states is not None and len(np.unique(readings.initial_states.session)) > 1
 
 
 def _static(fitted: Readings, geometry: Geometry, neutral: float) -> Fit:

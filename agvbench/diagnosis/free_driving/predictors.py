@@ -15,7 +15,6 @@ from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.effects import Effect
 from agvbench.model import VehicleModel
 from agvbench.model.simulation.simulation import SimulatedRun, Simulation
-from agvbench.signals import robust_std
 from agvbench.types import Floats
 from agvbench.vehicle.kinematics import wheel_speed
 
@@ -69,33 +68,6 @@ def prior_model(vehicle: VehicleModel, readings: Readings, kinds: Sequence[type[
     return poses.reshape(len(readings), -1, 3)
 
 
-def nodal_deviation(predictor: Predictor, parameters: Floats) -> float:
-    """Return the standard deviation of the logarithm of the speed about the prediction, within sessions, times two.
-
-    A larger deviation of the initial speed of a window indicates another drive level.
-    """
-    initial_states, batch = _initial_states(predictor.readings), predictor.batch
-    short_runs = [
-        SimulatedRun(run.commands, np.array([b + _SHORT_S]), float(h), begins_s=float(b))
-        for run, h, b in zip(predictor.readings.runs, predictor.readings.started_h, initial_states.t_s, strict=True)
-    ]
-    settled, initial = predictor.settled(parameters)
-    initial[:, 3] = np.nan
-    simulation = Simulation(batch.geometry, batch.maps.neutral, short_runs, kinds=batch.kinds)
-    moved = simulation.predict(settled, predictor.all_parameters(parameters), initial) - initial[:, :3]
-    predicted = (np.cos(initial[:, 2]) * moved[:, 0] + np.sin(initial[:, 2]) * moved[:, 1]) / _SHORT_S
-    use = (
-        (np.abs(predicted) > _SLOW_MPS)
-        & (predicted * initial_states.speed_mps > 0.0)
-        & (np.abs(initial_states.speed_mps) > _SLOW_MPS)
-    )
-    deviation = np.log(np.abs(initial_states.speed_mps[use]) / np.abs(predicted[use]))
-    session = initial_states.session[use]
-    for name in np.unique(session):
-        deviation[session == name] -= np.median(deviation[session == name])
-    return max(_MIN_DEVIATION, 2.0 * robust_std(deviation)) if len(deviation) else _MIN_DEVIATION
-
-
 def autocorrelation_time(fitted: Fit) -> float:
     """Return the number of windows that are worth one independent window.
 
@@ -119,6 +91,3 @@ def autocorrelation_time(fitted: Fit) -> float:
 
 
 _MAX_LAG, _MIN_PAIRS = 10, 10
-_SHORT_S = 0.01
-_SLOW_MPS = 0.05
-_MIN_DEVIATION = 0.05

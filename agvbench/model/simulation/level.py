@@ -42,7 +42,7 @@ def drive_speed(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: floa
 def level_lift(
     s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, recent_speed: float, speed: float
 ) -> float:
-    """Return the difference of the drive speed to the commanded one, weighted by its significance.
+    """Return by how much the drive is faster than commanded, weighted by its significance.
 
     The means of a speed that changed recently do not tell the level: their ratio counts the less, the larger the
     variance of the commanded speed was.
@@ -57,7 +57,8 @@ def level_lift(
     if log_ratio == 0.0:
         return 0.0
     weight = 1.0 / (1.0 + (deviation / log_ratio) ** 4)
-    return float(weight * (drive_speed(s, p, vehicle, servos, now, speed) - servos[5]))
+    faster = drive_speed(s, p, vehicle, servos, now, speed) - servos[5]
+    return float(weight * faster * math.copysign(1.0, servos[5]))
 
 
 @compiled(inner=True)

@@ -86,7 +86,7 @@ def _last_reversal(reversal: float, before: float, now: float) -> float:
 def _obey(
     s: Floats, p: Floats, commands: Floats, settled: Floats, driven: int, front: int, rear: int, lift: float
 ) -> None:
-    """Put commands and aims into `s`; a driving command gets the speed `lift` of the drive level.
+    """Put commands and aims into `s`; the `lift` of the drive level makes a driving command faster, either way.
 
     The drive obeys the row `driven`, the servos `front` and `rear`.
     """
@@ -98,8 +98,8 @@ def _obey(
         s[REAR_REVERSAL] = _last_reversal(s[REAR_REVERSAL], settled[rear - 1, 1], settled[rear, 1])
     s[DRIVE_COMMAND], s[FRONT_COMMAND], s[REAR_COMMAND] = commands[driven, 0], commands[front, 1], commands[rear, 2]
     s[FRONT_AIM], s[REAR_AIM], s[SPEED_AIM] = settled[front, 0], settled[rear, 1], settled[driven, 2]
-    if settled[driven, 2] != 0.0:
-        s[SPEED_AIM] += lift
+    if lift != 0.0 and settled[driven, 2] != 0.0:
+        s[SPEED_AIM] = math.copysign(max(abs(settled[driven, 2]) + lift, 0.0), settled[driven, 2])
     s[STEERING_LAG], s[STEERING_RATE], s[ACCELERATE_LAG], s[BRAKE_LAG] = 0.0, math.inf, 0.0, 0.0
     s[FRONT_BACKLASH] = s[REAR_BACKLASH] = 0.0
     s[STEERING_INERTIA], s[STEERING_ACCELERATION], s[REAR_LAG_RATIO] = 0.0, math.inf, 1.0

@@ -1,0 +1,90 @@
+"""The level of the drive: how fast the same command drives the vehicle in different sessions.
+
+A battery is charged or a floor is swept between sessions. What is known of a window's level is its initial speed beside
+the speed that the commands before it result in; no pose after the beginning of a window is used.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.stats import t as student
+
+from agvbench.diagnosis.criteria import FREE_DRIVING_LEVEL
+from agvbench.diagnosis.data.readings import Readings
+from agvbench.diagnosis.data.window_splits import _initial_states
+from agvbench.diagnosis.model.batch import Batch
+from agvbench.diagnosis.model.predictor import Predictor
+from agvbench.model.simulation.simulation import SimulatedRun, Simulation
+from agvbench.signals import robust_std
+from agvbench.types import Floats
+
+_SHORT_S = 0.01
+_SLOW_MPS = 0.05
+
+
+def nodal_deviation(predictor: Predictor, parameters: Floats) -> float:
+    """Return the standard deviation of the logarithm of the speed about the prediction, within sessions, times two.
+
+    A larger deviation of the initial speed of a window indicates another drive level.
+    """
+    deviation = _speed_deviations(predictor, parameters)
+    session = _initial_states(predictor.readings).session
+    known = np.isfinite(deviation)
+    deviation, session = deviation[known], session[known]
+    for name in np.unique(session):
+        deviation[session == name] -= np.median(deviation[session == name])
+    least = FREE_DRIVING_LEVEL.min_deviation
+    return max(least, 2.0 * robust_std(deviation)) if len(deviation) else least
+
+
+def sessions_differ(readings: Readings, predictor: Predictor, parameters: Floats) -> bool:
+    """Return whether the sessions of `readings` differ in the level of the drive.
+
+    Deviations of the initial speed are compared between each session and the others by Student's test, with blocks of
+    driving as units.
+    """
+    batch = Batch(readings, predictor.maps, predictor.batch.geometry, kinds=predictor.batch.kinds)
+    deviation = _speed_deviations(Predictor(batch), parameters[: predictor.maps.size])
+    known = np.isfinite(deviation)
+    if not known.any():
+        return False
+    blocks, index = np.unique(readings.group[known], return_inverse=True)
+    middle = np.array([np.median(deviation[known][index == k]) for k in range(len(blocks))])
+    first = np.searchsorted(index, np.arange(len(blocks)), sorter=np.argsort(index, kind="stable"))
+    session = _initial_states(readings).session[known][np.argsort(index, kind="stable")[first]]
+    names = np.unique(session)
+    return any(_differs(middle[session == name], middle[session != name], len(names)) for name in names)
+
+
+def _differs(one: Floats, others: Floats, sessions: int) -> bool:
+    """Return whether two sets of levels differ; Bonferroni's correction is for the number of `sessions`."""
+    freedom = len(one) + len(others) - 2
+    if freedom < 1 or not len(one) or not len(others):
+        return False
+    difference = abs(float(np.mean(one) - np.mean(others)))
+    pooled = (np.sum((one - np.mean(one)) ** 2) + np.sum((others - np.mean(others)) ** 2)) / freedom
+    stderr = float(np.sqrt(pooled * (1.0 / len(one) + 1.0 / len(others))))
+    critical = float(student.isf(0.5 * FREE_DRIVING_LEVEL.alpha / sessions, freedom))
+    return difference > max(FREE_DRIVING_LEVEL.min_deviation, critical * stderr)
+
+
+def _speed_deviations(predictor: Predictor, parameters: Floats) -> Floats:
+    """Return the logarithm of the initial speed over the predicted one, (W,); NaN at low speed."""
+    initial_states, batch = _initial_states(predictor.readings), predictor.batch
+    short_runs = [
+        SimulatedRun(run.commands, np.array([b + _SHORT_S]), float(h), begins_s=float(b))
+        for run, h, b in zip(predictor.readings.runs, predictor.readings.started_h, initial_states.t_s, strict=True)
+    ]
+    settled, initial = predictor.settled(parameters)
+    initial[:, 3] = np.nan
+    simulation = Simulation(batch.geometry, batch.maps.neutral, short_runs, kinds=batch.kinds)
+    moved = simulation.predict(settled, predictor.all_parameters(parameters), initial) - initial[:, :3]
+    predicted = (np.cos(initial[:, 2]) * moved[:, 0] + np.sin(initial[:, 2]) * moved[:, 1]) / _SHORT_S
+    use = (
+        (np.abs(predicted) > _SLOW_MPS)
+        & (predicted * initial_states.speed_mps > 0.0)
+        & (np.abs(initial_states.speed_mps) > _SLOW_MPS)
+    )
+    out = np.full(len(predicted), np.nan)
+    out[use] = np.log(np.abs(initial_states.speed_mps[use]) / np.abs(predicted[use]))
+    return out
