@@ -90,6 +90,11 @@ def calibrate(
     opened = as_campaign(campaign)
     header = opened.header
     geometry = header.geometry
+    geometry.require_two_axles(
+        "arcs and straights calibrate steered axles only",
+        where=f"campaign {header.name}",
+        remedy="use agvbench diagnose: its --out writes a vehicle with fitted maps",
+    )
     runs = [run for run in opened if run.split not in {"held_out", "validation"} and session in (None, run.session)]
     if session is not None and not runs:
         raise InputError("no run belongs to this session", where=f"campaign {header.name}", value=repr(session))

@@ -35,6 +35,9 @@ def nominal_model(
     >>> model.command_for(front_rad=math.radians(15.0), rear_rad=0.0, speed_mps=0.32)
     Command(drive=900.0, front=1300.0, rear=1500.0)
     """
+    geometry.require_two_axles(
+        "a nominal vehicle has steered axles", where=f"vehicle {name}", remedy="give a vehicle file with its maps"
+    )
     full = _FULL_COMMAND.get(command_unit, 1.0)
     low, high = neutral - abs(full), neutral + abs(full)
     steering = Line.through(neutral, _FULL_ANGLE_RAD / full, command_low=low, command_high=high)

@@ -91,6 +91,11 @@ def plan(
     PlanError
         If the vehicle cannot drive the trajectory, or not inside the workspace.
     """
+    model.geometry.require_two_axles(
+        "trajectories are planned for steered axles only",
+        where=f"vehicle {model.name}",
+        remedy="record its drives, and import them with agvbench import",
+    )
     made = _made(trajectory, model)
     if workspace is None:
         return made if start is None else replace(made, start=start)

@@ -83,6 +83,13 @@ class Geometry:
         """Whether the vehicle turns by the difference of its wheels' speeds."""
         return self.kinematics == "differential"
 
+    def require_two_axles(self, what: str, *, where: object, remedy: str) -> None:
+        """Raise `VehicleError` if the vehicle is differential; `what` cannot be done for it."""
+        if self.is_differential:
+            raise VehicleError(
+                what, where=where, value=f'kinematics = "{self.kinematics}"', limit="two_axle", remedy=remedy
+            )
+
     @property
     def wheelbase_m(self) -> float:
         """Distance from axle to axle [m]."""

@@ -70,11 +70,11 @@ def drive(corpus: Path, name: str, options: list[str]) -> str:
 
 def measured(corpus: Path) -> None:
     """Import the DART recordings where there are any: free driving in the place of runs from rest."""
-    from perf_dart import recordings
+    from perf_measured import recordings
 
     from agvbench.campaign import import_recordings
 
-    files = recordings()
+    files = recordings("dart")
     if files and not (corpus / "measured-dart").exists():
         import_recordings("dart", files, corpus / "measured-dart")
         print("measured-dart: imported", flush=True)

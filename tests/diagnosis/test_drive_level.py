@@ -53,3 +53,10 @@ def test_another_level_on_the_test_day_is_followed():
     assert found.verdict in (Verdict.NAMED, Verdict.UNKNOWN)
     errors = found.held_out.errors["position_rms_mm"]
     assert errors["after"] < 0.75 * errors["before"]
+
+
+def test_an_effect_at_its_bound_is_not_named():
+    # A wheel that is a quarter larger turns the vehicle by more than the library's bound of 1 1/m allows.
+    found = diagnose(Campaign(Differential(right_wheel=1.6)))
+    assert "wheel_diameter_mismatch" not in [effect.name for effect in found.effects]
+    assert found.verdict is Verdict.UNKNOWN

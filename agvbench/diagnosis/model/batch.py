@@ -124,6 +124,11 @@ class Batch:
         self.rows = np.concatenate([rows_of_run[i] for i in run])
         self.row_change = np.concatenate(changed)
 
+    def with_kinds(self, kinds: Sequence[type[Effect]]) -> Batch:
+        """Return this batch with other effects outside the library."""
+        level = self.nodal_deviation
+        return Batch(self.readings, self.maps, self.geometry, level, self.autocorrelation_time, kinds)
+
     def with_priors(self, priors: tuple[Prior, ...]) -> Batch:
         """Return this batch with other priors of the effects' parameters; both share the packed runs."""
         other = copy(self)

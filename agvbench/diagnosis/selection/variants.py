@@ -12,7 +12,6 @@ import numpy as np
 from agvbench.diagnosis.criteria import FIT, SELECTION, VARIANT
 from agvbench.diagnosis.estimation.fit import fit
 from agvbench.diagnosis.estimation.score_test import first_order_gain
-from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.candidates import Candidate, bounds_of, candidate, candidates
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
@@ -52,9 +51,7 @@ def with_extended_library(selector: Selector) -> Selector:
     batch = selector.batch
     if selector.extended is None:
         is_extended = {*EXTENDED_LIBRARY} <= {*batch.kinds}
-        selector.extended = (
-            batch if is_extended else Batch(batch.readings, batch.maps, batch.geometry, kinds=EXTENDED_LIBRARY)
-        )
+        selector.extended = batch if is_extended else batch.with_kinds(EXTENDED_LIBRARY)
     return selector.for_batch(selector.extended)
 
 

@@ -139,7 +139,7 @@ def _header(
     """Return the campaign's header; a session that is resumed keeps the names that it began with."""
     identity = link.identity()
     header = CampaignHeader(
-        schema=schema_for(nominal.geometry.driven),
+        schema=schema_for(nominal.geometry.driven, nominal.geometry.kinematics, nominal.command_unit),
         name=directory.resolve().name,
         vehicle_name=nominal.name if settings.vehicle else identity.vehicle,
         front_axle_m=nominal.geometry.front_axle_m,
@@ -148,6 +148,7 @@ def _header(
         neutral=nominal.neutral,
         mocap_rate_hz=identity.mocap_rate_hz,
         driven=nominal.geometry.driven,
+        kinematics=nominal.geometry.kinematics,
     )
     if resume and (directory / FILE_NAME).exists():
         stored = CampaignHeader.load(directory / FILE_NAME)
