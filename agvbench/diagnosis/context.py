@@ -6,7 +6,14 @@ from collections import Counter
 from dataclasses import asdict, dataclass
 
 from agvbench.calibration.campaign_protocol import HeaderLike
-from agvbench.diagnosis.criteria import FREE_DRIVING, FREE_DRIVING_LEVEL, LOGGED, SELECTION, stated_criteria
+from agvbench.diagnosis.criteria import (
+    FREE_DRIVING,
+    FREE_DRIVING_LEVEL,
+    LOGGED,
+    SELECTION,
+    SESSION_CLOCK,
+    stated_criteria,
+)
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.result import Diagnosis, Verdict
 from agvbench.errors import CampaignError
@@ -46,7 +53,8 @@ class DiagnosisContext:
 
         windows = readings.initial_states is not None
         criteria = stated_criteria(FREE_DRIVING if windows else SELECTION, with_priors=bool(self.priors))
-        criteria |= {"drive_level": asdict(FREE_DRIVING_LEVEL)} if windows else {}
+        if windows:
+            criteria |= {"drive_level": asdict(FREE_DRIVING_LEVEL), "session_clock": asdict(SESSION_CLOCK)}
         logged: dict[str, object] = {}
         if stated := readings.logged.stated():
             criteria["logged"], logged = asdict(LOGGED), {"logged_columns": stated}

@@ -221,6 +221,33 @@ class DriveLevelCriteria:
 
 
 @dataclass(frozen=True)
+class SessionClockCriteria:
+    """When the clocks of camera and vehicle differ by another offset in one session of free driving.
+
+    ``alpha``
+        Level of the test, for all sessions together.
+    ``min_offset_s``
+        Least offset: commands and poses of most loggers are a few hundredths of a second apart.
+    ``adapted_s``
+        Part at the beginning of a test session from which its offset is estimated; it is not part of the test.
+    ``min_blocks``, ``least_stderr_s``
+        Least number of blocks of 2 s for a standard error, and the smallest one: few blocks may agree by chance.
+    ``max_stderr_s``
+        Largest standard error: where steering changes slowly, play and other causes look like an offset.
+    ``min_speed_mps``
+        Least speed at which the yaw rate of steered axles tells their angle.
+    """
+
+    alpha: float = 1e-3
+    min_offset_s: float = 0.04
+    adapted_s: float = 20.0
+    min_blocks: int = 3
+    least_stderr_s: float = 0.004
+    max_stderr_s: float = 0.02
+    min_speed_mps: float = 0.1
+
+
+@dataclass(frozen=True)
 class LoggedCriteria:
     """Which columns that a lab logged are covariates.
 
@@ -298,6 +325,7 @@ LOGGED = LoggedCriteria()
 DESIGN = DesignCriteria()
 PRIOR = PriorCriteria()
 FREE_DRIVING_LEVEL = DriveLevelCriteria()
+SESSION_CLOCK = SessionClockCriteria()
 
 
 def stated_criteria(

@@ -147,6 +147,20 @@ def remedies_in_words(content: Mapping[str, Any]) -> Iterator[str]:
             yield f"Remedy of {effect.get('name')}: {remedy}."
 
 
+def sessions_in_words(content: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what differs in single sessions of free driving: the clock of the camera, and the level of the drive."""
+    windows = mapping(mapping(content.get("provenance")).get("windows"))
+    for name, found in mapping(windows.get("sessions")).items():
+        clock, level = (mapping(mapping(found).get(key)) for key in ("clock_offset", "drive_level"))
+        if clock.get("significant"):
+            value_s, stderr_s = number(clock.get("value_s")), number(clock.get("stderr_s"))
+            offset = f"{abs(value_s):.3f} ± {stderr_s:.3f} s {'behind' if value_s > 0.0 else 'ahead of'} the others"
+            yield f"Session {name}: camera clock {offset}; its commands were moved by that."
+        if level.get("significant"):
+            factor, stderr = number(level.get("factor")), number(level.get("stderr"))
+            yield f"Session {name}: the same drive commands give {factor:.2f} ± {stderr:.2f} times the others' speed."
+
+
 def states_in_words(content: Mapping[str, Any]) -> Iterator[str]:
     """Yield how many effects of the library are absent."""
     states = [mapping(state).get("state") for state in mapping(content.get("states")).values()]

@@ -10,7 +10,7 @@ from agvbench.diagnosis import Verdict, diagnose
 from agvbench.diagnosis.data.readings import Readings, read_windows
 from agvbench.diagnosis.data.windows import Horizon
 from agvbench.diagnosis.estimation.fit import fit
-from agvbench.diagnosis.free_driving.drive_level import nodal_deviation, sessions_differ
+from agvbench.diagnosis.free_driving.drive_level import drive_levels, nodal_deviation
 from agvbench.diagnosis.free_driving.maps import smooth_maps, start_values_of_windows
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
@@ -32,13 +32,17 @@ def sessions_of(truth: Differential, seed: int, **changes: float) -> tuple[Readi
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("hidden", [{}, {"speed_lag_s": 0.4}, {"delay_s": 0.2}, {"yaw_lag_s": 0.5}])
 def test_sessions_of_one_level_do_not_differ(hidden, seed):
-    assert not sessions_differ(*sessions_of(Differential(**hidden), seed))
+    levels = drive_levels(*sessions_of(Differential(**hidden), seed))
+    assert len(levels) == 3
+    assert not any(level.significant for level in levels.values())
 
 
 @pytest.mark.parametrize("gain", [0.7, 1.15])
 def test_a_session_of_another_level_differs(gain):
     readings, predictor, parameters = sessions_of(Differential(), 0, speed_gain=gain)
-    assert sessions_differ(readings, predictor, parameters)
+    other = drive_levels(readings, predictor, parameters)["day 2"]
+    assert other.significant
+    assert other.factor == pytest.approx(gain / 0.9, abs=4.0 * other.stderr + 0.02)
     assert 0.05 <= nodal_deviation(predictor, parameters) < 0.4
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from agvbench.calibration import inspect_frames
 from agvbench.campaign.campaign import session_starts
 from agvbench.diagnosis.data.initial_pose import frame_noise, initial_pose, shift_commands_half_a_row, unwrapped_poses
 from agvbench.diagnosis.data.logged import NO_LOGGED_COLUMNS, LoggedColumns, logged_columns
+from agvbench.diagnosis.data.session_clocks import ClockOffset
 from agvbench.diagnosis.data.splits import group_runs, with_common_levels
 from agvbench.diagnosis.data.windows import (
     Horizon,
@@ -50,7 +51,7 @@ class Readings:
     reason. ``initial_states`` are those of windows; None for runs from rest. ``preset`` is True if the axles had
     settled at each run's first steering command before it was given, and False if they were at neutral. ``priors`` are
     separate measurements of the effects' parameters, which belong to the evidence of every model. ``logged`` are the
-    columns that the lab logged.
+    columns that the lab logged. ``clock_offsets`` are those of sessions of free driving.
     """
 
     runs: tuple[Run, ...]
@@ -65,6 +66,7 @@ class Readings:
     preset: bool = False
     priors: tuple[Prior, ...] = ()
     logged: LoggedColumns = NO_LOGGED_COLUMNS
+    clock_offsets: Mapping[str, ClockOffset] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.runs)
@@ -96,6 +98,7 @@ class Readings:
             self.preset,
             self.priors,
             self.logged.select(chosen),
+            self.clock_offsets,
         )
 
     def simulated(self) -> list[SimulatedRun]:

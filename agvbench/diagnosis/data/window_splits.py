@@ -46,6 +46,12 @@ def held_out_windows(readings: Readings, seed: int) -> NDArray[np.bool_]:
     return np.zeros(len(readings), dtype=np.bool_)
 
 
+def test_sessions(readings: Readings, held: NDArray[np.bool_]) -> set[str]:
+    """Return the sessions of which all windows are test windows."""
+    session = _initial_states(readings).session
+    return set(session[held].tolist()) - set(session[~held].tolist())
+
+
 def fold_groups(readings: Readings) -> NDArray[np.int64]:
     """Return the groups that cross-validation leaves out as a whole, (R,).
 

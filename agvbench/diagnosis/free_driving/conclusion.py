@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +19,7 @@ from agvbench.diagnosis.findings.effect_states import effect_states
 from agvbench.diagnosis.findings.estimates import named_effects
 from agvbench.diagnosis.findings.omitted_effects import omitted_effects
 from agvbench.diagnosis.findings.prior_checks import check_priors, provenance_of, with_contradictions, with_evidence
+from agvbench.diagnosis.free_driving.drive_level import DriveLevel
 from agvbench.diagnosis.free_driving.errors import QUANTITIES, by_recording, repeatability_squares, rms, squares
 from agvbench.diagnosis.free_driving.predictors import change_by_speed_error, constant_velocity, prior_model, speed_held
 from agvbench.diagnosis.free_driving.selection import WindowSelector
@@ -37,7 +39,8 @@ class WindowConclusion:
     """Assesses the selection on the test windows.
 
     ``readings`` are all windows, ``assessment`` those that are predicted here, with the mask ``held`` of the test
-    windows. ``static`` are the maps without effects, fitted to the training windows.
+    windows. ``static`` are the maps without effects, fitted to the training windows. ``levels`` are those of the drive
+    by session.
     """
 
     context: DiagnosisContext
@@ -47,6 +50,7 @@ class WindowConclusion:
     static: Fit
     selector: WindowSelector
     selection: Selection
+    levels: Mapping[str, DriveLevel]
 
     def diagnosis(self, horizon: Horizon) -> Diagnosis:
         """Return the diagnosis."""
@@ -99,9 +103,21 @@ class WindowConclusion:
                 "stride_s": horizon.stride_s,
                 "level_scatter": float(batch.nodal_deviation),
                 "redundancy": batch.autocorrelation_time,
+                "sessions": self._sessions(),
                 "recordings": by_recording(self.assessment, predicted, perturbed, self.held, self.context.seed),
                 "effects": self._effect_errors(predicted["after"]),
             },
+        }
+
+    def _sessions(self) -> dict[str, dict[str, object]]:
+        """Return the clock offset and the level of the drive of each session, beside those of the others."""
+        offsets = self.readings.clock_offsets
+        return {
+            name: {
+                **({"clock_offset": dataclasses.asdict(offsets[name])} if name in offsets else {}),
+                **({"drive_level": dataclasses.asdict(self.levels[name])} if name in self.levels else {}),
+            }
+            for name in dict.fromkeys([*offsets, *self.levels])
         }
 
     def _poses(self, model: ScoredModel) -> Floats:

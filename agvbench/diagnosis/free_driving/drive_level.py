@@ -6,6 +6,8 @@ the speed that the commands before it result in; no pose after the beginning of 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.stats import t as student
 
@@ -37,8 +39,17 @@ def nodal_deviation(predictor: Predictor, parameters: Floats) -> float:
     return max(least, 2.0 * robust_std(deviation)) if len(deviation) else least
 
 
-def sessions_differ(readings: Readings, predictor: Predictor, parameters: Floats) -> bool:
-    """Return whether the sessions of `readings` differ in the level of the drive.
+@dataclass(frozen=True)
+class DriveLevel:
+    """The speed of one session over that of the others under the same commands, with its standard error."""
+
+    factor: float
+    stderr: float
+    significant: bool
+
+
+def drive_levels(readings: Readings, predictor: Predictor, parameters: Floats) -> dict[str, DriveLevel]:
+    """Return the level of the drive of each session of `readings`.
 
     Deviations of the initial speed are compared between each session and the others by Student's test, with blocks of
     driving as units.
@@ -46,26 +57,24 @@ def sessions_differ(readings: Readings, predictor: Predictor, parameters: Floats
     batch = Batch(readings, predictor.maps, predictor.batch.geometry, kinds=predictor.batch.kinds)
     deviation = _speed_deviations(Predictor(batch), parameters[: predictor.maps.size])
     known = np.isfinite(deviation)
-    if not known.any():
-        return False
-    blocks, index = np.unique(readings.group[known], return_inverse=True)
+    blocks, first, index = np.unique(readings.group[known], return_index=True, return_inverse=True)
     middle = np.array([np.median(deviation[known][index == k]) for k in range(len(blocks))])
-    first = np.searchsorted(index, np.arange(len(blocks)), sorter=np.argsort(index, kind="stable"))
-    session = _initial_states(readings).session[known][np.argsort(index, kind="stable")[first]]
+    session = _initial_states(readings).session[known][first]
     names = np.unique(session)
-    return any(_differs(middle[session == name], middle[session != name], len(names)) for name in names)
+    return {str(name): _level(middle[session == name], middle[session != name], len(names)) for name in names}
 
 
-def _differs(one: Floats, others: Floats, sessions: int) -> bool:
-    """Return whether two sets of levels differ; Bonferroni's correction is for the number of `sessions`."""
+def _level(one: Floats, others: Floats, sessions: int) -> DriveLevel:
+    """Return the level of a session's blocks against others, tested at the level of all `sessions` (Bonferroni)."""
     freedom = len(one) + len(others) - 2
-    if freedom < 1 or not len(one) or not len(others):
-        return False
-    difference = abs(float(np.mean(one) - np.mean(others)))
+    if freedom < 1 or not len(others):
+        return DriveLevel(1.0, np.inf, significant=False)
+    difference = float(np.mean(one) - np.mean(others))
     pooled = (np.sum((one - np.mean(one)) ** 2) + np.sum((others - np.mean(others)) ** 2)) / freedom
     stderr = float(np.sqrt(pooled * (1.0 / len(one) + 1.0 / len(others))))
     critical = float(student.isf(0.5 * FREE_DRIVING_LEVEL.alpha / sessions, freedom))
-    return difference > max(FREE_DRIVING_LEVEL.min_deviation, critical * stderr)
+    significant = abs(difference) > max(FREE_DRIVING_LEVEL.min_deviation, critical * stderr)
+    return DriveLevel(float(np.exp(difference)), float(np.exp(difference)) * stderr, significant)
 
 
 def _speed_deviations(predictor: Predictor, parameters: Floats) -> Floats:

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agvbench.diagnosis.context import require_runs
-from agvbench.diagnosis.criteria import DATA
+from agvbench.diagnosis.criteria import DATA, SESSION_CLOCK
 from agvbench.diagnosis.data.readings import Readings, read_windows
+from agvbench.diagnosis.data.session_clocks import aligned, clock_offsets
 from agvbench.diagnosis.data.splits import Split
-from agvbench.diagnosis.data.window_splits import held_out_windows, thinned
+from agvbench.diagnosis.data.window_splits import held_out_windows, test_sessions, thinned
 from agvbench.diagnosis.data.windows import Horizon
 from agvbench.diagnosis.estimation.fit import Fit, fit
 from agvbench.diagnosis.free_driving.conclusion import WindowConclusion
-from agvbench.diagnosis.free_driving.drive_level import nodal_deviation, sessions_differ
+from agvbench.diagnosis.free_driving.drive_level import DriveLevel, drive_levels, nodal_deviation
 from agvbench.diagnosis.free_driving.maps import NODES, smooth_maps, start_values_of_windows
 from agvbench.diagnosis.free_driving.predictors import autocorrelation_time
 from agvbench.diagnosis.free_driving.selection import WindowSelector
@@ -37,11 +39,12 @@ ABSORBED_IN_WINDOWS = frozenset({"mocap_scale"})
 
 @dataclass(frozen=True)
 class SelectedFromWindows:
-    """Static maps without effects, the selector, and its selection."""
+    """Static maps without effects, the selector, its selection, and the level of the drive of each session."""
 
     static: Fit
     selector: WindowSelector
     selection: Selection
+    levels: Mapping[str, DriveLevel]
 
 
 @dataclass
@@ -56,7 +59,19 @@ class FreeDriving(Method[SelectedFromWindows]):
     horizon: Horizon
 
     def read(self, runs: Sequence[Run]) -> Readings:
-        """Return the poses of the windows, and the priors of the vehicle file."""
+        """Return the poses of the windows on one clock, and the priors of the vehicle file."""
+        found = self._windows(runs)
+        if not len(found):
+            return found
+        tested = test_sessions(found, held_out_windows(found, self.context.seed))
+        offsets = clock_offsets(runs, is_differential=self.context.geometry.is_differential, partial=tested)
+        moved = {name for name, offset in offsets.items() if offset.significant}
+        if moved:
+            found = self._windows(aligned(runs, offsets))
+            found = found.select(~_adapting(found, moved & tested))
+        return replace(found, clock_offsets=offsets)
+
+    def _windows(self, runs: Sequence[Run]) -> Readings:
         is_differential = self.context.geometry.is_differential
         read = read_windows(runs, self.horizon, self.context.header.neutral, turns_on_the_spot=is_differential)
         return replace(read, priors=self.context.priors)
@@ -88,9 +103,10 @@ class FreeDriving(Method[SelectedFromWindows]):
         """Select effects in evenly spaced training windows."""
         fitted = readings.select(thinned(np.flatnonzero(split.training), DATA.max_fitted_windows))
         self.on_progress(f"{len(fitted)} training windows, {np.count_nonzero(split.test)} test windows")
-        static = _static(fitted, self.context.geometry, self.context.header.neutral)
-        selector = self._selector(readings, split, static)
-        return SelectedFromWindows(static, selector, selector.select())
+        static = static_maps(fitted, self.context.geometry, self.context.header.neutral)
+        levels = self._drive_levels(readings, split, static)
+        selector = self._selector(readings, split, static, levels)
+        return SelectedFromWindows(static, selector, selector.select(), levels)
 
     def conclude(self, readings: Readings, split: Split, selected: SelectedFromWindows) -> Diagnosis:
         """Open the test windows, and return the diagnosis."""
@@ -105,16 +121,24 @@ class FreeDriving(Method[SelectedFromWindows]):
             selected.static,
             selected.selector,
             selected.selection,
+            selected.levels,
         ).diagnosis(self.horizon)
 
-    def _selector(self, readings: Readings, split: Split, static: Fit) -> WindowSelector:
+    def _selector(
+        self, readings: Readings, split: Split, static: Fit, levels: Mapping[str, DriveLevel]
+    ) -> WindowSelector:
         """Return the selector for the training windows of `static`, with the level of the drive if sessions differ."""
-        test = thinned(np.flatnonzero(split.test), DATA.max_fitted_windows)
-        trained = thinned(np.flatnonzero(split.training), DATA.max_fitted_windows)
-        every = readings.select(np.sort(np.r_[trained, test]))
-        differ = _has_sessions(every) and sessions_differ(every, static.predictor, static.parameters)
+        differ = any(level.significant for level in levels.values())
         deviation = nodal_deviation(static.predictor, static.parameters) if differ else np.inf
+        test = thinned(np.flatnonzero(split.test), DATA.max_fitted_windows)
         return self._selector_with(deviation, readings.select(test), static)
+
+    @staticmethod
+    def _drive_levels(readings: Readings, split: Split, static: Fit) -> dict[str, DriveLevel]:
+        """Return the level of the drive of each session, if there are several, from evenly spaced windows."""
+        chosen = [thinned(np.flatnonzero(part), DATA.max_fitted_windows) for part in (split.training, split.test)]
+        every = readings.select(np.sort(np.concatenate(chosen)))
+        return drive_levels(every, static.predictor, static.parameters) if _has_sessions(every) else {}
 
     def _selector_with(self, deviation: float, test: Readings, static: Fit) -> WindowSelector:
         """Return the selector for a given deviation of the level; see `Simulation.predict`."""
@@ -137,11 +161,18 @@ class FreeDriving(Method[SelectedFromWindows]):
         )
 
 
+def _adapting(readings: Readings, sessions: Collection[str]) -> NDArray[np.bool_]:
+    """Return which windows begin in the part of these sessions from which their clock offset was estimated, (W,)."""
+    names = np.array([run.session or "" for run in readings.runs])
+    elapsed_s = 3600.0 * readings.started_h + readings.begins_s
+    return np.isin(names, list(sessions)) & (elapsed_s < SESSION_CLOCK.adapted_s)
+
+
 def _has_sessions(readings: Readings) -> bool:
     return readings.initial_states is not None and len(np.unique(readings.initial_states.session)) > 1
 
 
-def _static(fitted: Readings, geometry: Geometry, neutral: float) -> Fit:
+def static_maps(fitted: Readings, geometry: Geometry, neutral: float) -> Fit:
     """Return the static maps fitted to the windows, with the number of nodes by Schwarz's criterion."""
     best: tuple[float, Fit] | None = None
     for steering, drive in NODES:

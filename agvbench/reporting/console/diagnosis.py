@@ -23,6 +23,7 @@ from agvbench.workflows.diagnosis_files import (
     left_in_words,
     next_in_words,
     remedies_in_words,
+    sessions_in_words,
     states_in_words,
 )
 
@@ -44,6 +45,7 @@ def print_diagnosis(found: Diagnosis, console: Console) -> None:
         _say(fit_in_words(content), console)
         if windows := found.provenance.get("windows"):
             console.print(windows_table(windows))
+        _say(sessions_in_words(content), console)
         if found.held_out.worse_on:
             _say([f"Worse than before on: {', '.join(found.held_out.worse_on)}."], console)
     _say((*states_in_words(content), *remedies_in_words(content), *next_in_words(content)), console)

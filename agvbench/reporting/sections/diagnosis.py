@@ -39,6 +39,7 @@ from agvbench.workflows.diagnosis_files import (
     next_in_words,
     number,
     remedies_in_words,
+    sessions_in_words,
 )
 from agvbench.workflows.report import ReportData
 
@@ -94,8 +95,8 @@ def diagnosis_blocks(shown: ShownDiagnosis) -> list[Block]:
     blocks: list[Block] = [Paragraph(verdict, lead=True)]
     blocks += [table for table in (_effects(content), _errors(content), _states(content)) if table.rows]
     said = (
-        *left_in_words(content), *fit_in_words(content), *remedies_in_words(content), *next_in_words(content),
-        *shown.problems,
+        *left_in_words(content), *fit_in_words(content), *sessions_in_words(content), *remedies_in_words(content),
+        *next_in_words(content), *shown.problems,
     )  # fmt: skip
     sentences = [plain_sentences(text) for text in said]
     if sentences:

@@ -1,0 +1,295 @@
+"""Clock offsets of sessions: by how much later the poses of one session answer its commands than those of the others.
+
+The clocks of camera and vehicle are seldom one clock, and their offset may differ between recordings. What all sessions
+have in common, a delay or a lag, belongs to the effects; only differences are estimated here. The yaw rate of a session
+is regressed on its steering commands, delayed by each of many offsets, with one steering map and one lag for all
+sessions. Without the lag, slow and fast steering would seem to have different delays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from agvbench.diagnosis.criteria import SESSION_CLOCK
+from agvbench.diagnosis.data.windows import unwrapped_track
+from agvbench.signals import robust_std
+from agvbench.types import Commands, Floats, Run
+
+_OFFSETS_S = np.arange(-0.4, 1.0, 0.02)
+_LAGS_S = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8)
+# No multiple of usual command periods: a delay between two of its multiples would have the same loss.
+_STEP_S = 0.0437
+_NODES = 13
+_BLOCK_S = 2.0
+_ROUNDS, _REWEIGHTINGS = 12, 3
+_HALF_S = 0.1
+_OUTLIER = 3.0
+_MIN_ROWS = 100
+
+
+@dataclass(frozen=True)
+class ClockOffset:
+    """The offset of a session's poses against its commands, less that of the other sessions: [s], with its error.
+
+    A positive one is a clock of the camera behind that of the others. The commands of a ``significant`` one were moved.
+    """
+
+    value_s: float
+    stderr_s: float
+    significant: bool
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """The yaw rate ``turned`` (n,) of a session, the ``speed`` that it belongs to, and the block of each row.
+
+    ``commanded`` (offsets, axles, n) are the commands of the axles that steer, delayed by each offset. The speed of a
+    vehicle that is commanded a yaw rate is one.
+    """
+
+    turned: Floats
+    speed: Floats
+    block: Floats
+    commanded: Floats
+
+
+def clock_offsets(
+    runs: Sequence[Run], *, is_differential: bool, partial: Collection[str] = ()
+) -> dict[str, ClockOffset]:
+    """Return the clock offset of each session that is long enough; empty with fewer than two of them.
+
+    Of the sessions in `partial`, which are set apart for the test, only the first seconds are used.
+    """
+    sessions: dict[str, list[Run]] = {}
+    used = [run for run in runs if run.is_ok and len(run.commands)]
+    for run in used:
+        sessions.setdefault(run.session or "", []).append(run)
+    steered = [role for role in ("front", "rear") if any(np.ptp(getattr(run.commands, role)) for run in used)]
+    if not steered:
+        return {}
+    tracks = {
+        name: [_track(run, min(r.started_s for r in own), is_differential=is_differential) for run in own]
+        for name, own in sessions.items()
+    }
+    tracks = {
+        name: [one.until(SESSION_CLOCK.adapted_s) for one in own] if name in partial else own
+        for name, own in tracks.items()
+    }
+    tracks = {name: own for name, own in tracks.items() if sum(len(one.grid_s) for one in own) >= _MIN_ROWS}
+    if len(tracks) < 2:
+        return {}
+    fits = [_block_losses([_rows(own, steered, lag_s) for own in tracks.values()]) for lag_s in _LAGS_S]
+    losses, _ = min(fits, key=lambda one: one[1])
+    estimates = {name: _jackknife(loss) for name, loss in zip(tracks, losses, strict=True)}
+    known = {name: one for name, one in estimates.items() if one.stderr_s <= SESSION_CLOCK.max_stderr_s}
+    return _differences(known)
+
+
+def aligned(runs: Iterable[Run], offsets: Mapping[str, ClockOffset]) -> list[Run]:
+    """Return `runs` with the commands of sessions whose offset is significant moved to the clock of the others."""
+    out = []
+    for run in runs:
+        offset = offsets.get(run.session or "")
+        if offset is not None and offset.significant:
+            run = replace(run, commands=replace(run.commands, t_s=run.commands.t_s + offset.value_s))  # noqa: PLW2901
+        out.append(run)
+    return out
+
+
+@dataclass(frozen=True)
+class _Track:
+    """A run's motion at ``grid_s`` (n,): ``speed``, ``yaw_rate`` and seconds since its session began."""
+
+    commands: Commands
+    grid_s: Floats
+    speed: Floats
+    yaw_rate: Floats
+    elapsed_s: Floats
+
+    def select(self, kept: NDArray[np.bool_]) -> _Track:
+        parts = (part[kept] for part in (self.grid_s, self.speed, self.yaw_rate, self.elapsed_s))
+        return _Track(self.commands, *parts)
+
+    def until(self, seconds: float) -> _Track:
+        """Return the part in the first `seconds` of the session."""
+        return self.select(self.elapsed_s <= seconds)
+
+
+def _track(run: Run, began_s: float, *, is_differential: bool) -> _Track:
+    t_s, poses = unwrapped_track(run)
+    if len(t_s) < 2 or t_s[-1] - t_s[0] < 4.0 * _HALF_S:
+        none = np.empty(0)
+        return _Track(run.commands, none, none, none, none)
+    first = max(float(t_s[0]) + _HALF_S, float(run.commands.t_s[0] + _OFFSETS_S[-1]))
+    grid = np.arange(first, float(t_s[-1]) - _HALF_S, _STEP_S)
+    forward, yaw_rate, seen = _motion(t_s, poses, grid)
+    speed = np.ones(len(grid)) if is_differential else forward
+    track = _Track(run.commands, grid, speed, yaw_rate, run.started_s - began_s + grid)
+    return track.select(seen & (np.abs(speed) > SESSION_CLOCK.min_speed_mps))
+
+
+def _rows(tracks: Sequence[_Track], steered: Sequence[str], lag_s: float) -> _Rows:
+    commanded = [
+        np.array(
+            [[_lagged(one.commands, role, one.grid_s - offset, lag_s) for role in steered] for offset in _OFFSETS_S]
+        )
+        for one in tracks
+    ]
+    turned, speed, elapsed_s = (
+        np.concatenate([getattr(one, name) for one in tracks]) for name in ("yaw_rate", "speed", "elapsed_s")
+    )
+    return _Rows(turned, speed, np.floor(elapsed_s / _BLOCK_S), np.concatenate(commanded, axis=-1))
+
+
+def _lagged(commands: Commands, role: str, t_s: Floats, lag_s: float) -> Floats:
+    """Return the commands of `role` at `t_s`, behind a lag of first order; the first one was given long before."""
+    values: Floats = getattr(commands, role)
+    index = np.maximum(np.searchsorted(commands.t_s, t_s + 1e-9, side="right") - 1, 0)
+    if lag_s == 0.0:
+        return values[index]
+    state, left = np.empty(len(values)), np.exp(-np.diff(commands.t_s) / lag_s)
+    state[0] = values[0]
+    for k, share in enumerate(left):
+        state[k + 1] = values[k] + (state[k] - values[k]) * share
+    since_s = np.maximum(t_s - commands.t_s[index], 0.0)
+    return np.asarray(values[index] + (state[index] - values[index]) * np.exp(-since_s / lag_s))
+
+
+def _motion(t_s: Floats, poses: Floats, grid: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Return forward speed and yaw rate at `grid` (n,) by central differences, which do not lag, and where known."""
+    before, middle, after = (
+        np.column_stack([np.interp(grid + shift, t_s, poses[:, k]) for k in range(3)])
+        for shift in (-_HALF_S, 0.0, _HALF_S)
+    )
+    velocity = (after - before) / (2.0 * _HALF_S)
+    forward = np.cos(middle[:, 2]) * velocity[:, 0] + np.sin(middle[:, 2]) * velocity[:, 1]
+    frames = np.searchsorted(t_s, grid + _HALF_S) - np.searchsorted(t_s, grid - _HALF_S)
+    return forward, velocity[:, 2], frames >= 2
+
+
+def _block_losses(rows: list[_Rows]) -> tuple[list[Floats], float]:
+    """Return the loss of each block at each offset (blocks, offsets) by session, and the scale of the residuals.
+
+    All sessions have one map.
+    """
+    ends = np.concatenate([one.commanded for one in rows], axis=-1)
+    nodes = np.linspace(ends.min(axis=(0, 2)), ends.max(axis=(0, 2)), _NODES, axis=-1)
+    best = [int(np.argmin(np.abs(_OFFSETS_S - 0.1)))] * len(rows)
+    losses, scale = list[Floats](), np.inf
+    for _ in range(_ROUNDS):
+        curve, scale = _map(rows, best, nodes)
+        losses = [_losses(one, nodes, curve, scale) for one in rows]
+        moved = [int(np.argmin(loss.sum(axis=0))) for loss in losses]
+        if moved == best:
+            break
+        best = moved
+    return losses, scale
+
+
+def _map(rows: list[_Rows], offsets: list[int], nodes: Floats) -> tuple[Floats, float]:
+    """Return the values of the steering map at its nodes, robustly fitted at these offsets, and their scale."""
+    design = np.concatenate([_design(one, one.commanded[k], nodes) for one, k in zip(rows, offsets, strict=True)])
+    turned = np.concatenate([one.turned for one in rows])
+    weight = np.ones(len(turned))
+    curve, scale = np.zeros(design.shape[1]), 1.0
+    for _ in range(_REWEIGHTINGS):
+        # The maps of two axles are known up to a constant: a small ridge decides.
+        normal = design.T @ (design * weight[:, None]) + 1e-6 * len(turned) * np.eye(design.shape[1])
+        curve = np.linalg.solve(normal, design.T @ (weight * turned))
+        residual = turned - design @ curve
+        scale = max(robust_std(residual), 1e-6)
+        weight = 1.0 / (1.0 + (residual / (_OUTLIER * scale)) ** 2)
+    return curve, scale
+
+
+def _losses(rows: _Rows, nodes: Floats, curve: Floats, scale: float) -> Floats:
+    blocks, index = np.unique(rows.block, return_inverse=True)
+    out = np.empty((len(blocks), len(_OFFSETS_S)))
+    for k, told in enumerate(rows.commanded):
+        curvature = sum(
+            np.interp(command, own, values)
+            for command, own, values in zip(told, nodes, curve.reshape(len(nodes), -1), strict=True)
+        )
+        residual = (rows.turned - rows.speed * curvature) / scale
+        out[:, k] = np.bincount(index, np.log1p((residual / _OUTLIER) ** 2), len(blocks))
+    return out
+
+
+def _design(rows: _Rows, commanded: Floats, nodes: Floats) -> Floats:
+    """Return the derivatives of the yaw rate (n, axles · nodes) by the nodal values, at `commanded` (axles, n)."""
+    weights = [
+        np.interp(command, own, unit) for command, own in zip(commanded, nodes, strict=True) for unit in np.eye(_NODES)
+    ]
+    return np.asarray(rows.speed[:, None] * np.stack(weights, axis=-1))
+
+
+@dataclass(frozen=True)
+class _Estimate:
+    value_s: float
+    stderr_s: float
+    blocks: int
+
+
+def _jackknife(losses: Floats) -> _Estimate:
+    """Return the offset with the least loss, and its standard error by leaving out one block at a time."""
+    total, count = losses.sum(axis=0), len(losses)
+    if count < SESSION_CLOCK.min_blocks:
+        return _Estimate(_minimum(total), np.inf, count)
+    without = np.array([_minimum(total - one) for one in losses])
+    stderr = float(np.sqrt((count - 1.0) / count * np.sum((without - without.mean()) ** 2)))
+    return _Estimate(_minimum(total), max(stderr, SESSION_CLOCK.least_stderr_s), count)
+
+
+def _minimum(loss: Floats) -> float:
+    """Return the offset of the least loss, between the grid by a parabola."""
+    k = int(np.clip(np.argmin(loss), 1, len(loss) - 2))
+    before, here, after = loss[k - 1 : k + 2]
+    bend = before - 2.0 * here + after
+    shift = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
+    return float(_OFFSETS_S[k] + np.clip(shift, -1.0, 1.0) * (_OFFSETS_S[1] - _OFFSETS_S[0]))
+
+
+def _differences(estimates: dict[str, _Estimate]) -> dict[str, ClockOffset]:
+    """Return the offset of each session from the common one: the weighted mean of the sessions that do not differ.
+
+    Of the sessions that differ, the one with the largest ratio to its error is set apart first, and the others are
+    compared anew. Of two that differ from one another, the one with fewer blocks is set apart.
+    """
+    common, sessions = dict(estimates), len(estimates)
+    while len(common) > 1:
+        tested = {name: _against(one, _others(common, name)) for name, one in common.items()}
+        ratio = {name: abs(value) / stderr for name, (value, stderr) in tested.items()}
+        far = [name for name in common if _is_significant(*tested[name], common[name].blocks, sessions)]
+        if not far:
+            break
+        del common[max(far, key=lambda name: (ratio[name], -common[name].blocks))]
+    out = {}
+    for name, one in estimates.items():
+        value, stderr = _against(one, _others(common, name))
+        out[name] = ClockOffset(value, stderr, significant=name not in common)
+    return out
+
+
+def _others(common: dict[str, _Estimate], name: str) -> list[_Estimate]:
+    return [one for other, one in common.items() if other != name]
+
+
+def _against(one: _Estimate, others: list[_Estimate]) -> tuple[float, float]:
+    """Return the difference of an estimate from the weighted mean of others, with its standard error."""
+    if not others:
+        return 0.0, one.stderr_s
+    weight = np.array([1.0 / other.stderr_s**2 for other in others])
+    values = np.array([other.value_s for other in others])
+    middle = float(np.sum(weight * values) / np.sum(weight))
+    spread = float(np.std(values)) if len(values) > 2 else 0.0
+    return one.value_s - middle, float(np.sqrt(one.stderr_s**2 + 1.0 / np.sum(weight) + spread**2))
+
+
+def _is_significant(value: float, stderr: float, blocks: int, sessions: int) -> bool:
+    critical = float(student.isf(0.5 * SESSION_CLOCK.alpha / sessions, max(blocks - 1, 1)))
+    return abs(value) > max(SESSION_CLOCK.min_offset_s, critical * stderr)
