@@ -40,7 +40,9 @@ def test_sessions_of_one_level_do_not_differ(hidden, seed):
 @pytest.mark.parametrize("gain", [0.7, 1.15])
 def test_a_session_of_another_level_differs(gain):
     readings, predictor, parameters = sessions_of(Differential(), 0, speed_gain=gain)
-    other = drive_levels(readings, predictor, parameters)["day 2"]
+    levels = drive_levels(readings, predictor, parameters)
+    assert [name for name, level in levels.items() if level.significant] == ["day 2"]
+    other = levels["day 2"]
     assert other.significant
     assert other.factor == pytest.approx(gain / 0.9, abs=4.0 * other.stderr + 0.02)
     assert 0.05 <= nodal_deviation(predictor, parameters) < 0.4

@@ -6,7 +6,7 @@ the speed that the commands before it result in; no pose after the beginning of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import t as student
@@ -47,12 +47,18 @@ class DriveLevel:
     stderr: float
     significant: bool
 
+    @property
+    def ratio(self) -> float:
+        """The difference of the logarithm of the speed over its standard error."""
+        return float(abs(np.log(self.factor)) * self.factor / max(self.stderr, 1e-9))
+
 
 def drive_levels(readings: Readings, predictor: Predictor, parameters: Floats) -> dict[str, DriveLevel]:
-    """Return the level of the drive of each session of `readings`.
+    """Return the level of the drive of each session of `readings`, beside the sessions that do not differ.
 
     Deviations of the initial speed are compared between each session and the others by Student's test, with blocks of
-    driving as units.
+    driving as units. The session that differs most is set apart first, and the others are compared anew; of two that
+    differ from one another, the one with fewer blocks is set apart.
     """
     batch = Batch(readings, predictor.maps, predictor.batch.geometry, kinds=predictor.batch.kinds)
     deviation = _speed_deviations(Predictor(batch), parameters[: predictor.maps.size])
@@ -60,8 +66,20 @@ def drive_levels(readings: Readings, predictor: Predictor, parameters: Floats) -
     blocks, first, index = np.unique(readings.group[known], return_index=True, return_inverse=True)
     middle = np.array([np.median(deviation[known][index == k]) for k in range(len(blocks))])
     session = _initial_states(readings).session[known][first]
-    names = np.unique(session)
-    return {str(name): _level(middle[session == name], middle[session != name], len(names)) for name in names}
+    by_session = {str(name): middle[session == name] for name in np.unique(session)}
+    common = dict(by_session)
+    while len(common) > 1:
+        levels = {name: _level(one, _others(common, name), len(by_session)) for name, one in common.items()}
+        far = [name for name, level in levels.items() if level.significant]
+        if not far:
+            break
+        del common[max(far, key=lambda name: (levels[name].ratio, -len(common[name])))]
+    levels = {name: _level(one, _others(common, name), len(by_session)) for name, one in by_session.items()}
+    return {name: replace(level, significant=name not in common) for name, level in levels.items()}
+
+
+def _others(common: dict[str, Floats], name: str) -> Floats:
+    return np.concatenate([np.empty(0), *(one for other, one in common.items() if other != name)])
 
 
 def _level(one: Floats, others: Floats, sessions: int) -> DriveLevel:
