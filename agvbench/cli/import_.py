@@ -1,10 +1,13 @@
 """Turn CSV recordings of any lab into a campaign.
 
 A mapping in TOML says which column is what, in which unit and axis, which rows were driven, what jumps are
-impossible, and where a recording is cut into runs. "dart" ships with agvbench; docs/how-to/import-your-csv.md shows
-how to write one. Every row that is left out is counted, on the console and in the campaign's import.parquet.
+impossible, and where a recording is cut into runs. --guess writes one from a recording: columns by their names, units
+by what vehicles do, and the questions that only you can answer. "dart" ships with agvbench;
+docs/how-to/import-your-csv.md shows how to write one. Every row that is left out is counted, on the console and in the
+campaign's import.parquet.
 
 examples:
+  agvbench import --guess monday.csv --out lab.toml
   agvbench import --mapping dart.toml recordings/*.csv --out campaigns/dart
   agvbench import --mapping lab.toml monday.csv tuesday.csv --out campaigns/lab
 """
@@ -19,11 +22,11 @@ HELP = "turn CSV recordings into a campaign"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument("files", nargs="+", metavar="FILE", help="CSV recordings; their names become the runs' ids")
+    how = parser.add_mutually_exclusive_group(required=True)
+    how.add_argument("--mapping", metavar="M.toml", help="a mapping file, or the name of a shipped one")
+    how.add_argument("--guess", action="store_true", help="guess the mapping of FILE, and write it to --out")
     parser.add_argument(
-        "--mapping", required=True, metavar="M.toml", help="a mapping file, or the name of a shipped one"
-    )
-    parser.add_argument(
-        "--out", required=True, metavar="DIR", help="the campaign directory to make; must be empty or new"
+        "--out", required=True, metavar="DIR", help="the campaign directory to make (empty or new); or the mapping file"
     )
 
 
@@ -31,8 +34,11 @@ def run(arguments: argparse.Namespace) -> int:
     """Import; return the exit code."""
     from rich.console import Console
 
-    from agvbench.reporting.console.recordings import print_import
-    from agvbench.workflows.import_recordings import run_import
+    from agvbench.reporting.console.recordings import print_guess, print_import
+    from agvbench.workflows.import_recordings import run_guess, run_import
 
+    if arguments.guess:
+        print_guess(arguments.out, run_guess(arguments.files, arguments.out), Console())
+        return 0
     print_import(run_import(arguments.mapping, arguments.files, arguments.out), Console())
     return 0

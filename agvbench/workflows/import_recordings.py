@@ -9,6 +9,32 @@ from rich.console import Console
 from rich.progress import track
 
 from agvbench.campaign import Campaign, import_recordings
+from agvbench.campaign.recordings.guess import guess_mapping
+from agvbench.errors import FileError
+
+
+def run_guess(files: Sequence[str], out: str) -> list[str]:
+    """Write the guessed mapping of one recording to the new file `out`; return the questions that it leaves.
+
+    Raises
+    ------
+    FileError
+        If there is more than one recording, it cannot be guessed, or `out` exists or cannot be written.
+    """
+    if len(files) != 1:
+        remedy = "give the one that has all columns"
+        raise FileError(
+            "a mapping is guessed from one recording", where="--guess", value=f"{len(files)}", remedy=remedy
+        )
+    path = Path(out)
+    if path.exists():
+        raise FileError("exists already", where=path, remedy="choose another file")
+    text, questions = guess_mapping(files[0])
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise FileError(f"cannot be written ({error.strerror})", where=path, remedy="choose another file") from None
+    return questions
 
 
 def run_import(mapping: str, files: Sequence[str], out: str) -> Campaign:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import pandas as pd
 from rich import box
 from rich.console import Console
@@ -29,6 +31,14 @@ def print_import(campaign: Campaign, console: Console) -> None:
     console.print(_table(campaign.table(IMPORT_TABLE)))
     sessions = campaign.runs["session"].nunique()
     console.print(f"runs: {len(campaign)}, sessions: {sessions}, campaign: {campaign.path}", soft_wrap=True)
+
+
+def print_guess(path: str, questions: Iterable[str], console: Console) -> None:
+    """Print where the guessed mapping is, and what it leaves to answer."""
+    console.print(f"wrote {path}", soft_wrap=True, highlight=False)
+    for question in questions:
+        console.print(f"  ? {question}", soft_wrap=True, highlight=False, markup=False)
+    console.print(f"then: agvbench import --mapping {path} FILES --out DIR", soft_wrap=True, highlight=False)
 
 
 def _table(accounts: pd.DataFrame) -> Table:
