@@ -8,9 +8,14 @@ from dataclasses import replace
 
 import pytest
 from free_drives import FREE_HEADER, free_runs
-from tiny_vehicle import Tiny
+from tiny_vehicle import NEUTRAL, Tiny
 
 from agvbench.diagnosis import Diagnosis, Verdict, diagnose
+from agvbench.diagnosis.data.readings import read_windows
+from agvbench.diagnosis.data.windows import Horizon
+from agvbench.diagnosis.findings.corrected_vehicle import corrected_vehicle
+from agvbench.diagnosis.free_driving.method import static_maps
+from agvbench.diagnosis.model.predictor import MAX_ANGLE_RAD
 from agvbench.effects.variants import effect_variants
 from agvbench.errors import CampaignError
 from agvbench.model import VehicleModel
@@ -87,3 +92,24 @@ def test_nothing_is_named_where_nothing_is_hidden():
 def test_too_little_driving_is_refused_in_one_line():
     with pytest.raises(CampaignError, match="too little free driving"):
         diagnose(FreeCampaign(free_runs(Tiny(), sessions=1, runs=1, seconds=10.0)))
+
+
+def mirrored(run: Run) -> Run:
+    """Return a run on a floor with a reversed y axis."""
+    return replace(run, frames=replace(run.frames, y_m=-run.frames.y_m))
+
+
+def test_few_long_recordings_on_a_mirrored_floor_are_refused():
+    runs = [mirrored(run) for run in free_runs(Tiny(), sessions=2, runs=1, seconds=40.0)]
+    with pytest.raises(CampaignError, match="heading_rad and the floor are mirrored"):
+        diagnose(FreeCampaign(runs))
+
+
+def test_an_angle_that_no_axle_has_is_the_limit_in_the_corrected_vehicle():
+    readings = read_windows(free_runs(Tiny(), sessions=2, runs=1), Horizon(2.0, 1.0), NEUTRAL)
+    fitted = static_maps(readings, FREE_HEADER.geometry, NEUTRAL)
+    maps = fitted.predictor.maps
+    wild = fitted.parameters.copy()
+    wild[maps.slices()["front"]] *= 100.0
+    vehicle = corrected_vehicle(FREE_HEADER, FREE_HEADER.geometry, replace(fitted, parameters=wild), maps, 0)
+    assert max(map(abs, vehicle.front.output_range)) == pytest.approx(MAX_ANGLE_RAD)

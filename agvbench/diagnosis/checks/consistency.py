@@ -16,7 +16,7 @@ from agvbench.types import Floats, Run
 
 _RATE_FACTOR = 30.0
 _MAX_UNORDERED = 0.25
-_FRAME_INTERVAL_S = 0.3
+_FRAME_INTERVAL_S, _STRETCH = 0.3, 30
 _MIN_TURN_RAD, _MIN_STEPS, _MIN_TURNING = 0.15, 5, 5
 _TURN_RATIO_LIMITS = (0.5, 2.0)
 
@@ -78,7 +78,7 @@ def require_plausible_units(runs: Sequence[Run], header: HeaderLike) -> None:
 
 
 def _tracks(runs: Sequence[Run]) -> Iterator[tuple[Floats, Floats]]:
-    """Yield times (n,) and poses (n, 3), with a continuous heading, of each run, one frame every 0.3 s."""
+    """Yield times (n,) and poses (n, 3), with a continuous heading, of each 9 s of a run, one frame every 0.3 s."""
     for run in runs:
         f = run.frames
         seen = f.tracked.astype(np.bool_) & np.isfinite(f.t_s + f.x_m + f.y_m + f.heading_rad)
@@ -89,7 +89,9 @@ def _tracks(runs: Sequence[Run]) -> Iterator[tuple[Floats, Floats]]:
         poses = np.column_stack([f.x_m[order], f.y_m[order], np.unwrap(f.heading_rad[order])])
         # Rounding may put the last time past the last frame.
         chosen = np.unique(np.searchsorted(t_s[:-1], np.arange(t_s[0], t_s[-1], _FRAME_INTERVAL_S)))
-        yield t_s[chosen], poses[chosen]
+        for first in range(0, len(chosen), _STRETCH):
+            own = chosen[first : first + _STRETCH]
+            yield t_s[own], poses[own]
 
 
 def _turn_ratio(tracks: list[tuple[Floats, Floats]]) -> float | None:

@@ -61,7 +61,8 @@ RANDOM_EFFECTS = ("x_m", "y_m", "heading_rad", "front_rad", "rear_rad", "log_spe
 
 _STEP = 1e-4  # rad, m/s
 _STEP_SHARE = 1e-3
-_MAX_ANGLE_RAD, _MAX_YAW_RATE = 1.4, 30.0
+MAX_ANGLE_RAD, MAX_YAW_RATE = 1.4, 30.0
+"""Limits of the values of steering maps; what a fit puts beyond them counts as the limit."""
 
 
 class Predictor:
@@ -108,7 +109,7 @@ class Predictor:
         """Return steady-state values of every row (rows, 3) and initial states (runs, 5)."""
         where, run = self.maps.slices(), self.batch.base.row_runs
         values = [self.batch.weights[role] @ parameters[where[role]] for role in ROLES]
-        most = _MAX_YAW_RATE if self.batch.geometry.is_differential else _MAX_ANGLE_RAD
+        most = MAX_YAW_RATE if self.batch.geometry.is_differential else MAX_ANGLE_RAD
         front, rear = (np.clip(values[k] + random_effects[run, 3 + k], -most, most) for k in (0, 1))
         speed = np.where(self.batch.driven, values[2] * np.exp(random_effects[run, 5]), 0.0)
         initial = np.zeros((len(self.readings), 5))
