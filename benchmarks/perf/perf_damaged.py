@@ -159,7 +159,7 @@ def outcome(vehicle: str, written: dict[str, pd.DataFrame], directory: Path) -> 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the outcomes; return 1 if there was a crash."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--vehicle", default="cpm")
+    parser.add_argument("--vehicle", default="cpm", choices=("cpm", "eth"), help="one whose mapping has these columns")
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--first-seed", type=int, default=0)
     wanted = parser.parse_args(arguments)

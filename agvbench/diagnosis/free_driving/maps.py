@@ -67,7 +67,9 @@ def start_values_of_windows(maps: NodalMaps, readings: Readings, geometry: Geome
     """
     time = np.column_stack([readings.begins_s, readings.t_s])
     poses = np.concatenate([readings.start[:, None], readings.poses], axis=1)
+    # At low frame rates two samples may be one frame, between which there is no motion to see.
     dt = np.diff(time, axis=1)
+    dt = np.where(dt > 0.0, dt, np.nan)
     step, turn = np.diff(poses[..., :2], axis=1), np.diff(poses[..., 2], axis=1)
     middle = poses[:, :-1, 2] + 0.5 * turn
     # The chord of an arc is shorter than the arc.
