@@ -54,13 +54,13 @@ def drive(truth: Differential, seconds: float, rng: np.random.Generator) -> tupl
     """Return commands and frames of one drive."""
     v_command, w_command = joystick(seconds, rng)
     t = np.arange(0.0, seconds, _STEP_S)
-    told = np.clip(((t - truth.delay_s) / _COMMAND_S + 1e-9).astype(int), 0, len(v_command) - 1)
+    commanded = np.clip(((t - truth.delay_s) / _COMMAND_S + 1e-9).astype(int), 0, len(v_command) - 1)
     v = w = 0.0
     x, y, heading = rng.uniform(-1.0, 1.0, 3)
     path = np.empty((len(t), 3))
     for k in range(len(t)):
         path[k] = x, y, heading
-        v_aim, w_aim = truth.speed_gain * v_command[told[k]], truth.yaw_gain * w_command[told[k]]
+        v_aim, w_aim = truth.speed_gain * v_command[commanded[k]], truth.yaw_gain * w_command[commanded[k]]
         v += (v_aim - v) * (_STEP_S / truth.speed_lag_s if truth.speed_lag_s else 1.0)
         w += (w_aim - w) * (_STEP_S / truth.yaw_lag_s if truth.yaw_lag_s else 1.0)
         left, right = v - 0.5 * _TRACK_M * w, (v + 0.5 * _TRACK_M * w) * truth.right_wheel

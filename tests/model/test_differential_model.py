@@ -34,8 +34,8 @@ def turtle(lag_s: float = 0.0, speed_lag_s: float = 0.0, curvature: float = 0.0)
     )  # fmt: skip
 
 
-def truth(t_s: Floats, times: Floats, told: Floats, lag_s: float, speed_lag_s: float, curvature: float) -> Floats:
-    """Return poses (n, 3) of the centroid, which is 0.15 m ahead of the axle; `told` (m, 2) are speed and yaw rate."""
+def truth(t_s: Floats, times: Floats, commanded: Floats, lag_s: float, speed_lag_s: float, curvature: float) -> Floats:
+    """Return poses (n, 3) of the centroid, which is 0.15 m ahead of the axle; `commanded` (m, 2): speed, yaw rate."""
 
     def rate(_: float, s: Floats, v_aim: float, w_aim: float) -> list[float]:
         v, w = s[3] if speed_lag_s else v_aim, s[4] if lag_s else w_aim
@@ -46,7 +46,7 @@ def truth(t_s: Floats, times: Floats, told: Floats, lag_s: float, speed_lag_s: f
 
     state, out = np.array([-0.15, 0.0, 0.0, 0.0, 0.0]), np.empty((len(t_s), 3))
     ends = np.append(times[1:], t_s[-1] + 1.0)
-    for begin, end, (v_aim, w_aim) in zip(times, ends, told, strict=True):
+    for begin, end, (v_aim, w_aim) in zip(times, ends, commanded, strict=True):
         own = (t_s >= begin) & (t_s < end)
         solved = solve_ivp(
             rate, (begin, end), state, "DOP853", t_eval=np.append(t_s[own], end), args=(v_aim, w_aim), rtol=1e-10,
@@ -66,12 +66,12 @@ def truth(t_s: Floats, times: Floats, told: Floats, lag_s: float, speed_lag_s: f
 def test_rollouts_agree_with_dop853(seed: int, lag_s: float, speed_lag_s: float, curvature: float) -> None:
     rng = np.random.default_rng(seed)
     times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.05, 1.0, 6))])
-    told = rng.uniform(-1.0, 1.0, (7, 2)) * [0.8, 1.5]
-    told[rng.random(7) < 0.3, 0] = 0.0  # turns on the spot
+    commanded = rng.uniform(-1.0, 1.0, (7, 2)) * [0.8, 1.5]
+    commanded[rng.random(7) < 0.3, 0] = 0.0  # turns on the spot
     t = np.linspace(0.0, times[-1] + 1.0, 120)
-    commands = Commands(times, told[:, 0], told[:, 1], np.zeros(7))
+    commands = Commands(times, commanded[:, 0], commanded[:, 1], np.zeros(7))
     ours = turtle(lag_s, speed_lag_s, curvature).rollout([commands], [(0.0, 0.0, 0.0)], [t])[0]
-    expected = truth(t, times, told, lag_s, speed_lag_s, curvature)
+    expected = truth(t, times, commanded, lag_s, speed_lag_s, curvature)
     np.testing.assert_allclose(ours, expected, rtol=0.0, atol=5e-5)
 
 

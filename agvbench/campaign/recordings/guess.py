@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.campaign.recordings.mapping import ANGLE, LENGTH, TIME
 from agvbench.campaign.tables.csv_text import read_csv_text
 from agvbench.errors import FileError, OneOf
 from agvbench.types import Floats
@@ -28,10 +29,7 @@ _EPOCH_S = 1e8
 # Limits that no recording exceeds [m/s, rad/s; Hz]: a wrong unit must not make a mapping that cannot be read.
 _LARGEST, _HIGHEST_HZ = 100.0, 1e5
 _SUFFIXES = {"time": ("s", "ms", "us", "ns"), "length": ("m", "cm", "mm"), "angle": ("rad", "deg", "mrad")}
-_FACTORS = {
-    "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "m": 1.0, "cm": 1e-2, "mm": 1e-3,
-    "rad": 1.0, "deg": np.pi / 180.0, "mrad": 1e-3,
-}  # fmt: skip
+_FACTORS = {**TIME, **LENGTH, **ANGLE}
 _MEASURED = re.compile(r"est|meas|imu|odo|actual|encoder|sensor|fit")
 _NAMES = {
     "time": r"\bt\b|time|stamp|epoch|sec\b",

@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from agvbench.calibration.measurement.windows import held_command
 from agvbench.diagnosis.criteria import SESSION_CLOCK
+from agvbench.diagnosis.data.differing_sessions import differing_sessions, others
 from agvbench.diagnosis.data.windows import unwrapped_track
 from agvbench.signals import robust_std
 from agvbench.types import Commands, Floats, Run
@@ -148,10 +150,10 @@ def _rows(tracks: Sequence[_Track], steered: Sequence[str], lag_s: float) -> _Ro
 
 def _lagged(commands: Commands, role: str, t_s: Floats, lag_s: float) -> Floats:
     """Return the commands of `role` at `t_s`, behind a lag of first order; the first one was given long before."""
+    if lag_s == 0.0:
+        return held_command(commands, role, t_s)
     values: Floats = getattr(commands, role)
     index = np.maximum(np.searchsorted(commands.t_s, t_s + 1e-9, side="right") - 1, 0)
-    if lag_s == 0.0:
-        return values[index]
     state, left = np.empty(len(values)), np.exp(-np.diff(commands.t_s) / lag_s)
     state[0] = values[0]
     for k, share in enumerate(left):
@@ -210,10 +212,10 @@ def _map(rows: list[_Rows], offsets: list[int], nodes: Floats) -> tuple[Floats, 
 def _losses(rows: _Rows, nodes: Floats, curve: Floats, scale: float) -> Floats:
     blocks, index = np.unique(rows.block, return_inverse=True)
     out = np.empty((len(blocks), len(_OFFSETS_S)))
-    for k, told in enumerate(rows.commanded):
+    for k, delayed in enumerate(rows.commanded):
         curvature = sum(
             np.interp(command, own, values)
-            for command, own, values in zip(told, nodes, curve.reshape(len(nodes), -1), strict=True)
+            for command, own, values in zip(delayed, nodes, curve.reshape(len(nodes), -1), strict=True)
         )
         residual = (rows.turned - rows.speed * curvature) / scale
         out[:, k] = np.bincount(index, np.log1p((residual / _OUTLIER) ** 2), len(blocks))
@@ -255,36 +257,26 @@ def _minimum(loss: Floats) -> float:
 
 
 def _differences(estimates: dict[str, _Estimate]) -> dict[str, ClockOffset]:
-    """Return the offset of each session from the common one: the weighted mean of the sessions that do not differ.
+    """Return the offset of each session from the common one: the weighted mean of the sessions that do not differ."""
 
-    Of the sessions that differ, the one with the largest ratio to its error is set apart first, and the others are
-    compared anew. Of two that differ from one another, the one with fewer blocks is set apart.
-    """
-    common, sessions = dict(estimates), len(estimates)
-    while len(common) > 1:
-        tested = {name: _against(one, _others(common, name)) for name, one in common.items()}
-        ratio = {name: abs(value) / stderr for name, (value, stderr) in tested.items()}
-        far = [name for name in common if _is_significant(*tested[name], common[name].blocks, sessions)]
-        if not far:
-            break
-        del common[max(far, key=lambda name: (ratio[name], -common[name].blocks))]
-    out = {}
-    for name, one in estimates.items():
-        value, stderr = _against(one, _others(common, name))
-        out[name] = ClockOffset(value, stderr, significant=name not in common)
-    return out
+    def deviation(one: _Estimate, rest: list[_Estimate]) -> float | None:
+        value, stderr = _against(one, rest)
+        return abs(value) / stderr if _is_significant(value, stderr, one.blocks, len(estimates)) else None
+
+    differing = differing_sessions(estimates, deviation, lambda one: one.blocks)
+    common = {name: one for name, one in estimates.items() if name not in differing}
+    return {
+        name: ClockOffset(*_against(one, others(common, name)), significant=name in differing)
+        for name, one in estimates.items()
+    }
 
 
-def _others(common: dict[str, _Estimate], name: str) -> list[_Estimate]:
-    return [one for other, one in common.items() if other != name]
-
-
-def _against(one: _Estimate, others: list[_Estimate]) -> tuple[float, float]:
+def _against(one: _Estimate, rest: list[_Estimate]) -> tuple[float, float]:
     """Return the difference of an estimate from the weighted mean of others, with its standard error."""
-    if not others:
+    if not rest:
         return 0.0, one.stderr_s
-    weight = np.array([1.0 / other.stderr_s**2 for other in others])
-    values = np.array([other.value_s for other in others])
+    weight = np.array([1.0 / other.stderr_s**2 for other in rest])
+    values = np.array([other.value_s for other in rest])
     middle = float(np.sum(weight * values) / np.sum(weight))
     spread = float(np.std(values)) if len(values) > 2 else 0.0
     return one.value_s - middle, float(np.sqrt(one.stderr_s**2 + 1.0 / np.sum(weight) + spread**2))

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from agvbench.diagnosis.criteria import FREE_DRIVING_LEVEL
+from agvbench.diagnosis.data.differing_sessions import differing_sessions, others
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.data.window_splits import _initial_states
 from agvbench.diagnosis.model.batch import Batch
@@ -57,8 +58,7 @@ def drive_levels(readings: Readings, predictor: Predictor, parameters: Floats) -
     """Return the level of the drive of each session of `readings`, beside the sessions that do not differ.
 
     Deviations of the initial speed are compared between each session and the others by Student's test, with blocks of
-    driving as units. The session that differs most is set apart first, and the others are compared anew; of two that
-    differ from one another, the one with fewer blocks is set apart.
+    driving as units; see `differing_sessions`.
     """
     batch = Batch(readings, predictor.maps, predictor.batch.geometry, kinds=predictor.batch.kinds)
     deviation = _speed_deviations(Predictor(batch), parameters[: predictor.maps.size])
@@ -67,29 +67,26 @@ def drive_levels(readings: Readings, predictor: Predictor, parameters: Floats) -
     middle = np.array([np.median(deviation[known][index == k]) for k in range(len(blocks))])
     session = _initial_states(readings).session[known][first]
     by_session = {str(name): middle[session == name] for name in np.unique(session)}
-    common = dict(by_session)
-    while len(common) > 1:
-        levels = {name: _level(one, _others(common, name), len(by_session)) for name, one in common.items()}
-        far = [name for name, level in levels.items() if level.significant]
-        if not far:
-            break
-        del common[max(far, key=lambda name: (levels[name].ratio, -len(common[name])))]
-    levels = {name: _level(one, _others(common, name), len(by_session)) for name, one in by_session.items()}
-    return {name: replace(level, significant=name not in common) for name, level in levels.items()}
+
+    def tested(one: Floats, rest: list[Floats]) -> float | None:
+        level = _level(one, rest, len(by_session))
+        return level.ratio if level.significant else None
+
+    differing = differing_sessions(by_session, tested, len)
+    common = {name: one for name, one in by_session.items() if name not in differing}
+    levels = {name: _level(one, others(common, name), len(by_session)) for name, one in by_session.items()}
+    return {name: replace(level, significant=name in differing) for name, level in levels.items()}
 
 
-def _others(common: dict[str, Floats], name: str) -> Floats:
-    return np.concatenate([np.empty(0), *(one for other, one in common.items() if other != name)])
-
-
-def _level(one: Floats, others: Floats, sessions: int) -> DriveLevel:
+def _level(one: Floats, rest: list[Floats], sessions: int) -> DriveLevel:
     """Return the level of a session's blocks against others, tested at the level of all `sessions` (Bonferroni)."""
-    freedom = len(one) + len(others) - 2
-    if freedom < 1 or not len(others):
+    other = np.concatenate([np.empty(0), *rest])
+    freedom = len(one) + len(other) - 2
+    if freedom < 1 or not len(other):
         return DriveLevel(1.0, np.inf, significant=False)
-    difference = float(np.mean(one) - np.mean(others))
-    pooled = (np.sum((one - np.mean(one)) ** 2) + np.sum((others - np.mean(others)) ** 2)) / freedom
-    stderr = float(np.sqrt(pooled * (1.0 / len(one) + 1.0 / len(others))))
+    difference = float(np.mean(one) - np.mean(other))
+    pooled = (np.sum((one - np.mean(one)) ** 2) + np.sum((other - np.mean(other)) ** 2)) / freedom
+    stderr = float(np.sqrt(pooled * (1.0 / len(one) + 1.0 / len(other))))
     critical = float(student.isf(0.5 * FREE_DRIVING_LEVEL.alpha / sessions, freedom))
     significant = abs(difference) > max(FREE_DRIVING_LEVEL.min_deviation, critical * stderr)
     return DriveLevel(float(np.exp(difference)), float(np.exp(difference)) * stderr, significant)

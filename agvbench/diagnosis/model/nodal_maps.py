@@ -56,15 +56,12 @@ class NodalMaps:
             return _interpolation(nodes, command)
         # Neutral is a node with a fixed value of zero, not a parameter.
         place = int(np.searchsorted(nodes, self.neutral))
-        if not len(nodes):
-            return np.empty((len(command), 0))
-        if place in (0, len(nodes)):
-            # A direction that was never driven is taken for the mirror image of the other.
-            mirrored = (command < self.neutral) if place == 0 else (command > self.neutral)
-            reflected = np.where(mirrored, 2.0 * self.neutral - command, command)
-            own = np.delete(_interpolation(np.insert(nodes, place, self.neutral), reflected), place, axis=1)
-            return np.where(mirrored[:, None], -own, own)
-        return np.delete(_interpolation(np.insert(nodes, place, self.neutral), command), place, axis=1)
+        # A direction that was never driven is taken for the mirror image of the other.
+        below, above = (command < self.neutral) & (place == 0), (command > self.neutral) & (place == len(nodes))
+        mirrored = below | above
+        reflected = np.where(mirrored, 2.0 * self.neutral - command, command)
+        weights = np.delete(_interpolation(np.insert(nodes, place, self.neutral), reflected), place, axis=1)
+        return np.where(mirrored[:, None], -weights, weights)
 
     def beside(self, values: Floats, kind: type[Effect], parameters: Floats) -> Floats:
         """Return `values` (size,), fitted without an effect of this kind, converted for a model with it."""
@@ -194,8 +191,6 @@ def _implied(role: str, m: RunMeasurement, geometry: Geometry) -> float:
 
 def _interpolation(nodes: Floats, command: Floats) -> Floats:
     out = np.zeros((len(command), len(nodes)))
-    if not len(nodes):
-        return out
     if len(nodes) < 2:
         out[:, :] = 1.0
         return out
