@@ -112,6 +112,8 @@ class Effect:
         Whether the effect is about two driven axles, and no candidate where one is driven.
     needs_steered_axles
         Whether the effect is about axle angles, and no candidate for a differential vehicle.
+    needs_differential
+        Whether the effect is about a differential vehicle, and no candidate where axles are steered.
     arrive
         ``arrive(state, time_s, …) -> time_s``: time at which a command given at `time_s` takes effect; may change
         ``REAR_WAIT`` and ``DRIVE_WAIT``.
@@ -143,6 +145,7 @@ class Effect:
     longest_step_s: ClassVar[float] = math.inf
     needs_both_axles_driven: ClassVar[bool] = False
     needs_steered_axles: ClassVar[bool] = False
+    needs_differential: ClassVar[bool] = False
     arrive: ClassVar[Hook | None] = None
     aim: ClassVar[Hook | None] = None
     steer: ClassVar[Hook | None] = None

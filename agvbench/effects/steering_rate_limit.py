@@ -34,4 +34,4 @@ class SteeringRateLimit(Effect):
     @staticmethod
     def aim(state: Floats, rate_rad_per_s: float) -> None:
         """Set the rate limit of the servos."""
-        state[STEERING_RATE] = rate_rad_per_s
+        state[STEERING_RATE] = min(state[STEERING_RATE], rate_rad_per_s)

@@ -15,7 +15,7 @@ def example_names() -> tuple[str, ...]:
     """Return the names of the vehicles that ship with agvbench.
 
     >>> example_names()
-    ('front_steered', 'thesis')
+    ('differential', 'front_steered', 'thesis')
     """
     return tuple(sorted(path.stem for path in _DATA.glob("*.toml")))
 
@@ -29,7 +29,7 @@ def example_path(name: str) -> Path:
 
 @cache
 def example_vehicle(name: str) -> VehicleModel:
-    """Return a shipped vehicle: ``"thesis"``, or ``"front_steered"`` in normalised units."""
+    """Return a shipped vehicle: ``"thesis"``, ``"front_steered"`` (normalised units), ``"differential"`` (SI units)."""
     return VehicleModel.load(example_path(name))
 
 

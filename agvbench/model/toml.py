@@ -140,7 +140,7 @@ def vehicle_fields(content: Mapping[str, Any]) -> dict[str, Any]:
     for key in ("name", "command_unit"):
         if not isinstance(content[key], str):
             raise VehicleError("must be a text", where=key, value=repr(content[key]))
-    geometry = from_table(Geometry, _table(content, "geometry"), where="geometry")
+    geometry = from_table(Geometry, _whole_geometry(_table(content, "geometry")), where="geometry")
     return {
         "name": content["name"],
         "geometry": geometry,
@@ -186,6 +186,12 @@ def _table(content: Mapping[str, Any], key: str) -> Mapping[str, Any]:
     if not isinstance(table, Mapping):
         raise VehicleError("must be a table", where=key, value=repr(table))
     return table
+
+
+def _whole_geometry(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the table with what goes without saying: a differential vehicle has no front axle."""
+    implied = {"front_axle_m": 0.0} if table.get("kinematics") == "differential" else {}
+    return {**implied, **table}
 
 
 def _geometry_to_toml(geometry: Geometry) -> dict[str, Any]:

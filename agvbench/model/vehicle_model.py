@@ -16,6 +16,7 @@ from agvbench.model.priors import Prior
 from agvbench.model.toml import naming_file, physics_digest, read_vehicle, write_vehicle
 from agvbench.notebook_html import heading_html, table_html
 from agvbench.types import Command, Commands, CommandUnit, Floats
+from agvbench.vehicle.channels import channels_of, quantity_of
 from agvbench.vehicle.fields import coerce_float
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import StaticMap
@@ -85,14 +86,7 @@ class VehicleModel:
             if names.count(name) > 1:
                 raise VehicleError("an effect may be given once", where="effects", value=name)
         for effect in self.effects:
-            if effect.needs_steered_axles and self.geometry.is_differential and not effect.is_null:
-                raise VehicleError(
-                    "an effect of steered axles, but the vehicle has none",
-                    where="effects",
-                    value=effect.name,
-                    limit='kinematics = "differential"',
-                    remedy="remove the effect, or correct geometry.kinematics",
-                )
+            self._check_kinematics(effect)
             if effect.needs_both_axles_driven and self.geometry.driven != "both" and not effect.is_null:
                 raise VehicleError(
                     "an effect of two driven axles, but one is driven",
@@ -101,6 +95,21 @@ class VehicleModel:
                     limit=f'driven = "{self.geometry.driven}"',
                     remedy="remove the effect, or correct geometry.driven",
                 )
+
+    def _check_kinematics(self, effect: Effect) -> None:
+        is_differential = self.geometry.is_differential
+        if effect.is_null or not (effect.needs_steered_axles if is_differential else effect.needs_differential):
+            return
+        of_other = (
+            "steered axles, but the vehicle has none" if is_differential else "a differential vehicle, but this is none"
+        )
+        raise VehicleError(
+            f"an effect of {of_other}",
+            where="effects",
+            value=effect.name,
+            limit=f'kinematics = "{self.geometry.kinematics}"',
+            remedy="remove the effect, or correct geometry.kinematics",
+        )
 
     def _check_angles(self) -> None:
         for axle in ("rear",) if self.geometry.is_differential else ("front", "rear"):
@@ -121,7 +130,8 @@ class VehicleModel:
     def command_for(self, front_rad: float, rear_rad: float, speed_mps: float) -> Command:
         """Return the command whose steady state has these axle angles [rad] and this speed of the axles [m/s].
 
-        If neutral already gives the value (standstill, an axle that is not steered), the command is neutral.
+        For a differential vehicle `front_rad` is the yaw rate [rad/s], and `rear_rad` is 0. If neutral already gives
+        the value (standstill, an axle that is not steered), the command is neutral.
 
         Raises
         ------
@@ -129,13 +139,24 @@ class VehicleModel:
             If an angle or the speed is out of reach, with the limit.
         """
         return Command(
-            drive=self._inverse("drive", speed_mps, "speed", 1.0, "m/s"),
-            front=self._inverse("front", front_rad, "angle", math.degrees(1.0), "°"),
-            rear=self._inverse("rear", rear_rad, "angle", math.degrees(1.0), "°"),
+            drive=self._inverse("drive", speed_mps),
+            front=self._inverse("front", front_rad),
+            rear=self._inverse("rear", rear_rad),
         )
 
-    def _inverse(self, role: str, output: float, what: str, scale: float, unit: str) -> float:
+    def stop_after(self, command: Command) -> Command:
+        """Return the command that stops the vehicle after `command`: the drive at neutral, the steering held.
+
+        A differential vehicle steers with its drive: all is neutral.
+        """
+        if self.geometry.is_differential:
+            return Command(self.neutral, self.neutral, self.neutral)
+        return command._replace(drive=self.neutral)
+
+    def _inverse(self, role: str, output: float) -> float:
         static_map: StaticMap = getattr(self, role)
+        quantity = quantity_of(role, self.geometry)
+        what, scale, unit = quantity.name, quantity.scale, quantity.unit
         if float(static_map(self.neutral)) == output:
             return self.neutral
         try:
@@ -144,7 +165,7 @@ class VehicleModel:
             low, high = static_map.output_range
             inside = low <= output <= high
             raise VehicleError(
-                error.what if inside else f"{role} {what} is out of reach",
+                error.what if inside else f"{what if what == quantity.channel else f'{role} {what}'} is out of reach",
                 where=f"vehicle {self.name}",
                 value=f"{scale * output:.4g} {unit}",
                 limit=error.limit if inside else f"{scale * low:.4g} … {scale * high:.4g} {unit}",
@@ -206,9 +227,6 @@ class VehicleModel:
         return rollout(self, commands, initial, t_s, started_h)
 
 
-_UNITS = {"front": ("°", math.degrees(1.0)), "rear": ("°", math.degrees(1.0)), "drive": ("m/s", 1.0)}
-
-
 def model_html(model: VehicleModel) -> str:
     """Return geometry, static maps with the range of their outputs, and effects with their parameters, as HTML."""
     geometry = model.geometry
@@ -218,7 +236,7 @@ def model_html(model: VehicleModel) -> str:
     else:
         axles = f"front axle {geometry.front_axle_m:g} m ahead of the marker centroid, {axles}"
     line = f"{axles}; commands in {model.command_unit}, neutral {model.neutral:g}"
-    maps = [_map_row(model, role) for role in _UNITS]
+    maps = [_map_row(model, role) for role in channels_of(geometry)]
     effects = [
         (effect.name, p.name, effect.values[p.name], p.unit) for effect in model.effects for p in effect.parameters()
     ]
@@ -231,6 +249,6 @@ def model_html(model: VehicleModel) -> str:
 
 def _map_row(model: VehicleModel, role: str) -> tuple[str, str, float, float, str]:
     static_map = getattr(model, role)
-    unit, scale = ("rad/s", 1.0) if role == "front" and model.geometry.is_differential else _UNITS[role]
-    low, high = static_map.output_range
-    return role, static_map.kind.replace("_", " "), scale * low, scale * high, unit
+    quantity = quantity_of(role, model.geometry)
+    low, high = (quantity.scale * end for end in static_map.output_range)
+    return role, static_map.kind.replace("_", " "), low, high, quantity.unit

@@ -10,7 +10,8 @@ import numpy as np
 from agvbench.effects import Stage
 from agvbench.model import VehicleModel
 from agvbench.planning.end_pose_prediction import Departure, EndPoseError, coasting_path, rest_poses
-from agvbench.planning.legs import Leg, axles_swept, legs_of
+from agvbench.planning.leg import Leg, axles_swept
+from agvbench.planning.legs import legs_of
 from agvbench.planning.placement import check_fits
 from agvbench.planning.planner import Plan, commands_of, plan
 from agvbench.planning.shooting import shoot

@@ -1,51 +1,19 @@
-"""Legs: segments as this vehicle drives them, each with constant axle angles and one speed; and their path."""
+"""From the segments of a trajectory to legs: segments as this vehicle drives them, with the rests between them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
-
-import numpy as np
 
 from agvbench.errors import PlanError, UnsuitedVehicleError
 from agvbench.model import VehicleModel
+from agvbench.planning.differential_legs import differential_leg
+from agvbench.planning.leg import Leg, full_speed
 from agvbench.planning.steering import axle_angles, radius_of, smallest_radius
-from agvbench.planning.trajectories.segments import Arc, Pause, Segment, Steering, Straight, axle_speed
+from agvbench.planning.trajectories.segments import Arc, Pause, SpotTurn, Steering, Straight, axle_speed
 from agvbench.planning.trajectories.trajectory import Trajectory
-from agvbench.types import Floats, Pose, wrap_angle
-from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.kinematics import body_motion
 
 _MOUNTED_OFF_RAD = math.radians(3.0)
-
-
-@dataclass(frozen=True)
-class Leg:
-    """A stretch of time in which nothing about the vehicle's motion changes.
-
-    Parameters
-    ----------
-    where
-        How messages call it.
-    front_rad, rear_rad
-        Axle angles [rad].
-    speed_mps
-        Speed of both axles [m/s], signed; 0 at rest.
-    duration_s
-        Duration [s].
-    """
-
-    where: str
-    front_rad: float
-    rear_rad: float
-    speed_mps: float
-    duration_s: float
-
-    @property
-    def is_rest(self) -> bool:
-        """Whether the vehicle stands still."""
-        return self.speed_mps == 0.0
 
 
 def legs_of(trajectory: Trajectory, model: VehicleModel) -> list[Leg]:
@@ -54,20 +22,30 @@ def legs_of(trajectory: Trajectory, model: VehicleModel) -> list[Leg]:
     Raise `PlanError` if an axle angle is beyond its end stops or a speed beyond what the drive reaches.
     """
     segments = trajectory.expand()
-    driven = [_leg(segment, trajectory, model, where=trajectory.segment_name(i)) for i, segment in enumerate(segments)]
+    leg_of = differential_leg if model.geometry.is_differential else _leg
+    driven = [
+        segment.duration_s
+        if isinstance(segment, Pause)
+        else leg_of(segment, trajectory, model, where=trajectory.segment_name(i))
+        for i, segment in enumerate(segments)
+    ]
+    if model.geometry.is_differential:  # it has no steering to set
+        return _with_rests(driven, 0.0, at_every_change=False, where=trajectory.name)
     return _with_rests(
         driven, trajectory.steer_first_s, at_every_change=trajectory.steer_at_rest, where=trajectory.name
     )
 
 
-def _leg(segment: Segment, trajectory: Trajectory, model: VehicleModel, *, where: str) -> Leg | float:
-    """Return the leg that drives a segment, or the duration of a pause."""
-    if isinstance(segment, Pause):
-        return segment.duration_s
+def _leg(segment: Straight | Arc | SpotTurn, trajectory: Trajectory, model: VehicleModel, *, where: str) -> Leg:
+    """Return the leg that drives a segment with two axles."""
+    if isinstance(segment, SpotTurn):
+        raise UnsuitedVehicleError(
+            "a vehicle with steered axles cannot turn on the spot", where=where, remedy="drive an arc"
+        )
     front, rear = _angles(segment, segment.steering or trajectory.steering, model, where=where)
     speed = axle_speed(
         trajectory.speed if segment.speed is None else segment.speed,
-        _full_speed(model, segment.direction == "backward", where=where),
+        full_speed(model, segment.direction == "backward", where=where),
         where=where,
     )
     signed = -speed if segment.direction == "backward" else speed
@@ -81,15 +59,6 @@ def _leg(segment: Segment, trajectory: Trajectory, model: VehicleModel, *, where
         assert segment.angle_deg is not None  # noqa: S101 - an arc has one of the three
         duration = math.radians(segment.angle_deg) / yaw_rate
     return Leg(where, front, rear, signed, duration)
-
-
-def _full_speed(model: VehicleModel, backward: bool, *, where: str) -> float:
-    low, high = model.drive.output_range
-    full = -low if backward else high
-    direction = "backward" if backward else "forward"
-    if not full > 0.0:
-        raise PlanError(f"this vehicle does not drive {direction}", where=where)
-    return full
 
 
 def _angles(segment: Straight | Arc, mode: Steering, model: VehicleModel, *, where: str) -> tuple[float, float]:
@@ -179,81 +148,11 @@ def _with_rests(driven: list[Leg | float], steer_first_s: float, *, at_every_cha
 
 
 def _needs_rest(before: Leg, after: Leg, *, at_every_change: bool) -> bool:
-    steers = (before.front_rad, before.rear_rad) != (after.front_rad, after.rear_rad)
+    steers = (before.front, before.rear) != (after.front, after.rear)
     if before.is_rest:
         return steers
     return before.speed_mps * after.speed_mps < 0.0 or (at_every_change and steers)
 
 
 def _rest(leg: Leg, duration_s: float) -> Leg:
-    return Leg(leg.where, leg.front_rad, leg.rear_rad, 0.0, duration_s)
-
-
-_SWEPT_STEP_M = 0.005
-
-
-def advance(leg: Leg, pose: tuple[float, float, float], after_s: Floats, geometry: Geometry) -> Floats:
-    """Return the poses `after_s` seconds (n,) into a leg that begins at `pose`, shape (n, 3); heading unwrapped."""
-    speed, sideslip, yaw_rate = _motion(leg, geometry)
-    x, y, heading = pose
-    turn = yaw_rate * after_s
-    # The chord of an arc of angle 2a is its length times sin(a)/a, which is 1 on a straight.
-    chord = speed * after_s * np.sinc(turn / (2.0 * np.pi))
-    direction = heading + sideslip + 0.5 * turn
-    return np.column_stack([x + chord * np.cos(direction), y + chord * np.sin(direction), heading + turn])
-
-
-def _motion(leg: Leg, geometry: Geometry) -> tuple[float, float, float]:
-    speed, sideslip, yaw_rate = body_motion(leg.front_rad, leg.rear_rad, leg.speed_mps, leg.speed_mps, geometry)
-    return float(speed), float(sideslip), float(yaw_rate)
-
-
-def sample(legs: Sequence[Leg], geometry: Geometry, step_s: float) -> Floats:
-    """Return t [s], x [m], y [m], heading [rad, unwrapped] in the start frame, shape (n, 4).
-
-    There is a row every `step_s` of each leg and at both of its ends.
-    """
-    rows = [np.zeros((1, 4))]
-    for leg in legs:
-        t, *pose = rows[-1][-1]
-        steps = np.arange(step_s, leg.duration_s - 1e-9, step_s)
-        after = np.append(steps, leg.duration_s)
-        rows.append(np.column_stack([t + after, advance(leg, (pose[0], pose[1], pose[2]), after, geometry)]))
-    return np.concatenate(rows)
-
-
-def end_pose(path: Floats) -> Pose:
-    """Return the last pose of a path (n, 4) as `sample` returns it."""
-    x, y, heading = path[-1, 1:].tolist()
-    return Pose(x, y, wrap_angle(heading))
-
-
-def swept(legs: Sequence[Leg], geometry: Geometry) -> Floats:
-    """Return when and where the centres of both axles pass: the floor that the vehicle's length needs.
-
-    Returns
-    -------
-    t [s], x [m], y [m] in the start frame, shape (n, 3), a row of each axle every 5 mm of the centroid's path or
-    less. Of circles driven over and over only the first is there, so that hours need no more rows than minutes.
-    """
-    t, pose = 0.0, (0.0, 0.0, 0.0)
-    rows = [_axles(np.zeros(1), np.zeros((1, 3)), geometry)]
-    for leg in legs:
-        speed, _, yaw_rate = _motion(leg, geometry)
-        once_s = min(leg.duration_s, 2.0 * np.pi / abs(yaw_rate)) if yaw_rate else leg.duration_s
-        after = np.linspace(0.0, once_s, 2 + int(abs(speed) * once_s / _SWEPT_STEP_M))[1:]
-        rows.append(_axles(t + after, advance(leg, pose, after, geometry), geometry))
-        x, y, heading = advance(leg, pose, np.array([leg.duration_s]), geometry)[0].tolist()
-        t, pose = t + leg.duration_s, (x, y, heading)
-    return np.concatenate(rows)
-
-
-def _axles(t_s: Floats, poses: Floats, geometry: Geometry) -> Floats:
-    along = np.column_stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])])
-    front, rear = poses[:, :2] + geometry.front_axle_m * along, poses[:, :2] - geometry.rear_axle_m * along
-    return np.column_stack([np.repeat(t_s, 2), np.stack([front, rear], axis=1).reshape(-1, 2)])
-
-
-def axles_swept(path: Floats, geometry: Geometry) -> Floats:
-    """Return when and where the axles' centres pass on a `path` (n, 4) of t, x, y, heading; shape (2n, 3)."""
-    return _axles(path[:, 0], path[:, 1:], geometry)
+    return Leg(leg.where, leg.front, leg.rear, 0.0, duration_s, is_rest=True)

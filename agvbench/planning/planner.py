@@ -9,7 +9,8 @@ import numpy as np
 
 from agvbench.errors import PlanError, UnsuitedVehicleError, VehicleError
 from agvbench.model import VehicleModel
-from agvbench.planning.legs import Leg, end_pose, legs_of, sample, swept
+from agvbench.planning.leg import Leg, end_pose, sample, swept
+from agvbench.planning.legs import legs_of
 from agvbench.planning.placement import best_start, check_fits, does_not_fit
 from agvbench.planning.trajectories.shapes import CommandTable
 from agvbench.planning.trajectories.trajectory import Trajectory
@@ -32,7 +33,7 @@ class Plan:
         What was planned.
     commands
         Timed commands; the last row, at `duration_s`, is the stop: the drive at neutral, the steering held, so that
-        the vehicle coasts along its path.
+        the vehicle coasts along its path. A differential vehicle has nothing to hold: all is neutral.
     duration_s
         From the first command to the stop [s].
     target
@@ -91,11 +92,6 @@ def plan(
     PlanError
         If the vehicle cannot drive the trajectory, or not inside the workspace.
     """
-    model.geometry.require_two_axles(
-        "trajectories are planned for steered axles only",
-        where=f"vehicle {model.name}",
-        remedy="record its drives, and import them with agvbench import",
-    )
     made = _made(trajectory, model)
     if workspace is None:
         return made if start is None else replace(made, start=start)
@@ -153,13 +149,13 @@ def commands_of(legs: Sequence[Leg], model: VehicleModel) -> Commands:
         if not rows or command != rows[-1][1]:
             rows.append((t, command))
         t += leg.duration_s
-    rows.append((t, rows[-1][1]._replace(drive=model.neutral)))
+    rows.append((t, model.stop_after(rows[-1][1])))
     return commands_from_rows([(at, *command) for at, command in rows])
 
 
 def _command(leg: Leg, model: VehicleModel) -> Command:
     try:
-        command = model.command_for(leg.front_rad, leg.rear_rad, leg.speed_mps)
+        command = model.command_for(leg.front, leg.rear, leg.speed_mps)
     except (VehicleError, PlanError) as error:
         raise PlanError(
             f"speed {abs(leg.speed_mps):.3f} m/s cannot be commanded: {error.what}",
@@ -168,7 +164,7 @@ def _command(leg: Leg, model: VehicleModel) -> Command:
             remedy=error.remedy,
         ) from None
     # Neutral is what the drive's electronics take for a stop; a fitted map need not be zero there.
-    return command._replace(drive=model.neutral) if leg.is_rest else command
+    return model.stop_after(command) if leg.is_rest else command
 
 
 Row = tuple[float, float, float, float]
@@ -190,8 +186,8 @@ def commands_and_legs(trajectory: Trajectory, model: VehicleModel) -> tuple[Comm
     table = trajectory.commands
     assert table is not None  # noqa: S101 - only called for raw commands
     _check(table, trajectory.name, model)
-    *_, front, rear = table.rows[-1]
-    commands = commands_from_rows([*table.rows, (table.duration_s, model.neutral, front, rear)])
+    stop = model.stop_after(Command(*table.rows[-1][1:]))
+    commands = commands_from_rows([*table.rows, (table.duration_s, *stop)])
     fronts, rears = model.axle_angles(commands.front, commands.rear)
     speeds = model.speed(commands.drive)
     legs = [
@@ -199,10 +195,11 @@ def commands_and_legs(trajectory: Trajectory, model: VehicleModel) -> tuple[Comm
             f"{trajectory.name}: commands.rows[{i}]",
             float(fronts[i]),
             float(rears[i]),
-            0.0 if drive == model.neutral else float(speeds[i]),
+            0.0 if commands.drive[i] == model.neutral else float(speeds[i]),
             float(commands.t_s[i + 1] - commands.t_s[i]),
+            is_rest=model.stop_after(commands.at(i)) == commands.at(i),
         )
-        for i, drive in enumerate(commands.drive[:-1])
+        for i in range(len(commands) - 1)
     ]
     return commands, legs
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from agvbench.planning.legs import Leg
+from agvbench.planning.leg import Leg
 from agvbench.types import Floats, wrap_angle
 from agvbench.vehicle.maps import StaticMap
 
@@ -122,7 +122,7 @@ class _ShootingProblem:
 
     def solve_from(self, front_rad: float, rear_rad: float) -> Floats:
         """Return the changes that a search ends with that begins so far from the plan's steering."""
-        offsets = {"front_rad": front_rad / _ANGLE_RAD, "rear_rad": rear_rad / _ANGLE_RAD}
+        offsets = {"front": front_rad / _ANGLE_RAD, "rear": rear_rad / _ANGLE_RAD}
         return self._solve(np.array([offsets.get(knob.field, 0.0) for knob in self._knobs]))
 
     def legs(self, u: Floats) -> list[Leg]:
@@ -192,8 +192,8 @@ def _knobs(legs: Sequence[Leg], front: StaticMap, rear: StaticMap) -> list[_Knob
         if leg.is_rest:
             continue
         for field, angle, axle, static_map in (
-            ("front_rad", leg.front_rad, "front", front),
-            ("rear_rad", leg.rear_rad, "rear", rear),
+            ("front", leg.front, "front", front),
+            ("rear", leg.rear, "rear", rear),
         ):
             low, high = (limit - angle for limit in static_map.output_range)
             if high > low:
@@ -212,22 +212,22 @@ def _changed(legs: Sequence[Leg], knobs: Sequence[_Knob], u: Floats) -> list[Leg
         leg = out[knob.leg]
         if knob.field == "duration_s":
             out[knob.leg] = replace(leg, duration_s=leg.duration_s * math.exp(_LOG_DURATION * value))
-        elif knob.field == "front_rad":
-            out[knob.leg] = replace(leg, front_rad=leg.front_rad + _ANGLE_RAD * value)
+        elif knob.field == "front":
+            out[knob.leg] = replace(leg, front=leg.front + _ANGLE_RAD * value)
         else:
-            out[knob.leg] = replace(leg, rear_rad=leg.rear_rad + _ANGLE_RAD * value)
+            out[knob.leg] = replace(leg, rear=leg.rear + _ANGLE_RAD * value)
     for i, leg in enumerate(legs):
         if leg.is_rest:
             like = out[_served(legs, i)]
-            out[i] = replace(leg, front_rad=like.front_rad, rear_rad=like.rear_rad)
+            out[i] = replace(leg, front=like.front, rear=like.rear)
     return out
 
 
 def _served(legs: Sequence[Leg], rest: int) -> int:
     """Return the leg whose steering is set during a rest: the next that drives with it, else the last one."""
-    angles = legs[rest].front_rad, legs[rest].rear_rad
+    angles = legs[rest].front, legs[rest].rear
     following = next((i for i in range(rest, len(legs)) if not legs[i].is_rest), None)
-    if following is not None and (legs[following].front_rad, legs[following].rear_rad) == angles:
+    if following is not None and (legs[following].front, legs[following].rear) == angles:
         return following
     before = next((i for i in range(rest, -1, -1) if not legs[i].is_rest), following)
     assert before is not None  # noqa: S101 - some leg drives, else there is no plan

@@ -33,9 +33,11 @@ def body_velocity(
     Parameters
     ----------
     front_rad, rear_rad
-        Axle angles [rad], counter-clockwise positive, within ±π/2; they and the speeds broadcast.
+        Axle angles [rad], counter-clockwise positive, within ±π/2; they and the speeds broadcast. The front value of a
+        differential vehicle is its yaw rate [rad/s], and the rear one is ignored.
     front_mps, rear_mps
         Speeds of the axles along their wheels [m/s], forward positive; that of an axle that is not driven is ignored.
+        The front one of a differential vehicle is the forward speed of its axle.
     geometry
         Where the axles are, and which of them drives.
 
@@ -51,6 +53,9 @@ def body_velocity(
     (True, 0.0)
     """
     front, rear = np.asarray(front_rad, dtype=np.float64), np.asarray(rear_rad, dtype=np.float64)
+    if geometry.is_differential:
+        along, yaw_rate = np.broadcast_arrays(np.asarray(front_mps, dtype=np.float64), front)
+        return along, geometry.rear_axle_m * yaw_rate, yaw_rate
     share = geometry.front_drive_share
     forward = share * np.asarray(front_mps) * np.cos(front) + (1.0 - share) * np.asarray(rear_mps) * np.cos(rear)
     tan_front, tan_rear = np.tan(front), np.tan(rear)
@@ -71,11 +76,16 @@ def body_motion(
         v = u / cos β [m/s], negative when driving backward; (vf cos δf + vr cos δr) / (2 cos β) if both axles drive.
     sideslip
         β = arctan((lf tan δr + lr tan δf) / (lf + lr)) [rad]: the velocity points along heading + β (eq. 5.9, 5.10).
+        It is ±π/2 for a differential vehicle that turns on the spot.
     yaw_rate
         ψ̇ = v cos β (tan δf − tan δr) / (lf + lr) [rad/s].
     """
     front, rear = np.asarray(front_rad, dtype=np.float64), np.asarray(rear_rad, dtype=np.float64)
-    forward, _, yaw_rate = body_velocity(front, rear, front_mps, rear_mps, geometry)
+    forward, left, yaw_rate = body_velocity(front, rear, front_mps, rear_mps, geometry)
+    if geometry.is_differential:
+        backward = forward < 0.0
+        sideslip = np.arctan2(np.where(backward, -left, left), np.abs(forward))
+        return np.where(backward, -1.0, 1.0) * np.hypot(forward, left), sideslip, yaw_rate
     lever = geometry.front_axle_m * np.tan(rear) + geometry.rear_axle_m * np.tan(front)
     sideslip = np.arctan(lever / geometry.wheelbase_m) + np.zeros_like(forward)
     return forward / np.cos(sideslip), sideslip, yaw_rate

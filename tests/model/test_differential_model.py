@@ -10,13 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from agvbench.calibration import calibrate
 from agvbench.campaign import CampaignHeader
 from agvbench.effects import CorneringSpeedLoss, SpeedLag, SteeringLag, WheelDiameterMismatch
 from agvbench.errors import CampaignError, VehicleError
 from agvbench.model import VehicleModel
-from agvbench.model.nominal import nominal_model
-from agvbench.planning import load_trajectory, plan
 from agvbench.types import Commands, Floats
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.kinematics import actuator_values
@@ -109,22 +106,6 @@ def test_an_effect_of_steered_axles_is_refused() -> None:
 def test_a_geometry_that_cannot_be_is_refused(values, message) -> None:
     with pytest.raises(VehicleError, match=message):
         Geometry(*values)
-
-
-def test_what_needs_steered_axles_refuses_a_differential_vehicle() -> None:
-    with pytest.raises(VehicleError, match=r'planned for steered axles only: kinematics = "differential"'):
-        plan(load_trajectory("5_forward_left"), turtle())
-    with pytest.raises(VehicleError, match="vehicle turtle: a nominal vehicle has steered axles"):
-        nominal_model("turtle", GEOMETRY, "si", 0.0)
-    with pytest.raises(VehicleError, match="campaign c: arcs and straights calibrate steered axles only"):
-        calibrate(InMemory())
-
-
-class InMemory:
-    header = CampaignHeader(3, "c", "turtle", 0.0, -0.05, "si", 0.0, 50.0, kinematics="differential")
-
-    def __iter__(self):
-        return iter(())
 
 
 HEADER = CampaignHeader(3, "c", "turtle", 0.0, -0.05, "si", 0.0, 50.0, kinematics="differential")

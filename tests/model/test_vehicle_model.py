@@ -147,5 +147,5 @@ def test_angles_that_no_axle_reaches_are_refused() -> None:
 
 def test_examples_ship_and_unknown_ones_are_named() -> None:
     assert isinstance(VehicleModel.load(example_path("thesis")), VehicleModel)
-    with pytest.raises(VehicleError, match=r"ships with agvbench: truck \(one of: front_steered, thesis\)"):
+    with pytest.raises(VehicleError, match=r"truck \(one of: differential, front_steered, thesis\)"):
         example_path("truck")

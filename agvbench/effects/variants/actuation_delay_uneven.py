@@ -29,6 +29,7 @@ class ActuationDelayUneven(Variant):
     equivalents: ClassVar[Mapping[str, Mapping[str, float]]] = {
         "actuation_delay.delay_s": {"front_s": 1 / 3, "rear_s": 1 / 3, "drive_s": 1 / 3}
     }
+    needs_steered_axles: ClassVar[bool] = True
 
     front_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.05)
     rear_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.05)

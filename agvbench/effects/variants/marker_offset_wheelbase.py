@@ -28,6 +28,7 @@ class MarkerOffsetWheelbase(Variant):
     reference: ClassVar[str] = "Bentvelsen 2015, eq. 5.6–5.8 with other distances of the axles"
     limits: ClassVar[str] = "axle_coupling of both axles turns the vehicle in the same way"
     equivalents: ClassVar[Mapping[str, Mapping[str, float]]] = {"wheelbase_error.longer": {"longer": 1.0}}
+    needs_steered_axles: ClassVar[bool] = True
 
     forward_m: float = parameter(unit="m", low=-0.5, high=0.5, scale=0.01)
     left_m: float = parameter(unit="m", low=-0.5, high=0.5, scale=0.01)

@@ -27,6 +27,7 @@ class SteeringBacklashUneven(Variant):
     equivalents: ClassVar[Mapping[str, Mapping[str, float]]] = {
         "steering_backlash.width_rad": {"front_width_rad": 0.5, "rear_width_rad": 0.5}
     }
+    needs_steered_axles: ClassVar[bool] = True
 
     front_width_rad: float = parameter(unit="rad", low=0.0, high=0.5, scale=0.03)
     rear_width_rad: float = parameter(unit="rad", low=0.0, high=0.5, scale=0.03)

@@ -84,7 +84,23 @@ class Pause(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="
     duration_s: Duration
 
 
-Segment = Straight | Arc | Pause
+class SpotTurn(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="spot_turn", tag_field="kind"):
+    """A turn on the spot about the middle of the axle of a differential vehicle, which alone can drive it.
+
+    `yaw_rate` is ``"full"``, ``"half"``, a share such as ``"75%"``, or rad/s; `angle_deg` is without sign.
+    """
+
+    turn: Turn
+    angle_deg: TurnAngle | None = None
+    duration_s: Duration | None = None
+    yaw_rate: Speed = "full"
+
+    def __post_init__(self) -> None:
+        exactly_one(self, "angle_deg", "duration_s")
+        check_speed(self.yaw_rate, "yaw_rate", "rad/s", "turn to the other side")
+
+
+Segment = Straight | Arc | SpotTurn | Pause
 
 
 def from_pieces(pieces: tuple[Piece, ...]) -> tuple[Segment, ...]:
@@ -130,13 +146,21 @@ def share_of(speed: str) -> float | None:
     return share if 0.0 < share <= 1.0 else None
 
 
-def check_speed(speed: Speed) -> None:
+def check_speed(
+    speed: Speed,
+    what: str = "speed",
+    unit: str = "m/s",
+    otherwise: str = 'to drive backward say direction = "backward"',
+) -> None:
     """Raise ValueError, with a line for the user, unless `speed` is one."""
     if isinstance(speed, str):
         if share_of(speed) is None:
-            raise ValueError(f'speed is not a speed: {speed!r} (limit: "full", "half", a share "1%" to "100%", or m/s)')
+            raise ValueError(
+                f"{what} is not a {what.replace('_', ' ')}: {speed!r} "
+                f'(limit: "full", "half", a share "1%" to "100%", or {unit})'
+            )
     elif not (math.isfinite(speed) and speed > 0.0):
-        raise ValueError(f'speed is not above zero: {speed} m/s; to drive backward say direction = "backward"')
+        raise ValueError(f"{what} is not above zero: {speed} {unit}; {otherwise}")
 
 
 def axle_speed(speed: Speed, full_mps: float, *, where: str) -> float:

@@ -1,0 +1,122 @@
+"""A leg: a stretch of time in which nothing about the vehicle's motion changes; and the path that legs follow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from agvbench.errors import PlanError
+from agvbench.model import VehicleModel
+from agvbench.types import Floats, Pose, wrap_angle
+from agvbench.vehicle.geometry import Geometry
+from agvbench.vehicle.kinematics import body_motion
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A stretch of time in which nothing about the vehicle's motion changes.
+
+    Parameters
+    ----------
+    where
+        How messages call it.
+    front, rear
+        Axle angles [rad]. The front value of a differential vehicle is its yaw rate [rad/s], and the rear one is 0.
+    speed_mps
+        Speed of both axles [m/s], signed; 0 at rest and while a differential vehicle turns on the spot.
+    duration_s
+        Duration [s].
+    is_rest
+        Whether the vehicle stands still; the angles are then those to which the steering is set.
+    """
+
+    where: str
+    front: float
+    rear: float
+    speed_mps: float
+    duration_s: float
+    is_rest: bool = False
+
+    def motion(self, geometry: Geometry) -> tuple[float, float, float]:
+        """Return speed [m/s], sideslip [rad] and yaw rate [rad/s] of the centroid; all zero at rest."""
+        if self.is_rest:
+            return 0.0, 0.0, 0.0
+        speed, sideslip, yaw_rate = body_motion(self.front, self.rear, self.speed_mps, self.speed_mps, geometry)
+        return float(speed), float(sideslip), float(yaw_rate)
+
+
+def full_speed(model: VehicleModel, backward: bool, *, where: str) -> float:
+    """Return the vehicle's full speed in a direction [m/s, positive]; raise `PlanError` if it does not drive there."""
+    low, high = model.drive.output_range
+    full = -low if backward else high
+    direction = "backward" if backward else "forward"
+    if not full > 0.0:
+        raise PlanError(f"this vehicle does not drive {direction}", where=where)
+    return full
+
+
+_SWEPT_STEP_M = 0.005
+
+
+def advance(leg: Leg, pose: tuple[float, float, float], after_s: Floats, geometry: Geometry) -> Floats:
+    """Return the poses `after_s` seconds (n,) into a leg that begins at `pose`, shape (n, 3); heading unwrapped."""
+    speed, sideslip, yaw_rate = leg.motion(geometry)
+    x, y, heading = pose
+    turn = yaw_rate * after_s
+    # The chord of an arc of angle 2a is its length times sin(a)/a, which is 1 on a straight.
+    chord = speed * after_s * np.sinc(turn / (2.0 * np.pi))
+    direction = heading + sideslip + 0.5 * turn
+    return np.column_stack([x + chord * np.cos(direction), y + chord * np.sin(direction), heading + turn])
+
+
+def sample(legs: Sequence[Leg], geometry: Geometry, step_s: float) -> Floats:
+    """Return t [s], x [m], y [m], heading [rad, unwrapped] in the start frame, shape (n, 4).
+
+    There is a row every `step_s` of each leg and at both of its ends.
+    """
+    rows = [np.zeros((1, 4))]
+    for leg in legs:
+        t, *pose = rows[-1][-1]
+        steps = np.arange(step_s, leg.duration_s - 1e-9, step_s)
+        after = np.append(steps, leg.duration_s)
+        rows.append(np.column_stack([t + after, advance(leg, (pose[0], pose[1], pose[2]), after, geometry)]))
+    return np.concatenate(rows)
+
+
+def end_pose(path: Floats) -> Pose:
+    """Return the last pose of a path (n, 4) as `sample` returns it."""
+    x, y, heading = path[-1, 1:].tolist()
+    return Pose(x, y, wrap_angle(heading))
+
+
+def swept(legs: Sequence[Leg], geometry: Geometry) -> Floats:
+    """Return when and where the centres of both axles pass: the floor that the vehicle's length needs.
+
+    Returns
+    -------
+    t [s], x [m], y [m] in the start frame, shape (n, 3), a row of each axle every 5 mm of the centroid's path or
+    less. Of circles driven over and over only the first is there, so that hours need no more rows than minutes.
+    """
+    t, pose = 0.0, (0.0, 0.0, 0.0)
+    rows = [_axles(np.zeros(1), np.zeros((1, 3)), geometry)]
+    for leg in legs:
+        speed, _, yaw_rate = leg.motion(geometry)
+        once_s = min(leg.duration_s, 2.0 * np.pi / abs(yaw_rate)) if yaw_rate else leg.duration_s
+        after = np.linspace(0.0, once_s, 2 + int(abs(speed) * once_s / _SWEPT_STEP_M))[1:]
+        rows.append(_axles(t + after, advance(leg, pose, after, geometry), geometry))
+        x, y, heading = advance(leg, pose, np.array([leg.duration_s]), geometry)[0].tolist()
+        t, pose = t + leg.duration_s, (x, y, heading)
+    return np.concatenate(rows)
+
+
+def _axles(t_s: Floats, poses: Floats, geometry: Geometry) -> Floats:
+    along = np.column_stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])])
+    front, rear = poses[:, :2] + geometry.front_axle_m * along, poses[:, :2] - geometry.rear_axle_m * along
+    return np.column_stack([np.repeat(t_s, 2), np.stack([front, rear], axis=1).reshape(-1, 2)])
+
+
+def axles_swept(path: Floats, geometry: Geometry) -> Floats:
+    """Return when and where the axles' centres pass on a `path` (n, 4) of t, x, y, heading; shape (2n, 3)."""
+    return _axles(path[:, 0], path[:, 1:], geometry)
