@@ -15,7 +15,7 @@ from agvbench.errors import PlantError
 from agvbench.simulator.checked_plant import CheckedPlant, as_plant_error, raised
 from agvbench.types import PlantFactory
 
-_SAMPLED = ("agvbench.simulator.hidden:", "agvbench.simulator:random_plant", "agvbench.simulator.plants:random_plant")
+_SAMPLED = ("agvbench.simulator.hidden:", "agvbench.simulator:random_", "agvbench.simulator.plants:random_")
 _FORM = "write MODULE:FACTORY or path/to/FILE.py:FACTORY"
 
 

@@ -25,6 +25,7 @@ from agvbench.simulator.vehicle_parameters import (
 from agvbench.types import PlantFactory
 
 if TYPE_CHECKING:
+    from agvbench.simulator.differential import DifferentialPlant
     from agvbench.simulator.vehicle_plant import VehiclePlant
 
 _DEG = math.pi / 180.0
@@ -197,7 +198,27 @@ def _random_side(full_mps: float, draw: Draw) -> DriveSide:
     return DriveSide(dead_band, knee, full_mps * (reach + knee) / reach, full_mps, draw(0.8, 1.5))
 
 
+def differential_plant(seed: int) -> DifferentialPlant:
+    """Return a small robot with two driven wheels. `drive` is a speed [m/s], `front` a yaw rate [rad/s]."""
+    from agvbench.simulator.differential import DifferentialPlant, DifferentialVehicle  # loads numba
+
+    return DifferentialPlant(DifferentialVehicle(), seed)
+
+
+def random_differential_plant(seed: int) -> DifferentialPlant:
+    """Return a differential vehicle drawn at random; see `agvbench.simulator.differential.random_differential`."""
+    from agvbench.simulator.differential import DifferentialPlant, random_differential
+
+    return DifferentialPlant(random_differential(seed), seed)
+
+
 PLANTS: Mapping[str, PlantFactory] = MappingProxyType(
-    {"make_plant": make_plant, "random_plant": random_plant, "small_plant": small_plant}
+    {
+        "make_plant": make_plant,
+        "random_plant": random_plant,
+        "small_plant": small_plant,
+        "differential_plant": differential_plant,
+        "random_differential_plant": random_differential_plant,
+    }
 )
 """Every plant that ships, by name: each inherits the whole contract (`agvbench.simulator.plant_contract`)."""

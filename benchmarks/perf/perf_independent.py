@@ -44,8 +44,18 @@ ALSO_TRUE: Mapping[str, frozenset[str]] = {
 """Effects of the library that describe a cause of another name in part, and are no wrong name."""
 WRONG_DISTANCES = frozenset({"wheelbase_error", "marker_offset"})
 """The axle distances in campaign.toml are wrong by a millimetre or two each, as those that a lab measures."""
-ALWAYS_TRUE: Mapping[str, frozenset[str]] = {"state_space": frozenset({"speed_lag", "steering_lag"})}
-"""Servos and motor of this simulator have a time constant of 5 ms, with and without a cause."""
+ALWAYS_TRUE: Mapping[str, frozenset[str]] = {
+    "state_space": frozenset({"speed_lag", "steering_lag"}),
+    "differential_wheels": frozenset({"speed_lag", "steering_lag", "wheel_lag", "actuation_delay"}),
+}
+"""Servos and motors of these simulators have a time constant of 5 ms, with and without a cause.
+
+That of both wheels of a differential vehicle resembles a delay of 5 ms.
+"""
+NAMES: Mapping[str, Mapping[str, str]] = {"differential_wheels": {"steering_rate_limit": "yaw_acceleration_limit"}}
+"""Causes that the library knows by another name on such a vehicle."""
+ABSORBED: Mapping[str, frozenset[str]] = {"differential_wheels": frozenset({"drive_dead_band", "mocap_scale"})}
+"""Causes that free maps absorb: they need no name."""
 
 
 @dataclass(frozen=True)
@@ -136,8 +146,9 @@ def judged(simulator: str, trial: Trial, known: Mapping[str, str], found: Diagno
     named = {effect.name: {effect.name, *effect.confounded_with} for effect in found.effects}
     said = frozenset().union(*named.values()) if named else frozenset()
     also = (ALSO_TRUE.get(cause, frozenset()) for cause in trial.causes)
-    true = WRONG_DISTANCES.union(trial.causes, ALWAYS_TRUE.get(simulator, ()), *also)
-    inside = [cause for cause in trial.causes if known[cause] == "inside"]
+    absorbed, names = ABSORBED.get(simulator, frozenset()), NAMES.get(simulator, {})
+    inside = [names.get(cause, cause) for cause in trial.causes if known[cause] == "inside" and cause not in absorbed]
+    true = WRONG_DISTANCES.union(trial.causes, inside, ALWAYS_TRUE.get(simulator, ()), *also)
     errors = dict(found.held_out.errors["end_position_mm"]) if found.held_out is not None else {}
     return Answer(
         trial.name,

@@ -12,7 +12,7 @@ from agvbench.simulator import check_plant
 from agvbench.simulator.plant_contract import CLAUSES, subject_of
 from agvbench.simulator.plants import PLANTS
 
-UNITS = {"small_plant": "normalised"}
+UNITS = {"small_plant": "normalised", "differential_plant": "si", "random_differential_plant": "si"}
 
 
 @pytest.mark.parametrize("clause", CLAUSES.values(), ids=CLAUSES)
