@@ -11,6 +11,7 @@ from agvbench.calibration.maps.selection import (
     fit_steering_map,
     steering_fitters,
 )
+from agvbench.calibration.measurement.body_velocity import BodyVelocity, measure_body_velocity
 from agvbench.calibration.measurement.circle import CircleFit, CircleFits, fit_circle, fit_circles
 from agvbench.calibration.measurement.frames import FrameQuality, clean_frames, inspect_frames
 from agvbench.calibration.measurement.run_measurement import RunMeasurement, measure_run
@@ -20,6 +21,7 @@ from agvbench.vehicle.quaternion import quaternion_to_heading
 
 __all__ = [
     "CALIBRATION_EXPERIMENTS",
+    "BodyVelocity",
     "Calibration",
     "CircleFit",
     "CircleFits",
@@ -42,6 +44,7 @@ __all__ = [
     "fit_steering_map",
     "identify",
     "inspect_frames",
+    "measure_body_velocity",
     "measure_run",
     "quaternion_to_heading",
     "steering_fitters",

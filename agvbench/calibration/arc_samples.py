@@ -7,13 +7,14 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 
 from agvbench.calibration.measurement.run_measurement import RunMeasurement, measure_run
-from agvbench.calibration.samples import Role, Sample
+from agvbench.calibration.samples import Sample
 from agvbench.errors import FitError
 from agvbench.types import Run
+from agvbench.vehicle.channels import Role
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.kinematics import wheel_speed
 
-CALIBRATION_EXPERIMENTS = ("steering_front", "steering_rear", "steering_opposite", "drive")
+CALIBRATION_EXPERIMENTS = ("steering_front", "steering_rear", "steering_opposite", "drive", "yaw_rate")
 # Whose runs say most about a role; the next are asked where these vary its command too little.
 _OWN: dict[Role, tuple[str, ...]] = {
     "front": ("steering_front", "steering_opposite"),

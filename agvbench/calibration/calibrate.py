@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 from agvbench.calibration.arc_samples import CALIBRATION_EXPERIMENTS, arc_samples, described, measure_runs
 from agvbench.calibration.campaign_protocol import CampaignLike, HeaderLike
+from agvbench.calibration.differential_samples import differential_samples
 from agvbench.calibration.free_driving import FreeDriving, read_free_driving
 from agvbench.calibration.maps.end_stops import saturated
 from agvbench.calibration.maps.map_fit import MapFit, assess_map, rounded
@@ -22,11 +22,12 @@ from agvbench.calibration.maps.selection import (
     preferred,
     steering_fitters,
 )
-from agvbench.calibration.samples import ROLES, CurvePoints, Role, Sample, points_of
+from agvbench.calibration.samples import CurvePoints, Sample, points_of
 from agvbench.campaign.arguments import as_campaign
 from agvbench.errors import FitError, InputError, OneOf
 from agvbench.model import VehicleModel
 from agvbench.types import Run
+from agvbench.vehicle.channels import ROLES, Role, channels_of, quantity_of
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import Fixed, StaticMap
 
@@ -45,7 +46,8 @@ class Calibration:
 
     ``model`` with its provenance; ``fits`` by role (``"front"``, ``"rear"``, ``"drive"``) and kind, the refused kinds
     with their error; ``chosen`` the kind of the model's map by role (``"fixed"`` for an axle whose command never
-    varied); ``measurements`` one row per sample (axle, command, value in deg or m/s, stderr, run_id, left_out, why);
+    varied); ``measurements`` one row per sample (axle, command, value in deg, rad/s or m/s, stderr, run_id, left_out,
+    why);
     ``warnings`` in plain words, what was left out among them.
     """
 
@@ -61,10 +63,10 @@ def calibrate(
 ) -> Calibration:
     """Fit the static maps of a vehicle from its calibration runs.
 
-    Runs of the experiments ``steering_front``, ``steering_rear``, ``steering_opposite`` and ``drive`` hold one
-    command each and are measured one by one (`measure_run`). A campaign without any, such as an imported recording
-    of free driving, is read by windows instead (`read_free_driving`). Runs that are not ``ok`` are excluded, and so are
-    validation and test runs (``split`` = ``validation`` or ``held_out``).
+    Runs of the experiments ``steering_front``, ``steering_rear``, ``steering_opposite``, ``drive`` and ``yaw_rate``
+    hold one command each and are measured one by one (`measure_run`, `measure_body_velocity`). A campaign without any,
+    such as an imported recording of free driving, is read by windows instead (`read_free_driving`). Runs that are not
+    ``ok`` are excluded, and so are validation and test runs (``split`` = ``validation`` or ``held_out``).
 
     Parameters
     ----------
@@ -90,26 +92,30 @@ def calibrate(
     opened = as_campaign(campaign)
     header = opened.header
     geometry = header.geometry
-    geometry.require_two_axles(
-        "arcs and straights calibrate steered axles only",
-        where=f"campaign {header.name}",
-        remedy="use agvbench diagnose: its --out writes a vehicle with fitted maps",
-    )
     runs = [run for run in opened if run.split not in {"held_out", "validation"} and session in (None, run.session)]
     if session is not None and not runs:
         raise InputError("no run belongs to this session", where=f"campaign {header.name}", value=repr(session))
     dedicated = [run for run in runs if run.experiment in CALIBRATION_EXPERIMENTS]
     free = None
-    if dedicated:
+    if dedicated and geometry.is_differential:
+        samples, warnings, used = _from_turns(dedicated, geometry, header)
+    elif dedicated:
         samples, warnings, used = _from_arcs(dedicated, geometry, header)
     else:
+        geometry.require_two_axles(
+            "free driving of a differential vehicle is not calibrated",
+            where=f"campaign {header.name}",
+            remedy="use agvbench diagnose: its --out writes a vehicle with fitted maps",
+        )
         free = read_free_driving(runs, geometry, header)
         samples, warnings, used = free.samples, free.words, free.runs_used
     fits, chosen = _fit_roles(samples, header, maps, free)
     best = {role: fit for role in ROLES if isinstance(fit := fits[role].get(chosen[role]), MapFit)}
-    warnings = [*warnings, *_warnings(best, samples)]
+    warnings = [*warnings, *_warnings(best, samples, geometry)]
     front, rear, drive = (_chosen_map(role, best, samples) for role in ROLES)
     method = "windows of free driving" if free else "arcs and straights"
+    if geometry.is_differential:
+        method = "straights and turns on the spot"
     model = VehicleModel(
         name=header.vehicle_name,
         geometry=geometry,
@@ -120,19 +126,31 @@ def calibrate(
         drive=drive,
         provenance=_provenance(header, method, used, maps, chosen, best, session),
     )
-    return Calibration(model, fits, chosen, _table(samples, best), warnings)
+    return Calibration(model, fits, chosen, _table(samples, best, geometry), warnings)
 
 
 def _from_arcs(runs: list[Run], geometry: Geometry, header: HeaderLike) -> tuple[list[Sample], list[str], int]:
     measured, refused = measure_runs(runs, geometry, header.neutral)
     words = described(refused)
     if not measured:
-        raise FitError(
-            "no calibration run can be measured",
-            where=f"campaign {header.name}",
-            value=f"0 of {len(runs)} runs; {words[0]}",
-        )
+        raise _unmeasured(header, runs, words)
     return arc_samples(runs, measured, geometry), words, len(measured)
+
+
+def _from_turns(runs: list[Run], geometry: Geometry, header: HeaderLike) -> tuple[list[Sample], list[str], int]:
+    samples, refused = differential_samples(runs, geometry, header.neutral)
+    words = described(refused)
+    if not samples:
+        raise _unmeasured(header, runs, words)
+    return samples, words, len(runs) - len(refused)
+
+
+def _unmeasured(header: HeaderLike, runs: list[Run], words: list[str]) -> FitError:
+    return FitError(
+        "no calibration run can be measured",
+        where=f"campaign {header.name}",
+        value=f"0 of {len(runs)} runs; {words[0]}",
+    )
 
 
 def _fit_roles(
@@ -164,8 +182,10 @@ def _fit_role(
             limit=f"at least {MIN_COMMANDS}",
             remedy="drive bench_calibration.py with its whole grid",
         )
-    fitters = drive_fitters(header.neutral) if role == "drive" else steering_fitters()
-    order = DRIVE_KINDS if role == "drive" else STEERING_KINDS
+    # Motors set a yaw rate as they set a speed: with a dead band and saturation.
+    by_motor = role == "drive" or header.geometry.is_differential
+    fitters = drive_fitters(header.neutral) if by_motor else steering_fitters()
+    order = DRIVE_KINDS if by_motor else STEERING_KINDS
     fits = compare_maps(points, fitters)
     try:
         return fits, preferred(fits, ("thesis",) if maps == "thesis" else order).name
@@ -180,27 +200,27 @@ def _chosen_map(role: Role, best: Best, samples: list[Sample]) -> StaticMap:
     return Fixed(output=rounded(float(points.value[0])), command=float(points.command[0]))
 
 
-def _warnings(best: Best, samples: list[Sample]) -> list[str]:
+def _warnings(best: Best, samples: list[Sample], geometry: Geometry) -> list[str]:
     """Return in words what was left out of the chosen fits, and what looks odd."""
     words = []
-    for role in ROLES:
-        scale, unit = (1.0, " m/s") if role == "drive" else (math.degrees(1.0), "°")
+    for role in channels_of(geometry):
+        quantity = quantity_of(role, geometry)
+        name = quantity.name if geometry.is_differential else role
         aside = [s for s in samples if s.role == role and s.why_left_out]
         reasons = Counter(s.why_left_out for s in aside)
-        words += [f"{role}: {count} samples left out: {why}" for why, count in reasons.items()]
+        words += [f"{name}: {count} samples left out: {why}" for why, count in reasons.items()]
         if (fit := best.get(role)) is None:
-            value = scale * float(points_of(samples, role).value[0])
-            words.append(f"{role}: its command never varied; taken as fixed at {value:.2f}{unit}")
+            value = quantity.scale * float(points_of(samples, role).value[0])
+            unit = quantity.unit if quantity.unit == "°" else f" {quantity.unit}"
+            words.append(f"{name}: its command never varied; taken as fixed at {value:.2f}{unit}")
             continue
-        words += [
-            f"{role}: {out.command:g} ({scale * out.value:.3g}{unit}) left out: {out.why}" for out in fit.left_out
-        ]
+        words += [f"{name}: {out.command:g} ({quantity.text(out.value)}) left out: {out.why}" for out in fit.left_out]
         if fit.name == "line_with_end_stops":
             words += [
-                f"{role}: {out.command:g} ({scale * out.value:.3g}{unit}) not on the line: {out.why}"
+                f"{name}: {out.command:g} ({quantity.text(out.value)}) not on the line: {out.why}"
                 for out in saturated(fit)
             ]
-        words += [f"{role}: {note}" for note in fit.notes]
+        words += [f"{name}: {note}" for note in fit.notes]
     return words
 
 
@@ -233,13 +253,13 @@ def _provenance(
     return provenance
 
 
-def _table(samples: list[Sample], best: Best) -> pd.DataFrame:
+def _table(samples: list[Sample], best: Best, geometry: Geometry) -> pd.DataFrame:
     import pandas as pd
 
     reasons = {(role, out.command): out.why for role, fit in best.items() for out in fit.left_out}
     rows = []
-    for s in samples:
-        scale = 1.0 if s.role == "drive" else math.degrees(1.0)
+    for s in [s for s in samples if s.role in channels_of(geometry)]:
+        scale = quantity_of(s.role, geometry).scale
         why = s.why_left_out or reasons.get((s.role, s.command), "")
         rows.append((s.role, s.command, scale * s.value, scale * s.stderr, s.run_id, bool(why), why))
     columns = ["axle", "command", "value", "stderr", "run_id", "left_out", "why"]

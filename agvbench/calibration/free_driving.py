@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from agvbench.calibration.campaign_protocol import HeaderLike
 from agvbench.calibration.drive_regression import DriveData, DriveRegression, regress_drive
 from agvbench.calibration.measurement.windows import WINDOW_S, Windows, command_spread, held_command, measured_windows
-from agvbench.calibration.samples import Role, Sample
+from agvbench.calibration.samples import Sample
 from agvbench.errors import FitError
 from agvbench.types import Floats, Run
+from agvbench.vehicle.channels import Role
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.kinematics import wheel_speed
 

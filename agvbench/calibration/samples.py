@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agvbench.errors import FitError
 from agvbench.types import Floats
+from agvbench.vehicle.channels import Role
 
 # Smaller values, whose squares underflow, are zero: no fit divides by them or takes their logarithm.
 _ZERO = 1e-100
@@ -59,13 +59,9 @@ class CurvePoints:
         )
 
 
-Role = Literal["front", "rear", "drive"]
-ROLES: tuple[Role, ...] = ("front", "rear", "drive")
-
-
 @dataclass(frozen=True)
 class Sample:
-    """One measured value of one role: rad for an axle, m/s (along the wheels) for the drive.
+    """One measured value of one role: rad for an axle, rad/s for a yaw rate, m/s (along the wheels) for the drive.
 
     ``why_left_out`` is empty for a sample that counts.
     """

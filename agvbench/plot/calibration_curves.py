@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -11,13 +10,13 @@ from numpy.typing import NDArray
 from agvbench.errors import InputError, OneOf
 from agvbench.plot.style import ON_WHITE, Ink, colour, label, require_result
 from agvbench.types import Floats
+from agvbench.vehicle.channels import channels_of, quantity_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from agvbench.calibration import Calibration
 
-_LABELS = {"front": "front axle angle [°]", "rear": "rear axle angle [°]", "drive": "speed [m/s]"}
 _UNITS = {"us": "µs"}
 _MEASURED, _LEFT_OUT = 1, 0
 _CURVE_POINTS = 240
@@ -29,7 +28,8 @@ def calibration_curve(axes: Axes, calibration: Calibration, axle: Literal["front
     Parameters
     ----------
     axes
-        Where to draw: the command in the vehicle's unit, and the axle angle [°] or the speed [m/s].
+        Where to draw: the command in the vehicle's unit, and the axle angle [°], the yaw rate [rad/s] or the
+        speed [m/s].
     calibration
         What `agvbench.calibrate` returned.
     axle
@@ -41,16 +41,23 @@ def calibration_curve(axes: Axes, calibration: Calibration, axle: Literal["front
         If `calibration` is none, there is no such axle, or nothing was measured of it.
     """
     require_result(calibration, "measurements", where="calibration", made_by="agvbench.calibrate")
-    table = calibration.measurements
+    table, model = calibration.measurements, calibration.model
     rows = table[table["axle"] == axle]
     if rows.empty:
-        raise InputError("nothing was measured", where="axle", value=repr(axle), limit=OneOf(_LABELS))
-    model = calibration.model
+        raise InputError(
+            "nothing was measured", where="axle", value=repr(axle), limit=OneOf(channels_of(model.geometry))
+        )
+    quantity = quantity_of(axle, model.geometry)
     command, value, stderr = (rows[name].to_numpy(dtype=float) for name in ("command", "value", "stderr"))
     at = np.linspace(command.min(), command.max(), _CURVE_POINTS)
-    scale = 1.0 if axle == "drive" else math.degrees(1.0)
-    label(axes, x=f"command [{_UNITS.get(model.command_unit, '–')}]", y=_LABELS[axle], title=calibration.chosen[axle])
-    axes.plot(at, scale * getattr(model, axle)(at), color=ON_WHITE.ink, linewidth=1.2)
+    set_value = f"{quantity.channel} {quantity.name}" if quantity.name == "angle" else quantity.name
+    label(
+        axes,
+        x=f"command [{_UNITS.get(model.command_unit, '–')}]",
+        y=f"{set_value} [{quantity.unit}]",
+        title=calibration.chosen[axle],
+    )
+    axes.plot(at, quantity.scale * getattr(model, axle)(at), color=ON_WHITE.ink, linewidth=1.2)
     draw_measured(axes, command, value, stderr, rows["left_out"].to_numpy(dtype=np.bool_), ON_WHITE)
     return axes
 

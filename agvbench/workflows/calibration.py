@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -15,6 +14,8 @@ from agvbench.campaign import Campaign
 from agvbench.errors import AgvbenchError
 from agvbench.model import VehicleModel
 from agvbench.types import Floats
+from agvbench.vehicle.channels import channels_of, quantity_of
+from agvbench.vehicle.geometry import Geometry
 from agvbench.workflows.output_files import write_file
 
 if TYPE_CHECKING:
@@ -84,7 +85,6 @@ def write_firmware_header(model: VehicleModel, path: Path) -> None:
 
 
 TABLE, VEHICLE = "calibration", "vehicle.toml"
-AXLES = {"front": ("front axle", "deg"), "rear": ("rear axle", "deg"), "drive": ("drive", "m/s")}
 _REQUIRED = ("axle", "command", "value")
 _TRUE = {"true", "1", "1.0", "yes"}
 _CURVE_POINTS = 240
@@ -92,9 +92,10 @@ _CURVE_POINTS = 240
 
 @dataclass(frozen=True)
 class Curve:
-    """One axle: measured points, arrays of shape (n,), and the fitted map sampled, shape (m,) (empty: no model)."""
+    """One channel: measured points, arrays of shape (n,), and the fitted map sampled, shape (m,) (empty: no model)."""
 
     axle: str
+    channel: str
     unit: str
     command: Floats
     value: Floats
@@ -120,7 +121,8 @@ def read_calibration_curves(campaign: Campaign) -> CalibrationCurves:
     """Return the calibration curves of `campaign`, as far as its directory holds them; their absence is no error.
 
     The measurements are the table ``calibration`` (``axle`` front, rear or drive; ``command`` in vehicle units;
-    ``value`` in deg or m/s; optional ``stderr``, ``run_id``, ``left_out``), the maps are those of ``vehicle.toml``.
+    ``value`` in deg, rad/s or m/s; optional ``stderr``, ``run_id``, ``left_out``), the maps are those of
+    ``vehicle.toml``.
     """
     if not any((campaign.path / f"{TABLE}{suffix}").exists() for suffix in (".parquet", ".csv")):
         return CalibrationCurves(why_absent="The campaign holds no calibration measurements (table calibration).")
@@ -132,8 +134,9 @@ def read_calibration_curves(campaign: Campaign) -> CalibrationCurves:
     if missing:
         return CalibrationCurves(why_absent=f"The calibration measurements lack the column {missing[0]}.")
     model, why = _model(campaign)
-    curves = [curve for axle in AXLES if (curve := _curve(table, axle, model)) is not None]
-    kinds = {axle: getattr(model, axle).kind.replace("_", " ") for axle in AXLES} if model else {}
+    geometry = campaign.header.geometry
+    curves = [curve for axle in channels_of(geometry) if (curve := _curve(table, axle, geometry, model)) is not None]
+    kinds = {str(c.axle): getattr(model, c.axle).kind.replace("_", " ") for c in curves} if model else {}
     if not curves:
         why = "The calibration measurements name no axle of front, rear and drive."
     name, hashed = (model.name, model.calibration_hash) if model else ("", "")
@@ -152,24 +155,25 @@ def _model(campaign: Campaign) -> tuple[VehicleModel | None, str]:
         return None, f"No fitted curve is drawn: {error}."
 
 
-def _curve(table: pd.DataFrame, axle: str, model: VehicleModel | None) -> Curve | None:
+def _curve(table: pd.DataFrame, axle: str, geometry: Geometry, model: VehicleModel | None) -> Curve | None:
     rows = table[table["axle"].astype(str) == axle]
     command, value = _numbers(rows, "command"), _numbers(rows, "value")
     usable = np.isfinite(command) & np.isfinite(value)
     if not usable.any():
         return None
     left_out = np.array([str(v).lower() in _TRUE for v in rows.get("left_out", [False] * len(rows))], dtype=np.bool_)
-    none = np.empty(0)
+    none, quantity = np.empty(0), quantity_of(axle, geometry)
     fitted, map_command, map_value = none, none, none
     if model is not None:
-        scale = 1.0 if axle == "drive" else 180.0 / math.pi
+        scale = quantity.scale
         static_map = getattr(model, axle)
         low, high = float(command[usable].min()), float(command[usable].max())
         map_command = np.linspace(low, high, _CURVE_POINTS)
         fitted, map_value = scale * static_map(command[usable]), scale * static_map(map_command)
     return Curve(
         axle,
-        AXLES[axle][1],
+        quantity.channel,
+        quantity.word,
         command[usable],
         value[usable],
         _numbers(rows, "stderr")[usable],

@@ -94,6 +94,7 @@ def _vehicle_facts(a: Campaign, b: Campaign) -> Iterator[tuple[str, str, str]]:
         unit = one.command_unit
         yield "neutral", f"{one.neutral:g} {unit}", f"{other.neutral:g} {unit}"
     yield "driven axle", one.driven, other.driven
+    yield "kinematics", one.kinematics, other.kinematics
     yield from _options(a, b, _VEHICLE)
 
 

@@ -202,12 +202,12 @@ class Segment:
     end_s: float
 
 
-def driven_segment(commands: Commands, last_frame_s: float, neutral: float | None) -> Segment:
+def driven_segment(commands: Commands, last_frame_s: float, neutral: float | None, *, turns: bool = False) -> Segment:
     """Return the longest stretch of one command in which the vehicle was commanded to drive.
 
     The last row is the stop, and `neutral` (if None, its drive command) says which rows stand still: steering
     is set before the vehicle drives. A run that never leaves neutral, as in the middle of the drive
-    calibration, is taken for what it is: its longest stretch.
+    calibration, is taken for what it is: its longest stretch. With `turns` the front command moves a vehicle, too.
     """
     rows = np.column_stack([commands.drive, commands.front, commands.rear])
     changes = np.flatnonzero(np.any(np.diff(rows, axis=0) != 0.0, axis=1)) + 1
@@ -215,6 +215,8 @@ def driven_segment(commands: Commands, last_frame_s: float, neutral: float | Non
     times = np.r_[commands.t_s[starts], max(last_frame_s, commands.t_s[-1])]
     stop = float(commands.drive[-1]) if neutral is None else neutral
     driven = commands.drive[starts] != stop
+    if turns:
+        driven |= commands.front[starts] != (commands.front[-1] if neutral is None else neutral)
     # A stop is no measurement of standing still, unless nothing else was asked for.
     among = np.flatnonzero(driven) if driven.any() else np.arange(len(starts))
     longest = among[np.argmax(np.diff(times)[among])]

@@ -99,7 +99,7 @@ def _reach(request: RunRequest, plan: Plan) -> float:
     start, path = request.start, plan.expected
     turn = np.exp(1j * start.heading_rad)
     floor = complex(start.x_m, start.y_m) + turn * (path[:, 1] + 1j * path[:, 2])
-    longest_axle = max(plan.geometry.front_axle_m, plan.geometry.rear_axle_m)
+    longest_axle = max(plan.geometry.front_axle_m, abs(plan.geometry.rear_axle_m))
     return float(np.abs(floor).max() + longest_axle + DEFAULT_MARGIN_M)
 
 

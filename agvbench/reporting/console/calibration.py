@@ -11,6 +11,7 @@ from rich.text import Text
 
 from agvbench.calibration import Calibration, MapFit
 from agvbench.errors import FitError
+from agvbench.vehicle.channels import channels_of, quantity_of
 
 _EXPLAINS = 0.5
 _CAPTION = (
@@ -42,9 +43,12 @@ def _fits_table(calibration: Calibration) -> Table:
     table.add_column("fit", no_wrap=True)
     for heading in ("n", "out", "R²", "residual", "rms", "predicted"):
         table.add_column(heading, justify="right", no_wrap=True)
-    for role, fits in calibration.fits.items():
-        unit, scale, digits = ("mm/s", 1e3, 1) if role == "drive" else ("°", math.degrees(1.0), 3)
-        table.add_row("", f"{role}, {unit}" if fits else f"{role}: fixed", style="bold")
+    geometry = calibration.model.geometry
+    for role in channels_of(geometry):
+        fits, quantity = calibration.fits[role], quantity_of(role, geometry)
+        unit, scale, digits = ("mm/s", 1e3, 1) if role == "drive" else (quantity.unit, quantity.scale, 3)
+        name = quantity.channel if geometry.is_differential else role
+        table.add_row("", f"{name}, {unit}" if fits else f"{name}: fixed", style="bold")
         for name, fit in fits.items():
             mark = "●" if name == calibration.chosen[role] else ""
             table.add_row(mark, _short(name), *_numbers(fit, scale, digits))

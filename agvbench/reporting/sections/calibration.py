@@ -10,11 +10,12 @@ from agvbench.plot.calibration_curves import draw_measured
 from agvbench.reporting.content import Block, Column, FigureBlock, Panel, Paragraph, Table, Value
 from agvbench.reporting.figures.style import INK, ON_PAGE, dress, new_figure, to_svg
 from agvbench.reporting.sections.base import Section
-from agvbench.workflows.calibration import AXLES, Curve
+from agvbench.types import CommandUnit
+from agvbench.workflows.calibration import Curve
 from agvbench.workflows.report import ReportData
 
 _COLUMNS = (
-    Column("axle", "axle"),
+    Column("axle", "channel"),
     Column("map", "map"),
     Column("points", "points", 0),
     Column("left_out", "left out", 0),
@@ -29,7 +30,7 @@ _CAPTION = (
 
 
 class CalibrationSection(Section):
-    """A panel and a row per axle."""
+    """A panel and a row per channel."""
 
     slug, title, order = "calibration", "Calibration", 80
 
@@ -39,9 +40,10 @@ class CalibrationSection(Section):
         blocks: list[Block] = [Paragraph(absent)] if absent else []
         if not curves:
             return blocks or [Paragraph("The campaign holds no calibration measurements.")]
-        unit = "µs" if data.header.command_unit == "us" else "–"
+        unit = data.header.command_unit
         panels = [
-            Panel(AXLES[c.axle][0], draw_curve(c, f"curve-{c.axle}", command_label=f"command [{unit}]")) for c in curves
+            Panel(c.channel, draw_curve(c, f"curve-{c.axle}", command_label=f"command [{_command_unit(c, unit)}]"))
+            for c in curves
         ]
         blocks.append(FigureBlock("calibration-curves", _CAPTION, panels))
         rows = [_row(curve, data.curves.kinds.get(curve.axle, "")) for curve in curves]
@@ -51,11 +53,17 @@ class CalibrationSection(Section):
         return blocks
 
 
+def _command_unit(curve: Curve, unit: CommandUnit) -> str:
+    if unit == "si":  # a command is what it sets
+        return "rad" if curve.unit == "deg" else curve.unit
+    return "µs" if unit == "us" else "–"
+
+
 def _row(curve: Curve, kind: str) -> list[Value]:
     kept = ~curve.left_out
     residuals = (curve.value - curve.fitted)[kept] if len(curve.fitted) else np.empty(0)
     return [
-        AXLES[curve.axle][0],
+        curve.channel,
         kind,
         len(curve.value),
         int(curve.left_out.sum()),

@@ -29,7 +29,10 @@ def _facts(data: ReportData) -> Iterator[tuple[str, str]]:
     yield "campaign", header.name
     yield "directory", str(data.path)
     yield "vehicle", header.vehicle_name
-    yield "axles before and behind the markers' centroid", f"{header.front_axle_m} m, {header.rear_axle_m} m"
+    if header.geometry.is_differential:
+        yield "kinematics", f"differential, axle {header.rear_axle_m} m behind the markers' centroid"
+    else:
+        yield "axles before and behind the markers' centroid", f"{header.front_axle_m} m, {header.rear_axle_m} m"
     yield "commands", f"{header.command_unit}, neutral {header.neutral:g}"
     yield "motion capture", f"{header.mocap_rate_hz:g} Hz"
     yield "firmware", _distinct(run.firmware for run in data.runs)
