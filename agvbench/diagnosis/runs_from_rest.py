@@ -8,7 +8,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from agvbench.calibration import RunMeasurement, measure_run
 from agvbench.diagnosis.checks.consistency import require_consistent_repeats
 from agvbench.diagnosis.checks.sufficiency import insufficient_data
 from agvbench.diagnosis.conclusion import conclude
@@ -19,7 +18,8 @@ from agvbench.diagnosis.data.splits import Split, split_runs
 from agvbench.diagnosis.discrepancy.stepwise import add_term_and_reconsider
 from agvbench.diagnosis.method import Method
 from agvbench.diagnosis.model.batch import Batch
-from agvbench.diagnosis.model.nodal_maps import ROLES, NodalMaps, nodal_maps, start_values
+from agvbench.diagnosis.model.nodal_maps import ROLES, NodalMaps, nodal_maps
+from agvbench.diagnosis.model.steady_drives import start_values, steady_drives
 from agvbench.diagnosis.result import Diagnosis
 from agvbench.diagnosis.selection.actuators import prefer_actuators, separate_lag_from_delay
 from agvbench.diagnosis.selection.candidates import given_effects
@@ -32,10 +32,9 @@ from agvbench.diagnosis.selection.subsampling import refit_to_all, subsample_rep
 from agvbench.diagnosis.selection.validation import validated
 from agvbench.diagnosis.selection.variants import candidates_for, select_variants_and_reconsider
 from agvbench.diagnosis.selection.with_term import TermSelection
-from agvbench.errors import FitError
 from agvbench.model import nominal_model
 from agvbench.types import Floats, Run
-from agvbench.vehicle.geometry import Driven, Geometry
+from agvbench.vehicle.geometry import Driven
 
 
 @dataclass(frozen=True)
@@ -104,7 +103,9 @@ class RunsFromRest(Method[SelectedFromRest]):
 
     def _undeclared_axle(self, library: Selection, selector: Selector) -> Driven | None:
         """Return the axle that alone drives the vehicle, if no file declares it and the runs show it."""
-        return better_driven_axle(library, selector) if self.context.geometry.driven == UNDECLARED else None
+        geometry = self.context.geometry
+        is_open = geometry.driven == UNDECLARED and not geometry.is_differential
+        return better_driven_axle(library, selector) if is_open else None
 
     def conclude(self, readings: Readings, split: Split, selected: SelectedFromRest) -> Diagnosis:
         """Open the test runs, and return the diagnosis."""
@@ -127,23 +128,15 @@ class RunsFromRest(Method[SelectedFromRest]):
     def selector(self, readings: Readings) -> Selector:
         """Return the selector for these runs, with the better of both initial states of the steering."""
         context = self.context
-        maps = nodal_maps(readings.runs, context.header.neutral)
-        measured = _measurements(readings.runs, context.geometry, context.header.neutral)
-        start = start_values(maps, measured, _prior_values(maps, context), context.geometry)
+        neutral, geometry = context.header.neutral, context.geometry
+        maps = nodal_maps(readings.runs, neutral, is_differential=geometry.is_differential)
+        start = start_values(maps, steady_drives(readings.runs, geometry, neutral), _prior_values(maps, context))
         tried, kinds = candidates_for(context.vehicle, context.geometry)
         batch = Batch(readings, maps, context.geometry, kinds=kinds)
         given = given_effects(context.vehicle, tried)
-        return choose_initial_steering(Selector(batch, tried, start, context.seed, self.on_progress, *given))
-
-
-def _measurements(runs: tuple[Run, ...], geometry: Geometry, neutral: float) -> list[RunMeasurement]:
-    out = []
-    for run in runs:
-        try:
-            out.append(measure_run(run, geometry, neutral=neutral))
-        except FitError:
-            continue  # a run without a steady part gives no initial value, but remains in the fit
-    return out
+        selector = Selector(batch, tried, start, context.seed, self.on_progress, *given)
+        # A differential vehicle that stands has no yaw rate: nothing could have been set before.
+        return selector if geometry.is_differential else choose_initial_steering(selector)
 
 
 def _prior_values(maps: NodalMaps, context: DiagnosisContext) -> dict[str, Floats]:

@@ -106,14 +106,9 @@ class Window:
 
 
 def horizon_of(header: HeaderLike, runs: Iterable[Run]) -> Horizon | None:
-    """Return the horizon of the windows; None if the campaign declares none and most of its runs begin at rest.
-
-    The runs of a differential vehicle are always cut into windows.
-    """
+    """Return the horizon of the windows; None if the campaign declares none and most of its runs begin at rest."""
     if header.prediction_horizon_s is not None:
         return Horizon(header.prediction_horizon_s, header.prediction_stride_s or header.prediction_horizon_s)
-    if header.geometry.is_differential:
-        return Horizon()
     usable = [run for run in runs if run.is_ok and len(run.frames)]
     resting = sum(starts_at_rest(run, header.neutral) for run in usable)
     return Horizon() if usable and resting < 0.5 * len(usable) else None

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -22,33 +23,45 @@ Step = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class Levels:
-    """Command levels of a design: ``drive`` (forward and backward, fast and slow), ``front`` and ``rear``."""
+    """Command levels of a design: ``drive`` (forward and backward, fast and slow), ``front`` and ``rear``.
+
+    With ``turns_on_the_spot`` the front command moves the vehicle, as the yaw rate of a differential one does.
+    """
 
     drive: tuple[float, ...]
     front: tuple[float, ...]
     rear: tuple[float, ...]
     neutral: float
+    turns_on_the_spot: bool = False
 
 
 @dataclass(frozen=True)
 class Design:
-    """``steps`` of duration [s], drive, front, rear; the vehicle is at rest before and after, with its axles set."""
+    """``steps`` of duration [s], drive, front, rear; the vehicle is at rest before and after, with its axles set.
+
+    A vehicle that ``turns_on_the_spot`` has no axles to set.
+    """
 
     steps: tuple[Step, ...]
     neutral: float
+    turns_on_the_spot: bool = False
 
     @property
     def duration_s(self) -> float:
         """The time of the stop [s]."""
-        return SET_FIRST_S + sum(step[0] for step in self.steps)
+        return self._set_first_s + sum(step[0] for step in self.steps)
+
+    @property
+    def _set_first_s(self) -> float:
+        return 0.0 if self.turns_on_the_spot else SET_FIRST_S
 
     def rows(self) -> tuple[tuple[float, float, float, float], ...]:
         """Return rows of t_s, drive, front, rear, without the stop."""
         _, _, front, rear = self.steps[0]
-        rows = [(0.0, self.neutral, front, rear)]
-        at = SET_FIRST_S
+        rows = [] if self.turns_on_the_spot else [(0.0, self.neutral, front, rear)]
+        at = self._set_first_s
         for duration, *command in self.steps:
-            if tuple(command) != rows[-1][1:]:
+            if not rows or tuple(command) != rows[-1][1:]:
                 rows.append((round(at, 3), command[0], command[1], command[2]))
             at += duration
         return tuple(rows)
@@ -56,7 +69,7 @@ class Design:
     def commands(self) -> Commands:
         """Return the commands, with the stop at the end."""
         rows = self.rows()
-        _, _, front, rear = rows[-1]
+        front, rear = (self.neutral, self.neutral) if self.turns_on_the_spot else rows[-1][2:]
         table = np.array([*rows, (round(self.duration_s, 3), self.neutral, front, rear)])
         t_s, drive, fronts, rears = (np.ascontiguousarray(column) for column in table.T)
         return Commands(t_s, drive, fronts, rears)
@@ -73,17 +86,21 @@ def levels_of(maps: NodalMaps, values: Floats) -> Levels:
             fastest = own[np.argmax(sign * speed[own])]
             half = own[np.argmin(np.abs(sign * speed[own] - 0.5 * sign * speed[fastest]))]
             drives += [float(maps.nodes["drive"][k]) for k in dict.fromkeys((fastest, half))]
+    if "front" in maps.zero_at_neutral:
+        nodes = np.insert(maps.nodes["front"], 0, maps.neutral)
+        yaw_rates = _steering(nodes, np.insert(values[where["front"]], 0, 0.0), maps.neutral, math.inf)
+        return Levels(tuple(drives), yaw_rates, (maps.neutral,), maps.neutral, turns_on_the_spot=True)
     front, rear = (_steering(maps.nodes[role], values[where[role]], maps.neutral) for role in ("front", "rear"))
     return Levels(tuple(drives), front, rear, maps.neutral)
 
 
-def _steering(nodes: Floats, angle: Floats, neutral: float) -> tuple[float, ...]:
+def _steering(nodes: Floats, angle: Floats, neutral: float, largest: float = _MAX_ANGLE_RAD) -> tuple[float, ...]:
     """Return the straight level first, then the far and half-way levels to either side."""
     straight = int(np.argmin(np.abs(nodes - neutral)))
     bent = angle - angle[straight]
     chosen = [straight]
     for sign in (1.0, -1.0):
-        own = np.flatnonzero((sign * bent > 0.03) & (np.abs(angle) < _MAX_ANGLE_RAD))
+        own = np.flatnonzero((sign * bent > 0.03) & (np.abs(angle) < largest))
         if len(own):
             far = own[np.argmax(sign * bent[own])]
             half = own[np.argmin(np.abs(bent[own] - 0.5 * bent[far]))]
@@ -93,7 +110,7 @@ def _steering(nodes: Floats, angle: Floats, neutral: float) -> tuple[float, ...]
 
 def designs(levels: Levels) -> list[Design]:
     """Return the initial designs: constant commands, steering in steps, stops and starts, forward and backward."""
-    return [Design(tuple(steps), levels.neutral) for steps in _sequences(levels) if steps]
+    return [Design(tuple(steps), levels.neutral, levels.turns_on_the_spot) for steps in _sequences(levels) if steps]
 
 
 def _sequences(levels: Levels) -> Iterator[list[Step]]:
@@ -151,5 +168,5 @@ def mutated(design: Design, levels: Levels, rng: np.random.Generator) -> Design:
         steps.insert(k, (0.6, *steps[int(rng.integers(len(steps)))][1:]))
     elif len(steps) > 1:
         del steps[k]
-    made = Design(tuple(steps), design.neutral)
+    made = replace(design, steps=tuple(steps))
     return made if made.duration_s <= MAX_DURATION_S + SET_FIRST_S + 0.5 else design

@@ -119,10 +119,13 @@ def columns_by_campaign_time(
     c = rates.covariates
     one, zero, curvature = np.ones(len(rates.run)), np.zeros(len(rates.run)), c["curvature_per_m"]
     yield terms.SpeedByCampaignTime, {0: one[:, None]}
-    angle = np.arctan(tangents.tangent)
-    gain = by_axle_angles(angle[:, 0], angle[:, 1], tangents, geometry)
-    yield terms.SteeringByCampaignTime, {k: v.sum(axis=1, keepdims=True) for k, v in gain.items()}
-    yield terms.TrimByCampaignTime, by_axle_angles(one, one, tangents, geometry)
+    if geometry.is_differential:
+        yield terms.SteeringByCampaignTime, {1: geometry.rear_axle_m * curvature[:, None], 2: curvature[:, None]}
+    else:
+        angle = np.arctan(tangents.tangent)
+        gain = by_axle_angles(angle[:, 0], angle[:, 1], tangents, geometry)
+        yield terms.SteeringByCampaignTime, {k: v.sum(axis=1, keepdims=True) for k, v in gain.items()}
+        yield terms.TrimByCampaignTime, by_axle_angles(one, one, tangents, geometry)
     heading = 0.5 * (rates.begin + rates.end)[:, 2]
     cos, sin = (c["direction"] / c["speed_mps"] * of(heading) for of in (np.cos, np.sin))
     yield terms.DriftByCampaignTime, {0: np.column_stack([cos, sin]), 1: np.column_stack([-sin, cos])}

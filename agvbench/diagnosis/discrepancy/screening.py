@@ -81,14 +81,22 @@ def options(
     for term, shapes in changes(rates, tangents, geometry, regression):
         yield term, ((columns, course.values) for columns, course in shapes)
     yield from _logged(rates, tangents, geometry)
-    direction = c["direction"]
+    if not geometry.is_differential:
+        yield from _steering(rates, tangents, geometry)
+    yield terms.WaveByDistance, _waves(rates)
+
+
+def _steering(
+    rates: Rates, tangents: SteeringTangents, geometry: Geometry
+) -> Iterator[tuple[type[DiscrepancyTerm], Iterator[Option]]]:
+    """Yield the terms of steered axles: by direction of travel, and by what was steered before."""
+    direction = rates.covariates["direction"]
     yield terms.SteeringByDirection, iter([(by_axle_angles(direction, direction, tangents, geometry), Values())])
     angles = [np.arctan(before) - np.arctan(tangents.tangent) for before in (tangents.previous, tangents.reversal)]
     if np.any(angles[0] != 0.0):
         both = [by_axle_angles(angle[:, 0], angle[:, 1], tangents, geometry) for angle in angles]
         columns = {k: np.column_stack([shares[k].sum(axis=1) for shares in both]) for k in both[0]}
         yield terms.SteeringByHistory, iter([(columns, Values())])
-    yield terms.WaveByDistance, _waves(rates)
 
 
 _BY_LOGGED_COLUMN: dict[type[DiscrepancyTerm], type[terms.ByLoggedColumn]] = {

@@ -17,7 +17,7 @@ from agvbench.diagnosis.estimation.score_test import first_order_gain
 from agvbench.diagnosis.findings.omitted_effects import OmittedEffect
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.result import Bound, EffectState, NamedEffect, State
-from agvbench.diagnosis.selection.candidates import ABSORBED_BY_MAPS, candidates
+from agvbench.diagnosis.selection.candidates import absorbed_by_maps, candidates
 from agvbench.effects import Effect, effect_kinds
 from agvbench.effects.variants import cause_of
 
@@ -49,7 +49,9 @@ def effect_states(
             states[name] = EffectState(State.NOT_IDENTIFIABLE, indistinguishable_from=replaced)
         else:
             states[name] = _absent(kind, _bounds(chosen, kind, omitted.get(name)))
-    absorbed = {name: EffectState(State.NOT_IDENTIFIABLE, why=_ABSORBED) for name in ABSORBED_BY_MAPS - states.keys()}
+    absorbed = {
+        name: EffectState(State.NOT_IDENTIFIABLE, why=_ABSORBED) for name in absorbed_by_maps(geometry) - states.keys()
+    }
     return dict(sorted((states | absorbed).items()))
 
 

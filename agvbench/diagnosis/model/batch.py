@@ -104,7 +104,7 @@ class Batch:
         self.base = Simulation(geometry, maps.neutral, runs, kinds=kinds)
         self.commands: dict[str, Floats] = {role: getattr(self.base, role) for role in ROLES}
         self.weights = {role: maps.weights(role, self.commands[role]) for role in ROLES}
-        self.driven = self.commands["drive"] != maps.neutral
+        self.acting = self._acting()
         rows_of_run = [np.arange(a, b) for a, b in pairwise(self.base.row_starts.tolist())]
         self.by_node = sum(map(self._count_nodes, rows_of_run)) < sum(map(self._count_levels, rows_of_run))
         changes = [list(self._nodes(own) if self.by_node else self._levels(own)) for own in rows_of_run]
@@ -123,6 +123,16 @@ class Batch:
         self.perturbed = self._grouped(np.array(kind), np.array(row))
         self.rows = np.concatenate([rows_of_run[i] for i in run])
         self.row_change = np.concatenate(changed)
+
+    def _acting(self) -> dict[str, NDArray[np.bool_]]:
+        """Return the rows (rows,) in which each channel acts: the drive unless it is at neutral, the steering always.
+
+        The yaw rate of a differential vehicle acts while the vehicle is commanded to move.
+        """
+        driven = self.commands["drive"] != self.maps.neutral
+        always = np.ones(len(driven), dtype=np.bool_)
+        turns = driven | (self.commands["front"] != self.maps.neutral)
+        return {"drive": driven, "front": turns if self.geometry.is_differential else always, "rear": always}
 
     def with_kinds(self, kinds: Sequence[type[Effect]]) -> Batch:
         """Return this batch with other effects outside the library."""
@@ -157,22 +167,15 @@ class Batch:
         return grouped
 
     def _count_levels(self, own: NDArray[np.int64]) -> int:
-        driven = self.driven[own]
-        return sum(
-            len(np.unique(self.commands[r][own][driven] if r == "drive" else self.commands[r][own])) for r in ROLES
-        )
+        return sum(len(np.unique(self.commands[r][own][self.acting[r][own]])) for r in ROLES)
 
     def _count_nodes(self, own: NDArray[np.int64]) -> int:
-        driven = self.driven[own]
-        return sum(
-            int(np.count_nonzero((self.weights[r][own][driven] if r == "drive" else self.weights[r][own]).any(axis=0)))
-            for r in ROLES
-        )
+        return sum(int(np.count_nonzero(self.weights[r][own][self.acting[r][own]].any(axis=0))) for r in ROLES)
 
     def _levels(self, own: NDArray[np.int64]) -> Iterator[tuple[str, int, Floats]]:
         """Yield role, a row with it, and the derivative of each row's commands (rows, 3) for each level of one run."""
         for k, role in enumerate(ROLES):
-            rows = self.driven[own] if role == "drive" else np.ones(len(own), dtype=np.bool_)
+            rows = self.acting[role][own]
             values = self.commands[role][own]
             for level in np.unique(values[rows]):
                 moves = rows & (values == level)
@@ -181,6 +184,6 @@ class Batch:
     def _nodes(self, own: NDArray[np.int64]) -> Iterator[tuple[str, int, Floats]]:
         """Yield role, index, and the derivative of each row's commands (rows, 3) for each nodal value of one run."""
         for k, role in enumerate(ROLES):
-            weights = self.weights[role][own] * (self.driven[own][:, None] if role == "drive" else 1.0)
+            weights = self.weights[role][own] * self.acting[role][own][:, None]
             for node in np.flatnonzero(weights.any(axis=0)):
                 yield role, int(node), np.outer(weights[:, node], np.arange(len(ROLES)) == k)

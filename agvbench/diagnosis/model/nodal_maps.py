@@ -8,17 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.calibration import RunMeasurement
 from agvbench.effects import Effect
 from agvbench.types import Commands, Floats, Run
-from agvbench.vehicle.geometry import Geometry
-from agvbench.vehicle.kinematics import wheel_speed
 
 ROLES = ("front", "rear", "drive")
 _MAX_NODES = 40
 _UNIFORM_NODES = 16
 _HELD_S = 0.25
-_MIN_SPEED_MPS = 0.02
 
 
 @dataclass(frozen=True)
@@ -155,38 +151,6 @@ def _driven_commands(runs: Sequence[Run], role: str, neutral: float, *, on_the_s
 
 def _driven_rows(commands: Commands, neutral: float) -> NDArray[np.bool_]:
     return np.asarray(commands.drive != neutral)
-
-
-def start_values(
-    maps: NodalMaps, measured: Sequence[RunMeasurement], prior_model: dict[str, Floats], geometry: Geometry
-) -> Floats:
-    """Return the nodal values at which a fit starts: those of steady drives, by inverted kinematics.
-
-    At nodes without a steady drive they are those of the prior model (`prior_model[role]`, values at the nodes), plus
-    its error interpolated from the measured nodes. A fit from a distant start may end in another local minimum.
-    """
-    values = []
-    for role in ROLES:
-        nodes = maps.nodes[role]
-        known = np.full(len(nodes), np.nan)
-        for k, node in enumerate(nodes):
-            implied = [_implied(role, m, geometry) for m in measured if getattr(m.command, role) == node]
-            implied = [v for v in implied if np.isfinite(v)]
-            if implied:
-                known[k] = float(np.median(implied))
-        measured_here = np.isfinite(known)
-        error = (known - prior_model[role])[measured_here]
-        moved = prior_model[role] + (np.interp(nodes, nodes[measured_here], error) if len(error) else 0.0)
-        values.append(np.where(measured_here, known, moved))
-    return np.concatenate(values)
-
-
-def _implied(role: str, m: RunMeasurement, geometry: Geometry) -> float:
-    if role != "drive":
-        return float(getattr(m, f"{role}_rad")) if abs(m.speed_mps) > _MIN_SPEED_MPS else np.nan
-    if not m.moves:
-        return 0.0
-    return float(wheel_speed(m.speed_mps * np.cos(m.sideslip_rad), m.front_rad, m.rear_rad, geometry))
 
 
 def _interpolation(nodes: Floats, command: Floats) -> Floats:

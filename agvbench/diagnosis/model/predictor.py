@@ -111,7 +111,8 @@ class Predictor:
         values = [self.batch.weights[role] @ parameters[where[role]] for role in ROLES]
         most = MAX_YAW_RATE if self.batch.geometry.is_differential else MAX_ANGLE_RAD
         front, rear = (np.clip(values[k] + random_effects[run, 3 + k], -most, most) for k in (0, 1))
-        speed = np.where(self.batch.driven, values[2] * np.exp(random_effects[run, 5]), 0.0)
+        front = np.where(self.batch.acting["front"], front, 0.0)
+        speed = np.where(self.batch.acting["drive"], values[2] * np.exp(random_effects[run, 5]), 0.0)
         initial = np.zeros((len(self.readings), 5))
         initial[:, :3] = self.readings.start + random_effects[:, :3]
         if self.readings.initial_states is not None:

@@ -21,9 +21,11 @@ from agvbench.diagnosis.selection.variants import variant_candidates, with_exten
 from agvbench.effects.variants import cause_of
 
 CAMERA = "mocap_latency"
-ACTUATORS = ("actuation_delay", "steering_lag", "speed_lag")
+ACTUATORS = ("actuation_delay", "steering_lag", "speed_lag", "wheel_lag")
 SERVOS = ("actuation_delay", "steering_lag", "steering_rate_limit")
+MOTORS = (*SERVOS, "yaw_acceleration_limit", "speed_lag", "wheel_lag")
 _DELAY, _EVEN, _UNEVEN = "actuation_delay", "steering_lag_inertia", "steering_lag_uneven"
+_LAG, _SPEED, _WHEELS = "steering_lag", "speed_lag", "wheel_lag"
 # Of a response of second order with critical damping: its inertia over its lag.
 _CRITICAL = 0.5
 _LEAST_LAG_S = 0.02
@@ -35,9 +37,9 @@ def separate_lag_from_delay(selection: Selection, selector: Selector) -> Selecti
     A selection of one effect at a time takes what resembles the whole response, and neither a delay of each servo nor a
     rate limit leaves a gain to the other causes. If both descriptions predict equally, the lag becomes an alternative.
     """
-    chosen = selection.chosen
-    slow = [name for name in chosen.names if cause_of(name) in SERVOS and name not in selector.given]
-    if not slow or {*SERVOS} & {cause_of(name) for name in selector.given}:
+    chosen, which = selection.chosen, MOTORS if selector.batch.geometry.is_differential else SERVOS
+    slow = [name for name in chosen.names if cause_of(name) in which and name not in selector.given]
+    if not slow or {*which} & {cause_of(name) for name in selector.given}:
         return selection
     extended = with_extended_library(selector)
     separate = _with_lag_and_delay(extended, chosen, slow)
@@ -46,13 +48,13 @@ def separate_lag_from_delay(selection: Selection, selector: Selector) -> Selecti
     difference = separate.deviance - chosen.deviance
     gains_clearly = difference < -selector.min_gain * max(len(separate.names) - len(chosen.names), 1)
     if gains_clearly:
-        replaced = _replaced(selection, selector, extended, separate)
+        replaced = _replaced(selection, selector, extended, separate, which)
         if {*replaced.chosen.names} != {*chosen.names}:
             return replaced
     if difference > SELECTION.alternative_margin:
         return selection
     present = {cause_of(name) for name in chosen.names}
-    absent = [name for name in separate.names if cause_of(name) in SERVOS and cause_of(name) not in present]
+    absent = [name for name in separate.names if cause_of(name) in which and cause_of(name) not in present]
     # A gain that rests on few runs selects no lag, but leaves it possible.
     others = {
         cause_of(name): difference
@@ -65,34 +67,56 @@ def separate_lag_from_delay(selection: Selection, selector: Selector) -> Selecti
 
 
 def _with_lag_and_delay(extended: Selector, chosen: ScoredModel, slow: list[str]) -> ScoredModel | None:
-    """Return the model with a delay and a lag of second order in place of the effects `slow`; None if it diverges.
-
-    Servos of which one is slower than the other have a lag each.
-    """
+    """Return the model with a delay and lags of second order in place of the effects `slow`; None if it diverges."""
     own = chosen.fit.effect_values()
-    front, rear, drive = _responses_s(own, slow)
-    delay = min(drive, front, rear)
-    lags = max(front - delay, _LEAST_LAG_S), max(rear - delay, _LEAST_LAG_S)
     kept = [value for key, value in own.items() if key.partition(".")[0] not in slow]
     others = tuple(name for name in chosen.names if name not in slow)
     maps = chosen.fit.parameters[: extended.batch.maps.size]
-    mean = 0.5 * sum(lags)
-    responses = {_EVEN: [mean, _CRITICAL * mean], _UNEVEN: [lags[0], _CRITICAL * lags[0], lags[1] / lags[0]]}
+    responses = _motors(own, slow) if extended.batch.geometry.is_differential else _servos(own, slow)
     found = []
-    for response, values in responses.items():
-        start = np.r_[maps, kept, delay, values]
+    for names, values in responses.items():
+        start = np.r_[maps, kept, values]
         starts = frozenset(one for one in chosen.starts if one[0] not in slow) | {("lag and delay", start.tobytes())}
         with suppress(np.linalg.LinAlgError):  # the fit diverged
-            found.append(extended.score((*others, _DELAY, response), start, chosen.fit, starts=starts))
-    if len(found) == len(responses) and found[0].deviance < found[1].deviance + extended.min_gain:
+            found.append(extended.score((*others, *names), start, chosen.fit, starts=starts))
+    if len(found) == len(responses) and found[0].deviance < found[-1].deviance + extended.min_gain:
         return found[0]
     return found[-1] if found else None
+
+
+def _servos(own: Mapping[str, float], slow: list[str]) -> dict[tuple[str, ...], list[float]]:
+    """Return effects with initial values: one lag of both servos, or a lag each where one is slower than the other."""
+    front, rear, drive = _responses_s(own, slow)
+    delay = min(drive, front, rear)
+    lags = max(front - delay, _LEAST_LAG_S), max(rear - delay, _LEAST_LAG_S)
+    mean = 0.5 * sum(lags)
+    return {
+        (_DELAY, _EVEN): [delay, mean, _CRITICAL * mean],
+        (_DELAY, _UNEVEN): [delay, lags[0], _CRITICAL * lags[0], lags[1] / lags[0]],
+    }
+
+
+def _motors(own: Mapping[str, float], slow: list[str]) -> dict[tuple[str, ...], list[float]]:
+    """Return effects with initial values: the motors of a differential vehicle, which set speed and yaw rate.
+
+    Where both start at once, a delay resembles the lags of both, and neither lag alone describes them: half of the
+    response is taken for a delay. The wheels have one lag, or speed and yaw rate have one each.
+    """
+    yaw, _, drive = _responses_s(own, slow)
+    values = {key.partition(".")[2]: value for key, value in own.items() if key.partition(".")[0] in slow}
+    drive += 0.5 * (values.get("accelerate_s", 0.0) + values.get("brake_s", 0.0))
+    delay = 0.5 * min(yaw, drive)
+    lags = max(yaw - delay, _LEAST_LAG_S), max(drive - delay, _LEAST_LAG_S)
+    return {
+        (_DELAY, _WHEELS): [delay, 0.5 * sum(lags)],
+        (_DELAY, _LAG, _SPEED): [delay, lags[0], lags[1], lags[1]],
+    }
 
 
 def _responses_s(own: Mapping[str, float], slow: list[str]) -> tuple[float, float, float]:
     """Return the time after which front servo, rear servo and drive respond, by the effects `slow` [s]."""
     values = {key.partition(".")[2]: value for key, value in own.items() if key.partition(".")[0] in slow}
-    common, lag = values.get("delay_s", 0.0), values.get("time_constant_s", 0.0)
+    common, lag = values.get("delay_s", values.get("latency_s", 0.0)), values.get("time_constant_s", 0.0)
     steering = values.get("steering_s", common)
     rear_lag = lag * values.get("rear_ratio", 1.0)
     return (
@@ -102,9 +126,11 @@ def _responses_s(own: Mapping[str, float], slow: list[str]) -> tuple[float, floa
     )
 
 
-def _replaced(selection: Selection, selector: Selector, extended: Selector, model: ScoredModel) -> Selection:
+def _replaced(
+    selection: Selection, selector: Selector, extended: Selector, model: ScoredModel, which: tuple[str, ...]
+) -> Selection:
     """Return the selection with `model` in place of the chosen one, less the effects that it does not need."""
-    current, gains = extended.backward_elimination(selection.base, model, SERVOS)
+    current, gains = extended.backward_elimination(selection.base, model, which)
     gain = selection.chosen.deviance - current.deviance
     if gain > 0.0:
         selector.on_progress(f"{' + '.join(current.names)}: lag and delay separately gain {gain:.0f}")
@@ -137,6 +163,11 @@ def prefer_actuators(selection: Selection, selector: Selector) -> Selection:
     extended = with_extended_library(selector)
     without = extended.without_effect(selection.base, chosen, camera)
     every = _with_actuators(extended, without)
+    if selector.batch.geometry.is_differential:
+        # The camera resembles the lags of both motors together, and none of them alone.
+        slow = [name for name in chosen.names if cause_of(name) in (CAMERA, *MOTORS) and name not in selector.given]
+        joint = _with_lag_and_delay(extended, chosen, slow)
+        every = min((model for model in (every, joint) if model is not None), key=lambda model: model.deviance)
     difference, gain = every.deviance - chosen.deviance, without.deviance - chosen.deviance
     margin = SELECTION.alternative_margin
     if difference > (max(margin, SELECTION.camera_share * gain) if has_structure(chosen, selector.seed) else margin):
@@ -166,7 +197,7 @@ def prefer_actuators(selection: Selection, selector: Selector) -> Selection:
 def _with_actuators(extended: Selector, current: ScoredModel) -> ScoredModel:
     """Return the model with every actuator, and with the effects that meet the criterion beside them."""
     for name in ACTUATORS:
-        if name not in {cause_of(present) for present in current.names}:
+        if name in extended.candidates and name not in {cause_of(present) for present in current.names}:
             larger = extended.with_effect(current, name)
             current = larger if larger.is_fitted else current
     while True:

@@ -54,7 +54,7 @@ def candidates(geometry: Geometry, exclude: Iterable[str] = ()) -> dict[str, Can
 
     Effects of two driven axles are no candidates if one is driven, and those of axle angles if none is steered.
     """
-    excluded = {*exclude, *ABSORBED_BY_MAPS}
+    excluded = {*exclude, *absorbed_by_maps(geometry)}
     return {
         name: candidate(kind)
         for name, kind in effect_kinds().items()
@@ -62,9 +62,18 @@ def candidates(geometry: Geometry, exclude: Iterable[str] = ()) -> dict[str, Can
     }
 
 
+def absorbed_by_maps(geometry: Geometry) -> frozenset[str]:
+    """Return the effects that nodal maps absorb.
+
+    The speed map of a differential vehicle absorbs the camera's scale, but for the lever arm of the markers, which
+    `marker_offset` moves as well.
+    """
+    return ABSORBED_BY_MAPS | ({"mocap_scale"} if geometry.is_differential else frozenset())
+
+
 def applies(kind: type[Effect], geometry: Geometry) -> bool:
     """Return whether a vehicle of this geometry can have an effect."""
-    if geometry.is_differential and kind.needs_steered_axles:
+    if kind.needs_steered_axles if geometry.is_differential else kind.needs_differential:
         return False
     return geometry.driven == "both" or not kind.needs_both_axles_driven
 

@@ -13,7 +13,7 @@ from agvbench.diagnosis.criteria import FIT, SELECTION, VARIANT
 from agvbench.diagnosis.estimation.fit import fit
 from agvbench.diagnosis.estimation.score_test import first_order_gain
 from agvbench.diagnosis.model.predictor import Predictor
-from agvbench.diagnosis.selection.candidates import Candidate, bounds_of, candidate, candidates
+from agvbench.diagnosis.selection.candidates import Candidate, applies, bounds_of, candidate, candidates
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.initial_steering import STEERING_DYNAMICS, under_other_initial_steering
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
@@ -136,6 +136,8 @@ def _replacements(selection: Selection, selector: Selector, extended: Selector, 
         other: selector.with_effect(without, other) for other in selector.candidates if other not in chosen.names
     }
     for variant in effect_variants().values():
+        if not applies(variant, selector.batch.geometry):
+            continue
         if (model := models.get(variant.variant_of)) is None:
             continue
         kind = candidate(variant)
