@@ -42,13 +42,11 @@ def run(arguments: argparse.Namespace) -> int:
     from agvbench.adapters.contract import camera_options
     from agvbench.reporting.console.doctor import print_finding
     from agvbench.running.configuration.settings import BenchSettings
-    from agvbench.running.configuration.vehicles import lab_vehicle
+    from agvbench.running.configuration.vehicles import with_lab_vehicle
     from agvbench.workflows.doctor import FindingState, Lab, examine
 
     given = {destination(flag): getattr(arguments, destination(flag)) for flag in _OF_THE_RIG}
-    settings = BenchSettings.given(
-        {"vehicle": lab_vehicle()} | {name: value for name, value in given.items() if value is not None}
-    )
+    settings = BenchSettings.given(with_lab_vehicle({k: v for k, v in given.items() if v is not None}))
     if not settings.connect:
         if settings.mocap == _ON_THE_BUS:
             raise FlagError("no camera is named", where="--mocap", remedy="add --connect ENDPOINT, or name an adapter")

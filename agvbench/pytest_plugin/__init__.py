@@ -8,8 +8,9 @@
         drive.trajectory("my_turn.toml", condition=condition)
 
 Fixtures: ``drive`` (see `agvbench.running.session.session.Driver`) and ``bench`` (the session). Marks: ``repeats``,
-``grid``, ``experiment``. The plugin is found through its entry point and declares options ``--agvbench-…``. Marks,
-fixtures and hooks are registered when the first file of benchmarks is found: other sessions of pytest see none of them.
+``grid``, ``kinematics``, ``experiment``. The plugin is found through its entry point and declares options
+``--agvbench-…``. Marks, fixtures and hooks are registered when the first file of benchmarks is found: other sessions of
+pytest see none of them.
 """
 
 from __future__ import annotations

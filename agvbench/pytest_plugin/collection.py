@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 REPEAT = "agvbench_repeat"
 TRAJECTORIES = "trajectories"
-CALIBRATION_EXPERIMENTS = frozenset({"steering_front", "steering_rear", "steering_opposite", "drive"})
+CALIBRATION_EXPERIMENTS = frozenset({"steering_front", "steering_rear", "steering_opposite", "drive", "yaw_rate"})
 _DEFAULT_REPEATS = 10
 _SETTINGS = pytest.StashKey["BenchSettings"]()
 
@@ -131,6 +131,7 @@ def _arrange(config: pytest.Config, items: list[pytest.Item], benches: list[pyte
     try:
         settings = settings_from(config)
         undriven = [item for item in benches if not _condition_applies(item)]
+        other_kind = _of_other_kinematics(benches, settings)
         unknown = [] if settings.corrected else [item for item in benches if _is_corrected(item)]
     except AgvbenchError as error:
         raise pytest.UsageError(worded(config, error)) from None
@@ -142,7 +143,7 @@ def _arrange(config: pytest.Config, items: list[pytest.Item], benches: list[pyte
     if len(unknown) == len(benches):
         text = "--corrected: no corrected model; give the vehicle file that a diagnosis wrote"
         raise pytest.UsageError(worded(config, text))
-    left_out = {*undriven, *unknown}
+    left_out = {*undriven, *unknown, *other_kind}
     driven = [item for item in benches if item not in left_out]
     driven = ordered(driven, settings.order, seed=settings.seed, phase=phase, repeat=repeat, name=run_name)
     items[:] = [item for item in items if not is_bench(item)] + driven
@@ -239,6 +240,17 @@ def _condition_applies(item: pytest.Item) -> bool:
 
     conditions = load_trajectory(str(given["trajectory"])).conditions
     return not conditions or given["condition"] in conditions
+
+
+def _of_other_kinematics(benches: Iterable[pytest.Item], settings: BenchSettings) -> list[pytest.Item]:
+    """Return the benchmarks that are marked for vehicles of another kind than the session's."""
+    marks = {item: mark.args[0] for item in benches if (mark := item.get_closest_marker("kinematics")) is not None}
+    if not marks:
+        return []
+    from agvbench.running.configuration.vehicles import uncalibrated_vehicle
+
+    kind = uncalibrated_vehicle(settings.vehicle).geometry.kinematics
+    return [item for item, asked in marks.items() if asked != kind]
 
 
 T = TypeVar("T")

@@ -24,6 +24,7 @@ _MARKS = (
     "repeats(n, full=None): drive n times (full times with --agvbench-full); n=None follows --agvbench-repeats",
     "grid(name, reduced, full): parametrize by `reduced`, with --agvbench-full by `full`",
     "trajectories: parametrize `trajectory` by --agvbench-trajectories (default: the eight and the folder's own)",
+    "kinematics(kind): drive only vehicles of this kind, two_axle or differential",
     "experiment(name): what the campaign calls the runs of this benchmark (default: the function's name)",
 )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,9 +11,11 @@ import numpy as np
 from agvbench.errors import FlagError
 from agvbench.model import VehicleModel
 from agvbench.types import Command, Commands, CommandUnit
+from agvbench.vehicle.maps import StaticMap
 
 PRESTEER_S = 0.5
 _FULL_COMMAND: dict[CommandUnit, float] = {"us": 600.0, "normalised": 1.0, "si": 1.0}
+"""In SI units a map's own range says what full command is, if it has one."""
 
 
 @dataclass(frozen=True)
@@ -31,12 +34,7 @@ class Shares:
     @classmethod
     def of_model(cls, model: VehicleModel) -> Shares:
         """Return the shares of a vehicle; which way its outputs go with the command is read from its maps."""
-        full = _FULL_COMMAND[model.command_unit]
-        outputs = [
-            static_map(np.array([model.neutral - full, model.neutral + full]))
-            for static_map in (model.drive, model.front, model.rear)
-        ]
-        return cls(model.neutral, *(float(np.sign(high - low)) * full for low, high in outputs))
+        return cls(model.neutral, *(_full_command(model, m) for m in (model.drive, model.front, model.rear)))
 
     def command(self, drive: float = 0.0, front: float = 0.0, rear: float = 0.0) -> Command:
         """Return the command of three shares.
@@ -57,16 +55,29 @@ class Shares:
         )
 
 
-def held(neutral: float, steps: Sequence[tuple[float, Command]], *, presteer_s: float = PRESTEER_S) -> Commands:
+def _full_command(model: VehicleModel, static_map: StaticMap) -> float:
+    """Return what a share of 1 adds to neutral; 0 for a map without a direction."""
+    full = _FULL_COMMAND[model.command_unit]
+    low, high = (abs(end - model.neutral) for end in static_map.command_range)
+    if model.command_unit == "si" and math.isfinite(max(low, high)):
+        full = max(low, high)
+    below, above = static_map(np.array([model.neutral - full, model.neutral + full]))
+    return float(np.sign(above - below)) * full
+
+
+def held(model: VehicleModel, steps: Sequence[tuple[float, Command]], *, presteer_s: float = PRESTEER_S) -> Commands:
     """Return commands that hold each of `steps` (duration [s], command) in turn, then stop.
 
     The steering is set `presteer_s` before the vehicle drives, so that the arc is steered from its beginning;
-    after the stop it stays as it is, since a vehicle at rest should not turn its wheels while its pose is read.
+    after the stop it stays as it is, since a vehicle at rest should not turn its wheels while its pose is read. A
+    differential vehicle has no steering to set: it begins with the first of `steps`.
     """
-    first, last = steps[0][1], steps[-1][1]
-    rows = [first._replace(drive=neutral), *(command for _, command in steps), last._replace(drive=neutral)]
-    times = np.concatenate([[0.0, presteer_s], presteer_s + np.cumsum([duration for duration, _ in steps])])
-    columns = np.array(rows, dtype=float)
+    commands = [command for _, command in steps]
+    durations = [duration for duration, _ in steps]
+    if not model.geometry.is_differential:
+        commands, durations = [model.stop_after(commands[0]), *commands], [presteer_s, *durations]
+    columns = np.array([*commands, model.stop_after(commands[-1])], dtype=float)
+    times = np.concatenate([[0.0], np.cumsum(durations)])
     return Commands(times, columns[:, 0], columns[:, 1], columns[:, 2])
 
 

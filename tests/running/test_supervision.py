@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -148,3 +149,15 @@ def test_a_lone_late_or_wrong_frame_stops_nobody(late_s: float, aside_m: float, 
     watching = Supervisor(ROOM, 1500.0)
     watching.control_cycle(link, Command(1900.0, 1500.0, 1500.0), t_s=0.0, hold_s=3.0, seen=[])
     assert link.stops == 0
+
+
+@pytest.mark.parametrize(("turns_on_the_spot", "stops"), [(True, 1), (False, 0)])
+def test_a_camera_that_freezes_while_the_vehicle_turns_on_the_spot_is_noticed(turns_on_the_spot, stops) -> None:
+    t_s = np.arange(0.0, 3.0, 0.02)
+    heading, zeros = np.where(t_s < 0.5, t_s, 0.5), np.zeros(len(t_s))
+    link = Scripted(Frames(t_s, zeros, zeros, heading, t_s >= 0.0, np.arange(len(t_s)), zeros, t_s))
+    watching = Supervisor(ROOM, 0.0, turns_on_the_spot=turns_on_the_spot)
+    caught = pytest.raises(SafetyStopError, match="tracking is frozen") if stops else nullcontext()
+    with caught:
+        watching.control_cycle(link, Command(0.0, 1.0, 0.0), t_s=0.0, hold_s=3.0, seen=[])
+    assert link.stops == stops

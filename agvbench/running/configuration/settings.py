@@ -60,7 +60,7 @@ class BenchSettings:
     )
     plant: str = _option(
         "agvbench.simulator:make_plant",
-        "simulated plant, MODULE_OR_FILE:FACTORY (default: a vehicle like the thesis')",
+        "simulated plant, MODULE_OR_FILE:FACTORY (default: one of the vehicle's kind, like the thesis' or a robot)",
         metavar="PLANT",
     )
     trajectories: str = _option(

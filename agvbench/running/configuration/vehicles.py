@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+from agvbench.errors import AgvbenchError
 from agvbench.model import VehicleModel, nominal_model, thesis_vehicle
 from agvbench.running.configuration.settings import BenchSettings
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import FullSpeedOrStop, MonotoneTable
 
+DIFFERENTIAL_PLANT = "agvbench.simulator:differential_plant"
 LAB_VEHICLE = "vehicle.toml"
 """The vehicle of a lab folder: every command takes it where no other is named."""
 
@@ -17,6 +22,19 @@ LAB_VEHICLE = "vehicle.toml"
 def lab_vehicle() -> str:
     """Return the vehicle file of the current folder, or "" where it has none."""
     return LAB_VEHICLE if Path(LAB_VEHICLE).is_file() else ""
+
+
+def with_lab_vehicle(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the options `given` with the vehicle of the lab folder, and the simulated plant of its kind, as defaults.
+
+    A vehicle file that cannot be read is refused where it is used.
+    """
+    options = {"vehicle": lab_vehicle(), **given}
+    if "plant" not in given and options["vehicle"]:
+        with suppress(AgvbenchError):
+            if VehicleModel.load(options["vehicle"]).geometry.is_differential:
+                options["plant"] = DIFFERENTIAL_PLANT
+    return options
 
 
 def known_models(settings: BenchSettings) -> dict[str, VehicleModel]:

@@ -86,7 +86,8 @@ class Bench:
         self.awaited: set[str] = set()
         workspace = Workspace.parse(settings.workspace)
         safety = replace(DEFAULT_SAFETY, flickers=not self._identity.simulated, control_cycle_s=settings.exchange)
-        self._supervisor = Supervisor(workspace, nominal.neutral, safety)
+        turns_on_the_spot = nominal.geometry.is_differential
+        self._supervisor = Supervisor(workspace, nominal.neutral, safety, turns_on_the_spot=turns_on_the_spot)
         self._placer = make_placer(settings.place, Rig(link, nominal, workspace, self._supervisor, limits, on_progress))
 
     def model(self, condition: str) -> VehicleModel:

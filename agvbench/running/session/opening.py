@@ -36,7 +36,7 @@ from agvbench.running.configuration.provenance import (
     with_new,
 )
 from agvbench.running.configuration.settings import SETTINGS_FILE, BenchSettings, settings_for_resume
-from agvbench.running.configuration.vehicles import LAB_VEHICLE, expected_calibration, known_models, lab_vehicle
+from agvbench.running.configuration.vehicles import LAB_VEHICLE, expected_calibration, known_models, with_lab_vehicle
 from agvbench.running.execution.bench import Bench
 from agvbench.running.execution.calibration import VEHICLE_FILE, calibrate_campaign
 from agvbench.running.execution.campaign_time import (
@@ -257,7 +257,7 @@ def session_settings(given: Mapping[str, Any], out: str | None, *, resume: bool)
         return directory, _with_own_calibration(directory, settings)
     if resume and has_runs(directory):  # a session that ended between header and settings has no runs
         _require(directory, SETTINGS_FILE, "the settings of its session")
-    return directory, BenchSettings.given({"vehicle": lab_vehicle(), **given})
+    return directory, BenchSettings.given(with_lab_vehicle(given))
 
 
 def _require(directory: Path, name: str, what: str) -> None:

@@ -42,11 +42,11 @@ def open_session_rig(settings: BenchSettings, models: Mapping[str, VehicleModel]
     AgvbenchError
         If an adapter cannot be opened, or `check_rig` refuses the rig.
     """
-    for model in models.values():
-        model.geometry.require_two_axles(
-            "benchmarks drive steered axles only",
-            where=f"vehicle {model.name}",
-            remedy="record its drives, and import them with agvbench import",
+    if settings.place == "auto":
+        models["uncalibrated"].geometry.require_two_axles(
+            "only a vehicle with steered axles drives back to its start",
+            where=f"vehicle {models['uncalibrated'].name}",
+            remedy="leave out --place auto",
         )
     options = adapter_options(settings, models)
     with open_rig(

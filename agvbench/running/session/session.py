@@ -286,7 +286,7 @@ class Driver:
         if shares.rear == 0.0 and any(step.get("rear") for _, step in steps):
             self._session.not_applicable.add(self._run_id)
             raise NotDrivenError("this vehicle does not steer its rear axle")
-        commands = held(shares.neutral, [(duration_s, shares.command(**step)) for duration_s, step in steps])
+        commands = held(self._session.nominal, [(duration_s, shares.command(**step)) for duration_s, step in steps])
         trajectory = _as_trajectory(self._experiment, commands, self._session.nominal.command_unit)
         return self._session.plan(trajectory, "uncalibrated")
 

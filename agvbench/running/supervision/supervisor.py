@@ -40,11 +40,20 @@ class Supervisor:
     """Watches a run as it is driven.
 
     A hold is divided into parts of ``control_cycle_s``; every rule checks the frames of each ``watch_s`` of them.
-    How a hold is cut makes no difference to what a simulated vehicle does.
+    How a hold is cut makes no difference to what a simulated vehicle does. A vehicle that ``turns_on_the_spot`` is
+    moved by its front command, too.
     """
 
-    def __init__(self, workspace: Workspace, neutral_drive: float, limits: SafetyLimits = DEFAULT_SAFETY) -> None:
+    def __init__(
+        self,
+        workspace: Workspace,
+        neutral_drive: float,
+        limits: SafetyLimits = DEFAULT_SAFETY,
+        *,
+        turns_on_the_spot: bool = False,
+    ) -> None:
         self._workspace, self._neutral, self._limits = workspace, neutral_drive, limits
+        self._turns_on_the_spot = turns_on_the_spot
         self._classes = classes_by_file(rules, Rule)  # type: ignore[type-abstract]
         self.begin()
 
@@ -69,7 +78,8 @@ class Supervisor:
             As from the link.
         """
         end_s = t_s + hold_s
-        if command.drive == self._neutral:
+        turns = self._turns_on_the_spot and command.front != self._neutral
+        if command.drive == self._neutral and not turns:
             self._driving_since_s = None
         elif self._driving_since_s is None:
             self._driving_since_s = t_s
