@@ -9,8 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from agvbench.calibration.measurement.windows import held_command
 from agvbench.diagnosis.criteria import FREE_DRIVING_LEVEL
 from agvbench.diagnosis.data.differing_sessions import differing_sessions, others
 from agvbench.diagnosis.data.readings import Readings
@@ -23,6 +25,9 @@ from agvbench.types import Floats
 
 _SHORT_S = 0.01
 _SLOW_MPS = 0.05
+_MOST_KNOTS, _WINDOWS_PER_KNOT, _ROUNDS = 15, 8, 5
+_LEAST_OVERLAP = 0.02
+"""Less of a session's windows beside commands of other sessions says nothing about its level."""
 
 
 def nodal_deviation(predictor: Predictor, parameters: Floats) -> float:
@@ -57,28 +62,73 @@ class DriveLevel:
 def drive_levels(readings: Readings, predictor: Predictor, parameters: Floats) -> dict[str, DriveLevel]:
     """Return the level of the drive of each session of `readings`, beside the sessions that do not differ.
 
-    Deviations of the initial speed are compared between each session and the others by Student's test, with blocks of
-    driving as units; see `differing_sessions`.
+    The maps were fitted to several sessions, and have taken up a part of what differs where these gave other commands.
+    A common curve over the command, with a level for each session, gives that part back. Deviations of the initial
+    speed from the curve are compared between each session and the others by Student's test, with blocks of driving as
+    units; see `differing_sessions`.
     """
     batch = Batch(readings, predictor.maps, predictor.batch.geometry, kinds=predictor.batch.kinds)
     deviation = _speed_deviations(Predictor(batch), parameters[: predictor.maps.size])
     known = np.isfinite(deviation)
+    initial_states = _initial_states(readings)
+    session = initial_states.session[known]
+    times = initial_states.t_s[known]
+    runs = [run for run, use in zip(readings.runs, known, strict=True) if use]
+    command = np.array([held_command(run.commands, "drive", t) for run, t in zip(runs, times, strict=True)])
+    curve, inflation = _common_curve(command, deviation[known], session)
+    beside = deviation[known] - curve
     blocks, first, index = np.unique(readings.group[known], return_index=True, return_inverse=True)
-    middle = np.array([np.median(deviation[known][index == k]) for k in range(len(blocks))])
-    session = _initial_states(readings).session[known][first]
+    middle = np.array([np.median(beside[index == k]) for k in range(len(blocks))])
+    session = session[first]
     by_session = {str(name): middle[session == name] for name in np.unique(session)}
 
+    def level(name: str, rest: list[Floats]) -> DriveLevel:
+        return _level(by_session[name], rest, len(by_session), inflation[name])
+
     def tested(one: Floats, rest: list[Floats]) -> float | None:
-        level = _level(one, rest, len(by_session))
-        return level.ratio if level.significant else None
+        name = next(name for name, own in by_session.items() if own is one)
+        found = level(name, rest)
+        return found.ratio if found.significant else None
 
     differing = differing_sessions(by_session, tested, len)
     common = {name: one for name, one in by_session.items() if name not in differing}
-    levels = {name: _level(one, others(common, name), len(by_session)) for name, one in by_session.items()}
+    levels = {name: level(name, others(common, name)) for name in by_session}
     return {name: replace(level, significant=name in differing) for name, level in levels.items()}
 
 
-def _level(one: Floats, rest: list[Floats], sessions: int) -> DriveLevel:
+def _common_curve(x: Floats, y: Floats, session: NDArray[np.str_]) -> tuple[Floats, dict[str, float]]:
+    """Return the curve of `y` (n,) over `x` (n,) at each point, fitted with a level for each session.
+
+    Also by session by how much the curve widens the standard error of its level: infinitely where the session gave
+    commands that no other one gave.
+    """
+    names = np.unique(session)
+    count = min(_MOST_KNOTS, len(x) // _WINDOWS_PER_KNOT)
+    knots = np.unique(np.quantile(x, np.linspace(0.0, 1.0, count))) if count > 1 else np.empty(0)
+    if len(names) < 2 or len(knots) < 2:
+        return np.zeros(len(y)), {str(name): 1.0 for name in names}
+    hats = np.column_stack([np.interp(x, knots, row) for row in np.eye(len(knots))])
+    levels = (session[:, None] == names).astype(np.float64)
+    # Windows with large deviations, such as those during a lag, must not bend the curve.
+    weight = np.ones(len(y))
+    for _ in range(_ROUNDS):
+        design = np.column_stack([hats, levels[:, 1:]]) * weight[:, None]
+        solution, *_ = np.linalg.lstsq(design, weight * y, rcond=1e-6)
+        off = y - np.column_stack([hats, levels[:, 1:]]) @ solution
+        scale = max(robust_std(off), 1e-6)
+        weight = np.sqrt(np.minimum(1.0, 2.0 * scale / np.maximum(np.abs(off), 1e-12)))
+    inflation = {str(name): _inflation(hats, one) for name, one in zip(names, levels.T, strict=True)}
+    return hats @ solution[: len(knots)], inflation
+
+
+def _inflation(hats: Floats, own: Floats) -> float:
+    """Return by how much a level's standard error grows since a curve is fitted beside it."""
+    rest = own - hats @ np.linalg.lstsq(hats, own, rcond=None)[0]
+    left, total = float(rest @ rest), float(np.sum((own - own.mean()) ** 2))
+    return float(np.sqrt(total / left)) if left > _LEAST_OVERLAP * total else np.inf
+
+
+def _level(one: Floats, rest: list[Floats], sessions: int, inflation: float) -> DriveLevel:
     """Return the level of a session's blocks against others, tested at the level of all `sessions` (Bonferroni)."""
     other = np.concatenate([np.empty(0), *rest])
     freedom = len(one) + len(other) - 2
@@ -86,7 +136,7 @@ def _level(one: Floats, rest: list[Floats], sessions: int) -> DriveLevel:
         return DriveLevel(1.0, np.inf, significant=False)
     difference = float(np.mean(one) - np.mean(other))
     pooled = (np.sum((one - np.mean(one)) ** 2) + np.sum((other - np.mean(other)) ** 2)) / freedom
-    stderr = float(np.sqrt(pooled * (1.0 / len(one) + 1.0 / len(other))))
+    stderr = inflation * float(np.sqrt(pooled * (1.0 / len(one) + 1.0 / len(other))))
     critical = float(student.isf(0.5 * FREE_DRIVING_LEVEL.alpha / sessions, freedom))
     significant = abs(difference) > max(FREE_DRIVING_LEVEL.min_deviation, critical * stderr)
     return DriveLevel(float(np.exp(difference)), float(np.exp(difference)) * stderr, significant)
