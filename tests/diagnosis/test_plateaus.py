@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from tiny_vehicle import FRONT_M, NEUTRAL, REAR_M, InMemory, Tiny, campaign_runs, drive, held, rear_of, switched
 
-from agvbench.calibration import measure_run
 from agvbench.diagnosis import Verdict, diagnose
 from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.estimation.fit import fit
 from agvbench.diagnosis.model.batch import Batch
-from agvbench.diagnosis.model.nodal_maps import ROLES, NodalMaps, nodal_maps, start_values
+from agvbench.diagnosis.model.nodal_maps import ROLES, NodalMaps, nodal_maps
+from agvbench.diagnosis.model.steady_drives import start_values, steady_drives
 from agvbench.diagnosis.selection.candidates import bounds_of, candidates
 from agvbench.diagnosis.selection.stepwise import Selector
 from agvbench.effects import SteeringLag
@@ -70,9 +70,7 @@ def selector(play):
     readings, geometry = read_runs(play.runs, NEUTRAL), Geometry(FRONT_M, REAR_M)
     maps = nodal_maps(readings.runs, NEUTRAL)
     prior_model = {role: np.zeros(len(maps.nodes[role])) for role in ROLES}
-    start = start_values(
-        maps, [measure_run(run, geometry, neutral=NEUTRAL) for run in play.runs], prior_model, geometry
-    )
+    start = start_values(maps, steady_drives(play.runs, geometry, NEUTRAL), prior_model)
     return Selector(Batch(readings, maps, geometry), candidates(geometry), start, 0, lambda _: None)
 
 

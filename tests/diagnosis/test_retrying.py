@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from tiny_vehicle import FRONT_M, HEADER, NEUTRAL, REAR_M, Tiny
 
-from agvbench.calibration import measure_run
 from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.discrepancy import stepwise as empirical
 from agvbench.diagnosis.estimation.levenberg_marquardt import Convergence, FitState, LevenbergMarquardt
 from agvbench.diagnosis.model.batch import Batch
-from agvbench.diagnosis.model.nodal_maps import ROLES, nodal_maps, start_values
+from agvbench.diagnosis.model.nodal_maps import ROLES, nodal_maps
 from agvbench.diagnosis.model.predictor import Predictor
+from agvbench.diagnosis.model.steady_drives import start_values, steady_drives
 from agvbench.diagnosis.selection import variants as forms
 from agvbench.diagnosis.selection.candidates import candidates, default_candidate
 from agvbench.diagnosis.selection.initial_steering import under_other_initial_steering
@@ -33,7 +33,7 @@ def selector(tiny_campaign):
     readings, geometry = read_runs(runs, HEADER.neutral), Geometry(FRONT_M, REAR_M)
     maps = nodal_maps(readings.runs, NEUTRAL)
     prior_model = {role: np.zeros(len(maps.nodes[role])) for role in ROLES}
-    start = start_values(maps, [measure_run(run, geometry, neutral=NEUTRAL) for run in runs], prior_model, geometry)
+    start = start_values(maps, steady_drives(runs, geometry, NEUTRAL), prior_model)
     return Selector(Batch(readings, maps, geometry), candidates(geometry), start, 0, lambda _: None)
 
 

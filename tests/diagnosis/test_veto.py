@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from tiny_vehicle import FRONT_M, HEADER, NEUTRAL, REAR_M, InMemory, Tiny
 
-from agvbench.calibration import measure_run
 from agvbench.diagnosis import Verdict, diagnose
 from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.data.splits import split_runs
 from agvbench.diagnosis.model.batch import Batch
-from agvbench.diagnosis.model.nodal_maps import ROLES, nodal_maps, start_values
+from agvbench.diagnosis.model.nodal_maps import ROLES, nodal_maps
+from agvbench.diagnosis.model.steady_drives import start_values, steady_drives
 from agvbench.diagnosis.selection.candidates import candidates
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.validation import validated
@@ -29,7 +29,7 @@ def chooser(campaign):
     held = ~split_runs(readings.runs, readings.group, 0).training
     maps = nodal_maps(readings.runs, NEUTRAL)
     prior_model = {role: np.zeros(len(maps.nodes[role])) for role in ROLES}
-    start = start_values(maps, [measure_run(run, geometry, neutral=NEUTRAL) for run in runs], prior_model, geometry)
+    start = start_values(maps, steady_drives(runs, geometry, NEUTRAL), prior_model)
     batch = Batch(readings.select(~held), maps, geometry)
     return Selector(batch, candidates(geometry), start, 0, lambda _: None), readings, held
 

@@ -21,6 +21,7 @@ QUICK = ("docs/tutorial.md", "docs/how-to/nightly.md", "docs/how-to/write-a-traj
 SLOW = (
     "docs/how-to/bring-your-own-plant.md",
     "docs/how-to/close-the-loop.md",
+    "docs/how-to/drive-a-differential-vehicle.md",
     "docs/how-to/set-up-a-lab.md",
     "docs/how-to/write-an-effect.md",
 )

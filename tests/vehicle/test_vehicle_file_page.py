@@ -15,7 +15,9 @@ TEXT = (Path(__file__).parents[2] / "docs" / "reference" / "vehicle-file.md").re
 
 
 def test_its_example_is_a_vehicle(tmp_path):
-    (example,) = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)
+    example, robot = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)
+    (tmp_path / "robot.toml").write_text(robot)
+    assert VehicleModel.load(tmp_path / "robot.toml").geometry.is_differential
     (tmp_path / "car.toml").write_text(example)
     car = VehicleModel.load(tmp_path / "car.toml")
     assert float(car.front(1500.0)) == pytest.approx(0.0)
