@@ -18,7 +18,7 @@ FILES = sorted((REFERENCE / "blind-trials").glob("*.json"))
 
 def test_there_are_files():
     assert [file.name for file in FILES] == [
-        "change-9841.json", "hysteresis-9040.json", "nothing-20168.json", "vehicles-9030.json"
+        "change-9841.json", "hysteresis-9040.json", "nothing-20168.json", "vehicles-9030.json", "vehicles-9751.json",
     ]  # fmt: skip
 
 

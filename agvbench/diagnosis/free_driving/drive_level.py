@@ -62,7 +62,7 @@ class DriveLevel:
 def drive_levels(readings: Readings, predictor: Predictor, parameters: Floats) -> dict[str, DriveLevel]:
     """Return the level of the drive of each session of `readings`, beside the sessions that do not differ.
 
-    The maps were fitted to several sessions, and have taken up a part of what differs where these gave other commands.
+    The maps were fitted to several sessions, and absorbed a part of what differs where these gave other commands.
     A common curve over the command, with a level for each session, gives that part back. Deviations of the initial
     speed from the curve are compared between each session and the others by Student's test, with blocks of driving as
     units; see `differing_sessions`.
