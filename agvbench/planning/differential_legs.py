@@ -10,8 +10,8 @@ import math
 
 from agvbench.errors import PlanError, UnsuitedVehicleError
 from agvbench.model import VehicleModel
-from agvbench.planning.leg import Leg, full_speed
-from agvbench.planning.trajectories.segments import Arc, SpotTurn, Straight, axle_speed, share_of
+from agvbench.planning.leg import Leg, leg_along, signed_speed
+from agvbench.planning.trajectories.segments import Arc, SpotTurn, Straight, share_of_full
 from agvbench.planning.trajectories.trajectory import Trajectory
 
 
@@ -27,27 +27,20 @@ def differential_leg(
     """
     if isinstance(segment, SpotTurn):
         return _spot_turn(segment, model, where=where)
-    backward = segment.direction == "backward"
-    asked = trajectory.speed if segment.speed is None else segment.speed
-    speed = axle_speed(asked, full_speed(model, backward, where=where), where=where)
-    signed = -speed if backward else speed
-    if isinstance(segment, Straight):
-        return _straight(segment, signed, where=where)
-    return _arc(segment, signed, model, where=where)
-
-
-def _straight(segment: Straight, speed_mps: float, *, where: str) -> Leg:
-    if segment.crab_deg:
+    speed = signed_speed(segment, trajectory, model, where=where)
+    if isinstance(segment, Arc):
+        yaw_rate = _arc_yaw_rate(segment, speed, model, where=where)
+    elif segment.crab_deg:
         raise UnsuitedVehicleError(
             "a differential vehicle moves along its heading only", where=where, value=f"crab_deg = {segment.crab_deg:g}"
         )
-    if segment.duration_s is not None:
-        return Leg(where, 0.0, 0.0, speed_mps, segment.duration_s)
-    assert segment.length_m is not None  # noqa: S101 - a straight has a length or a duration
-    return Leg(where, 0.0, 0.0, speed_mps, segment.length_m / abs(speed_mps))
+    else:
+        yaw_rate = 0.0
+    return leg_along(segment, yaw_rate, 0.0, speed, model.geometry, where=where)
 
 
-def _arc(segment: Arc, speed_mps: float, model: VehicleModel, *, where: str) -> Leg:
+def _arc_yaw_rate(segment: Arc, speed_mps: float, model: VehicleModel, *, where: str) -> float:
+    """Return the yaw rate [rad/s] that keeps the centroid on the arc's circle."""
     if segment.radius_m is None:
         raise UnsuitedVehicleError(
             "axle_angle_deg is an angle of an axle, and a differential vehicle steers none",
@@ -74,12 +67,7 @@ def _arc(segment: Arc, speed_mps: float, model: VehicleModel, *, where: str) -> 
             limit=f"{largest:.2f} rad/s",
             remedy=f"slow down, or widen it to at least {math.ceil(radius * 100.0) / 100.0:.2f} m",
         )
-    if segment.duration_s is not None:
-        return Leg(where, yaw_rate, 0.0, speed_mps, segment.duration_s)
-    if segment.angle_deg is not None:
-        return Leg(where, yaw_rate, 0.0, speed_mps, math.radians(segment.angle_deg) / abs(yaw_rate))
-    assert segment.length_m is not None  # noqa: S101 - an arc has one of the three
-    return Leg(where, yaw_rate, 0.0, speed_mps, segment.length_m / (segment.radius_m * abs(yaw_rate)))
+    return yaw_rate
 
 
 def _largest_yaw_rate(model: VehicleModel, *, left: bool) -> float:
@@ -91,17 +79,9 @@ def _largest_yaw_rate(model: VehicleModel, *, left: bool) -> float:
 def _spot_turn(segment: SpotTurn, model: VehicleModel, *, where: str) -> Leg:
     side = 1.0 if segment.turn == "left" else -1.0
     full = _largest_yaw_rate(model, left=side > 0.0)
-    if isinstance(segment.yaw_rate, str):
-        share = share_of(segment.yaw_rate)
-        assert share is not None  # noqa: S101 - checked when the trajectory was read
-        if not math.isfinite(full):
-            raise PlanError(
-                f"what {segment.yaw_rate} yaw rate is is not known: its map has no end", where=where,
-                remedy="say it in rad/s",
-            )  # fmt: skip
-        rate = share * full
-    else:
-        rate = segment.yaw_rate
+    rate = segment.yaw_rate
+    if isinstance(rate, str):
+        rate = share_of_full(rate, full, "yaw rate", "its map", "rad/s", where=where)
     if not 0.0 < rate <= full * (1.0 + 1e-9):
         raise PlanError(
             f"yaw rate is more than the vehicle reaches to the {segment.turn}",

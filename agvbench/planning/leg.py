@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,6 +10,8 @@ import numpy as np
 
 from agvbench.errors import PlanError
 from agvbench.model import VehicleModel
+from agvbench.planning.trajectories.segments import Arc, Straight, axle_speed
+from agvbench.planning.trajectories.trajectory import Trajectory
 from agvbench.types import Floats, Pose, wrap_angle
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.kinematics import body_motion
@@ -47,14 +50,31 @@ class Leg:
         return float(speed), float(sideslip), float(yaw_rate)
 
 
-def full_speed(model: VehicleModel, backward: bool, *, where: str) -> float:
-    """Return the vehicle's full speed in a direction [m/s, positive]; raise `PlanError` if it does not drive there."""
+def signed_speed(segment: Straight | Arc, trajectory: Trajectory, model: VehicleModel, *, where: str) -> float:
+    """Return the speed of the drive on a segment [m/s], negative backward; raise `PlanError` if it is out of reach."""
+    backward = segment.direction == "backward"
     low, high = model.drive.output_range
     full = -low if backward else high
-    direction = "backward" if backward else "forward"
     if not full > 0.0:
-        raise PlanError(f"this vehicle does not drive {direction}", where=where)
-    return full
+        raise PlanError(f"this vehicle does not drive {segment.direction}", where=where)
+    speed = axle_speed(trajectory.speed if segment.speed is None else segment.speed, full, where=where)
+    return -speed if backward else speed
+
+
+def leg_along(
+    segment: Straight | Arc, front: float, rear: float, speed_mps: float, geometry: Geometry, *, where: str
+) -> Leg:
+    """Return the leg that drives a segment with these values, for as long as its length or angle takes."""
+    centroid, _, yaw_rate = (abs(float(x)) for x in body_motion(front, rear, speed_mps, speed_mps, geometry))
+    if segment.duration_s is not None:
+        duration = segment.duration_s
+    elif segment.length_m is not None:
+        duration = segment.length_m / centroid
+    else:
+        assert isinstance(segment, Arc)  # noqa: S101 - a straight has a length or a duration
+        assert segment.angle_deg is not None  # noqa: S101 - an arc has one of the three
+        duration = math.radians(segment.angle_deg) / yaw_rate
+    return Leg(where, front, rear, speed_mps, duration)
 
 
 _SWEPT_STEP_M = 0.005

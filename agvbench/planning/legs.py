@@ -7,11 +7,10 @@ import math
 from agvbench.errors import PlanError, UnsuitedVehicleError
 from agvbench.model import VehicleModel
 from agvbench.planning.differential_legs import differential_leg
-from agvbench.planning.leg import Leg, full_speed
+from agvbench.planning.leg import Leg, leg_along, signed_speed
 from agvbench.planning.steering import axle_angles, radius_of, smallest_radius
-from agvbench.planning.trajectories.segments import Arc, Pause, SpotTurn, Steering, Straight, axle_speed
+from agvbench.planning.trajectories.segments import Arc, Pause, SpotTurn, Steering, Straight
 from agvbench.planning.trajectories.trajectory import Trajectory
-from agvbench.vehicle.kinematics import body_motion
 
 _MOUNTED_OFF_RAD = math.radians(3.0)
 
@@ -29,11 +28,9 @@ def legs_of(trajectory: Trajectory, model: VehicleModel) -> list[Leg]:
         else leg_of(segment, trajectory, model, where=trajectory.segment_name(i))
         for i, segment in enumerate(segments)
     ]
-    if model.geometry.is_differential:  # it has no steering to set
-        return _with_rests(driven, 0.0, at_every_change=False, where=trajectory.name)
-    return _with_rests(
-        driven, trajectory.steer_first_s, at_every_change=trajectory.steer_at_rest, where=trajectory.name
-    )
+    # A differential vehicle has no steering to set.
+    steer_first_s = 0.0 if model.geometry.is_differential else trajectory.steer_first_s
+    return _with_rests(driven, steer_first_s, at_every_change=trajectory.steer_at_rest, where=trajectory.name)
 
 
 def _leg(segment: Straight | Arc | SpotTurn, trajectory: Trajectory, model: VehicleModel, *, where: str) -> Leg:
@@ -43,22 +40,8 @@ def _leg(segment: Straight | Arc | SpotTurn, trajectory: Trajectory, model: Vehi
             "a vehicle with steered axles cannot turn on the spot", where=where, remedy="drive an arc"
         )
     front, rear = _angles(segment, segment.steering or trajectory.steering, model, where=where)
-    speed = axle_speed(
-        trajectory.speed if segment.speed is None else segment.speed,
-        full_speed(model, segment.direction == "backward", where=where),
-        where=where,
-    )
-    signed = -speed if segment.direction == "backward" else speed
-    centroid, _, yaw_rate = (abs(float(x)) for x in body_motion(front, rear, signed, signed, model.geometry))
-    if segment.duration_s is not None:
-        duration = segment.duration_s
-    elif segment.length_m is not None:
-        duration = segment.length_m / centroid
-    else:
-        assert isinstance(segment, Arc)  # noqa: S101 - a straight has a length or a duration
-        assert segment.angle_deg is not None  # noqa: S101 - an arc has one of the three
-        duration = math.radians(segment.angle_deg) / yaw_rate
-    return Leg(where, front, rear, signed, duration)
+    speed = signed_speed(segment, trajectory, model, where=where)
+    return leg_along(segment, front, rear, speed, model.geometry, where=where)
 
 
 def _angles(segment: Straight | Arc, mode: Steering, model: VehicleModel, *, where: str) -> tuple[float, float]:

@@ -166,6 +166,14 @@ def checked_pose(pose: tuple[float, float, float]) -> tuple[float, float, float]
     return x, y, heading
 
 
+def checked_delay(frames: float, most: int) -> None:
+    """Raise `PlantError` unless a command's delay is from none to `most` frames."""
+    if not 0 <= frames <= most:
+        raise PlantError(
+            "command delay is out of range", where="delay_frames", value=frames, limit=f"0 to {most} frames"
+        )
+
+
 def checked_advance(drive: float, front: float, rear: float, dt: float) -> tuple[float, float, float, float]:
     """Return a command and how long to hold it [s] as plain floats.
 

@@ -1,5 +1,5 @@
 # mypy: disallow-untyped-decorators=False, warn-return-any=False
-"""A simulated differential vehicle: two driven wheels with speed controllers of their own, and a castor.
+"""A simulated differential vehicle: two driven wheels with speed controllers of their own.
 
 Commands are a speed and a yaw rate; the controller turns them into wheel speeds with the radius and track that it
 assumes. The wheels' true radii and the track that scrubs differ from them. The integrator has a fixed grid of 1 ms, so
@@ -14,8 +14,9 @@ from dataclasses import astuple, dataclass, replace
 import numpy as np
 
 from agvbench.compiled import cached_njit
-from agvbench.errors import PlantError
-from agvbench.simulator.checked_plant import checked_advance, checked_pose
+from agvbench.simulator.checked_plant import checked_advance, checked_delay, checked_pose
+from agvbench.simulator.random_streams import random_stream
+from agvbench.simulator.time_grid import whole_steps
 from agvbench.types import Floats
 
 STEP_S = 0.001
@@ -23,8 +24,6 @@ FRAME_STEPS = 20
 """Steps from one reading of the command to the next."""
 MAX_DELAY_FRAMES = 14
 _RING = 16
-_ROUNDING = 1e-9  # of a step: a call that ends this close to a grid point ends on it
-_SEEDS = 2**64
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,11 +148,7 @@ def advance(
     speed = p[SPEED_UNIT] * min(limit, max(-limit, drive - p[NEUTRAL]))
     yaw_rate = p[YAW_UNIT] * min(limit, max(-limit, front - p[NEUTRAL]))
     begun = state[REMAINDER] > 0.0  # the first cell is under way: its command has been read
-    remainder = state[REMAINDER] + dt
-    cells = math.floor(remainder / STEP_S + _ROUNDING)
-    remainder -= cells * STEP_S
-    if remainder < _ROUNDING * STEP_S:
-        remainder = 0.0
+    cells, remainder = whole_steps(state[REMAINDER] + dt, STEP_S)
     for cell in range(cells + (remainder > 0.0)):
         if not begun and counters[0] % FRAME_STEPS == 0:
             _latch(p, state, counters, speed, yaw_rate)
@@ -172,7 +167,7 @@ def advance(
 class DifferentialPlant:
     """A simulated differential vehicle behind the plant protocol: `drive` is its speed, `front` its yaw rate.
 
-    Equal calls give equal poses bit for bit. The heading goes on counting over full turns.
+    Equal calls give equal poses bit for bit. The heading is continuous over full turns.
 
     Parameters
     ----------
@@ -192,11 +187,7 @@ class DifferentialPlant:
     """
 
     def __init__(self, vehicle: DifferentialVehicle, seed: int) -> None:
-        if not 0 <= vehicle.delay_frames <= MAX_DELAY_FRAMES:
-            raise PlantError(
-                "command delay is out of range", where="delay_frames", value=vehicle.delay_frames,
-                limit=f"0 to {MAX_DELAY_FRAMES} frames",
-            )  # fmt: skip
+        checked_delay(vehicle.delay_frames, MAX_DELAY_FRAMES)
         self.vehicle, self._seed = vehicle, seed
         self._constants = np.array(astuple(vehicle), dtype=np.float64)
         self._state, self._counters = np.zeros(STATE_SIZE), np.zeros(2, dtype=np.int64)
@@ -212,7 +203,7 @@ class DifferentialPlant:
             If the pose is not finite.
         """
         place = checked_pose(pose)
-        rng = np.random.default_rng([self._seed % _SEEDS, seed % _SEEDS])
+        rng = random_stream(self._seed, seed)
         self._variation[:] = self.vehicle.wheel_scatter * rng.standard_normal(2)
         self._counters[:] = rng.integers(FRAME_STEPS), 0
         hours = self._state[HOURS]
@@ -243,7 +234,7 @@ def random_differential(seed: int) -> DifferentialVehicle:
     controller 8…25 rad/s, damping 0.7…1, acceleration 1…6 m/s²; slip 0…0.4 s²/m²; markers ±6 mm along and across;
     droop 0…0.05 1/h; delay 0…5 frames.
     """
-    rng = np.random.default_rng([0xD1FF, seed % _SEEDS])
+    rng = random_stream(0xD1FF, seed)
 
     def draw(low: float, high: float) -> float:
         return float(rng.uniform(low, high))

@@ -16,6 +16,7 @@ import math
 import numpy as np
 
 from agvbench.compiled import cached_njit
+from agvbench.simulator.time_grid import whole_steps
 from agvbench.types import Floats
 
 STEP_S = 1.0 / 1200.0
@@ -52,7 +53,6 @@ _RELIEF_SPEED = 0.02  # m/s: reversing wheels have closed the linkage's play abo
 _CREEP = 0.004  # m/s: dry friction is smooth below it
 _SECONDS_PER_HOUR = 3600.0
 _SLACK_OPENS = 0.05  # s: without power the drive train comes off its flanks within this
-_ROUNDING = 1e-9  # of a step: a call that ends this close to a grid point ends on it
 
 
 @cached_njit()
@@ -176,11 +176,7 @@ def advance(
     low, high = p[COMMAND_LOW], p[COMMAND_HIGH]
     command = (min(high, max(low, drive)), min(high, max(low, front)), min(high, max(low, rear)))
     begun = state[REMAINDER] > 0.0  # the first cell is under way: its pulse frame has been read
-    remainder = state[REMAINDER] + dt
-    cells = math.floor(remainder / STEP_S + _ROUNDING)
-    remainder -= cells * STEP_S
-    if remainder < _ROUNDING * STEP_S:
-        remainder = 0.0
+    cells, remainder = whole_steps(state[REMAINDER] + dt, STEP_S)
     for cell in range(cells + (remainder > 0.0)):
         if not begun and counters[STEPS] % FRAME_STEPS == 0:
             _latch(p, run_variation, state, counters, command)

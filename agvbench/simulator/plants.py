@@ -11,8 +11,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-import numpy as np
-
+from agvbench.simulator.random_streams import random_stream
 from agvbench.simulator.vehicle_parameters import (
     Battery,
     Body,
@@ -154,7 +153,7 @@ def random_vehicle(seed: int) -> SimulatedVehicle:
     rear against front wheels ±3 %; braking rate 2…4 /s; overrun 1…3.5, scrub 0…0.04; marker centroid ±5 mm along
     and across; relief in reverse 0…0.05; battery droop 0.04…0.12; play 0.05…0.25° and 0.1…0.6 %; delay 0…3 frames.
     """
-    rng = np.random.default_rng([0xA6F, seed % 2**64])
+    rng = random_stream(0xA6F, seed)
 
     def draw(low: float, high: float) -> float:
         return float(rng.uniform(low, high))

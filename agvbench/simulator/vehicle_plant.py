@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from agvbench.errors import PlantError
 from agvbench.simulator import dynamics
-from agvbench.simulator.checked_plant import checked_advance, checked_pose
+from agvbench.simulator.checked_plant import checked_advance, checked_delay, checked_pose
+from agvbench.simulator.random_streams import random_stream
 from agvbench.simulator.vehicle_parameters import MAX_DELAY_FRAMES, SimulatedVehicle
-
-_SEEDS = 2**64
 
 
 class VehiclePlant:
     """A simulated vehicle.
 
     Commands beyond the servos' range are clipped, as a servo does; what is no finite number is an error. Equal
-    calls give equal poses bit for bit. The heading goes on counting over full turns.
+    calls give equal poses bit for bit. The heading is continuous over full turns.
 
     Parameters
     ----------
@@ -36,11 +34,7 @@ class VehiclePlant:
     """
 
     def __init__(self, vehicle: SimulatedVehicle, seed: int) -> None:
-        if not 0 <= vehicle.delay_frames <= MAX_DELAY_FRAMES:
-            raise PlantError(
-                "command delay is out of range", where="delay_frames", value=vehicle.delay_frames,
-                limit=f"0 to {MAX_DELAY_FRAMES} frames",
-            )  # fmt: skip
+        checked_delay(vehicle.delay_frames, MAX_DELAY_FRAMES)
         self.vehicle = vehicle
         self._seed = seed
         self._constants = vehicle.pack()
@@ -60,7 +54,7 @@ class VehiclePlant:
             If the pose is not finite.
         """
         x, y, heading = checked_pose(pose)
-        rng = np.random.default_rng([self._seed % _SEEDS, seed % _SEEDS])
+        rng = random_stream(self._seed, seed)
         run_variation = self.vehicle.run_variation
         self._run_variation[:] = rng.standard_normal(3) * (
             run_variation.front_rad,

@@ -163,19 +163,24 @@ def check_speed(
         raise ValueError(f"{what} is not above zero: {speed} {unit}; {otherwise}")
 
 
+def share_of_full(text: str, full: float, what: str, whose: str, unit: str, *, where: str) -> float:
+    """Return the share of `full` that `text` names; raise `PlanError` if no one knows how much full is."""
+    if not math.isfinite(full):
+        raise PlanError(
+            f"what {text} {what} is is not known: {whose} has no end", where=where, remedy=f"say it in {unit}"
+        )
+    share = share_of(text)
+    assert share is not None  # noqa: S101 - checked when the trajectory was read
+    return share * full
+
+
 def axle_speed(speed: Speed, full_mps: float, *, where: str) -> float:
     """Return the axle speed [m/s, positive] that `speed` means for a vehicle whose full speed is `full_mps`.
 
     Raise `PlanError` if the vehicle does not go so fast, or no one knows how fast it goes.
     """
     if isinstance(speed, str):
-        if not math.isfinite(full_mps):
-            raise PlanError(
-                f"what {speed} speed is is not known: the drive's map has no end", where=where, remedy="say it in m/s"
-            )
-        share = share_of(speed)
-        assert share is not None  # noqa: S101 - checked when the trajectory was read
-        return share * full_mps
+        return share_of_full(speed, full_mps, "speed", "the drive's map", "m/s", where=where)
     if speed > full_mps * (1.0 + 1e-9):
         raise PlanError(
             "speed is more than the drive reaches",

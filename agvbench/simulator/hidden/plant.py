@@ -9,11 +9,11 @@ from agvbench.simulator.checked_plant import checked_advance, checked_pose
 from agvbench.simulator.hidden import _kernel as kernel
 from agvbench.simulator.hidden.constants import LATENCY_S, NAMES, pack
 from agvbench.simulator.hidden.truth import SealedTruth
+from agvbench.simulator.random_streams import random_stream
 
 _HOUR_S = 3600.0
 TURNAROUND_S = 15.0
 """Between a run and the next reset: what fetching the vehicle takes. Batteries drain and servos warm meanwhile."""
-_SEEDS = 2**64
 
 
 class HiddenPlant:
@@ -70,7 +70,7 @@ class HiddenPlant:
             If the pose is not finite.
         """
         x, y, heading = checked_pose(pose)
-        rng = np.random.default_rng([self._seed % _SEEDS, seed % _SEEDS])
+        rng = random_stream(self._seed, seed)
         self._run_variation[:] = rng.standard_normal(3) * self._spread
         if self._driven:
             self._state[kernel.SESSION] += self._work[1, 0] + self._turnaround_s

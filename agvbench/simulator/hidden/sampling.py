@@ -15,6 +15,7 @@ from agvbench.simulator.hidden.plant import HiddenPlant
 from agvbench.simulator.hidden.recipe import Recipe, Values
 from agvbench.simulator.hidden.separation import Separation, SeparationStudy, separation
 from agvbench.simulator.hidden.truth import HiddenEffect, Kind, SealedTruth
+from agvbench.simulator.random_streams import random_stream
 
 FLOORS = 3.0
 """What a hidden effect leaves at least on the reference drives."""
@@ -52,12 +53,12 @@ def make_hidden_plant(spec: str, seed: int, *, floors: float = FLOORS) -> Hidden
 
 def vehicle_of(seed: int) -> BaseVehicle:
     """Return the vehicle that all plants of a seed share, whatever they hide."""
-    return sample_vehicle(np.random.default_rng([0xBA5E, seed % _SEEDS]))
+    return sample_vehicle(random_stream(0xBA5E, seed))
 
 
 def sampled_spec(seed: int) -> str:
     """Return what `make_plant` hides for a seed: nothing in a fifth of cases, two effects in a fifth, else one."""
-    rng = np.random.default_rng([0x5EA1, seed % _SEEDS])
+    rng = random_stream(0x5EA1, seed)
     # Effects that change, and others, came later: what earlier seeds drew has been published.
     later = {recipe.name for recipe in LATER}
     share, names = rng.random(), [n for n, recipe in CATALOGUE.items() if not recipe.changes and n not in later]
