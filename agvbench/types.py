@@ -58,6 +58,8 @@ class RunStatus:
 
 
 CONDITIONS = ("uncalibrated", "calibrated", "corrected")
+CALIBRATION_EXPERIMENTS = ("steering_front", "steering_rear", "steering_opposite", "drive", "yaw_rate")
+"""The experiments whose runs hold one command each, for static maps."""
 
 
 _Angle = TypeVar("_Angle", float, Floats)

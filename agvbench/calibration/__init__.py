@@ -1,6 +1,5 @@
 """From measured runs to static maps."""
 
-from agvbench.calibration.arc_samples import CALIBRATION_EXPERIMENTS
 from agvbench.calibration.calibrate import Calibration, calibrate
 from agvbench.calibration.identification import Identification, PoseNoise, identify
 from agvbench.calibration.maps.map_fit import ExcludedPoint, MapFit
@@ -16,6 +15,7 @@ from agvbench.calibration.measurement.circle import CircleFit, CircleFits, fit_c
 from agvbench.calibration.measurement.frames import FrameQuality, clean_frames, inspect_frames
 from agvbench.calibration.measurement.run_measurement import RunMeasurement, measure_run
 from agvbench.calibration.samples import CurvePoints
+from agvbench.types import CALIBRATION_EXPERIMENTS
 from agvbench.vehicle.kinematics import axle_angles_from_arc, axle_angles_from_curvature
 from agvbench.vehicle.quaternion import quaternion_to_heading
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from os import PathLike
 from typing import TYPE_CHECKING, Literal
 
-from agvbench.calibration.arc_samples import CALIBRATION_EXPERIMENTS, arc_samples, described, measure_runs
 from agvbench.calibration.campaign_protocol import CampaignLike, HeaderLike
-from agvbench.calibration.differential_samples import differential_samples
 from agvbench.calibration.free_driving import FreeDriving, read_free_driving
 from agvbench.calibration.maps.end_stops import saturated
 from agvbench.calibration.maps.map_fit import MapFit, assess_map, rounded
@@ -22,11 +21,14 @@ from agvbench.calibration.maps.selection import (
     preferred,
     steering_fitters,
 )
+from agvbench.calibration.measurement.body_velocity import measure_body_velocity
+from agvbench.calibration.measurement.run_measurement import measure_run
+from agvbench.calibration.run_samples import arc_samples, described, differential_samples, measure_runs
 from agvbench.calibration.samples import CurvePoints, Sample, points_of
 from agvbench.campaign.arguments import as_campaign
 from agvbench.errors import FitError, InputError, OneOf
 from agvbench.model import VehicleModel
-from agvbench.types import Run
+from agvbench.types import CALIBRATION_EXPERIMENTS, Run
 from agvbench.vehicle.channels import ROLES, Role, channels_of, quantity_of
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import Fixed, StaticMap
@@ -47,8 +49,7 @@ class Calibration:
     ``model`` with its provenance; ``fits`` by role (``"front"``, ``"rear"``, ``"drive"``) and kind, the refused kinds
     with their error; ``chosen`` the kind of the model's map by role (``"fixed"`` for an axle whose command never
     varied); ``measurements`` one row per sample (axle, command, value in deg, rad/s or m/s, stderr, run_id, left_out,
-    why);
-    ``warnings`` in plain words, what was left out among them.
+    why); ``warnings`` in plain words, what was left out among them.
     """
 
     model: VehicleModel
@@ -97,10 +98,8 @@ def calibrate(
         raise InputError("no run belongs to this session", where=f"campaign {header.name}", value=repr(session))
     dedicated = [run for run in runs if run.experiment in CALIBRATION_EXPERIMENTS]
     free = None
-    if dedicated and geometry.is_differential:
-        samples, warnings, used = _from_turns(dedicated, geometry, header)
-    elif dedicated:
-        samples, warnings, used = _from_arcs(dedicated, geometry, header)
+    if dedicated:
+        samples, warnings, used = _from_held_commands(dedicated, geometry, header)
     else:
         geometry.require_two_axles(
             "free driving of a differential vehicle is not calibrated",
@@ -129,28 +128,22 @@ def calibrate(
     return Calibration(model, fits, chosen, _table(samples, best, geometry), warnings)
 
 
-def _from_arcs(runs: list[Run], geometry: Geometry, header: HeaderLike) -> tuple[list[Sample], list[str], int]:
-    measured, refused = measure_runs(runs, geometry, header.neutral)
+def _from_held_commands(runs: list[Run], geometry: Geometry, header: HeaderLike) -> tuple[list[Sample], list[str], int]:
+    neutral = header.neutral
+    if geometry.is_differential:
+        turned, refused = measure_runs(runs, partial(measure_body_velocity, geometry=geometry, neutral=neutral))
+        samples, used = differential_samples(turned, neutral), len(turned)
+    else:
+        measured, refused = measure_runs(runs, partial(measure_run, geometry=geometry, neutral=neutral))
+        samples, used = arc_samples(runs, measured, geometry), len(measured)
     words = described(refused)
-    if not measured:
-        raise _unmeasured(header, runs, words)
-    return arc_samples(runs, measured, geometry), words, len(measured)
-
-
-def _from_turns(runs: list[Run], geometry: Geometry, header: HeaderLike) -> tuple[list[Sample], list[str], int]:
-    samples, refused = differential_samples(runs, geometry, header.neutral)
-    words = described(refused)
-    if not samples:
-        raise _unmeasured(header, runs, words)
-    return samples, words, len(runs) - len(refused)
-
-
-def _unmeasured(header: HeaderLike, runs: list[Run], words: list[str]) -> FitError:
-    return FitError(
-        "no calibration run can be measured",
-        where=f"campaign {header.name}",
-        value=f"0 of {len(runs)} runs; {words[0]}",
-    )
+    if not used:
+        raise FitError(
+            "no calibration run can be measured",
+            where=f"campaign {header.name}",
+            value=f"0 of {len(runs)} runs; {words[0]}",
+        )
+    return samples, words, used
 
 
 def _fit_roles(
@@ -210,9 +203,8 @@ def _warnings(best: Best, samples: list[Sample], geometry: Geometry) -> list[str
         reasons = Counter(s.why_left_out for s in aside)
         words += [f"{name}: {count} samples left out: {why}" for why, count in reasons.items()]
         if (fit := best.get(role)) is None:
-            value = quantity.scale * float(points_of(samples, role).value[0])
-            unit = quantity.unit if quantity.unit == "°" else f" {quantity.unit}"
-            words.append(f"{name}: its command never varied; taken as fixed at {value:.2f}{unit}")
+            value = quantity.text(float(points_of(samples, role).value[0]), ".2f")
+            words.append(f"{name}: its command never varied; taken as fixed at {value}")
             continue
         words += [f"{name}: {out.command:g} ({quantity.text(out.value)}) left out: {out.why}" for out in fit.left_out]
         if fit.name == "line_with_end_stops":

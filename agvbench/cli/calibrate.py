@@ -1,9 +1,9 @@
 """Fit the static maps of a vehicle from a campaign's calibration runs.
 
 Runs of the experiments steering_front, steering_rear, steering_opposite and drive hold one command each; from the arc
-that each drove follow both axle angles and the speed. A campaign without any, such as imported free driving, is
-read by short windows instead. Every fit is printed: the thesis' line and cubic with their R², and the maps that
-predict better, with what was left out and why.
+that each drove follow both axle angles and the speed. For a differential vehicle drive holds straights, and yaw_rate
+turns on the spot. A campaign without any, such as imported free driving, is read by short windows instead. Every fit
+is printed: the thesis' line and cubic with their R², and the maps that predict better, with what was left out and why.
 
 examples:
   agvbench calibrate campaigns/tonight                        look only

@@ -14,7 +14,7 @@ from agvbench.campaign.atomic_files import write_atomically
 from agvbench.errors import FileError, FlagError
 from agvbench.running.configuration.campaign_directory import CAMPAIGNS, newest
 from agvbench.running.configuration.settings import BenchSettings, settings_for_resume
-from agvbench.running.configuration.vehicles import with_lab_vehicle
+from agvbench.running.configuration.vehicles import default_plant, lab_vehicle
 
 SETTINGS = "loop.toml"
 BEFORE, DIAGNOSIS, VEHICLE, PLANS, AFTER = "before", "diagnosis.json", "vehicle.toml", "plans.json", "after"
@@ -38,7 +38,7 @@ def opened(given: Mapping[str, Any], out: str | None, *, resume: bool) -> tuple[
         directory = Path(out) if out is not None else newest(SETTINGS, "loop")
         return directory, settings_for_resume(BenchSettings.read(directory / SETTINGS, "loop"), options)
     directory = Path(out) if out is not None else CAMPAIGNS / datetime.now().astimezone().strftime("loop-%Y%m%d-%H%M%S")
-    settings = BenchSettings.given(options | _plant_of(options))
+    settings = BenchSettings.given({"plant": default_plant(options.get("vehicle", lab_vehicle())), **options})
     if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
         remedy = "go on with --resume" if (directory / SETTINGS).exists() else "choose another directory"
         raise FlagError("exists already and is not empty", where="--out", value=directory, remedy=remedy)
@@ -48,11 +48,6 @@ def opened(given: Mapping[str, Any], out: str | None, *, resume: bool) -> tuple[
         raise FileError("cannot be made", where=directory, value=error.strerror, remedy="choose another") from None
     write(directory / SETTINGS, tomli_w.dumps(asdict(settings)))
     return directory, settings
-
-
-def _plant_of(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the plant of the vehicle's kind, unless it is given or the usual one."""
-    return {name: value for name, value in with_lab_vehicle(options).items() if name == "plant"}
 
 
 def write(path: Path, text: str) -> None:

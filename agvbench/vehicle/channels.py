@@ -36,9 +36,9 @@ class Quantity:
     unit: str = ""
     word: str = ""
 
-    def text(self, value: float) -> str:
-        """Return an SI value with its unit."""
-        return f"{self.scale * value:.3g}{'' if self.unit == '°' else ' '}{self.unit}"
+    def text(self, value: float, form: str = ".3g") -> str:
+        """Return an SI value with its unit, the number in this `form`."""
+        return f"{self.scale * value:{form}}{'' if self.unit == '°' else ' '}{self.unit}"
 
 
 _DEG = math.degrees(1.0)

@@ -28,6 +28,7 @@ class Differential:
     yaw_gain: float = 0.7
     speed_lag_s: float = 0.0
     yaw_lag_s: float = 0.0
+    yaw_acceleration: float = np.inf
     delay_s: float = 0.0
     camera_delay_s: float = 0.0
     right_wheel: float = 1.0
@@ -62,7 +63,8 @@ def drive(truth: Differential, seconds: float, rng: np.random.Generator) -> tupl
         path[k] = x, y, heading
         v_aim, w_aim = truth.speed_gain * v_command[commanded[k]], truth.yaw_gain * w_command[commanded[k]]
         v += (v_aim - v) * (_STEP_S / truth.speed_lag_s if truth.speed_lag_s else 1.0)
-        w += (w_aim - w) * (_STEP_S / truth.yaw_lag_s if truth.yaw_lag_s else 1.0)
+        most = truth.yaw_acceleration * _STEP_S
+        w += np.clip((w_aim - w) * (_STEP_S / truth.yaw_lag_s if truth.yaw_lag_s else 1.0), -most, most)
         left, right = v - 0.5 * _TRACK_M * w, (v + 0.5 * _TRACK_M * w) * truth.right_wheel
         forward, yaw = 0.5 * (left + right), (right - left) / _TRACK_M
         yaw /= 1.0 + truth.slip_by_speed * forward * forward

@@ -22,6 +22,8 @@ def found(diagnosis: Diagnosis) -> dict[str, float]:
     ("truth", "expected", "tolerance"),
     [
         ({"yaw_lag_s": 0.3}, {"steering_lag.time_constant_s": 0.3}, 0.01),
+        ({"yaw_lag_s": 0.3, "speed_lag_s": 0.3}, {"wheel_lag.time_constant_s": 0.3}, 0.01),
+        ({"yaw_acceleration": 2.0}, {"yaw_acceleration_limit.acceleration_radps2": 2.0}, 0.1),
         ({"speed_lag_s": 0.3}, {"speed_lag.accelerate_s": 0.3, "speed_lag.brake_s": 0.3}, 0.01),
         ({"right_wheel": 1.03}, {"wheel_diameter_mismatch.curvature_per_m": CURVATURE}, 0.003),
         ({"marker_ahead_m": 0.13}, {"marker_offset.forward_m": 0.03}, 0.002),

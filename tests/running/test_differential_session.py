@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from agvbench.calibration import calibrate
-from agvbench.campaign import Campaign
+from agvbench.campaign import Campaign, CampaignHeader
 from agvbench.diagnosis import Diagnosis, Verdict, diagnose
 from agvbench.errors import FitError, VehicleError
 from agvbench.model import VehicleModel
@@ -18,6 +20,7 @@ from agvbench.running.session.opening import open_session
 from agvbench.running.session.session import BenchSession, NotDrivenError
 from agvbench.simulator.differential import DifferentialVehicle
 from agvbench.statistics.run_errors import run_error
+from agvbench.types import Run
 
 TRUTH = DifferentialVehicle()
 SHARES = (-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)
@@ -65,6 +68,24 @@ def test_measurements_have_a_row_for_each_run_and_channel(driven: Path) -> None:
     turns = table[table["axle"] == "front"]
     assert float((turns["value"] / turns["command"]).std()) < 0.01
     assert (table["stderr"] > 0.0).all()
+
+
+def test_a_rejected_run_is_no_sample(driven: Path) -> None:
+    campaign = Campaign.open(driven)
+    rejected = next(run.run_id for run in campaign if run.experiment == "yaw_rate")
+    runs = [replace(run, status="rejected: moved") if run.run_id == rejected else run for run in campaign]
+    found = calibrate(InMemory(campaign.header, runs))
+    assert rejected not in set(found.measurements["run_id"])
+    assert f"run {rejected} left out: rejected: moved" in found.warnings
+
+
+@dataclass(frozen=True)
+class InMemory:
+    header: CampaignHeader
+    runs: list[Run]
+
+    def __iter__(self) -> Iterator[Run]:
+        return iter(self.runs)
 
 
 def test_what_calibration_cannot_know_remains(driven: Path) -> None:
@@ -119,7 +140,7 @@ def test_it_has_no_rear_axle_and_does_not_drive_back(tmp_path: Path) -> None:
 def test_a_turn_on_the_spot_stays_on_the_spot(tmp_path: Path) -> None:
     with open_session(OPTIONS, out=str(tmp_path / "a"), resume=False, dry_run=False) as opened:
         run = opened.driver("turn", experiment="yaw_rate", repeat=1).hold(for_s=3.0, front=0.5)
-    frames = run.run.frames if hasattr(run, "run") else run.frames
+    frames = run.frames
     lever = math.hypot(TRUTH.marker_forward_m, TRUTH.marker_left_m)
     assert max(np.ptp(frames.x_m), np.ptp(frames.y_m)) < 2.2 * lever
     assert float(np.ptp(np.unwrap(frames.heading_rad))) > 1.0

@@ -6,10 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agvbench.calibration.measurement.frames import inspect_frames
 from agvbench.calibration.measurement.path import correlation_factor, robust_slope, slope_stderr
-from agvbench.calibration.measurement.run_measurement import MIN_FRAMES, driven_segment, steady_frames
-from agvbench.errors import FitError
+from agvbench.calibration.measurement.run_measurement import steady_part
 from agvbench.types import Command, Floats, Frames, Run
 from agvbench.vehicle.geometry import Geometry
 
@@ -56,13 +54,7 @@ def measure_body_velocity(run: Run, geometry: Geometry, *, neutral: float) -> Bo
     FitError
         If the run has no usable frames, or held no command long enough.
     """
-    where = f"run {run.run_id}"
-    frames, quality = inspect_frames(run.frames)
-    if len(frames) < MIN_FRAMES or not len(run.commands):
-        value = f"{len(frames)} of {quality.frames} usable"
-        raise FitError("too few frames to measure", where=where, value=value, limit=f"at least {MIN_FRAMES}")
-    segment = driven_segment(run.commands, float(frames.t_s[-1]), neutral, turns=geometry.is_differential)
-    steady = steady_frames(frames, segment, where=where)
+    segment, steady, _ = steady_part(run, neutral, turns=geometry.is_differential)
     heading = np.unwrap(steady.heading_rad)
     yaw_rate = robust_slope(steady.t_s, heading)
     yaw_stderr = slope_stderr(steady.t_s, heading, yaw_rate)

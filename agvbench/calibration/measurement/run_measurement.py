@@ -80,17 +80,7 @@ def measure_run(run: Run, geometry: Geometry, *, neutral: float | None = None) -
     FitError
         If the run has no usable frames, held no command long enough, or did not follow one arc.
     """
-    where = f"run {run.run_id}"
-    frames, quality = inspect_frames(run.frames)
-    if len(frames) < MIN_FRAMES or not len(run.commands):
-        raise FitError(
-            "too few frames to measure",
-            where=where,
-            value=f"{len(frames)} of {quality.frames} usable",
-            limit=f"at least {MIN_FRAMES}",
-        )
-    segment = driven_segment(run.commands, float(frames.t_s[-1]), neutral)
-    steady = steady_frames(frames, segment, where=where)
+    segment, steady, quality = steady_part(run, neutral)
     if _stands_still(steady):
         return _stands(run.run_id, segment, steady, quality)
     return _moves(run.run_id, segment, steady, geometry, quality)
@@ -200,6 +190,24 @@ class Segment:
     command: Command
     begin_s: float
     end_s: float
+
+
+def steady_part(run: Run, neutral: float | None, *, turns: bool = False) -> tuple[Segment, Frames, FrameQuality]:
+    """Return the longest stretch of one command in a run, its clean frames after settling, and the frames' quality.
+
+    Raise `FitError` if too few frames are usable, or the command was not held long enough; see `driven_segment`.
+    """
+    where = f"run {run.run_id}"
+    frames, quality = inspect_frames(run.frames)
+    if len(frames) < MIN_FRAMES or not len(run.commands):
+        raise FitError(
+            "too few frames to measure",
+            where=where,
+            value=f"{len(frames)} of {quality.frames} usable",
+            limit=f"at least {MIN_FRAMES}",
+        )
+    segment = driven_segment(run.commands, float(frames.t_s[-1]), neutral, turns=turns)
+    return segment, steady_frames(frames, segment, where=where), quality
 
 
 def driven_segment(commands: Commands, last_frame_s: float, neutral: float | None, *, turns: bool = False) -> Segment:

@@ -28,7 +28,7 @@ Columns = dict[int, Floats]
 class SteeringTangents:
     """Tangents of the steady-state angles of both axles (n, 2) at each residual rate.
 
-    Those of a differential vehicle are its yaw rates [rad/s], and zero. ``previous`` (n, 2): those under the previous
+    They mean nothing for a differential vehicle. ``previous`` (n, 2): those under the previous
     steering command; ``reversal`` (n, 2): those at which each axle last reversed; ``levels`` (n, 3): index of the level
     of drive, front and rear in force.
     """
@@ -43,7 +43,7 @@ def steering_tangents(batch: Batch, parameters: Floats, rates: Rates) -> Steerin
     """Return the steering_tangents tangents at each rate, by the nodal values in `parameters`."""
     where = batch.maps.slices()
     settled = np.column_stack([batch.weights[role] @ parameters[where[role]] for role in ("front", "rear")])
-    tangent = settled if batch.geometry.is_differential else np.tan(np.clip(settled, -1.4, 1.4))
+    tangent = np.tan(np.clip(settled, -1.4, 1.4))
     previous, reversal = tangent.copy(), tangent.copy()
     for k, role in enumerate(("front", "rear")):
         command = batch.commands[role]

@@ -72,28 +72,32 @@ def drive_levels(readings: Readings, predictor: Predictor, parameters: Floats) -
     known = np.isfinite(deviation)
     initial_states = _initial_states(readings)
     session = initial_states.session[known]
-    times = initial_states.t_s[known]
-    runs = [run for run, use in zip(readings.runs, known, strict=True) if use]
-    command = np.array([held_command(run.commands, "drive", t) for run, t in zip(runs, times, strict=True)])
+    at = zip(np.flatnonzero(known).tolist(), initial_states.t_s[known], strict=True)
+    command = np.array([held_command(readings.runs[i].commands, "drive", t) for i, t in at])
     curve, inflation = _common_curve(command, deviation[known], session)
     beside = deviation[known] - curve
     blocks, first, index = np.unique(readings.group[known], return_index=True, return_inverse=True)
     middle = np.array([np.median(beside[index == k]) for k in range(len(blocks))])
-    session = session[first]
-    by_session = {str(name): middle[session == name] for name in np.unique(session)}
+    sessions = {
+        str(name): _Session(middle[session[first] == name], inflation[str(name)]) for name in np.unique(session)
+    }
 
-    def level(name: str, rest: list[Floats]) -> DriveLevel:
-        return _level(by_session[name], rest, len(by_session), inflation[name])
+    def deviates(one: _Session, rest: list[_Session]) -> float | None:
+        level = _level(one, rest, len(sessions))
+        return level.ratio if level.significant else None
 
-    def tested(one: Floats, rest: list[Floats]) -> float | None:
-        name = next(name for name, own in by_session.items() if own is one)
-        found = level(name, rest)
-        return found.ratio if found.significant else None
-
-    differing = differing_sessions(by_session, tested, len)
-    common = {name: one for name, one in by_session.items() if name not in differing}
-    levels = {name: level(name, others(common, name)) for name in by_session}
+    differing = differing_sessions(sessions, deviates, lambda one: len(one.blocks))
+    common = {name: one for name, one in sessions.items() if name not in differing}
+    levels = {name: _level(one, others(common, name), len(sessions)) for name, one in sessions.items()}
     return {name: replace(level, significant=name in differing) for name, level in levels.items()}
+
+
+@dataclass(frozen=True)
+class _Session:
+    """Deviations of a session's ``blocks`` (n,), and by how much the common curve widens the level's standard error."""
+
+    blocks: Floats
+    inflation: float
 
 
 def _common_curve(x: Floats, y: Floats, session: NDArray[np.str_]) -> tuple[Floats, dict[str, float]]:
@@ -109,12 +113,12 @@ def _common_curve(x: Floats, y: Floats, session: NDArray[np.str_]) -> tuple[Floa
         return np.zeros(len(y)), {str(name): 1.0 for name in names}
     hats = np.column_stack([np.interp(x, knots, row) for row in np.eye(len(knots))])
     levels = (session[:, None] == names).astype(np.float64)
+    design = np.column_stack([hats, levels[:, 1:]])
     # Windows with large deviations, such as those during a lag, must not bend the curve.
     weight = np.ones(len(y))
     for _ in range(_ROUNDS):
-        design = np.column_stack([hats, levels[:, 1:]]) * weight[:, None]
-        solution, *_ = np.linalg.lstsq(design, weight * y, rcond=1e-6)
-        off = y - np.column_stack([hats, levels[:, 1:]]) @ solution
+        solution, *_ = np.linalg.lstsq(design * weight[:, None], weight * y, rcond=1e-6)
+        off = y - design @ solution
         scale = max(robust_std(off), 1e-6)
         weight = np.sqrt(np.minimum(1.0, 2.0 * scale / np.maximum(np.abs(off), 1e-12)))
     inflation = {str(name): _inflation(hats, one) for name, one in zip(names, levels.T, strict=True)}
@@ -128,15 +132,15 @@ def _inflation(hats: Floats, own: Floats) -> float:
     return float(np.sqrt(total / left)) if left > _LEAST_OVERLAP * total else np.inf
 
 
-def _level(one: Floats, rest: list[Floats], sessions: int, inflation: float) -> DriveLevel:
+def _level(session: _Session, rest: list[_Session], sessions: int) -> DriveLevel:
     """Return the level of a session's blocks against others, tested at the level of all `sessions` (Bonferroni)."""
-    other = np.concatenate([np.empty(0), *rest])
+    one, other = session.blocks, np.concatenate([np.empty(0), *(each.blocks for each in rest)])
     freedom = len(one) + len(other) - 2
     if freedom < 1 or not len(other):
         return DriveLevel(1.0, np.inf, significant=False)
     difference = float(np.mean(one) - np.mean(other))
     pooled = (np.sum((one - np.mean(one)) ** 2) + np.sum((other - np.mean(other)) ** 2)) / freedom
-    stderr = inflation * float(np.sqrt(pooled * (1.0 / len(one) + 1.0 / len(other))))
+    stderr = session.inflation * float(np.sqrt(pooled * (1.0 / len(one) + 1.0 / len(other))))
     critical = float(student.isf(0.5 * FREE_DRIVING_LEVEL.alpha / sessions, freedom))
     significant = abs(difference) > max(FREE_DRIVING_LEVEL.min_deviation, critical * stderr)
     return DriveLevel(float(np.exp(difference)), float(np.exp(difference)) * stderr, significant)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
 from agvbench.calibration import RunMeasurement, measure_body_velocity, measure_run
+from agvbench.calibration.run_samples import measure_runs
 from agvbench.diagnosis.model.nodal_maps import ROLES, NodalMaps
-from agvbench.errors import FitError
 from agvbench.types import Command, Floats, Run
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.kinematics import wheel_speed
@@ -19,26 +20,20 @@ SteadyDrive = tuple[Command, Mapping[str, float]]
 
 
 def steady_drives(runs: Iterable[Run], geometry: Geometry, neutral: float) -> list[SteadyDrive]:
-    """Return what each run with a steady part says of the channels, by inverted kinematics."""
-    of_run = _body_velocity if geometry.is_differential else _arc
-    found = []
-    for run in runs:
-        try:
-            found.append(of_run(run, geometry, neutral))
-        except FitError:
-            continue  # a run without a steady part gives no initial value, but remains in the fit
-    return found
+    """Return what each run with a steady part says of the channels, by inverted kinematics.
+
+    A run without one gives no initial value, but remains in the fit.
+    """
+    if geometry.is_differential:
+        turned, _ = measure_runs(runs, partial(measure_body_velocity, geometry=geometry, neutral=neutral))
+        return [(m.command, {"front": m.yaw_rate_radps, "drive": m.forward_mps}) for m in turned.values()]
+    measured, _ = measure_runs(runs, partial(measure_run, geometry=geometry, neutral=neutral))
+    return [(m.command, _of_arc(m, geometry)) for m in measured.values()]
 
 
-def _body_velocity(run: Run, geometry: Geometry, neutral: float) -> SteadyDrive:
-    m = measure_body_velocity(run, geometry, neutral=neutral)
-    return m.command, {"front": m.yaw_rate_radps, "drive": m.forward_mps}
-
-
-def _arc(run: Run, geometry: Geometry, neutral: float) -> SteadyDrive:
-    m = measure_run(run, geometry, neutral=neutral)
+def _of_arc(m: RunMeasurement, geometry: Geometry) -> dict[str, float]:
     turns = abs(m.speed_mps) > _MIN_SPEED_MPS
-    return m.command, {
+    return {
         "front": m.front_rad if turns else np.nan,
         "rear": m.rear_rad if turns else np.nan,
         "drive": _along_wheels(m, geometry) if m.moves else 0.0,

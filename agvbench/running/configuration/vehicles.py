@@ -25,16 +25,20 @@ def lab_vehicle() -> str:
 
 
 def with_lab_vehicle(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the options `given` with the vehicle of the lab folder, and the simulated plant of its kind, as defaults.
-
-    A vehicle file that cannot be read is refused where it is used.
-    """
+    """Return the options `given`, by default with the lab folder's vehicle and a simulated plant of its kind."""
     options = {"vehicle": lab_vehicle(), **given}
-    if "plant" not in given and options["vehicle"]:
-        with suppress(AgvbenchError):
-            if VehicleModel.load(options["vehicle"]).geometry.is_differential:
-                options["plant"] = DIFFERENTIAL_PLANT
-    return options
+    return options if "plant" in given else {"plant": default_plant(options["vehicle"]), **options}
+
+
+def default_plant(vehicle: str) -> str:
+    """Return the simulated plant of the kind of the vehicle file `vehicle`, else that of the thesis' vehicle.
+
+    A file that cannot be read is refused where it is used.
+    """
+    with suppress(AgvbenchError):
+        if vehicle and VehicleModel.load(vehicle).geometry.is_differential:
+            return DIFFERENTIAL_PLANT
+    return BenchSettings.plant
 
 
 def known_models(settings: BenchSettings) -> dict[str, VehicleModel]:

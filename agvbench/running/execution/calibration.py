@@ -14,7 +14,7 @@ from agvbench.model import VehicleModel
 from agvbench.model.priors import Prior
 from agvbench.running.configuration.provenance import recorded_rows
 from agvbench.running.execution.run_records import attempts_by_run
-from agvbench.types import Outcome, Run
+from agvbench.types import CALIBRATION_EXPERIMENTS, Outcome, Run
 
 VEHICLE_FILE = "vehicle.toml"
 MEASUREMENTS_TABLE = "calibration"
@@ -78,8 +78,6 @@ def unfinished_calibration(directory: Path, recorded: Mapping[str, Run], attempt
     CampaignError
         If the campaign's plan is damaged.
     """
-    from agvbench.calibration import CALIBRATION_EXPERIMENTS
-
     rows = recorded_rows(directory, PLANNED_TABLE)
     planned = {str(row["run_id"]) for row in rows if row["experiment"] in CALIBRATION_EXPERIMENTS}
     attempts_at = attempts_by_run(recorded.values())
@@ -103,6 +101,4 @@ def _kept_model(writer: CampaignWriter, campaign: Campaign, digest: str) -> Vehi
 
 def _calibration_runs(campaign: Campaign) -> list[str]:
     """Return the ids of the calibration runs that count, in order."""
-    from agvbench.calibration import CALIBRATION_EXPERIMENTS
-
     return sorted(run.run_id for run in campaign if run.is_ok and run.experiment in CALIBRATION_EXPERIMENTS)

@@ -1,12 +1,14 @@
-"""Samples from runs that held one command each: the calibration drives of fig. 7.1 and 7.2."""
+"""Samples from runs that held one command each: the calibration drives of fig. 7.1 and 7.2, and turns on the spot."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TypeVar
 
-from agvbench.calibration.measurement.run_measurement import RunMeasurement, measure_run
+from agvbench.calibration.measurement.body_velocity import BodyVelocity
+from agvbench.calibration.measurement.run_measurement import RunMeasurement
 from agvbench.calibration.samples import Sample
 from agvbench.errors import FitError
 from agvbench.types import Run
@@ -14,7 +16,7 @@ from agvbench.vehicle.channels import Role
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.kinematics import wheel_speed
 
-CALIBRATION_EXPERIMENTS = ("steering_front", "steering_rear", "steering_opposite", "drive", "yaw_rate")
+Measured = TypeVar("Measured")
 # Whose runs say most about a role; the next are asked where these vary its command too little.
 _OWN: dict[Role, tuple[str, ...]] = {
     "front": ("steering_front", "steering_opposite"),
@@ -25,18 +27,16 @@ _MIN_COMMANDS = 4
 _STRAIGHT_RAD = math.radians(6.0)
 
 
-def measure_runs(
-    runs: Iterable[Run], geometry: Geometry, neutral: float
-) -> tuple[dict[str, RunMeasurement], dict[str, str]]:
-    """Return the measurement of each run by its id, and for the others why there is none."""
-    measured: dict[str, RunMeasurement] = {}
+def measure_runs(runs: Iterable[Run], measure: Callable[[Run], Measured]) -> tuple[dict[str, Measured], dict[str, str]]:
+    """Return what `measure` says of each run by its id, and for the others why it raised `FitError`."""
+    measured: dict[str, Measured] = {}
     refused: dict[str, str] = {}
     for run in runs:
         if not run.is_ok:
             refused[run.run_id] = run.status
             continue
         try:
-            measured[run.run_id] = measure_run(run, geometry, neutral=neutral)
+            measured[run.run_id] = measure(run)
         except FitError as error:
             refused[run.run_id] = str(error).removeprefix(f"run {run.run_id}: ")
     return measured, refused
@@ -85,6 +85,31 @@ def _drive_sample(command: float, m: RunMeasurement, geometry: Geometry) -> Samp
     if max(abs(m.front_rad), abs(m.rear_rad)) <= _STRAIGHT_RAD:
         return sample
     return sample.without("driven in a turn: what turning costs is an effect, not the map")
+
+
+_OTHER: dict[Role, Role] = {"drive": "front", "front": "drive"}
+
+
+def differential_samples(measured: Mapping[str, BodyVelocity], neutral: float) -> list[Sample]:
+    """Return what the runs of a differential vehicle, by id, say of its drive and of its yaw rate.
+
+    The speed's curve is read from runs whose yaw rate command is neutral and the yaw rate's from those whose speed
+    command is, so that what the one costs the other (slip, unequal wheels) stays out of both. Where these vary their
+    command too little, all runs are read. It has no rear axle: this channel is fixed.
+    """
+    samples = [Sample("rear", neutral, 0.0, math.nan, run_id) for run_id in list(measured)[:1]]
+    for role, other in _OTHER.items():
+        own = {name: m for name, m in measured.items() if getattr(m.command, other) == neutral}
+        varied = len({getattr(m.command, role) for m in own.values()}) >= _MIN_COMMANDS
+        samples += [_body_sample(role, name, m) for name, m in (own if varied else measured).items()]
+    return samples
+
+
+def _body_sample(role: Role, run_id: str, m: BodyVelocity) -> Sample:
+    value, stderr = m.forward_mps, m.forward_stderr_mps
+    if role == "front":
+        value, stderr = m.yaw_rate_radps, m.yaw_rate_stderr_radps
+    return Sample(role, float(getattr(m.command, role)), value, stderr, run_id)
 
 
 def described(refused: dict[str, str]) -> list[str]:
