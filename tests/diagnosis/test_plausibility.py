@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from differential_vehicle import Campaign, Differential
 from hypothesis import example, given
 from hypothesis import strategies as st
 from tiny_vehicle import HEADER, NEUTRAL, Tiny, drive, held
@@ -31,7 +32,7 @@ def test_a_run_of_any_length(first, count):
     run = replace(RUN, frames=frames)
     require_plausible_units([run], HEADER)
     last_s = -np.inf
-    for k, (when, poses) in enumerate(_tracks([run])):
+    for k, (when, poses, _) in enumerate(_tracks([run])):
         assert when[0] == t_s[0] if k == 0 else when[0] > last_s
         last_s = when[-1]
         assert last_s <= t_s[-1]
@@ -45,3 +46,16 @@ def test_every_frame_doubled_is_no_other_unit():
     in_milliseconds = replace(frames, t_s=1000.0 * frames.t_s)
     with pytest.raises(CampaignError, match="t_s is not in seconds"):
         require_plausible_units([replace(RUN, frames=in_milliseconds)], HEADER)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_of_a_vehicle_that_turns_on_the_spot_is_no_path(seed):
+    campaign = Campaign(Differential(noise_m=0.015), seed=seed)
+    require_plausible_units(campaign.runs, campaign.header)
+
+
+def test_a_mirrored_floor_of_such_a_vehicle_is_refused():
+    campaign = Campaign(Differential(noise_m=0.002))
+    mirrored = [replace(run, frames=replace(run.frames, y_m=-run.frames.y_m)) for run in campaign]
+    with pytest.raises(CampaignError, match="heading_rad and the floor are mirrored"):
+        require_plausible_units(mirrored, campaign.header)

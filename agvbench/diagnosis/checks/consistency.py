@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.calibration.campaign_protocol import HeaderLike
+from agvbench.diagnosis.data.initial_pose import frame_noise
 from agvbench.diagnosis.data.readings import BACK_IN_TIME, Readings
 from agvbench.diagnosis.residuals.residuals import pose_residuals
 from agvbench.errors import CampaignError
@@ -19,6 +20,8 @@ _MAX_UNORDERED = 0.25
 _FRAME_INTERVAL_S, _STRETCH = 0.3, 30
 _MIN_TURN_RAD, _MIN_STEPS, _MIN_TURNING = 0.15, 5, 5
 _TURN_RATIO_LIMITS = (0.5, 2.0)
+_MIN_STEP_TO_NOISE = 10.0
+"""A step so long has a direction known to 8°."""
 
 
 def require_ordered_clocks(refused: Mapping[str, str], runs: int, *, where: str) -> None:
@@ -77,8 +80,8 @@ def require_plausible_units(runs: Sequence[Run], header: HeaderLike) -> None:
     raise CampaignError(what, where=where, value=value, limit="once", remedy=remedy)
 
 
-def _tracks(runs: Sequence[Run]) -> Iterator[tuple[Floats, Floats]]:
-    """Yield times (n,) and poses (n, 3), with a continuous heading, of each 9 s of a run, one frame every 0.3 s."""
+def _tracks(runs: Sequence[Run]) -> Iterator[tuple[Floats, Floats, float]]:
+    """Yield times (n,), poses (n, 3) with a continuous heading, and their noise [m], of each 9 s, one every 0.3 s."""
     for run in runs:
         f = run.frames
         seen = f.tracked.astype(np.bool_) & np.isfinite(f.t_s + f.x_m + f.y_m + f.heading_rad)
@@ -87,20 +90,22 @@ def _tracks(runs: Sequence[Run]) -> Iterator[tuple[Floats, Floats]]:
             continue
         t_s = f.t_s[order]
         poses = np.column_stack([f.x_m[order], f.y_m[order], np.unwrap(f.heading_rad[order])])
+        noise_m = float(frame_noise(poses)[0])
         # Rounding may put the last time past the last frame.
         chosen = np.unique(np.searchsorted(t_s[:-1], np.arange(t_s[0], t_s[-1], _FRAME_INTERVAL_S)))
         for first in range(0, len(chosen), _STRETCH):
             own = chosen[first : first + _STRETCH]
-            yield t_s[own], poses[own]
+            yield t_s[own], poses[own], noise_m
 
 
-def _turn_ratio(tracks: list[tuple[Floats, Floats]]) -> float | None:
+def _turn_ratio(tracks: list[tuple[Floats, Floats, float]]) -> float | None:
     """Return the rotation of headings relative to that of the direction of motion, the median of turning runs."""
     ratios = []
-    for _, poses in tracks:
+    for _, poses, noise_m in tracks:
         step = np.diff(poses[:, :2], axis=0)
         length = np.hypot(step[:, 0], step[:, 1])
-        moves = length > 0.3 * np.max(length, initial=0.0)
+        # A vehicle that turns on the spot, or stands, has the direction of its noise.
+        moves = length > max(0.3 * np.max(length, initial=0.0), _MIN_STEP_TO_NOISE * noise_m)
         # Modulo half a turn: a reversing vehicle moves in the opposite direction along the same line.
         course = np.unwrap(np.arctan2(step[moves, 1], step[moves, 0]), period=np.pi)
         heading = (0.5 * (poses[1:, 2] + poses[:-1, 2]))[moves]
