@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import pkgutil
+from collections.abc import Iterator
 from types import ModuleType
 from typing import TypeGuard, TypeVar
 
@@ -28,10 +29,13 @@ def classes_by_file(package: ModuleType | str, base: type[_Class]) -> list[type[
     []
     """
     module = importlib.import_module(package) if isinstance(package, str) else package
-    modules = (
-        importlib.import_module(info.name) for info in pkgutil.iter_modules(module.__path__, f"{module.__name__}.")
-    )
-    return [cls for inside in modules for cls in own_classes(inside, base) if not inspect.isabstract(cls)]
+    return [cls for inside in modules_of(module) for cls in own_classes(inside, base) if not inspect.isabstract(cls)]
+
+
+def modules_of(package: ModuleType) -> Iterator[ModuleType]:
+    """Import and yield the modules of `package`, in the order of their names; those of packages inside it are not."""
+    for info in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
+        yield importlib.import_module(info.name)
 
 
 def own_classes(module: ModuleType, base: type[_Class]) -> list[type[_Class]]:

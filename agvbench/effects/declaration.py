@@ -1,15 +1,14 @@
-"""Check that the class of an effect is complete, and that its file can be imported, before anything is compiled."""
+"""Check that the class of an effect is complete before anything is compiled."""
 
 from __future__ import annotations
 
 import dataclasses
 import difflib
 import inspect
-import traceback
-from pathlib import Path
 
 from agvbench.effects.base import HOOKS, TIME_HOOKS, Effect, Hook
 from agvbench.errors import FileError, OneOf
+from agvbench.own_modules import shown_file
 
 MANDATORY = ("name", "stage", "relaxes", "reference", "limits")
 _HOW_TO = "see docs/how-to/write-an-effect.md"
@@ -66,20 +65,4 @@ def _error(kind: type[Effect], what: str, value: str, remedy: str) -> FileError:
 
 def source_of(kind: type[Effect]) -> str:
     """Return the file of an effect's class, from the current folder where it lies in it."""
-    return _shown(inspect.getfile(kind))
-
-
-def import_error(error: Exception, folders: list[str]) -> FileError:
-    """Return the error of a file in one of `folders` that cannot be imported: with its path and line."""
-    if isinstance(error, SyntaxError):
-        file, line, what = error.filename or "", error.lineno, error.msg
-    else:
-        frames = traceback.extract_tb(error.__traceback__)
-        own = [frame for frame in frames if str(Path(frame.filename).parent) in folders] or [frames[-1]]
-        file, line, what = own[-1].filename, own[-1].lineno, f"{type(error).__name__} {error}"
-    return FileError("cannot be imported", where=f"{_shown(file)}:{line}", value=what, remedy=f"correct it; {_HOW_TO}")
-
-
-def _shown(file: str) -> str:
-    path, here = Path(file), Path.cwd()
-    return str(path.relative_to(here) if path.is_relative_to(here) else path)
+    return shown_file(inspect.getfile(kind))

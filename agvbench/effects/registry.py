@@ -9,17 +9,20 @@ from types import MappingProxyType
 from typing import Any
 
 from agvbench.effects.base import Effect
-from agvbench.effects.declaration import check_declaration, import_error, source_of
-from agvbench.effects.own_folder import FOLDER, own_effects
+from agvbench.effects.declaration import check_declaration, source_of
 from agvbench.errors import FileError, OneOf, VehicleError
-from agvbench.registry import classes_by_file
+from agvbench.own_modules import OwnModules
+from agvbench.registry import classes_by_file, own_classes
+
+OWN_EFFECTS = OwnModules("effects", "agvbench.effects", "agvbench_own_effects", "docs/how-to/write-an-effect.md")
+"""Effects of the user: the files of the folder ``effects`` in the current folder that import `agvbench.effects`."""
 
 
 @cache
 def effect_kinds() -> Mapping[str, type[Effect]]:
     """Return every effect's class by its name, in alphabetical order; own effects follow in the same order.
 
-    Own effects are those of the folder ``effects`` in the current folder; see `agvbench.effects.own_folder`.
+    Own effects are those of the folder ``effects`` in the current folder; see `OWN_EFFECTS`.
 
     Raises
     ------
@@ -27,9 +30,10 @@ def effect_kinds() -> Mapping[str, type[Effect]]:
         If a file cannot be imported, the class in it is incomplete, or its name is taken.
     """
     try:
-        found, own = classes_by_file("agvbench.effects", Effect), own_effects()
+        found = classes_by_file("agvbench.effects", Effect)
+        own = [cls for module in OWN_EFFECTS.load() for cls in own_classes(module, Effect)]
     except Exception as error:
-        raise import_error(error, [str(Path(__file__).parent), str(Path(FOLDER).absolute())]) from error
+        raise OWN_EFFECTS.import_error(error, Path(__file__).parent) from error
     for cls in (*found, *own):
         check_declaration(cls)
     kinds = {cls.name: cls for cls in sorted(found, key=_name)}

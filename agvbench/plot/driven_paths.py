@@ -11,6 +11,7 @@ import numpy as np
 
 from agvbench.campaign.arguments import as_runs
 from agvbench.errors import InputError
+from agvbench.metrics.measured_run import smooth_poses
 from agvbench.plot.style import ON_WHITE, Ink, colour, condition_numbers, label, literal, trajectory_title
 from agvbench.types import Floats, Frames, Pose, Run
 
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from agvbench.planning import Plan
 
 ARROW_M = 0.22
-_JUMP_M = 0.1
-_NEIGHBOURS = 5
 _FEWEST_POINTS, _MOST_POINTS, _POINTS_PER_M = 80, 600, 20.0
 
 
@@ -71,36 +70,12 @@ def drawn_path(frames: Frames) -> Floats:
     Frames that are not tracked, or lie more than 0.1 m from the median of the five around them, are left out: this is
     for looking at, not for measuring.
     """
-    poses = _in_order(frames)
-    poses = poses[_smooth(poses)]
+    poses = smooth_poses(frames)
     if len(poses) <= _FEWEST_POINTS:
         return poses
     way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(poses[:, 1]), np.diff(poses[:, 2])))])
     wanted = np.linspace(0.0, way[-1], int(np.clip(way[-1] * _POINTS_PER_M, _FEWEST_POINTS, _MOST_POINTS)))
     return np.asarray(poses[np.unique(np.searchsorted(way, wanted).clip(0, len(poses) - 1))])
-
-
-def smooth_poses(frames: Frames) -> Floats:
-    """Return every tracked pose in order of capture and without jumps, shape (n, 4)."""
-    poses = _in_order(frames)
-    return np.asarray(poses[_smooth(poses)])
-
-
-def _in_order(frames: Frames) -> Floats:
-    poses = np.column_stack([frames.t_s, frames.x_m, frames.y_m, frames.heading_rad])
-    poses = poses[frames.tracked.astype(np.bool_) & np.isfinite(poses).all(axis=1)]
-    return np.asarray(poses[np.unique(poses[:, 0], return_index=True)[1]])
-
-
-def _smooth(poses: Floats) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    if len(poses) < _NEIGHBOURS:
-        return np.ones(len(poses), dtype=np.bool_)
-    half = _NEIGHBOURS // 2
-    padded = np.pad(poses[:, 1:3], ((half, half), (0, 0)), mode="reflect")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, _NEIGHBOURS, axis=0)
-    away = np.hypot(*(poses[:, 1:3] - np.median(windows, axis=2)).T)
-    smooth: np.ndarray[tuple[int], np.dtype[np.bool_]] = away <= _JUMP_M
-    return smooth
 
 
 def from_start(path: Floats) -> Floats:

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from agvbench.campaign import CampaignHeader
-from agvbench.errors import AgvbenchError, FitError
-from agvbench.model import VehicleModel, thesis_vehicle
-from agvbench.planning import Plan, load_trajectory, plan, steered
-from agvbench.planning.trajectories.trajectory import TRAJECTORY_NAME
-from agvbench.plot.driven_paths import smooth_poses
+from agvbench.errors import FitError
+from agvbench.metrics.measured_run import smooth_poses
+from agvbench.metrics.planned_paths import PlannedPaths
 from agvbench.plot.style import colour, condition_numbers
 from agvbench.reporting.content import plain
 from agvbench.statistics.end_poses import in_order
@@ -25,55 +20,6 @@ from agvbench.workflows.report import ReportData
 
 if TYPE_CHECKING:
     import rerun as rr
-
-_SAME_TARGET = 1e-6
-
-
-class PlannedPaths:
-    """Plans the runs of a campaign again, with its vehicle: a path is geometry, the same under each condition.
-
-    Parameters
-    ----------
-    path, header
-        The campaign; without a ``vehicle.toml`` in it, the thesis' vehicle with the campaign's axles.
-    """
-
-    def __init__(self, path: Path, header: CampaignHeader) -> None:
-        self._model = _vehicle(path, header)
-        self._plan = lru_cache(maxsize=None)(self._planned)
-
-    def of(self, run: Run) -> tuple[Floats | None, Pose | None]:
-        """Return the path in the floor frame, shape (n, 2) [m], and the target pose there.
-
-        None for a path whose trajectory is not known here, or leads to another target than the run had; None for the
-        target of a run that has none. The start is the measured one.
-        """
-        try:
-            start = start_pose(run).pose
-        except FitError:
-            return None, None
-        target = start.compose(run.target) if run.target.is_finite else None
-        made = self._plan(run.trajectory)
-        if made is None or not np.allclose(made.target, run.target, rtol=0.0, atol=_SAME_TARGET, equal_nan=True):
-            return None, target
-        c, s = np.cos(start.heading_rad), np.sin(start.heading_rad)
-        return made.expected[:, 1:3] @ np.array([[c, s], [-s, c]]) + np.array(start[:2]), target
-
-    def _planned(self, name: str) -> Plan | None:
-        if not TRAJECTORY_NAME.fullmatch(name) or name.endswith(".toml"):
-            return None
-        try:
-            return plan(steered(load_trajectory(name), "", self._model), self._model)
-        except AgvbenchError:
-            return None
-
-
-def _vehicle(path: Path, header: CampaignHeader) -> VehicleModel:
-    try:
-        return VehicleModel.load(path / "vehicle.toml")
-    except AgvbenchError:
-        return replace(thesis_vehicle(), geometry=header.geometry)
-
 
 TIMELINE = "run_time"
 _ARROW_M = 0.25
@@ -92,14 +38,13 @@ def write_recording(data: ReportData, path: Path) -> None:
     import rerun as rr
 
     counted = [run for run in data.runs if run.is_ok]
-    plans = PlannedPaths(data.path, data.header)
     recording = rr.RecordingStream("agvbench", recording_id=plain(data.header.name), send_properties=False)
     recording.save(path, default_blueprint=_blueprint(counted))
     numbers = condition_numbers(in_order(run.condition for run in data.runs))
     recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     for run in counted:
         _send_run(recording, run, colour(numbers[run.condition]))
-        _send_plan(recording, _entity(run), *plans.of(run))
+        _send_plan(recording, _entity(run), *_on_floor(run, data.planned))
     recording.flush()
     recording.disconnect()
 
@@ -124,6 +69,19 @@ def _send_run(recording: rr.RecordingStream, run: Run, shown: str) -> None:
         recording.log(f"{entity}/commands", rr.SeriesLines(names=["drive", "front", "rear"]), static=True)
         columns = rr.Scalars.columns(scalars=held)
         recording.send_columns(f"{entity}/commands", indexes=[_time(at)], columns=columns)
+
+
+def _on_floor(run: Run, plans: PlannedPaths) -> tuple[Floats | None, Pose | None]:
+    """Return the planned path (n, 2) [m] and the target in the floor frame, from the measured start; None without."""
+    try:
+        start = start_pose(run).pose
+    except FitError:
+        return None, None
+    target = start.compose(run.target) if run.target.is_finite else None
+    if (path := plans.of(run)) is None:
+        return None, target
+    c, s = np.cos(start.heading_rad), np.sin(start.heading_rad)
+    return path[:, 1:3] @ np.array([[c, s], [-s, c]]) + np.array(start[:2]), target
 
 
 def _send_plan(recording: rr.RecordingStream, entity: str, path: Floats | None, target: Pose | None) -> None:

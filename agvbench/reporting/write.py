@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -11,7 +12,8 @@ from agvbench.campaign import Campaign
 from agvbench.campaign.arguments import as_campaign
 from agvbench.campaign.atomic_files import made_folder, replace_whole
 from agvbench.diagnosis import Diagnosis
-from agvbench.errors import FileError
+from agvbench.errors import FileError, RecordingError
+from agvbench.metrics.table import write_metrics
 from agvbench.reporting.content import Content, plain
 from agvbench.reporting.pages import to_html, to_markdown
 from agvbench.reporting.progress import track
@@ -56,7 +58,9 @@ def write_report(
     margin_deg: float = MARGIN_DEG,
     recording: bool = True,
 ) -> WrittenReport:
-    """Write the report of `campaign` into the directory `out`.
+    """Write the report of `campaign` into the directory `out`, and its metrics as ``errors.parquet`` beside its runs.
+
+    Where the campaign's directory cannot be written, the metrics are in the report alone.
 
     Parameters
     ----------
@@ -86,6 +90,8 @@ def write_report(
         track=lambda runs, total: track(runs, total, what="reading runs"),
     )
     out = data.path / "report" if out is None else Path(out)
+    with suppress(RecordingError):
+        write_metrics(data.path, data.metrics)
     try:
         registry = all_sections()
         with made_folder(out):
@@ -111,6 +117,7 @@ def _texts(data: ReportData, sections: Sequence[Content]) -> Iterator[tuple[str,
     subtitle = f"{plain(data.header.vehicle_name)} · {len(data.runs)} runs"
     yield from page_texts(plain(data.header.name), subtitle, sections)
     yield f"{TABLES}/pose_errors.csv", frame_to_csv(data.errors)
+    yield f"{TABLES}/metrics.csv", frame_to_csv(data.metrics)
 
 
 def _write(path: Path, text: str) -> Path:

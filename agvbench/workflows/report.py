@@ -13,6 +13,8 @@ import numpy as np
 
 from agvbench.campaign import Campaign, CampaignHeader
 from agvbench.errors import InputError
+from agvbench.metrics.planned_paths import PlannedPaths
+from agvbench.metrics.table import metrics_of_runs
 from agvbench.statistics import Comparison, bias_and_spread, compare_errors, end_pose_table, pose_errors, valid
 from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM, checked_margins
 from agvbench.statistics.end_poses import in_order
@@ -63,7 +65,8 @@ class ReportData:
     ``errors`` is what `pose_errors` returns, ``end_poses`` the table of tables 8.3–8.10, ``spread`` accuracy apart from
     repeatability, ``comparisons`` every condition against the next one, ``quality`` one row per run. ``problems`` are
     sentences about what could not be read or compared; ``events`` are what adapters
-    reported; ``diagnosis`` lies in the directory, or None.
+    reported; ``planned`` are the planned paths, ``metrics`` what `metric_table` returns; ``diagnosis`` lies in the
+    directory, or None.
     """
 
     path: Path
@@ -76,6 +79,8 @@ class ReportData:
     quality: pd.DataFrame
     curves: CalibrationCurves
     events: pd.DataFrame
+    planned: PlannedPaths
+    metrics: pd.DataFrame
     provenance: dict[str, str] = field(default_factory=dict)
     problems: list[str] = field(default_factory=list)
     diagnosis: ShownDiagnosis | None = None
@@ -113,6 +118,7 @@ def gather(
     runs = list(tracked)
     errors = pose_errors(runs)
     problems: list[str] = []
+    planned = PlannedPaths(campaign)
     return ReportData(
         path=campaign.path,
         header=campaign.header,
@@ -124,6 +130,8 @@ def gather(
         quality=run_quality(runs, rate_hz=campaign.header.mocap_rate_hz),
         curves=read_calibration_curves(campaign),
         events=_events(campaign, problems),
+        planned=planned,
+        metrics=metrics_of_runs(runs, planned),
         provenance=_provenance(campaign, problems),
         problems=problems,
         diagnosis=read_diagnosis(campaign.path),

@@ -7,8 +7,7 @@ import sys
 import pytest
 
 from agvbench.effects import registry
-from agvbench.effects.own_folder import PACKAGE
-from agvbench.effects.registry import effect_kinds
+from agvbench.effects.registry import OWN_EFFECTS, effect_kinds
 
 
 @pytest.fixture
@@ -21,5 +20,5 @@ def own(tmp_path, monkeypatch):
         return effect_kinds.__wrapped__()
 
     yield kinds
-    for name in [name for name in sys.modules if name.partition(".")[0] == PACKAGE]:
+    for name in [name for name in sys.modules if name.partition(".")[0] == OWN_EFFECTS.imported_as]:
         del sys.modules[name]

@@ -68,7 +68,7 @@ def simulation() -> Simulation:
 
 def test_every_file_of_the_package_adds_an_effect() -> None:
     files = {path.stem for path in Path(effects_package.__file__).parent.glob("*.py")}
-    assert files - {"__init__", "base", "declaration", "own_folder", "registry", "state"} == set(KINDS)
+    assert files - {"__init__", "base", "declaration", "registry", "state"} == set(KINDS)
 
 
 def test_names_and_parameters_are_the_contract() -> None:

@@ -6,7 +6,7 @@ import pytest
 from own_effect import PROGRAM, python, write
 
 from agvbench.effects import SteeringLag
-from agvbench.effects.own_folder import own_files
+from agvbench.effects.registry import OWN_EFFECTS
 from agvbench.errors import FileError
 
 
@@ -20,13 +20,13 @@ def test_only_effects_are_executed_and_nothing_in_a_campaign(tmp_path, monkeypat
     path = write(tmp_path)
     (path.parent / "game.py").write_text("raise SystemExit('no effect')", encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    assert [str(file) for file in own_files()] == ["effects/lateral_load_loss.py"]
+    assert [str(file) for file in OWN_EFFECTS.files()] == ["effects/lateral_load_loss.py"]
     (tmp_path / "run").mkdir()
     (tmp_path / "campaign.toml").write_text("", encoding="utf-8")
-    assert own_files() == []
+    assert OWN_EFFECTS.files() == []
     write(tmp_path / "run")
     monkeypatch.chdir(tmp_path / "run")
-    assert own_files() == []
+    assert OWN_EFFECTS.files() == []
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from agvbench.errors import AgvbenchError
+from agvbench.metrics.table import write_metrics
 from agvbench.planning import Plan
 from agvbench.planning.workspace import DEFAULT_MARGIN_M
 from agvbench.reporting.console.tables import end_pose_summary, said_first
@@ -110,8 +111,9 @@ def bench_summary(directory: Path, *, report: bool) -> str:
     """
     try:
         if not report:
-            defined = Text(f"{DEFINITIONS}\n")
-            return as_text(Group(*_end_poses(gather(directory), defined), Text(f"campaign: {directory}")))
+            data, defined = gather(directory), Text(f"{DEFINITIONS}\n")
+            write_metrics(directory, data.metrics)
+            return as_text(Group(*_end_poses(data, defined), Text(f"campaign: {directory}")))
         written = write_report(directory)
     except AgvbenchError as error:
         return f"no report: {error}\ncampaign: {directory}"

@@ -1,0 +1,1 @@
+"""The metrics that ship with agvbench: each module's metrics are found by the registry."""

@@ -1,0 +1,71 @@
+"""The planned paths of a campaign's runs, planned again from the trajectories that it drove."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from agvbench.campaign import Campaign
+from agvbench.campaign.manifest import sha256
+from agvbench.errors import AgvbenchError
+from agvbench.model import VehicleModel, thesis_vehicle
+from agvbench.planning import Plan, load_trajectory, plan, steered
+from agvbench.planning.trajectories.loading import trajectory_file
+from agvbench.planning.trajectories.trajectory import TRAJECTORY_NAME
+from agvbench.types import Floats, Run
+
+_SAME_TARGET = 1e-6
+_INPUTS, _INPUT = "inputs", "trajectory "
+
+
+class PlannedPaths:
+    """Plans the runs of a campaign again, with its vehicle: a path is geometry, the same under each condition.
+
+    Without a ``vehicle.toml`` in the campaign, the thesis' vehicle with the campaign's axles is used. A trajectory
+    whose file is not the recorded one has no path.
+    """
+
+    def __init__(self, campaign: Campaign) -> None:
+        self._model = _vehicle(campaign)
+        self._recorded = _recorded_hashes(campaign)
+        self._plan = lru_cache(maxsize=None)(self._planned)
+
+    def of(self, run: Run) -> Floats | None:
+        """Return the path in the start frame, shape (n, 4): t [s], x, y [m], heading [rad, unwrapped].
+
+        None if the trajectory is not known here, has changed, or leads to another target than the run had.
+        """
+        made = self._plan(run.trajectory)
+        if made is None or not np.allclose(made.target, run.target, rtol=0.0, atol=_SAME_TARGET, equal_nan=True):
+            return None
+        return made.expected
+
+    def _planned(self, name: str) -> Plan | None:
+        if not TRAJECTORY_NAME.fullmatch(name) or name.endswith(".toml"):
+            return None
+        try:
+            if self._recorded.get(name) not in (None, sha256(trajectory_file(name))):
+                return None
+            return plan(steered(load_trajectory(name), "", self._model), self._model)
+        except (AgvbenchError, OSError):
+            return None
+
+
+def _vehicle(campaign: Campaign) -> VehicleModel:
+    try:
+        return VehicleModel.load(campaign.path / "vehicle.toml")
+    except AgvbenchError:
+        return replace(thesis_vehicle(), geometry=campaign.header.geometry)
+
+
+def _recorded_hashes(campaign: Campaign) -> Mapping[str, str]:
+    """Return the hashes of the trajectories' files by name; none where the campaign did not record them."""
+    try:
+        table = campaign.table(_INPUTS)
+        rows = zip(table["input"].astype(str), table["sha256"].astype(str), strict=True)
+        return {name.removeprefix(_INPUT): digest for name, digest in rows if name.startswith(_INPUT)}
+    except (AgvbenchError, KeyError):
+        return {}

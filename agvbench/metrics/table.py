@@ -1,0 +1,131 @@
+"""The metrics of runs as a table, and the file ``errors.parquet`` in which a campaign keeps them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pyarrow as pa
+
+from agvbench.campaign import Campaign
+from agvbench.campaign.arguments import as_campaign
+from agvbench.campaign.atomic_files import write_atomically
+from agvbench.campaign.manifest import MANIFEST_FILE, Manifest, record
+from agvbench.campaign.tables.parquet import read_parquet, to_parquet
+from agvbench.errors import CampaignError, RecordingError
+from agvbench.metrics.measured_run import MeasuredRun
+from agvbench.metrics.metric import Metric
+from agvbench.metrics.planned_paths import PlannedPaths
+from agvbench.metrics.registry import all_metrics
+from agvbench.types import Run
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FILE = "errors.parquet"
+OF_RUN = ("run_id", "experiment", "trajectory", "condition", "repeat", "session", "firmware", "started_s", "status")
+COLUMNS = (*OF_RUN, "metric", "value", "unit")
+Track = Callable[[Sequence[Run]], Iterable[Run]]
+"""Wraps runs while they are evaluated, to show progress."""
+
+
+def metric_table(campaign: Campaign | str | Path, *, track: Track = iter) -> pd.DataFrame:
+    """Return the metrics of every run that has a target: one row for each run and metric.
+
+    Columns: ``run_id``, ``experiment``, ``trajectory``, ``condition``, ``repeat``, ``session``, ``firmware``,
+    ``started_s``, ``status`` as in the runs table; ``metric``, ``value`` and ``unit``. A metric that a run does not
+    have (no planned path, nothing logged) has no row.
+
+    Parameters
+    ----------
+    campaign
+        A campaign, or its directory.
+    track
+        Wraps the runs while they are evaluated, to show progress.
+
+    Raises
+    ------
+    InputError
+        If `campaign` is neither.
+    CampaignError
+        If the campaign cannot be read.
+    FileError
+        If a metric of the lab cannot be imported or evaluated.
+    """
+    opened = as_campaign(campaign)
+    return metrics_of_runs(track(list(opened)), PlannedPaths(opened))
+
+
+def metrics_of_runs(runs: Iterable[Run], paths: PlannedPaths) -> pd.DataFrame:
+    """Return what `metric_table` returns, of runs that were read already and the planned paths of their campaign."""
+    import pandas as pd
+
+    metrics = tuple(all_metrics().values())
+    aimed = (MeasuredRun.of(run, paths.of(run)) for run in runs if run.target.is_finite)
+    return pd.DataFrame([row for run in aimed for row in _rows(run, metrics)], columns=list(COLUMNS))
+
+
+def _rows(run: MeasuredRun, metrics: Iterable[Metric]) -> Iterator[tuple[object, ...]]:
+    named = [getattr(run, name) for name in OF_RUN]
+    named[OF_RUN.index("session")] = run.session or ""
+    for metric in metrics:
+        if math.isfinite(value := metric.of(run)):
+            yield (*named, metric.name, value, metric.unit)
+
+
+def write_metrics(directory: Path, table: pd.DataFrame) -> Path:
+    """Write what `metric_table` returned as ``errors.parquet`` into a campaign directory; return the file.
+
+    A campaign that lists hashes of its files lists that of this one, too. A file with the same content stays.
+
+    Raises
+    ------
+    RecordingError
+        If the disk refuses.
+    """
+    path = directory / FILE
+    arrow = pa.Table.from_pandas(table, preserve_index=False).replace_schema_metadata(None)
+    content = to_parquet(arrow)
+    try:
+        if path.exists() and path.read_bytes() == content:
+            return path
+        if (directory / MANIFEST_FILE).exists():
+            record(directory, {FILE: content})
+        else:
+            write_atomically(path, content)
+    except OSError as error:
+        raise RecordingError("cannot be written", where=path, value=error.strerror) from None
+    return path
+
+
+def read_metrics(directory: Path) -> pd.DataFrame | None:
+    """Return the table that lies in a campaign directory, or None where there is none.
+
+    Raises
+    ------
+    CampaignError
+        If it is damaged, or has other columns.
+    """
+    path = directory / FILE
+    if not path.exists():
+        return None
+    Manifest(directory).check(path)
+    table = read_parquet(path)
+    if missing := [name for name in COLUMNS if name not in table.column_names]:
+        remedy = f"delete it; agvbench report {directory} writes it again"
+        raise CampaignError("is no table of metrics", where=path, value=f"no column {missing[0]}", remedy=remedy)
+    frame: pd.DataFrame = table.select(list(COLUMNS)).to_pandas()
+    return frame
+
+
+def by_run(table: pd.DataFrame) -> pd.DataFrame:
+    """Return one row per run with a column for each metric, NaN where the run does not have it.
+
+    The other columns are those of the runs table, as in `metric_table`.
+    """
+    wide = table.pivot(index="run_id", columns="metric", values="value")
+    runs = table.drop_duplicates("run_id")[list(OF_RUN)].set_index("run_id")
+    joined = runs.join(wide).reset_index()
+    return joined.rename_axis(columns=None)
