@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from agvbench.reporting import write_report
     from agvbench.statistics import Comparison, pose_errors, valid
     from agvbench.types import Pose, Run
-    from agvbench.workflows.compare import compare
+    from agvbench.workflows.comparison.compare import compare
 
 __version__ = "0.2.0"
 __all__ = [
@@ -64,7 +64,7 @@ if not TYPE_CHECKING:  # mypy would take any name for an attribute of a module w
         "reporting": ("write_report",),
         "statistics": ("Comparison", "pose_errors", "valid"),
         "types": ("Pose", "Run"),
-        "workflows.compare": ("compare",),
+        "workflows.comparison.compare": ("compare",),
     }
     _HOMES = {name: package for package, names in _PACKAGES.items() for name in names}
 

@@ -2,26 +2,43 @@
 
 Says per trajectory and condition whether end position error, heading error and |Δs| are better, the same within a
 margin, worse, or whether the repeats cannot say. End position error and heading error decide what a regression is;
-|Δs|, as the thesis defines it, is a note unless --with-delta-s. Shows by how much the mean end position moved. Two
-campaigns that do not differ report a regression with a chance of at most 1 %. What is missing from a campaign, and
-differences between vehicles, cameras, trajectories and calibrations, are listed first.
+|Δs|, as the thesis defines it, is a note unless --with-delta-s; --metrics adds errors along the path, time, or a lab's
+own metrics. Shows by how much the mean end position moved. Two campaigns that do not differ report a regression with a
+chance of at most 1 %. What is missing from a campaign, and differences between vehicles, cameras, trajectories and
+calibrations, are listed first.
+
+A gate limits a statistic (median, mean, p95, max, sd) of a metric over the repeats of each trajectory: --fail-on
+METRIC.STATISTIC>LIMIT, or a TOML file of rules. A limit with a plus sign is a growth since A, which must be shown by a
+test (a chance of at most 1 % over all rules where nothing has grown); one without is a limit on B.
 
 examples:
   agvbench compare campaigns/last-night campaigns/tonight
   agvbench compare A B --margin-mm 5 --margin-deg 0.5 --json comparison.json
   agvbench compare A --conditions uncalibrated calibrated
   agvbench compare A B --conditions calibrated corrected     calibrated of A, corrected of B
+  agvbench compare A B --metrics cross_track_rms,driving_time
+  agvbench compare A B --fail-on 'position_error.p95>+10%' --fail-on 'cross_track_rms.median>12mm'
+  agvbench compare A B --gate gate.toml --junit compare.xml --markdown summary.md
 
-exit codes: 0 no regression; 1 regression (with --fail-on any: any difference); 2 could not compare;
-3 inconclusive: a campaign is incomplete, or the vehicles take commands in different units.
+exit codes: 0 nothing failed; 1 a regression (with --fail-on any: any difference), or a rule failed; 2 could not
+compare; 3 inconclusive: a campaign is incomplete, the vehicles take commands in different units, or there are too few
+repeats for a rule.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from agvbench.running.configuration.session_options import number
+
+if TYPE_CHECKING:
+    from agvbench.campaign import Campaign
+    from agvbench.metrics.gate import GateCheck
+    from agvbench.statistics import Comparison
+    from agvbench.workflows.comparison.comparability import Comparability
 
 HELP = "compare two campaigns, or two conditions: better, same, worse, or cannot say"
 
@@ -34,8 +51,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--conditions", metavar=("OF_A", "OF_B"), nargs=2, help="compare this condition of A with that of B (or of A)"
     )
     parser.add_argument(
-        "--fail-on", choices=("regression", "any", "never"), default="regression", help="when to exit with 1"
+        "--fail-on", metavar="RULE", action="append", default=[],
+        help="when to exit with 1: regression (the default without rules), any, never, or METRIC.STATISTIC>LIMIT; "
+        "may be repeated",
+    )  # fmt: skip
+    parser.add_argument(
+        "--gate", metavar="F", type=Path, help="TOML file with rules: docs/reference/statistics.md#gates"
     )
+    parser.add_argument("--metrics", metavar="NAMES", default="", help="metrics that decide, too, commas between")
     parser.add_argument(
         "--with-delta-s", action="store_true", help="|Δs| worse alone is a regression, too, instead of a note"
     )
@@ -47,32 +70,67 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--across-vehicles", action="store_true", help="compare vehicles that take commands in different units"
     )
     parser.add_argument("--json", metavar="F", type=Path, help="write the comparison as JSON, too")
+    parser.add_argument("--junit", metavar="F", type=Path, help="write it as JUnit XML, too, for CI servers")
+    parser.add_argument("--markdown", metavar="F", type=Path, help="write it as Markdown, too, for a pull request")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Compare, print the comparison, and return its exit code."""
     from agvbench.campaign import Campaign
-    from agvbench.reporting.console.tables import print_comparison, print_warnings, wide_console
-    from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
-    from agvbench.statistics.quantities import END_POSE, QUANTITIES
-    from agvbench.workflows.comparability import comparability
-    from agvbench.workflows.compare import compare, exit_code, write_json
+    from agvbench.reporting.console.tables import print_comparison, print_gate, print_warnings, wide_console
+    from agvbench.workflows.comparison.comparability import comparability
+    from agvbench.workflows.comparison.decision import FailurePolicy, exit_code
 
     console = wide_console()
+    policy = FailurePolicy.parse(arguments.fail_on, arguments.gate)
     a = Campaign.open(arguments.a)
     b = None if arguments.b is None else Campaign.open(arguments.b)
     known = comparability(a, b, across_vehicles=arguments.across_vehicles)
     print_warnings(console, known.sentences)
-    comparison = compare(
+    comparison = _compared(arguments, a, b)
+    checks = policy.checks(a, b, _pair(arguments))
+    _write(arguments, comparison, checks, known, failing=policy.verdicts != "never")
+    print_comparison(console, comparison)
+    print_gate(console, checks)
+    return exit_code(comparison, policy, checks, known)
+
+
+def _pair(arguments: argparse.Namespace) -> tuple[str, str] | None:
+    return tuple(arguments.conditions) if arguments.conditions else None
+
+
+def _compared(arguments: argparse.Namespace, a: Campaign, b: Campaign | None) -> Comparison:
+    from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
+    from agvbench.statistics.quantities import END_POSE, QUANTITIES
+    from agvbench.workflows.comparison.compare import compare
+
+    return compare(
         a,
         b,
-        conditions=tuple(arguments.conditions) if arguments.conditions else None,
+        conditions=_pair(arguments),
         margin_mm=MARGIN_MM if arguments.margin_mm is None else arguments.margin_mm,
         margin_deg=MARGIN_DEG if arguments.margin_deg is None else arguments.margin_deg,
         deciding=QUANTITIES if arguments.with_delta_s else END_POSE,
+        metrics=[name.strip() for name in arguments.metrics.split(",") if name.strip()],
         across_vehicles=arguments.across_vehicles,
     )
+
+
+def _write(
+    arguments: argparse.Namespace,
+    comparison: Comparison,
+    checks: Sequence[GateCheck],
+    known: Comparability,
+    *,
+    failing: bool,
+) -> None:
+    """Write the files that were asked for."""
+    from agvbench.reporting.gate_files import write_junit, write_markdown
+    from agvbench.workflows.comparison.decision import write_json
+
     if arguments.json:
-        write_json(comparison, arguments.json, known)
-    print_comparison(console, comparison)
-    return exit_code(comparison, arguments.fail_on, known)
+        write_json(comparison, arguments.json, known, checks)
+    if arguments.junit:
+        write_junit(arguments.junit, comparison, checks, failing=failing)
+    if arguments.markdown:
+        write_markdown(arguments.markdown, comparison, checks, known)

@@ -8,8 +8,9 @@ of at most 1 %, whatever their noise. |Δs|, as the thesis defines it, is a note
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 # What a lab would hardly act on: about a quarter of a per cent of a two-metre drive.
 MARGIN_MM = 5.0
 MARGIN_DEG = 1.0
+_NOTHING: Mapping[Quantity, float] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -169,6 +171,7 @@ def compare_errors(
     conditions: tuple[str, str] | None = None,
     same_campaign: bool = False,
     deciding: Collection[Quantity] = END_POSE,
+    further: Mapping[Quantity, float] = _NOTHING,
     names: tuple[str, str] = ("A", "B"),
     alpha: float = ALPHA,
     resamples: int = RESAMPLES,
@@ -191,6 +194,8 @@ def compare_errors(
     deciding
         The quantities that decide whether something is worse, of end position error, heading error and |Δs|; the others
         are notes.
+    further
+        Further quantities, columns of `a` and `b`, with their margins; these decide, too.
     names
         What to call the two sides.
     alpha
@@ -206,12 +211,14 @@ def compare_errors(
     FlagError
         If a margin is negative or not finite.
     """
-    margins = checked_margins(margin_mm, margin_deg)
-    cells, left_out = match_cells(a, b, conditions=conditions, same_campaign=same_campaign)
-    raw = [of_cell(cell, q, margins[q], resamples, seed) for cell in cells for q in QUANTITIES]
-    if len(cells) > 1:
-        raw += [of_all(cells, q, margins[q], resamples, seed) for q in QUANTITIES]
-    differences, tests = decide_families(raw, deciding, alpha)
+    margins = checked_margins(margin_mm, margin_deg) | dict(further)
+    cells, left_out = match_cells(a, b, conditions=conditions, same_campaign=same_campaign, quantities=tuple(margins))
+    raw = [of_cell(cell, q, margins[q], resamples, seed) for cell in cells for q in margins if cell.has(q)]
+    for quantity, margin in margins.items():
+        having = [cell for cell in cells if cell.has(quantity)]
+        if len(having) > 1:
+            raw.append(of_all(having, quantity, margin, resamples, seed))
+    differences, tests = decide_families(raw, [*deciding, *further], alpha)
     shifts = sorted(map(end_shift, cells), key=lambda shift: -shift.length_mm)
     note = session_note(cells, same_campaign=same_campaign)
     return Comparison(*names, tuple(differences), tuple(shifts), tuple(left_out), (note,), alpha, tests)

@@ -9,7 +9,7 @@ from agvbench.notebook_html import heading_html, table_html
 from agvbench.statistics.differences import ComparisonVerdict, Difference, EndShift, SampleSummary
 from agvbench.statistics.hypothesis_tests import required_sample_size
 from agvbench.statistics.intervals import CONFIDENCE
-from agvbench.statistics.quantities import DISTANCE, POSITION
+from agvbench.statistics.quantities import DISTANCE, HEADING
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -115,7 +115,7 @@ def _difference(d: Difference, comparison: Comparison) -> dict[str, Any]:
     return {
         "trajectory": d.trajectory,
         "condition": d.condition,
-        "quantity": d.quantity.column if d.quantity is POSITION else f"abs_{d.quantity.column}",
+        "quantity": f"abs_{d.quantity.column}" if d.quantity in (HEADING, DISTANCE) else d.quantity.column,
         "unit": d.quantity.unit,
         "margin": d.margin,
         "a": _sample(d.a),

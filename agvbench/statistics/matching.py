@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -37,9 +37,10 @@ class Side:
     target: Floats
 
     def values(self, quantity: Quantity, session: str | None = None) -> Floats:
-        """Return the absolute errors, of all runs or of one session."""
+        """Return the absolute errors, of all runs or of one session; those of runs that have one."""
         values = self.absolute[quantity.column]
-        return values if session is None else values[self.session == session]
+        chosen = values if session is None else values[self.session == session]
+        return chosen[np.isfinite(chosen)]
 
     @property
     def sessions(self) -> list[str]:
@@ -61,6 +62,10 @@ class Cell:
         """Return the absolute errors of both sides."""
         return self.a.values(quantity), self.b.values(quantity)
 
+    def has(self, quantity: Quantity) -> bool:
+        """Whether both sides have runs with this quantity."""
+        return all(map(len, self.values(quantity)))
+
     def strata(self, quantity: Quantity) -> Strata:
         """Return the absolute errors of both sides, one pair per session that both sides share."""
         if not self.by_session:
@@ -70,9 +75,16 @@ class Cell:
 
 
 def match_cells(
-    a: pd.DataFrame, b: pd.DataFrame, *, conditions: tuple[str, str] | None, same_campaign: bool
+    a: pd.DataFrame,
+    b: pd.DataFrame,
+    *,
+    conditions: tuple[str, str] | None,
+    same_campaign: bool,
+    quantities: Sequence[Quantity] = QUANTITIES,
 ) -> tuple[list[Cell], list[str]]:
     """Return the cells that `a` and `b` have in common, and a sentence about every one that is left out.
+
+    ``quantities`` are the columns of `a` and `b` that will be compared.
 
     Raises
     ------
@@ -83,7 +95,7 @@ def match_cells(
     if conditions is not None:
         a, b = _of_condition(a, conditions[0], "A"), _of_condition(b, conditions[1], "B")
     keys = ["trajectory"] if conditions is not None else ["trajectory", "condition"]
-    sides_a, sides_b = _sides(a, keys), _sides(b, keys)
+    sides_a, sides_b = _sides(a, keys, quantities), _sides(b, keys, quantities)
     label = None if conditions is None else " → ".join(conditions)
     cells, left_out = [], []
     for key, side in sides_a.items():
@@ -101,14 +113,14 @@ def match_cells(
     return cells, left_out
 
 
-def _sides(errors: pd.DataFrame, keys: list[str]) -> dict[_Key, Side]:
+def _sides(errors: pd.DataFrame, keys: list[str], quantities: Sequence[Quantity]) -> dict[_Key, Side]:
     groups = errors.groupby([errors[key].astype(str) for key in keys], sort=False)
-    return {tuple(map(str, key)): _side(rows) for key, rows in groups}
+    return {tuple(map(str, key)): _side(rows, quantities) for key, rows in groups}
 
 
-def _side(rows: pd.DataFrame) -> Side:
+def _side(rows: pd.DataFrame, quantities: Sequence[Quantity]) -> Side:
     return Side(
-        absolute={q.column: np.abs(rows[q.column].to_numpy(dtype=float)) for q in QUANTITIES},
+        absolute={q.column: np.abs(rows[q.column].to_numpy(dtype=float)) for q in quantities},
         ends_mm=rows[[ALONG.column, ACROSS.column]].to_numpy(dtype=float),
         session=rows["session"].to_numpy(dtype=object),
         target=rows[_TARGET].to_numpy(dtype=float)[0],

@@ -19,6 +19,7 @@ from shell_blocks import execute, shell, write_files
 ROOT = Path(__file__).parents[2]
 QUICK = ("docs/tutorial.md", "docs/how-to/nightly.md", "docs/how-to/write-a-trajectory.md")
 SLOW = (
+    "docs/how-to/add-a-metric.md",
     "docs/how-to/bring-your-own-plant.md",
     "docs/how-to/close-the-loop.md",
     "docs/how-to/drive-a-differential-vehicle.md",

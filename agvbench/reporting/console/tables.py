@@ -14,17 +14,20 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 from agvbench.reporting.content import Column, Paragraph, Table, Value, plain, plain_sentences
+from agvbench.reporting.gate_files import gate_sentence, gate_table
 from agvbench.statistics.comparison_summary import headline, notes_in_words
 from agvbench.statistics.differences import ALL
 from agvbench.statistics.quantities import COMPONENT_DEFINITIONS, DEFINITIONS
 
 if TYPE_CHECKING:
+    from agvbench.metrics.gate import GateCheck
     from agvbench.reporting.write import WrittenReport
     from agvbench.statistics import Comparison, Difference
     from agvbench.statistics.intervals import Interval
     from agvbench.workflows.report import ReportData
 
 _VERDICT_STYLES = {"better": "green", "worse": "bold red", "same": "cyan", "cannot": "dim"}
+_VERDICT_STYLES |= {"fail": "bold red", "pass": "green", "inconclusive": "dim"}
 _LONGEST_HEADING, _NARROWEST = 14, 110
 _INTERVAL = "95 % interval"
 _UNLIMITED = 1000
@@ -199,6 +202,16 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
         console.print(Text(note, style="dim"))
     console.print(Text(_legend(comparison), style="dim"))
     console.print(Text(headline(comparison), style="bold"))
+
+
+def print_gate(console: Console, checks: Sequence[GateCheck]) -> None:
+    """Print the checks of a gate, failures first, and how many failed; nothing without rules."""
+    if not checks:
+        return
+    table = gate_table(checks)
+    console.print(_Fitting(console_table(table), _grouped(table)))
+    console.print(Text(table.note, style="dim"))
+    console.print(Text(f"Gate: {gate_sentence(checks)}.", style="bold"))
 
 
 def _legend(comparison: Comparison) -> str:

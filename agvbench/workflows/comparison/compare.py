@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from agvbench.campaign import Campaign
 from agvbench.campaign.arguments import as_campaign
 from agvbench.campaign.names import as_text
 from agvbench.errors import FlagError, InputError
-from agvbench.statistics import Comparison, ComparisonVerdict, compare_errors
+from agvbench.metrics.registry import named_metric
+from agvbench.metrics.table import by_run, metric_table
+from agvbench.statistics import Comparison, compare_errors
 from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
-from agvbench.statistics.comparison_summary import comparison_to_json
 from agvbench.statistics.differences import ALPHA
 from agvbench.statistics.intervals import RESAMPLES
 from agvbench.statistics.quantities import END_POSE, Quantity
 from agvbench.statistics.run_errors import as_errors
-from agvbench.workflows.comparability import NOTHING_KNOWN, Comparability, comparability, is_same_campaign
-from agvbench.workflows.output_files import write_file
+from agvbench.workflows.comparison.comparability import comparability, is_same_campaign
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,6 +38,7 @@ def compare(
     margin_mm: float = MARGIN_MM,
     margin_deg: float = MARGIN_DEG,
     deciding: Collection[Quantity] = END_POSE,
+    metrics: Sequence[str] = (),
     names: tuple[str, str] | None = None,
     same_campaign: bool = False,
     across_vehicles: bool = False,
@@ -66,6 +65,8 @@ def compare(
         regression, however significant.
     deciding
         The quantities that decide whether something is worse (`agvbench.statistics.quantities`); the others are notes.
+    metrics
+        Names of further metrics that are compared and decide, too (`agvbench.metrics`); they need campaigns.
     names
         What to call the two sides; by default their directories, or the conditions.
     same_campaign
@@ -92,15 +93,17 @@ def compare(
     pair = _checked(conditions)
     if other is None and pair is None:
         raise _alone(one)
-    errors_a = as_errors(one, where="a")
+    further = _further(metrics)
+    errors_a = _errors(one, further, "a")
     compared = compare_errors(
         errors_a,
-        errors_a if other is None else as_errors(other, where="b"),
+        errors_a if other is None else _errors(other, further, "b"),
         margin_mm=margin_mm,
         margin_deg=margin_deg,
         conditions=pair,
         same_campaign=same_campaign or other is None,
         deciding=deciding,
+        further=further,
         names=names or _names(one, other, pair),
         alpha=alpha,
         resamples=resamples,
@@ -113,6 +116,26 @@ def _side(side: Comparable, where: str) -> Campaign | pd.DataFrame:
     if isinstance(side, Campaign | str | PathLike):
         return as_campaign(side)
     return as_errors(side, where=where)
+
+
+def _further(metrics: Sequence[str]) -> dict[Quantity, float]:
+    """Return the quantities of these metrics with their margins."""
+    found = [named_metric(name, where="metrics") for name in metrics]
+    return {Quantity(m.name, m.title, m.unit, m.title, m.digits): m.margin for m in found}
+
+
+def _errors(side: Campaign | pd.DataFrame, further: Mapping[Quantity, float], where: str) -> pd.DataFrame:
+    """Return the errors of a side, with a column for each of the `further` metrics."""
+    errors = as_errors(side, where=where)
+    if not further:
+        return errors
+    if not isinstance(side, Campaign):
+        missing = [q.column for q in further if q.column not in errors]
+        if missing:
+            raise InputError("has no such metric", where=where, value=missing[0], remedy="give a campaign")
+        return errors
+    columns = ["run_id", *(q.column for q in further)]
+    return errors.merge(by_run(metric_table(side)).reindex(columns=columns), on="run_id", how="left")
 
 
 def _checked(conditions: Sequence[str] | None) -> tuple[str, str] | None:
@@ -150,38 +173,3 @@ def _names(
         return conditions
     first, second = (str(side.path) if isinstance(side, Campaign) else letter for side, letter in ((a, "A"), (b, "B")))
     return (first, second) if conditions is None else (f"{first} ({conditions[0]})", f"{second} ({conditions[1]})")
-
-
-def exit_code(comparison: Comparison, fail_on: str, known: Comparability = NOTHING_KNOWN) -> int:
-    """Return 0 (no regression), 1 (regression, or any difference with ``any``), 2 (could not compare) or 3.
-
-    3, inconclusive: the campaigns are not comparable, or one is incomplete and no regression was found. With ``never``
-    every comparison that was possible gives 0.
-    """
-    if not comparison.could_compare:
-        return 2
-    if fail_on == "never":
-        return 0
-    if known.incomparable:
-        return 3
-    bad = {"regression": [ComparisonVerdict.WORSE], "any": [ComparisonVerdict.WORSE, ComparisonVerdict.BETTER]}[fail_on]
-    if any(comparison.of(verdict) for verdict in bad):
-        return 1
-    return 3 if known.incomplete else 0
-
-
-def write_json(comparison: Comparison, path: str | Path, known: Comparability = NOTHING_KNOWN) -> None:
-    """Write `comparison` as JSON (schema 1), with what was `known` before it.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be written.
-    """
-    content = comparison_to_json(comparison) | {
-        "complete": not known.incomplete,
-        "cautions": list(known.sentences),
-        "calibrations": list(known.calibrations),
-    }
-    text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
-    write_file("--json", Path(path), lambda file: file.write_text(f"{text}\n", encoding="utf-8"))

@@ -1,0 +1,1 @@
+"""Comparison of two campaigns: whether they are comparable, their differences, gates, exit codes."""

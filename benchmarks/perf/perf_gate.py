@@ -1,0 +1,89 @@
+"""Gates: false failures of pairs of equal campaigns, and what is found of a growth, over all rules and trajectories.
+
+    python benchmarks/perf/perf_gate.py [--pairs 1000] [--json FILE]
+
+Campaigns are drawn: eight trajectories, three metrics with normal, gamma and signed noise, as many repeats as said. The
+planned false-alarm rate is 1 % over all checks. Rates have 95 % Clopper–Pearson bounds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy.stats import binomtest
+
+from agvbench.metrics.gate import GateVerdict, check_gate
+from agvbench.metrics.gate_rules import GateRule
+
+_SD_MM = 4.0
+_ANY = ("position_error.median>+0%", "heading_error.mean>+0%", "cross_track_rms.p95>+0%")
+_TENTH = ("position_error.p95>+10%", "heading_error.max>+10%", "cross_track_rms.sd>+10%")
+_RULES = {"median, mean and p95, any growth": _ANY, "p95, max and sd, growth by 10 %": _TENTH}
+_GROWN = "3"
+
+
+def main() -> None:
+    """Run the trials and print their rates."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--pairs", type=int, default=1000)
+    parser.add_argument("--resamples", type=int, default=5000)
+    parser.add_argument("--json", type=Path)
+    arguments = parser.parse_args()
+    rows = [row for name, texts in _RULES.items() for row in _rates(name, texts, arguments.pairs, arguments.resamples)]
+    for row in rows:
+        low, high = row["bounds"]
+        share = row["count"] / row["pairs"]
+        print(f"{row['rules']:34} n = {row['repeats']:2}  {row['what']:46} {row['count']:4} of {row['pairs']}", end="")
+        print(f"  {share:6.1%}  ({low:.1%} to {high:.1%})")
+    if arguments.json:
+        arguments.json.write_text(json.dumps(rows, indent=1), encoding="utf-8")
+
+
+def _rates(name: str, texts: Sequence[str], pairs: int, resamples: int) -> list[dict[str, Any]]:
+    rules = [GateRule.parse(text) for text in texts]
+    cases = [
+        ("a check failed where nothing has grown", 10, 0.0),
+        ("a check failed where nothing has grown", 30, 0.0),
+        ("end position error + 3 sd of one trajectory found", 10, 3.0),
+    ]
+    rows = []
+    for what, repeats, grown in cases:
+        found = sum(_found(rules, repeats, grown, seed, resamples) for seed in range(pairs))
+        interval = binomtest(found, pairs).proportion_ci(method="exact")
+        bounds = [float(interval.low), float(interval.high)]
+        rows.append({"rules": name, "what": what, "repeats": repeats, "count": found, "pairs": pairs, "bounds": bounds})
+    return rows
+
+
+def _found(rules: Sequence[GateRule], repeats: int, grown: float, seed: int, resamples: int) -> bool:
+    rng = np.random.default_rng([seed, repeats, int(10 * grown)])
+    a, b = _campaign(rng, repeats, 0.0), _campaign(rng, repeats, grown)
+    failed = [c for c in check_gate(rules, b, a, resamples=resamples, seed=seed) if c.verdict is GateVerdict.FAIL]
+    if not grown:
+        return bool(failed)
+    return any(c.trajectory == _GROWN and c.rule.metric == "position_error" for c in failed)
+
+
+def _campaign(rng: np.random.Generator, repeats: int, grown: float) -> pd.DataFrame:
+    rows = []
+    for trajectory in "12345678":
+        shift = grown * _SD_MM if trajectory == _GROWN else 0.0
+        drawn = {
+            ("position_error", "mm"): rng.normal(20.0, _SD_MM, repeats) + shift,
+            ("heading_error", "deg"): rng.normal(0.0, 1.0, repeats),
+            ("cross_track_rms", "mm"): rng.gamma(4.0, 2.0, repeats),
+        }
+        for (metric, unit), values in drawn.items():
+            named = (trajectory, "calibrated", "ok", metric)
+            rows += [(f"{trajectory}-{k}", *named, float(value), unit) for k, value in enumerate(values)]
+    return pd.DataFrame(rows, columns=["run_id", "trajectory", "condition", "status", "metric", "value", "unit"])
+
+
+if __name__ == "__main__":
+    main()
