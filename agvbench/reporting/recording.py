@@ -53,7 +53,7 @@ class PlannedPaths:
         except FitError:
             return None, None
         target = start.compose(run.target) if run.target.is_finite else None
-        made = self._plan(run.trajectory)
+        made = self._plan(run.trajectory.removesuffix(f"-{run.extra.get('controller', '')}"))
         if made is None or not np.allclose(made.target, run.target, rtol=0.0, atol=_SAME_TARGET, equal_nan=True):
             return None, target
         c, s = np.cos(start.heading_rad), np.sin(start.heading_rad)
