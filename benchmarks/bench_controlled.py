@@ -10,7 +10,7 @@ from agvbench.control import PurePursuit, Stanley
 CONTROLLERS = {"pure_pursuit": PurePursuit, "stanley": Stanley}
 
 
-@pytest.mark.repeats(5)
+@pytest.mark.repeats
 @pytest.mark.parametrize("condition", ["uncalibrated", "calibrated"])
 @pytest.mark.parametrize("trajectory", ["figure_eight"])
 def bench_open_loop(drive, trajectory, condition):
@@ -18,7 +18,7 @@ def bench_open_loop(drive, trajectory, condition):
     drive.trajectory(trajectory, condition=condition)
 
 
-@pytest.mark.repeats(5)
+@pytest.mark.repeats
 @pytest.mark.parametrize("condition", ["uncalibrated", "calibrated"])
 @pytest.mark.parametrize("controller", CONTROLLERS)
 @pytest.mark.parametrize("trajectory", ["figure_eight"])

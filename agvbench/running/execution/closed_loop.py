@@ -7,6 +7,7 @@ import re
 import time
 import traceback
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -179,11 +180,13 @@ class ClosedLoop:
         self._read = len(seen)
 
     def _command(self, demand: object) -> Command:
+        """Return the command for a demand; raise `ControllerError` if it is none."""
         actuation = self._control.reference.actuation
-        if isinstance(demand, Motion) and demand.is_finite:
-            return actuation.command(demand)
-        if isinstance(demand, Command) and all(map(math.isfinite, demand)):
-            return actuation.clipped(demand)
+        with suppress(TypeError):  # numbers that are none
+            if isinstance(demand, Motion) and demand.is_finite:
+                return actuation.command(demand)
+            if isinstance(demand, Command) and all(map(math.isfinite, demand)):
+                return actuation.clipped(demand)
         raise self._control.unusable(self._run_id, demand)
 
     def _stop(self) -> Command:
