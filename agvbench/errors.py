@@ -13,6 +13,7 @@
     ├── FitError                  data that do not determine what is fitted
     │   └── NotAnArcError         points that do not lie on an arc
     ├── PlantError                a plant that breaks the plant protocol
+    ├── ControllerError           a controller of a closed-loop run that failed, or returned what cannot be commanded
     └── LinkError                 bus, adapters and hardware
         ├── MessageError          a message that cannot be decoded
         ├── AdapterGoneError      an adapter that did not answer or vanished
@@ -144,6 +145,10 @@ class NotAnArcError(FitError):
 
 class PlantError(AgvbenchError):
     """A plant that breaks the plant protocol."""
+
+
+class ControllerError(AgvbenchError):
+    """A controller of a closed-loop run that failed, or returned what cannot be commanded."""
 
 
 class LinkError(AgvbenchError):

@@ -38,7 +38,7 @@ class PlannedPaths:
 
         None if the trajectory is not known here, has changed, or leads to another target than the run had.
         """
-        made = self._plan(run.trajectory)
+        made = self._plan(run.trajectory.removesuffix(f"-{run.extra.get('controller', '')}"))
         if made is None or not np.allclose(made.target, run.target, rtol=0.0, atol=_SAME_TARGET, equal_nan=True):
             return None
         return made.expected

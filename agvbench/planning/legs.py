@@ -56,7 +56,7 @@ def _angles(segment: Straight | Arc, mode: Steering, model: VehicleModel, *, whe
         radius = radius_of(mode, math.radians(segment.axle_angle_deg), model.geometry)
     side = 1.0 if segment.turn == "left" else -1.0
     front, rear = (side * angle for angle in axle_angles(mode, radius, model.geometry, where=where))
-    front, rear = _as_mounted(front, rear, model)
+    front, rear = as_mounted(front, rear, model)
     for axle, angle in (("front", front), ("rear", rear)):
         _check_end_stop(f"turn radius {radius:.2f} m", axle, angle, model, where, _widen(mode, model))
     return front, rear
@@ -66,7 +66,7 @@ def _straight_angles(segment: Straight, mode: Steering, model: VehicleModel, *, 
     crab = math.radians(segment.crab_deg)
     if crab and mode != "crab":
         raise PlanError("crab_deg needs crab steering", where=where, value=mode, remedy='say steering = "crab"')
-    front, rear = _as_mounted(crab, crab, model)
+    front, rear = as_mounted(crab, crab, model)
     for axle, angle in (("front", front), ("rear", rear)):
         what = f"moving at {segment.crab_deg:.1f}° to the heading" if crab else "a straight"
         _check_end_stop(
@@ -75,7 +75,7 @@ def _straight_angles(segment: Straight, mode: Steering, model: VehicleModel, *, 
     return front, rear
 
 
-def _as_mounted(front_rad: float, rear_rad: float, model: VehicleModel) -> tuple[float, float]:
+def as_mounted(front_rad: float, rear_rad: float, model: VehicleModel) -> tuple[float, float]:
     """Return both angles turned by what an axle that does not steer is mounted off by, as calibration found it.
 
     Turned alike they keep a straight a straight, and an arc's curvature to first order.

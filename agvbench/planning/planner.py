@@ -168,7 +168,7 @@ def _command(leg: Leg, model: VehicleModel) -> Command:
 
 
 Row = tuple[float, float, float, float]
-_UNIT_RANGE = {"us": (500.0, 2500.0), "normalised": (-1.0, 1.0), "si": (-20.0, 20.0)}
+UNIT_RANGE = {"us": (500.0, 2500.0), "normalised": (-1.0, 1.0), "si": (-20.0, 20.0)}
 """What may be commanded at all: beyond 500 to 2500 µs servos run against their stops."""
 
 
@@ -212,7 +212,7 @@ def _check(table: CommandTable, name: str, model: VehicleModel) -> None:
             value=table.unit,
             limit=model.command_unit,
         )
-    low, high = _UNIT_RANGE[table.unit]
+    low, high = UNIT_RANGE[table.unit]
     for i, row in enumerate(table.rows):
         for column, value in zip(("drive", "front", "rear"), row[1:], strict=True):
             if not low <= value <= high:

@@ -17,7 +17,12 @@ import pytest
 from shell_blocks import execute, shell, write_files
 
 ROOT = Path(__file__).parents[2]
-QUICK = ("docs/tutorial.md", "docs/how-to/nightly.md", "docs/how-to/write-a-trajectory.md")
+QUICK = (
+    "docs/how-to/control-in-closed-loop.md",
+    "docs/how-to/nightly.md",
+    "docs/how-to/write-a-trajectory.md",
+    "docs/tutorial.md",
+)
 SLOW = (
     "docs/how-to/add-a-metric.md",
     "docs/how-to/bring-your-own-plant.md",

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from agvbench.campaign import CampaignHeader, CampaignWriter
+from agvbench.control import PurePursuit
 from agvbench.errors import AgvbenchError
 from agvbench.model import example_path
 from agvbench.running.configuration.benchmark_files import find_benchmark
@@ -89,6 +90,19 @@ def driven(**arguments):
     return act
 
 
+def controlled(name, make_controller, **more):
+    def act():
+        with open_session({}, out="new", resume=False, dry_run=True) as session:
+            driver = Driver(session, "run", experiment="free", repeat=1)
+            driver.controlled(name, make_controller, condition="uncalibrated", **more)
+
+    return act
+
+
+def without_gain(_):
+    return {}["gain"]
+
+
 def calibrated_from_nothing():
     Path("full/something").unlink()
     calibrate_campaign(CampaignWriter.create("full", HEADER), maps="default")
@@ -125,6 +139,9 @@ CASES = {
     "`agvbench init full` (not empty)": lambda: make_lab("full"),
     "`drive.hold(drive=2.0, …)`": driven(for_s=1.0, drive=2.0),
     '`drive.trajectory("1", condition="blue")`': driven(name="1", condition="blue"),
+    "`drive.controlled(…, period_s=2.0)`": controlled("1", PurePursuit, period_s=2.0),
+    '`drive.controlled("crab", PurePursuit, …)`': controlled("crab", PurePursuit),
+    "`drive.controlled(…)`, a factory that fails": controlled("1", without_gain),
     "`trajectories` without calibration": calibrated_from_nothing,
 }
 

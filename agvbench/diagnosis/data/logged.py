@@ -24,7 +24,8 @@ COMPUTED = frozenset({
 })  # fmt: skip
 """Covariates that every diagnosis has: a logged column of such a name would be taken for it."""
 
-_WRITTEN = frozenset({"duration_s", "events", "safety_stop", "source", "source_row", "command_hold_s"})
+_CONTROL = ("controller", "control_period_s", "controller_delay_s", "controller_compute_s")
+_WRITTEN = frozenset({"duration_s", "events", "safety_stop", "source", "source_row", "command_hold_s", *_CONTROL})
 _WRITTEN_PREFIX = "placing_"
 _FIRMWARE = "firmware"
 _IDENTIFIERS = ("id", "uuid", "_id", "_uuid")

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
 from dataclasses import replace
 
 from agvbench.bus.messages.event import Event
 from agvbench.campaign import CampaignWriter
 from agvbench.errors import (
     CampaignError,
+    ControllerError,
     FlagError,
-    LinkError,
-    PlantError,
-    RecordingError,
     RunStoppedError,
     SafetyStopError,
 )
@@ -22,11 +20,14 @@ from agvbench.planning import Departure, Workspace
 from agvbench.running.configuration.settings import BenchSettings
 from agvbench.running.execution.calibration import unfinished_calibration
 from agvbench.running.execution.campaign_time import CampaignTime, SessionBegan
+from agvbench.running.execution.closed_loop import ClosedLoop
 from agvbench.running.execution.drive import DEFAULT_TIMING, Drive, Timing, control_cycles_of, drive
 from agvbench.running.execution.event_log import EventLog
+from agvbench.running.execution.latch import Failure, Latch
 from agvbench.running.execution.pause import PauseRequest, holding_neutral
 from agvbench.running.execution.run_records import (
     RunRequest,
+    as_sent,
     attempts_by_run,
     record_aborted,
     recorded_run,
@@ -186,6 +187,7 @@ class Bench:
             return self._repeat_unseen(request, self._recorded[run_id])
         self.pause.wait(run_id, holding_neutral(self.link, self._neutral()))
         request = self._placed(request, run_id)
+        loop = self._closed_loop(request, run_id)
         started_s = self._time.now_s()
         self._session = self._session.with_run(started_s)
         self.log.take(self.link, "", started_s)
@@ -194,16 +196,21 @@ class Bench:
         stopped = False
         try:
             driven = self._drive(
-                request, run_id, seen, at_rest=lambda: before.extend(self.log.take(self.link, run_id, started_s))
+                request, run_id, seen, loop, at_rest=lambda: before.extend(self.log.take(self.link, run_id, started_s))
             )
-            status = self._status(request, driven)
+            request = as_sent(request, loop)
+            status = self._status(request, driven, loop)
         except RunStoppedError as stop:
             stopped = True
+            request = as_sent(request, loop)
             driven, status = self._stopped(request, seen, stop)
             self._on_progress(f"{run_id} {status}")
         except BaseException as error:
-            record_aborted(self.writer, request, run_id, started_s, seen, error, self._identity.firmware)
+            record_aborted(self.writer, as_sent(request, loop), run_id, started_s, seen, error, self._identity.firmware)
             self.log.take(self.link, run_id, started_s)
+            if isinstance(error, ControllerError):  # the session goes on with the next run
+                self._placer.was_moved()
+                self._time.has_run(started_s, self._timing.rest_before_s + self._supervisor.commanded_until_s)
             raise
         events = self.log.take(self.link, run_id, started_s + driven.duration_s)
         if (count := len(before) + len(events)) and not self._identity.lock_step:
@@ -261,10 +268,23 @@ class Bench:
         """Return the command before a run: everything neutral, since a run's first command is the first recorded."""
         return Command(self.nominal.neutral, self.nominal.neutral, self.nominal.neutral)
 
-    def _drive(self, request: RunRequest, run_id: str, seen: list[Frames], at_rest: Callable[[], object]) -> Drive:
+    def _closed_loop(self, request: RunRequest, run_id: str) -> ClosedLoop | None:
+        """Return what drives an attempt closed loop; None for a run whose commands are known."""
+        if request.control is None:
+            return None
+        return ClosedLoop(request.control, run_id, request.start, lock_step=self._identity.lock_step)
+
+    def _drive(
+        self,
+        request: RunRequest,
+        run_id: str,
+        seen: list[Frames],
+        loop: ClosedLoop | None,
+        at_rest: Callable[[], object],
+    ) -> Drive:
         return drive(
             self.link,
-            request.commands,
+            loop or request.commands,
             neutral=self._neutral(),
             start=request.start,
             run_key=self._placer.run_key(self._random_key(run_id)),
@@ -282,7 +302,9 @@ class Bench:
         stopped = times_stopped(run_id, self._recorded)
         return f"{run_id}-again{stopped}" if stopped else run_id
 
-    def _status(self, request: RunRequest, driven: Drive) -> str:
+    def _status(self, request: RunRequest, driven: Drive, loop: ClosedLoop | None) -> str:
+        if loop is not None and loop.complaint:
+            return str(RunStatus(Outcome.REJECTED, loop.complaint))
         begin_s = -self._timing.rest_before_s
         quality = assess(
             driven.frames,
@@ -296,36 +318,3 @@ class Bench:
 
 def _attempt_id(request: RunRequest, attempt: int) -> str:
     return request.run_id if attempt == 1 else f"{request.run_id}-attempt{attempt}"
-
-
-Failure = LinkError | PlantError | RecordingError
-
-
-class Latch:
-    """Remembers what went wrong first.
-
-    A disk that is full now is full for the next run, too: driving on would wear the vehicle for nothing.
-    """
-
-    def __init__(self) -> None:
-        self._failure: Failure | None = None
-
-    @property
-    def failure(self) -> Failure | None:
-        """What went wrong first, if anything did."""
-        return self._failure
-
-    def check(self) -> None:
-        """Raise `LinkError` with the first failure as its cause, if there was one."""
-        if self._failure is not None:
-            remedy = None if self._failure.remedy else "fix it and go on with --resume"
-            raise LinkError("the bench drives no more after the first failure", value=self._failure, remedy=remedy)
-
-    @contextmanager
-    def remembering(self) -> Iterator[None]:
-        """Remember what fails while the context lasts."""
-        try:
-            yield
-        except (LinkError, PlantError, RecordingError) as error:
-            self._failure = self._failure or error
-            raise

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,9 +42,37 @@ class Drive:
     duration_s: float
 
 
+class TimedCommand(NamedTuple):
+    """A command to be sent at `t_s` [s] of the run's clock and held for `hold_s` [s]; the last, a stop, for 0."""
+
+    t_s: float
+    command: Command
+    hold_s: float
+
+
+CommandSource = Callable[[list[Frames]], Iterator[TimedCommand]]
+"""Yields a run's commands one by one; each may depend on the frames seen by then, to which `drive` adds."""
+
+
+def planned(commands: Commands) -> CommandSource:
+    """Return the source of commands that are known before the run."""
+
+    def timed(_: list[Frames]) -> Iterator[TimedCommand]:
+        t_s = commands.t_s.tolist()
+        for i, (at_s, until_s) in enumerate(zip(t_s, [*t_s[1:], t_s[-1]], strict=True)):
+            yield TimedCommand(at_s, commands.at(i), until_s - at_s)
+
+    return timed
+
+
+def as_commands(sent: list[TimedCommand]) -> Commands:
+    """Return what was sent, which is at least one command, as timed commands."""
+    return Commands(*np.array([(t_s, *command) for t_s, command, _ in sent], dtype=float).T.copy())
+
+
 def drive(
     link: RunnerLink,
-    commands: Commands,
+    commands: Commands | CommandSource,
     *,
     neutral: Command,
     start: Pose,
@@ -55,7 +84,7 @@ def drive(
 ) -> Drive:
     """Drive `commands` from `start` and return everything seen.
 
-    The last row of `commands` stops the vehicle. `run_key` names a simulated run, whose randomness follows from it;
+    The last of `commands` stops the vehicle. `run_key` names a simulated run, whose randomness follows from it;
     None is for real vehicles, which stand at `start` already. `supervisor` stops the vehicle when something is wrong.
     `seen` is filled batch by batch, for a caller that keeps the frames of a failed run.
     `at_rest` is called after the rest, before the first of `commands`.
@@ -68,6 +97,8 @@ def drive(
         If the bus or an adapter fails; the vehicle has been commanded to stop.
     """
     batches = [] if seen is None else seen
+    source = planned(commands) if isinstance(commands, Commands) else commands
+    sent: list[TimedCommand] = []
     watched = partial(supervisor.control_cycle, link, seen=batches)
     supervisor.begin()
     try:
@@ -76,17 +107,18 @@ def drive(
         watched(neutral, t_s=-timing.rest_before_s, hold_s=timing.rest_before_s)
         _check_seen(batches, timing, where=link.keys.root)
         at_rest()
-        for i in range(len(commands) - 1):
-            hold_s = float(commands.t_s[i + 1] - commands.t_s[i])
-            watched(commands.at(i), t_s=float(commands.t_s[i]), hold_s=hold_s)
-        end_s = _settle(watched, commands, batches, timing)
+        for timed in source(batches):
+            sent.append(timed)
+            if timed.hold_s > 0.0:
+                watched(timed.command, t_s=timed.t_s, hold_s=timed.hold_s)
+        end_s = _settle(watched, sent[-1], batches, timing)
         batches.append(link.flush())
     except BaseException:
         # Ctrl-C, a lost adapter, a bug: before anything else the vehicle stands still.
         link.stop()
         raise
     frames = _until(Frames.concatenate(batches), end_s)
-    return Drive(commands, frames, timing.rest_before_s + end_s)
+    return Drive(as_commands(sent), frames, timing.rest_before_s + end_s)
 
 
 def _check_seen(batches: list[Frames], timing: Timing, *, where: str) -> None:
@@ -96,9 +128,9 @@ def _check_seen(batches: list[Frames], timing: Timing, *, where: str) -> None:
         raise safety_stop(0.0, "tracking was lost", where=where, value=value, ends_session=False)
 
 
-def _settle(watched: Callable[..., None], commands: Commands, batches: list[Frames], timing: Timing) -> float:
+def _settle(watched: Callable[..., None], stop: TimedCommand, batches: list[Frames], timing: Timing) -> float:
     """Hold the last command until the vehicle stands still; return when that was [s]."""
-    last, t_s = commands.at(len(commands) - 1), float(commands.t_s[-1])
+    t_s, last, _ = stop
     limit_s = t_s + timing.settle_limit_s
     watched(last, t_s=t_s, hold_s=timing.settle_s)
     t_s += timing.settle_s

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from agvbench.campaign import CampaignWriter
 from agvbench.campaign.completeness import planned_id
 from agvbench.errors import CampaignError, SafetyStopError
+from agvbench.running.execution.closed_loop import ClosedLoop, Control
 from agvbench.running.execution.drive import Drive
 from agvbench.types import Commands, Frames, Outcome, Pose, Run, RunStatus
 
@@ -33,6 +34,15 @@ class RunRequest:
     start: Pose
     session: str | None = None
     extra: Mapping[str, object] = field(default_factory=dict)
+    control: Control | None = None
+    """What drives the run closed loop, from the same start; ``commands`` are then those of the open-loop plan."""
+
+
+def as_sent(request: RunRequest, loop: ClosedLoop | None) -> RunRequest:
+    """Return `request` with the commands that `loop` sent and what it measured; unchanged without a loop."""
+    if loop is None:
+        return request
+    return replace(request, commands=loop.commands or request.commands, extra={**request.extra, **loop.columns()})
 
 
 def recorded_run(request: RunRequest, run_id: str, started_s: float, status: str, driven: Drive, firmware: str) -> Run:

@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from agvbench.control import ControllerFactory, Reference
 from agvbench.errors import FitError, FlagError, OneOf, PlanError
 from agvbench.model import VehicleModel
 from agvbench.planning import (
@@ -23,7 +24,9 @@ from agvbench.planning import (
 from agvbench.planning.trajectories.shapes import CommandTable
 from agvbench.running.command_shares import Shares, falling, held
 from agvbench.running.configuration.provenance import RecordedInputs, trajectory_inputs
-from agvbench.running.execution.bench import Bench, Failure
+from agvbench.running.execution.bench import Bench
+from agvbench.running.execution.closed_loop import DEFAULT_PERIOD_S, Control
+from agvbench.running.execution.latch import Failure
 from agvbench.running.execution.run_records import RunRequest
 from agvbench.running.session.driven_run import DrivenRun
 from agvbench.running.session.end_pose_bias import NO_BIAS_CORRECTIONS
@@ -225,12 +228,42 @@ class Driver:
         LinkError
             If the bus or hardware failed.
         """
+        return self._drive(self._planned(name, condition), condition)
+
+    def controlled(
+        self,
+        name: str,
+        make_controller: ControllerFactory,
+        *,
+        condition: str,
+        period_s: float = DEFAULT_PERIOD_S,
+    ) -> DrivenRun:
+        """Drive the trajectory `name` closed loop: a controller commands the vehicle every `period_s` [s].
+
+        `make_controller` makes it for each attempt; `condition` says with which model its motions become commands. The
+        run's trajectory is called by both names, such as ``figure_eight-PurePursuit``.
+
+        Raises
+        ------
+        ControllerError
+            If the controller fails or returns what cannot be commanded; the vehicle was stopped, the run is aborted.
+        FlagError, PlanError, RunRejectedError, LinkError
+            As `trajectory`. A controller that does not end the run is rejected.
+        """
+        planned = self._planned(name, condition)
+        control = Control(make_controller, Reference(planned, self._session.model(condition)), period_s)
+        with self._planning():
+            control.controller(self._run_id)  # what it cannot follow is said before anything moves, or in a dry run
+        # Open and closed loop are not repeats of one another.
+        name = f"{planned.trajectory.name}-{control.name}"
+        return self._drive(planned, condition, trajectory=name, control=control)
+
+    def _planned(self, name: str, condition: str) -> Plan:
         if condition not in CONDITIONS:
             raise FlagError("unknown condition", value=condition, limit=OneOf(CONDITIONS), where=self._run_id)
         trajectory = self._session.trajectory(name)
         with self._planning():
-            planned = self._session.plan(trajectory, condition)
-        return self._drive(planned, condition)
+            return self._session.plan(trajectory, condition)
 
     def hold(
         self,
@@ -290,7 +323,9 @@ class Driver:
         trajectory = _as_trajectory(self._experiment, commands, self._session.nominal.command_unit)
         return self._session.plan(trajectory, "uncalibrated")
 
-    def _drive(self, planned: Plan, condition: str, *, trajectory: str | None = None) -> DrivenRun:
+    def _drive(
+        self, planned: Plan, condition: str, *, trajectory: str | None = None, control: Control | None = None
+    ) -> DrivenRun:
         request = RunRequest(
             run_id=self._run_id,
             experiment=self._experiment,
@@ -300,6 +335,7 @@ class Driver:
             commands=planned.commands,
             target=planned.target,
             start=planned.start,
+            control=control,
         )
         run = self._session.run(request, planned)
         if not run.is_ok:
