@@ -19,6 +19,7 @@ examples:
   agvbench compare A B --metrics cross_track_rms,driving_time
   agvbench compare A B --fail-on 'position_error.p95>+10%' --fail-on 'cross_track_rms.median>12mm'
   agvbench compare A B --gate gate.toml --junit compare.xml --markdown summary.md
+  agvbench compare A --plan --margin-mm 5      how many repeats will decide, before B is driven
 
 exit codes: 0 nothing failed; 1 a regression (with --fail-on any: any difference), or a rule failed; 2 could not
 compare; 3 inconclusive: a campaign is incomplete, the vehicles take commands in different units, or there are too few
@@ -35,6 +36,8 @@ from typing import TYPE_CHECKING
 from agvbench.running.configuration.session_options import number
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from agvbench.campaign import Campaign
     from agvbench.metrics.gate import GateCheck
     from agvbench.statistics import Comparison
@@ -69,6 +72,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--across-vehicles", action="store_true", help="compare vehicles that take commands in different units"
     )
+    parser.add_argument("--plan", action="store_true", help="say how many repeats decide a comparison with A")
+    parser.add_argument(
+        "--power", metavar="P", type=number, default=0.9, help="of --plan: the chance of a verdict (0.9)"
+    )
     parser.add_argument("--json", metavar="F", type=Path, help="write the comparison as JSON, too")
     parser.add_argument("--junit", metavar="F", type=Path, help="write it as JUnit XML, too, for CI servers")
     parser.add_argument("--markdown", metavar="F", type=Path, help="write it as Markdown, too, for a pull request")
@@ -82,6 +89,8 @@ def run(arguments: argparse.Namespace) -> int:
     from agvbench.workflows.comparison.decision import FailurePolicy, exit_code
 
     console = wide_console()
+    if arguments.plan:
+        return _plan(arguments, console)
     policy = FailurePolicy.parse(arguments.fail_on, arguments.gate)
     a = Campaign.open(arguments.a)
     b = None if arguments.b is None else Campaign.open(arguments.b)
@@ -93,6 +102,28 @@ def run(arguments: argparse.Namespace) -> int:
     print_comparison(console, comparison)
     print_gate(console, checks)
     return exit_code(comparison, policy, checks, known)
+
+
+def _plan(arguments: argparse.Namespace, console: Console) -> int:
+    """Print how many repeats decide; return 0."""
+    from agvbench.errors import FlagError
+    from agvbench.reporting.console.tables import print_planned_repeats
+    from agvbench.statistics import pose_errors
+    from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
+    from agvbench.statistics.sample_size import plan_repeats
+
+    if arguments.b is not None:
+        raise FlagError(
+            "plans a comparison with one campaign", where="--plan", value=arguments.b, remedy="leave it out"
+        )
+    planned = plan_repeats(
+        pose_errors(arguments.a),
+        margin_mm=MARGIN_MM if arguments.margin_mm is None else arguments.margin_mm,
+        margin_deg=MARGIN_DEG if arguments.margin_deg is None else arguments.margin_deg,
+        power=arguments.power,
+    )
+    print_planned_repeats(console, planned, arguments.power)
+    return 0
 
 
 def _pair(arguments: argparse.Namespace) -> tuple[str, str] | None:

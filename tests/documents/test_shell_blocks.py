@@ -18,7 +18,6 @@ from shell_blocks import execute, shell, write_files
 
 ROOT = Path(__file__).parents[2]
 QUICK = (
-    "docs/how-to/control-in-closed-loop.md",
     "docs/how-to/nightly.md",
     "docs/how-to/write-a-trajectory.md",
     "docs/tutorial.md",
@@ -27,6 +26,7 @@ SLOW = (
     "docs/how-to/add-a-metric.md",
     "docs/how-to/bring-your-own-plant.md",
     "docs/how-to/close-the-loop.md",
+    "docs/how-to/control-in-closed-loop.md",
     "docs/how-to/drive-a-differential-vehicle.md",
     "docs/how-to/set-up-a-lab.md",
     "docs/how-to/write-an-effect.md",

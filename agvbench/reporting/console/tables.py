@@ -18,12 +18,14 @@ from agvbench.reporting.gate_files import gate_sentence, gate_table
 from agvbench.statistics.comparison_summary import headline, notes_in_words
 from agvbench.statistics.differences import ALL
 from agvbench.statistics.quantities import COMPONENT_DEFINITIONS, DEFINITIONS
+from agvbench.statistics.sample_size import plan_in_words
 
 if TYPE_CHECKING:
     from agvbench.metrics.gate import GateCheck
     from agvbench.reporting.write import WrittenReport
     from agvbench.statistics import Comparison, Difference
     from agvbench.statistics.intervals import Interval
+    from agvbench.statistics.sample_size import PlannedRepeats
     from agvbench.workflows.report import ReportData
 
 _VERDICT_STYLES = {"better": "green", "worse": "bold red", "same": "cyan", "cannot": "dim"}
@@ -212,6 +214,34 @@ def print_gate(console: Console, checks: Sequence[GateCheck]) -> None:
     console.print(_Fitting(console_table(table), _grouped(table)))
     console.print(Text(table.note, style="dim"))
     console.print(Text(f"Gate: {gate_sentence(checks)}.", style="bold"))
+
+
+def print_planned_repeats(console: Console, planned: Sequence[PlannedRepeats], power: float) -> None:
+    """Print how many repeats decide a comparison, the largest numbers first."""
+    columns = [
+        Column("trajectory", "trajectory"),
+        Column("condition", "condition"),
+        Column("quantity", "error"),
+        Column("repeats", "n", 0),
+        Column("sd", "sd", 2),
+        Column("sd_limit", "80 % limit", 2),
+        Column("margin", "margin", 1),
+        Column("worse", "worse", 0, group="repeats for"),
+        Column("same", "same", 0, group="repeats for"),
+    ]
+    rows = [
+        [p.trajectory, p.condition, p.quantity.labelled, p.repeats, p.sd, p.sd_limit, p.margin, p.worse, p.same]
+        for p in planned
+    ]
+    console.print(console_table(Table("planned", "Repeats that decide (of each side)", columns, rows)))
+    console.print(Text(_PLANNED, style="dim"))
+    console.print(Text(plan_in_words(planned, power), style="bold"))
+
+
+_PLANNED = (
+    "worse: the error has grown by two margins. same: nothing has changed. Normal noise with the 80 % limit of the "
+    "measured standard deviation; rank-sum tests, corrected for all rows. Empty: more than 200 repeats."
+)
 
 
 def _legend(comparison: Comparison) -> str:
