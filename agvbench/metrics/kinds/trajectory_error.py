@@ -22,7 +22,7 @@ def absolute_trajectory_error(run: MeasuredRun) -> float:
     """Root mean square of the distances between driven and planned positions at the same time, start poses equal."""
     if run.planned is None:
         return math.nan
-    driven = run.driven
+    driven = _while_planned(run.driven, run.planned)
     planned = _at(driven[:, 0], run.planned)
     return 1e3 * float(np.sqrt(np.mean(np.sum((driven[:, 1:3] - planned[:, 1:3]) ** 2, axis=1))))
 
@@ -32,12 +32,18 @@ def relative_trajectory_error(run: MeasuredRun) -> float:
     """Root mean square of the position error of the motion within 1 s, in the frame of its beginning."""
     if run.planned is None:
         return math.nan
-    begin = run.driven[run.driven[:, 0] <= run.driven[-1, 0] - _APART_S]
+    driven = _while_planned(run.driven, run.planned)
+    begin = driven[driven[:, 0] <= driven[-1, 0] - _APART_S]
     if not len(begin):
         return math.nan
-    after = _at(begin[:, 0] + _APART_S, run.driven)
+    after = _at(begin[:, 0] + _APART_S, driven)
     apart = _motion(begin, after) - _motion(_at(begin[:, 0], run.planned), _at(after[:, 0], run.planned))
     return 1e3 * float(np.sqrt(np.mean(np.abs(apart) ** 2)))
+
+
+def _while_planned(driven: Floats, planned: Floats) -> Floats:
+    """Return the driven poses up to the end of the plan: later ones have no planned pose of their time."""
+    return np.asarray(driven[driven[:, 0] <= planned[-1, 0]])
 
 
 def _at(t_s: Floats, poses: Floats) -> Floats:
