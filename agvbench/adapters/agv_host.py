@@ -19,7 +19,7 @@ from agvbench.bus.messages.identity import AgvIdentity
 from agvbench.bus.messages.request import decode_claim, decode_replay, decode_reset
 from agvbench.bus.messages.truth import Truth, TruthFlags
 from agvbench.errors import AdapterGoneError, LinkError, MessageError, RunStoppedError
-from agvbench.types import Command, Floats
+from agvbench.types import Floats
 
 _COMMANDS_WAITING = 256
 _REORDERED_REPORTED = 10
@@ -121,8 +121,9 @@ class AgvHost(Host):
         self.malformed, self.reordered = RateLimitedCounter(), RateLimitedCounter(first=_REORDERED_REPORTED)
         self._heard_s: float | None = None
         identity = checked_identity(adapter, AGV, AgvIdentity)
-        self._identity_bytes, self._lock_step, neutral = encode(identity), identity.lock_step, identity.neutral
-        self._neutral_drive, self._neutral = neutral, Command(neutral, neutral, neutral)
+        self._identity_bytes, self._lock_step = encode(identity), identity.lock_step
+        self._neutral = identity.channels.neutral
+        self._neutral_drive = self._neutral.drive
         self._gap_limit_s = min(adapter.watchdog_s, SILENCE_LIMIT_S)
         self._rest()
         self._claim = Claim(session, keys, required=not self._lock_step)

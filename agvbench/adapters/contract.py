@@ -25,7 +25,8 @@ from agvbench.bus.messages.identity import AgvIdentity, MocapIdentity
 from agvbench.bus.messages.request import Replay, Reset, Sampling
 from agvbench.bus.messages.truth import Truth, TruthFlags
 from agvbench.errors import FlagError, LinkError, OneOf
-from agvbench.types import CommandUnit, Floats, Frames
+from agvbench.types import Floats, Frames
+from agvbench.vehicle.channels import Channels
 
 DEFAULT_PLANT = "agvbench.simulator:make_plant"
 SILENCE_LIMIT_S = 0.5
@@ -44,9 +45,8 @@ class AdapterOptions:
         ``MODULE:FACTORY`` or ``FILE.py:FACTORY`` of a simulated vehicle.
     seed
         Of the campaign: with a run's key it seeds all that is random in that run.
-    command_unit, neutral
-        What the vehicle understands, where the adapter cannot know: a plant does not say. ``neutral`` defaults to
-        1500 µs or 0.
+    channels
+        What the vehicle understands, where the adapter cannot know: a plant does not say. By default µs about 1500.
     calibration_hash
         Of the vehicle model that the bench uses, for provenance.
     camera
@@ -60,18 +60,10 @@ class AdapterOptions:
     vehicle: str = "agv1"
     plant: str = DEFAULT_PLANT
     seed: int = 0
-    command_unit: CommandUnit = "us"
-    neutral: float | None = None
+    channels: Channels = field(default_factory=lambda: Channels.alike("us"))
     calibration_hash: str = ""
     camera: Mapping[str, str | float] = field(default_factory=dict)
     clock: Clock = field(default_factory=WallClock)
-
-    @property
-    def neutral_command(self) -> float:
-        """The command at which nothing moves."""
-        if self.neutral is not None:
-            return self.neutral
-        return 1500.0 if self.command_unit == "us" else 0.0
 
 
 class AgvReports(Protocol):

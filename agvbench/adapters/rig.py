@@ -14,7 +14,7 @@ from agvbench.bus.link import VehicleLink
 from agvbench.bus.messages.identity import Identity
 from agvbench.bus.session import bus_session
 from agvbench.errors import LinkError
-from agvbench.types import CommandUnit
+from agvbench.vehicle.channels import Channels
 
 
 @contextmanager
@@ -28,8 +28,7 @@ def open_rig(
     bus_config: BusConfig | None = None,
     lab: str = "lab",
     vehicle: str = "agv1",
-    command_unit: CommandUnit = "us",
-    neutral: float | None = None,
+    channels: Channels | None = None,
     calibration_hash: str = "",
     camera: Mapping[str, str | float] | None = None,
     clock: Clock | None = None,
@@ -42,7 +41,7 @@ def open_rig(
     ----------
     agv, mocap
         Adapter specifications, ``SCHEME`` or ``SCHEME:ADDRESS``; not used with `connect`.
-    plant, seed, command_unit, neutral, calibration_hash, camera
+    plant, seed, channels, calibration_hash, camera
         For the adapters (`AdapterOptions`). With `connect`, a simulator that runs with another seed is refused.
     connect
         Endpoints of adapters that run as their own processes, as ``"tcp/127.0.0.1:7447"``; None hosts them here, with
@@ -69,8 +68,7 @@ def open_rig(
                 vehicle=vehicle,
                 plant=plant,
                 seed=seed,
-                command_unit=command_unit,
-                neutral=neutral,
+                channels=channels or Channels.alike("us"),
                 calibration_hash=calibration_hash,
                 camera=camera or {},
             )

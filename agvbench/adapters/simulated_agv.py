@@ -10,7 +10,7 @@ from agvbench.adapters.contract import AdapterOptions, AgvAdapter, AgvReports, r
 from agvbench.bus.messages.identity import AgvIdentity
 from agvbench.bus.messages.request import Reset, Sampling
 from agvbench.simulator import load_plant
-from agvbench.types import Command, Plant
+from agvbench.types import Plant
 
 
 class SimulatedAgv(AgvAdapter):
@@ -21,8 +21,7 @@ class SimulatedAgv(AgvAdapter):
 
     def __init__(self, plant: Plant, options: AdapterOptions) -> None:
         self._plant, self._options = plant, options
-        neutral = options.neutral_command
-        self._neutral = Command(neutral, neutral, neutral)
+        self._neutral = options.channels.neutral
         self._held = self._neutral
         self._sampling: Sampling | None = None
         self._plant_s = math.nan
@@ -40,8 +39,7 @@ class SimulatedAgv(AgvAdapter):
             adapter=self.scheme,
             firmware="simulated",
             calibration_hash=self._options.calibration_hash,
-            command_unit=self._options.command_unit,
-            neutral=self._options.neutral_command,
+            channels=self._options.channels,
             simulated=True,
             lock_step=self.lock_step,
             extra={"seed": str(self._options.seed), "plant": self._options.plant},

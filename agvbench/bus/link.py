@@ -113,7 +113,7 @@ class VehicleLink:
         return Identity.of(agv, mocap)
 
     def _make_driver(self) -> LockStep | RealTime:
-        neutral = self._identity.neutral
+        neutral = self._identity.channels.neutral
         if self._identity.lock_step:
             return LockStep(
                 self._inbox,

@@ -28,11 +28,11 @@ class LockStep:
         watchdog: Watchdog,
         *,
         keys: Keys,
-        neutral: float,
+        neutral: Command,
         clock: object,
     ) -> None:
         self._inbox, self._outbox, self._liveliness, self._watchdog = inbox, outbox, liveliness, watchdog
-        self._keys, self._neutral, self._clock = keys, Command(neutral, neutral, neutral), clock
+        self._keys, self._neutral, self._clock = keys, neutral, clock
         self._hung: AdapterGoneError | None = None
 
     def start(self) -> None:

@@ -81,12 +81,12 @@ class RealTime:
         *,
         session: Any,
         keys: Keys,
-        neutral: float,
+        neutral: Command,
         clock: Clock,
     ) -> None:
         self._inbox, self._outbox, self._liveliness = inbox, outbox, liveliness
         self._session, self._keys, self._clock = session, keys, clock
-        self._neutral = Command(neutral, neutral, neutral)
+        self._neutral = neutral
         self._arrived: deque[tuple[float, FramesMessage]] = deque()
         # One is counted by the thread that receives, the other by the one that takes: no lock between them.
         self._came = self._gone = 0

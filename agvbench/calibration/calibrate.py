@@ -118,8 +118,7 @@ def calibrate(
     model = VehicleModel(
         name=header.vehicle_name,
         geometry=geometry,
-        command_unit=header.command_unit,
-        neutral=header.neutral,
+        channels=header.channels,
         front=front,
         rear=rear,
         drive=drive,
@@ -177,7 +176,7 @@ def _fit_role(
         )
     # Motors set a yaw rate as they set a speed: with a dead band and saturation.
     by_motor = role == "drive" or header.geometry.is_differential
-    fitters = drive_fitters(header.neutral) if by_motor else steering_fitters()
+    fitters = drive_fitters(getattr(header.neutral, role)) if by_motor else steering_fitters()
     order = DRIVE_KINDS if by_motor else STEERING_KINDS
     fits = compare_maps(points, fitters)
     try:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Protocol
 
-from agvbench.types import CommandUnit, Run
+from agvbench.types import Command, Run
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
 
 
@@ -25,11 +26,11 @@ class HeaderLike(Protocol):
         """Where the axles are, and which of them drives."""
 
     @property
-    def command_unit(self) -> CommandUnit:
-        """Unit of the commands."""
+    def channels(self) -> Channels:
+        """Units, neutral commands and ranges of the command channels."""
 
     @property
-    def neutral(self) -> float:
+    def neutral(self) -> Command:
         """Command at which the vehicle stands and steers straight."""
 
     @property

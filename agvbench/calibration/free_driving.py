@@ -161,7 +161,7 @@ def _drive(moving: list[_Drive], header: HeaderLike, words: list[str]) -> tuple[
         turned=(np.abs(np.tan(front)) + np.abs(np.tan(rear)))[kept],
         session=np.repeat([d.run.session or "" for d in moving], counts)[kept],
     )
-    regression = regress_drive(data, header.neutral)
+    regression = regress_drive(data, header.neutral.drive)
     words += [f"drive: {word}" for word in regression.words]
     owner = np.repeat([d.run.run_id for d in moving], counts)
     return _samples("drive", level[kept], regression.settled_mps, owner[kept]), regression

@@ -11,7 +11,7 @@ from agvbench.calibration.measurement.body_velocity import BodyVelocity
 from agvbench.calibration.measurement.run_measurement import RunMeasurement
 from agvbench.calibration.samples import Sample
 from agvbench.errors import FitError
-from agvbench.types import Run
+from agvbench.types import Command, Run
 from agvbench.vehicle.channels import Role
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.kinematics import wheel_speed
@@ -90,16 +90,16 @@ def _drive_sample(command: float, m: RunMeasurement, geometry: Geometry) -> Samp
 _OTHER: dict[Role, Role] = {"drive": "front", "front": "drive"}
 
 
-def differential_samples(measured: Mapping[str, BodyVelocity], neutral: float) -> list[Sample]:
+def differential_samples(measured: Mapping[str, BodyVelocity], neutral: Command) -> list[Sample]:
     """Return what the runs of a differential vehicle, by id, say of its drive and of its yaw rate.
 
     The speed's curve is read from runs whose yaw rate command is neutral and the yaw rate's from those whose speed
     command is, so that what the one costs the other (slip, unequal wheels) stays out of both. Where these vary their
     command too little, all runs are read. It has no rear axle: this channel is fixed.
     """
-    samples = [Sample("rear", neutral, 0.0, math.nan, run_id) for run_id in list(measured)[:1]]
+    samples = [Sample("rear", neutral.rear, 0.0, math.nan, run_id) for run_id in list(measured)[:1]]
     for role, other in _OTHER.items():
-        own = {name: m for name, m in measured.items() if getattr(m.command, other) == neutral}
+        own = {name: m for name, m in measured.items() if getattr(m.command, other) == getattr(neutral, other)}
         varied = len({getattr(m.command, role) for m in own.values()}) >= _MIN_COMMANDS
         samples += [_body_sample(role, name, m) for name, m in (own if varied else measured).items()]
     return samples

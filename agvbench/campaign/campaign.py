@@ -15,9 +15,10 @@ import pyarrow as pa
 from agvbench.campaign.header import FILE_NAME, CampaignHeader
 from agvbench.campaign.manifest import Manifest
 from agvbench.campaign.names import as_texts
+from agvbench.campaign.tables.command_columns import by_role, command_columns
 from agvbench.campaign.tables.consistency import check_commands, check_poses, check_runs
 from agvbench.campaign.tables.motion_checks import check_motion
-from agvbench.campaign.tables.schema import COMMANDS, POSES, RUNS, TABLES, numbers
+from agvbench.campaign.tables.schema import POSES, RUNS, TABLES, numbers
 from agvbench.campaign.tables.source import SUFFIXES, Source
 from agvbench.campaign.tables.timed_table import TimedTable, blank_untracked
 from agvbench.errors import CampaignError
@@ -91,8 +92,9 @@ class Campaign:
     @cached_property
     def _commands(self) -> TimedTable:
         source = self._sources["commands"]
-        table = TimedTable(source.path, source.read(COMMANDS), self.run_ids, in_parts=source.in_parts)
-        check_commands(table, self._runs["status"].to_pylist(), self.header.command_unit)
+        rows = by_role(source.read(command_columns(self.header)), self.header)
+        table = TimedTable(source.path, rows, self.run_ids, in_parts=source.in_parts)
+        check_commands(table, self._runs["status"].to_pylist(), self.header)
         # Some write a first command at −0.5 s, or at the first frame's time: a run's clock is 0 at its first command.
         self._early_s = table.first("t_s")
         table.shift(self._early_s)
@@ -124,7 +126,7 @@ class Campaign:
 
     @cached_property
     def commands(self) -> pd.DataFrame:
-        """The commands table, in the order of `run_ids`."""
+        """The commands table by role (drive, front, rear), in the order of `run_ids`."""
         frame: pd.DataFrame = self._commands.table.to_pandas()
         return frame
 

@@ -1,9 +1,10 @@
-"""The head of a campaign: ``campaign.toml`` (schema 1)."""
+"""The head of a campaign: ``campaign.toml`` (schemas 1 to 4)."""
 
 from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,10 +12,12 @@ from typing import Annotated, Any
 import msgspec
 
 from agvbench.campaign.manifest import record
-from agvbench.errors import CampaignError, FileError
+from agvbench.errors import CampaignError, FileError, VehicleError
 from agvbench.text_files import read_toml
-from agvbench.types import CommandUnit
+from agvbench.types import Command, CommandUnit
 from agvbench.validation import convert
+from agvbench.vehicle.channel_tables import channel_names, channels_from_keys, channels_to_keys
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Driven, Geometry, Kinematics
 
 SCHEMA = 1
@@ -22,7 +25,9 @@ SCHEMA_OF_DRIVEN_AXLE = 2
 """The schema that knows ``driven``; campaigns of vehicles that both axles drive are written in schema 1."""
 SCHEMA_OF_KINEMATICS = 3
 """The schema that knows ``kinematics`` and commands in SI units."""
-_SCHEMAS = (SCHEMA, SCHEMA_OF_DRIVEN_AXLE, SCHEMA_OF_KINEMATICS)
+SCHEMA_OF_CHANNELS = 4
+"""The schema that knows the tables ``[channels.NAME]``."""
+_SCHEMAS = (SCHEMA, SCHEMA_OF_DRIVEN_AXLE, SCHEMA_OF_KINEMATICS, SCHEMA_OF_CHANNELS)
 FILE_NAME = "campaign.toml"
 _MAX_BYTES = 1 << 20
 
@@ -31,9 +36,11 @@ FrameRate = Annotated[float, msgspec.Meta(gt=0.0, le=1e6)]
 """Of a camera [Hz]; above, times of frames cannot be distinguished in nanoseconds."""
 
 
-def schema_for(driven: Driven, kinematics: Kinematics = "two_axle", command_unit: CommandUnit = "us") -> int:
+def schema_for(driven: Driven, kinematics: Kinematics, channels: Channels) -> int:
     """Return the lowest schema that describes a vehicle."""
-    if kinematics != "two_axle" or command_unit == "si":
+    if (common := channels.common) is None:
+        return SCHEMA_OF_CHANNELS
+    if kinematics != "two_axle" or common.unit == "si":
         return SCHEMA_OF_KINEMATICS
     return SCHEMA if driven == "both" else SCHEMA_OF_DRIVEN_AXLE
 
@@ -43,10 +50,9 @@ class CampaignHeader:
     """What holds for every run of a campaign.
 
     ``front_axle_m`` and ``rear_axle_m`` [m] are the distances from the markers' centroid to the axles, as in
-    `Geometry`; ``driven`` is the driven axle, ``kinematics`` the kind of kinematics; ``neutral`` is the command at
-    which the vehicle stands still and steers straight,
-    in ``command_unit``; ``prediction_horizon_s`` and ``prediction_stride_s`` [s] say how to cut free driving into
-    predictions.
+    `Geometry`; ``driven`` is the driven axle, ``kinematics`` the kind of kinematics; ``channels`` are the units,
+    neutral commands and ranges of the command channels; ``prediction_horizon_s`` and ``prediction_stride_s`` [s] say
+    how to cut free driving into predictions.
 
     Raises
     ------
@@ -59,8 +65,7 @@ class CampaignHeader:
     vehicle_name: str
     front_axle_m: float
     rear_axle_m: float
-    command_unit: CommandUnit
-    neutral: float
+    channels: Channels
     mocap_rate_hz: float
     prediction_horizon_s: float | None = None
     prediction_stride_s: float | None = None
@@ -75,24 +80,7 @@ class CampaignHeader:
                 raise CampaignError(
                     f"{field.name} is not a finite number", where=FILE_NAME, value=value, remedy="give a number"
                 )
-        needed = schema_for(self.driven, self.kinematics, self.command_unit)
-        if self.schema < needed:
-            key, value = next(
-                (key, value)
-                for key, value in (
-                    ("kinematics", self.kinematics),
-                    ("command_unit", self.command_unit),
-                    ("driven", self.driven),
-                )
-                if value not in ("two_axle", "us", "normalised", "both")
-            )
-            raise CampaignError(
-                f"{key} needs a newer schema",
-                where=f"{FILE_NAME}: [vehicle]",
-                value=f'{key} = "{value}" in schema {self.schema}',
-                limit=f"schema {needed}",
-                remedy=f"set schema = {needed}",
-            )
+        self._require_schema(schema_for(self.driven, self.kinematics, self.channels))
         if self.kinematics == "two_axle" and self.front_axle_m + self.rear_axle_m <= 0.0:
             raise CampaignError(
                 "the wheelbase front_axle_m + rear_axle_m is not positive",
@@ -100,6 +88,35 @@ class CampaignHeader:
                 value=f"{self.front_axle_m + self.rear_axle_m:g} m",
                 remedy="give the distances from the markers' centroid to the axles in metres",
             )
+
+    def _require_schema(self, needed: int) -> None:
+        if self.schema >= needed:
+            return
+        common = self.channels.common
+        given = {
+            "[channels]": common is None,
+            f'kinematics = "{self.kinematics}"': self.kinematics != "two_axle",
+            'command_unit = "si"': common is not None and common.unit == "si",
+            f'driven = "{self.driven}"': True,
+        }
+        text = next(text for text, is_given in given.items() if is_given)
+        raise CampaignError(
+            f"{text.partition(' ')[0]} needs a newer schema",
+            where=f"{FILE_NAME}: [vehicle]" if common else FILE_NAME,
+            value=f"{text} in schema {self.schema}",
+            limit=f"schema {needed}",
+            remedy=f"set schema = {needed}",
+        )
+
+    @property
+    def neutral(self) -> Command:
+        """The command at which the vehicle stands still and steers straight."""
+        return self.channels.neutral
+
+    @property
+    def command_columns(self) -> Mapping[str, str]:
+        """The columns of the commands table, by role: the names of the channels where each has its own table."""
+        return channel_names("two_axle" if self.channels.common else self.kinematics)
 
     @property
     def geometry(self) -> Geometry:
@@ -114,7 +131,7 @@ class CampaignHeader:
 
     @classmethod
     def load(cls, path: str | Path) -> CampaignHeader:
-        """Read ``campaign.toml``; keys that schema 1 does not know are left alone.
+        """Read ``campaign.toml``; keys that no schema knows are left alone.
 
         Raises
         ------
@@ -126,7 +143,9 @@ class CampaignHeader:
         _check_schema(table.get("schema"), path)
         remedy = "correct campaign.toml (docs/reference/campaign-directory.md)"
         file = convert(table, _File, where=str(path), error=CampaignError, remedy=remedy)
-        return cls.from_tables(path, file.name, file.vehicle, file.mocap, file.prediction, schema=file.schema)
+        return cls.from_tables(
+            path, file.name, file.vehicle, file.mocap, file.prediction, channels=file.channels, schema=file.schema
+        )
 
     @classmethod
     def from_tables(
@@ -137,6 +156,7 @@ class CampaignHeader:
         mocap: Mocap,
         prediction: Prediction | None,
         *,
+        channels: ChannelTables | None = None,
         schema: int | None = None,
     ) -> CampaignHeader:
         """Return the header that these tables make; an impossible value is a `CampaignError` of file `where`.
@@ -150,15 +170,15 @@ class CampaignHeader:
                 where=f"{where}: vehicle",
                 remedy='give the distance to the front axle, or kinematics = "differential"',
             )
+        described = _channels(where, vehicle, channels)
         try:
             return cls(
-                schema=schema or schema_for(vehicle.driven, vehicle.kinematics, vehicle.command_unit),
+                schema=schema or schema_for(vehicle.driven, vehicle.kinematics, described),
                 name=name,
                 vehicle_name=vehicle.name,
                 front_axle_m=vehicle.front_axle_m or 0.0,
                 rear_axle_m=vehicle.rear_axle_m,
-                command_unit=vehicle.command_unit,
-                neutral=vehicle.neutral,
+                channels=described,
                 mocap_rate_hz=mocap.rate_hz,
                 prediction_horizon_s=prediction.horizon_s,
                 prediction_stride_s=prediction.stride_s or prediction.horizon_s,
@@ -175,6 +195,8 @@ class CampaignHeader:
         """Write ``campaign.toml``, renamed into place when whole, and list its hash."""
         import tomli_w
 
+        described = channels_to_keys(self.channels, self.kinematics)
+        of_channels = {key: described.pop(key) for key in ("channels",) if key in described}
         table: dict[str, Any] = {
             "schema": self.schema,
             "name": self.name,
@@ -182,11 +204,11 @@ class CampaignHeader:
                 "name": self.vehicle_name,
                 "front_axle_m": self.front_axle_m,
                 "rear_axle_m": self.rear_axle_m,
-                "command_unit": self.command_unit,
-                "neutral": self.neutral,
+                **described,
                 **({} if self.driven == "both" else {"driven": self.driven}),
                 **({} if self.kinematics == "two_axle" else {"kinematics": self.kinematics}),
             },
+            **of_channels,
             "mocap": {"rate_hz": self.mocap_rate_hz},
         }
         prediction = {"horizon_s": self.prediction_horizon_s, "stride_s": self.prediction_stride_s}
@@ -200,11 +222,15 @@ class Vehicle(msgspec.Struct, frozen=True):
 
     name: str
     rear_axle_m: float
-    command_unit: CommandUnit
-    neutral: float
+    command_unit: CommandUnit | None = None
+    neutral: float | None = None
     front_axle_m: float | None = None
     driven: Driven = "both"
     kinematics: Kinematics = "two_axle"
+
+
+ChannelTables = dict[str, dict[str, str | float]]
+"""The tables ``[channels.NAME]``."""
 
 
 class Mocap(msgspec.Struct, frozen=True):
@@ -226,6 +252,30 @@ class _File(msgspec.Struct):
     vehicle: Vehicle
     mocap: Mocap
     prediction: Prediction | None = None
+    channels: ChannelTables | None = None
+
+
+def _channels(where: object, vehicle: Vehicle, tables: ChannelTables | None) -> Channels:
+    """Return the channels of a head, or raise `CampaignError` for file `where`."""
+    given = {"command_unit": vehicle.command_unit, "neutral": vehicle.neutral, "channels": tables}
+    content = {key: value for key, value in given.items() if value is not None}
+    for key in ("command_unit", "neutral") if tables is None else ():
+        if key not in content:
+            raise CampaignError(
+                f"key '{key}' is missing", where=f"{where}: vehicle",
+                remedy="give command_unit and neutral, or [channels] (docs/reference/campaign-directory.md)",
+            )  # fmt: skip
+    if vehicle.neutral is not None and not math.isfinite(vehicle.neutral):
+        raise CampaignError(
+            "neutral is not a finite number", where=where, value=vehicle.neutral, remedy="give a number"
+        )
+    try:
+        return channels_from_keys(content, vehicle.kinematics)
+    except VehicleError as error:
+        place = f"{where}: {error.where}"
+        raise CampaignError(
+            error.what, where=place, value=error.value, limit=error.limit, remedy=error.remedy
+        ) from None
 
 
 def _read_toml(path: Path) -> dict[str, Any]:

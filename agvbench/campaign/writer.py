@@ -15,6 +15,7 @@ from agvbench.campaign.atomic_files import TEMPORARY_PREFIX, is_temporary
 from agvbench.campaign.header import FILE_NAME, CampaignHeader
 from agvbench.campaign.lock import LOCK_FILE
 from agvbench.campaign.manifest import MANIFEST_FILE, PLANNED_TABLE, Manifest, record
+from agvbench.campaign.tables.command_columns import by_role
 from agvbench.campaign.tables.consistency import check_commands, check_poses, check_runs
 from agvbench.campaign.tables.parquet import to_parquet
 from agvbench.campaign.tables.parts import part_name, parts_of, run_id_of
@@ -22,7 +23,7 @@ from agvbench.campaign.tables.schema import TABLES
 from agvbench.campaign.tables.source import parts
 from agvbench.campaign.tables.timed_table import TimedTable, blank_untracked
 from agvbench.errors import CampaignError, RecordingError
-from agvbench.types import CommandUnit, Run
+from agvbench.types import Run
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -93,6 +94,11 @@ class CampaignWriter:
         manifest.check_beside()
         manifest.require_files()
         stored = CampaignHeader.load(path / FILE_NAME)
+        if stored.channels != header.channels:
+            raise CampaignError(
+                "was begun with other command channels", where=path, value=f"{header.channels}",
+                limit=f"{stored.channels}", remedy="resume with the same vehicle, or begin a new campaign",
+            )  # fmt: skip
         for field in fields(header):
             old, new = getattr(stored, field.name), getattr(header, field.name)
             if old != new:
@@ -166,8 +172,8 @@ class CampaignWriter:
                 "two runs have one id", where=self.path, value=run.run_id, remedy="give the run its own id"
             )
         name = part_name(run.run_id)
-        tables = parts_of(run)
-        check_parts(tables, self.path, self.header.command_unit)
+        tables = parts_of(run, self.header)
+        check_parts(tables, self.path, self.header)
         files = {f"{table}.parquet/{name}": to_parquet(part) for table, part in tables.items()}
         with self._recording():
             record(self.path, files, durable=self._durable)
@@ -205,13 +211,13 @@ class CampaignWriter:
             record(self.path, {name: temporary.read_bytes()}, durable=self._durable)
 
 
-def check_parts(tables: Mapping[str, pa.Table], where: Path, unit: CommandUnit) -> None:
+def check_parts(tables: Mapping[str, pa.Table], where: Path, header: CampaignHeader) -> None:
     """Raise `CampaignError`, at `where`, for a run that would make a whole campaign unreadable later."""
     run_ids, status = (tables["runs"][name].to_pylist() for name in ("run_id", "status"))
     check_runs(tables["runs"], where)
-    commands = TimedTable(where, tables["commands"], run_ids, in_parts=True)
+    commands = TimedTable(where, by_role(tables["commands"], header), run_ids, in_parts=True)
     poses = TimedTable(where, blank_untracked(tables["poses"]), run_ids, in_parts=True)
-    check_commands(commands, status, unit)
+    check_commands(commands, status, header)
     check_poses(poses, status, commands.last("t_s"))
 
 

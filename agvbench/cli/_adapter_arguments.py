@@ -6,11 +6,13 @@ import argparse
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+from agvbench.errors import FlagError
 from agvbench.running.configuration.session_options import number, whole_number
 
 if TYPE_CHECKING:
     from agvbench.adapters.contract import AdapterOptions
     from agvbench.adapters.contract_checks import CheckResult
+    from agvbench.vehicle.channels import Channels
 
 AGV_ENDPOINT = "tcp/127.0.0.1:7447"
 MOCAP_ENDPOINT = "tcp/127.0.0.1:7448"
@@ -48,10 +50,11 @@ def add_vehicle_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="MODULE_OR_FILE:FACTORY",
         help="what drives in the simulation (default: %(default)s)",
     )
-    group.add_argument(
-        "--command-unit", choices=("us", "normalised"), default="us", help="what it understands (default: %(default)s)"
-    )
+    group.add_argument("--command-unit", choices=("us", "normalised"), help="what it understands (default: us)")
     group.add_argument("--neutral", type=number, metavar="COMMAND", help="where it stands still (default: 1500 or 0)")
+    group.add_argument(
+        "--vehicle", metavar="FILE", help="vehicle.toml whose command channels it has, in place of unit and neutral"
+    )
 
 
 def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
@@ -103,7 +106,19 @@ def endpoints(arguments: argparse.Namespace, default_listen: str) -> dict[str, l
 
 def vehicle_options(arguments: argparse.Namespace) -> dict[str, Any]:
     """Return what `add_vehicle_arguments` declares."""
-    return {"plant": arguments.plant, "command_unit": arguments.command_unit, "neutral": arguments.neutral}
+    return {"plant": arguments.plant, "channels": _channels(arguments)}
+
+
+def _channels(arguments: argparse.Namespace) -> Channels:
+    from agvbench.model import VehicleModel
+    from agvbench.vehicle.channels import Channels
+
+    if not arguments.vehicle:
+        return Channels.alike(arguments.command_unit or "us", arguments.neutral)
+    for option, value in {"--command-unit": arguments.command_unit, "--neutral": arguments.neutral}.items():
+        if value is not None:
+            raise FlagError("the vehicle file says this", where=option, value=value, remedy=f"leave out {option}")
+    return VehicleModel.load(arguments.vehicle).channels
 
 
 def camera_options(arguments: argparse.Namespace) -> dict[str, Any]:

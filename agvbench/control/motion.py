@@ -10,7 +10,7 @@ import numpy as np
 from agvbench.errors import VehicleError
 from agvbench.model import VehicleModel
 from agvbench.planning.legs import as_mounted
-from agvbench.planning.planner import UNIT_RANGE
+from agvbench.planning.planner import command_range
 from agvbench.planning.steering import centre_forward
 from agvbench.planning.trajectories.segments import Steering
 from agvbench.types import Command
@@ -82,24 +82,28 @@ class Actuation:
         channel = getattr(self.model, role)
         low, high = channel.output_range
         reached = _clip(wanted, (low, high))
-        if float(channel(self.model.neutral)) == reached:
-            return self.model.neutral
+        neutral: float = getattr(self.model.neutral, role)
+        if float(channel(neutral)) == reached:
+            return neutral
         try:
             return float(channel.inverse(reached))
         except VehicleError:
             return float(channel.inverse(high if wanted > 0.0 else low))
 
     def clipped(self, command: Command) -> Command:
-        """Return a finite `command` clipped to the range of each channel's map and of its unit."""
-        low, high = UNIT_RANGE[self.model.command_unit]
-        ranges = (getattr(self.model, role).command_range for role in Command._fields)
-        return Command(*(_clip(v, (max(low, a), min(high, b))) for v, (a, b) in zip(command, ranges, strict=True)))
+        """Return a finite `command` clipped to the range of each channel, of its unit and of its map."""
+        return Command(*(self._clipped(role, getattr(command, role)) for role in Command._fields))
+
+    def _clipped(self, role: str, command: float) -> float:
+        allowed = command_range(getattr(self.model.channels, role))
+        known = getattr(self.model, role).command_range
+        return _clip(command, (max(allowed[0], known[0]), min(allowed[1], known[1])))
 
     def motion(self, command: Command) -> Motion:
         """Return the motion that the model's static maps give `command`; a turn on the spot is none."""
         model, geometry = self.model, self.model.geometry
         front, rear = (float(angle) for angle in model.axle_angles(command.front, command.rear))
-        speed = 0.0 if command.drive == model.neutral else float(model.speed(command.drive))
+        speed = 0.0 if command.drive == model.neutral.drive else float(model.speed(command.drive))
         if geometry.is_differential:
             return Motion(speed, front / speed if speed else 0.0)
         forward, left, turn = (float(value) for value in body_velocity(front, rear, 1.0, 1.0, geometry))

@@ -142,5 +142,5 @@ class RunsFromRest(Method[SelectedFromRest]):
 def _prior_values(maps: NodalMaps, context: DiagnosisContext) -> dict[str, Floats]:
     """Return the values of the vehicle model before (or the nominal one) at the nodes of the maps, by role."""
     header = context.header
-    model = context.vehicle or nominal_model(header.vehicle_name, context.geometry, header.command_unit, header.neutral)
+    model = context.vehicle or nominal_model(header.vehicle_name, context.geometry, header.channels)
     return {role: np.asarray(getattr(model, role)(maps.nodes[role])) for role in ROLES}

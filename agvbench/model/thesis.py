@@ -13,6 +13,7 @@ import numpy as np
 
 from agvbench.model.vehicle_model import VehicleModel
 from agvbench.types import Floats
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import LineWithEndStops, MonotoneTable
 
@@ -42,8 +43,7 @@ def build_thesis_vehicle(tables: Path) -> VehicleModel:
     return VehicleModel(
         name="thesis",
         geometry=Geometry(front_axle_m=0.181, rear_axle_m=0.121),
-        command_unit="us",
-        neutral=1500.0,
+        channels=Channels.alike("us"),
         front=front,
         rear=rear,
         drive=_drive(tables),

@@ -4,8 +4,8 @@
 
     schema = 1
     name = "my_vehicle"
-    command_unit = "us"            # or "normalised", "si"
-    neutral = 1500.0
+    command_unit = "us"            # or "normalised", "si"; a table [channels.NAME] for each channel in place of
+    neutral = 1500.0               # command_unit and neutral: docs/reference/vehicle-file.md
 
     [geometry]
     front_axle_m = 0.181           # marker centroid to axle
@@ -52,7 +52,8 @@ from agvbench.effects import Effect, effect_from_toml
 from agvbench.errors import FileError, VehicleError
 from agvbench.model.priors import priors_from_toml, priors_to_toml
 from agvbench.text_files import read_toml
-from agvbench.vehicle.fields import check_keys, from_table, number, to_table
+from agvbench.vehicle.channel_tables import channels_from_keys, channels_to_keys
+from agvbench.vehicle.fields import check_keys, from_table, to_table
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import StaticMap, map_from_toml
 
@@ -62,8 +63,9 @@ if TYPE_CHECKING:
 SCHEMA = 1
 _UNITS = {"front": "rad", "rear": "rad", "drive": "m/s"}
 _DEFAULTS = {"driven": "both", "kinematics": "two_axle"}
-_REQUIRED = ("schema", "name", "command_unit", "neutral", "geometry", "maps")
-_OPTIONAL = ("effects", "priors", "provenance")
+_COMMON = ("command_unit", "neutral")
+_REQUIRED = ("schema", "name", "geometry", "maps")
+_OPTIONAL = (*_COMMON, "channels", "effects", "priors", "provenance")
 
 
 def read_vehicle(path: Path) -> dict[str, Any]:
@@ -116,8 +118,7 @@ def vehicle_to_toml(model: VehicleModel) -> dict[str, Any]:
     content: dict[str, Any] = {
         "schema": SCHEMA,
         "name": model.name,
-        "command_unit": model.command_unit,
-        "neutral": model.neutral,
+        **channels_to_keys(model.channels, model.geometry.kinematics),
         "geometry": _geometry_to_toml(model.geometry),
         "maps": {role: _map_to_toml(getattr(model, role), unit) for role, unit in _units(model.geometry).items()},
     }
@@ -134,18 +135,16 @@ def vehicle_fields(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of the `VehicleModel` in the content of a vehicle file; raise `VehicleError` if it is none."""
     _check_schema(content)
     check_keys(content, (*_REQUIRED, *_OPTIONAL), where="top level")
-    for key in _REQUIRED:
+    for key in (*_REQUIRED, *(_COMMON if "channels" not in content else ())):
         if key not in content:
             raise VehicleError("a key is missing", where="top level", value=key, remedy=f"add {key}")
-    for key in ("name", "command_unit"):
-        if not isinstance(content[key], str):
-            raise VehicleError("must be a text", where=key, value=repr(content[key]))
+    if not isinstance(content["name"], str):
+        raise VehicleError("must be a text", where="name", value=repr(content["name"]))
     geometry = from_table(Geometry, _whole_geometry(_table(content, "geometry")), where="geometry")
     return {
         "name": content["name"],
         "geometry": geometry,
-        "command_unit": content["command_unit"],
-        "neutral": number(content["neutral"], where="neutral"),
+        "channels": channels_from_keys(content, geometry.kinematics),
         **_maps_from_toml(_table(content, "maps"), _units(geometry)),
         "effects": _effects_from_toml(content.get("effects", [])),
         "priors": priors_from_toml(_table(content, "priors")) if "priors" in content else (),
@@ -156,7 +155,7 @@ def vehicle_fields(content: Mapping[str, Any]) -> dict[str, Any]:
 def physics_digest(model: VehicleModel) -> str:
     """Return the first sixteen hexadecimal digits of SHA-256 over what is physical in `model`."""
     content = vehicle_to_toml(model)
-    physics = {key: content[key] for key in ("schema", "command_unit", "neutral", "geometry", "maps")}
+    physics = {key: content[key] for key in content.keys() - {"name", "effects", "priors", "provenance"}}
     acting = sorted((effect for effect in model.effects if not effect.is_null), key=lambda effect: effect.name)
     physics["effects"] = [effect.to_toml() for effect in acting]
     # Adding zero makes −0.0 and 0.0, which drive alike, hash alike.

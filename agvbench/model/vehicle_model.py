@@ -6,18 +6,16 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import get_args
 
 from numpy.typing import ArrayLike
 
 from agvbench.effects import Effect
-from agvbench.errors import OneOf, VehicleError
+from agvbench.errors import VehicleError
 from agvbench.model.priors import Prior
 from agvbench.model.toml import naming_file, physics_digest, read_vehicle, write_vehicle
 from agvbench.notebook_html import heading_html, table_html
-from agvbench.types import Command, Commands, CommandUnit, Floats
-from agvbench.vehicle.channels import channels_of, quantity_of
-from agvbench.vehicle.fields import coerce_float
+from agvbench.types import Command, Commands, Floats
+from agvbench.vehicle.channels import Channel, Channels, channels_of, quantity_of
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import StaticMap
 
@@ -35,10 +33,8 @@ class VehicleModel:
         The vehicle's name.
     geometry
         Positions of the axles.
-    command_unit
-        ``"us"``, ``"normalised"`` or ``"si"``.
-    neutral
-        Command at standstill with (about) straight axles, in command units.
+    channels
+        Unit, neutral command and range of each command channel.
     front, rear
         Command → axle angle [rad], counter-clockwise positive; `Fixed` for an axle that is not steered. The front map
         of a differential vehicle is command → yaw rate [rad/s], and its rear map is `Fixed`.
@@ -59,8 +55,7 @@ class VehicleModel:
 
     name: str
     geometry: Geometry
-    command_unit: CommandUnit
-    neutral: float
+    channels: Channels
     front: StaticMap
     rear: StaticMap
     drive: StaticMap
@@ -69,12 +64,8 @@ class VehicleModel:
     priors: tuple[Prior, ...] = ()
 
     def __post_init__(self) -> None:
-        coerce_float(self, "neutral")
         object.__setattr__(self, "effects", tuple(self.effects))
         object.__setattr__(self, "provenance", dict(self.provenance))
-        if self.command_unit not in get_args(CommandUnit):
-            limit = OneOf(get_args(CommandUnit))
-            raise VehicleError("unknown unit", where="command_unit", value=repr(self.command_unit), limit=limit)
         object.__setattr__(self, "priors", tuple(self.priors))
         self._check_angles()
         stated = [prior.name for prior in self.priors]
@@ -119,6 +110,11 @@ class VehicleModel:
                     value, limit = f"{math.degrees(end):.1f}°", f"±{math.degrees(_LARGEST_ANGLE_RAD):.0f}°"
                     raise VehicleError("axle angle is too large", where=f"maps.{axle}", value=value, limit=limit)
 
+    @property
+    def neutral(self) -> Command:
+        """The command at standstill with (about) straight axles."""
+        return self.channels.neutral
+
     def axle_angles(self, front_command: ArrayLike, rear_command: ArrayLike) -> tuple[Floats, Floats]:
         """Return the steady-state angles of both axles [rad] for commands of any shape."""
         return self.front(front_command), self.rear(rear_command)
@@ -150,17 +146,18 @@ class VehicleModel:
         A differential vehicle steers with its drive: all is neutral.
         """
         if self.geometry.is_differential:
-            return Command(self.neutral, self.neutral, self.neutral)
-        return command._replace(drive=self.neutral)
+            return self.neutral
+        return command._replace(drive=self.neutral.drive)
 
     def _inverse(self, role: str, output: float) -> float:
         static_map: StaticMap = getattr(self, role)
+        channel: Channel = getattr(self.channels, role)
         quantity = quantity_of(role, self.geometry)
         what, scale, unit = quantity.name, quantity.scale, quantity.unit
-        if float(static_map(self.neutral)) == output:
-            return self.neutral
+        if float(static_map(channel.neutral)) == output:
+            return channel.neutral
         try:
-            return float(static_map.inverse(output))
+            command = float(static_map.inverse(output))
         except VehicleError as error:
             low, high = static_map.output_range
             inside = low <= output <= high
@@ -171,6 +168,12 @@ class VehicleModel:
                 limit=error.limit if inside else f"{scale * low:.4g} … {scale * high:.4g} {unit}",
                 remedy=error.remedy,
             ) from None
+        if not channel.holds(command):
+            raise VehicleError(
+                f"{role} {what} needs a command beyond its channel's range", where=f"vehicle {self.name}",
+                value=f"{scale * output:.4g} {unit} at {command:.4g}", limit=channel.range_text,
+            )  # fmt: skip
+        return command
 
     def effect(self, name: str) -> Effect | None:
         """Return the effect called `name`, if this model has it."""
@@ -235,7 +238,7 @@ def model_html(model: VehicleModel) -> str:
         axles = f"differential, axle {geometry.rear_axle_m:g} m behind the marker centroid"
     else:
         axles = f"front axle {geometry.front_axle_m:g} m ahead of the marker centroid, {axles}"
-    line = f"{axles}; commands in {model.command_unit}, neutral {model.neutral:g}"
+    line = f"{axles}; commands in {model.channels}"
     maps = [_map_row(model, role) for role in channels_of(geometry)]
     effects = [
         (effect.name, p.name, effect.values[p.name], p.unit) for effect in model.effects for p in effect.parameters()

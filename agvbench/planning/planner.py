@@ -16,6 +16,7 @@ from agvbench.planning.trajectories.shapes import CommandTable
 from agvbench.planning.trajectories.trajectory import Trajectory
 from agvbench.planning.workspace import Workspace
 from agvbench.types import Command, Commands, Floats, Pose
+from agvbench.vehicle.channels import Channel
 from agvbench.vehicle.geometry import Geometry
 
 _STEP_S = 0.02
@@ -168,8 +169,14 @@ def _command(leg: Leg, model: VehicleModel) -> Command:
 
 
 Row = tuple[float, float, float, float]
-UNIT_RANGE = {"us": (500.0, 2500.0), "normalised": (-1.0, 1.0), "si": (-20.0, 20.0)}
+_UNIT_RANGE = {"us": (500.0, 2500.0), "normalised": (-1.0, 1.0), "si": (-20.0, 20.0)}
 """What may be commanded at all: beyond 500 to 2500 µs servos run against their stops."""
+
+
+def command_range(channel: Channel) -> tuple[float, float]:
+    """Return the lowest and highest command of a channel that a table may hold."""
+    low, high = _UNIT_RANGE[channel.unit]
+    return max(low, channel.low), min(high, channel.high)
 
 
 def commands_from_rows(rows: Sequence[Row]) -> Commands:
@@ -195,7 +202,7 @@ def commands_and_legs(trajectory: Trajectory, model: VehicleModel) -> tuple[Comm
             f"{trajectory.name}: commands.rows[{i}]",
             float(fronts[i]),
             float(rears[i]),
-            0.0 if commands.drive[i] == model.neutral else float(speeds[i]),
+            0.0 if commands.drive[i] == model.neutral.drive else float(speeds[i]),
             float(commands.t_s[i + 1] - commands.t_s[i]),
             is_rest=model.stop_after(commands.at(i)) == commands.at(i),
         )
@@ -205,16 +212,16 @@ def commands_and_legs(trajectory: Trajectory, model: VehicleModel) -> tuple[Comm
 
 
 def _check(table: CommandTable, name: str, model: VehicleModel) -> None:
-    if table.unit != model.command_unit:
+    if table.unit != model.channels.table_unit:
         raise UnsuitedVehicleError(
             "commands are in another unit than the vehicle's",
             where=f"{name}: commands.unit",
             value=table.unit,
-            limit=model.command_unit,
+            limit=model.channels.table_unit,
         )
-    low, high = UNIT_RANGE[table.unit]
     for i, row in enumerate(table.rows):
         for column, value in zip(("drive", "front", "rear"), row[1:], strict=True):
+            low, high = command_range(getattr(model.channels, column))
             if not low <= value <= high:
                 raise PlanError(
                     f"{column} command is out of range",

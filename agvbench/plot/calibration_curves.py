@@ -53,7 +53,7 @@ def calibration_curve(axes: Axes, calibration: Calibration, axle: Literal["front
     set_value = f"{quantity.channel} {quantity.name}" if quantity.name == "angle" else quantity.name
     label(
         axes,
-        x=f"command [{_UNITS.get(model.command_unit, '–')}]",
+        x=f"command [{_UNITS.get(getattr(model.channels, axle).unit, '–')}]",
         y=f"{set_value} [{quantity.unit}]",
         title=calibration.chosen[axle],
     )

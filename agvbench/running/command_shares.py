@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agvbench.errors import FlagError
+from agvbench.errors import FlagError, VehicleError
 from agvbench.model import VehicleModel
 from agvbench.types import Command, Commands, CommandUnit
+from agvbench.vehicle.channels import Channel
 from agvbench.vehicle.maps import StaticMap
 
 PRESTEER_S = 0.5
@@ -26,7 +27,7 @@ class Shares:
     that is not steered.
     """
 
-    neutral: float
+    neutral: Command
     drive: float
     front: float
     rear: float
@@ -34,12 +35,12 @@ class Shares:
     @classmethod
     def of_model(cls, model: VehicleModel) -> Shares:
         """Return the shares of a vehicle; which way its outputs go with the command is read from its maps."""
-        return cls(model.neutral, *(_full_command(model, m) for m in (model.drive, model.front, model.rear)))
+        return cls(model.neutral, *(_full_command(model, role) for role in Command._fields))
 
     def command(self, drive: float = 0.0, front: float = 0.0, rear: float = 0.0) -> Command:
         """Return the command of three shares.
 
-        >>> Shares(neutral=1500.0, drive=-600.0, front=-600.0, rear=-600.0).command(drive=1, front=0.5)
+        >>> Shares(Command(1500.0, 1500.0, 1500.0), drive=-600.0, front=-600.0, rear=-600.0).command(drive=1, front=0.5)
         Command(drive=900.0, front=1200.0, rear=1500.0)
 
         Raises
@@ -50,18 +51,31 @@ class Shares:
         for name, share in {"drive": drive, "front": front, "rear": rear}.items():
             if not -1.0 <= share <= 1.0:
                 raise FlagError(f"share of full {name} command is out of range", value=share, limit="−1 to 1")
-        return Command(
-            self.neutral + drive * self.drive, self.neutral + front * self.front, self.neutral + rear * self.rear
-        )
+        at = self.neutral
+        return Command(at.drive + drive * self.drive, at.front + front * self.front, at.rear + rear * self.rear)
 
 
-def _full_command(model: VehicleModel, static_map: StaticMap) -> float:
-    """Return what a share of 1 adds to neutral; 0 for a map without a direction."""
-    full = _FULL_COMMAND[model.command_unit]
-    low, high = (abs(end - model.neutral) for end in static_map.command_range)
-    if model.command_unit == "si" and math.isfinite(max(low, high)):
+def _full_command(model: VehicleModel, role: str) -> float:
+    """Return what a share of 1 adds to neutral; 0 for a map without a direction.
+
+    Raise `VehicleError` if the channel's range leaves no command on one side of neutral.
+    """
+    static_map: StaticMap = getattr(model, role)
+    channel: Channel = getattr(model.channels, role)
+    neutral, full = channel.neutral, _FULL_COMMAND[channel.unit]
+    low, high = (abs(end - neutral) for end in static_map.command_range)
+    if channel.unit == "si" and math.isfinite(max(low, high)):
         full = max(low, high)
-    below, above = static_map(np.array([model.neutral - full, model.neutral + full]))
+    below, above = static_map(np.array([neutral - full, neutral + full]))
+    if below == above:
+        return 0.0
+    full = min(full, neutral - channel.low, channel.high - neutral)
+    if full == 0.0:
+        raise VehicleError(
+            f"{role} is driven to both sides of neutral, but its channel's range ends there",
+            where=f"vehicle {model.name}", value=f"neutral {neutral:g}", limit=channel.range_text,
+            remedy="correct neutral and range",
+        )  # fmt: skip
     return float(np.sign(above - below)) * full
 
 

@@ -139,13 +139,13 @@ def gather(
 
 
 def _is_thesis_vehicle(header: CampaignHeader) -> bool:
-    """Return whether axle distances and command unit are those of the vehicle that the thesis drove."""
+    """Return whether axle distances and command units are those of the vehicle that the thesis drove."""
     from agvbench.model import thesis_vehicle
 
     model = thesis_vehicle()
     axles = (header.front_axle_m, header.rear_axle_m)
     near = all(map(math.isclose, axles, (model.geometry.front_axle_m, model.geometry.rear_axle_m)))
-    return near and header.command_unit == model.command_unit
+    return near and header.channels.table_unit == model.channels.table_unit
 
 
 def _between_conditions(

@@ -9,6 +9,7 @@ from __future__ import annotations
 from agvbench.model import VehicleModel
 from agvbench.simulator.hidden import HiddenPlant, SealedTruth
 from agvbench.simulator.hidden.constants import BASE
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import DeadBandWithSaturation, LineWithEndStops
 
@@ -40,8 +41,7 @@ def nominal_vehicle() -> VehicleModel:
     return VehicleModel(
         name="firmware_vehicle",
         geometry=Geometry(BASE["front_axle"], BASE["rear_axle"]),
-        command_unit="us",
-        neutral=neutral,
+        channels=Channels.alike("us"),
         front=_servo("front"),
         rear=_servo("rear"),
         drive=DeadBandWithSaturation(low, neutral - dead, neutral + dead, high, forward, -backward),

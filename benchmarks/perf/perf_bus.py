@@ -48,6 +48,7 @@ from agvbench.bus.outbox import CommandOutbox
 from agvbench.bus.session import open_bus_session
 from agvbench.errors import LinkError
 from agvbench.types import Command, Frames, Pose
+from agvbench.vehicle.channels import Channels
 
 BOUND = 1.2
 QOS = {
@@ -93,7 +94,7 @@ class EchoAgv(AgvAdapter):
 
     def identity(self) -> AgvIdentity:
         """Return the identity."""
-        return AgvIdentity("agv1", "echo", "", "", "us", 0.0, simulated=True, lock_step=True)
+        return AgvIdentity("agv1", "echo", "", "", Channels.alike("us", 0.0), simulated=True, lock_step=True)
 
     def apply(self, message: CommandMessage) -> None:
         """Have the camera publish."""

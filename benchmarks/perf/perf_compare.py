@@ -26,6 +26,7 @@ from agvbench.reporting import write_report
 from agvbench.statistics.hypothesis_tests import rank_test
 from agvbench.statistics.intervals import median_difference_interval
 from agvbench.types import Commands, Floats, Frames, Pose, Run
+from agvbench.vehicle.channels import Channels
 
 ROUNDS, RUNS, POSES, REPORT_BOUND_S = 7, 300, 1200, 15.0
 TARGETS = {"1": (2.0, 0.0, 0.0), "2": (-2.0, 0.0, 0.0), "5": (1.0, 1.0, math.pi / 2), "6": (1.0, -1.0, -math.pi / 2)}
@@ -119,7 +120,7 @@ def write_campaign(path: Path) -> Path:
     """Write 300 runs of 1200 poses: four trajectories under two conditions."""
     rng = np.random.default_rng(3)
     writer = CampaignWriter.create(
-        path, CampaignHeader(1, "perf", "AGV", 0.18, 0.18, "us", 1500.0, 120.0), durable=False
+        path, CampaignHeader(1, "perf", "AGV", 0.18, 0.18, Channels.alike("us"), 120.0), durable=False
     )
     t = np.arange(POSES) / 120.0 - 1.0
     share = np.clip(t / 7.0, 0.0, 1.0)

@@ -24,12 +24,13 @@ from rich.table import Table
 
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
 from agvbench.types import Commands, Frames, Pose, Run
+from agvbench.vehicle.channels import Channels
 
 RUNS, POSES, COMMANDS, ROUNDS = 300, 1200, 300, 3
 ROWS = RUNS * (1 + POSES + COMMANDS)
 JOBS = (("append", "a part for each run", 3.0), ("read", "a part for each run", 1.5), ("read file", "one file", 1.0))
 TABLES = ("poses", "commands", "runs")
-HEADER = CampaignHeader(1, "perf", "thesis", 0.1, 0.1, "us", 1500.0, 120.0)
+HEADER = CampaignHeader(1, "perf", "thesis", 0.1, 0.1, Channels.alike("us"), 120.0)
 
 
 def make_run(number: int) -> Run:

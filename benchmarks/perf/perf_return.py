@@ -28,7 +28,8 @@ from agvbench.running.positioning.placers import Auto, Rig
 from agvbench.running.quality import DEFAULT_LIMITS
 from agvbench.running.supervision.supervisor import Supervisor
 from agvbench.simulator.hidden import sampled_spec
-from agvbench.types import Command, Commands, Pose, wrap_angle
+from agvbench.types import Commands, Pose, wrap_angle
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
 
 FIRST_SEED = 3000
@@ -75,7 +76,11 @@ def _jobs(model: VehicleModel, room: Workspace, *, small: bool) -> Iterator[Job]
 def _go(name: str, spec: str, seed: int, returns: int, *, bus: bool) -> Driven:
     small = spec == SMALL
     geometry = Geometry(front_axle_m=0.06, rear_axle_m=0.115)
-    model = nominal_model("small", geometry, "normalised", 0.0, rear_steered=False) if small else uncalibrated_vehicle()
+    model = (
+        nominal_model("small", geometry, Channels.alike("normalised"), rear_steered=False)
+        if small
+        else uncalibrated_vehicle()
+    )
     room, driven = Workspace.parse(ROOM), Driven(name)
     Watched.spec = spec
     neutral = model.neutral
@@ -93,8 +98,7 @@ def _go(name: str, spec: str, seed: int, returns: int, *, bus: bool) -> Driven:
                     _note(driven, start, room)
                     driven.duration_s.append(float(placing.duration_s))
                     driven.attempts.append(placing.attempts)
-                rest = Command(neutral, neutral, neutral)
-                drive(link, commands, neutral=rest, start=start, run_key=None, supervisor=supervisor)
+                drive(link, commands, neutral=neutral, start=start, run_key=None, supervisor=supervisor)
         except AgvbenchError as error:
             driven.failure = str(error)
     return driven

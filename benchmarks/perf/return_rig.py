@@ -53,13 +53,12 @@ def make_watched(seed: int) -> Watched:
 @contextmanager
 def rig(seed: int, model: VehicleModel, *, bus: bool) -> Iterator[RunnerLink]:
     """Open a rig with the plant of `Watched.spec`; its clock may begin anew."""
-    unit, neutral = model.command_unit, model.neutral
     if bus:
         plant = f"{__name__}:make_watched"
-        with open_rig("sim", plant=plant, seed=seed, command_unit=unit, neutral=neutral) as link:
+        with open_rig("sim", plant=plant, seed=seed, channels=model.channels) as link:
             yield ContinuousLink(link)
         return
-    options = AdapterOptions(plant=Watched.spec, seed=seed, command_unit=unit, neutral=neutral)
+    options = AdapterOptions(plant=Watched.spec, seed=seed, channels=model.channels)
     yield ContinuousLink(cast("VehicleLink", ShortCircuit(make_watched(seed), options)))
 
 

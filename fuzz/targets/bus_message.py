@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from agvbench.errors import MessageError
+from agvbench.vehicle.channels import Channels
 from fuzz.target import Target
 
 
@@ -67,7 +68,7 @@ class BusMessage(Target):
             reset,
             reset.sampling,
             Replay(reset, Commands(numbers, numbers, numbers, numbers), 3.0),
-            AgvIdentity("agv1", "sim", "none", "", "us", 1500.0, True, True, extra),
+            AgvIdentity("agv1", "sim", "none", "", Channels.alike("us"), True, True, extra),
             MocapIdentity("sim", 240.0, True, extra),
             TimeMessage(12.5),
             ClaimMessage(7),

@@ -16,8 +16,8 @@ class StillVehicle(AgvAdapter):
         return cls(options)
 
     def identity(self) -> AgvIdentity:
-        name, unit, neutral = self._options.vehicle, self._options.command_unit, self._options.neutral_command
-        return AgvIdentity(name, "still", "none", "", unit, neutral, simulated=False, lock_step=False)
+        name, channels = self._options.vehicle, self._options.channels
+        return AgvIdentity(name, "still", "none", "", channels, simulated=False, lock_step=False)
 
     def apply(self, message: CommandMessage) -> None:
         pass

@@ -25,6 +25,7 @@ from agvbench.bus.session import open_bus_session
 from agvbench.cli import main
 from agvbench.errors import AgvbenchError
 from agvbench.types import Command, Frames
+from agvbench.vehicle.channels import Channels
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "errors-bus.md"
 LINES = dict(re.findall(r"^\| ([^|]+) \| `(.+)` \|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE))
@@ -61,7 +62,7 @@ def control_cycle(
 
 
 def real_and_simulated(agv_simulated: bool) -> Callable[[], Identity]:
-    agv = AgvIdentity("blue", "serial", "1.0", "", "us", 1500.0, simulated=agv_simulated, lock_step=False)
+    agv = AgvIdentity("blue", "serial", "1.0", "", Channels.alike("us"), simulated=agv_simulated, lock_step=False)
     return lambda: Identity.of(agv, MocapIdentity("sim", 120.0, simulated=not agv_simulated))
 
 

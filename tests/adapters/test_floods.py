@@ -118,7 +118,7 @@ def test_what_a_runner_keeps_of_a_flood_is_bounded_and_its_stop_goes_out() -> No
         vehicle = session.declare_subscriber(KEYS.command, heard)
         inbox, outbox = Inbox(session, KEYS), CommandOutbox(session, KEYS)
         liveliness = Liveliness(session, KEYS, WallClock())
-        runner = RealTime(inbox, outbox, liveliness, session=session, keys=KEYS, neutral=1500.0, clock=WallClock())
+        runner = RealTime(inbox, outbox, liveliness, session=session, keys=KEYS, neutral=NEUTRAL, clock=WallClock())
         for number in range(1, 101):
             frames = FramesMessage(number, MAX_ROWS, columns, 0, FrameClock.ADAPTER, 0.0, FramesFlags.LAST, 5)
             session.put(KEYS.report, encode(frames))

@@ -27,6 +27,7 @@ from agvbench.bus.real_time import Failure, measure_offset
 from agvbench.bus.session import open_bus_session
 from agvbench.errors import AgvbenchError, LinkError, RunStoppedError
 from agvbench.types import Command, Frames
+from agvbench.vehicle.channels import Channels
 
 pytestmark = pytest.mark.real_time
 
@@ -112,7 +113,7 @@ class Silent(AgvAdapter):
         return cls()
 
     def identity(self) -> AgvIdentity:
-        return AgvIdentity("agv1", "silent", "1", "", "us", 1500.0, simulated=False, lock_step=False)
+        return AgvIdentity("agv1", "silent", "1", "", Channels.alike("us"), simulated=False, lock_step=False)
 
     def apply(self, message: CommandMessage) -> None:
         self.applied.append(message)

@@ -13,6 +13,7 @@ from agvbench.adapters import open_rig
 from agvbench.bus.clock import SimulatedClock
 from agvbench.errors import AdapterGoneError, LinkError, PlantError
 from agvbench.types import Command, Commands, Frames, Pose
+from agvbench.vehicle.channels import Channels
 
 PERFECT = dict.fromkeys(("lost", "doubled", "late", "wrong", "untracked", "marker_noise_m", "latency_s"), 0.0)
 
@@ -127,10 +128,10 @@ def test_simulated_time_passes_as_commands_are_held() -> None:
 
 
 def test_identity_tells_vehicle_unit_and_rate() -> None:
-    options = {"command_unit": "normalised", "calibration_hash": "abc", "camera": {"rate_hz": 240.0}}
+    options = {"channels": Channels.alike("normalised"), "calibration_hash": "abc", "camera": {"rate_hz": 240.0}}
     with open_rig(plant=TINY, vehicle="blue", seed=4, **options) as link:  # type: ignore[arg-type]
         identity = link.identity()
-    assert (identity.vehicle, identity.command_unit, identity.neutral) == ("blue", "normalised", 0.0)
+    assert (identity.vehicle, identity.channels) == ("blue", Channels.alike("normalised"))
     assert (identity.simulated, identity.lock_step, identity.mocap_rate_hz) == (True, True, 240.0)
     assert identity.calibration_hash == "abc"
     assert identity.agv.extra["seed"] == "4"

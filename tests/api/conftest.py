@@ -15,6 +15,7 @@ from agvbench.campaign import CampaignHeader, CampaignWriter
 from agvbench.model import nominal_model, thesis_vehicle
 from agvbench.planning import load_trajectory
 from agvbench.types import NO_TARGET, Commands, Frames, Run
+from agvbench.vehicle.channels import Channels
 
 TRUTH = thesis_vehicle()
 HOSTILE = "<script>$alert$</script>"
@@ -54,7 +55,7 @@ def runs(trajectory_name: str) -> Iterator[Run]:
         yield Run(
             **names, **shared, repeat=1, target=NO_TARGET, started_s=60.0 * number, commands=commands, frames=frames
         )
-    believed = nominal_model("nominal", TRUTH.geometry, "us", 1500.0)
+    believed = nominal_model("nominal", TRUTH.geometry, Channels.alike("us"))
     for number in range(6):
         condition = ("uncalibrated", "calibrated")[number % 2]
         plan = agvbench.plan(load_trajectory("5"), (believed, TRUTH)[number % 2])
@@ -69,7 +70,7 @@ def runs(trajectory_name: str) -> Iterator[Run]:
 def campaign(tmp_path_factory) -> agvbench.Campaign:
     """The campaign, whose trajectory has a name that no page and no figure may take for markup."""
     path = tmp_path_factory.mktemp("api") / "campaign"
-    header = CampaignHeader(1, f"monday {HOSTILE}", "thesis", 0.181, 0.121, "us", 1500.0, _RATE_HZ)
+    header = CampaignHeader(1, f"monday {HOSTILE}", "thesis", 0.181, 0.121, Channels.alike("us"), _RATE_HZ)
     writer = CampaignWriter.create(path, header, durable=False)
     for run in runs(HOSTILE):
         writer.append(run)

@@ -39,6 +39,7 @@ from agvbench.bus.messages.truth import Truth, decode_truth
 from agvbench.errors import LinkError, MessageError, PlanError
 from agvbench.registry import own_classes
 from agvbench.types import Command, Commands, Frames, Pose
+from agvbench.vehicle.channels import Channels
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 anything = st.floats()
@@ -300,7 +301,7 @@ def _one(codec: Any) -> Any:
         "command": CommandMessage(1, 0.0, Command(0.0, 0.0, 0.0), 0.1),
         "frames": FramesMessage(1, 0, b""),
         "event": Event(1, "agv", Level.INFO, "kind", "text"),
-        "agv_identity": AgvIdentity("a", "b", "c", "d", "us", 1500.0, True, True),
+        "agv_identity": AgvIdentity("a", "b", "c", "d", Channels.alike("us"), True, True),
         "mocap_identity": MocapIdentity("a", 120.0, True),
         "reset": reset,
         "sampling": Sampling(120.0, 0.0),

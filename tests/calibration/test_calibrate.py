@@ -15,6 +15,7 @@ from agvbench.calibration import calibrate
 from agvbench.errors import FitError, InputError, VehicleError
 from agvbench.model import VehicleModel
 from agvbench.types import Commands, Run
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
 
 STEPS = np.arange(-600.0, 601.0, 200.0)
@@ -26,8 +27,11 @@ class Header:
     vehicle_name: str = "agv1"
     front_axle_m: float = FRONT_M
     rear_axle_m: float = REAR_M
-    command_unit: str = "us"
-    neutral: float = 1500.0
+    channels: Channels = Channels.alike("us")  # noqa: RUF009
+
+    @property
+    def neutral(self):
+        return self.channels.neutral
 
     @property
     def geometry(self) -> Geometry:
@@ -191,7 +195,7 @@ def free_runs(count=6, seed=0, gain=1.0, session="a", neutral=0.0, both_ways=Fal
     return runs
 
 
-NORMALISED = {"front_axle_m": 0.06, "rear_axle_m": 0.115, "command_unit": "normalised", "neutral": 0.0}
+NORMALISED = {"front_axle_m": 0.06, "rear_axle_m": 0.115, "channels": Channels.alike("normalised")}
 
 
 @pytest.fixture(scope="module")
@@ -290,7 +294,7 @@ def test_measured_free_driving_gives_a_vehicle_like_the_real_one(tmp_path):
 
     campaign = import_recordings("dart", sorted(MEASURED.glob("steering_sweep_*.csv")), tmp_path / "dart")
     model = calibrate(campaign).model
-    assert model.command_unit == "normalised"
+    assert model.channels == Channels.alike("normalised")
     # A car of 0.175 m wheelbase: +1 turns left; its tightest circles have a radius of about half a metre.
     low, high = model.front.output_range
     assert model.front.is_rising

@@ -12,8 +12,9 @@ from test_calibrate import PLAN, STEPS, drive_all, front, rear, speed
 from agvbench.campaign import CampaignHeader, CampaignWriter
 from agvbench.cli import main
 from agvbench.model import Prior, VehicleModel, thesis_vehicle
+from agvbench.vehicle.channels import Channels
 
-HEADER = CampaignHeader(1, "tonight", "agv1", FRONT_M, REAR_M, "us", 1500.0, 60.0)
+HEADER = CampaignHeader(1, "tonight", "agv1", FRONT_M, REAR_M, Channels.alike("us"), 60.0)
 
 
 @pytest.fixture(scope="module")

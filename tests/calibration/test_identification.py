@@ -10,8 +10,10 @@ import pytest
 from agvbench.calibration.identification import PoseNoise, identify
 from agvbench.errors import FitError, InputError
 from agvbench.model.simulation.simulation import SimulatedRun, Simulation
-from agvbench.types import Commands
+from agvbench.types import Command, Commands
 from agvbench.vehicle.geometry import Geometry
+
+NEUTRAL = Command(1500.0, 1500.0, 1500.0)
 
 GEOMETRY = Geometry(0.181, 0.121)
 NOISE = PoseNoise(3e-4, 1e-3)
@@ -63,7 +65,7 @@ def campaign():
     rng = np.random.default_rng(4)
     told = [commands(rng) for _ in range(6)]
     starts = [(*rng.uniform(-1.0, 1.0, 2), rng.uniform(-3.0, 3.0)) for _ in told]
-    simulation = Simulation(GEOMETRY, 1500.0, [SimulatedRun(c, FRAMES_S) for c in told])
+    simulation = Simulation(GEOMETRY, NEUTRAL, [SimulatedRun(c, FRAMES_S) for c in told])
     settled = simulation.settled(front_rad, lambda c: np.zeros(len(c)), speed_mps)
     true = np.concatenate([driven(c, s) for c, s in zip(told, starts, strict=True)])
     return simulation, settled, true, np.array(starts)

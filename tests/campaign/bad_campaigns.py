@@ -16,6 +16,7 @@ from motion_samples import Change, bench, reversed_in_time, write
 
 from agvbench.campaign import Campaign, CampaignWriter
 from agvbench.campaign.tables.parquet import read_parquet
+from agvbench.vehicle.channels import Channels
 
 HERE = Path("c")
 Cases = dict[str, tuple[str, Callable[[], object]]]
@@ -160,7 +161,7 @@ def _create_twice() -> None:
 
 def _resume_otherwise() -> None:
     CampaignWriter.create(HERE, HEADER)
-    CampaignWriter.resume(HERE, replace(HEADER, neutral=1490.0))
+    CampaignWriter.resume(HERE, replace(HEADER, channels=Channels.alike("us", 1490.0)))
 
 
 def _resume_files() -> None:
@@ -196,7 +197,7 @@ CASES: Cases = {
     ),
     "head-too-large": ("a `campaign.toml` of 2 MB", _file("campaign.toml", lambda p: p.write_bytes(b"#" * (2 << 20)))),
     "head-without-schema": ("no `schema`", _head("schema", None)),
-    "head-of-the-future": ("`schema = 4`", _head("schema", 4)),
+    "head-of-the-future": ("`schema = 5`", _head("schema", 5)),
     "head-schema-zero": ("`schema = 0`", _head("schema", 0)),
     "head-lacks-key": ("no `vehicle.front_axle_m`", _head("front_axle_m", None, "vehicle")),
     "head-wrong-type": ("text where a number belongs", _head("rear_axle_m", "9 cm", "vehicle")),

@@ -12,6 +12,7 @@ import tomli_w
 
 from agvbench.campaign import CampaignHeader
 from agvbench.types import Commands, Frames, Pose, Run
+from agvbench.vehicle.channels import Channels
 
 HEADER = CampaignHeader(
     schema=1,
@@ -19,8 +20,7 @@ HEADER = CampaignHeader(
     vehicle_name="thesis",
     front_axle_m=0.11,
     rear_axle_m=0.09,
-    command_unit="us",
-    neutral=1500.0,
+    channels=Channels.alike("us"),
     mocap_rate_hz=120.0,
 )
 

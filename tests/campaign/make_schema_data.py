@@ -14,6 +14,7 @@ import pandas as pd
 
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
 from agvbench.types import NO_TARGET, Commands, Frames, Pose, Run
+from agvbench.vehicle.channels import Channels
 
 COUNT = 12
 
@@ -43,7 +44,7 @@ def saved_runs() -> list[Run]:
 
 def main(directory: Path) -> None:
     """Write the same campaign as parts, as parquet files and as CSV."""
-    header = CampaignHeader(1, "saved", "thesis", 0.11, 0.09, "us", 1500.0, 120.0, 1.0, 0.5)
+    header = CampaignHeader(1, "saved", "thesis", 0.11, 0.09, Channels.alike("us"), 120.0, 1.0, 0.5)
     writer = CampaignWriter.create(directory / "parts", header)
     for run in saved_runs():
         writer.append(run)

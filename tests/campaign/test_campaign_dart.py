@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from agvbench.campaign import Campaign, import_recordings
+from agvbench.vehicle.channels import Channels
 
 MEASURED = Path(os.environ.get("AGVBENCH_MEASURED", Path(__file__).resolve().parents[3] / "shared" / "measured"))
 FILES = sorted((MEASURED / "dart").glob("*.csv"))
@@ -54,7 +55,7 @@ def test_sessions_are_days_and_the_head_describes_the_car(campaign: Campaign) ->
     assert campaign.runs["session"].unique().tolist() == ["2024-07-19", "2024-09-16", "2024-09-25"]
     header = campaign.header
     assert header.front_axle_m + header.rear_axle_m == pytest.approx(0.175)
-    assert (header.command_unit, header.neutral, header.prediction_horizon_s) == ("normalised", 0.0, 2.0)
+    assert (header.channels, header.prediction_horizon_s) == (Channels.alike("normalised"), 2.0)
     assert (campaign.commands["rear"] == 0.0).all()
     assert campaign.commands["front"].abs().max() == pytest.approx(1.0)
 

@@ -16,6 +16,7 @@ from agvbench.campaign.recordings.guess import guess_mapping
 from agvbench.campaign.recordings.mapping import load_mapping
 from agvbench.cli import main
 from agvbench.errors import AgvbenchError, FileError
+from agvbench.vehicle.channels import Channels
 
 ROWS, RATE_HZ = 1000, 50.0
 
@@ -78,7 +79,7 @@ def test_a_recording_is_imported_as_it_was_driven(style, tmp_path):
     np.testing.assert_allclose(wrapped(run.frames.heading_rad - truth["heading"][first:]), 0.0, atol=1e-6)
     np.testing.assert_allclose(np.diff(run.frames.t_s), 1.0 / RATE_HZ, atol=1e-4)
     unit = {"pulses since 1970": "us", "differential": "si"}.get(style, "normalised")
-    assert (campaign.header.command_unit, campaign.header.neutral) == (unit, 1500.0 if unit == "us" else 0.0)
+    assert campaign.header.channels == Channels.alike(unit)
     assert campaign.header.geometry.is_differential is (style == "differential")
     assert campaign.header.mocap_rate_hz == pytest.approx(RATE_HZ, rel=0.01)
 

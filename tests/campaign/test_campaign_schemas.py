@@ -9,6 +9,7 @@ from campaign_samples import assert_same_run
 from make_schema_data import saved_runs
 
 from agvbench.campaign import Campaign
+from agvbench.vehicle.channels import Channels
 
 DATA = Path(__file__).parent / "data"
 
@@ -19,8 +20,8 @@ def test_saved_campaigns_read_as_they_were_written(saved: str) -> None:
     for expected, run in zip(saved_runs(), campaign, strict=True):
         assert_same_run(expected, run)
     header = campaign.header
-    assert (header.schema, header.name, header.vehicle_name, header.command_unit) == (1, "saved", "thesis", "us")
-    assert (header.front_axle_m, header.rear_axle_m, header.neutral) == (0.11, 0.09, 1500.0)
+    assert (header.schema, header.name, header.vehicle_name) == (1, "saved", "thesis")
+    assert (header.front_axle_m, header.rear_axle_m, header.channels) == (0.11, 0.09, Channels.alike("us"))
     assert (header.mocap_rate_hz, header.prediction_horizon_s, header.prediction_stride_s) == (120.0, 1.0, 0.5)
 
 

@@ -11,10 +11,12 @@ import numpy as np
 
 from agvbench.campaign import CampaignHeader
 from agvbench.types import NO_TARGET, Commands, Frames, Run
+from agvbench.vehicle.channels import Channels
 
 HEADER = CampaignHeader(
-    schema=3, name="differential", vehicle_name="turtle", front_axle_m=0.0, rear_axle_m=0.1, command_unit="si",
-    neutral=0.0, mocap_rate_hz=50.0, prediction_horizon_s=2.0, prediction_stride_s=1.0, kinematics="differential",
+    schema=3, name="differential", vehicle_name="turtle", front_axle_m=0.0, rear_axle_m=0.1,
+    channels=Channels.alike("si"), mocap_rate_hz=50.0, prediction_horizon_s=2.0, prediction_stride_s=1.0,
+    kinematics="differential",
 )  # fmt: skip
 _STEP_S, _FRAME_S, _COMMAND_S = 0.002, 0.02, 0.1
 _TRACK_M = 0.4

@@ -18,6 +18,7 @@ from agvbench.diagnosis.selection.candidates import candidates
 from agvbench.model import nominal_model
 from agvbench.planning import Workspace, plan, trajectory_from_table
 from agvbench.types import Pose
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
 
 GEOMETRY = Geometry(HEADER.front_axle_m, HEADER.rear_axle_m)
@@ -71,7 +72,7 @@ def test_the_run_that_separates_rivals_does_so_when_it_is_driven(diagnosed):
     assert experiment is not None
     assert not proposal.inseparable
     trajectory = trajectory_from_table(experiment.to_table()["trajectory"])
-    nominal = nominal_model("tiny", GEOMETRY, "us", HEADER.neutral)
+    nominal = nominal_model("tiny", GEOMETRY, Channels.alike("us"))
     commands = plan(trajectory, nominal).commands
     rng = np.random.default_rng(5)
     alternative = swapped(chosen, "steering_lag", "axle_coupling", candidates(GEOMETRY))
@@ -140,7 +141,7 @@ def test_starts_keep_the_run_on_a_small_floor(diagnosed):
     experiment = discriminate(
         selection.chosen.fit, alternatives, candidates(GEOMETRY), unit="us", workspace=repeatability
     ).experiment
-    commands = plan(experiment.trajectory, nominal_model("tiny", GEOMETRY, "us", HEADER.neutral)).commands
+    commands = plan(experiment.trajectory, nominal_model("tiny", GEOMETRY, Channels.alike("us"))).commands
     for start in experiment.starts:
         frames = drive(truth, commands, Pose(*start), 0.0, np.random.default_rng(0))
         assert np.hypot(frames.x_m, frames.y_m).max() < 1.2

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tiny_vehicle import FRONT_M, NEUTRAL, REAR_M, Tiny, campaign_runs
+from tiny_vehicle import FRONT_M, NEUTRAL, NEUTRAL_COMMAND, REAR_M, Tiny, campaign_runs
 
 from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.model.batch import Batch, GroupedSums
@@ -31,7 +31,7 @@ def test_terms_that_belong_together_are_summed(places):
 @pytest.fixture(scope="module")
 def predictor():
     readings = read_runs(campaign_runs(Tiny())).select(np.arange(0, 40, 4))
-    maps = nodal_maps(readings.runs, NEUTRAL)
+    maps = nodal_maps(readings.runs, NEUTRAL_COMMAND)
     batch = Batch(readings, maps, Geometry(FRONT_M, REAR_M))
     assert not batch.by_node
     return Predictor(batch, ("steering_lag",))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tiny_vehicle import HEADER, NEUTRAL, Tiny, campaign_runs
+from tiny_vehicle import HEADER, NEUTRAL_COMMAND, Tiny, campaign_runs
 from whole_information import every_parameter
 
 from agvbench.diagnosis.data.readings import read_runs
@@ -25,6 +25,7 @@ from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.candidates import bounds_of
 from agvbench.model import nominal_model
 from agvbench.model.priors import Prior
+from agvbench.vehicle.channels import Channels
 
 LATENCY = Prior("mocap_latency", "latency_s", 0.008, 0.001, "data sheet")
 DELAY = Prior("actuation_delay", "delay_s", 0.0, 0.001, "oscilloscope")
@@ -98,11 +99,11 @@ def test_the_gradient_is_minus_half_the_derivative_of_the_loss(seed):
 def batch():
     """Return a few runs of a vehicle that obeys 20 ms late."""
     runs = [run for run in campaign_runs(Tiny(delay_s=0.02)) if run.experiment in {"step", "trajectory"}][:12]
-    return Batch(read_runs(runs, NEUTRAL), nodal_maps(runs, NEUTRAL), HEADER.geometry)
+    return Batch(read_runs(runs, NEUTRAL_COMMAND), nodal_maps(runs, NEUTRAL_COMMAND), HEADER.geometry)
 
 
 def start_of(batch):
-    nominal = nominal_model("tiny", HEADER.geometry, "us", NEUTRAL)
+    nominal = nominal_model("tiny", HEADER.geometry, Channels.alike("us"))
     return np.concatenate([getattr(nominal, role)(batch.maps.nodes[role]) for role in ROLES])
 
 

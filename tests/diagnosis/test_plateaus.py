@@ -6,7 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tiny_vehicle import FRONT_M, NEUTRAL, REAR_M, InMemory, Tiny, campaign_runs, drive, held, rear_of, switched
+from tiny_vehicle import (
+    FRONT_M,
+    NEUTRAL,
+    NEUTRAL_COMMAND,
+    REAR_M,
+    InMemory,
+    Tiny,
+    campaign_runs,
+    drive,
+    held,
+    rear_of,
+    switched,
+)
 
 from agvbench.diagnosis import Verdict, diagnose
 from agvbench.diagnosis.data.readings import read_runs
@@ -67,10 +79,10 @@ def play():
 @pytest.fixture(scope="module")
 def selector(play):
     """Return a selector of these runs."""
-    readings, geometry = read_runs(play.runs, NEUTRAL), Geometry(FRONT_M, REAR_M)
-    maps = nodal_maps(readings.runs, NEUTRAL)
+    readings, geometry = read_runs(play.runs, NEUTRAL_COMMAND), Geometry(FRONT_M, REAR_M)
+    maps = nodal_maps(readings.runs, NEUTRAL_COMMAND)
     prior_model = {role: np.zeros(len(maps.nodes[role])) for role in ROLES}
-    start = start_values(maps, steady_drives(play.runs, geometry, NEUTRAL), prior_model)
+    start = start_values(maps, steady_drives(play.runs, geometry, NEUTRAL_COMMAND), prior_model)
     return Selector(Batch(readings, maps, geometry), candidates(geometry), start, 0, lambda _: None)
 
 

@@ -6,12 +6,13 @@ import json
 from dataclasses import replace
 
 import pytest
-from tiny_vehicle import FRONT_M, HEADER, NEUTRAL, REAR_M, InMemory, Tiny
+from tiny_vehicle import FRONT_M, HEADER, REAR_M, InMemory, Tiny
 
 from agvbench.diagnosis import Verdict, diagnose
 from agvbench.effects import WheelbaseError
 from agvbench.model import Prior, nominal_model
 from agvbench.model.priors import priors_to_toml
+from agvbench.vehicle.channels import Channels
 
 pytestmark = pytest.mark.slow
 
@@ -25,7 +26,7 @@ NO_DELAY = Prior("actuation_delay", "delay_s", 0.0, 0.001, "oscilloscope")
 
 def stated(*priors, effects=()):
     """Return the nominal vehicle with priors."""
-    return replace(nominal_model("tiny", HEADER.geometry, "us", NEUTRAL), priors=priors, effects=effects)
+    return replace(nominal_model("tiny", HEADER.geometry, Channels.alike("us")), priors=priors, effects=effects)
 
 
 def seen_late(campaign, latency_s):

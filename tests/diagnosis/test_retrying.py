@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tiny_vehicle import FRONT_M, HEADER, NEUTRAL, REAR_M, Tiny
+from tiny_vehicle import FRONT_M, HEADER, NEUTRAL_COMMAND, REAR_M, Tiny
 
 from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.discrepancy import stepwise as empirical
@@ -31,9 +31,9 @@ NO_LIMIT = np.array([[0.0, 5.0]])
 def selector(tiny_campaign):
     runs = list(tiny_campaign(Tiny(steering_lag_s=0.15)))
     readings, geometry = read_runs(runs, HEADER.neutral), Geometry(FRONT_M, REAR_M)
-    maps = nodal_maps(readings.runs, NEUTRAL)
+    maps = nodal_maps(readings.runs, NEUTRAL_COMMAND)
     prior_model = {role: np.zeros(len(maps.nodes[role])) for role in ROLES}
-    start = start_values(maps, steady_drives(runs, geometry, NEUTRAL), prior_model)
+    start = start_values(maps, steady_drives(runs, geometry, NEUTRAL_COMMAND), prior_model)
     return Selector(Batch(readings, maps, geometry), candidates(geometry), start, 0, lambda _: None)
 
 

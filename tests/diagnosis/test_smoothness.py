@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tiny_selector import selector_of
-from tiny_vehicle import NEUTRAL, InMemory, Tiny, campaign_runs, drive
+from tiny_vehicle import NEUTRAL, NEUTRAL_COMMAND, InMemory, Tiny, campaign_runs, drive
 
 from agvbench.diagnosis import diagnose
 from agvbench.diagnosis.data.readings import read_runs
@@ -18,7 +18,7 @@ from agvbench.diagnosis.model.smoothness import SmoothnessPrior, typical_speed_m
 from agvbench.types import Commands, Pose, Run
 
 NODES = np.array([1000.0, 1150.0, 1300.0, 1312.0, 1400.0, 1600.0, 1700.0, 1850.0, 2000.0])
-MAPS = NodalMaps(dict.fromkeys(ROLES, NODES), NEUTRAL)
+MAPS = NodalMaps(dict.fromkeys(ROLES, NODES), NEUTRAL_COMMAND)
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tiny_vehicle import NEUTRAL, InMemory, Tiny, campaign_runs, drive
+from tiny_vehicle import NEUTRAL, NEUTRAL_COMMAND, InMemory, Tiny, campaign_runs, drive
 
 from agvbench.diagnosis import Verdict, diagnose
 from agvbench.diagnosis.model.nodal_maps import nodal_maps, select_levels
@@ -77,7 +77,7 @@ def test_a_lag_is_found_beside_it():
 
 
 def test_a_value_lies_at_every_level_that_was_held():
-    maps = nodal_maps(swinging(Tiny()), NEUTRAL)
+    maps = nodal_maps(swinging(Tiny()), NEUTRAL_COMMAND)
     assert {1000.0, 1150.0, 1300.0, 1400.0, 1600.0, 1700.0, 1850.0, 2000.0} <= set(maps.nodes["front"])
     assert all(len(nodes) <= MOST for nodes in maps.nodes.values())
 
@@ -114,7 +114,7 @@ def test_levels_that_are_only_passed_have_no_value_beside_held_ones():
         np.array([0.0, 0.4, 0.45, 0.5, 0.55, 2.0]), np.r_[NEUTRAL, np.full(4, 900.0), NEUTRAL],
         np.r_[1300.0, passed, 1300.0], np.full(6, NEUTRAL),
     )  # fmt: skip
-    nodes = nodal_maps([*runs, dataclasses.replace(runs[0], commands=sweep)], NEUTRAL).nodes["front"]
+    nodes = nodal_maps([*runs, dataclasses.replace(runs[0], commands=sweep)], NEUTRAL_COMMAND).nodes["front"]
     # The last level is held until the vehicle stops.
     assert not {*passed[:3]} & {*nodes}
     assert {1000.0, 1300.0, 1340.0, 1700.0} <= {*nodes}

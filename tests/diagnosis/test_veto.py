@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tiny_vehicle import FRONT_M, HEADER, NEUTRAL, REAR_M, InMemory, Tiny
+from tiny_vehicle import FRONT_M, HEADER, NEUTRAL_COMMAND, REAR_M, InMemory, Tiny
 
 from agvbench.diagnosis import Verdict, diagnose
 from agvbench.diagnosis.data.readings import read_runs
@@ -27,9 +27,9 @@ def chooser(campaign):
     runs = list(campaign)
     readings, geometry = read_runs(runs, HEADER.neutral), Geometry(FRONT_M, REAR_M)
     held = ~split_runs(readings.runs, readings.group, 0).training
-    maps = nodal_maps(readings.runs, NEUTRAL)
+    maps = nodal_maps(readings.runs, NEUTRAL_COMMAND)
     prior_model = {role: np.zeros(len(maps.nodes[role])) for role in ROLES}
-    start = start_values(maps, steady_drives(runs, geometry, NEUTRAL), prior_model)
+    start = start_values(maps, steady_drives(runs, geometry, NEUTRAL_COMMAND), prior_model)
     batch = Batch(readings.select(~held), maps, geometry)
     return Selector(batch, candidates(geometry), start, 0, lambda _: None), readings, held
 

@@ -10,7 +10,7 @@ import pytest
 from free_drives import FREE_HEADER, free_runs
 from hypothesis import given
 from hypothesis import strategies as st
-from tiny_vehicle import HEADER, NEUTRAL, Tiny, campaign_runs
+from tiny_vehicle import HEADER, NEUTRAL, NEUTRAL_COMMAND, Tiny, campaign_runs
 
 from agvbench.diagnosis.data.readings import Readings, read_windows
 from agvbench.diagnosis.data.window_splits import held_out_windows, thinned
@@ -43,12 +43,12 @@ def arc(speed: float, yaw: float, noise_m: float = 0.0, seconds: float = 8.0, ra
 
 def cut(run: Run) -> list[Window]:
     """Return the windows of a run that is a recording of its own."""
-    return cut_windows(run, HORIZON, NEUTRAL, RecordedMotion.of([run]))
+    return cut_windows(run, HORIZON, NEUTRAL_COMMAND, RecordedMotion.of([run]))
 
 
 @pytest.fixture(scope="module")
 def readings() -> Readings:
-    return read_windows(free_runs(QUIET, sessions=3, runs=1), HORIZON, NEUTRAL)
+    return read_windows(free_runs(QUIET, sessions=3, runs=1), HORIZON, NEUTRAL_COMMAND)
 
 
 @given(speed=st.floats(0.1, 2.0), yaw=st.floats(-2.0, 2.0).filter(lambda w: abs(w) > 0.01))
@@ -63,7 +63,7 @@ def test_the_state_on_a_circle_is_that_of_the_circle(speed, yaw):
 
 def test_the_naive_predictor_goes_on_along_the_circle():
     windows = cut(arc(0.8, 0.9))
-    read = read_windows([arc(0.8, 0.9)], HORIZON, NEUTRAL)
+    read = read_windows([arc(0.8, 0.9)], HORIZON, NEUTRAL_COMMAND)
     assert len(read) == len(windows) > 3
     np.testing.assert_allclose(constant_velocity(read), read.poses, atol=0.003)
 
@@ -71,10 +71,10 @@ def test_the_naive_predictor_goes_on_along_the_circle():
 def test_nothing_after_the_beginning_is_used():
     run = arc(0.5, 0.3, noise_m=1e-3)
     recorded = RecordedMotion.of([run])
-    before = cut_windows(run, HORIZON, NEUTRAL, recorded)[0]
+    before = cut_windows(run, HORIZON, NEUTRAL_COMMAND, recorded)[0]
     later = run.frames.t_s > before.t0_s
     perturbed = dataclasses.replace(run.frames, x_m=run.frames.x_m + 0.01 * later * np.sin(40.0 * run.frames.t_s))
-    again = cut_windows(dataclasses.replace(run, frames=perturbed), HORIZON, NEUTRAL, recorded)[0]
+    again = cut_windows(dataclasses.replace(run, frames=perturbed), HORIZON, NEUTRAL_COMMAND, recorded)[0]
     for name in ("start", "speed_mps", "recent_speed_mps", "constant_velocity"):
         np.testing.assert_allclose(getattr(again, name), getattr(before, name), atol=1e-12)
     assert not np.allclose(again.poses, before.poses, atol=1e-3)
@@ -138,20 +138,20 @@ def _at_rest(run: Run) -> Run:
     ],
 )  # fmt: skip
 def test_a_run_without_windows_says_why_with_figure_and_limit(run, reason):
-    assert read_windows([run], HORIZON, NEUTRAL).refused["arc"].startswith(reason)
+    assert read_windows([run], HORIZON, NEUTRAL_COMMAND).refused["arc"].startswith(reason)
 
 
 def test_no_window_begins_before_the_first_command():
     run = arc(0.5, 0.3)
     late = dataclasses.replace(run, commands=dataclasses.replace(run.commands, t_s=np.array([3.0])))
-    windows = read_windows([late], HORIZON, NEUTRAL)
+    windows = read_windows([late], HORIZON, NEUTRAL_COMMAND)
     assert windows.begins_s.min() >= 3.0
-    start = start_values_of_windows(smooth_maps(windows.runs, NEUTRAL, 9, 6), windows, GEOMETRY)
+    start = start_values_of_windows(smooth_maps(windows.runs, NEUTRAL_COMMAND, 9, 6), windows, GEOMETRY)
     assert np.isfinite(start).all()
 
 
 def test_a_direction_that_was_never_driven_mirrors_the_other(readings):
-    maps = smooth_maps(readings.runs, NEUTRAL, 9, 6)
+    maps = smooth_maps(readings.runs, NEUTRAL_COMMAND, 9, 6)
     assert (maps.nodes["drive"] < NEUTRAL).all()
     command = NEUTRAL + np.array([-300.0, -50.0, 0.0, 50.0, 300.0])
     speed = maps.weights("drive", command) @ np.arange(6.0, 0.0, -1.0)
@@ -168,7 +168,7 @@ def test_runs_from_rest_stay_runs_and_free_driving_becomes_windows():
 
 def test_slopes_by_nodes_are_those_of_whole_maps(readings):
     some = readings.select(np.arange(0, len(readings), 9))
-    maps = smooth_maps(some.runs, NEUTRAL, 9, 6)
+    maps = smooth_maps(some.runs, NEUTRAL_COMMAND, 9, 6)
     batch = Batch(some, maps, GEOMETRY, 0.1)
     assert batch.by_node
     predictor = Predictor(batch, ("steering_lag", "cornering_speed_loss"))
@@ -188,7 +188,7 @@ def test_slopes_by_nodes_are_those_of_whole_maps(readings):
 def test_start_values_are_near_the_maps_that_drove(readings):
     from tiny_vehicle import front_of, speed_of
 
-    maps = smooth_maps(readings.runs, NEUTRAL, 9, 6)
+    maps = smooth_maps(readings.runs, NEUTRAL_COMMAND, 9, 6)
     start, where = start_values_of_windows(maps, readings, GEOMETRY), maps.slices()
     inner = slice(2, -2)
     fronts = [front_of(c) for c in maps.nodes["front"]]

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 from free_drives import FREE_HEADER, free_runs
-from tiny_vehicle import NEUTRAL, Tiny
+from tiny_vehicle import NEUTRAL_COMMAND, Tiny
 
 from agvbench.diagnosis import Diagnosis, Verdict, diagnose
 from agvbench.diagnosis.data.readings import read_windows
@@ -106,8 +106,8 @@ def test_few_long_recordings_on_a_mirrored_floor_are_refused():
 
 
 def test_an_angle_that_no_axle_has_is_the_limit_in_the_corrected_vehicle():
-    readings = read_windows(free_runs(Tiny(), sessions=2, runs=1), Horizon(2.0, 1.0), NEUTRAL)
-    fitted = static_maps(readings, FREE_HEADER.geometry, NEUTRAL)
+    readings = read_windows(free_runs(Tiny(), sessions=2, runs=1), Horizon(2.0, 1.0), NEUTRAL_COMMAND)
+    fitted = static_maps(readings, FREE_HEADER.geometry, NEUTRAL_COMMAND)
     maps = fitted.predictor.maps
     wild = fitted.parameters.copy()
     wild[maps.slices()["front"]] *= 100.0

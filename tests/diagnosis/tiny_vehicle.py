@@ -14,16 +14,17 @@ import numpy as np
 
 from agvbench.campaign import CampaignHeader
 from agvbench.types import NO_TARGET, Command, Commands, Frames, Pose, Run
+from agvbench.vehicle.channels import Channels
 
 FRONT_M, REAR_M, NEUTRAL = 0.181, 0.121, 1500.0
+NEUTRAL_COMMAND = Command(NEUTRAL, NEUTRAL, NEUTRAL)
 HEADER = CampaignHeader(
     schema=1,
     name="tiny",
     vehicle_name="tiny",
     front_axle_m=FRONT_M,
     rear_axle_m=REAR_M,
-    command_unit="us",
-    neutral=NEUTRAL,
+    channels=Channels.alike("us"),
     mocap_rate_hz=60.0,
 )
 _STEP_S = 1.0 / 240.0

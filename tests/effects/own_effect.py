@@ -56,10 +56,10 @@ import numpy as np
 from agvbench.model import example_vehicle
 from agvbench.effects import effect_kinds
 from agvbench.model.simulation.simulation import SimulatedRun, Simulation
-from agvbench.types import Commands
+from agvbench.types import Command, Commands
 from agvbench.vehicle.geometry import Geometry
 run = SimulatedRun(Commands(*np.array([[0.0], [1000.0], [1300.0], [1500.0]])), np.array([0.0, 0.1]))
-simulation = Simulation(Geometry(0.2, 0.1), 1500.0, [run])
+simulation = Simulation(Geometry(0.2, 0.1), Command(1500.0, 1500.0, 1500.0), [run])
 settled, start = np.array([[0.0, 0.0, 0.0], [0.4, 0.0, 0.3]]), np.zeros((1, 4))
 slower = simulation.parameters([effect_kinds()["lateral_load_loss"](loss=1.0)])
 for parameters in (simulation.parameters(), slower):

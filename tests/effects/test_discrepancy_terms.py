@@ -17,8 +17,10 @@ from agvbench.effects import TIME_HOOKS, effect_kinds
 from agvbench.effects import state as s
 from agvbench.errors import InputError
 from agvbench.model.simulation.simulation import SimulatedRun, Simulation
-from agvbench.types import Commands
+from agvbench.types import Command, Commands
 from agvbench.vehicle.geometry import Geometry
+
+NEUTRAL = Command(1500.0, 1500.0, 1500.0)
 
 each_term = pytest.mark.parametrize("term", TERMS, ids=[term.name for term in TERMS])
 OF_TIME = [term for term in TERMS if issubclass(term, ByCampaignTime)]
@@ -42,7 +44,7 @@ def test_it_is_declared_as_an_effect_is(term: type[DiscrepancyTerm]) -> None:
 def test_a_change_holds_in_its_part_of_the_campaign_only(term: type[DiscrepancyTerm]) -> None:
     hours = (0.1, 0.5, 0.9)
     runs = [SimulatedRun(COMMANDS, np.linspace(0.2, 4.0, 40), started_h=h) for h in hours]
-    simulation = Simulation(Geometry(0.18, 0.12), 1500.0, runs, kinds=(term,))
+    simulation = Simulation(Geometry(0.18, 0.12), NEUTRAL, runs, kinds=(term,))
     nothing = simulation.parameters()
     values = {p.name: p.scale for p in term.parameters()} | {"begins_h": 0.3, "ends_h": 0.7, "time_constant_h": 0.0}
     inside = nothing.copy()
@@ -58,7 +60,7 @@ def test_a_change_holds_in_its_part_of_the_campaign_only(term: type[DiscrepancyT
 def test_a_change_is_in_proportion_to_its_column_only(term: type[DiscrepancyTerm]) -> None:
     logged = ((0.0, 0.0, 5.0), (-3.0, 0.01, 0.0), (0.0, 0.02, 5.0), ())
     runs = [SimulatedRun(COMMANDS, np.linspace(0.2, 4.0, 40), logged=values) for values in logged]
-    simulation = Simulation(Geometry(0.18, 0.12), 1500.0, runs, kinds=(term,))
+    simulation = Simulation(Geometry(0.18, 0.12), NEUTRAL, runs, kinds=(term,))
     nothing = simulation.parameters()
     second = nothing.copy()
     second[simulation.indices(term.name)] = [p.scale for p in term.parameters()]
@@ -73,7 +75,7 @@ def test_more_columns_than_the_simulation_holds_are_refused() -> None:
     assert LOGGED.max_regressors <= s.LOGGED_COUNT
     run = SimulatedRun(COMMANDS, np.linspace(0.2, 4.0, 4), logged=(0.0,) * (s.LOGGED_COUNT + 1))
     with pytest.raises(InputError, match="too many logged values"):
-        Simulation(Geometry(0.18, 0.12), 1500.0, [run])
+        Simulation(Geometry(0.18, 0.12), NEUTRAL, [run])
 
 
 @given(hours=st.floats(0.0, 20.0), begin=st.floats(0.0, 5.0), end=st.floats(0.0, 10.0), constant=st.floats(0.0, 6.0))

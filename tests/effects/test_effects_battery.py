@@ -24,9 +24,11 @@ from agvbench.model.simulation.hook_errors import check_hooks
 from agvbench.model.simulation.simulation import SimulatedRun, Simulation
 from agvbench.registry import own_classes
 from agvbench.reporting.console.effects import reference_page
-from agvbench.types import Commands
+from agvbench.types import Command, Commands
 from agvbench.vehicle.geometry import Geometry
 from agvbench.workflows.effects import template_text
+
+NEUTRAL = Command(1500.0, 1500.0, 1500.0)
 
 KINDS = effect_kinds()
 each_effect = pytest.mark.parametrize("cls", KINDS.values(), ids=KINDS.keys())
@@ -63,7 +65,7 @@ INITIAL = np.array([[0.5, 0.2, 0.3, 0.0]])
 
 @pytest.fixture(scope="module")
 def simulation() -> Simulation:
-    return Simulation(Geometry(0.18, 0.12), 1500.0, [RUN])
+    return Simulation(Geometry(0.18, 0.12), NEUTRAL, [RUN])
 
 
 def test_every_file_of_the_package_adds_an_effect() -> None:

@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from agvbench.effects import Effect, effect_kinds
 from agvbench.effects import state as s
 from agvbench.model.simulation.simulation import SimulatedRun, Simulation
-from agvbench.types import Commands
+from agvbench.types import Command, Commands
 from agvbench.vehicle.geometry import Geometry
 
 FRONT_M, REAR_M, NEUTRAL, STARTED_H = 0.18, 0.12, 1500.0, 1.0
@@ -63,7 +63,9 @@ def test_the_simulation_is_the_integral_of_the_plain_hooks(cls: type[Effect], sp
     effect = cls(**{p.name: p.scale for p in cls.parameters()})
     angles = (0.35, -0.1)
     commands = Commands(np.zeros(1), *(np.array([value]) for value in COMMANDED.values()))
-    simulation = Simulation(Geometry(FRONT_M, REAR_M), NEUTRAL, [SimulatedRun(commands, FRAMES_S, STARTED_H)])
+    simulation = Simulation(
+        Geometry(FRONT_M, REAR_M), Command(NEUTRAL, NEUTRAL, NEUTRAL), [SimulatedRun(commands, FRAMES_S, STARTED_H)]
+    )
     settled = np.array([[0.0, 0.0, 0.0], [*angles, speed]])
     simulated = simulation.predict(settled, simulation.parameters([effect]), np.array([[*START, 0.0]]))
     span, start = (0.0, FRAMES_S[-1]), [*START, 0.0]

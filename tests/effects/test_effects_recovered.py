@@ -23,8 +23,10 @@ from agvbench.simulator.hidden.constants import BASE
 from agvbench.simulator.hidden.plant import TURNAROUND_S
 from agvbench.simulator.hidden.reference_drives import path, reference_drives
 from agvbench.simulator.hidden.sampling import make_hidden_plant, vehicle_of
-from agvbench.types import Commands
+from agvbench.types import Command, Commands
 from agvbench.vehicle.geometry import Geometry
+
+NEUTRAL = Command(1500.0, 1500.0, 1500.0)
 
 SEED = 7
 NOISE = np.array([2e-4, 2e-4, 1e-3])
@@ -82,7 +84,7 @@ class Data:
             runs.append(SimulatedRun(commands, self._times(drive), clock_s / 3600.0))
             clock_s += times[-1] + TURNAROUND_S
         self.starts = np.array([[*drive.start, 0.0, 0.0] for drive in drives])
-        self.simulation = Simulation(Geometry(0.181, 0.121), 1500.0, runs)
+        self.simulation = Simulation(Geometry(0.181, 0.121), NEUTRAL, runs)
         known = constants | ({"drive_dead": 0.0} if name == "drive_dead_band" else {})
         self.settled = settled(self.simulation, known)
         noise = np.random.default_rng(3).normal(size=(len(self.simulation.predict(*self.at_null())), 3)) * NOISE

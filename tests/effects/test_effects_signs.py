@@ -12,8 +12,10 @@ import pytest
 
 from agvbench.effects import effect_kinds
 from agvbench.model.simulation.simulation import SimulatedRun, Simulation
-from agvbench.types import Commands
+from agvbench.types import Command, Commands
 from agvbench.vehicle.geometry import Geometry
+
+NEUTRAL = Command(1500.0, 1500.0, 1500.0)
 
 GEOMETRY = Geometry(0.18, 0.12)
 LEFT = (0.3, -0.3, 0.3)
@@ -27,7 +29,7 @@ def drive(row, effect=None, *, seconds=2.0, started_h=0.0, then=None, geometry=G
     times = seconds * np.arange(float(len(rows)))
     commands = Commands(times, *(1500.0 + 100.0 * np.array(rows).T[[2, 0, 1]]))
     run = SimulatedRun(commands, np.array([0.0, seconds * len(rows)]), started_h)
-    simulation = Simulation(geometry, 1500.0, [run])
+    simulation = Simulation(geometry, NEUTRAL, [run])
     effects = [] if effect is None else [effect_kinds()[effect](**values)]
     settled = np.vstack([[0.0, 0.0, 0.0], *rows])
     return simulation.predict(settled, simulation.parameters(effects), np.zeros((1, 4)))[-1]

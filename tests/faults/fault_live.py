@@ -87,7 +87,7 @@ class Live:
 
 
 def _driven(link: VehicleLink, rest_s: float, limits: SafetyLimits) -> str:
-    supervisor = Supervisor(Workspace.circle(12.0), NEUTRAL.drive, limits)
+    supervisor = Supervisor(Workspace.circle(12.0), NEUTRAL, limits)
     try:
         drive(
             link,

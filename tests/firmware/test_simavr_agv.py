@@ -11,6 +11,7 @@ from agvbench.adapters import AdapterOptions, open_rig
 from agvbench.adapters.registry import open_agv
 from agvbench.errors import LinkError
 from agvbench.types import Command, Frames, Pose
+from agvbench.vehicle.channels import Channels
 
 PERFECT = dict.fromkeys(("lost", "doubled", "late", "wrong", "untracked", "marker_noise_m", "latency_s"), 0.0)
 NEUTRAL = Command(1500.0, 1500.0, 1500.0)
@@ -99,7 +100,7 @@ def test_the_camera_may_speak_natnet() -> None:
         ("simavr:1,9", AdapterOptions(plant=PLANT), "simavr: no such firmware: '9' (one of: 1, 2)"),
         ("simavr:2,phase_ms=20", AdapterOptions(plant=PLANT), "phase_ms=20 (limit: 0 to below 20 ms)"),
         ("simavr:2,phase_ms=x", AdapterOptions(plant=PLANT), "no such phase of the servo frame: phase_ms=x"),
-        ("simavr", AdapterOptions(plant=PLANT, command_unit="normalised"), "takes microseconds"),
+        ("simavr", AdapterOptions(plant=PLANT, channels=Channels.alike("normalised")), "takes microseconds"),
     ],
 )
 def test_what_cannot_be_opened_is_one_line(spec: str, options: AdapterOptions, line: str) -> None:

@@ -15,6 +15,7 @@ from agvbench.effects import CorneringSpeedLoss, SpeedLag, SteeringLag, WheelDia
 from agvbench.errors import CampaignError, VehicleError
 from agvbench.model import VehicleModel
 from agvbench.types import Commands, Floats
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.kinematics import actuator_values
 from agvbench.vehicle.maps import Fixed, Line
@@ -25,7 +26,7 @@ GEOMETRY = Geometry(0.0, 0.15, kinematics="differential")
 def turtle(lag_s: float = 0.0, speed_lag_s: float = 0.0, curvature: float = 0.0) -> VehicleModel:
     """A vehicle whose commands are its speed [m/s] and yaw rate [rad/s]."""
     return VehicleModel(
-        name="turtle", geometry=GEOMETRY, command_unit="si", neutral=0.0,
+        name="turtle", geometry=GEOMETRY, channels=Channels.alike("si"),
         front=Line(1.0, 0.0), rear=Fixed(command=0.0), drive=Line(1.0, 0.0),
         effects=(SteeringLag(lag_s), SpeedLag(speed_lag_s, speed_lag_s), WheelDiameterMismatch(curvature)),
     )  # fmt: skip
@@ -108,7 +109,7 @@ def test_a_geometry_that_cannot_be_is_refused(values, message) -> None:
         Geometry(*values)
 
 
-HEADER = CampaignHeader(3, "c", "turtle", 0.0, -0.05, "si", 0.0, 50.0, kinematics="differential")
+HEADER = CampaignHeader(3, "c", "turtle", 0.0, -0.05, Channels.alike("si"), 50.0, kinematics="differential")
 
 
 def test_a_campaign_keeps_its_kinematics(tmp_path) -> None:

@@ -15,6 +15,7 @@ from agvbench.effects import ActuationDelay, SpeedLag, SteeringLag, effect_kinds
 from agvbench.errors import InputError, VehicleError
 from agvbench.model import VehicleModel, example_vehicle, thesis_vehicle
 from agvbench.types import Commands, Floats, Pose
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Driven, Geometry
 from agvbench.vehicle.maps import Line
 
@@ -26,8 +27,7 @@ def vehicle(truth: Truth) -> VehicleModel:
     return VehicleModel(
         name="unit",
         geometry=Geometry(truth.lf, truth.lr),
-        command_unit="normalised",
-        neutral=0.0,
+        channels=Channels.alike("normalised"),
         front=UNIT,
         rear=UNIT,
         drive=UNIT,

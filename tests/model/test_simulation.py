@@ -13,8 +13,10 @@ import agvbench.effects as library
 from agvbench.effects import effect_kinds
 from agvbench.errors import InputError
 from agvbench.model.simulation.simulation import SimulatedRun, Simulation
-from agvbench.types import Commands
+from agvbench.types import Command, Commands
 from agvbench.vehicle.geometry import Geometry
+
+NEUTRAL = Command(1500.0, 1500.0, 1500.0)
 
 START = (0.4, -0.3, 0.6)
 ROWS = np.vstack([[*REST, 0.0], SETTLED])
@@ -27,7 +29,7 @@ PAIRS = list(itertools.combinations(SIZES, 2))
 
 @pytest.fixture(scope="module")
 def simulation() -> Simulation:
-    return Simulation(Geometry(LF, LR), 1500.0, [RUN])
+    return Simulation(Geometry(LF, LR), NEUTRAL, [RUN])
 
 
 def parameters(simulation, sizes):
@@ -119,7 +121,7 @@ def test_moving_the_start_moves_the_poses(simulation):
 
 
 def test_only_chosen_runs_are_simulated():
-    both = Simulation(Geometry(LF, LR), 1500.0, [RUN, RUN])
+    both = Simulation(Geometry(LF, LR), NEUTRAL, [RUN, RUN])
     rows, initial = np.vstack([ROWS, ROWS]), np.vstack([INITIAL, INITIAL])
     first, second = both.split(both.predict(rows, both.parameters(), initial, runs=[1]))
     assert np.isnan(first).all()
@@ -132,7 +134,7 @@ def test_a_window_of_a_run_goes_on_where_the_run_was():
     whole = true_poses(sizes, START)
     for first in (40, 70, 110):
         window = SimulatedRun(RUN.commands, FRAMES[first:], STARTED_H, begins_s=FRAMES[first])
-        simulation = Simulation(Geometry(LF, LR), 1500.0, [window])
+        simulation = Simulation(Geometry(LF, LR), NEUTRAL, [window])
         initial = np.array([[*whole[first], np.nan]])
         predicted = simulation.predict(ROWS, parameters(simulation, sizes), initial)
         np.testing.assert_allclose(predicted, whole[first:], atol=1e-5)
@@ -140,7 +142,7 @@ def test_a_window_of_a_run_goes_on_where_the_run_was():
 
 def test_a_window_may_begin_at_another_speed():
     window = SimulatedRun(Commands(*np.array([[0.0], [1500.0], [1500.0], [1500.0]])), FRAMES[10:], begins_s=1.0)
-    simulation = Simulation(Geometry(LF, LR), 1500.0, [window])
+    simulation = Simulation(Geometry(LF, LR), NEUTRAL, [window])
     lag = parameters(simulation, {"speed_lag": {"accelerate_s": 0.3, "brake_s": 0.5}})
     poses = simulation.predict(np.zeros((2, 3)), lag, np.array([[0.0, 0.0, 0.0, 0.4]]))
     rolled = np.where(FRAMES[10:] > 1.0, 0.4 * 0.5 * -np.expm1(-(FRAMES[10:] - 1.0) / 0.5), 0.0)
@@ -167,7 +169,7 @@ def test_effects_and_parameters_are_two_ways_to_say_the_same(simulation):
 )
 def test_bad_runs_are_refused(change, message):
     with pytest.raises(InputError) as caught:
-        Simulation(Geometry(LF, LR), 1500.0, [dataclasses.replace(RUN, **change)])
+        Simulation(Geometry(LF, LR), NEUTRAL, [dataclasses.replace(RUN, **change)])
     assert str(caught.value) == message
 
 

@@ -12,8 +12,10 @@ from agvbench.effects import effect_kinds
 from agvbench.errors import FileError
 from agvbench.model.simulation import compose as simulation_compose
 from agvbench.model.simulation.simulation import SimulatedRun, Simulation
-from agvbench.types import Commands
+from agvbench.types import Command, Commands
 from agvbench.vehicle.geometry import Geometry
+
+NEUTRAL = Command(1500.0, 1500.0, 1500.0)
 
 # Slower in a disc about (1, 0): depends on the place, so it needs short steps.
 PATCH = """
@@ -40,10 +42,10 @@ import numpy as np
 from slow_patch import SlowPatch
 from agvbench.model.simulation.simulation import SimulatedRun
 from agvbench.model.simulation.simulation import Simulation
-from agvbench.types import Commands
+from agvbench.types import Command, Commands
 from agvbench.vehicle.geometry import Geometry
 run = SimulatedRun(Commands(*np.array([[0.0], [1600.0], [1500.0], [1500.0]])), np.array([0.0, 10.0]))
-simulation = Simulation(Geometry(0.2, 0.1), 1500.0, [run], kinds=[SlowPatch])
+simulation = Simulation(Geometry(0.2, 0.1), Command(1500.0, 1500.0, 1500.0), [run], kinds=[SlowPatch])
 settled = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.3]])
 for loss in (0.0, 0.5):
     print(simulation.predict(settled, simulation.parameters([SlowPatch(loss)]), np.zeros((1, 4)))[-1, 0])
@@ -91,7 +93,7 @@ def test_an_edited_kernel_is_written_again(tmp_path, monkeypatch):
 
 def test_runs_are_packed_one_after_another():
     run = SimulatedRun(Commands(*np.array([[0.0], [1600.0], [1500.0], [1500.0]])), np.array([0.0, 10.0]))
-    simulation = Simulation(Geometry(0.2, 0.1), 1500.0, [run, run])
+    simulation = Simulation(Geometry(0.2, 0.1), NEUTRAL, [run, run])
     assert len(simulation) == 2
     assert simulation.row_starts.tolist() == [0, 2, 4]
     assert simulation.drive.tolist() == [1500.0, 1600.0, 1500.0, 1600.0]

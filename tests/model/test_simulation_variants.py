@@ -13,8 +13,10 @@ from agvbench.effects import effect_kinds
 from agvbench.effects.variants import effect_variants
 from agvbench.model.simulation.compose import kernel_text
 from agvbench.model.simulation.simulation import SimulatedRun, Simulation
-from agvbench.types import Commands
+from agvbench.types import Command, Commands
 from agvbench.vehicle.geometry import Geometry
+
+NEUTRAL = Command(1500.0, 1500.0, 1500.0)
 
 START = (0.4, -0.3, 0.6)
 ROWS = np.vstack([[*REST, 0.0], SETTLED])
@@ -54,7 +56,7 @@ each = pytest.mark.parametrize(("name", "values"), SIZES)
 
 def simulated(effects, *, begins_s=None, first=0, initial=INITIAL):
     run = SimulatedRun(DRIVEN, FRAMES[first:], begins_s=begins_s)
-    simulation = Simulation(Geometry(LF, LR), 1500.0, [run], kinds=tuple(effect_variants().values()))
+    simulation = Simulation(Geometry(LF, LR), NEUTRAL, [run], kinds=tuple(effect_variants().values()))
     return simulation.predict(ROWS, simulation.parameters(effects), initial)
 
 
@@ -120,7 +122,7 @@ def test_the_windup_lasts_over_commands_without_power_and_relaxes_under_power():
     ids = np.arange(1.0, 6.0)
     run = SimulatedRun(Commands(moments, 1500.0 + ids, 1500.0 + ids, 1500.0 + ids), frames)
     kinds = tuple(effect_variants().values())
-    simulation = Simulation(Geometry(LF, LR), 1500.0, [run], kinds=kinds)
+    simulation = Simulation(Geometry(LF, LR), NEUTRAL, [run], kinds=kinds)
     law = effect_variants()["speed_lag_spring_back"](**values)
     rows = np.vstack([[*REST, 0.0], settled])
     predicted = simulation.predict(rows, simulation.parameters([law]), INITIAL)

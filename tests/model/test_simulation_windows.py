@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from agvbench.model.simulation.simulation import SimulatedRun, Simulation
-from agvbench.types import Commands
+from agvbench.types import Command, Commands
 from agvbench.vehicle.geometry import Geometry
+
+NEUTRAL = Command(1500.0, 1500.0, 1500.0)
 
 T = np.arange(2.1, 4.0, 0.1)
 BEGINS_S = 2.0
@@ -17,7 +19,7 @@ def window(front: float = 0.0) -> tuple[Simulation, np.ndarray]:
     """Return a window at 2 s into a drive at one command, and its settled rows."""
     one = np.array([-100.0])
     run = SimulatedRun(Commands(one, one * 0 + 1000.0, one * 0 + 1500, one * 0 + 1500), T, begins_s=BEGINS_S)
-    return Simulation(Geometry(0.2, 0.1), 1500.0, [run]), np.array([[front, 0.0, 0.0], [front, 0.0, 0.4]])
+    return Simulation(Geometry(0.2, 0.1), NEUTRAL, [run]), np.array([[front, 0.0, 0.0], [front, 0.0, 0.4]])
 
 
 def parameters(simulation: Simulation, **values: float) -> np.ndarray:

@@ -18,6 +18,7 @@ from agvbench.model import VehicleModel, example_names, example_path, example_ve
 from agvbench.model.thesis import build_thesis_vehicle
 from agvbench.resources import resource_directory
 from agvbench.types import Command
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import Fixed, Line
 
@@ -87,7 +88,7 @@ def test_what_is_out_of_reach_is_refused_with_its_limit(
 
 
 def test_the_nominal_model_has_the_thesis_values_and_knows_no_half_speed() -> None:
-    model = nominal_model("agv", GEOMETRY, "us", 1500.0)
+    model = nominal_model("agv", GEOMETRY, Channels.alike("us"))
     assert np.degrees(model.front([900.0, 1500.0, 2100.0])).tolist() == pytest.approx([45.0, 0.0, -45.0])
     assert model.speed([900.0, 1500.0, 2100.0]).tolist() == [0.32, 0.0, -0.32]
     assert model.command_for(0.0, 0.0, -0.32) == Command(2100.0, 1500.0, 1500.0)
@@ -96,7 +97,7 @@ def test_the_nominal_model_has_the_thesis_values_and_knows_no_half_speed() -> No
 
 
 def test_the_nominal_model_in_normalised_units_turns_left_and_forward_on_positive_commands() -> None:
-    model = nominal_model("car", GEOMETRY, "normalised", 0.0, rear_steered=False)
+    model = nominal_model("car", GEOMETRY, Channels.alike("normalised"), rear_steered=False)
     assert math.degrees(float(model.front(1.0))) == pytest.approx(45.0)
     assert model.rear([-1.0, 1.0]).tolist() == [0.0, 0.0]
     assert model.command_for(math.radians(-45.0), 0.0, 0.32) == Command(1.0, -1.0, 0.0)
@@ -121,8 +122,8 @@ def test_calibration_hash_follows_the_physics_only() -> None:
     ]
     assert {m.calibration_hash for m in same} == {model.calibration_hash}
     different = [
-        replace(model, neutral=1501.0),
-        replace(model, command_unit="normalised"),
+        replace(model, channels=Channels.alike("us", 1501.0)),
+        replace(model, channels=Channels.alike("normalised", 1500.0)),
         replace(model, geometry=Geometry(0.181, 0.1211)),
         replace(model, front=model.rear),
         replace(model, effects=(SteeringLag(0.1),)),

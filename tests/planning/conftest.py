@@ -2,6 +2,7 @@ import pytest
 
 from agvbench.model import example_vehicle, nominal_model, thesis_vehicle
 from agvbench.planning import trajectory_from_table
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
 
 
@@ -17,7 +18,7 @@ def front_steered():
 
 @pytest.fixture
 def nominal():
-    return nominal_model("agv", Geometry(0.181, 0.121), "us", 1500.0)
+    return nominal_model("agv", Geometry(0.181, 0.121), Channels.alike("us"))
 
 
 @pytest.fixture

@@ -15,6 +15,7 @@ from agvbench.planning import Departure, Workspace, corrected_plan, depends_on_t
 from agvbench.simulator.hidden import make_hidden_plant
 from agvbench.simulator.hidden.plant import HiddenPlant
 from agvbench.types import Pose
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import MonotoneTable
 
@@ -49,7 +50,7 @@ def true_model(truth):
     drive = table((-600.0, c["gain_forward"] * reach), (-dead, 0.0), (dead, 0.0), (600.0, -c["gain_backward"] * reach))
     effects = tuple(effect_kinds()[e.name](**e.parameters) for e in truth.effects)
     geometry = Geometry(c["front_axle"], c["rear_axle"])
-    return VehicleModel("true", geometry, "us", 1500.0, steering("front"), steering("rear"), drive, effects)
+    return VehicleModel("true", geometry, Channels.alike("us"), steering("front"), steering("rear"), drive, effects)
 
 
 def driven(truth, commands, start, hours=0.0):

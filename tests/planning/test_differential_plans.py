@@ -17,10 +17,11 @@ from agvbench.planning import THE_EIGHT, Workspace, corrected_plan, load_traject
 from agvbench.planning.end_pose_prediction import Departure, rest_poses
 from agvbench.planning.trajectories.loading import trajectory_from_table
 from agvbench.types import Command, Pose
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
 
-ROBOT = nominal_model("robot", Geometry(0.0, 0.1, kinematics="differential"), "si", 0.0)
-CENTRED = nominal_model("robot", Geometry(0.0, 0.0, kinematics="differential"), "si", 0.0)
+ROBOT = nominal_model("robot", Geometry(0.0, 0.1, kinematics="differential"), Channels.alike("si"))
+CENTRED = nominal_model("robot", Geometry(0.0, 0.0, kinematics="differential"), Channels.alike("si"))
 
 
 def of_segments(*segments: dict, **more):
@@ -55,7 +56,7 @@ def test_the_markers_keep_their_radius():
 
 @given(angle=st.floats(1.0, 720.0), turn=st.sampled_from(["left", "right"]), ahead=st.floats(-0.3, 0.3))
 def test_a_turn_on_the_spot_turns_about_the_axle(angle, turn, ahead):
-    model = nominal_model("robot", Geometry(0.0, ahead, kinematics="differential"), "si", 0.0)
+    model = nominal_model("robot", Geometry(0.0, ahead, kinematics="differential"), Channels.alike("si"))
     made = plan(of_segments({"kind": "spot_turn", "turn": turn, "angle_deg": angle, "yaw_rate": 0.5}), model)
     assert made.duration_s == pytest.approx(math.radians(angle) / 0.5)
     axle = made.expected[:, 1:3] - ahead * np.column_stack([np.cos(made.expected[:, 3]), np.sin(made.expected[:, 3])])
@@ -105,7 +106,7 @@ def test_what_it_cannot_drive_is_one_line(message):
 
 
 def test_steered_axles_do_not_turn_on_the_spot():
-    thesis = nominal_model("agv", Geometry(0.181, 0.121), "us", 1500.0)
+    thesis = nominal_model("agv", Geometry(0.181, 0.121), Channels.alike("us"))
     with pytest.raises(PlanError, match="a vehicle with steered axles cannot turn on the spot; drive an arc"):
         plan(of_segments({"kind": "spot_turn", "turn": "left", "angle_deg": 90.0}), thesis)
 

@@ -15,10 +15,11 @@ from agvbench.model import nominal_model, thesis_vehicle
 from agvbench.planning import Workspace, load_trajectory, plan, trajectory_from_table
 from agvbench.planning.shortest_paths.pieces import Piece
 from agvbench.types import Pose
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import Line
 
-NOMINAL = nominal_model("agv", Geometry(FRONT_M, REAR_M), "us", 1500.0)
+NOMINAL = nominal_model("agv", Geometry(FRONT_M, REAR_M), Channels.alike("us"))
 THESIS = thesis_vehicle()
 FULL_MPS = float(THESIS.speed(900.0))
 turns = st.sampled_from(["left", "right"])
@@ -230,7 +231,7 @@ def test_a_vehicle_steered_in_front_needs_the_front_mode(front_steered):
     with pytest.raises(PlanError, match='rear axle, which does not steer; say steering = "front"'):
         plan(load_trajectory("5"), front_steered)
     made = plan(load_trajectory("5").with_steering("front"), front_steered)
-    assert np.all(made.commands.rear == front_steered.neutral)
+    assert np.all(made.commands.rear == front_steered.neutral.rear)
 
 
 @quick
@@ -252,7 +253,9 @@ def test_half_speed_is_refused_before_calibration():
 
 
 def test_a_drive_without_known_full_speed_needs_metres_per_second(make):
-    endless = type(NOMINAL)("agv", NOMINAL.geometry, "us", 1500.0, NOMINAL.front, NOMINAL.rear, Line(-5e-4, 0.75))
+    endless = type(NOMINAL)(
+        "agv", NOMINAL.geometry, Channels.alike("us"), NOMINAL.front, NOMINAL.rear, Line(-5e-4, 0.75)
+    )
     segments = [{"kind": "straight", "length_m": 1.0}]
     with pytest.raises(PlanError, match="say it in m/s"):
         plan(make(segments=segments), endless)

@@ -10,6 +10,7 @@ import pandas as pd
 from agvbench.campaign import CampaignHeader, CampaignWriter
 from agvbench.model import thesis_vehicle
 from agvbench.types import NO_TARGET, Commands, Frames, Pose, Run
+from agvbench.vehicle.channels import Channels
 
 EIGHT = {
     "1_forward": (2.0, 0.0, 0.0),
@@ -69,7 +70,7 @@ def make_campaign(
 ):
     """Write a campaign in which every trajectory was driven `repeats` times under every condition; return its path."""
     rng = np.random.default_rng(seed)
-    header = CampaignHeader(1, name, "thesis AGV", 0.181, 0.121, "us", 1500.0, 120.0)
+    header = CampaignHeader(1, name, "thesis AGV", 0.181, 0.121, Channels.alike("us"), 120.0)
     writer = CampaignWriter.create(path, header, durable=False)
     commands = Commands(np.array([0.0, MOVE_S]), np.array([900.0, 1500.0]), np.full(2, 1500.0), np.full(2, 1500.0))
     started = 0.0
@@ -122,7 +123,7 @@ def add_calibration(writer, rng):
 def make_free_campaign(path, *, runs=2):
     """Write a campaign of free drives: no run has a target."""
     rng = np.random.default_rng(1)
-    header = CampaignHeader(1, "Free", "car", 0.1, 0.1, "normalised", 0.0, 120.0)
+    header = CampaignHeader(1, "Free", "car", 0.1, 0.1, Channels.alike("normalised"), 120.0)
     writer = CampaignWriter.create(path, header, durable=False)
     commands = Commands(np.array([0.0]), np.array([0.3]), np.array([0.1]), np.array([0.0]))
     for index in range(runs):

@@ -16,6 +16,7 @@ from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
 from agvbench.cli import main
 from agvbench.running.configuration.settings import BenchSettings
 from agvbench.types import Commands
+from agvbench.vehicle.channels import Channels
 
 
 @pytest.fixture(scope="module")
@@ -161,7 +162,9 @@ def test_an_incomplete_campaign_is_said_first_and_is_no_success(judged, code, co
 
 def test_vehicles_of_different_units_are_compared_on_purpose_only(nights, capsys, tmp_path):
     night = Campaign.open(nights[1])
-    writer = CampaignWriter.create(tmp_path / "c", dataclasses.replace(night.header, command_unit="normalised"))
+    writer = CampaignWriter.create(
+        tmp_path / "c", dataclasses.replace(night.header, channels=Channels.alike("normalised", 1500.0))
+    )
     for each in night:
         still = np.zeros(len(each.commands))
         writer.append(dataclasses.replace(each, commands=Commands(each.commands.t_s, still, still, still)))

@@ -16,12 +16,13 @@ from agvbench.running.configuration.settings import BenchSettings
 from agvbench.running.execution.calibration import calibrate_campaign
 from agvbench.running.session.opening import open_session
 from agvbench.running.session.session import Driver
+from agvbench.vehicle.channels import Channels
 from agvbench.workflows.init import make_lab
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "errors-bench.md"
 ROWS = dict(re.findall(r"^\| (.+?) \| `(.+)` \|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE))
 
-HEADER = CampaignHeader(1, "full", "agv1", 0.181, 0.121, "us", 1500.0, 120.0)
+HEADER = CampaignHeader(1, "full", "agv1", 0.181, 0.121, Channels.alike("us"), 120.0)
 
 
 @pytest.fixture(autouse=True)
@@ -75,7 +76,7 @@ def over_the_bus_in_another_unit(monkeypatch):
     real = rig_checks.open_rig
 
     def in_microseconds(**options):
-        return real(**options | {"command_unit": "us", "neutral": 1500.0})
+        return real(**options | {"channels": Channels.alike("us")})
 
     monkeypatch.setattr(rig_checks, "open_rig", in_microseconds)
     opened(vehicle=str(example_path("front_steered")))()

@@ -23,6 +23,7 @@ from agvbench.running.quality import DEFAULT_LIMITS
 from agvbench.running.session.opening import open_session
 from agvbench.running.supervision.supervisor import Supervisor
 from agvbench.types import Pose
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -88,7 +89,7 @@ class Real(ContinuousLink):
 
 def test_an_operator_is_asked_where_a_real_vehicle_does_not_come() -> None:
     told: list[str] = []
-    model, room = nominal_model("agv", Geometry(0.181, 0.121), "us", 1500.0), Workspace.circle(6.1)
+    model, room = nominal_model("agv", Geometry(0.181, 0.121), Channels.alike("us")), Workspace.circle(6.1)
     with open_rig("sim", plant="returning_plants:Dead") as direct:
         link = Real(direct)
         # Nobody puts a real vehicle anywhere by software: it stands where it stands, 8 mm off.

@@ -25,6 +25,7 @@ from agvbench.running.execution.run_records import attempts_by_run
 from agvbench.running.positioning.placers import PLACERS, Auto
 from agvbench.running.session.opening import open_session
 from agvbench.running.session.session import NotDrivenError
+from agvbench.vehicle.channels import Channels
 from agvbench.workflows.bench import run_benchmarks
 
 MINE = """'''Two turns, for agvbench.'''
@@ -121,12 +122,15 @@ def test_one_that_drives_back_itself_begins_at_other_random_numbers_too(tmp_path
 @pytest.mark.parametrize(
     ("changed", "line"),
     [
-        ({"neutral": 1480.0}, "the vehicle stands still at another command than its file says: 1480.0 (limit: 1500.0)"),
-        ({"command_unit": "normalised"}, "the vehicle takes commands in another unit than its file says: normalised"),
+        (
+            Channels.alike("us", 1480.0),
+            "the vehicle stands still at another command than its file says: 1480.0 (limit: 1500.0)",
+        ),
+        (Channels.alike("normalised"), "the vehicle takes commands in another unit than its file says: normalised"),
     ],
 )
 def test_a_model_of_another_vehicle_is_refused_before_anything_moves(lab, changed, line):
-    dataclasses.replace(thesis_vehicle(), **changed).save(lab / "other.toml")
+    dataclasses.replace(thesis_vehicle(), channels=changed).save(lab / "other.toml")
     for option in ("--calibration", "--corrected"):
         said = bench("trajectories", "-k=calibrated", f"{option}=other.toml")
         assert said.returncode == 2

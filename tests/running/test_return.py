@@ -21,13 +21,14 @@ from agvbench.running.positioning.automatic_return.leg_drive import Follower
 from agvbench.running.positioning.automatic_return.returner import Returner
 from agvbench.running.supervision.supervisor import Supervisor
 from agvbench.types import Command, Pose, wrap_angle
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
 
 sys.path.insert(0, str(Path(__file__).parent))
 import returning_plants
 
-NOMINAL = nominal_model("agv", Geometry(0.181, 0.121), "us", 1500.0)
-SMALL = nominal_model("car", Geometry(0.060, 0.115), "normalised", 0.0, rear_steered=False)
+NOMINAL = nominal_model("agv", Geometry(0.181, 0.121), Channels.alike("us"))
+SMALL = nominal_model("car", Geometry(0.060, 0.115), Channels.alike("normalised"), rear_steered=False)
 STARTS = (Pose(1.2, 0.8, 2.5), Pose(-1.0, 0.3, 0.0), Pose(-1.0, -0.9, -1.6), Pose(0.0, 0.0, 3.1))
 
 
@@ -36,7 +37,7 @@ def returner(
     plant: str, model: VehicleModel = NOMINAL, room: str = "circle:6.1"
 ) -> Iterator[tuple[ContinuousLink, Returner]]:
     spec = f"returning_plants:{plant}"
-    with open_rig("sim", plant=spec, seed=3, command_unit=model.command_unit, neutral=model.neutral) as link:
+    with open_rig("sim", plant=spec, seed=3, channels=model.channels) as link:
         continuous, space = ContinuousLink(link), Workspace.parse(room)
         yield continuous, Returner(continuous, model, space, Supervisor(space, model.neutral))
 

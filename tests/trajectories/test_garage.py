@@ -7,11 +7,12 @@ import pytest
 
 from agvbench.model import nominal_model, thesis_vehicle
 from agvbench.planning import load_trajectory, plan
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
 
 RADIUS_M, PAST_M, INTO_M = 0.7, 0.5, 0.8
 EIGHTH = math.sqrt(0.5)
-MODELS = [thesis_vehicle(), nominal_model("agv", Geometry(0.181, 0.121), "us", 1500.0)]
+MODELS = [thesis_vehicle(), nominal_model("agv", Geometry(0.181, 0.121), Channels.alike("us"))]
 
 
 def parked():

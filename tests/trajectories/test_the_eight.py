@@ -9,6 +9,7 @@ import pytest
 from agvbench.model import nominal_model, thesis_vehicle
 from agvbench.planning import list_trajectories, load_trajectory, plan
 from agvbench.planning.trajectories.loading import trajectory_files
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
 
 TARGETS = {  # thesis section 8.2: m, m, degrees
@@ -21,7 +22,7 @@ TARGETS = {  # thesis section 8.2: m, m, degrees
     "7": (-1, 1, -90),
     "8": (-1, -1, 90),
 }
-NOMINAL = nominal_model("agv", Geometry(0.181, 0.121), "us", 1500.0)
+NOMINAL = nominal_model("agv", Geometry(0.181, 0.121), Channels.alike("us"))
 
 
 @pytest.mark.parametrize("name", TARGETS)

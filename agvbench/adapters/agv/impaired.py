@@ -29,7 +29,7 @@ class ImpairedAgv(AgvAdapter):
         for when, fault in self._faults:
             if fault.needs_line and self._line is None:
                 raise LinkError("vehicle has no serial line", where=f"{SCHEME}:{when.name}", value=vehicle.scheme)
-        self._neutral = options.neutral_command
+        self._neutral = options.channels.neutral
         self.watchdog_s = vehicle.watchdog_s
 
     @classmethod

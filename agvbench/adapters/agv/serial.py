@@ -6,7 +6,7 @@ import threading
 
 from agvbench.adapters.contract import SILENCE_LIMIT_S, AdapterOptions, AgvAdapter, AgvReports
 from agvbench.adapters.serial_line.conversation import Conversation
-from agvbench.adapters.serial_line.dialect import check_unit
+from agvbench.adapters.serial_line.dialect import check_channels
 from agvbench.adapters.serial_line.port import SerialPort
 from agvbench.bus.clock import Clock
 from agvbench.bus.counters import RateLimitedCounter
@@ -14,7 +14,6 @@ from agvbench.bus.messages.command import CommandFlags, CommandMessage
 from agvbench.bus.messages.event import VEHICLE_STOPPED_ITSELF, Level
 from agvbench.bus.messages.identity import AgvIdentity
 from agvbench.errors import AgvbenchError, LinkError
-from agvbench.types import Command
 
 GREETING_LIMIT_S = 4.0
 """A board that resets when its port is opened spends 1.6 s in its boot loader."""
@@ -32,7 +31,7 @@ class SerialAgv(AgvAdapter):
     port
         Open.
     options
-        Their ``command_unit`` is ``"us"``; ``clock`` is what waits.
+        Their ``channels`` take microseconds; ``clock`` is what waits.
     """
 
     scheme = "serial"
@@ -40,8 +39,7 @@ class SerialAgv(AgvAdapter):
     def __init__(self, port: SerialPort, options: AdapterOptions) -> None:
         self._port, self._options = port, options
         self._clock: Clock = options.clock
-        neutral = options.neutral_command
-        self._neutral = Command(neutral, neutral, neutral)
+        self._neutral = options.channels.neutral
         self._lock, self._closed = threading.Lock(), threading.Event()
         self._failure: AgvbenchError | None = None
         self._reports: AgvReports | None = None
@@ -78,7 +76,7 @@ class SerialAgv(AgvAdapter):
         """Open the port `address` and greet the vehicle."""
         if not address:
             raise LinkError("which serial port?", where=cls.scheme, remedy="write serial:/dev/ttyACM0")
-        check_unit(options.command_unit, where=cls.scheme)
+        check_channels(options.channels, where=cls.scheme)
         port = SerialPort(address)
         try:
             return cls(port, options)
@@ -94,8 +92,7 @@ class SerialAgv(AgvAdapter):
             adapter=self.scheme,
             firmware=f"agvbench {hello.firmware_version}",
             calibration_hash=options.calibration_hash,
-            command_unit=options.command_unit,
-            neutral=options.neutral_command,
+            channels=options.channels,
             simulated=False,
             lock_step=False,
             extra={

@@ -14,7 +14,7 @@ import numpy as np
 
 from agvbench.adapters.agv.sim import SimAgv
 from agvbench.adapters.contract import AdapterOptions, run_seed
-from agvbench.adapters.serial_line.dialect import check_unit
+from agvbench.adapters.serial_line.dialect import check_channels
 from agvbench.adapters.simavr.address import FRAME_S, FirmwareAddress
 from agvbench.adapters.simavr.host import CYCLES_PER_S, Pulse
 from agvbench.adapters.simavr.microcontroller import Microcontroller
@@ -40,7 +40,7 @@ class SimavrAgv(SimAgv):
     plant
         Each pulse is what it holds, from the pulse's falling edge to that of the channel's next.
     options
-        Its ``command_unit`` is ``"us"``.
+        Its ``channels`` take microseconds.
     address
         Which firmware, and at which phase of its frame runs begin.
     """
@@ -48,7 +48,7 @@ class SimavrAgv(SimAgv):
     scheme = "simavr"
 
     def __init__(self, plant: Plant, options: AdapterOptions, address: FirmwareAddress = _DEFAULT) -> None:
-        check_unit(options.command_unit, where=self.scheme)
+        check_channels(options.channels, where=self.scheme)
         super().__init__(plant, options)
         self._phase_s = address.phase_s
         self._controller = Microcontroller(address.version)
@@ -73,7 +73,7 @@ class SimavrAgv(SimAgv):
         extra = {**sim.extra, "firmware_calibration": hello.calibration_hash, "firmware_unit": hello.unit}
         firmware = f"agvbench {hello.firmware_version} in simavr"
         return AgvIdentity(
-            sim.vehicle, sim.adapter, firmware, sim.calibration_hash, sim.command_unit, sim.neutral, sim.simulated,
+            sim.vehicle, sim.adapter, firmware, sim.calibration_hash, sim.channels, sim.simulated,
             sim.lock_step, extra,
         )  # fmt: skip
 

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from agvbench.adapters.agv.live import LiveAgv
 from agvbench.adapters.agv.serial import SerialAgv
 from agvbench.adapters.contract import AdapterOptions, AgvReports
-from agvbench.adapters.serial_line.dialect import check_unit
+from agvbench.adapters.serial_line.dialect import check_channels
 from agvbench.adapters.serial_line.port import SerialPort
 from agvbench.adapters.simavr.address import FRAME_S, FirmwareAddress
 from agvbench.adapters.simavr.host import SimavrHost
@@ -37,7 +37,7 @@ class SimavrLiveAgv(LiveAgv):
     plant
         Each pulse is what it holds, from when the pulse is heard of, a few milliseconds after its falling edge.
     options
-        Its ``command_unit`` is ``"us"``.
+        Its ``channels`` take microseconds.
     version
         Of the firmware.
     """
@@ -45,7 +45,7 @@ class SimavrLiveAgv(LiveAgv):
     scheme = "simavr-live"
 
     def __init__(self, plant: Plant, options: AdapterOptions, version: str) -> None:
-        check_unit(options.command_unit, where=self.scheme)
+        check_channels(options.channels, where=self.scheme)
         super().__init__(plant, options)
         self._microcontroller = SimavrHost(version, live=True)
         try:

@@ -77,7 +77,7 @@ def _identity(vehicle: AgvAdapter, options: AdapterOptions) -> str:
         raise CheckFailedError("identity changes from one call to the next", "return the same as long as it is open")
     if identity.vehicle != options.vehicle:
         raise CheckFailedError(f"vehicle is called {identity.vehicle!r}", "return options.vehicle")
-    commands = f"commands in {identity.command_unit}, neutral {identity.neutral:g}"
+    commands = f"commands in {identity.channels}"
     return f"{identity.vehicle} ({identity.firmware}), {commands}"
 
 

@@ -70,7 +70,7 @@ class VehicleFault(Fault):
     def inject(self, line: SerialLine | None) -> None:
         """Do it; called before every command from when the fault begins. `line` is None where there is none."""
 
-    def alter(self, command: Command, neutral: float) -> Command:
+    def alter(self, command: Command, neutral: Command) -> Command:
         """Return what the vehicle is commanded in place of `command`; `neutral` is what moves nothing."""
         return command
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from agvbench.adapters.serial_line.replies import Hello
 from agvbench.errors import LinkError
 from agvbench.types import Command
+from agvbench.vehicle.channels import ROLES, Channels
 
 PROTOCOL_VERSION = 1
 NEUTRAL_US = 1500.0
@@ -56,10 +57,16 @@ DIALECTS = {1: Dialect("deg", 30, 150, checksums=False), 2: Dialect("us", 600, 2
 """By version of the firmware."""
 
 
-def check_unit(command_unit: str, *, where: object = None) -> None:
-    """Raise `LinkError` unless a bench's commands are in what the firmware is talked to in: microseconds."""
-    if command_unit != "us":
-        raise LinkError("the firmware takes microseconds", where=where, value=command_unit, limit="command unit us")
+def check_channels(channels: Channels, *, where: object = None) -> None:
+    """Raise `LinkError` unless commands are in microseconds and the drive stops where the firmware's watchdog does."""
+    for role in ROLES:
+        if (unit := getattr(channels, role).unit) != "us":
+            raise LinkError("the firmware takes microseconds", where=where, value=unit, limit="command unit us")
+    if (neutral := channels.drive.neutral) != NEUTRAL_US:
+        raise LinkError(
+            "the firmware's watchdog stops the drive at another pulse", where=where, value=f"neutral {neutral:g} µs",
+            limit=f"{NEUTRAL_US:g} µs", remedy="trim the speed controller to it",
+        )  # fmt: skip
 
 
 def dialect_of(hello: Hello, *, where: object = None) -> Dialect:

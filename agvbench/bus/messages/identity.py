@@ -9,8 +9,8 @@ from typing import Annotated
 from msgspec import Meta, field
 
 from agvbench.bus.messages.codec import Message, Text, decoder
-from agvbench.errors import LinkError, MessageError
-from agvbench.types import CommandUnit
+from agvbench.errors import LinkError, MessageError, VehicleError
+from agvbench.vehicle.channels import Channels
 
 _Extra = Annotated[dict[Text, Text], Meta(max_length=64)]
 
@@ -18,23 +18,18 @@ _Extra = Annotated[dict[Text, Text], Meta(max_length=64)]
 class AgvIdentity(Message, tag="agv_identity", frozen=True):
     """What an AGV adapter says of itself.
 
-    ``neutral`` is the command at which nothing moves, in ``command_unit``; ``lock_step`` means that time passes
-    only in exchanges; ``extra`` is for provenance (seed, plant, port, versions).
+    ``channels`` are the units, neutral commands and ranges of its command channels; ``lock_step`` means that time
+    passes only in exchanges; ``extra`` is for provenance (seed, plant, port, versions).
     """
 
     vehicle: Text
     adapter: Text
     firmware: Text
     calibration_hash: Text
-    command_unit: CommandUnit
-    neutral: float
+    channels: Channels
     simulated: bool
     lock_step: bool
     extra: _Extra = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        if not math.isfinite(self.neutral):
-            raise MessageError("neutral is not finite", where=self.vehicle, value=self.neutral)
 
 
 class MocapIdentity(Message, tag="mocap_identity", frozen=True):
@@ -57,8 +52,7 @@ class Identity:
     vehicle: str
     firmware: str
     calibration_hash: str
-    command_unit: CommandUnit
-    neutral: float
+    channels: Channels
     simulated: bool
     lock_step: bool
     mocap_rate_hz: float
@@ -87,8 +81,7 @@ class Identity:
             vehicle=agv.vehicle,
             firmware=agv.firmware,
             calibration_hash=agv.calibration_hash,
-            command_unit=agv.command_unit,
-            neutral=agv.neutral,
+            channels=agv.channels,
             simulated=agv.simulated,
             lock_step=agv.lock_step,
             mocap_rate_hz=mocap.rate_hz,
@@ -97,5 +90,15 @@ class Identity:
         )
 
 
-decode_agv_identity = decoder(AgvIdentity)
+_decode_agv_identity = decoder(AgvIdentity)
+
+
+def decode_agv_identity(payload: bytes) -> AgvIdentity:
+    """Return the identity, or raise `MessageError`."""
+    try:
+        return _decode_agv_identity(payload)
+    except VehicleError as error:  # a channel that cannot be
+        raise MessageError(error.what, where=f"channels: {error.where}", value=error.value, limit=error.limit) from None
+
+
 decode_mocap_identity = decoder(MocapIdentity)

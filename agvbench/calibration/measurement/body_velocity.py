@@ -32,7 +32,7 @@ class BodyVelocity:
     frames_used: int
 
 
-def measure_body_velocity(run: Run, geometry: Geometry, *, neutral: float) -> BodyVelocity:
+def measure_body_velocity(run: Run, geometry: Geometry, *, neutral: Command) -> BodyVelocity:
     """Measure forward speed and yaw rate of a run in which one command was held.
 
     The yaw rate is the robust slope of the heading (`robust_slope`). The velocity in the vehicle frame is constant

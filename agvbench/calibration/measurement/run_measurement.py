@@ -57,7 +57,7 @@ class RunMeasurement:
         return math.isfinite(self.front_rad)
 
 
-def measure_run(run: Run, geometry: Geometry, *, neutral: float | None = None) -> RunMeasurement:
+def measure_run(run: Run, geometry: Geometry, *, neutral: Command | None = None) -> RunMeasurement:
     """Measure both axle angles and the speed of a run in which one command was held (thesis fig. 7.1 and 7.2).
 
     Frames are cleaned; from the steady part of the longest stretch of one command the path is fitted as a circle
@@ -192,7 +192,7 @@ class Segment:
     end_s: float
 
 
-def steady_part(run: Run, neutral: float | None, *, turns: bool = False) -> tuple[Segment, Frames, FrameQuality]:
+def steady_part(run: Run, neutral: Command | None, *, turns: bool = False) -> tuple[Segment, Frames, FrameQuality]:
     """Return the longest stretch of one command in a run, its clean frames after settling, and the frames' quality.
 
     Raise `FitError` if too few frames are usable, or the command was not held long enough; see `driven_segment`.
@@ -210,10 +210,10 @@ def steady_part(run: Run, neutral: float | None, *, turns: bool = False) -> tupl
     return segment, steady_frames(frames, segment, where=where), quality
 
 
-def driven_segment(commands: Commands, last_frame_s: float, neutral: float | None, *, turns: bool = False) -> Segment:
+def driven_segment(commands: Commands, last_frame_s: float, neutral: Command | None, *, turns: bool = False) -> Segment:
     """Return the longest stretch of one command in which the vehicle was commanded to drive.
 
-    The last row is the stop, and `neutral` (if None, its drive command) says which rows stand still: steering
+    The last row is the stop, and `neutral` (if None, its commands) says which rows stand still: steering
     is set before the vehicle drives. A run that never leaves neutral, as in the middle of the drive
     calibration, is taken for what it is: its longest stretch. With `turns` the front command moves a vehicle, too.
     """
@@ -221,10 +221,10 @@ def driven_segment(commands: Commands, last_frame_s: float, neutral: float | Non
     changes = np.flatnonzero(np.any(np.diff(rows, axis=0) != 0.0, axis=1)) + 1
     starts = np.r_[0, changes].astype(np.int64)
     times = np.r_[commands.t_s[starts], max(last_frame_s, commands.t_s[-1])]
-    stop = float(commands.drive[-1]) if neutral is None else neutral
-    driven = commands.drive[starts] != stop
+    stop = commands.at(len(commands) - 1) if neutral is None else neutral
+    driven = commands.drive[starts] != stop.drive
     if turns:
-        driven |= commands.front[starts] != (commands.front[-1] if neutral is None else neutral)
+        driven |= commands.front[starts] != stop.front
     # A stop is no measurement of standing still, unless nothing else was asked for.
     among = np.flatnonzero(driven) if driven.any() else np.arange(len(starts))
     longest = among[np.argmax(np.diff(times)[among])]

@@ -17,6 +17,7 @@ from agvbench.campaign.manifest import sha256
 from agvbench.campaign.recordings.mapping import FileRule, Mapping, find_mapping, load_mapping
 from agvbench.campaign.recordings.recording import Recording, read_recording
 from agvbench.campaign.recordings.segmentation import Account, account_for, cut, why_nothing
+from agvbench.campaign.tables.command_columns import by_role
 from agvbench.campaign.tables.motion_checks import check_motion
 from agvbench.campaign.tables.parts import parts_of
 from agvbench.campaign.tables.timed_table import TimedTable
@@ -121,11 +122,12 @@ def _distinct(files: Sequence[str | Path]) -> list[Path]:
 
 def _check(runs: list[Run], header: CampaignHeader, mapping_path: Path) -> None:
     """Check the runs before anything is written."""
-    parts = [parts_of(run) for run in runs]
+    parts = [parts_of(run, header) for run in runs]
     for run, tables in zip(runs, parts, strict=True):
-        check_parts(tables, Path(str(run.extra["source"])), header.command_unit)
+        check_parts(tables, Path(str(run.extra["source"])), header)
     whole = {name: pa.concat_tables([tables[name] for tables in parts]) for name in ("runs", "commands", "poses")}
     ids = [run.run_id for run in runs]
+    whole["commands"] = by_role(whole["commands"], header)
     commands, poses = (TimedTable(mapping_path, whole[name], ids, in_parts=True) for name in ("commands", "poses"))
     check_motion(header, whole["runs"], commands, poses)
 

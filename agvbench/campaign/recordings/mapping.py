@@ -75,7 +75,7 @@ class QuantityColumn(_Strict, frozen=True):
 
 
 class Signal(_Strict, frozen=True):
-    """A command column: command = cell · scale + offset, in the vehicle's command unit."""
+    """A command column: command = cell · scale + offset, in the unit of its channel."""
 
     column: str
     scale: _Number = 1.0
@@ -162,6 +162,7 @@ class Mapping(_Strict, frozen=True):
     mocap: Mocap
     columns: Columns
     prediction: PredictionSettings | None = None
+    channels: header.ChannelTables | None = None
     csv: Csv = Csv()
     gate: Gate | None = None
     runs: Runs = Runs()
@@ -169,7 +170,9 @@ class Mapping(_Strict, frozen=True):
 
     def header(self, path: Path) -> CampaignHeader:
         """Return the campaign's head by this mapping, read from `path`; raise `CampaignError` if it is impossible."""
-        return CampaignHeader.from_tables(path, self.name, self.vehicle, self.mocap, self.prediction)
+        return CampaignHeader.from_tables(
+            path, self.name, self.vehicle, self.mocap, self.prediction, channels=self.channels
+        )
 
 
 def find_mapping(name: str | Path) -> Path:

@@ -140,7 +140,7 @@ def _held(cells: Cells, name: str) -> Floats:
     """Return a command column in which an empty cell repeats the one before; neutral if it is not mapped."""
     signal = getattr(cells.mapping.columns, name)
     if signal is None:
-        return np.full(len(cells.table), cells.mapping.vehicle.neutral)
+        return np.full(len(cells.table), getattr(cells.mapping.header(cells.path).neutral, name))
     values = cells.number(signal.column, signal.scale, signal.offset)
     last = np.maximum.accumulate(np.where(np.isfinite(values), np.arange(len(values)), -1))
     return np.where(last >= 0, values[last], np.nan)

@@ -14,10 +14,12 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from agvbench.campaign.header import CampaignHeader
 from agvbench.campaign.tables.schema import SPLITS
 from agvbench.campaign.tables.timed_table import TimedTable
 from agvbench.errors import CampaignError, OneOf
 from agvbench.types import RUN_OK, CommandUnit, Floats, RunStatus
+from agvbench.vehicle.channels import Channel
 
 FIRST_COMMAND_TOLERANCE_S = 60.0
 CLOCK_TOLERANCE_S = 600.0
@@ -103,18 +105,20 @@ def _is_status(text: str) -> bool:
     return True
 
 
-def check_commands(commands: TimedTable, status: list[str], unit: CommandUnit) -> None:
-    """Raise `CampaignError` if the commands table contradicts the runs.
+def check_commands(commands: TimedTable, status: list[str], header: CampaignHeader) -> None:
+    """Raise `CampaignError` if the commands table contradicts the runs or the head.
 
-    A run that counts has commands; all are finite and in the unit, and their time increases from about 0.
+    A run that counts has commands; all are finite and within their channel, and their time increases from about 0.
     """
     _refuse_runs_without(commands, status)
-    for name in ("t_s", "drive", "front", "rear"):
-        values = commands.column(name)
+    names = header.command_columns
+    for column, name in {"t_s": "t_s", **names}.items():
+        values = commands.column(column)
         _refuse(commands, ~np.isfinite(values), f"{name} is not a finite number", values, remedy="correct it")
-    low, high, remedy = _COMMAND_LIMITS[unit]
-    for name in ("drive", "front", "rear"):
-        values = commands.column(name)
+    for role, name in names.items():
+        channel: Channel = getattr(header.channels, role)
+        low, high, remedy = _command_limits(channel, name)
+        values = commands.column(role)
         outside = (values < low) | (values > high)
         _refuse(commands, outside, f"{name} is out of range", values, f"{low:g}…{high:g}", remedy)
     t_s = commands.column("t_s")
@@ -126,6 +130,12 @@ def check_commands(commands: TimedTable, status: list[str], unit: CommandUnit) -
     remedy = "t_s counts from the first command: shift the run's commands and poses"
     limit = f"within {FIRST_COMMAND_TOLERANCE_S:g} s of 0"
     _refuse(commands, late, "t_s of the first command is not 0", t_s, limit, remedy)
+
+
+def _command_limits(channel: Channel, name: str) -> _Limits:
+    if channel.is_bounded:
+        return _Limits(channel.low, channel.high, f"correct it, or [channels.{name}] of campaign.toml")
+    return _COMMAND_LIMITS[channel.unit]
 
 
 def check_poses(poses: TimedTable, status: list[str], last_command_s: Floats) -> None:

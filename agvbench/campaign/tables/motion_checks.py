@@ -265,7 +265,7 @@ def _follows(steps: _Steps, t_s: Floats, header: CampaignHeader, commands: Timed
     best = np.zeros((2, len(steps.runs)))
     for lag_s in _LAGS_S:
         row = _command_rows(commands, steps.runs[steps.run], t_s - lag_s)
-        drive = np.abs(commands.column("drive")[row] - header.neutral)
+        drive = np.abs(commands.column("drive")[row] - header.neutral.drive)
         steering = commands.column("front")[row] - commands.column("rear")[row]
         follow = np.maximum(_correlation(steps, np.abs(ahead), drive), 0.0)
         # Steering commands an angle of an axle, or the yaw rate itself.

@@ -8,6 +8,7 @@ from urllib.parse import quote, unquote
 import numpy as np
 import pyarrow as pa
 
+from agvbench.campaign.header import CampaignHeader
 from agvbench.errors import CampaignError
 from agvbench.types import Run
 
@@ -41,12 +42,12 @@ def run_id_of(part: Path) -> str:
     return unquote(part.name.removesuffix(_SUFFIX))
 
 
-def parts_of(run: Run) -> dict[str, pa.Table]:
+def parts_of(run: Run, header: CampaignHeader) -> dict[str, pa.Table]:
     """Return the run's parts in the order in which they are to be written: the row of ``runs`` makes it exist.
 
     Raise `CampaignError` if an extra or logged column has the name of a known one.
     """
-    return {"poses": _poses_part(run), "commands": _commands_part(run), "runs": _runs_part(run)}
+    return {"poses": _poses_part(run), "commands": _commands_part(run, header), "runs": _runs_part(run)}
 
 
 def _runs_part(run: Run) -> pa.Table:
@@ -74,10 +75,11 @@ def _runs_part(run: Run) -> pa.Table:
     return pa.table({name: pa.array([value]) for name, value in row.items() if value is not None})
 
 
-def _commands_part(run: Run) -> pa.Table:
+def _commands_part(run: Run, header: CampaignHeader) -> pa.Table:
     """Return the run's rows of the commands table."""
     commands = run.commands
-    columns = {name: _floats(getattr(commands, name)) for name in ("t_s", "drive", "front", "rear")}
+    names = {"t_s": "t_s", **header.command_columns}
+    columns = {name: _floats(getattr(commands, role)) for role, name in names.items()}
     return pa.table({"run_id": pa.repeat(run.run_id, len(commands)), **columns})
 
 

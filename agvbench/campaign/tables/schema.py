@@ -1,4 +1,4 @@
-"""The columns of the tables of schema 1, and their types: a cell that cannot have its type is named."""
+"""The columns of the tables, and their types: a cell that cannot have its type is named."""
 
 from __future__ import annotations
 

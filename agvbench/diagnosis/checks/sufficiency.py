@@ -31,7 +31,7 @@ def insufficient_data(readings: Readings, header: HeaderLike) -> str:
             remedy="drive bench_calibration.py and bench_trajectories.py first",
         )
     commands = [run.commands for run in readings.runs]
-    if all(np.all(c.drive == header.neutral) for c in commands):
+    if all(np.all(c.drive == header.neutral.drive) for c in commands):
         return "the drive was never commanded anything but neutral"
     if len({(f, r) for c in commands for f, r in zip(c.front.tolist(), c.rear.tolist(), strict=True)}) == 1:
         return "steering was never excited: its commands are the same in all runs"

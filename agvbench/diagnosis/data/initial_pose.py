@@ -14,7 +14,7 @@ import numpy as np
 from agvbench.errors import FitError
 from agvbench.signals import MAD_TO_STD
 from agvbench.statistics.rest_poses import SPEED_LIMIT_MPS, start_pose
-from agvbench.types import Floats, Frames, Run
+from agvbench.types import Command, Floats, Frames, Run
 
 _LAST_S = 0.2
 _STANDSTILL_M = 0.005
@@ -38,13 +38,13 @@ def shift_commands_half_a_row(run: Run) -> Run:
     return replace(run, commands=replace(run.commands, t_s=np.maximum.accumulate(t_s)))
 
 
-def first_drive_s(run: Run, neutral: float) -> float:
+def first_drive_s(run: Run, neutral: Command) -> float:
     """Return the time of the first drive command other than neutral; ∞ if there is none."""
-    driven = np.flatnonzero(run.commands.drive != neutral)
+    driven = np.flatnonzero(run.commands.drive != neutral.drive)
     return float(run.commands.t_s[driven[0]]) if len(driven) else np.inf
 
 
-def starts_at_rest(run: Run, neutral: float) -> bool:
+def starts_at_rest(run: Run, neutral: Command) -> bool:
     """Return whether the vehicle was at rest in the last frames before its first drive command.
 
     If there are no such frames, a run with few commands is taken to start at rest. A run whose commands change
@@ -73,7 +73,7 @@ def _halves(half: int) -> tuple[slice, slice]:
     return slice(0, half), slice(-half, None)
 
 
-def initial_pose(run: Run, frames: Frames, neutral: float | None) -> tuple[Floats, Floats]:
+def initial_pose(run: Run, frames: Frames, neutral: Command | None) -> tuple[Floats, Floats]:
     """Return the pose at rest at the start (3,) [m, m, rad] and its standard errors (3,), from cleaned `frames`.
 
     Raises

@@ -26,7 +26,7 @@ from agvbench.diagnosis.data.windows import (
 from agvbench.errors import FitError
 from agvbench.model.priors import Prior
 from agvbench.model.simulation.simulation import SimulatedRun
-from agvbench.types import Commands, Floats, Frames, Run
+from agvbench.types import Command, Commands, Floats, Frames, Run
 
 SAMPLES = 24
 """Poses per run, the same number for short and long runs, because the run is the unit of observation."""
@@ -125,7 +125,7 @@ class Readings:
         return np.zeros(len(self)) if self.initial_states is None else self.initial_states.t_s
 
 
-def read_runs(runs: Iterable[Run], neutral: float | None = None) -> Readings:
+def read_runs(runs: Iterable[Run], neutral: Command | None = None) -> Readings:
     """Clean, sample and group runs; ``refused`` lists the runs that cannot be used.
 
     If `neutral` is given, a vehicle counts as at rest while its drive command is neutral. This supplies the initial
@@ -149,7 +149,9 @@ def read_runs(runs: Iterable[Run], neutral: float | None = None) -> Readings:
     return Readings(tuple(kept), t_s, poses, start, stderr, started_h, group_runs(kept), refused, None, logged=logged)
 
 
-def read_windows(runs: Iterable[Run], horizon: Horizon, neutral: float, *, turns_on_the_spot: bool = False) -> Readings:
+def read_windows(
+    runs: Iterable[Run], horizon: Horizon, neutral: Command, *, turns_on_the_spot: bool = False
+) -> Readings:
     """Cut runs into windows; ``refused`` lists the runs without any window, with the reason."""
     every = list(with_common_levels(list(runs)))
     began = session_starts(every)
@@ -186,7 +188,7 @@ def read_windows(runs: Iterable[Run], horizon: Horizon, neutral: float, *, turns
     return Readings(cut, t_s, poses, start, stderr, started_h, group, refused, initial_states, logged=logged)
 
 
-def _read(run: Run, neutral: float | None) -> tuple[Floats, Floats, Floats, Floats]:
+def _read(run: Run, neutral: Command | None) -> tuple[Floats, Floats, Floats, Floats]:
     if not run.is_ok:
         raise FitError(run.status)
     frames = _in_order(run)

@@ -21,7 +21,7 @@ from agvbench.diagnosis.data.motion_filter import MotionFilter, MotionStates
 from agvbench.errors import FitError
 from agvbench.model.simulation.loop import RECENT_SPEED_S
 from agvbench.statistics.rest_poses import SPEED_LIMIT_MPS
-from agvbench.types import Commands, Floats, Frames, Run
+from agvbench.types import Command, Commands, Floats, Frames, Run
 
 SUPPORT_S = 0.2
 """Least duration of the frames before a window [s]."""
@@ -184,7 +184,7 @@ class _Track:
 
 
 def cut_windows(
-    run: Run, horizon: Horizon, neutral: float, recorded: RecordedMotion, *, turns_on_the_spot: bool = False
+    run: Run, horizon: Horizon, neutral: Command, recorded: RecordedMotion, *, turns_on_the_spot: bool = False
 ) -> list[Window]:
     """Return the windows of `run` in which the vehicle drives and is tracked; `recorded` is that of its recording.
 
@@ -287,11 +287,11 @@ def _recent_speed(t: Floats, motion: Floats) -> float:
     return float(np.sum(weight * longitudinal) / np.sum(weight * dt))
 
 
-def _stands(window: Window, neutral: float, *, turns_on_the_spot: bool) -> bool:
+def _stands(window: Window, neutral: Command, *, turns_on_the_spot: bool) -> bool:
     """Return whether the vehicle stands at the beginning of a window, and is commanded to."""
     c = window.run.commands
     recent = c.t_s > window.t0_s - SUPPORT_S
-    moved = np.any(c.drive[recent] != neutral) or (turns_on_the_spot and np.any(c.front[recent] != neutral))
+    moved = np.any(c.drive[recent] != neutral.drive) or (turns_on_the_spot and np.any(c.front[recent] != neutral.front))
     return bool(abs(window.speed_mps) < SPEED_LIMIT_MPS and not moved)
 
 

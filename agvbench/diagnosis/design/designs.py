@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from agvbench.diagnosis.model.nodal_maps import NodalMaps
-from agvbench.types import Commands, Floats
+from agvbench.types import Command, Commands, Floats
 
 SET_FIRST_S = 0.4
 MAX_DURATION_S = 9.0
@@ -31,7 +31,7 @@ class Levels:
     drive: tuple[float, ...]
     front: tuple[float, ...]
     rear: tuple[float, ...]
-    neutral: float
+    neutral: Command
     turns_on_the_spot: bool = False
 
 
@@ -43,7 +43,7 @@ class Design:
     """
 
     steps: tuple[Step, ...]
-    neutral: float
+    neutral: Command
     turns_on_the_spot: bool = False
 
     @property
@@ -58,7 +58,7 @@ class Design:
     def rows(self) -> tuple[tuple[float, float, float, float], ...]:
         """Return rows of t_s, drive, front, rear, without the stop."""
         _, _, front, rear = self.steps[0]
-        rows = [] if self.turns_on_the_spot else [(0.0, self.neutral, front, rear)]
+        rows = [] if self.turns_on_the_spot else [(0.0, self.neutral.drive, front, rear)]
         at = self._set_first_s
         for duration, *command in self.steps:
             if not rows or tuple(command) != rows[-1][1:]:
@@ -69,8 +69,8 @@ class Design:
     def commands(self) -> Commands:
         """Return the commands, with the stop at the end."""
         rows = self.rows()
-        front, rear = (self.neutral, self.neutral) if self.turns_on_the_spot else rows[-1][2:]
-        table = np.array([*rows, (round(self.duration_s, 3), self.neutral, front, rear)])
+        front, rear = self.neutral[1:] if self.turns_on_the_spot else rows[-1][2:]
+        table = np.array([*rows, (round(self.duration_s, 3), self.neutral.drive, front, rear)])
         t_s, drive, fronts, rears = (np.ascontiguousarray(column) for column in table.T)
         return Commands(t_s, drive, fronts, rears)
 
@@ -87,10 +87,12 @@ def levels_of(maps: NodalMaps, values: Floats) -> Levels:
             half = own[np.argmin(np.abs(sign * speed[own] - 0.5 * sign * speed[fastest]))]
             drives += [float(maps.nodes["drive"][k]) for k in dict.fromkeys((fastest, half))]
     if "front" in maps.zero_at_neutral:
-        nodes = np.insert(maps.nodes["front"], 0, maps.neutral)
-        yaw_rates = _steering(nodes, np.insert(values[where["front"]], 0, 0.0), maps.neutral, math.inf)
-        return Levels(tuple(drives), yaw_rates, (maps.neutral,), maps.neutral, turns_on_the_spot=True)
-    front, rear = (_steering(maps.nodes[role], values[where[role]], maps.neutral) for role in ("front", "rear"))
+        nodes = np.insert(maps.nodes["front"], 0, maps.neutral.front)
+        yaw_rates = _steering(nodes, np.insert(values[where["front"]], 0, 0.0), maps.neutral.front, math.inf)
+        return Levels(tuple(drives), yaw_rates, (maps.neutral.rear,), maps.neutral, turns_on_the_spot=True)
+    front, rear = (
+        _steering(maps.nodes[role], values[where[role]], getattr(maps.neutral, role)) for role in ("front", "rear")
+    )
     return Levels(tuple(drives), front, rear, maps.neutral)
 
 
@@ -121,7 +123,7 @@ def _sequences(levels: Levels) -> Iterator[list[Step]]:
             for seconds in (4.0, 8.0):
                 yield [(seconds, drive, *steering)]
             for rhythm in _RHYTHMS_S[:-1]:
-                yield _repeated([(rhythm, drive, *steering), (rhythm, levels.neutral, *steering)])
+                yield _repeated([(rhythm, drive, *steering), (rhythm, levels.neutral.drive, *steering)])
         for one, other in [*((straight, s) for s in poses[1:]), *pairwise(poses[1:])]:
             for rhythm in _RHYTHMS_S:
                 yield _repeated([(rhythm, drive, *one), (rhythm, drive, *other)])
@@ -159,7 +161,7 @@ def mutated(design: Design, levels: Levels, rng: np.random.Generator) -> Design:
     if kind == 0:
         steps[k] = (round(max(_MIN_STEP_S, duration * float(rng.choice([0.6, 0.8, 1.25, 1.6]))), 2), drive, front, rear)
     elif kind == 1:
-        steps[k] = (duration, float(rng.choice([*levels.drive, levels.neutral])), front, rear)
+        steps[k] = (duration, float(rng.choice([*levels.drive, levels.neutral.drive])), front, rear)
     elif kind == 2:
         steps[k] = (duration, drive, float(rng.choice(levels.front)), rear)
     elif kind == 3:

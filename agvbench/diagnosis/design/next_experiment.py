@@ -25,7 +25,8 @@ from agvbench.diagnosis.proposal import NextExperiment, Proposal
 from agvbench.diagnosis.selection.candidates import Candidate
 from agvbench.planning import Trajectory, Workspace
 from agvbench.planning.trajectories.shapes import CommandTable
-from agvbench.types import CommandUnit, Floats
+from agvbench.types import Floats
+from agvbench.vehicle.channels import TableUnit
 
 _REQUIRED_FOR_PAIR: dict[frozenset[str], str] = {
     frozenset({"actuation_delay", "mocap_latency"}): (
@@ -80,7 +81,7 @@ def discriminate(
     alternatives: Mapping[str, Mapping[str, float]],
     candidates: Mapping[str, Candidate],
     *,
-    unit: CommandUnit,
+    unit: TableUnit,
     workspace: Workspace | None = None,
     seed: int = 0,
 ) -> Proposal:
@@ -138,7 +139,7 @@ def identify(
     chosen: Fit,
     flat: Sequence[Unidentified],
     *,
-    unit: CommandUnit,
+    unit: TableUnit,
     workspace: Workspace | None = None,
     seed: int = 0,
 ) -> NextExperiment | None:
@@ -196,7 +197,7 @@ def _now(item: Unidentified) -> str:
     return "unknown" if item.stderr > _UNKNOWN * item.scale else f"± {item.stderr:.2g}"
 
 
-def as_trajectory(design: Design, unit: CommandUnit, name: str, description: str) -> Trajectory:
+def as_trajectory(design: Design, unit: TableUnit, name: str, description: str) -> Trajectory:
     """Return a design as a trajectory."""
     table = CommandTable(unit=unit, rows=design.rows(), duration_s=round(design.duration_s, 3))
     return Trajectory(

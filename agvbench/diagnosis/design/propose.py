@@ -32,7 +32,7 @@ def with_next_experiment(
     chosen = selection.chosen.fit
     tried = candidates(chosen.predictor.batch.geometry)
     workspace = covered_workspace(readings, chosen.predictor.batch.geometry)
-    unit = header.command_unit
+    unit = header.channels.table_unit
     alternatives = {e.name: {name: 0.0 for name in e.confounded_with if name in tried} for e in found.effects}
     alternatives = {name: others for name, others in alternatives.items() if others}
     flat = unidentified(chosen, tried)

@@ -31,15 +31,14 @@ def corrected_vehicle(header: HeaderLike, geometry: Geometry, fitted: Fit, maps:
     for role, own in where.items():
         nodes, value, of_role = maps.nodes[role], values[role], weight[own]
         if role in maps.zero_at_neutral:
-            place = int(np.searchsorted(nodes, maps.neutral))
-            nodes, value = np.insert(nodes, place, maps.neutral), np.insert(value, place, 0.0)
+            place = int(np.searchsorted(nodes, getattr(maps.neutral, role)))
+            nodes, value = np.insert(nodes, place, getattr(maps.neutral, role)), np.insert(value, place, 0.0)
             of_role = np.insert(of_role, place, 1e12)
-        tables[role] = _table(nodes, value, of_role) if len(nodes) else Fixed(command=maps.neutral)
+        tables[role] = _table(nodes, value, of_role) if len(nodes) else Fixed(command=getattr(maps.neutral, role))
     return VehicleModel(
         name=header.vehicle_name,
         geometry=geometry,
-        command_unit=header.command_unit,
-        neutral=header.neutral,
+        channels=header.channels,
         **tables,
         effects=_effects(fitted),
         provenance={"campaign": header.name, "method": "diagnose", "seed": seed},

@@ -49,7 +49,7 @@ def map_effects(fitted: Fit, vehicle: VehicleModel | None) -> tuple[NamedEffect,
     if "steering_saturation" not in given:
         found += list(_saturation({role: known[role] for role in ("front", "rear")}))
     if "drive_dead_band" not in given:
-        found += list(_dead_band(known["drive"], fitted.predictor.maps.neutral))
+        found += list(_dead_band(known["drive"], fitted.predictor.maps.neutral.drive))
     return tuple(found)
 
 

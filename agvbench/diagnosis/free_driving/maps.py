@@ -10,7 +10,7 @@ import numpy as np
 from agvbench.calibration.measurement.windows import held_command
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.model.nodal_maps import ROLES, NodalMaps, nodal_maps
-from agvbench.types import Floats, Run
+from agvbench.types import Command, Floats, Run
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.kinematics import actuator_values
 
@@ -24,7 +24,7 @@ _MIN_SPEED_MPS = 0.05
 
 
 def smooth_maps(
-    runs: Sequence[Run], neutral: float, steering: int, drive: int, *, is_differential: bool = False
+    runs: Sequence[Run], neutral: Command, steering: int, drive: int, *, is_differential: bool = False
 ) -> NodalMaps:
     """Return nodal maps with a node at every level, or with evenly spaced nodes if there are many levels.
 
@@ -37,13 +37,14 @@ def smooth_maps(
         if not len(nodes[role]):
             continue
         if role in found.zero_at_neutral:
-            commanded = commanded[commanded != neutral]
+            commanded = commanded[commanded != getattr(neutral, role)]
         if len(np.unique(commanded)) <= _MANY_LEVELS:
             continue
         if role not in found.zero_at_neutral:
             nodes[role] = np.linspace(commanded.min(), commanded.max(), steering)
         else:
-            nodes[role] = _on_each_side(commanded, drive if role == "drive" else (steering + 1) // 2, neutral)
+            count = drive if role == "drive" else (steering + 1) // 2
+            nodes[role] = _on_each_side(commanded, count, getattr(neutral, role))
     return replace(found, nodes=nodes)
 
 
@@ -86,7 +87,7 @@ def start_values_of_windows(maps: NodalMaps, readings: Readings, geometry: Geome
         # A command is unknown before the first one of the recording.
         use = moving & np.isfinite(commanded)
         if role in maps.zero_at_neutral:
-            use &= commanded != maps.neutral
+            use &= commanded != getattr(maps.neutral, role)
         out.append(_smoothed(maps.nodes[role], maps.weights(role, commanded[use]), value[role][use]))
     return np.concatenate(out)
 

@@ -30,7 +30,7 @@ from agvbench.diagnosis.selection.candidates import given_effects
 from agvbench.diagnosis.selection.stepwise import Selection
 from agvbench.diagnosis.selection.variants import candidates_for
 from agvbench.errors import CampaignError
-from agvbench.types import Run
+from agvbench.types import Command, Run
 from agvbench.vehicle.geometry import Geometry
 
 ABSORBED_IN_WINDOWS = frozenset({"mocap_scale"})
@@ -172,7 +172,7 @@ def _has_sessions(readings: Readings) -> bool:
     return readings.initial_states is not None and len(np.unique(readings.initial_states.session)) > 1
 
 
-def static_maps(fitted: Readings, geometry: Geometry, neutral: float) -> Fit:
+def static_maps(fitted: Readings, geometry: Geometry, neutral: Command) -> Fit:
     """Return the static maps fitted to the windows, with the number of nodes by Schwarz's criterion."""
     best: tuple[float, Fit] | None = None
     for steering, drive in NODES:

@@ -129,9 +129,9 @@ class Batch:
 
         The yaw rate of a differential vehicle acts while the vehicle is commanded to move.
         """
-        driven = self.commands["drive"] != self.maps.neutral
+        driven = self.commands["drive"] != self.maps.neutral.drive
         always = np.ones(len(driven), dtype=np.bool_)
-        turns = driven | (self.commands["front"] != self.maps.neutral)
+        turns = driven | (self.commands["front"] != self.maps.neutral.front)
         return {"drive": driven, "front": turns if self.geometry.is_differential else always, "rear": always}
 
     def with_kinds(self, kinds: Sequence[type[Effect]]) -> Batch:

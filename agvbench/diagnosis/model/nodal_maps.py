@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.effects import Effect
-from agvbench.types import Commands, Floats, Run
+from agvbench.types import Command, Floats, Run
 
 ROLES = ("front", "rear", "drive")
 _MAX_NODES = 40
@@ -27,7 +27,7 @@ class NodalMaps:
     """
 
     nodes: dict[str, Floats]
-    neutral: float
+    neutral: Command
     zero_at_neutral: frozenset[str] = frozenset({"drive"})
 
     @property
@@ -51,12 +51,13 @@ class NodalMaps:
         if role not in self.zero_at_neutral:
             return _interpolation(nodes, command)
         # Neutral is a node with a fixed value of zero, not a parameter.
-        place = int(np.searchsorted(nodes, self.neutral))
+        neutral: float = getattr(self.neutral, role)
+        place = int(np.searchsorted(nodes, neutral))
         # A direction that was never driven is taken for the mirror image of the other.
-        below, above = (command < self.neutral) & (place == 0), (command > self.neutral) & (place == len(nodes))
+        below, above = (command < neutral) & (place == 0), (command > neutral) & (place == len(nodes))
         mirrored = below | above
-        reflected = np.where(mirrored, 2.0 * self.neutral - command, command)
-        weights = np.delete(_interpolation(np.insert(nodes, place, self.neutral), reflected), place, axis=1)
+        reflected = np.where(mirrored, 2.0 * neutral - command, command)
+        weights = np.delete(_interpolation(np.insert(nodes, place, neutral), reflected), place, axis=1)
         return np.where(mirrored[:, None], -weights, weights)
 
     def beside(self, values: Floats, kind: type[Effect], parameters: Floats) -> Floats:
@@ -64,7 +65,7 @@ class NodalMaps:
         converted = values.copy()
         for role in ("front", "rear"):
             own = self.slices()[role]
-            at_neutral = float((self.weights(role, np.array([self.neutral])) @ values[own])[0])
+            at_neutral = float((self.weights(role, np.array([getattr(self.neutral, role)])) @ values[own])[0])
             converted[own] = kind.beside(values[own], at_neutral, *parameters.tolist())
         return converted
 
@@ -78,14 +79,15 @@ class NodalMaps:
             nodes, observed = self.nodes[role], ~unobserved[own]
             at, known = nodes[observed], values[own][observed]
             if role in self.zero_at_neutral:
-                place = int(np.searchsorted(at, self.neutral))
-                at, known = np.insert(at, place, self.neutral), np.insert(known, place, 0.0)
+                neutral = getattr(self.neutral, role)
+                place = int(np.searchsorted(at, neutral))
+                at, known = np.insert(at, place, neutral), np.insert(known, place, 0.0)
             if len(at):
                 filled[own] = np.where(observed, values[own], np.interp(nodes, at, known))
         return filled
 
 
-def nodal_maps(runs: Sequence[Run], neutral: float, *, is_differential: bool = False) -> NodalMaps:
+def nodal_maps(runs: Sequence[Run], neutral: Command, *, is_differential: bool = False) -> NodalMaps:
     """Return maps with nodes at `select_levels` of the driven commands; `is_differential` as in `Geometry`."""
     nodes = {}
     zero_at_neutral = frozenset({"drive", "front"} if is_differential else {"drive"})
@@ -98,7 +100,7 @@ def nodal_maps(runs: Sequence[Run], neutral: float, *, is_differential: bool = F
         longest_s = np.zeros(len(levels))
         np.maximum.at(longest_s, which, held_s)
         levels = select_levels(levels, longest_s)
-        nodes[role] = levels[levels != neutral] if role in zero_at_neutral else levels
+        nodes[role] = levels[levels != getattr(neutral, role)] if role in zero_at_neutral else levels
     return NodalMaps(nodes, neutral, zero_at_neutral)
 
 
@@ -132,7 +134,7 @@ def _add_farthest(nodes: Floats, levels: Floats, near: float, most: int) -> Floa
     return np.sort(nodes)
 
 
-def _driven_commands(runs: Sequence[Run], role: str, neutral: float, *, on_the_spot: bool) -> tuple[Floats, Floats]:
+def _driven_commands(runs: Sequence[Run], role: str, neutral: Command, *, on_the_spot: bool) -> tuple[Floats, Floats]:
     """Return every command (n,) under which the vehicle was driven, and the time for which each was held [s].
 
     A vehicle that turns `on_the_spot` is driven by its front command, too.
@@ -140,17 +142,13 @@ def _driven_commands(runs: Sequence[Run], role: str, neutral: float, *, on_the_s
     commands, held_s = [], []
     for run in runs:
         values, t_s = getattr(run.commands, role), run.commands.t_s
-        driven = _driven_rows(run.commands, neutral) | (on_the_spot & (run.commands.front != neutral))
+        driven = (run.commands.drive != neutral.drive) | (on_the_spot & (run.commands.front != neutral.front))
         # A row begins where any command changes, so that one command may be held over many rows.
         changes = np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
         ends_s = np.append(t_s[changes[1:]], max(float(np.max(run.frames.t_s, initial=-np.inf)), t_s[-1]))
         commands.append(values[driven])
         held_s.append(np.repeat(ends_s - t_s[changes], np.diff(np.append(changes, len(values))))[driven])
     return np.concatenate(commands), np.concatenate(held_s)
-
-
-def _driven_rows(commands: Commands, neutral: float) -> NDArray[np.bool_]:
-    return np.asarray(commands.drive != neutral)
 
 
 def _interpolation(nodes: Floats, command: Floats) -> Floats:

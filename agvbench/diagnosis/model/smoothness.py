@@ -67,7 +67,7 @@ class SmoothnessPrior:
             speed_mps = typical_speed_mps(readings)
             for role, own in maps.slices().items():
                 size = speed_mps if role == "drive" else _TYPICAL_ANGLE_RAD
-                neutral = maps.neutral if role in maps.zero_at_neutral else None
+                neutral = getattr(maps.neutral, role) if role in maps.zero_at_neutral else None
                 for row, scale in _slope_changes(maps.nodes[role], neutral, size):
                     rows.append(np.zeros(maps.size))
                     rows[-1][own] = row

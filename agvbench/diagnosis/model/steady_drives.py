@@ -19,7 +19,7 @@ SteadyDrive = tuple[Command, Mapping[str, float]]
 """A command, and the steady-state value of each channel [rad, rad/s, m/s]; NaN where the run does not tell."""
 
 
-def steady_drives(runs: Iterable[Run], geometry: Geometry, neutral: float) -> list[SteadyDrive]:
+def steady_drives(runs: Iterable[Run], geometry: Geometry, neutral: Command) -> list[SteadyDrive]:
     """Return what each run with a steady part says of the channels, by inverted kinematics.
 
     A run without one gives no initial value, but remains in the fit.

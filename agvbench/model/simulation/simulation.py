@@ -25,7 +25,7 @@ from agvbench.effects.state import LOGGED_COUNT
 from agvbench.errors import InputError, VehicleError
 from agvbench.model.simulation.compose import kernel
 from agvbench.model.simulation.hook_errors import check_hooks
-from agvbench.types import Commands, Floats
+from agvbench.types import Command, Commands, Floats
 from agvbench.vehicle.geometry import Geometry
 
 Integers = NDArray[np.int64]
@@ -62,10 +62,10 @@ class SimulatedRun:
     preset: tuple[float, float] | None = None
     logged: tuple[float, ...] = ()
 
-    def before(self, neutral: float) -> dict[str, float]:
+    def before(self, neutral: Command) -> dict[str, float]:
         """Return the command that held before the first one, by channel."""
-        front, rear = self.preset or (neutral, neutral)
-        return {"drive": neutral, "front": front, "rear": rear}
+        front, rear = self.preset or (neutral.front, neutral.rear)
+        return {"drive": neutral.drive, "front": front, "rear": rear}
 
 
 class Simulation:
@@ -112,7 +112,7 @@ class Simulation:
     def __init__(
         self,
         geometry: Geometry,
-        neutral: float,
+        neutral: Command,
         runs: Sequence[SimulatedRun],
         *,
         kinds: Sequence[type[Effect]] = (),

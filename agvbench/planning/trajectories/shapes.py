@@ -27,7 +27,8 @@ from agvbench.planning.trajectories.segments import (
     exactly_one,
     from_pieces,
 )
-from agvbench.types import CommandUnit, Pose
+from agvbench.types import Pose
+from agvbench.vehicle.channels import TableUnit
 
 Coordinate = Annotated[float, Meta(ge=-10_000.0, le=10_000.0)]
 Heading = Annotated[float, Meta(ge=-36_000.0, le=36_000.0)]
@@ -183,9 +184,12 @@ MOST_ROWS = 8000
 
 
 class CommandTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Raw commands: `rows` of t_s, drive, front, rear in the vehicle's own `unit`; the stop is at `duration_s`."""
+    """Raw commands: `rows` of t_s, drive, front, rear in the vehicle's own `unit`; the stop is at `duration_s`.
 
-    unit: CommandUnit
+    The unit ``"channels"`` is that of each channel, for a vehicle whose channels have different ones.
+    """
+
+    unit: TableUnit
     duration_s: Duration
     rows: Annotated[tuple[Row, ...], Meta(min_length=1, max_length=MOST_ROWS)]
 

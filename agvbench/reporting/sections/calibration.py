@@ -11,6 +11,7 @@ from agvbench.reporting.content import Block, Column, FigureBlock, Panel, Paragr
 from agvbench.reporting.figures.style import INK, ON_PAGE, dress, new_figure, to_svg
 from agvbench.reporting.sections.base import Section
 from agvbench.types import CommandUnit
+from agvbench.vehicle.channels import Channels
 from agvbench.workflows.calibration import Curve
 from agvbench.workflows.report import ReportData
 
@@ -40,9 +41,9 @@ class CalibrationSection(Section):
         blocks: list[Block] = [Paragraph(absent)] if absent else []
         if not curves:
             return blocks or [Paragraph("The campaign holds no calibration measurements.")]
-        unit = data.header.command_unit
+        channels = data.header.channels
         panels = [
-            Panel(c.channel, draw_curve(c, f"curve-{c.axle}", command_label=f"command [{_command_unit(c, unit)}]"))
+            Panel(c.channel, draw_curve(c, f"curve-{c.axle}", command_label=f"command [{_command_unit(c, channels)}]"))
             for c in curves
         ]
         blocks.append(FigureBlock("calibration-curves", _CAPTION, panels))
@@ -53,7 +54,8 @@ class CalibrationSection(Section):
         return blocks
 
 
-def _command_unit(curve: Curve, unit: CommandUnit) -> str:
+def _command_unit(curve: Curve, channels: Channels) -> str:
+    unit: CommandUnit = getattr(channels, curve.axle).unit
     if unit == "si":  # a command is what it sets
         return "rad" if curve.unit == "deg" else curve.unit
     return "µs" if unit == "us" else "–"

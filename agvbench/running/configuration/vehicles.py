@@ -11,6 +11,7 @@ from typing import Any
 from agvbench.errors import AgvbenchError
 from agvbench.model import VehicleModel, nominal_model, thesis_vehicle
 from agvbench.running.configuration.settings import BenchSettings
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import FullSpeedOrStop, MonotoneTable
 
@@ -67,7 +68,7 @@ def uncalibrated_vehicle(path: str = "") -> VehicleModel:
     """
     if path:
         return VehicleModel.load(path)
-    return nominal_model("model AGV", Geometry(front_axle_m=0.181, rear_axle_m=0.121), "us", 1500.0)
+    return nominal_model("model AGV", Geometry(front_axle_m=0.181, rear_axle_m=0.121), Channels.alike("us"))
 
 
 def expected_calibration(path: str = "") -> VehicleModel:

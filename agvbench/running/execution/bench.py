@@ -40,7 +40,7 @@ from agvbench.running.positioning.start_pose import notify_operator
 from agvbench.running.quality import DEFAULT_LIMITS, QualityLimits, assess, not_as_planned
 from agvbench.running.supervision.limits import DEFAULT_SAFETY
 from agvbench.running.supervision.supervisor import Supervisor
-from agvbench.types import Command, Frames, Outcome, Run, RunStatus
+from agvbench.types import Frames, Outcome, Run, RunStatus
 
 _UNNAMED = SessionBegan()
 _MOST_UNSEEN = 3
@@ -158,8 +158,11 @@ class Bench:
             If hardware failed, now or earlier in this session: a bench that failed once drives no more.
         RecordingError
             If the run was driven and cannot be recorded; the bench drives no more, either.
+        VehicleError
+            If a command is out of the range of its channel: nothing was driven.
         """
         self.check()
+        self.nominal.channels.require_within(request.commands, where=request.run_id)
         request = replace(request, session=self._session.name)
         with self._latch.remembering():
             for attempt in range(1, self._attempts(request) + 1):
@@ -185,7 +188,7 @@ class Bench:
         run_id = _attempt_id(request, attempt)
         if run_id in self._recorded:
             return self._repeat_unseen(request, self._recorded[run_id])
-        self.pause.wait(run_id, holding_neutral(self.link, self._neutral()))
+        self.pause.wait(run_id, holding_neutral(self.link, self.nominal.neutral))
         request = self._placed(request, run_id)
         loop = self._closed_loop(request, run_id)
         started_s = self._time.now_s()
@@ -250,7 +253,7 @@ class Bench:
     def _repeat_unseen(self, request: RunRequest, run: Run) -> Run:
         if self._identity.simulated:
             duration_s = float(str(run.extra["duration_s"]))
-            commands, until_s = control_cycles_of(run.commands, self._neutral(), duration_s, self._timing)
+            commands, until_s = control_cycles_of(run.commands, self.nominal.neutral, duration_s, self._timing)
             self.link.replay(self._random_key(run.run_id), commands, pose=request.start, until_s=until_s)
             self._placer.was_moved()
             self._time.has_run(run.started_s, duration_s)
@@ -263,10 +266,6 @@ class Bench:
             return request
         self._time.has_placed(placing.duration_s)
         return replace(request, extra={**request.extra, **placing.columns()})
-
-    def _neutral(self) -> Command:
-        """Return the command before a run: everything neutral, since a run's first command is the first recorded."""
-        return Command(self.nominal.neutral, self.nominal.neutral, self.nominal.neutral)
 
     def _closed_loop(self, request: RunRequest, run_id: str) -> ClosedLoop | None:
         """Return what drives an attempt closed loop; None for a run whose commands are known."""
@@ -285,7 +284,7 @@ class Bench:
         return drive(
             self.link,
             loop or request.commands,
-            neutral=self._neutral(),
+            neutral=self.nominal.neutral,  # since a run's first command is the first recorded
             start=request.start,
             run_key=self._placer.run_key(self._random_key(run_id)),
             supervisor=self._supervisor,

@@ -192,7 +192,7 @@ class ClosedLoop:
     def _stop(self) -> Command:
         """Return the command that stops the vehicle after the last one, or after none."""
         model = self._control.reference.model
-        last = self._sent[-1].command if self._sent else Command(model.neutral, model.neutral, model.neutral)
+        last = self._sent[-1].command if self._sent else model.neutral
         return model.stop_after(last)
 
     def _send(self, timed: TimedCommand) -> TimedCommand:

@@ -42,7 +42,7 @@ class Placer(ABC):
     @property
     def _neutral(self) -> Command:
         """The command at which the vehicle stands."""
-        return Command(*[self._rig.model.neutral] * 3)
+        return self._rig.model.neutral
 
     @abstractmethod
     def place(self, start: Pose, run_id: str) -> ReturnResult | None:

@@ -139,13 +139,12 @@ def _header(
     """Return the campaign's header; a session that is resumed keeps the names that it began with."""
     identity = link.identity()
     header = CampaignHeader(
-        schema=schema_for(nominal.geometry.driven, nominal.geometry.kinematics, nominal.command_unit),
+        schema=schema_for(nominal.geometry.driven, nominal.geometry.kinematics, nominal.channels),
         name=directory.resolve().name,
         vehicle_name=nominal.name if settings.vehicle else identity.vehicle,
         front_axle_m=nominal.geometry.front_axle_m,
         rear_axle_m=nominal.geometry.rear_axle_m,
-        command_unit=nominal.command_unit,
-        neutral=nominal.neutral,
+        channels=nominal.channels,
         mocap_rate_hz=identity.mocap_rate_hz,
         driven=nominal.geometry.driven,
         kinematics=nominal.geometry.kinematics,

@@ -15,6 +15,7 @@ from agvbench.model import VehicleModel
 from agvbench.running.configuration.settings import BenchSettings
 from agvbench.running.rest_detection import LEAST_RATE_HZ
 from agvbench.running.supervision.limits import DEFAULT_SAFETY
+from agvbench.vehicle.channels import ROLES, Channel, Role
 
 _OPTIONS = {"uncalibrated": "--vehicle", "calibrated": "--calibration", "corrected": "--corrected"}
 
@@ -26,8 +27,7 @@ def adapter_options(settings: BenchSettings, models: Mapping[str, VehicleModel])
         vehicle=settings.vehicle_name,
         plant=settings.plant,
         seed=settings.seed,
-        command_unit=nominal.command_unit,
-        neutral=nominal.neutral,
+        channels=nominal.channels,
         calibration_hash=models["calibrated"].calibration_hash if "calibrated" in models else "",
         camera=camera_options([settings.camera]),
     )
@@ -59,8 +59,7 @@ def open_session_rig(settings: BenchSettings, models: Mapping[str, VehicleModel]
         bus_config=BusConfig.load(settings.bus_config) if settings.bus_config else None,
         lab=settings.lab,
         vehicle=options.vehicle,
-        command_unit=options.command_unit,
-        neutral=options.neutral,
+        channels=options.channels,
         calibration_hash=options.calibration_hash,
     ) as link:
         check_rig(models, settings, link)
@@ -86,15 +85,22 @@ def check_rig(models: Mapping[str, VehicleModel], settings: BenchSettings, link:
 def check_commands(models: Mapping[str, VehicleModel], identity: AgvIdentity | Identity) -> None:
     """Raise `VehicleError` unless the models, by condition, command the vehicle in its unit, about its neutral."""
     for condition, model in models.items():
-        for what, said, true in (
-            ("takes commands in another unit", model.command_unit, identity.command_unit),
-            ("stands still at another command", model.neutral, identity.neutral),
-        ):
-            if said != true:
-                remedy = f"give the right file with {_OPTIONS[condition]}"
+        for role in ROLES:
+            said, true = getattr(model.channels, role), getattr(identity.channels, role)
+            for what, ours, theirs in _differences(said, true, role):
                 raise VehicleError(
-                    f"the vehicle {what} than its file says", where=model.name, value=said, limit=true, remedy=remedy
-                )
+                    f"the vehicle {what} than its file says", where=model.name, value=ours, limit=theirs,
+                    remedy=f"give the right file with {_OPTIONS[condition]}",
+                )  # fmt: skip
+
+
+def _differences(said: Channel, true: Channel, role: Role) -> Iterator[tuple[str, object, object]]:
+    if said.unit != true.unit:
+        yield "takes commands in another unit", said.unit, true.unit
+    if said.neutral != true.neutral:
+        yield "stands still at another command", said.neutral, true.neutral
+    if said.low < true.low or said.high > true.high:
+        yield f"takes {role} commands in a smaller range", said.range_text, true.range_text
 
 
 def _check_control_cycle(settings: BenchSettings, link: VehicleLink) -> None:

@@ -30,7 +30,8 @@ from agvbench.running.execution.latch import Failure
 from agvbench.running.execution.run_records import RunRequest
 from agvbench.running.session.driven_run import DrivenRun
 from agvbench.running.session.end_pose_bias import NO_BIAS_CORRECTIONS
-from agvbench.types import CONDITIONS, Commands, CommandUnit, Pose, Run
+from agvbench.types import CONDITIONS, Commands, Pose, Run
+from agvbench.vehicle.channels import TableUnit
 
 
 class BenchSession:
@@ -320,7 +321,7 @@ class Driver:
             self._session.not_applicable.add(self._run_id)
             raise NotDrivenError("this vehicle does not steer its rear axle")
         commands = held(self._session.nominal, [(duration_s, shares.command(**step)) for duration_s, step in steps])
-        trajectory = _as_trajectory(self._experiment, commands, self._session.nominal.command_unit)
+        trajectory = _as_trajectory(self._experiment, commands, self._session.nominal.channels.table_unit)
         return self._session.plan(trajectory, "uncalibrated")
 
     def _drive(
@@ -346,7 +347,7 @@ class Driver:
         return DrivenRun.of(run)
 
 
-def _as_trajectory(name: str, commands: Commands, unit: CommandUnit) -> Trajectory:
+def _as_trajectory(name: str, commands: Commands, unit: TableUnit) -> Trajectory:
     *rows, stop = zip(*(column.tolist() for column in vars(commands).values()), strict=True)
     table = CommandTable(unit=unit, rows=tuple(rows), duration_s=stop[0])
     return Trajectory(schema=1, name=name, target="none", commands=table)

@@ -47,12 +47,12 @@ class Supervisor:
     def __init__(
         self,
         workspace: Workspace,
-        neutral_drive: float,
+        neutral: Command,
         limits: SafetyLimits = DEFAULT_SAFETY,
         *,
         turns_on_the_spot: bool = False,
     ) -> None:
-        self._workspace, self._neutral, self._limits = workspace, neutral_drive, limits
+        self._workspace, self._neutral, self._limits = workspace, neutral, limits
         self._turns_on_the_spot = turns_on_the_spot
         self._classes = classes_by_file(rules, Rule)  # type: ignore[type-abstract]
         self.begin()
@@ -78,8 +78,8 @@ class Supervisor:
             As from the link.
         """
         end_s = t_s + hold_s
-        turns = self._turns_on_the_spot and command.front != self._neutral
-        if command.drive == self._neutral and not turns:
+        turns = self._turns_on_the_spot and command.front != self._neutral.front
+        if command.drive == self._neutral.drive and not turns:
             self._driving_since_s = None
         elif self._driving_since_s is None:
             self._driving_since_s = t_s

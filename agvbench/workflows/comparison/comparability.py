@@ -12,6 +12,7 @@ from agvbench.errors import AgvbenchError
 from agvbench.running.configuration.provenance import INPUTS_TABLE
 from agvbench.running.configuration.settings import BenchSettings
 from agvbench.simulator import seed_samples_vehicle
+from agvbench.vehicle.channels import Channels
 
 _VEHICLE = ("agv", "plant")
 _CAMERA = ("mocap", "camera")
@@ -72,9 +73,10 @@ def _incomplete(side: Campaign) -> str:
 
 
 def _units(a: Campaign, b: Campaign) -> Iterator[str]:
-    if a.header.command_unit != b.header.command_unit:
+    one, other = (_units_text(side.header.channels) for side in (a, b))
+    if one != other:
         yield (
-            f"The vehicles take commands in different units ({a.header.command_unit} and {b.header.command_unit}): "
+            f"The vehicles take commands in different units ({one} and {other}): "
             "they are not one kind of vehicle (compared on purpose: --across-vehicles)."
         )
 
@@ -90,12 +92,24 @@ def _vehicle_facts(a: Campaign, b: Campaign) -> Iterator[tuple[str, str, str]]:
     yield "name", one.vehicle_name, other.vehicle_name
     for axle in ("front_axle_m", "rear_axle_m"):
         yield axle, f"{getattr(one, axle):g} m", f"{getattr(other, axle):g} m"
-    if one.command_unit == other.command_unit:
-        unit = one.command_unit
-        yield "neutral", f"{one.neutral:g} {unit}", f"{other.neutral:g} {unit}"
+    if _units_text(one.channels) == _units_text(other.channels):
+        yield _channel_facts(one.channels, other.channels)
     yield "driven axle", one.driven, other.driven
     yield "kinematics", one.kinematics, other.kinematics
     yield from _options(a, b, _VEHICLE)
+
+
+def _channel_facts(one: Channels, other: Channels) -> tuple[str, str, str]:
+    if (a := one.common) and (b := other.common):
+        return "neutral", f"{a.neutral:g} {a.unit}", f"{b.neutral:g} {b.unit}"
+    return "channels", f"({one})", f"({other})"
+
+
+def _units_text(channels: Channels) -> str:
+    """Return the unit of all channels, or that of each."""
+    if channels.table_unit != "channels":
+        return channels.table_unit
+    return f"drive {channels.drive.unit}, front {channels.front.unit}, rear {channels.rear.unit}"
 
 
 def _sampled_vehicles(a: Campaign, b: Campaign) -> Iterator[str]:

@@ -29,6 +29,7 @@ from agvbench.bus.messages.event import Level
 from agvbench.bus.messages.identity import decode_agv_identity
 from agvbench.errors import AgvbenchError, LinkError
 from agvbench.types import Command
+from agvbench.vehicle.channels import Channels
 
 pytestmark = pytest.mark.real_time
 
@@ -281,7 +282,7 @@ def test_ports_that_cannot_be_opened(tmp_path: Path) -> None:
         assert line in str(caught.value)
         assert "\n" not in str(caught.value)
     with pytest.raises(LinkError, match="takes microseconds"):
-        open_agv("serial:/dev/nowhere", AdapterOptions(command_unit="normalised"))
+        open_agv("serial:/dev/nowhere", AdapterOptions(channels=Channels.alike("normalised")))
 
 
 def test_a_port_that_is_in_use_says_so() -> None:

@@ -13,6 +13,6 @@ class Faster(VehicleFault):
     default = 1.5
     highest = 10.0
 
-    def alter(self, command: Command, neutral: float) -> Command:
+    def alter(self, command: Command, neutral: Command) -> Command:
         """Take the drive further from neutral."""
-        return command._replace(drive=neutral + self.value * (command.drive - neutral))
+        return command._replace(drive=neutral.drive + self.value * (command.drive - neutral.drive))

@@ -12,6 +12,7 @@ from agvbench.planning.steering import centre_forward
 from agvbench.planning.trajectories.segments import Steering
 from agvbench.running.command_shares import Shares
 from agvbench.types import Command
+from agvbench.vehicle.channels import Channel
 from agvbench.vehicle.maps import StaticMap
 
 _LARGEST_RAD = math.radians(40.0)
@@ -57,15 +58,20 @@ class CommandMapping:
     def command(self, share: float, curvature_per_m: float) -> Command:
         """Return the command of a share of full drive, negative backward, and a curvature [1/m], left positive."""
         front, rear = (
-            _steered(static_map, math.atan(lever * curvature_per_m), self.model.neutral)
-            for lever, static_map in zip(self._levers, (self.model.front, self.model.rear), strict=True)
+            _steered(static_map, math.atan(lever * curvature_per_m), channel)
+            for lever, static_map, channel in zip(
+                self._levers,
+                (self.model.front, self.model.rear),
+                (self.model.channels.front, self.model.channels.rear),
+                strict=True,
+            )
         )
-        return Command(self.model.neutral + share * self.shares.drive, front, rear)
+        return Command(self.neutral.drive + share * self.shares.drive, front, rear)
 
     @property
     def neutral(self) -> Command:
         """The command at which the vehicle stands."""
-        return Command(self.model.neutral, self.model.neutral, self.model.neutral)
+        return self.model.neutral
 
 
 def _mode(model: VehicleModel) -> Steering:
@@ -75,8 +81,9 @@ def _mode(model: VehicleModel) -> Steering:
     return "abeam" if front and rear else "front" if front else "rear"
 
 
-def _steered(static_map: StaticMap, angle_rad: float, neutral: float) -> float:
+def _steered(static_map: StaticMap, angle_rad: float, channel: Channel) -> float:
     low, high = static_map.output_range
     if low == high:
-        return neutral
-    return float(static_map.inverse(np.clip(angle_rad, low, high)))
+        return channel.neutral
+    command = float(static_map.inverse(np.clip(angle_rad, low, high)))
+    return min(channel.high, max(channel.low, command))

@@ -57,7 +57,7 @@ class _Unheard:
 
 
 def _vehicle(identity: AgvIdentity | Identity) -> str:
-    return f"{identity.vehicle} answers ({identity.firmware}), commands in {identity.command_unit}"
+    return f"{identity.vehicle} answers ({identity.firmware}), commands in {identity.channels}"
 
 
 def _camera(identity: MocapIdentity) -> str:

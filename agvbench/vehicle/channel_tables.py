@@ -1,0 +1,113 @@
+"""Command channels in files: ``command_unit`` and ``neutral`` for all of them, or a table ``[channels.NAME]`` for each.
+
+In a table SI units have their symbols, so that a reader of the file need not know what a channel sets.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Final
+
+from agvbench.errors import OneOf, VehicleError
+from agvbench.types import CommandUnit
+from agvbench.vehicle.channels import Channel, Channels
+from agvbench.vehicle.fields import check_keys, located, number
+from agvbench.vehicle.geometry import Kinematics
+
+_NAMES: Final[dict[Kinematics, dict[str, str]]] = {
+    "two_axle": {"drive": "drive", "front": "front", "rear": "rear"},
+    "differential": {"drive": "speed", "front": "yaw_rate"},
+}
+_SI_UNITS: Final = {"drive": "m/s", "speed": "m/s", "front": "rad", "rear": "rad", "yaw_rate": "rad/s"}
+_KEYS: Final = ("unit", "neutral", "low", "high")
+
+
+def channel_names(kinematics: Kinematics) -> Mapping[str, str]:
+    """Return the names of the channels in files, by role.
+
+    >>> dict(channel_names("differential"))
+    {'drive': 'speed', 'front': 'yaw_rate'}
+    """
+    return _NAMES[kinematics]
+
+
+def si_unit(name: str) -> str:
+    """Return the SI unit of the channel of this name in files.
+
+    >>> si_unit("yaw_rate")
+    'rad/s'
+    """
+    return _SI_UNITS[name]
+
+
+def channels_from_keys(content: Mapping[str, Any], kinematics: Kinematics) -> Channels:
+    """Return the channels of a file's `content`: its key ``channels``, or ``command_unit`` and ``neutral``.
+
+    Raises
+    ------
+    VehicleError
+        If both are there or a key is missing, unknown or has a value that cannot be used; the line names the key.
+    """
+    if "channels" not in content:
+        unit = content["command_unit"]
+        if not isinstance(unit, str):
+            raise VehicleError("must be a text", where="command_unit", value=repr(unit))
+        return Channels.alike(unit, number(content["neutral"], where="neutral"))  # type: ignore[arg-type]
+    for key in ("command_unit", "neutral"):
+        if key in content:
+            raise VehicleError(
+                "the channels are described twice", where=key, limit="command_unit and neutral, or [channels]",
+                remedy=f"delete {key}, or [channels]",
+            )  # fmt: skip
+    return _from_tables(content["channels"], kinematics)
+
+
+def channels_to_keys(channels: Channels, kinematics: Kinematics) -> dict[str, Any]:
+    """Return what `channels_from_keys` reads: ``command_unit`` and ``neutral`` if the channels are alike."""
+    if (common := channels.common) is not None:
+        return {"command_unit": common.unit, "neutral": common.neutral}
+    return {"channels": {name: _to_table(getattr(channels, role), name) for role, name in _NAMES[kinematics].items()}}
+
+
+def _from_tables(tables: object, kinematics: Kinematics) -> Channels:
+    names = _NAMES[kinematics]
+    if not isinstance(tables, Mapping):
+        raise VehicleError("must be a table", where="channels", value=repr(tables))
+    check_keys(tables, names.values(), where="channels")
+    for name in names.values():
+        if name not in tables:
+            raise VehicleError("a table is missing", where=f"channels.{name}", remedy=f"add [channels.{name}]")
+    found = {role: _from_table(tables[name], name) for role, name in names.items()}
+    return Channels(found["drive"], found["front"], found.get("rear", found["front"]))
+
+
+def _from_table(table: object, name: str) -> Channel:
+    where = f"channels.{name}"
+    if not isinstance(table, Mapping):
+        raise VehicleError("must be a table", where=where, value=repr(table))
+    check_keys(table, _KEYS, where=where)
+    for key in _KEYS:
+        if key not in table:
+            raise VehicleError("a key is missing", where=where, value=key, remedy=f"add {key} = …")
+    units: dict[object, CommandUnit] = {"us": "us", "normalised": "normalised", _SI_UNITS[name]: "si"}
+    unit = table["unit"]
+    if not isinstance(unit, str) or unit not in units:
+        raise VehicleError("unknown unit", where=f"{where}.unit", value=repr(unit), limit=OneOf(units))
+    neutral, low, high = (_finite(table[key], f"{where}.{key}") for key in _KEYS[1:])
+    try:
+        return Channel(units[unit], neutral, low, high)
+    except VehicleError as error:
+        raise located(error, where) from None
+
+
+def _finite(value: object, where: str) -> float:
+    found = number(value, where=where)
+    if math.isinf(found):
+        raise VehicleError("must be a finite number", where=where, value=found)
+    return found
+
+
+def _to_table(channel: Channel, name: str) -> dict[str, Any]:
+    unit = _SI_UNITS[name] if channel.unit == "si" else channel.unit
+    return {"unit": unit, "neutral": channel.neutral, "low": channel.low, "high": channel.high}
