@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from agvbench.statistics import Comparison, pose_errors, valid
     from agvbench.types import Pose, Run
     from agvbench.workflows.comparison.compare import compare
+    from agvbench.workflows.history import History, history
 
 __version__ = "0.2.0"
 __all__ = [
@@ -31,6 +32,7 @@ __all__ = [
     "Campaign",
     "Comparison",
     "Diagnosis",
+    "History",
     "Pose",
     "PoseNoise",
     "Run",
@@ -42,6 +44,7 @@ __all__ = [
     "calibrate",
     "compare",
     "diagnose",
+    "history",
     "identify",
     "plan",
     "plot",
@@ -65,6 +68,7 @@ if not TYPE_CHECKING:  # mypy would take any name for an attribute of a module w
         "statistics": ("Comparison", "pose_errors", "valid"),
         "types": ("Pose", "Run"),
         "workflows.comparison.compare": ("compare",),
+        "workflows.history": ("History", "history"),
     }
     _HOMES = {name: package for package, names in _PACKAGES.items() for name in names}
 

@@ -144,6 +144,18 @@ class Manifest:
         write_atomically(self._directory / MANIFEST_FILE, lines, durable=durable)
 
 
+def check_file(directory: Path, name: str) -> None:
+    """`Manifest.check` one file of a campaign; the list is not parsed where it has the file's hash."""
+    path = directory / MANIFEST_FILE
+    try:
+        require_regular(path)
+        if _lines({name: sha256(directory / name)}) in path.read_bytes():
+            return
+    except OSError:  # no list, or none that can be read: said below
+        pass
+    Manifest(directory).check(directory / name)
+
+
 def _hash(file: Path) -> str:
     try:
         return sha256(file)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -49,8 +50,15 @@ def to_parquet(table: pa.Table) -> memoryview:
     return memoryview(sink.getvalue())
 
 
-def read_parquet(path: Path, *, max_rows: int = MAX_ROWS, max_bytes: int = MAX_BYTES) -> pa.Table:
-    """Read a parquet file.
+def read_parquet(
+    path: Path,
+    *,
+    max_rows: int = MAX_ROWS,
+    max_bytes: int = MAX_BYTES,
+    columns: Sequence[str] | None = None,
+    plain: bool = True,
+) -> pa.Table:
+    """Read a parquet file, or those of the `columns` that it has; texts are dictionary columns unless `plain`.
 
     Raises
     ------
@@ -71,9 +79,9 @@ def read_parquet(path: Path, *, max_rows: int = MAX_ROWS, max_bytes: int = MAX_B
             file = pq.ParquetFile(
                 source, metadata=file.metadata, read_dictionary=texts, page_checksum_verification=True
             )
-            table = file.read(use_threads=False)
+            table = file.read(columns=None if columns is None else list(columns), use_threads=False)
             _require_room(path, _TOO_LARGE, sum(map(_text_bytes, table.columns)), max_bytes, " bytes")
-            return _plain(table)
+            return _plain(table) if plain else table
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise CampaignError(
             _what_is_wrong(path, error),

@@ -16,7 +16,7 @@ from agvbench.vehicle.channels import Channels
 
 _VEHICLE = ("agv", "plant")
 _CAMERA = ("mocap", "camera")
-_DIGITS = 12
+HASH_DIGITS = 12
 """Of a hash, as versions are known by theirs; the JSON has them whole."""
 
 
@@ -57,7 +57,7 @@ def comparability(a: Campaign, b: Campaign | None, *, across_vehicles: bool = Fa
         return Comparability(incomplete)
     units, *notes = (tuple(find(a, b)) for find in (_units, *_NOTES))
     qualified = tuple(sentence for found in notes for sentence in found)
-    hashes = tuple(_calibration_hash(side.path) for side in sides)
+    hashes = tuple(calibration_hash(side.path) for side in sides)
     if across_vehicles:
         return Comparability(incomplete, (), (*units, *qualified), hashes)
     return Comparability(incomplete, units, qualified, hashes)
@@ -150,11 +150,11 @@ def _trajectories(a: Campaign, b: Campaign) -> Iterator[str]:
 
 
 def _calibrations(a: Campaign, b: Campaign) -> Iterator[str]:
-    hashes = [_calibration_hash(side.path) for side in (a, b)]
+    hashes = [calibration_hash(side.path) for side in (a, b)]
     calibrated = any(set(side.runs["condition"]) - {"uncalibrated", ""} for side in (a, b))
     if all(hashes) and hashes[0] != hashes[1] and calibrated:
         yield (
-            f"The calibrations differ ({hashes[0][:_DIGITS]} and {hashes[1][:_DIGITS]}): this is part of every "
+            f"The calibrations differ ({hashes[0][:HASH_DIGITS]} and {hashes[1][:HASH_DIGITS]}): this is part of every "
             "difference but the uncalibrated ones. To compare firmware or vehicles alone, drive both with one "
             "calibration (bench --calibration FILE)."
         )
@@ -163,7 +163,8 @@ def _calibrations(a: Campaign, b: Campaign) -> Iterator[str]:
 _NOTES = (_vehicles, _sampled_vehicles, _cameras, _trajectories, _calibrations)
 
 
-def _calibration_hash(campaign: Path) -> str:
+def calibration_hash(campaign: Path) -> str:
+    """Return the hash of the vehicle file in a campaign directory; "" where there is none that can be read."""
     from agvbench.model import VehicleModel
 
     try:

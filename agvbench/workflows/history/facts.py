@@ -1,0 +1,65 @@
+"""What campaigns record besides errors (firmware, calibration, program, vehicle, options, files), and what changed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
+
+from agvbench.campaign.header import FILE_NAME, CampaignHeader
+from agvbench.errors import AgvbenchError
+from agvbench.running.configuration.provenance import INPUTS_TABLE, recorded_rows, recorded_trajectories
+from agvbench.running.configuration.settings import BenchSettings
+from agvbench.workflows.comparison.comparability import HASH_DIGITS, calibration_hash
+
+_OF_PROGRAM = ("agvbench", "git_revision", "host")
+_OPTIONS = ("agv", "mocap", "camera", "plant", "maps", "steering", "order", "place", "workspace", "exchange")
+Facts = Mapping[str, str]
+
+
+def facts_of(campaign: Path, firmware: str) -> Facts:
+    """Return what a campaign records about itself, by name; what it does not record, or cannot be read, is left out."""
+    found = {"firmware": firmware, "calibration": calibration_hash(campaign)[:HASH_DIGITS]}
+    for read in (_program, _header, _options, _trajectories):
+        with suppress(AgvbenchError, OSError, KeyError):
+            found |= read(campaign)
+    return {name: value for name, value in found.items() if value}
+
+
+def changed(before: Facts, after: Facts) -> Iterator[str]:
+    """Yield a phrase for each fact that both campaigns record and that differs.
+
+    >>> list(changed({"firmware": "2.0", "host": "lab"}, {"firmware": "2.1"}))
+    ['firmware 2.0 → 2.1']
+    """
+    for name, value in after.items():
+        if before.get(name, value) != value:
+            yield f"{name} {before[name]} → {value}"
+
+
+def _program(campaign: Path) -> dict[str, str]:
+    facts = {str(row["name"]): str(row["value"]) for row in recorded_rows(campaign, "provenance")}
+    return {name: facts[name] for name in _OF_PROGRAM if name in facts}
+
+
+def _header(campaign: Path) -> dict[str, str]:
+    header = asdict(CampaignHeader.load(campaign / FILE_NAME))
+    left_out = ("schema", "name", "prediction_horizon_s", "prediction_stride_s")
+    return {
+        name: f"{value:g}" if isinstance(value, float) else str(value)
+        for name, value in header.items()
+        if name not in left_out
+    }
+
+
+def _options(campaign: Path) -> dict[str, str]:
+    settings = BenchSettings.load(campaign)
+    return {f"--{name}": str(getattr(settings, name)) or "none" for name in _OPTIONS}
+
+
+def _trajectories(campaign: Path) -> dict[str, str]:
+    rows = recorded_rows(campaign, INPUTS_TABLE)
+    names = recorded_trajectories(rows)
+    hashes = {str(row["input"]): str(row["sha256"])[:HASH_DIGITS] for row in rows}
+    return {name: digest for name, digest in hashes.items() if name.removeprefix("trajectory ") in names}
