@@ -15,6 +15,7 @@ from agvbench.model.examples import example_vehicle
 from agvbench.model.nominal import nominal_model
 from agvbench.planning import load_trajectory, plan, steered
 from agvbench.types import Command
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.kinematics import body_velocity
 
@@ -59,7 +60,7 @@ numbers = st.floats(-1e12, 1e12)
 def test_whatever_is_asked_is_clipped_to_the_vehicle(speed, curvature, crab, name):
     model = example_vehicle(name)
     actuation = Actuation(model, "front")
-    limits = {"us": (500.0, 2500.0), "normalised": (-1.0, 1.0), "si": (-20.0, 20.0)}[model.command_unit]
+    limits = {"us": (500.0, 2500.0), "normalised": (-1.0, 1.0), "si": (-20.0, 20.0)}[model.channels.drive.unit]
     commands = actuation.command(Motion(speed, curvature, crab)), actuation.clipped(Command(speed, curvature, crab))
     for command in commands:
         assert all(limits[0] <= value <= limits[1] for value in command)
@@ -77,7 +78,7 @@ def test_speed_out_of_reach_keeps_the_turn():
 
 
 def test_a_drive_of_which_only_full_speed_is_known_drives_at_full_speed():
-    model = nominal_model("new", GEOMETRY, "us", 1500.0)
+    model = nominal_model("new", GEOMETRY, Channels.alike("us"))
     actuation = Actuation(model, "abeam")
     assert actuation.command(Motion(0.1)).drive == 900.0
     assert actuation.command(Motion(-0.1)).drive == 2100.0

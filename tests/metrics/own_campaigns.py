@@ -6,9 +6,10 @@ import numpy as np
 
 from agvbench.campaign import CampaignHeader, CampaignWriter
 from agvbench.types import Commands, Frames, Pose, Run
+from agvbench.vehicle.channels import Channels
 
 _RATE_HZ = 100.0
-_HEADER = CampaignHeader(1, "line", "mule", 0.11, 0.09, "us", 1500.0, _RATE_HZ)
+_HEADER = CampaignHeader(1, "line", "mule", 0.11, 0.09, Channels.alike("us"), _RATE_HZ)
 
 
 def line_campaign(path, *, rest_frames=100):
