@@ -1,13 +1,14 @@
-"""The thesis' vehicle with other command channels: −1…1 to the motor, and a steering of 0…1 that is straight at 0.5."""
+"""Plants in other command channels: a steering, or a yaw rate, of 0…1 that is straight at 0.5."""
 
 from __future__ import annotations
 
-from agvbench.simulator import make_plant
+from agvbench.simulator import differential_plant, make_plant
 from agvbench.types import Command, Plant
 from agvbench.vehicle.channels import Channel, Channels
 
 HALF = Channel("normalised", 0.5, 0.0, 1.0)
 CHANNELS = Channels(Channel("normalised", 0.0, -1.0, 1.0), HALF, HALF)
+TURNING = Channels(Channel("si", 0.0, -0.35, 0.35), HALF, HALF)
 
 
 class HalfSteering:
@@ -29,3 +30,20 @@ class HalfSteering:
 
 def make_half_steering(seed: int) -> HalfSteering:
     return HalfSteering(make_plant(seed))
+
+
+class HalfTurning:
+    """A differential vehicle: metres per second, and 0 to 1 for yaw rates of ∓1.2 rad/s."""
+
+    def __init__(self, plant: Plant) -> None:
+        self._plant = plant
+
+    def reset(self, pose: tuple[float, float, float], *, seed: int) -> None:
+        self._plant.reset(pose, seed=seed)
+
+    def advance(self, drive: float, front: float, rear: float, dt: float) -> tuple[float, float, float]:
+        return self._plant.advance(drive, 2.4 * (front - 0.5), 0.0, dt)
+
+
+def make_half_turning(seed: int) -> HalfTurning:
+    return HalfTurning(differential_plant(seed))

@@ -7,11 +7,13 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from agvbench.adapters import open_rig
 from agvbench.calibration import calibrate
 from agvbench.campaign import Campaign
+from agvbench.cli import main
 from agvbench.errors import PlanError, SafetyStopError, VehicleError
 from agvbench.model import VehicleModel, nominal_model
 from agvbench.planning import Workspace
@@ -22,11 +24,13 @@ from agvbench.running.positioning.automatic_return.returner import Returner
 from agvbench.running.session.opening import open_session
 from agvbench.running.session.session import BenchSession
 from agvbench.running.supervision.supervisor import Supervisor
+from agvbench.simulator.differential import DifferentialVehicle
 from agvbench.statistics.run_errors import run_error
 from agvbench.types import Command, Commands, Pose
+from agvbench.vehicle.geometry import Geometry
 
 sys.path.insert(0, str(Path(__file__).parent))
-from half_steering import CHANNELS, HalfSteering
+from half_steering import CHANNELS, TURNING, HalfSteering
 
 PLANT = "half_steering:make_half_steering"
 NEUTRAL = Command(0.0, 0.5, 0.5)
@@ -167,3 +171,32 @@ def test_a_command_out_of_range_moves_nothing(tmp_path: Path) -> None:
         with pytest.raises(PlanError, match=r"front command is out of range: 1\.2 \(limit: 0 to 1\)"):
             driver.trajectory(str(tmp_path / "far.toml"), condition="uncalibrated")
     assert not HalfSteering.given
+
+
+def test_a_differential_vehicle_is_calibrated_in_its_own_channels(tmp_path: Path) -> None:
+    geometry = Geometry(0.0, 0.05, kinematics="differential")
+    nominal_model("turning", geometry, TURNING).save(tmp_path / "turning.toml")
+    options = {"seed": 5, "vehicle": str(tmp_path / "turning.toml"), "plant": "half_steering:make_half_turning"}
+    with open_session(options, out=str(tmp_path / "c"), resume=False, dry_run=False) as opened:
+        for share in SHARES:
+            opened.driver(f"drive{share}", experiment="drive", repeat=1).hold(for_s=3.0, drive=share)
+            opened.driver(f"turn{share}", experiment="yaw_rate", repeat=1).hold(for_s=4.0, front=share)
+        model = opened.model("calibrated")
+        driven = opened.driver("5", experiment="trajectory", repeat=1).trajectory("5", condition="calibrated")
+    assert model.channels == Campaign.open(tmp_path / "c").header.channels == TURNING
+    truth = DifferentialVehicle()
+    radius = 0.5 * (truth.left_radius + truth.right_radius)
+    assert float(model.speed(0.3)) == pytest.approx(0.3 * radius, rel=0.005)
+    yaw_rate = truth.assumed_track_m / truth.true_track_m * radius * 1.2
+    np.testing.assert_allclose(model.front(np.array([0.0, 0.5, 1.0])), [-yaw_rate, 0.0, yaw_rate], atol=0.01)
+    assert driven.error.position_mm < 100.0
+    assert pq.read_table(tmp_path / "c" / "commands.parquet" / "5.parquet").column_names[2:] == ["speed", "yaw_rate"]
+
+
+def test_an_adapter_takes_its_channels_from_a_vehicle_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    half_steered().save(tmp_path / "half.toml")
+    arguments = ["agv", f"sim:{PLANT}", "--vehicle", str(tmp_path / "half.toml")]
+    assert main([*arguments, "--check"]) == 0
+    assert "front normalised, neutral 0.5, 0…1" in " ".join(capsys.readouterr().out.split())
+    assert main([*arguments, "--neutral", "1500"]) == 2
+    assert "--neutral: the vehicle file says this" in capsys.readouterr().err
