@@ -39,7 +39,7 @@ from agvbench.bus.messages.truth import Truth, decode_truth
 from agvbench.errors import LinkError, MessageError, PlanError
 from agvbench.registry import own_classes
 from agvbench.types import Command, Commands, Frames, Pose
-from agvbench.vehicle.channels import Channels
+from agvbench.vehicle.channels import Channel, Channels
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 anything = st.floats()
@@ -100,11 +100,15 @@ def frame_messages(draw: st.DrawFn) -> FramesMessage:
 
 details = (st.none() | text,) * 4
 events = st.builds(Event, u64, text, st.sampled_from(Level), text, text, u64, finite, u32, *details)
+channels = st.builds(
+    lambda ends, unit: Channel(unit, ends[1], ends[0], ends[2]),
+    st.lists(finite, min_size=3, max_size=3, unique=True).map(sorted),
+    st.sampled_from(["us", "normalised", "si"]),
+) | st.builds(Channel, st.just("us"), finite)
 agv_identities = st.builds(
     AgvIdentity,
     *(text,) * 4,
-    st.sampled_from(["us", "normalised"]),
-    finite,
+    st.builds(Channels, channels, channels, channels),
     st.booleans(),
     st.booleans(),
     st.dictionaries(text, text, max_size=4),
@@ -280,7 +284,7 @@ def test_any_reader_of_messagepack_can_read_a_message() -> None:
     one = np.array([1.5])
     frames = Frames(one, one + 1.0, one + 2.0, one, np.array([True]), np.array([7]), one, one)
     version, fields = msgspec.msgpack.decode(encode(FramesMessage(3, 1, pack_columns(frames), 2, FrameClock.ADAPTER)))
-    assert (version, fields["type"], fields["sequence"], fields["count"], fields["clock"]) == (4, "frames", 3, 1, 1)
+    assert (version, fields["type"], fields["sequence"], fields["count"], fields["clock"]) == (5, "frames", 3, 1, 1)
     assert struct.unpack("<6dqB", fields["columns"]) == (1.5, 2.5, 3.5, 1.5, 1.5, 1.5, 7, 1)
     version, fields = msgspec.msgpack.decode(encode(CommandMessage(1, 0.5, Command(1700.0, 1500.0, 1400.0), 0.1)))
     assert (fields["command"], fields["hold_s"]) == ([1700.0, 1500.0, 1400.0], 0.1)
@@ -333,9 +337,9 @@ def test_every_class_of_error_arrives(kind: type[errors.AgvbenchError]) -> None:
 @every_codec
 def test_another_encoding_is_refused_with_the_remedy(codec: Any) -> None:
     fields = msgspec.msgpack.decode(encode(_one(codec)))[1]
-    later = ([5, fields], [5, {**fields, "more": 1}], [5], [5, "a", "b"], [3, fields], [2**64 - 1, fields])
+    later = ([6, fields], [6, {**fields, "more": 1}], [6], [6, "a", "b"], [4, fields], [2**64 - 1, fields])
     for payload in (b"AGVB\x03" + bytes(59), b"AGVB\x01", *map(msgspec.msgpack.encode, later)):
-        with pytest.raises(MessageError, match=r"another encoding: \d+ \(limit: 4\); install the same agvbench"):
+        with pytest.raises(MessageError, match=r"another encoding: \d+ \(limit: 5\); install the same agvbench"):
             codec[1](payload)
 
 
@@ -411,10 +415,14 @@ def test_numbers_that_are_not_finite_are_refused(wrong: float) -> None:
         lambda: Replay(reset, Commands(none, none, none, none), wrong),
         lambda: decode_truth(encode(Truth(1, 1, 0.0, three, np.full((3, 3), wrong)))),
         lambda: MocapIdentity("a", wrong, True),
-        lambda: AgvIdentity("a", "b", "c", "d", "us", wrong, True, True),
     ):
         with pytest.raises(MessageError, match=r"finite|out of range"):
             make()
+    sound = encode(AgvIdentity("a", "b", "c", "d", Channels.alike("us"), True, True))
+    damaged = sound.replace(struct.pack(">d", 1500.0), struct.pack(">d", wrong), 1)
+    assert damaged != sound
+    with pytest.raises(MessageError, match=r"channels: neutral: must be a finite number"):
+        decode_agv_identity(damaged)
     fields = {"type": "time", "now_s": wrong}
     with pytest.raises(MessageError, match="time is not finite"):
         decode_time(msgspec.msgpack.encode([VERSION, fields]))

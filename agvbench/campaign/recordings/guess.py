@@ -11,16 +11,16 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.campaign.recordings.guess_channels import guess_channels, questions_about
 from agvbench.campaign.recordings.mapping import ANGLE, LENGTH, TIME
 from agvbench.campaign.tables.csv_text import read_csv_text
 from agvbench.errors import FileError, OneOf
 from agvbench.types import Floats
-from agvbench.vehicle.channel_tables import channel_names, si_unit
+from agvbench.vehicle.channel_tables import channel_names
 
 _DELIMITERS = ",;\t|"
 _LONGEST_STEP_S, _SHORTEST_STEP_S = 0.5, 5e-4
@@ -255,68 +255,16 @@ def _agreement(difference: Floats) -> float:
     return float(abs(np.mean(np.exp(2j * difference)))) if len(difference) else 0.0
 
 
-class _Channel(NamedTuple):
-    """A guessed channel; two of one unit and neutral are alike, whatever was seen of their ranges."""
-
-    unit: str
-    neutral: float
-    low: float
-    high: float
-
-    @property
-    def kind(self) -> tuple[str, float]:
-        return self.unit, self.neutral
-
-    def lines(self, name: str) -> list[str]:
-        unit = si_unit(name) if self.unit == "si" else self.unit
-        return [
-            f'unit = "{unit}"', f"neutral = {self.neutral:.1f}",
-            f"low = {self.low:.6g}   # ? the lowest and the highest command that it takes", f"high = {self.high:.6g}",
-        ]  # fmt: skip
-
-
-def _channels(columns: _Columns, *, is_differential: bool) -> dict[str, _Channel]:
-    """Return the channels by role; what is no pulse width shares a unit, and only an axle's neutral may be halfway."""
-    ends = {}
-    for role in ("drive", "front") if is_differential else ("drive", "front", "rear"):
-        values = columns.numbers[columns.taken.get(role, columns.taken["front"])]
-        ends[role] = float(np.nanmin(values)), float(np.nanmax(values))
-    pulses = {role for role, (low, high) in ends.items() if low >= 400.0 and high <= 2600.0}
-    largest = max((abs(end) for role, own in ends.items() if role not in pulses for end in own), default=0.0)
-    is_si = is_differential or largest > 1.0
-    found = {}
-    for role, (low, high) in ends.items():
-        if role in pulses:
-            found[role] = _Channel("us", 1500.0, min(low, 1000.0), max(high, 2000.0))
-        elif is_si:
-            found[role] = _Channel("si", 0.0, -largest, largest)
-        elif low >= 0.0 and role != "drive":
-            found[role] = _Channel("normalised", 0.5, 0.0, 1.0)
-        else:
-            found[role] = _Channel("normalised", 0.0, -1.0, 1.0)
-    _ask(columns, ends, found)
-    return found
-
-
-def _ask(columns: _Columns, ends: dict[str, tuple[float, float]], found: dict[str, _Channel]) -> None:
-    """Ask for the neutral of columns that are never negative, and for the unit of those beside pulse widths."""
-    foreign = [role for role in ends if role in columns.taken and found[role].unit != "us"]
-    if all(ends[role][0] >= 0.0 for role in foreign if role != "drive"):
-        columns.questions += [
-            f"{columns.taken[role]}: never negative ({low:g} to {high:g}); is {found[role].neutral:g} neutral?"
-            for role in foreign
-            for low, high in [ends[role]]
-            if low >= 0.0
-        ]
-    if {channel.unit for channel in found.values()} > {"us"}:
-        columns.questions += [f"{columns.taken[role]}: in {found[role].unit} units?" for role in foreign]
-
-
 def _vehicle(columns: _Columns) -> tuple[list[str], dict[str, list[str]]]:
     """Return the lines of the vehicle, once its commands are known, and of its channels unless they are alike."""
     front = columns.taken["front"]
     is_differential = bool(_TURNS.search(_plain(front))) and "rear" not in columns.taken
-    channels = _channels(columns, is_differential=is_differential)
+    roles = ("drive", "front") if is_differential else ("drive", "front", "rear")
+    names = {role: columns.taken.get(role, front) for role in roles}
+    channels = guess_channels({role: columns.numbers[name] for role, name in names.items()}, is_si=is_differential)
+    columns.questions += [
+        f"{names[role]}: {question}" for role, question in questions_about(channels).items() if role in columns.taken
+    ]
     if is_differential:
         columns.questions.append("rear_axle_m: how far is the tracked point ahead of the axle of the driven wheels?")
         axles = ['kinematics = "differential"', "rear_axle_m = 0.0  # ? from the tracked point backward to the axle"]
@@ -327,11 +275,11 @@ def _vehicle(columns: _Columns) -> tuple[list[str], dict[str, list[str]]]:
             "rear_axle_m = 0.15   # ? and backward to the rear axle",
         ]
     lines = [f'name = "{_word(columns.path.stem)}"', *axles]
-    if len({channel.kind for channel in channels.values()}) == 1:
-        unit, neutral = channels["drive"].kind
-        return [*lines, f'command_unit = "{unit}"', f"neutral = {neutral:.1f}"], {}
-    names = channel_names("differential" if is_differential else "two_axle")
-    return lines, {f"channels.{names[role]}": channel.lines(names[role]) for role, channel in channels.items()}
+    if len({(channel.unit, channel.neutral) for channel in channels.values()}) == 1:
+        drive = channels["drive"]
+        return [*lines, f'command_unit = "{drive.unit}"', f"neutral = {drive.neutral:.1f}"], {}
+    tables = channel_names("differential" if is_differential else "two_axle")
+    return lines, {f"channels.{tables[role]}": channel.lines(tables[role]) for role, channel in channels.items()}
 
 
 def _flag(columns: _Columns, role: str, name: str) -> list[str]:

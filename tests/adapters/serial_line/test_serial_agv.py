@@ -283,6 +283,10 @@ def test_ports_that_cannot_be_opened(tmp_path: Path) -> None:
         assert "\n" not in str(caught.value)
     with pytest.raises(LinkError, match="takes microseconds"):
         open_agv("serial:/dev/nowhere", AdapterOptions(channels=Channels.alike("normalised")))
+    with pytest.raises(
+        LinkError, match=r"watchdog stops the drive at another pulse: neutral 1480 µs \(limit: 1500 µs\)"
+    ):
+        open_agv("serial:/dev/nowhere", AdapterOptions(channels=Channels.alike("us", 1480.0)))
 
 
 def test_a_port_that_is_in_use_says_so() -> None:
