@@ -196,8 +196,11 @@ def _change_table(nights: Nights, found: Steps, read: Sequence[_Read]) -> pd.Dat
         for kind, steps, sd in zip(nights.series, found.of, found.sd, strict=True)
         for step in steps
     ]
-    rows.sort(key=lambda row: (-row[_CHANGE_COLUMNS.index("night")], -abs(row[14]) / row[15]))
-    return pd.DataFrame(rows, columns=list(_CHANGE_COLUMNS))
+    table = pd.DataFrame(rows, columns=list(_CHANGE_COLUMNS))
+    # Simulated nights of one seed are equal, and have no standard deviation.
+    size = (table["change"].abs() / table["sd"].where(table["sd"] > 0.0)).fillna(math.inf)
+    order = size.sort_values(ascending=False, kind="stable").index
+    return table.loc[order].sort_values("night", ascending=False, kind="stable").reset_index(drop=True)
 
 
 def _where(step: Step, read: Sequence[_Read]) -> Iterator[Any]:

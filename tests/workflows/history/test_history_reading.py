@@ -41,6 +41,14 @@ def test_a_step_is_shown_with_its_night_and_the_firmware_that_changed(stepped):
     assert "firmware 2.0 → 2.1" in found._repr_html_()
 
 
+def test_equal_nights_of_one_seed_step_with_the_program(tmp_path):
+    for night in range(14):
+        values = {("position_error", "1"): [15.0 if night >= 8 else 10.0] * 3}
+        write_night(tmp_path / f"{night:02d}", values, began=BEGAN + timedelta(days=night))
+    (step,) = agvbench.history(tmp_path).changes.to_dict("records")
+    assert (step["night"], step["change"], step["sd"]) == (8, 5.0, 0.0)
+
+
 def test_nightly_values_are_means_of_medians_of_absolute_values(tmp_path):
     values = {("position_error", "1"): [1.0, -5.0, 3.0], ("position_error", "2"): [-10.0, 12.0, 40.0]}
     write_night(tmp_path / "a", values)
