@@ -29,7 +29,7 @@ from agvbench.campaign.header import FILE_NAME
 from agvbench.campaign.manifest import record
 from agvbench.campaign.tables.parquet import to_parquet
 from agvbench.metrics import all_metrics
-from agvbench.metrics.table import write_metrics
+from agvbench.metrics.table import FILE
 from agvbench.statistics.change_points import find_steps
 from agvbench.statistics.intervals import Proportion
 from agvbench.types import Floats
@@ -76,7 +76,8 @@ def write_campaign(path: Path, metrics: pd.DataFrame, night: int) -> None:
     with (path / "SHA256SUMS").open("a", encoding="utf-8") as hashes:
         hashes.writelines(f"{k:064x}  {name}.parquet/run-{k:03d}.parquet\n" for name in ("runs", "commands", "poses")
                           for k in range(RUNS))  # fmt: skip
-    write_metrics(path, metrics)
+    content = pa.Table.from_pandas(metrics, preserve_index=False).replace_schema_metadata(None)
+    record(path, {FILE: to_parquet(content)}, durable=False)  # as write_metrics does, without waiting for the disk
 
 
 @dataclass(frozen=True)

@@ -196,8 +196,10 @@ def _change_table(nights: Nights, found: Steps, read: Sequence[_Read]) -> pd.Dat
         for kind, steps, sd in zip(nights.series, found.of, found.sd, strict=True)
         for step in steps
     ]
-    rows.sort(key=lambda row: (-row[_CHANGE_COLUMNS.index("night")], -abs(row[14]) / row[15]))
-    return pd.DataFrame(rows, columns=list(_CHANGE_COLUMNS))
+    table = pd.DataFrame(rows, columns=list(_CHANGE_COLUMNS))
+    size = (table["change"] / table["sd"]).abs()  # infinite where nights of a level are equal
+    order = np.lexsort((-size.to_numpy(dtype=float), -table["night"].to_numpy(dtype=float)))
+    return table.iloc[order].reset_index(drop=True)
 
 
 def _where(step: Step, read: Sequence[_Read]) -> Iterator[Any]:
