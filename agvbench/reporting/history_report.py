@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -39,9 +40,7 @@ _CHANGES = (
     Column("interval", "95 % interval"),
     Column("metric", "metric"),
     Column("condition", "condition"),
-    Column("before", "before"),
-    Column("after", "after"),
-    Column("unit", "unit"),
+    Column("levels", "levels"),
     Column("in_sd", "change in sd", 1),
     Column("words", "changed there"),
 )
@@ -79,14 +78,19 @@ def _change_row(row: Mapping[Any, Any], titles: dict[str, str], digits: int) -> 
     facts = list(dict.fromkeys(plain(fact) for _, fact in row["facts"]))
     more = [f"and {len(facts) - _FACTS_SHOWN} more"] if len(facts) > _FACTS_SHOWN else []
     number = Column("", "", digits)
+    levels = plain(f"{number.shown(row['before'])} → {number.shown(row['after'])} {row['unit']}")
+    in_sd = row["change"] / row["sd"] if row["sd"] > 0.0 else math.copysign(math.inf, row["change"])
+    words = "; ".join((facts[:_FACTS_SHOWN] + more) or ["nothing that is recorded"])
+    night = f"{row['driven']:%Y-%m-%d} {row['campaign']}"
+    return [night, _interval(row), titles[row["metric"]], row["condition"], levels, in_sd, words]
+
+
+def _interval(row: Mapping[Any, Any]) -> str:
+    """Return the interval of a step's night: dates, or campaigns where these were driven on one day."""
+    if row["earliest"] == row["latest"]:
+        return "this night"
     first, last = (f"{row[name]:%Y-%m-%d}" for name in ("earliest_driven", "latest_driven"))
-    in_sd = row["change"] / row["sd"] if row["sd"] > 0.0 else float("inf")
-    return [
-        f"{row['driven']:%Y-%m-%d} {row['campaign']}",
-        f"{row['earliest']} to {row['latest']}" if first == last else f"{first} to {last}",
-        titles[row["metric"]], row["condition"], number.shown(row["before"]), number.shown(row["after"]), row["unit"],
-        in_sd, "; ".join((facts[:_FACTS_SHOWN] + more) or ["nothing that is recorded"]),
-    ]  # fmt: skip
+    return f"{row['earliest']} to {row['latest']}" if first == last else f"{first} to {last}"
 
 
 def series_table(history: History) -> Table:

@@ -118,9 +118,10 @@ def _breaks(values: Floats, penalty: float) -> list[int]:
 
 
 def _about_levels(values: Floats, breaks: Sequence[int]) -> float:
-    """Return the standard deviation of `values`, shape (n,), about their levels."""
+    """Return the standard deviation of `values`, shape (n,), about their levels; 0 if it is that of rounding."""
     squares = sum(float(np.var(level)) * len(level) for level in np.split(values, breaks))
-    return math.sqrt(squares / (len(values) - len(breaks) - 1))
+    sd = math.sqrt(squares / (len(values) - len(breaks) - 1))
+    return sd if sd > resolution(values) else 0.0
 
 
 def _steps(values: Floats, nights: NDArray[np.int64], breaks: Sequence[int], variance: float) -> Iterator[Step]:

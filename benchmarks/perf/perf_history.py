@@ -29,10 +29,11 @@ from agvbench.campaign.header import FILE_NAME
 from agvbench.campaign.manifest import record
 from agvbench.campaign.tables.parquet import to_parquet
 from agvbench.metrics import all_metrics
-from agvbench.metrics.table import write_metrics
+from agvbench.metrics.table import FILE
 from agvbench.statistics.change_points import find_steps
 from agvbench.statistics.intervals import Proportion
 from agvbench.types import Floats
+from agvbench.vehicle.channels import Channels
 from agvbench.workflows.history import history
 from agvbench.workflows.history.nights import Nights
 
@@ -69,14 +70,15 @@ def write_campaigns(folder: Path, count: int) -> None:
 def write_campaign(path: Path, metrics: pd.DataFrame, night: int) -> None:
     """Write the head, the provenance and the metrics of a campaign, and hashes of the parts that it would have."""
     path.mkdir()
-    CampaignHeader(1, path.name, "AGV", 0.18, 0.18, "us", 1500.0, 120.0).save(path / FILE_NAME)
+    CampaignHeader(1, path.name, "AGV", 0.18, 0.18, Channels.alike("us"), 120.0).save(path / FILE_NAME)
     began = datetime(2024, 1, 1, 22, tzinfo=UTC) + timedelta(days=night)
     facts = pd.DataFrame({"name": ["began", "agvbench"], "value": [began.isoformat(), "0.2.0"]})
     record(path, {"provenance.parquet": to_parquet(pa.Table.from_pandas(facts, preserve_index=False))}, durable=False)
     with (path / "SHA256SUMS").open("a", encoding="utf-8") as hashes:
         hashes.writelines(f"{k:064x}  {name}.parquet/run-{k:03d}.parquet\n" for name in ("runs", "commands", "poses")
                           for k in range(RUNS))  # fmt: skip
-    write_metrics(path, metrics)
+    content = pa.Table.from_pandas(metrics, preserve_index=False).replace_schema_metadata(None)
+    record(path, {FILE: to_parquet(content)}, durable=False)  # as write_metrics does, without waiting for the disk
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from agvbench.plot.style import colour, literal, marker
+from agvbench.reporting.content import plain
 from agvbench.reporting.figures.style import MUTED, PAPER, dress, new_figure, to_svg
 from agvbench.types import Floats
 from agvbench.workflows.history import History
@@ -31,7 +32,7 @@ def draw_history(history: History, metric: str, unit: str, numbers: Mapping[str,
     """
     figure = new_figure(6.4, 2.7)
     axes = figure.add_subplot()
-    dress(axes, x="", y=literal(unit), size=9.0)
+    dress(axes, x="", y=literal(plain(unit)), size=9.0)
     rows = history.nights
     rows = rows[(rows["metric"] == metric) & (rows["unit"] == unit) & (rows["trajectory"] == ALL)]
     steps = history.changes

@@ -90,15 +90,17 @@ def nights_of(campaigns: Sequence[Cells]) -> Nights:
     return Nights(tuple(kinds), tuple(trajectories), repeats, median, spread)
 
 
-def _places(
-    cells: Cells, kinds: dict[tuple[str, str, str], int], trajectories: dict[str, int]
-) -> tuple[list[int], list[int]]:
+def _places(cells: Cells, kinds: dict[tuple[str, str, str], int], trajectories: dict[str, int]) -> tuple[Codes, Codes]:
     """Return the numbers of each cell's series and trajectory, which are given as they appear."""
-    conditions, metrics, units, ways = (
-        [names[k] for k in codes] for names, codes in zip(cells.names, cells.codes, strict=True)
-    )
-    series = [kinds.setdefault(kind, len(kinds)) for kind in zip(conditions, metrics, units, strict=True)]
-    return series, [trajectories.setdefault(way, len(trajectories)) for way in ways]
+    shape = tuple(max(1, len(names)) for names in cells.names[:3])
+    own, series = np.unique(np.ravel_multi_index(tuple(cells.codes[:3]), shape), return_inverse=True)
+    conditions, metrics, units, ways = cells.names
+    of_series = [
+        kinds.setdefault((conditions[c], metrics[m], units[u]), len(kinds))
+        for c, m, u in zip(*np.unravel_index(own, shape), strict=True)
+    ]
+    of_ways = {code: trajectories.setdefault(ways[code], len(trajectories)) for code in np.unique(cells.codes[3])}
+    return np.array(of_series, dtype=np.int64)[series], np.array([of_ways[code] for code in cells.codes[3]], np.int64)
 
 
 def _over(reduce: object, values: Floats, *, axis: int) -> Floats:

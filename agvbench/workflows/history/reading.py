@@ -197,10 +197,9 @@ def _change_table(nights: Nights, found: Steps, read: Sequence[_Read]) -> pd.Dat
         for step in steps
     ]
     table = pd.DataFrame(rows, columns=list(_CHANGE_COLUMNS))
-    # Simulated nights of one seed are equal, and have no standard deviation.
-    size = (table["change"].abs() / table["sd"].where(table["sd"] > 0.0)).fillna(math.inf)
-    order = size.sort_values(ascending=False, kind="stable").index
-    return table.loc[order].sort_values("night", ascending=False, kind="stable").reset_index(drop=True)
+    size = (table["change"] / table["sd"]).abs()  # infinite where nights of a level are equal
+    order = np.lexsort((-size.to_numpy(dtype=float), -table["night"].to_numpy(dtype=float)))
+    return table.iloc[order].reset_index(drop=True)
 
 
 def _where(step: Step, read: Sequence[_Read]) -> Iterator[Any]:

@@ -12,6 +12,7 @@ from agvbench.campaign.header import FILE_NAME
 from agvbench.campaign.manifest import record
 from agvbench.campaign.tables.parquet import to_parquet
 from agvbench.metrics.table import COLUMNS, write_metrics
+from agvbench.vehicle.channels import Channels
 
 METRICS = {"position_error": "mm", "heading_error": "deg", "own_metric": "V"}
 BEGAN = datetime(2026, 3, 1, 21, 30, tzinfo=UTC)
@@ -20,7 +21,7 @@ BEGAN = datetime(2026, 3, 1, 21, 30, tzinfo=UTC)
 def write_night(path, values, *, firmware="2.0", began=None, header=None, agvbench="0.2.0"):
     """Write a campaign whose table of metrics has ``values[metric, trajectory]``, a list with a number per repeat."""
     path.mkdir(parents=True)
-    header = header or CampaignHeader(1, path.name, "mule", 0.11, 0.09, "us", 1500.0, 120.0)
+    header = header or CampaignHeader(1, path.name, "mule", 0.11, 0.09, Channels.alike("us"), 120.0)
     header.save(path / FILE_NAME)
     if began is not None:
         import pyarrow as pa

@@ -7,11 +7,12 @@ import os
 import re
 import subprocess
 import sys
+from datetime import timedelta
 
 import numpy as np
 import pandas as pd
 import pytest
-from history_samples import write_nights
+from history_samples import BEGAN, write_night, write_nights
 
 from agvbench.cli import main
 from agvbench.metrics.table import read_metrics
@@ -74,6 +75,19 @@ def test_the_page_shows_steps_charts_and_what_was_not_read(tmp_path, capsys):
     assert "night-03/campaign.toml" in page
     assert not re.search(r"https?://(?!www\.w3\.org)", page)
     assert not (lab / "history").exists()
+
+
+def test_equal_nights_show_that_the_program_changed(tmp_path, capsys):
+    for night in range(20):
+        error, version = (19.9, "0.3.0") if night >= 14 else (20.0, "0.2.0")
+        values = {("position_error", "1"): [error] * 3}
+        began = BEGAN + timedelta(days=night)
+        write_night(tmp_path / "lab" / f"{night:02d}", values, began=began, agvbench=version)
+    assert main(["history", str(tmp_path / "lab"), "--json", str(tmp_path / "h.json")]) == 0
+    (step,) = json.loads((tmp_path / "h.json").read_text(encoding="utf-8"))["changes"]
+    assert (step["campaign"], step["earliest"], step["latest"], step["sd"]) == ("14", "14", "14", 0.0)
+    assert step["facts"] == [{"campaign": "14", "changed": "agvbench 0.2.0 → 0.3.0"}]
+    assert "−∞" in capsys.readouterr().out
 
 
 def test_the_same_campaigns_give_the_same_page(tmp_path, capsys):

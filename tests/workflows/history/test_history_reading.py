@@ -16,6 +16,7 @@ from history_samples import BEGAN, METRICS, write_night, write_nights
 import agvbench
 from agvbench.campaign import CampaignHeader
 from agvbench.errors import FlagError, InputError
+from agvbench.vehicle.channels import Channels
 from agvbench.workflows.history.result import write_json
 
 SAVED = Path(__file__).parents[2] / "campaign" / "data" / "schema_1"
@@ -143,9 +144,9 @@ def test_a_campaign_that_cannot_be_read_is_one_line_among_the_others(tmp_path, d
 def test_campaigns_of_every_schema_are_read(tmp_path):
     value = {("position_error", "1"): [1.0]}
     heads = [
-        CampaignHeader(1, "one", "a", 0.1, 0.1, "us", 1500.0, 120.0),
-        CampaignHeader(2, "two", "b", 0.1, 0.1, "us", 1500.0, 120.0, driven="rear"),
-        CampaignHeader(3, "three", "c", 0.0, 0.1, "si", 0.0, 120.0, kinematics="differential"),
+        CampaignHeader(1, "one", "a", 0.1, 0.1, Channels.alike("us"), 120.0),
+        CampaignHeader(2, "two", "b", 0.1, 0.1, Channels.alike("us"), 120.0, driven="rear"),
+        CampaignHeader(3, "three", "c", 0.0, 0.1, Channels.alike("si"), 120.0, kinematics="differential"),
     ]
     for head in heads:
         write_night(tmp_path / head.name, value, header=head)
