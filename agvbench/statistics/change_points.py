@@ -73,8 +73,8 @@ def find_steps(series: Floats, *, alpha: float, seed: int = 0) -> Steps:
     series
         Nights in the order in which they were driven.
     alpha
-        The chance of any step in series without one, from 0.01. It holds whatever the distribution of the nights, and
-        about where successive nights are correlated as much in each series.
+        The chance of any step in series without one, from 0.01. It holds whatever the distribution of the nights.
+        With an autocorrelation of 0.3 it is about 6 % at a level of 5 %, with 0.5 about 12 %.
     seed
         Of the random orders of nights: the same series and seed give the same steps.
     """

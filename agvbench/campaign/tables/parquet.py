@@ -80,8 +80,10 @@ def read_parquet(
                 source, metadata=file.metadata, read_dictionary=texts, page_checksum_verification=True
             )
             table = file.read(columns=None if columns is None else list(columns), use_threads=False)
+            if not plain:  # each text is in memory once
+                return table
             _require_room(path, _TOO_LARGE, sum(map(_text_bytes, table.columns)), max_bytes, " bytes")
-            return _plain(table) if plain else table
+            return _plain(table)
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise CampaignError(
             _what_is_wrong(path, error),
