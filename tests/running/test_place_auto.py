@@ -94,7 +94,7 @@ def test_an_operator_is_asked_where_a_real_vehicle_does_not_come() -> None:
         link = Real(direct)
         # Nobody puts a real vehicle anywhere by software: it stands where it stands, 8 mm off.
         link.reset(Pose(0.008, 0.0, 0.0), run_key="a")
-        placer = Auto(Rig(link, model, room, Supervisor(room, 1500.0), DEFAULT_LIMITS, told.append))
+        placer = Auto(Rig(link, model, room, Supervisor(room, model.neutral), DEFAULT_LIMITS, told.append))
         assert placer.place(Pose(0.0, 0.0, 0.0), "run") is None
     assert len(told) == 1
     assert told[0].startswith("agvbench/v2/lab/agv1: the vehicle does not move: full drive for 2 s; see to its battery")

@@ -40,7 +40,7 @@ def stopped(
     commands = Commands(*np.array([[0.0, 14.0], [1900.0, 1500.0], [1500.0, 1500.0], [1500.0, 1500.0]]))
     seen: list[Frames] = []
     with open_rig("sim", plant=f"{PLANTS}:{plant}", camera=camera or {}) as link:
-        supervisor = Supervisor(room, 1500.0, limits)
+        supervisor = Supervisor(room, NEUTRAL, limits)
         with pytest.raises(SafetyStopError) as caught:
             drive(link, commands, neutral=NEUTRAL, start=START, run_key="a", supervisor=supervisor, seen=seen)
         until_s = float(max(frames.t_s.max() for frames in seen if len(frames)))
@@ -146,7 +146,7 @@ def test_a_lone_late_or_wrong_frame_stops_nobody(late_s: float, aside_m: float, 
     captured_s[lone] -= late_s
     y_m[lone] = aside_m
     link = Scripted(Frames(captured_s, x_m, y_m, zeros, tracked, np.arange(len(t_s)), zeros, t_s))
-    watching = Supervisor(ROOM, 1500.0)
+    watching = Supervisor(ROOM, NEUTRAL)
     watching.control_cycle(link, Command(1900.0, 1500.0, 1500.0), t_s=0.0, hold_s=3.0, seen=[])
     assert link.stops == 0
 
@@ -156,7 +156,7 @@ def test_a_camera_that_freezes_while_the_vehicle_turns_on_the_spot_is_noticed(tu
     t_s = np.arange(0.0, 3.0, 0.02)
     heading, zeros = np.where(t_s < 0.5, t_s, 0.5), np.zeros(len(t_s))
     link = Scripted(Frames(t_s, zeros, zeros, heading, t_s >= 0.0, np.arange(len(t_s)), zeros, t_s))
-    watching = Supervisor(ROOM, 0.0, turns_on_the_spot=turns_on_the_spot)
+    watching = Supervisor(ROOM, Command(0.0, 0.0, 0.0), turns_on_the_spot=turns_on_the_spot)
     caught = pytest.raises(SafetyStopError, match="tracking is frozen") if stops else nullcontext()
     with caught:
         watching.control_cycle(link, Command(0.0, 1.0, 0.0), t_s=0.0, hold_s=3.0, seen=[])
