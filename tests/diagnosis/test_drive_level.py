@@ -14,6 +14,7 @@ from agvbench.diagnosis.free_driving.drive_level import drive_levels, nodal_devi
 from agvbench.diagnosis.free_driving.maps import smooth_maps, start_values_of_windows
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
+from agvbench.types import Command
 
 
 def fitted(readings: Readings) -> tuple[Predictor, np.ndarray]:
@@ -25,7 +26,7 @@ def fitted(readings: Readings) -> tuple[Predictor, np.ndarray]:
 
 def sessions_of(truth: Differential, seed: int, **changes: float) -> tuple[Readings, Predictor, np.ndarray]:
     runs = list(Campaign(truth, seed=seed, sessions=3, **changes))
-    readings = read_windows(runs, Horizon(), 0.0, turns_on_the_spot=True)
+    readings = read_windows(runs, Horizon(), Command(0.0, 0.0, 0.0), turns_on_the_spot=True)
     return readings, *fitted(readings)
 
 
