@@ -14,11 +14,10 @@ from agvbench.diagnosis.free_driving.drive_level import drive_levels, nodal_devi
 from agvbench.diagnosis.free_driving.maps import smooth_maps, start_values_of_windows
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
-from agvbench.types import Command
 
 
 def fitted(readings: Readings) -> tuple[Predictor, np.ndarray]:
-    maps = smooth_maps(readings.runs, 0.0, 9, 6, is_differential=True)
+    maps = smooth_maps(readings.runs, HEADER.neutral, 9, 6, is_differential=True)
     start = start_values_of_windows(maps, readings, HEADER.geometry)
     found = fit(Predictor(Batch(readings, maps, HEADER.geometry)), start, np.empty((0, 2)))
     return found.predictor, found.parameters
@@ -26,7 +25,7 @@ def fitted(readings: Readings) -> tuple[Predictor, np.ndarray]:
 
 def sessions_of(truth: Differential, seed: int, **changes: float) -> tuple[Readings, Predictor, np.ndarray]:
     runs = list(Campaign(truth, seed=seed, sessions=3, **changes))
-    readings = read_windows(runs, Horizon(), Command(0.0, 0.0, 0.0), turns_on_the_spot=True)
+    readings = read_windows(runs, Horizon(), HEADER.neutral, turns_on_the_spot=True)
     return readings, *fitted(readings)
 
 
