@@ -127,7 +127,7 @@ def test_designs_stay_within_known_levels_and_time(diagnosed):
         assert np.all(np.diff(commands.t_s) > 0.0)
         assert commands.t_s[0] == 0.0
         assert commands.t_s[-1] < 11.0
-        assert set(commands.drive) <= {*maps.nodes["drive"], HEADER.neutral}
+        assert set(commands.drive) <= {*maps.nodes["drive"], HEADER.neutral.drive}
         assert set(commands.front) <= set(maps.nodes["front"])
         assert set(commands.rear) <= set(maps.nodes["rear"])
 

@@ -35,7 +35,7 @@ from agvbench.vehicle.geometry import Geometry
 
 MAPS = NodalMaps(
     {"front": np.array([1000.0, 1400.0]), "rear": np.array([1000.0, 1500.0, 2000.0]), "drive": np.array([1600.0])},
-    NEUTRAL,
+    NEUTRAL_COMMAND,
 )
 PLAY_RAD, MORE_PLAY_RAD = 0.028, 0.09
 NEARLY_STRAIGHT = 1487.0
