@@ -95,7 +95,9 @@ class Source:
             header, runs = campaign.header, list(campaign)
         geometry = header.geometry
         windows = read_windows(runs, Horizon(), header.neutral, turns_on_the_spot=geometry.is_differential)
-        fitted = static_maps(windows.select(np.arange(0, len(windows), 1 + len(windows) // MAX_WINDOWS)), geometry, 0.0)
+        fitted = static_maps(
+            windows.select(np.arange(0, len(windows), 1 + len(windows) // MAX_WINDOWS)), geometry, header.neutral
+        )
         model = corrected_vehicle(header, geometry, fitted, fitted.predictor.maps, 0)
         names = {recording_of(run) for run in runs}
         noise = {n: RecordedMotion.of([r for r in runs if recording_of(r) == n]).filter.noise for n in names}

@@ -70,7 +70,7 @@ def _jobs(model: VehicleModel, room: Workspace, *, small: bool) -> Iterator[Job]
     while True:
         start = Pose(*rng.uniform([-1.0, -1.0, -math.pi], [1.0, 1.0, math.pi]).tolist())
         share, front = rng.choice([-0.4, 0.4]), rng.uniform(-0.8, 0.8)
-        yield start, held(shares.neutral, [(1.2, shares.command(drive=float(share), front=float(front)))])
+        yield start, held(model, [(1.2, shares.command(drive=float(share), front=float(front)))])
 
 
 def _go(name: str, spec: str, seed: int, returns: int, *, bus: bool) -> Driven:

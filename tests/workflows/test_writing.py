@@ -15,7 +15,7 @@ from agvbench import thesis
 from agvbench.campaign.manifest import Manifest, record
 from agvbench.errors import FileError
 from agvbench.statistics import Comparison
-from agvbench.workflows import compare
+from agvbench.workflows.comparison.decision import write_json
 from agvbench.workflows.init import make_lab
 from agvbench.workflows.output_files import write_file
 
@@ -82,7 +82,7 @@ def test_a_link_is_followed_and_a_pipe_is_written_to(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "write"),
     [
-        ("comparison.json", lambda path: compare.write_json(NOTHING_COMPARED, path)),
+        ("comparison.json", lambda path: write_json(NOTHING_COMPARED, path)),
         ("thesis.json", lambda path: thesis.write_json([], path)),
         ("thesis.md", lambda path: thesis.write_tables([], path.parent)),
     ],
