@@ -4,19 +4,19 @@ import dataclasses
 
 import numpy as np
 import pytest
-from tiny_vehicle import FRONT_M, NEUTRAL, REAR_M, Tiny
+from tiny_vehicle import FRONT_M, REAR_M, Tiny
 
 from agvbench.diagnosis import Verdict, diagnose
 from agvbench.diagnosis.findings.map_shapes import RefittedMap, dead_band, end_stops
 from agvbench.model import VehicleModel
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import DeadBandWithSaturation, Line, LineWithEndStops
 
 BELIEVED = VehicleModel(
     "tiny",
     Geometry(FRONT_M, REAR_M),
-    "us",
-    NEUTRAL,
+    Channels.alike("us"),
     front=Line(-0.0014, 2.1),
     rear=Line(-0.0014, 2.1),
     drive=Line(-0.0006, 0.9),
