@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import asdict
 from pathlib import Path
 
 from agvbench.campaign.header import FILE_NAME, CampaignHeader
@@ -44,7 +43,7 @@ def _program(campaign: Path) -> dict[str, str]:
 
 
 def _header(campaign: Path) -> dict[str, str]:
-    header = asdict(CampaignHeader.load(campaign / FILE_NAME))
+    header = vars(CampaignHeader.load(campaign / FILE_NAME))
     left_out = ("schema", "name", "prediction_horizon_s", "prediction_stride_s")
     return {
         name: f"{value:g}" if isinstance(value, float) else str(value)

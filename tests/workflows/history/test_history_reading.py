@@ -17,6 +17,7 @@ import agvbench
 from agvbench.campaign import CampaignHeader
 from agvbench.errors import FlagError, InputError
 from agvbench.vehicle.channels import Channels
+from agvbench.workflows.history.facts import changed, facts_of
 from agvbench.workflows.history.result import write_json
 
 SAVED = Path(__file__).parents[2] / "campaign" / "data" / "schema_1"
@@ -40,6 +41,15 @@ def test_a_step_is_shown_with_its_night_and_the_firmware_that_changed(stepped):
     assert found.headline == "1 step in 3 series of 40 nights."
     assert "night-25" not in found._repr_html_()
     assert "firmware 2.0 → 2.1" in found._repr_html_()
+
+
+def test_other_command_channels_are_said_in_words(tmp_path):
+    facts = []
+    for neutral in (1500.0, 1490.0):
+        head = CampaignHeader(1, "night", "mule", 0.11, 0.09, Channels.alike("us", neutral), 120.0)
+        write_night(tmp_path / f"{neutral:g}", {("position_error", "1"): [1.0]}, header=head)
+        facts.append(facts_of(tmp_path / f"{neutral:g}", ""))
+    assert list(changed(*facts)) == ["channels us, neutral 1500 → us, neutral 1490"]
 
 
 def test_equal_nights_of_one_seed_step_with_the_program(tmp_path):
@@ -119,7 +129,7 @@ def _changed(path):
 
 
 @pytest.mark.parametrize(
-    ("damage", "told"),
+    ("damage", "message"),
     [
         (lambda path: (path / "campaign.toml").write_text("schema 1"), "is not TOML"),
         (lambda path: (path / "errors.parquet").unlink(), "bad"),
@@ -130,13 +140,13 @@ def _changed(path):
         (_changed, "has changed since it was recorded"),
     ],
 )
-def test_a_campaign_that_cannot_be_read_is_one_line_among_the_others(tmp_path, damage, told):
+def test_a_campaign_that_cannot_be_read_is_one_line_among_the_others(tmp_path, damage, message):
     write_night(tmp_path / "good", {("position_error", "1"): [1.0]})
     damage(write_night(tmp_path / "bad", {("position_error", "1"): [1.0]}))
     found = agvbench.history(tmp_path)
     assert list(found.campaigns["campaign"]) == ["good"]
     (line,) = found.unread
-    assert told in line
+    assert message in line
     assert str(tmp_path / "bad") in line
     assert "\n" not in line
 
