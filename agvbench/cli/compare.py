@@ -33,6 +33,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from agvbench.cli._margins import add_margin_arguments, margins
 from agvbench.running.configuration.session_options import number
 
 if TYPE_CHECKING:
@@ -65,10 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--with-delta-s", action="store_true", help="|Δs| worse alone is a regression, too, instead of a note"
     )
-    parser.add_argument(
-        "--margin-mm", metavar="MM", type=number, help="noise band of end position error and |Δs| (default: 5)"
-    )
-    parser.add_argument("--margin-deg", metavar="DEG", type=number, help="noise band of the heading error (default: 1)")
+    add_margin_arguments(parser, "end position error and |Δs|", "the heading error")
     parser.add_argument(
         "--across-vehicles", action="store_true", help="compare vehicles that take commands in different units"
     )
@@ -109,19 +107,14 @@ def _plan(arguments: argparse.Namespace, console: Console) -> int:
     from agvbench.errors import FlagError
     from agvbench.reporting.console.tables import print_planned_repeats
     from agvbench.statistics import pose_errors
-    from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
     from agvbench.statistics.sample_size import plan_repeats
 
     if arguments.b is not None:
         raise FlagError(
             "plans a comparison with one campaign", where="--plan", value=arguments.b, remedy="leave it out"
         )
-    planned = plan_repeats(
-        pose_errors(arguments.a),
-        margin_mm=MARGIN_MM if arguments.margin_mm is None else arguments.margin_mm,
-        margin_deg=MARGIN_DEG if arguments.margin_deg is None else arguments.margin_deg,
-        power=arguments.power,
-    )
+    in_mm, in_deg = margins(arguments)
+    planned = plan_repeats(pose_errors(arguments.a), margin_mm=in_mm, margin_deg=in_deg, power=arguments.power)
     print_planned_repeats(console, planned, arguments.power)
     return 0
 
@@ -131,16 +124,16 @@ def _pair(arguments: argparse.Namespace) -> tuple[str, str] | None:
 
 
 def _compared(arguments: argparse.Namespace, a: Campaign, b: Campaign | None) -> Comparison:
-    from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
     from agvbench.statistics.quantities import END_POSE, QUANTITIES
     from agvbench.workflows.comparison.compare import compare
 
+    in_mm, in_deg = margins(arguments)
     return compare(
         a,
         b,
         conditions=_pair(arguments),
-        margin_mm=MARGIN_MM if arguments.margin_mm is None else arguments.margin_mm,
-        margin_deg=MARGIN_DEG if arguments.margin_deg is None else arguments.margin_deg,
+        margin_mm=in_mm,
+        margin_deg=in_deg,
         deciding=QUANTITIES if arguments.with_delta_s else END_POSE,
         metrics=[name.strip() for name in arguments.metrics.split(",") if name.strip()],
         across_vehicles=arguments.across_vehicles,

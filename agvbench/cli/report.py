@@ -14,7 +14,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from agvbench.running.configuration.session_options import number
+from agvbench.cli._margins import add_margin_arguments, margins
 
 HELP = "write the report of a campaign: HTML, tables, figures, Rerun recording"
 
@@ -23,8 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``agvbench report``."""
     parser.add_argument("campaign", metavar="DIR", type=Path, help="campaign directory")
     parser.add_argument("--out", metavar="DIR", type=Path, help="where to write (default: report/ in the campaign)")
-    parser.add_argument("--margin-mm", metavar="MM", type=number, help="noise band of distances (default: 5)")
-    parser.add_argument("--margin-deg", metavar="DEG", type=number, help="noise band of headings (default: 1)")
+    add_margin_arguments(parser, "distances", "headings")
     parser.add_argument("--no-recording", action="store_true", help="leave out campaign.rrd")
 
 
@@ -32,13 +31,13 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the report and print its summary."""
     from agvbench.reporting import write_report
     from agvbench.reporting.console.tables import print_report, wide_console
-    from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
 
+    in_mm, in_deg = margins(arguments)
     report = write_report(
         arguments.campaign,
         arguments.out,
-        margin_mm=MARGIN_MM if arguments.margin_mm is None else arguments.margin_mm,
-        margin_deg=MARGIN_DEG if arguments.margin_deg is None else arguments.margin_deg,
+        margin_mm=in_mm,
+        margin_deg=in_deg,
         recording=not arguments.no_recording,
     )
     print_report(wide_console(), report)
