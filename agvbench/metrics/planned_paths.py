@@ -10,6 +10,7 @@ import numpy as np
 
 from agvbench.campaign import Campaign
 from agvbench.campaign.manifest import sha256
+from agvbench.campaign.names import planned_name
 from agvbench.errors import AgvbenchError
 from agvbench.model import VehicleModel, thesis_vehicle
 from agvbench.planning import Plan, load_trajectory, plan, steered
@@ -38,7 +39,7 @@ class PlannedPaths:
 
         None if the trajectory is not known here, has changed, or leads to another target than the run had.
         """
-        made = self._plan(run.trajectory.removesuffix(f"-{run.extra.get('controller', '')}"))
+        made = self._plan(planned_name(run))
         if made is None or not np.allclose(made.target, run.target, rtol=0.0, atol=_SAME_TARGET, equal_nan=True):
             return None
         return made.expected

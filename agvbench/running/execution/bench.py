@@ -211,7 +211,7 @@ class Bench:
         except BaseException as error:
             record_aborted(self.writer, as_sent(request, loop), run_id, started_s, seen, error, self._identity.firmware)
             self.log.take(self.link, run_id, started_s)
-            if isinstance(error, ControllerError):  # the session goes on with the next run
+            if isinstance(error, ControllerError):  # the session continues with the next run
                 self._placer.was_moved()
                 self._time.has_run(started_s, self._timing.rest_before_s + self._supervisor.commanded_until_s)
             raise

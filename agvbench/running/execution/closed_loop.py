@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from agvbench.campaign.names import CONTROLLER
 from agvbench.control import ControlInput, Controller, ControllerFactory, Demand, Motion, Reference
 from agvbench.errors import AgvbenchError, ControllerError, FlagError
 from agvbench.running.execution.drive import TimedCommand, as_commands
@@ -206,7 +207,7 @@ class ClosedLoop:
 
     def columns(self) -> dict[str, object]:
         """Return what the runs table says of the controller; times [s] only where there are any."""
-        columns: dict[str, object] = {"controller": self._control.name, "control_period_s": self._control.period_s}
+        columns: dict[str, object] = {CONTROLLER: self._control.name, "control_period_s": self._control.period_s}
         if self._ages_s:
             columns["controller_delay_s"] = float(np.median(self._ages_s))
         # Of a simulation in lock step, wall time would differ between campaigns of one seed.

@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from agvbench.campaign.names import controlled_name
 from agvbench.control import ControllerFactory, Reference
 from agvbench.errors import FitError, FlagError, OneOf, PlanError
 from agvbench.model import VehicleModel
@@ -255,8 +256,7 @@ class Driver:
         control = Control(make_controller, Reference(planned, self._session.model(condition)), period_s)
         with self._planning():
             control.controller(self._run_id)  # what it cannot follow is said before anything moves, or in a dry run
-        # Open and closed loop are not repeats of one another.
-        name = f"{planned.trajectory.name}-{control.name}"
+        name = controlled_name(planned.trajectory.name, control.name)
         return self._drive(planned, condition, trajectory=name, control=control)
 
     def _planned(self, name: str, condition: str) -> Plan:
