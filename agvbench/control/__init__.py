@@ -9,11 +9,11 @@
 """
 
 from agvbench.control.controller import ControlInput, Controller, ControllerFactory, Demand
-from agvbench.control.follower import Approach, Follower, Tracking
+from agvbench.control.follower import Approach, PathFollower, Tracking
 from agvbench.control.motion import Actuation, Motion
 from agvbench.control.pure_pursuit import PurePursuit
 from agvbench.control.reference import Reference
-from agvbench.control.sections import Section, sections_of
+from agvbench.control.sections import PathSection, sections_of
 from agvbench.control.stanley import Stanley
 
 __all__ = [
@@ -23,11 +23,11 @@ __all__ = [
     "Controller",
     "ControllerFactory",
     "Demand",
-    "Follower",
     "Motion",
+    "PathFollower",
+    "PathSection",
     "PurePursuit",
     "Reference",
-    "Section",
     "Stanley",
     "Tracking",
     "sections_of",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from agvbench.control.controller import ControlInput
 from agvbench.control.reference import Reference
-from agvbench.control.sections import Section, sections_of
+from agvbench.control.sections import PathSection, sections_of
 from agvbench.errors import FlagError
 from agvbench.types import Pose
 
@@ -30,7 +30,7 @@ class Tracking:
         Speed to drive at [m/s], negative backward; 0 while the plan rests.
     """
 
-    section: Section
+    section: PathSection
     s_m: float
     guide: Pose
     speed_mps: float
@@ -76,7 +76,7 @@ def require(condition: bool, name: str, value: float, limit: str) -> None:
         raise FlagError("value cannot be used", where=f"parameter {name} of the controller", value=value, limit=limit)
 
 
-class Follower:
+class PathFollower:
     """Follows the sections of a plan one after another, with the rests that the plan has before them.
 
     Progress is searched near the last one, so that a path may cross itself. The state is that of one run.

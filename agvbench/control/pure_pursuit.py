@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from agvbench.control.controller import ControlInput
-from agvbench.control.follower import Approach, Follower, require
+from agvbench.control.follower import Approach, PathFollower, require
 from agvbench.control.motion import Motion
 from agvbench.control.reference import Reference
 from agvbench.types import Pose
@@ -37,7 +37,7 @@ class PurePursuit:
         self, reference: Reference, *, lookahead_m: float = 0.3, approach: Approach = _DEFAULT_APPROACH
     ) -> None:
         require(0.0 < lookahead_m < math.inf, "lookahead_m", lookahead_m, "above 0")
-        self._follower, self._lookahead_m = Follower(reference, approach), lookahead_m
+        self._follower, self._lookahead_m = PathFollower(reference, approach), lookahead_m
 
     def __call__(self, seen: ControlInput) -> Motion | None:
         """Return the motion towards the goal; None at the end of the path."""

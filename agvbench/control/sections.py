@@ -20,7 +20,7 @@ _TURNED_RAD = math.radians(0.5)
 
 
 @dataclass(frozen=True)
-class Section:
+class PathSection:
     """A stretch of the path of the guide point, a point on the vehicle's centre line.
 
     Parameters
@@ -75,7 +75,7 @@ class Section:
         return float(np.interp(s_m, self.s_m, self.speed_mps))
 
     def at(self, s_m: float) -> Pose:
-        """Return the point of the path at `s_m` [m] and its tangent [rad]; the path goes on straight beyond its end."""
+        """Return the point of the path at `s_m` [m] and its tangent [rad]; it is straight beyond its end."""
         last = len(self.s_m) - 1
         index = min(max(int(np.searchsorted(self.s_m, s_m, side="right")), 1), last)
         (x0, y0), (x1, y1) = self.points[index - 1].tolist(), self.points[index].tolist()
@@ -84,7 +84,7 @@ class Section:
         return Pose(float(x0 + share * (x1 - x0)), float(y0 + share * (y1 - y0)), tangent)
 
 
-def sections_of(reference: Reference, lever_m: float = 0.0) -> list[Section]:
+def sections_of(reference: Reference, lever_m: float = 0.0) -> list[PathSection]:
     """Return the sections of the plan's path, for a guide point `lever_m` [m] before the reference point as it drives.
 
     Raises
@@ -125,7 +125,7 @@ def _stretches(sense: Floats) -> list[tuple[int, int, float]]:
     return [(a, b, float(sense[a])) for a, b in pairwise(ends) if b > a]
 
 
-def _section(reference: Reference, rows: Floats, sense: float, rest_s: float, lever_m: float) -> Section | None:
+def _section(reference: Reference, rows: Floats, sense: float, rest_s: float, lever_m: float) -> PathSection | None:
     """Return the section of `rows` of the path; None where it is too short or nothing drives in its sense."""
     guide_m = reference.ahead_m + sense * lever_m
     points = _ahead(rows, guide_m)
@@ -135,9 +135,9 @@ def _section(reference: Reference, rows: Floats, sense: float, rest_s: float, le
     driven = np.sign(planned) == sense
     if s_m[-1] < _SHORTEST_M or not driven.any():
         return None
-    # Where the plan coasts, it goes on at the speed that it was driven with.
+    # Where the plan coasts, it continues at the speed that it was driven with.
     speed = np.interp(s_m[kept], s_m[kept][driven], planned[driven])
-    return Section(sense < 0.0, rest_s, guide_m, points[kept], s_m[kept], speed)
+    return PathSection(sense < 0.0, rest_s, guide_m, points[kept], s_m[kept], speed)
 
 
 def _ahead(path: Floats, distance_m: float) -> Floats:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from agvbench.control.controller import ControlInput
-from agvbench.control.follower import Approach, Follower, Tracking, require
+from agvbench.control.follower import Approach, PathFollower, Tracking, require
 from agvbench.control.motion import Motion
 from agvbench.control.reference import Reference
 from agvbench.types import Pose, wrap_angle
@@ -53,7 +53,7 @@ class Stanley:
             require(0.0 < value < math.inf, name, value, "above 0")
         require(0.0 <= softening_mps < math.inf, "softening_mps", softening_mps, "from 0")
         self._gain, self._softening_mps = gain_per_s, softening_mps
-        self._follower = Follower(reference, approach, self._lever_m)
+        self._follower = PathFollower(reference, approach, self._lever_m)
 
     def __call__(self, seen: ControlInput) -> Motion | None:
         """Return the motion of the steering law; None at the end of the path."""

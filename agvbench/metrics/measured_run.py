@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from agvbench.metrics.path_matching import Tracking, track_path
+from agvbench.metrics.path_matching import PathErrors, track_path
 from agvbench.statistics.rest_poses import start_pose
 from agvbench.statistics.run_errors import RunError, run_error
 from agvbench.types import Floats, Frames, Pose, Run
@@ -65,7 +65,7 @@ class MeasuredRun(Run):
         return run_error(self)
 
     @cached_property
-    def tracking(self) -> Tracking | None:
+    def tracking(self) -> PathErrors | None:
         """The driven poses against the planned path at the same progress; None without a planned path."""
         return None if self.planned is None else track_path(self.driven, self.planned)
 

@@ -23,7 +23,7 @@ _LEVER_M = 0.2
 
 
 @dataclass(frozen=True)
-class Tracking:
+class PathErrors:
     """Errors of driven poses against the planned path, evenly spread over the way driven; arrays of shape (n,).
 
     ``progress_m`` [m] is the length of the path up to the matched point. ``cross_track_m`` [m] is the offset to the
@@ -37,7 +37,7 @@ class Tracking:
     heading_rad: Floats
 
 
-def track_path(driven: Floats, planned: Floats) -> Tracking | None:
+def track_path(driven: Floats, planned: Floats) -> PathErrors | None:
     """Return the errors of `driven` against `planned`, both of shape (n, 4): t [s], x, y [m], heading [rad, unwrapped].
 
     None where either does not move.
@@ -52,7 +52,7 @@ def track_path(driven: Floats, planned: Floats) -> Tracking | None:
     offset = poses[:, 1:3] - path[matched, 1:3]
     left = np.column_stack([-going[:, 1], going[:, 0]])
     turned = poses[:, 3] - path[matched, 3]
-    return Tracking(
+    return PathErrors(
         progress_m=_way(path)[matched],
         cross_track_m=np.sum(offset * left, axis=1),
         along_track_m=np.sum(offset * going, axis=1),
@@ -112,13 +112,16 @@ def _squared_distances(a: Floats, b: Floats) -> Floats:  # pragma: no cover - co
 
 @cached_njit()
 def _least_sums(cost: Floats) -> Floats:  # pragma: no cover - compiled
-    """Return, for each pair, the least sum of the costs of pairs from the first pair to it, shape (n, m)."""
+    """Return the least sums of the costs (n, m) of pairs from the first pair to each, shape (n + 1, m + 1).
+
+    The first row and column are infinite: nothing comes before the first pair.
+    """
     total = np.full((len(cost) + 1, cost.shape[1] + 1), np.inf)
     total[0, 0] = 0.0
     for i in range(len(cost)):
         for j in range(cost.shape[1]):
             total[i + 1, j + 1] = cost[i, j] + min(total[i, j], total[i, j + 1], total[i + 1, j])
-    return total[1:, 1:]
+    return total
 
 
 @cached_njit()
@@ -127,17 +130,12 @@ def _aligned(a: Floats, b: Floats) -> Indices:  # pragma: no cover - compiled
     cost = _squared_distances(a, b)
     total = _least_sums(cost)
     i, j = len(a) - 1, len(b) - 1
-    nearest = np.full(len(a), j)
-    least = np.full(len(a), np.inf)
-    while i >= 0 and j >= 0:
+    nearest, least = np.full(len(a), j), np.full(len(a), np.inf)
+    while i >= 0:
         if cost[i, j] < least[i]:
             least[i], nearest[i] = cost[i, j], j
-        diagonal = total[i - 1, j - 1] if i > 0 and j > 0 else np.inf
-        one_back = total[i - 1, j] if i > 0 else np.inf
-        same = total[i, j - 1] if j > 0 else np.inf
-        if i == 0 and j == 0:
-            break
-        if diagonal <= one_back and diagonal <= same:
+        both, one_back, same = total[i, j], total[i, j + 1], total[i + 1, j]
+        if both <= one_back and both <= same:
             i, j = i - 1, j - 1
         elif one_back <= same:
             i -= 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,7 @@ import pyarrow as pa
 from agvbench.campaign import Campaign
 from agvbench.campaign.arguments import as_campaign
 from agvbench.campaign.atomic_files import write_atomically
-from agvbench.campaign.manifest import MANIFEST_FILE, Manifest, record
+from agvbench.campaign.manifest import MANIFEST_FILE, check_file, record
 from agvbench.campaign.tables.parquet import read_parquet, to_parquet
 from agvbench.errors import CampaignError, RecordingError
 from agvbench.metrics.measured_run import MeasuredRun
@@ -27,11 +27,9 @@ if TYPE_CHECKING:
 FILE = "errors.parquet"
 OF_RUN = ("run_id", "experiment", "trajectory", "condition", "repeat", "session", "firmware", "started_s", "status")
 COLUMNS = (*OF_RUN, "metric", "value", "unit")
-Track = Callable[[Sequence[Run]], Iterable[Run]]
-"""Wraps runs while they are evaluated, to show progress."""
 
 
-def metric_table(campaign: Campaign | str | Path, *, track: Track = iter) -> pd.DataFrame:
+def metric_table(campaign: Campaign | str | Path) -> pd.DataFrame:
     """Return the metrics of every run that has a target: one row for each run and metric.
 
     Columns: ``run_id``, ``experiment``, ``trajectory``, ``condition``, ``repeat``, ``session``, ``firmware``,
@@ -42,8 +40,6 @@ def metric_table(campaign: Campaign | str | Path, *, track: Track = iter) -> pd.
     ----------
     campaign
         A campaign, or its directory.
-    track
-        Wraps the runs while they are evaluated, to show progress.
 
     Raises
     ------
@@ -55,7 +51,7 @@ def metric_table(campaign: Campaign | str | Path, *, track: Track = iter) -> pd.
         If a metric of the lab cannot be imported or evaluated.
     """
     opened = as_campaign(campaign)
-    return metrics_of_runs(track(list(opened)), PlannedPaths(opened))
+    return metrics_of_runs(opened, PlannedPaths(opened))
 
 
 def metrics_of_runs(runs: Iterable[Run], paths: PlannedPaths) -> pd.DataFrame:
@@ -108,16 +104,33 @@ def read_metrics(directory: Path) -> pd.DataFrame | None:
     CampaignError
         If it is damaged, or has other columns.
     """
-    path = directory / FILE
-    if not path.exists():
+    if not (directory / FILE).exists():
         return None
-    Manifest(directory).check(path)
-    table = read_parquet(path)
-    if missing := [name for name in COLUMNS if name not in table.column_names]:
-        remedy = f"delete it; agvbench report {directory} writes it again"
-        raise CampaignError("is no table of metrics", where=path, value=f"no column {missing[0]}", remedy=remedy)
-    frame: pd.DataFrame = table.select(list(COLUMNS)).to_pandas()
+    frame: pd.DataFrame = read_columns(directory, COLUMNS).to_pandas()
     return frame
+
+
+def read_columns(directory: Path, columns: Sequence[str], *, plain: bool = True) -> pa.Table:
+    """Return these columns of the table that lies in a campaign directory; `plain` as in `read_parquet`.
+
+    Raises
+    ------
+    CampaignError
+        If the table is damaged, is not there, or lacks one of them.
+    """
+    path = directory / FILE
+    check_file(directory, FILE)
+    table = read_parquet(path, columns=columns, plain=plain)
+    if missing := [name for name in columns if name not in table.column_names]:
+        raise CampaignError(
+            "is no table of metrics", where=path, value=f"no column {missing[0]}", remedy=remedy_for(path)
+        )
+    return table
+
+
+def remedy_for(path: Path) -> str:
+    """Return what to do about a table of metrics that cannot be used."""
+    return f"delete it; agvbench report {path.parent} writes it again"
 
 
 def by_run(table: pd.DataFrame) -> pd.DataFrame:

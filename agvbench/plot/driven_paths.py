@@ -11,7 +11,7 @@ import numpy as np
 
 from agvbench.campaign.arguments import as_runs
 from agvbench.errors import InputError
-from agvbench.metrics.measured_run import smooth_poses
+from agvbench.metrics.measured_run import in_start_frame, smooth_poses
 from agvbench.plot.style import ON_WHITE, Ink, colour, condition_numbers, label, literal, trajectory_title
 from agvbench.types import Floats, Frames, Pose, Run
 
@@ -79,16 +79,13 @@ def drawn_path(frames: Frames) -> Floats:
 
 
 def from_start(path: Floats) -> Floats:
-    """Return a path, shape (n, 4): t [s], x, y [m], heading [rad], with x and y in its start frame.
+    """Return a path, shape (n, 4): t [s], x, y [m], heading [rad], in its start frame.
 
     The first poses' median stands for the start.
     """
     at_rest = path[path[:, 0] <= 0.0]
-    start = np.median(at_rest if len(at_rest) else path[:1], axis=0)
-    c, s = np.cos(start[3]), np.sin(start[3])
-    moved = path.copy()
-    moved[:, 1:3] = (path[:, 1:3] - start[1:3]) @ np.array([[c, -s], [s, c]])
-    return moved
+    _, *start = np.median(at_rest if len(at_rest) else path[:1], axis=0).tolist()
+    return in_start_frame(path, Pose(*start))
 
 
 def draw_group(axes: Axes, group: Sequence[Floats], index: int, label: str | None = None) -> None:

@@ -79,8 +79,8 @@ def write_junit(path: Path, comparison: Comparison, checks: Sequence[GateCheck],
             _check_case(gate, check)
     for suite in suites:
         suite.set("tests", str(len(suite)))
-        for kind in ("failure", "skipped"):
-            suite.set("failures" if kind == "failure" else kind, str(len(suite.findall(f"testcase/{kind}"))))
+        suite.set("failures", str(len(suite.findall("testcase/failure"))))
+        suite.set("skipped", str(len(suite.findall("testcase/skipped"))))
     ET.indent(suites)
     text = ET.tostring(suites, encoding="unicode", xml_declaration=True)
     write_file("--junit", path, lambda file: file.write_text(f"{text}\n", encoding="utf-8"))

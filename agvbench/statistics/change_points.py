@@ -31,7 +31,7 @@ _COMMON_SCALE = 0.9
 
 
 @dataclass(frozen=True)
-class Step:
+class ChangePoint:
     """A step of one series, between two nights; nights are numbered as the columns of the series.
 
     ``night`` is the first night after it, ``earliest`` and ``latest`` are the bounds of its 95 % interval, and
@@ -53,19 +53,19 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Steps:
+class ChangePoints:
     """The steps ``of`` each series in order, and what they were judged with.
 
     ``sd`` is the standard deviation of the nights of each series about their levels, shape (s,), NaN where a series
     has too few nights to be tested. ``autocorrelation`` is that of successive nights, over all series.
     """
 
-    of: tuple[tuple[Step, ...], ...]
+    of: tuple[tuple[ChangePoint, ...], ...]
     sd: Floats
     autocorrelation: float
 
 
-def find_steps(series: Floats, *, alpha: float, seed: int = 0) -> Steps:
+def find_steps(series: Floats, *, alpha: float, seed: int = 0) -> ChangePoints:
     """Return the steps of series of nightly values, shape (s, n), NaN where a night has none.
 
     Parameters
@@ -81,10 +81,10 @@ def find_steps(series: Floats, *, alpha: float, seed: int = 0) -> Steps:
     kept = [values[np.isfinite(values)] for values in series]
     long = [k for k, values in enumerate(kept) if len(values) >= FEWEST]
     tested = [k for k in long if np.ptp(kept[k]) > resolution(kept[k])]
-    sd, of = np.full(len(series), np.nan), [tuple[Step, ...]()] * len(series)
+    sd, of = np.full(len(series), np.nan), [tuple[ChangePoint, ...]()] * len(series)
     sd[long] = 0.0
     if not tested:
-        return Steps(tuple(of), sd, 0.0)
+        return ChangePoints(tuple(of), sd, 0.0)
     correlation = autocorrelation([kept[k] for k in tested])
     long_run = float(inflation(correlation))
     for k, stepped, penalty in zip(tested, *_tested(series[tested], correlation, alpha, seed), strict=True):
@@ -92,7 +92,7 @@ def find_steps(series: Floats, *, alpha: float, seed: int = 0) -> Steps:
         breaks = _breaks(kept[k], float(penalty) * variance) if stepped else []
         sd[k] = _about_levels(kept[k], breaks)
         of[k] = tuple(_steps(kept[k], np.flatnonzero(np.isfinite(series[k])), breaks, variance))
-    return Steps(tuple(of), sd, correlation)
+    return ChangePoints(tuple(of), sd, correlation)
 
 
 def _tested(series: Floats, correlation: float, alpha: float, seed: int) -> tuple[NDArray[np.bool_], Floats]:
@@ -124,12 +124,12 @@ def _about_levels(values: Floats, breaks: Sequence[int]) -> float:
     return sd if sd > resolution(values) else 0.0
 
 
-def _steps(values: Floats, nights: NDArray[np.int64], breaks: Sequence[int], variance: float) -> Iterator[Step]:
+def _steps(values: Floats, nights: NDArray[np.int64], breaks: Sequence[int], variance: float) -> Iterator[ChangePoint]:
     """Yield the steps at `breaks` of the values at `nights`, both of shape (n,)."""
     edges = [0, *breaks, len(values)]
     for (first, at), (_, end) in pairwise(pairwise(edges)):
         low, high = _interval(values[first:end], variance)
-        yield Step(
+        yield ChangePoint(
             night=int(nights[at]),
             earliest=int(nights[first + low]),
             latest=int(nights[first + high]),

@@ -28,8 +28,15 @@ if TYPE_CHECKING:
     from agvbench.statistics.sample_size import PlannedRepeats
     from agvbench.workflows.report import ReportData
 
-_VERDICT_STYLES = {"better": "green", "worse": "bold red", "same": "cyan", "cannot": "dim"}
-_VERDICT_STYLES |= {"fail": "bold red", "pass": "green", "inconclusive": "dim"}
+_VERDICT_STYLES = {
+    "better": "green",
+    "worse": "bold red",
+    "same": "cyan",
+    "cannot": "dim",
+    "pass": "green",
+    "fail": "bold red",
+    "inconclusive": "dim",
+}
 _LONGEST_HEADING, _NARROWEST = 14, 110
 _INTERVAL = "95 % interval"
 _UNLIMITED = 1000

@@ -11,11 +11,9 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from agvbench.campaign.manifest import check_file
-from agvbench.campaign.tables.parquet import read_parquet
 from agvbench.compiled import cached_njit
 from agvbench.errors import CampaignError, RecordingError
-from agvbench.metrics.table import FILE, metric_table, write_metrics
+from agvbench.metrics.table import FILE, metric_table, read_columns, remedy_for, write_metrics
 from agvbench.signals import MAD_TO_STD
 from agvbench.statistics.intervals import FEWEST
 from agvbench.types import RUN_OK, Floats
@@ -27,7 +25,7 @@ Codes = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Cells:
+class MetricCells:
     """Repeats of each condition, metric, unit and trajectory of one campaign, over the runs that count.
 
     ``names`` are the texts of each of `KEYS`; ``codes`` number them in each cell, shape (4, n). ``repeats``, ``median``
@@ -43,7 +41,7 @@ class Cells:
     firmware: str
 
 
-def read_cells(campaign: Path) -> Cells:
+def read_cells(campaign: Path) -> MetricCells:
     """Return the cells of the campaign in a directory; its hash is checked where the campaign lists one.
 
     A campaign without ``errors.parquet`` is evaluated, and keeps the file where its directory can be written.
@@ -61,20 +59,15 @@ def read_cells(campaign: Path) -> Cells:
         with suppress(RecordingError):
             write_metrics(campaign, frame)
         return _reduced(pa.Table.from_pandas(frame, preserve_index=False), path)
-    check_file(campaign, FILE)
-    return _reduced(read_parquet(path, columns=_COLUMNS, plain=False), path)
+    return _reduced(read_columns(campaign, _COLUMNS, plain=False), path)
 
 
-def _reduced(table: pa.Table, path: Path) -> Cells:
-    if missing := [name for name in _COLUMNS if name not in table.column_names]:
-        remedy = f"delete it; agvbench report {path.parent} writes it again"
-        raise CampaignError("is no table of metrics", where=path, value=f"no column {missing[0]}", remedy=remedy)
+def _reduced(table: pa.Table, path: Path) -> MetricCells:
     try:
         texts = {name: _encoded(table[name]) for name in _TEXTS}
         values = table["value"].cast(pa.float64()).to_numpy()
     except (pa.ArrowException, TypeError, ValueError):
-        remedy = f"delete it; agvbench report {path.parent} writes it again"
-        raise CampaignError("has a column of another type", where=path, remedy=remedy) from None
+        raise CampaignError("has a column of another type", where=path, remedy=remedy_for(path)) from None
     status, is_ok = texts["status"], np.zeros(1 + len(texts["status"][0]), dtype=np.bool_)
     is_ok[: len(status[0])] = [text == RUN_OK for text in status[0]]
     counts = is_ok[status[1]] & np.isfinite(values)
@@ -94,11 +87,11 @@ def _encoded(column: pa.ChunkedArray) -> tuple[tuple[str, ...], Codes]:
     return texts, whole.indices.to_numpy().astype(np.int64)
 
 
-def _cells(names: Sequence[tuple[str, ...]], codes: Codes, values: Floats, firmware: str) -> Cells:
+def _cells(names: Sequence[tuple[str, ...]], codes: Codes, values: Floats, firmware: str) -> MetricCells:
     shape = tuple(max(1, len(texts)) for texts in names)
     kinds, cell = np.unique(np.ravel_multi_index(tuple(codes), shape), return_inverse=True)
     parts = np.array(np.unravel_index(kinds, shape), dtype=np.int64)
-    return Cells(tuple(names), parts, *_statistics(cell.astype(np.int64), np.abs(values), len(kinds)), firmware)
+    return MetricCells(tuple(names), parts, *_statistics(cell.astype(np.int64), np.abs(values), len(kinds)), firmware)
 
 
 def _statistics(cell: Codes, values: Floats, count: int) -> tuple[Codes, Floats, Floats]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from agvbench.types import Floats
-from agvbench.workflows.history.cells import KEYS, Cells, Codes
+from agvbench.workflows.history.cells import KEYS, Codes, MetricCells
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -78,7 +78,7 @@ class Nights:
         return pd.DataFrame({"night": night} | texts | way | numbers)
 
 
-def nights_of(campaigns: Sequence[Cells]) -> Nights:
+def nights_of(campaigns: Sequence[MetricCells]) -> Nights:
     """Return the nightly values of campaigns in their order."""
     kinds, trajectories = dict[tuple[str, str, str], int](), dict[str, int]()
     places = [_places(cells, kinds, trajectories) for cells in campaigns]
@@ -90,7 +90,9 @@ def nights_of(campaigns: Sequence[Cells]) -> Nights:
     return Nights(tuple(kinds), tuple(trajectories), repeats, median, spread)
 
 
-def _places(cells: Cells, kinds: dict[tuple[str, str, str], int], trajectories: dict[str, int]) -> tuple[Codes, Codes]:
+def _places(
+    cells: MetricCells, kinds: dict[tuple[str, str, str], int], trajectories: dict[str, int]
+) -> tuple[Codes, Codes]:
     """Return the numbers of each cell's series and trajectory, which are given as they appear."""
     shape = tuple(max(1, len(names)) for names in cells.names[:3])
     own, series = np.unique(np.ravel_multi_index(tuple(cells.codes[:3]), shape), return_inverse=True)

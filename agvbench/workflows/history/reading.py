@@ -16,10 +16,10 @@ from agvbench.campaign.header import FILE_NAME, CampaignHeader
 from agvbench.campaign.names import as_texts
 from agvbench.errors import AgvbenchError, CampaignError, FlagError, InputError, OneOf
 from agvbench.metrics.registry import all_metrics
-from agvbench.statistics.change_points import ORDERS, Step, Steps, find_steps
+from agvbench.statistics.change_points import ORDERS, ChangePoint, ChangePoints, find_steps
 from agvbench.statistics.end_poses import in_order
 from agvbench.types import Floats
-from agvbench.workflows.history.cells import Cells, read_cells
+from agvbench.workflows.history.cells import MetricCells, read_cells
 from agvbench.workflows.history.facts import Facts, changed, facts_of
 from agvbench.workflows.history.folders import Dated, campaigns_below, dated
 from agvbench.workflows.history.nights import Nights, named, nights_of
@@ -41,7 +41,7 @@ class _Read:
     name: str
     driven: Dated
     vehicle: str
-    cells: Cells
+    cells: MetricCells
 
 
 def history(
@@ -157,7 +157,7 @@ def _night_table(nights: Nights, read: Sequence[_Read]) -> pd.DataFrame:
     return table
 
 
-def _series_table(nights: Nights, values: Floats, found: Steps) -> pd.DataFrame:
+def _series_table(nights: Nights, values: Floats, found: ChangePoints) -> pd.DataFrame:
     import pandas as pd
 
     rows = []
@@ -187,7 +187,7 @@ _CHANGE_COLUMNS = (
 )
 
 
-def _change_table(nights: Nights, found: Steps, read: Sequence[_Read]) -> pd.DataFrame:
+def _change_table(nights: Nights, found: ChangePoints, read: Sequence[_Read]) -> pd.DataFrame:
     import pandas as pd
 
     facts = cache(lambda night: facts_of(read[night].path, read[night].cells.firmware))
@@ -202,14 +202,14 @@ def _change_table(nights: Nights, found: Steps, read: Sequence[_Read]) -> pd.Dat
     return table.iloc[order].reset_index(drop=True)
 
 
-def _where(step: Step, read: Sequence[_Read]) -> Iterator[Any]:
+def _where(step: ChangePoint, read: Sequence[_Read]) -> Iterator[Any]:
     numbers = step.night, step.earliest, step.latest
     for night in numbers:
         yield from (read[night].name, read[night].driven.at)
     yield from numbers
 
 
-def _facts(step: Step, read: Sequence[_Read], facts: Callable[[int], Facts]) -> Iterator[tuple[str, str]]:
+def _facts(step: ChangePoint, read: Sequence[_Read], facts: Callable[[int], Facts]) -> Iterator[tuple[str, str]]:
     """Yield what changed from night to night within the interval of a step, with the campaign that brought it."""
     for before, after in pairwise(range(step.last_before, step.latest + 1)):
         for phrase in changed(facts(before), facts(after)):
