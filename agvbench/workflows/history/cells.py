@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 from numpy.typing import NDArray
 
@@ -71,7 +72,8 @@ def _reduced(table: pa.Table, path: Path) -> MetricCells:
     status, is_ok = texts["status"], np.zeros(1 + len(texts["status"][0]), dtype=np.bool_)
     is_ok[: len(status[0])] = [text == RUN_OK for text in status[0]]
     counts = is_ok[status[1]] & np.isfinite(values)
-    firmware = sorted({texts["firmware"][0][code] for code in np.unique(texts["firmware"][1][counts])})
+    versions, version = texts["firmware"]
+    firmware = sorted({versions[code] for code in np.flatnonzero(np.bincount(version[counts]))})
     codes = np.vstack([texts[name][1][counts] for name in KEYS])
     return _cells([texts[name][0] for name in KEYS], codes, values[counts], ", ".join(filter(None, firmware)))
 
@@ -89,7 +91,7 @@ def _encoded(column: pa.ChunkedArray) -> tuple[tuple[str, ...], Codes]:
 
 def _cells(names: Sequence[tuple[str, ...]], codes: Codes, values: Floats, firmware: str) -> MetricCells:
     shape = tuple(max(1, len(texts)) for texts in names)
-    kinds, cell = np.unique(np.ravel_multi_index(tuple(codes), shape), return_inverse=True)
+    cell, kinds = pd.factorize(np.ravel_multi_index(tuple(codes), shape))  # does not sort, as np.unique does
     parts = np.array(np.unravel_index(kinds, shape), dtype=np.int64)
     return MetricCells(tuple(names), parts, *_statistics(cell.astype(np.int64), np.abs(values), len(kinds)), firmware)
 

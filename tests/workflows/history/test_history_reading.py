@@ -20,7 +20,7 @@ from agvbench.vehicle.channels import Channels
 from agvbench.workflows.history.facts import changed, facts_of
 from agvbench.workflows.history.result import write_json
 
-SAVED = Path(__file__).parents[2] / "campaign" / "data" / "schema_1"
+SAVED = Path(__file__).parents[2] / "campaign" / "data"
 
 
 @pytest.fixture(scope="module")
@@ -151,19 +151,12 @@ def test_a_campaign_that_cannot_be_read_is_one_line_among_the_others(tmp_path, d
     assert "\n" not in line
 
 
-def test_campaigns_of_every_schema_are_read(tmp_path):
-    value = {("position_error", "1"): [1.0]}
-    heads = [
-        CampaignHeader(1, "one", "a", 0.1, 0.1, Channels.alike("us"), 120.0),
-        CampaignHeader(2, "two", "b", 0.1, 0.1, Channels.alike("us"), 120.0, driven="rear"),
-        CampaignHeader(3, "three", "c", 0.0, 0.1, Channels.alike("si"), 120.0, kinematics="differential"),
-    ]
-    for head in heads:
-        write_night(tmp_path / head.name, value, header=head)
+def test_saved_campaigns_of_every_schema_are_read(tmp_path):
     shutil.copytree(SAVED, tmp_path / "saved")
     found = agvbench.history(tmp_path)
     assert found.unread == ()
-    assert set(found.campaigns["campaign"]) == {"one", "two", "three", "saved/csv", "saved/parquet", "saved/parts"}
+    forms = {f"{schema}/{form}" for schema in range(1, 5) for form in ("csv", "parquet", "parts")}
+    assert set(found.campaigns["campaign"]) == {f"saved/schema_{name}" for name in forms}
 
 
 def test_metrics_and_conditions_are_chosen_by_name(stepped):
