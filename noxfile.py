@@ -86,12 +86,24 @@ def coverage(session: nox.Session) -> None:
 def firmware(session: nox.Session) -> None:
     """Build the vehicle's firmware and the simulated microcontroller; install the tools first where that is allowed."""
     if shutil.which("avr-gcc") is None or not Path("/usr/include/simavr/sim_avr.h").exists():
-        command = ["apt-get", "install", "--yes", "--quiet", "--no-install-recommends", *FIRMWARE_PACKAGES]
-        if shutil.which("apt-get") is None or os.geteuid() != 0:
-            session.error("tools are missing; as an administrator: " + " ".join(command))
-        session.run("apt-get", "update", "--quiet", external=True)
-        session.run(*command, external=True)
+        install_packages(session, FIRMWARE_PACKAGES)
     session.run("make", "-C", "firmware", *session.posargs, external=True)
+
+
+@nox.session(venv_backend="none")
+def browser(session: nox.Session) -> None:
+    """Install Chromium for the tests of pages, where there is none and that is allowed."""
+    if not any(map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))):
+        install_packages(session, ["chromium"])
+
+
+def install_packages(session: nox.Session, packages: list[str]) -> None:
+    """Install packages of Debian as root, or say what an administrator has to do."""
+    command = ["apt-get", "install", "--yes", "--quiet", "--no-install-recommends", *packages]
+    if shutil.which("apt-get") is None or os.geteuid() != 0:
+        session.error("tools are missing; as an administrator: " + " ".join(command))
+    session.run("apt-get", "update", "--quiet", external=True)
+    session.run(*command, external=True)
 
 
 @nox.session
@@ -107,10 +119,11 @@ def lint(session: nox.Session) -> None:
 
 @nox.session
 def docs(session: nox.Session) -> None:
-    """Run every example in docstrings and documents, and build the site."""
+    """Run every example in docstrings and documents, build the site into site/, and open its pages in a browser."""
     install(session, "test", "docs")
     session.run("pytest", "--doctest-modules", "--doctest-glob=*.md", "agvbench", "docs", "README.md", "-q")
-    session.run("mkdocs", "build", "--strict", "--quiet", "--site-dir", session.create_tmp())
+    session.run("zensical", "build", "--strict", "--clean")
+    session.run("pytest", "tests/pages/test_site.py", "-q")
 
 
 @nox.session

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import re
 from collections.abc import Iterator, Sequence
 
@@ -33,9 +34,15 @@ def to_html(title: str, subtitle: str, sections: Sequence[Content]) -> str:
         "drawing": lambda block: isinstance(block, FigureBlock),
     }
     environment.filters["spans"] = spans
+    environment.filters["labelled"] = _labelled
     environment.filters["shape"] = lambda index: _SHAPES[MARKERS[index % len(MARKERS)]]
     template = environment.get_template("report.html.j2")
     return template.render(title=title, subtitle=subtitle, sections=sections)
+
+
+def _labelled(svg: str, label: str) -> str:
+    """Return a drawing with the text that screen readers say for it."""
+    return svg.replace('role="img"', f'role="img" aria-label="{html.escape(label)}"', 1)
 
 
 _SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|~$!])")
