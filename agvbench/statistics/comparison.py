@@ -24,10 +24,9 @@ from agvbench.statistics.differences import (
     EndShift,
     decide_families,
     end_shift,
-    of_all,
-    of_cell,
     overall,
     pooled_sd,
+    raw_differences,
 )
 from agvbench.statistics.intervals import RESAMPLES
 from agvbench.statistics.matching import Cell, Side, match_cells
@@ -213,11 +212,7 @@ def compare_errors(
     """
     margins = checked_margins(margin_mm, margin_deg) | dict(further)
     cells, left_out = match_cells(a, b, conditions=conditions, same_campaign=same_campaign, quantities=tuple(margins))
-    raw = [of_cell(cell, q, margins[q], resamples, seed) for cell in cells for q in margins if cell.has(q)]
-    for quantity, margin in margins.items():
-        having = [cell for cell in cells if cell.has(quantity)]
-        if len(having) > 1:
-            raw.append(of_all(having, quantity, margin, resamples, seed))
+    raw = raw_differences(cells, margins, resamples, seed)
     differences, tests = decide_families(raw, [*deciding, *further], alpha)
     shifts = sorted(map(end_shift, cells), key=lambda shift: -shift.length_mm)
     note = session_note(cells, same_campaign=same_campaign)

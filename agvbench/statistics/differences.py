@@ -7,7 +7,7 @@ target.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -66,6 +66,7 @@ def decide(
     p_better: float,
     p_same: float,
     alpha: float = ALPHA,
+    alpha_same: float = ALPHA_SAME,
 ) -> ComparisonVerdict:
     """Return the verdict on a `difference` of medians (b − a) against a noise band of ±`margin`.
 
@@ -79,10 +80,9 @@ def decide(
     p_worse, p_better
         One-sided p-values of no difference, corrected for multiplicity.
     p_same
-        The larger p-value of the two one-sided tests of a difference of at least the margin, uncorrected; held against
-        5 %.
-    alpha
-        The level that `p_worse` and `p_better` are held against.
+        The larger p-value of the two one-sided tests of a difference of at least the margin.
+    alpha, alpha_same
+        The levels that `p_worse` and `p_better`, and `p_same`, are held against.
 
     Examples
     --------
@@ -95,7 +95,7 @@ def decide(
         return ComparisonVerdict.WORSE
     if p_better <= alpha and difference < -margin:
         return ComparisonVerdict.BETTER
-    return ComparisonVerdict.SAME if p_same <= ALPHA_SAME else ComparisonVerdict.INCONCLUSIVE
+    return ComparisonVerdict.SAME if p_same <= alpha_same else ComparisonVerdict.INCONCLUSIVE
 
 
 ALL = "all trajectories"
@@ -171,6 +171,18 @@ def of_all(cells: Sequence[Cell], quantity: Quantity, margin: float, resamples: 
     interval = average_difference_interval(pairs, resamples=resamples, seed=seed)
     strata = [stratum for cell in cells for stratum in cell.strata(quantity)]
     return _tested((ALL, "all"), quantity, margin, (samples[0], samples[1]), interval, strata)
+
+
+def raw_differences(
+    cells: Sequence[Cell], margins: Mapping[Quantity, float], resamples: int, seed: int
+) -> list[RawDifference]:
+    """Return every difference before correction: of each cell and quantity, then of all cells together."""
+    raw = [of_cell(cell, q, margins[q], resamples, seed) for cell in cells for q in margins if cell.has(q)]
+    for quantity, margin in margins.items():
+        having = [cell for cell in cells if cell.has(quantity)]
+        if len(having) > 1:
+            raw.append(of_all(having, quantity, margin, resamples, seed))
+    return raw
 
 
 def _tested(

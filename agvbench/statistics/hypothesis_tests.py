@@ -161,6 +161,23 @@ def holm(p_values: Sequence[float]) -> list[float]:
     return [float(value) for value in adjusted]
 
 
+def hochberg(p_values: Sequence[float]) -> list[float]:
+    """Return Hochberg's (1988) adjusted p-values, in the order given: none is corrected where all are significant.
+
+    Rejecting where the adjusted value is at most α keeps the chance of any false rejection at or below α, for
+    independent and for positively dependent tests. If all p-values are at most α, all are rejected, as by an
+    intersection–union test.
+
+    >>> hochberg([0.01, 0.04, 0.03])
+    [0.03, 0.04, 0.04]
+    """
+    p = np.asarray(p_values, dtype=float)
+    order = np.argsort(-p, kind="stable")
+    adjusted = np.empty_like(p)
+    adjusted[order] = np.minimum(1.0, np.minimum.accumulate(p[order] * np.arange(1, len(p) + 1)))
+    return [float(value) for value in adjusted]
+
+
 def tarone_testable(minimum_p: Sequence[float], alpha: float) -> list[bool]:
     """Return which tests could reach significance at all after correction (Tarone, 1990).
 

@@ -102,7 +102,7 @@ def match_cells(
         other = sides_b.get(key)
         if other is None:
             left_out.append(f"{' '.join(key)}: only in A")
-        elif not _same_target(side, other):
+        elif not same_target(side.target, other.target):
             left_out.append(f"{' '.join(key)}: the targets differ")
         else:
             by_session = same_campaign and _share_sessions(side, other)
@@ -147,8 +147,9 @@ def _of_condition(errors: pd.DataFrame, condition: str, side: str) -> pd.DataFra
     return chosen
 
 
-def _same_target(a: Side, b: Side) -> bool:
-    apart = a.target - b.target
+def same_target(a: Floats, b: Floats) -> bool:
+    """Return whether two targets (x [m], y [m], heading [rad]) agree within 1 mm and 0.1°."""
+    apart = a - b
     apart[2] = np.angle(np.exp(1j * apart[2]))
     return bool(np.all(np.abs(apart) <= _TARGET_TOLERANCE))
 
