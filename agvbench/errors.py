@@ -119,6 +119,12 @@ class CampaignError(InputError):
     """A campaign whose tables contradict themselves or the schema."""
 
 
+class NotComparableError(InputError):
+    """Campaigns that no comparison can conclude from: one is incomplete, or the vehicles are of different kinds."""
+
+    exit_code = 3
+
+
 class RecordingError(CampaignError):
     """A campaign that cannot be written any more: the disk is full, its folder is gone."""
 

@@ -12,6 +12,17 @@ examples:
   agvbench bench --plant my_plant.py:make_plant   your own simulated plant
   agvbench bench --trajectories garage,figure_eight   these in place of the eight
   agvbench bench endurance                        another benchmark: bench_endurance.py
+  agvbench bench --against A --fail-on 'position_error.p95>+10%' --junitxml bench.xml
+                                                  compare with the campaign A at the end, for a nightly job
+  agvbench bench --until decided --against A --calibration A/vehicle.toml --repeats 20
+                                                  at most 20 repeats, fewer where the comparison is decided before
+
+--until decided compares the runs so far with those of A after every round of repeats, from the third on. It stops when
+a regression is shown, or when each comparison is decided: better, or the same within its margin. The chance of any
+false regression is at most 1 %, that of any false "same" at most 5 %, over all comparisons and analyses together.
+
+exit codes: 0 every run is valid; 1 a run failed, or the comparison with --against shows a regression, or a rule failed;
+2 bad input or set-up; 3 A is not comparable, or the comparison is not decided.
 """
 
 from __future__ import annotations
@@ -33,6 +44,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("-k", dest="only", metavar="EXPRESSION", help="only benchmarks whose names match, as in pytest")
     add_options(parser.add_argument)
+    parser.add_argument(
+        "--junitxml",
+        metavar="FILE",
+        help="write a test case for each run as JUnit XML, with its errors as properties, for CI servers",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -42,4 +58,4 @@ def run(arguments: argparse.Namespace) -> int:
     check_values(vars(arguments))
     from agvbench.workflows.bench import run_benchmarks
 
-    return run_benchmarks(arguments.benchmarks, vars(arguments), only=arguments.only)
+    return run_benchmarks(arguments.benchmarks, vars(arguments), only=arguments.only, junit=arguments.junitxml)

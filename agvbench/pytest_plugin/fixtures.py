@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from agvbench.errors import AgvbenchError
+from agvbench.errors import AgvbenchError, NotComparableError
+from agvbench.pytest_plugin.against import AGAINST, is_left_out, prepare, write_analysis
 from agvbench.pytest_plugin.collection import chosen, experiment, is_bench, phase, plan_of, repeat, run_name
 from agvbench.pytest_plugin.options import given_options, option, worded
+from agvbench.workflows.bench import COMPARISON_CODE
 
 if TYPE_CHECKING:
     from agvbench.running.session.session import BenchSession, Driver
@@ -44,6 +46,7 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
     with ExitStack() as stack:
         stack.enter_context(announcing_compilation(_progress_printer(config)))
         try:
+            against = prepare(config, session.items)
             opened = open_session(
                 given_options(config) | chosen(config, session.items),
                 out=option(config, "--out"),
@@ -53,12 +56,17 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
                 on_progress=_progress_printer(config),
             )
             config.stash[SESSION] = bench_session = stack.enter_context(opened)
+            if against is not None:
+                against.begin(bench_session)
+                config.stash[AGAINST] = against
         except AgvbenchError as error:
+            if isinstance(error, NotComparableError):
+                config.stash[COMPARISON_CODE] = error.exit_code
             raise pytest.UsageError(worded(config, error)) from None
         except KeyboardInterrupt as interrupt:
             config.stash[INTERRUPT] = interrupt
             raise
-        benches = [item for item in session.items if is_bench(item)]
+        benches = [item for item in session.items if is_bench(item) and not is_left_out(item)]
         bench_session.expect(
             [run_name(item) for item in benches], [run_name(item) for item in benches if phase(item) == 0]
         )
@@ -68,7 +76,11 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
                 reporter.write_line(worded(config, notice))
         try:
             done = yield
+            if against is not None:
+                write_analysis(config, against.analyse_last())
             stack.close()
+            if against is not None:
+                against.judge()
         except AgvbenchError as error:
             raise pytest.UsageError(worded(config, error)) from None
         except KeyboardInterrupt as interrupt:
@@ -98,6 +110,8 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         from agvbench.running.session.termination_signals import exit_code
 
         session.exitstatus = exit_code(stash[INTERRUPT])
+    elif AGAINST in stash and session.exitstatus == pytest.ExitCode.OK and (code := stash[AGAINST].exit_code):
+        session.exitstatus = stash[COMPARISON_CODE] = code
     elif ENDS_PROGRAM in stash or (SESSION in stash and stash[SESSION].failure is not None):
         session.exitstatus = pytest.ExitCode.INTERRUPTED
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from agvbench.pytest_plugin.against import pytest_runtest_setup
 from agvbench.pytest_plugin.collection import (
     pytest_collection_modifyitems,
     pytest_generate_tests,
@@ -36,6 +37,7 @@ __all__ = [
     "pytest_report_teststatus",
     "pytest_runtest_makereport",
     "pytest_runtest_protocol",
+    "pytest_runtest_setup",
     "pytest_runtestloop",
     "pytest_sessionfinish",
     "pytest_terminal_summary",

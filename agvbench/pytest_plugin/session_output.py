@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection, Generator
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import pytest
 
-from agvbench.errors import AgvbenchError, FlagError, InputError, PlanError
+from agvbench.campaign.completeness import planned_id
+from agvbench.errors import AgvbenchError, FitError, FlagError, InputError, PlanError
+from agvbench.pytest_plugin.against import against_texts, is_left_out, take_analysis
 from agvbench.pytest_plugin.collection import is_bench, run_name
 from agvbench.pytest_plugin.fixtures import ENDS_PROGRAM, INTERRUPT, SESSION, STOPPED_IN, stop_line
 from agvbench.pytest_plugin.options import option, worded
@@ -46,10 +49,10 @@ class Progress:
             self._reporter.write_line(line)
         self._done += 1
 
-    def leave_out(self, run_id: str) -> None:
-        """Do not count the run that began last: this vehicle cannot drive it here."""
+    def leave_out(self, run_id: str, *, begun: bool = True) -> None:
+        """Do not count a run that is not driven, or the one that began last: this vehicle cannot drive it here."""
         if run_id in self._left:
-            self._total, self._done = self._total - 1, self._done - 1
+            self._total, self._done = self._total - 1, self._done - begun
 
     def end(self) -> None:
         """Wipe the line."""
@@ -96,7 +99,12 @@ def pytest_runtest_protocol(item: pytest.Item) -> bool | None:
     if SESSION in stash and stash[SESSION].failure is not None:
         stash[_NOT_DRIVEN] = stash.get(_NOT_DRIVEN, 0) + 1
         return True
-    if (progress := _progress(item.session)) is not None:
+    take_analysis(item)
+    if (progress := _progress(item.session)) is None:
+        return None
+    if is_left_out(item):
+        progress.leave_out(run_name(item), begun=False)
+    else:
         progress.begin(run_name(item), item.name.removeprefix("bench_"))
     return None
 
@@ -137,10 +145,22 @@ def pytest_runtest_makereport(
         report.user_properties.append(("agvbench", item.name))
         if SESSION in item.config.stash and _is_conclusive(report, call):
             item.config.stash[SESSION].concluded(run_name(item))
+        if report.when == "teardown":  # whose properties pytest writes
+            report.user_properties += _errors(item)
         if call.excinfo is not None and isinstance(call.excinfo.value, AgvbenchError):
             report.longrepr = f"{item.name}: {worded(item.config, call.excinfo.value)}"
         _report_stop(item, report)
     return report
+
+
+def _errors(item: pytest.Item) -> list[tuple[str, object]]:
+    """Return the errors of a benchmark's last run by their columns, for JUnit XML; none where it has no target."""
+    run = item.config.stash[SESSION].last_driven if SESSION in item.config.stash else None
+    if run is None or not item.config.getoption("xmlpath", None) or planned_id(run.run_id) != run_name(item):
+        return []
+    with suppress(InputError, FitError):
+        return [(name, round(value, 4)) for name, value in vars(run.error).items() if name != "delta_heading_deg"]
+    return []
 
 
 def _report_stop(item: pytest.Item, report: pytest.TestReport) -> None:
@@ -170,7 +190,7 @@ def pytest_report_teststatus(report: pytest.TestReport | pytest.CollectReport) -
         return None
     if _STOPPED in dict(report.user_properties):
         return _STOPPED, "", ""
-    if report.when == "call":
+    if report.when == "call" or report.skipped:
         return report.outcome, "", ""
     return None
 
@@ -212,3 +232,5 @@ def _conclude(terminalreporter: pytest.TerminalReporter, config: pytest.Config, 
         for line in session.events:
             terminalreporter.write_line(worded(config, line))
         terminalreporter.write_line(bench_summary(shown(session.directory), report=not option(config, "--no-report")))
+        for text in against_texts(config):
+            terminalreporter.write_line(text)

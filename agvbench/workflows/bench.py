@@ -15,17 +15,25 @@ from agvbench.running.configuration.settings import SETTINGS_FILE, BenchSettings
 
 _SIGNALLED = 128
 """Exit codes above are those of sessions that a signal ended, and that have said so."""
+COMPARISON_CODE = pytest.StashKey[int]()
+"""The exit code of the comparison with an earlier campaign, where it ends the session."""
 DEFAULT = ("calibration", "trajectories")
 # The command line has imported agvbench before pytest looks for plugins, which does no harm here.
 _IN_PROCESS = "ignore:Module already imported:pytest.PytestAssertRewriteWarning"
 
 
 def run_benchmarks(
-    names: Sequence[str], options: Mapping[str, Any], *, only: str | None = None, summary: bool = True
+    names: Sequence[str],
+    options: Mapping[str, Any],
+    *,
+    only: str | None = None,
+    junit: str | None = None,
+    summary: bool = True,
 ) -> int:
     """Run the benchmarks `names` with `options`; return the exit code of ``agvbench``.
 
-    ``only`` chooses among them as pytest's ``-k`` does; without ``summary`` nothing is said at the end. A session that
+    ``only`` chooses among them as pytest's ``-k`` does; pytest writes its results to the file `junit`, as JUnit XML;
+    without ``summary`` nothing is said at the end. A session that
     is resumed without saying which benchmarks drives those that it began with.
 
     Raises
@@ -41,6 +49,8 @@ def run_benchmarks(
     arguments = [*files, *quiet, SHORT_NAMES, *_flags(options)]
     if only:
         arguments += ["-k", only]
+    if junit:
+        arguments += [f"--junitxml={junit}"]
     if not summary:
         arguments += ["--no-summary", "-q"]
     ending = _Ending()
@@ -53,6 +63,8 @@ def run_benchmarks(
     if code == pytest.ExitCode.NO_TESTS_COLLECTED:
         where, value = ("-k", only) if only else ("agvbench bench", " ".join(names))
         raise FlagError("no run to drive", where=where, value=value, remedy="see what there is with --dry-run")
+    if ending.verdict is not None and code in (ending.verdict, pytest.ExitCode.USAGE_ERROR):
+        return ending.verdict
     # Codes of pytest that agvbench uses for something else.
     own = {int(pytest.ExitCode.USAGE_ERROR): 2, int(pytest.ExitCode.INTERNAL_ERROR): INTERNAL_ERROR_EXIT_CODE}
     return own.get(int(code), int(code))
@@ -62,6 +74,7 @@ class _Ending:
     """Ends pytest by Ctrl-C without its own words on it, and keeps the session's exit code."""
 
     code = 0
+    verdict: int | None = None
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_keyboard_interrupt(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
@@ -73,6 +86,7 @@ class _Ending:
     def pytest_sessionfinish(self, session: pytest.Session) -> Generator[None, None, None]:
         yield
         self.code = int(session.exitstatus)
+        self.verdict = session.config.stash.get(COMPARISON_CODE, None)
 
 
 def _begun_with(out: str | None) -> BenchSettings:

@@ -17,12 +17,21 @@ from agvbench.errors import AgvbenchError
 from agvbench.metrics.table import write_metrics
 from agvbench.planning import Plan
 from agvbench.planning.workspace import DEFAULT_MARGIN_M
-from agvbench.reporting.console.tables import end_pose_summary, said_first
+from agvbench.reporting.console.sequential import decision_in_words, sequential_summary
+from agvbench.reporting.console.tables import (
+    end_pose_summary,
+    print_comparison,
+    print_gate,
+    print_warnings,
+    said_first,
+)
 from agvbench.reporting.write import write_report
 from agvbench.running.execution.campaign_time import TURNAROUND_S
 from agvbench.running.execution.drive import DEFAULT_TIMING
 from agvbench.running.execution.run_records import RunRequest
 from agvbench.statistics.quantities import DEFINITIONS
+from agvbench.workflows.comparison.bench_gate import JudgedBench
+from agvbench.workflows.comparison.sequential_record import SequentialRecord
 from agvbench.workflows.report import ReportData, gather
 
 _NARROWEST = 100
@@ -30,10 +39,18 @@ _NARROWEST = 100
 
 def as_text(renderable: RenderableType) -> str:
     """Return `renderable` as lines without colours: as wide as ``COLUMNS`` says, else as the terminal, at least 100."""
+    console = _console()
+    console.print(renderable)
+    return _printed(console)
+
+
+def _console() -> Console:
     columns = shutil.get_terminal_size((_NARROWEST, 24)).columns
     width = columns if os.environ.get("COLUMNS", "").isdigit() else max(_NARROWEST, columns)
-    console = Console(file=io.StringIO(), width=width, no_color=True)
-    console.print(renderable)
+    return Console(file=io.StringIO(), width=width, no_color=True)
+
+
+def _printed(console: Console) -> str:
     file = console.file
     assert isinstance(file, io.StringIO)  # noqa: S101 - it is the one made above
     return file.getvalue().rstrip("\n")
@@ -119,6 +136,20 @@ def bench_summary(directory: Path, *, report: bool) -> str:
         return f"no report: {error}\ncampaign: {directory}"
     where = [Text(f"campaign: {directory}"), Text(f"report:   {written.files[0]}")]
     return as_text(Group(*_end_poses(written.data), *said_first(written), Text(""), *where))
+
+
+def sequential_text(record: SequentialRecord, driven: int, saved: int) -> str:
+    """Return a sequential comparison: its verdicts, what was decided, and how many runs that took and saved."""
+    return as_text(Group(sequential_summary(record), Text(decision_in_words(record, driven, saved))))
+
+
+def judged_text(judged: JudgedBench) -> str:
+    """Return the comparison and the gate of a bench, as ``agvbench compare`` prints them."""
+    console = _console()
+    print_warnings(console, judged.known.sentences)
+    print_comparison(console, judged.comparison)
+    print_gate(console, judged.checks)
+    return _printed(console)
 
 
 def _end_poses(data: ReportData, *below: RenderableType) -> list[RenderableType]:

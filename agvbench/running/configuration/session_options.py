@@ -69,6 +69,24 @@ SESSION_OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
     ("--resume", _FLAG, "go on with an interrupted session: the one in --out, or the last"),
     ("--dry-run", _FLAG, "say what would be driven, for how long and on how much floor; drive nothing"),
     ("--no-report", _FLAG, "write the campaign only, no report"),
+    (
+        "--against",
+        {"metavar": "DIR"},
+        "compare with this campaign at the end, as agvbench compare does, and end with its exit code",
+    ),
+    (
+        "--until",
+        {"choices": ("decided",)},
+        "decided: stop as soon as the comparison with --against is decided; --repeats is then the most repeats",
+    ),
+    ("--margin-mm", {"metavar": "MM", "type": number}, "noise band of the end position error (default: 5)"),
+    ("--margin-deg", {"metavar": "DEG", "type": number}, "noise band of the heading error (default: 1)"),
+    (
+        "--fail-on",
+        {"metavar": "RULE", "action": Joined},
+        "with --against, when to exit with 1: regression (default), any, never, METRIC.STATISTIC>LIMIT; commas between",
+    ),
+    ("--gate", {"metavar": "FILE"}, "with --against, a TOML file of such rules"),
 )
 _NAMES = "|".join(re.escape(flag) for flag, _, _ in OPTIONS + SESSION_OPTIONS)
 _OWN_OR_OTHERS = re.compile(rf"agvbench [a-z]+[^;,()]*|(?<![\w-])({_NAMES})(?![\w-])")

@@ -118,7 +118,7 @@ def open_session(
             session.notices = _notices(settings, given, given_directory)
             session.notices += idle_notice(recorded.values(), campaign_time.now_s(), settings.session)
             try:
-                with bench.pause.by_signal(), _leaving_out_undrivable(writer, session):
+                with bench.pause.by_signal(), _without_left_out(writer, session):
                     yield session
             finally:
                 bench.close()
@@ -179,16 +179,17 @@ def _record_plan(writer: CampaignWriter, settings: BenchSettings, plan: Sequence
 
 
 @contextmanager
-def _leaving_out_undrivable(writer: CampaignWriter, session: BenchSession) -> Iterator[None]:
-    """Take runs that this vehicle cannot drive here out of the plan when the session ends."""
+def _without_left_out(writer: CampaignWriter, session: BenchSession) -> Iterator[None]:
+    """Take runs that are not needed, or that this vehicle cannot drive here, out of the plan when the session ends."""
     try:
         yield
     finally:
         planned = recorded_rows(writer.path, PLANNED_TABLE)
-        drivable = [row for row in planned if row["run_id"] not in session.not_applicable]
-        if len(drivable) < len(planned):
+        left_out = session.not_applicable | session.not_needed
+        kept = [row for row in planned if row["run_id"] not in left_out]
+        if len(kept) < len(planned):
             with suppress(RecordingError):  # what ended the session is the error to report
-                writer.write_table(PLANNED_TABLE, pd.DataFrame(drivable, columns=list(planned[0])))
+                writer.write_table(PLANNED_TABLE, pd.DataFrame(kept, columns=list(planned[0])))
 
 
 def _bench(

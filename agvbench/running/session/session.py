@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -67,6 +67,10 @@ class BenchSession:
         self.notices: list[str] = []
         self.not_applicable: set[str] = set()
         """The ids of runs that this vehicle cannot drive here."""
+        self.not_needed: set[str] = set()
+        """The ids of runs that are left out because what they were planned for is known."""
+        self.last_driven: DrivenRun | None = None
+        """The last run that counts."""
         self.done: set[str] = set()
         """The ids of runs that an earlier session finished."""
 
@@ -92,6 +96,17 @@ class BenchSession:
         """Take note of a run that was driven, rejected for good, or cannot be driven: it is awaited no more."""
         if self._bench is not None:
             self._bench.awaited.discard(run_id)
+
+    def write_beside(self, name: str, write: Callable[[Path], object]) -> None:
+        """Have `write` write a further file of the campaign; not in a dry run.
+
+        Raises
+        ------
+        RecordingError
+            If the disk refuses.
+        """
+        if self._bench is not None:
+            self._bench.writer.write_beside(name, write)
 
     @property
     def events(self) -> list[str]:
@@ -344,7 +359,8 @@ class Driver:
                 "no attempt counted", where=self._run_id, value=run.status, remedy="see the campaign's rejected runs"
             )
         self._session.concluded(self._run_id)  # whatever the benchmark says of it then: it was driven
-        return DrivenRun.of(run)
+        self._session.last_driven = DrivenRun.of(run)
+        return self._session.last_driven
 
 
 def _as_trajectory(name: str, commands: Commands, unit: TableUnit) -> Trajectory:

@@ -8,11 +8,12 @@ from pathlib import Path
 
 from agvbench.campaign import Campaign
 from agvbench.campaign.completeness import Completeness
-from agvbench.errors import AgvbenchError
+from agvbench.errors import AgvbenchError, NotComparableError
 from agvbench.running.configuration.provenance import INPUTS_TABLE
 from agvbench.running.configuration.settings import BenchSettings
 from agvbench.simulator import seed_samples_vehicle
 from agvbench.vehicle.channels import Channels
+from agvbench.workflows.comparison.sequential_record import SequentialRecord, stopped_in_words
 
 _VEHICLE = ("agv", "plant")
 _CAMERA = ("mocap", "camera")
@@ -63,6 +64,22 @@ def comparability(a: Campaign, b: Campaign | None, *, across_vehicles: bool = Fa
     return Comparability(incomplete, units, qualified, hashes)
 
 
+def require_comparable(a: Campaign, channels: Channels) -> None:
+    """Check that a campaign that will be driven with `channels` can be compared with `a`.
+
+    Raises
+    ------
+    NotComparableError
+        If `a` is incomplete, or its vehicle takes commands in other units.
+    CampaignError
+        If a table of `a` cannot be read.
+    """
+    if (done := Completeness.of(a)) is not None and not done.is_complete:
+        raise NotComparableError(_incomplete(a))
+    for sentence in _differing_units(a.header.channels, channels):
+        raise NotComparableError(sentence.removesuffix("."))
+
+
 def is_same_campaign(a: Campaign, b: Campaign) -> bool:
     """Return whether both were read from one directory."""
     return a.path.resolve() == b.path.resolve()
@@ -73,7 +90,11 @@ def _incomplete(side: Campaign) -> str:
 
 
 def _units(a: Campaign, b: Campaign) -> Iterator[str]:
-    one, other = (_units_text(side.header.channels) for side in (a, b))
+    yield from _differing_units(a.header.channels, b.header.channels)
+
+
+def _differing_units(a: Channels, b: Channels) -> Iterator[str]:
+    one, other = _units_text(a), _units_text(b)
     if one != other:
         yield (
             f"The vehicles take commands in different units ({one} and {other}): "
@@ -160,7 +181,13 @@ def _calibrations(a: Campaign, b: Campaign) -> Iterator[str]:
         )
 
 
-_NOTES = (_vehicles, _sampled_vehicles, _cameras, _trajectories, _calibrations)
+def _sequentially_stopped(a: Campaign, b: Campaign) -> Iterator[str]:
+    for side in (a, b):
+        if (record := SequentialRecord.load(side.path)) is not None and record.analyses:
+            yield stopped_in_words(side.path, record)
+
+
+_NOTES = (_vehicles, _sampled_vehicles, _cameras, _trajectories, _calibrations, _sequentially_stopped)
 
 
 def calibration_hash(campaign: Path) -> str:

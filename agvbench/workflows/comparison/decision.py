@@ -19,7 +19,7 @@ from agvbench.workflows.comparison.comparability import NOTHING_KNOWN, Comparabi
 from agvbench.workflows.output_files import write_file
 
 POLICIES = ("regression", "any", "never")
-_FAILING = {
+_FAILING: dict[str, tuple[ComparisonVerdict, ...]] = {
     "regression": (ComparisonVerdict.WORSE,),
     "any": (ComparisonVerdict.WORSE, ComparisonVerdict.BETTER),
     "never": (),
@@ -48,6 +48,11 @@ class FailurePolicy:
         rules = [GateRule.parse(text) for text in fail_on if text not in POLICIES]
         rules += [] if gate is None else read_gate(gate)
         return cls(named[-1] if named else "never" if rules else "regression", tuple(rules))
+
+    @property
+    def failing(self) -> tuple[ComparisonVerdict, ...]:
+        """The verdicts that fail."""
+        return _FAILING[self.verdicts]
 
     def checks(self, a: Campaign, b: Campaign | None, conditions: tuple[str, str] | None) -> list[GateCheck]:
         """Return the checks of the rules on `b`, or on the second condition of `a` without it.
@@ -82,7 +87,7 @@ def exit_code(
         return 0
     if known.incomparable:
         return 3
-    failing = any(comparison.of(verdict) for verdict in _FAILING[policy.verdicts])
+    failing = any(comparison.of(verdict) for verdict in policy.failing)
     if failing or any(check.verdict is GateVerdict.FAIL for check in checks):
         return 1
     open_checks = any(check.verdict is GateVerdict.INCONCLUSIVE for check in checks)
