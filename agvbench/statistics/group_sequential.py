@@ -35,9 +35,10 @@ _BISECTIONS = 50
 
 
 class Spending(StrEnum):
-    """How a level is spent over the information: hardly at first, or evenly from the beginning."""
+    """How a level is spent over the information: hardly at first, by its third power, or evenly from the beginning."""
 
     OBRIEN_FLEMING = "O'Brien-Fleming"
+    CUBIC = "cubic"
     POCOCK = "Pocock"
 
 
@@ -55,7 +56,8 @@ def rank_sum_information(n_a: int, n_b: int) -> float:
 def spent(level: Floats, share: float, spending: Spending) -> Floats:
     """Return how much of each one-sided `level` may be spent at this `share` of the planned information.
 
-    Lan and DeMets (1983): 2 − 2 Φ(z / √share) with the quantile z of level / 2, and level · ln(1 + (e − 1) share).
+    Lan and DeMets (1983): 2 − 2 Φ(z / √share) with the quantile z of level / 2 (O'Brien and Fleming's kind), and
+    level · ln(1 + (e − 1) share) (Pocock's). Kim and DeMets (1987, Biometrika 74, 149–154): level · share³ (cubic).
 
     >>> spent(np.array([0.025]), 1.0, Spending.OBRIEN_FLEMING).round(6).tolist()
     [0.025]
@@ -67,6 +69,8 @@ def spent(level: Floats, share: float, spending: Spending) -> Floats:
         return np.zeros_like(level)
     if spending is Spending.POCOCK:
         return np.asarray(level * np.log1p((np.e - 1.0) * share))
+    if spending is Spending.CUBIC:
+        return np.asarray(level * share**3)
     return np.asarray(2.0 * ndtr(ndtri(level / 2.0) / np.sqrt(share)))
 
 

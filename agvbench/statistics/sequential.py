@@ -58,7 +58,7 @@ class SequentialPlan:
     fewest_repeats: int = FEWEST_REPEATS
     alpha: float = ALPHA
     alpha_same: float = ALPHA_SAME
-    spending: Spending = Spending.OBRIEN_FLEMING
+    spending: Spending = Spending.CUBIC
 
     def is_due(self, repeats: int, before: int) -> bool:
         """Whether to analyse after `repeats`, where the last analysis was after `before` (0: none).
