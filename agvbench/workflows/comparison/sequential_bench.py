@@ -97,6 +97,9 @@ class SequentialBench:
         if settings.order != "interleaved":
             remedy = "leave --order out, so that every trajectory is driven once before any twice"
             raise FlagError("has no rounds to analyse", where="--order", value=settings.order, remedy=remedy)
+        planned = [_with_name(row) for row in planned]
+        if recorded is not None:
+            _require_same_options(recorded, options)
         directory = options.against or (recorded.against if recorded else "")
         campaign = Campaign.open(Path(directory))
         require_comparable(campaign, uncalibrated_vehicle(settings.vehicle).channels)
@@ -104,7 +107,7 @@ class SequentialBench:
         places = _comparable_places(errors, planned, settings, directory)
         record = SequentialRecord(directory, _digest(errors), _plan(options, errors, planned, places))
         _require_repeats(record, places)
-        return cls(record if recorded is None else _continued(recorded, record, options), errors, planned, places)
+        return cls(record if recorded is None else _continued(recorded, record), errors, planned, places)
 
     def begin(self, write: Callable[[str, Callable[[Path], object]], None]) -> None:
         """Record the plan with `write`, which also gets every analysis."""
@@ -157,6 +160,12 @@ class SequentialBench:
         return len(repeats) - superfluous, superfluous
 
 
+def _with_name(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a planned run with the name of its trajectory, which may be given as a file, and what it was given as."""
+    given = str(row["trajectory"])
+    return {**row, "given": given, "trajectory": load_trajectory(given).name if given else ""}
+
+
 def _place(row: Mapping[str, Any]) -> Place:
     return str(row["trajectory"]), str(row["condition"])
 
@@ -174,7 +183,8 @@ def _comparable_places(
         for (trajectory, condition), rows in errors.groupby(["trajectory", "condition"], sort=False)
     }
     shared = [place for place in _places(planned) if place in targets]
-    ours = {name: _target(name, settings) for name in dict.fromkeys(name for name, _ in shared)}
+    given = {str(row["trajectory"]): row["given"] for row in planned}
+    ours = {name: _target(given[name], settings) for name in dict.fromkeys(name for name, _ in shared)}
     found = [place for place in shared if (t := ours[place[0]]) is None or same_target(targets[place], t)]
     if not found:
         raise InputError(
@@ -218,17 +228,21 @@ def _digest(errors: pd.DataFrame) -> str:
     return hashlib.sha256("\n".join(sorted(errors["run_id"].astype(str))).encode()).hexdigest()
 
 
-def _continued(recorded: SequentialRecord, now: SequentialRecord, options: SequentialOptions) -> SequentialRecord:
-    """Return what was recorded, after checking that nothing contradicts it."""
+def _require_same_options(recorded: SequentialRecord, options: SequentialOptions) -> None:
+    """Check that no option contradicts what the session began with."""
     remedy = "leave the option out, or start anew without --resume"
-    if Path(recorded.against).resolve() != Path(now.against).resolve():
+    if options.against is not None and Path(recorded.against).resolve() != Path(options.against).resolve():
         what = "a resumed session is compared with what it began with"
-        raise FlagError(what, where="--against", value=now.against, limit=recorded.against, remedy=remedy)
+        raise FlagError(what, where="--against", value=options.against, limit=recorded.against, remedy=remedy)
     for unit, column in (("mm", "position_mm"), ("deg", "delta_heading_deg")):
         given, before = getattr(options, f"margin_{unit}"), recorded.plan.margins[column]
         if given is not None and given != before:
             what = "a resumed session keeps its margin"
             raise FlagError(what, where=f"--margin-{unit}", value=given, limit=before, remedy=remedy)
+
+
+def _continued(recorded: SequentialRecord, now: SequentialRecord) -> SequentialRecord:
+    """Return what was recorded, after checking that the earlier campaign is still the same."""
     if recorded.against_runs != now.against_runs:
         raise InputError(
             "has other runs than when the comparison began",
