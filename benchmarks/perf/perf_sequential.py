@@ -74,8 +74,34 @@ def main() -> None:
         for noise in _NOISES
         for case in CASES
     ]
+    _print_levels(SequentialPlan(arguments.repeats, arguments.repeats, {}), 50 * arguments.campaigns)
     if arguments.json:
         arguments.json.write_text(json.dumps(rows, indent=1), encoding="utf-8")
+
+
+def _print_levels(plan: SequentialPlan, draws: int) -> None:
+    """Print how often one sequential rank-sum test rejects where nothing differs, in multiples of its level."""
+    rng, levels = np.random.default_rng(1), np.array([0.05, 0.01, 0.01 / _COMPARISONS])
+    rejected = np.zeros(len(levels))
+    for block in (min(10_000, draws - k) for k in range(0, draws, 10_000)):
+        a, b = (rng.standard_normal((block, n)) for n in (plan.repeats_a, plan.most_repeats))
+        pairs = np.cumsum((b[:, :, None] > a[:, None, :]).sum(axis=2), axis=1)
+        p_values = np.ones(block)
+        schedule: tuple[tuple[float, float], ...] = ()
+        for n, share in _schedule(plan):
+            schedule = (*schedule, (share, share))
+            p = _tails(plan.repeats_a, n)[pairs[:, n - 1]]
+            p_values = np.minimum(p_values, level_of(p, *sequential_p_table(schedule, plan.spending)))
+        rejected += (p_values[:, None] <= levels).sum(axis=0)
+    for level, count in zip(levels, rejected, strict=True):
+        print(f"one test at {level:.3%}: {count / draws / level:.3f} times its level in {draws} draws")
+
+
+def _schedule(plan: SequentialPlan) -> list[tuple[int, float]]:
+    """Return the repeats of every analysis, and the share of the planned information."""
+    most = rank_sum_information(plan.repeats_a, plan.most_repeats)
+    due = [n for n in range(1, plan.most_repeats + 1) if plan.is_due(n, n - 1)]
+    return [(n, rank_sum_information(plan.repeats_a, n) / most) for n in due]
 
 
 def _row(case: Case, noise: str, spending: Spending, campaigns: int, repeats: int) -> dict[str, Any]:
@@ -160,9 +186,7 @@ class Trials:
         repeats = np.full(self._campaigns, plan.most_repeats)
         regression, false_difference, false_same = (np.zeros_like(ended) for _ in range(3))
         schedule: tuple[tuple[float, float], ...] = ()
-        most = rank_sum_information(plan.repeats_a, plan.most_repeats)
-        for n in (n for n in range(1, plan.most_repeats + 1) if plan.is_due(n, n - 1)):
-            share = rank_sum_information(plan.repeats_a, n) / most
+        for n, share in _schedule(plan):
             schedule = (*schedule, (share, share))
             table = sequential_p_table(schedule, plan.spending)
             now = [level_of(p, *table) for p in self._p_values(n)]
