@@ -197,7 +197,7 @@ def sequential_p(p_values: Sequence[float], schedule: Schedule, spending: Spendi
     --------
     >>> steps = tuple((k / 5, k / 5) for k in range(1, 6))
     >>> round(sequential_p([0.4, 0.2, 0.01, 0.3], steps[:4], Spending.OBRIEN_FLEMING), 3)
-    0.053
+    0.048
     """
     tables = [sequential_p_table(schedule[: k + 1], spending) for k in range(len(schedule))]
     found = [float(level_of(np.array([p]), *table)[0]) for p, table in zip(p_values, tables, strict=True)]

@@ -53,12 +53,24 @@ def _shifted(count: int, shift: float) -> tuple[float, ...]:
 
 NO_CHANGE = Case("no change", _shifted(0, 0.0), 1.0)
 NO_CHANGE_WIDE = Case("no change", _shifted(0, 0.0), 2.0)
+HALF_OF_MARGIN = Case("one at half the margin", _shifted(1, 1.0), 2.0)
+NEAR_MARGIN = Case("one at 0.75 times the margin", _shifted(1, 1.5), 2.0)
 ONE_AT_MARGIN = Case("one at the margin", _shifted(1, 2.0), 2.0)
 BETTER_BUT_ONE = Case("seven better, one at the margin", (2.0, *(-4.0,) * 7, *(0.0,) * 8), 2.0)
 ALL_AT_MARGIN = Case("all at the margin, better", (-1.5,) * _CELLS, 1.5)
 TWO = Case("one worse by 2 sd", _shifted(1, 2.0), 1.0)
 THREE = Case("one worse by 3 sd", _shifted(1, 3.0), 1.0)
-CASES = (NO_CHANGE, NO_CHANGE_WIDE, ONE_AT_MARGIN, BETTER_BUT_ONE, ALL_AT_MARGIN, TWO, THREE)
+CASES = (
+    NO_CHANGE,
+    NO_CHANGE_WIDE,
+    HALF_OF_MARGIN,
+    NEAR_MARGIN,
+    ONE_AT_MARGIN,
+    BETTER_BUT_ONE,
+    ALL_AT_MARGIN,
+    TWO,
+    THREE,
+)
 
 
 def main() -> None:
@@ -113,7 +125,7 @@ def _row(case: Case, noise: str, spending: Spending, campaigns: int, repeats: in
         "spending": str(spending), "noise": noise, "case": case.what, "margin": case.margin, "campaigns": campaigns,
         "false_difference": _rate(stopped.false_difference), "false_same": _rate(stopped.false_same),
         "regression": regression, "no_regression": float(np.mean(stopped.decided & ~stopped.regression)),
-        "mean_repeats": float(np.mean(stopped.repeats)),
+        "regression_once": trials.regression_once(repeats), "mean_repeats": float(np.mean(stopped.repeats)),
     }  # fmt: skip
     if case in (TWO, THREE):
         fixed = trials.fixed_repeats(regression)
@@ -134,7 +146,10 @@ def _print(row: dict[str, Any]) -> None:
         for name, (share, low, high) in (("difference", row["false_difference"]), ("same", row["false_same"]))
     )
     print(f"{row['spending']:15} {row['noise']:14} {row['case']:31} margin {row['margin']:g}  {false}", end="  ")
-    print(f"regression {row['regression']:6.1%}  none {row['no_regression']:6.1%}", end="  ")
+    print(
+        f"regression {row['regression']:6.1%} (once {row['regression_once']:6.1%})  none {row['no_regression']:6.1%}",
+        end="  ",
+    )
     print(f"repeats {row['mean_repeats']:5.2f}", end="")
     print(f"  fixed {row['fixed_repeats']}  saved {row['saved']:.0%}" if "saved" in row else "", flush=True)
 
@@ -207,10 +222,15 @@ class Trials:
         better = (_holm(p_values[1]) <= self._plan.alpha) & (differences < -margin)
         return worse, better, (_hochberg(p_values[2]) <= self._plan.alpha_same) & ~worse & ~better
 
+    def regression_once(self, repeats: int) -> float:
+        """Return how often one comparison after so many repeats finds a regression."""
+        worse, _, _ = self._verdicts(list(self._p_values(repeats)), repeats)
+        return float(np.mean(worse.any(axis=1)))
+
     def fixed_repeats(self, power: float) -> int:
         """Return the smallest number of repeats that, tested once, finds the regression with this share."""
         for n in range(1, self._plan.most_repeats):
-            if np.mean(self._verdicts(list(self._p_values(n)), n)[0].any(axis=1)) >= power:
+            if self.regression_once(n) >= power:
                 return n
         return self._plan.most_repeats
 
