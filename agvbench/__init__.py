@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from agvbench.model.rollout import simulate
     from agvbench.model.simulation.simulation import SimulatedRun, Simulation
     from agvbench.planning import Trajectory, plan
-    from agvbench.reporting import write_report
+    from agvbench.reporting.write import write_report
     from agvbench.statistics import Comparison, pose_errors, valid
     from agvbench.types import Pose, Run
     from agvbench.workflows.comparison.compare import compare
@@ -64,7 +64,7 @@ if not TYPE_CHECKING:  # mypy would take any name for an attribute of a module w
         "model.rollout": ("simulate",),
         "model.simulation.simulation": ("SimulatedRun", "Simulation"),
         "planning": ("Trajectory", "plan"),
-        "reporting": ("write_report",),
+        "reporting.write": ("write_report",),
         "statistics": ("Comparison", "pose_errors", "valid"),
         "types": ("Pose", "Run"),
         "workflows.comparison.compare": ("compare",),

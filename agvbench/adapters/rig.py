@@ -25,6 +25,7 @@ def open_rig(
     plant: str = DEFAULT_PLANT,
     seed: int = 0,
     connect: str | Sequence[str] | None = None,
+    listen: Sequence[str] = (),
     bus_config: BusConfig | None = None,
     lab: str = "lab",
     vehicle: str = "agv1",
@@ -46,6 +47,8 @@ def open_rig(
     connect
         Endpoints of adapters that run as their own processes, as ``"tcp/127.0.0.1:7447"``; None hosts them here, with
         nothing open to the network.
+    listen
+        Endpoints at which others may join the bus, such as ``agvbench watch``; each of them can drive the vehicle.
     bus_config
         Certificates and rules of a secured bus; endpoints of TLS and QUIC need one.
     lab, vehicle
@@ -62,7 +65,9 @@ def open_rig(
     """
     endpoints = [connect] if isinstance(connect, str) else list(connect or ())
     with ExitStack() as stack:
-        session: Any = stack.enter_context(bus_session(connect=endpoints, config=bus_config))
+        session: Any = stack.enter_context(
+            bus_session(connect=endpoints, listen=listen, allow_remote=True, config=bus_config)
+        )
         if not endpoints:
             options = AdapterOptions(
                 vehicle=vehicle,

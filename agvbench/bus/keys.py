@@ -7,6 +7,7 @@
                                /mocap/<question> queryables: identity, reset, time
                                /report           all that is for the runner: frames, and what an adapter has to say
                                /truth            true poses, from a simulated AGV to a simulated camera
+                               /runner/state     the runner's state, published and queryable, to observers
                                /alive/<role>     liveliness tokens: agv, mocap
                                /alive/runner/<source>   and of every runner, by the source of its commands
 
@@ -26,6 +27,25 @@ IDENTITY, RESET, REPLAY, TIME = "identity", "reset", "replay", "time"
 CLAIM, RELEASE = "claim", "release"
 
 _NAME = re.compile(r"[A-Za-z0-9_.-]{1,64}", re.ASCII)
+
+
+def state_keys(lab: str | None, vehicle: str | None) -> str:
+    """Return the key expression of the states of all runners, or those of one lab or vehicle.
+
+    >>> state_keys(None, "agv1")
+    'agvbench/v2/*/agv1/runner/state'
+    """
+    names = (("lab", lab), ("vehicle", vehicle))
+    return "/".join(["agvbench/v2", *("*" if n is None else check_name(w, n) for w, n in names), f"{RUNNER}/state"])
+
+
+def of_state(key: str) -> Keys:
+    """Return the keys of the vehicle whose runner's state is at `key`.
+
+    >>> of_state("agvbench/v2/lab/agv1/runner/state")
+    Keys(lab='lab', vehicle='agv1')
+    """
+    return Keys(*key.split("/")[2:4])
 
 
 def check_name(what: str, name: str) -> str:
@@ -83,6 +103,11 @@ class Keys:
     def truth(self) -> str:
         """True poses, from a simulated AGV to a simulated camera."""
         return f"{self.root}/truth"
+
+    @property
+    def state(self) -> str:
+        """The runner's state, to observers."""
+        return f"{self.root}/{RUNNER}/state"
 
     def queryable(self, role: str, queryable: str) -> str:
         """Return the queryable of an adapter (``"*"``: all of them)."""

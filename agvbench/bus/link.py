@@ -20,6 +20,7 @@ from agvbench.bus.messages.request import ClaimMessage, Replay, Reset, Sampling,
 from agvbench.bus.outbox import CommandOutbox
 from agvbench.bus.queries import ask
 from agvbench.bus.real_time import RealTime
+from agvbench.bus.state_publisher import LOCK_STEP_PERIOD_S, REAL_TIME_PERIOD_S, StatePublisher, StateSource
 from agvbench.errors import AgvbenchError, LinkError
 from agvbench.types import Command, Commands, Frames, Pose
 
@@ -210,6 +211,11 @@ class VehicleLink:
         request = Reset(run_key, pose, _ANYWHERE, self._outbox.source, self._outbox.last)
         answer = self._ask(MOCAP, RESET, encode(request), self._limit_s)
         return replace(request, sampling=decode_sampling(answer))
+
+    def publish_state(self, state: StateSource) -> StatePublisher:
+        """Publish the runner's state until the publisher is closed, more seldom where time is simulated."""
+        period_s = LOCK_STEP_PERIOD_S if self._identity.lock_step else REAL_TIME_PERIOD_S
+        return StatePublisher(self._session, self.keys, self._outbox.source, state, period_s=period_s)
 
     @property
     def loss(self) -> LossCounter:

@@ -124,6 +124,7 @@ def bus_session(
     listen: Sequence[str] = (),
     connect: Sequence[str] = (),
     allow_remote: bool = False,
+    timeout_s: float = 5.0,
     config: BusConfig | None = None,
 ) -> Iterator[zenoh.Session]:
     """Open a session (`open_bus_session`) while the context lasts, and close it also where a receiver takes nothing.
@@ -140,7 +141,9 @@ def bus_session(
     """
     import zenoh
 
-    session = open_bus_session(listen=listen, connect=connect, allow_remote=allow_remote, config=config)
+    session = open_bus_session(
+        listen=listen, connect=connect, allow_remote=allow_remote, timeout_s=timeout_s, config=config
+    )
     try:
         yield session
     finally:

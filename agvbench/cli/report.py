@@ -29,8 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the report and print its summary."""
-    from agvbench.reporting import write_report
     from agvbench.reporting.console.tables import print_report, wide_console
+    from agvbench.reporting.write import write_report
 
     in_mm, in_deg = margins(arguments)
     report = write_report(

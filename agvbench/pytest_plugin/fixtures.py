@@ -54,6 +54,7 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
                 dry_run=bool(option(config, "--dry-run")),
                 plan=plan_of(session.items),
                 on_progress=_progress_printer(config),
+                listen=option(config, "--listen"),
             )
             config.stash[SESSION] = bench_session = stack.enter_context(opened)
             if against is not None:

@@ -1,5 +1,1 @@
 """Tables, figures, HTML and Rerun recordings."""
-
-from agvbench.reporting.write import WrittenReport, write_report
-
-__all__ = ["WrittenReport", "write_report"]

@@ -22,7 +22,7 @@ from rich.table import Table
 from scipy import stats
 
 from agvbench.campaign import CampaignHeader, CampaignWriter
-from agvbench.reporting import write_report
+from agvbench.reporting.write import write_report
 from agvbench.statistics.hypothesis_tests import rank_test
 from agvbench.statistics.intervals import median_difference_interval
 from agvbench.types import Commands, Floats, Frames, Pose, Run

@@ -31,6 +31,7 @@ class BusMessage(Target):
             decode_sampling,
             decode_time,
         )
+        from agvbench.bus.messages.runner_state import decode_runner_state
         from agvbench.bus.messages.truth import decode_truth
 
         report: Callable[[bytes], FramesMessage | Event] = decoder(FramesMessage, Event)
@@ -42,6 +43,7 @@ class BusMessage(Target):
         self._decoders: tuple[Callable[[bytes], Any], ...] = (
             decode_report, decode_command, decode_reset, decode_sampling, decode_replay, decode_agv_identity,
             decode_mocap_identity, decode_time, decode_claim, decode_truth,
+            decode_runner_state,
         )  # fmt: skip
 
     def seeds(self) -> Iterable[bytes]:
@@ -52,6 +54,7 @@ class BusMessage(Target):
         from agvbench.bus.messages.frames import FramesMessage, pack_columns
         from agvbench.bus.messages.identity import AgvIdentity, MocapIdentity
         from agvbench.bus.messages.request import ClaimMessage, Replay, Reset, Sampling, TimeMessage
+        from agvbench.bus.messages.runner_state import Phase, RunnerState, RunProgress, RunResult
         from agvbench.bus.messages.truth import Truth
         from agvbench.types import Command, Commands, Frames, Pose
 
@@ -61,6 +64,8 @@ class BusMessage(Target):
         )
         reset = Reset("run-001", Pose(1.0, 2.0, 0.5), Sampling(240.0, 0.001))
         extra = {"seed": "0", "plant": "agvbench.simulator:make_plant"}
+        run = RunProgress(3, 16, "trajectory-5-calibrated-r01", "trajectory", "5", "calibrated", 1, 1, 2.5, 6.8)
+        done = (RunResult("trajectory-4-calibrated-r01", "ok", 6.3, -0.2),)
         messages = (
             CommandMessage(1, 0.5, Command(1700.0, 1500.0, 1500.0), 0.1),
             FramesMessage(1, 3, pack_columns(frames)),
@@ -73,6 +78,23 @@ class BusMessage(Target):
             TimeMessage(12.5),
             ClaimMessage(7),
             Truth(1, 1, 0.1, numbers, np.zeros((3, 3))),
+            RunnerState(
+                9,
+                7,
+                "monday",
+                "1.0",
+                Phase.DRIVING,
+                1.7e9,
+                12.5,
+                run,
+                Pose(1.0, 2.0, 0.5),
+                Command(1700.0, 1500.0, 1500.0),
+                2,
+                1,
+                ("agv commands_late: 0.3 s",),
+                1,
+                done,
+            ),
         )
         yield from map(encode, messages)
 

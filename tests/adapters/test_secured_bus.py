@@ -9,6 +9,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import closing
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -22,8 +24,10 @@ from agvbench.bus.link import VehicleLink
 from agvbench.bus.messages.codec import encode
 from agvbench.bus.messages.command import CommandFlags, CommandMessage
 from agvbench.bus.messages.event import Event, Level
+from agvbench.bus.messages.runner_state import Phase, RunnerState
 from agvbench.bus.queries import ask
 from agvbench.bus.session import open_bus_session
+from agvbench.bus.state_follower import StateFollower, find_runners
 from agvbench.campaign import Campaign
 from agvbench.errors import AdapterGoneError, LinkError, PlantError
 from agvbench.running.configuration.settings import BenchSettings
@@ -120,6 +124,27 @@ def test_who_shows_no_certificate_or_a_strangers_is_refused(
             open_bus_session(connect=[plain], timeout_s=0.5)
         with open_bus_session(connect=[endpoint], config=BusConfig.load(machines["bench-pc"])) as session:
             assert list(session.info.links())
+
+
+def test_who_may_only_listen_watches_a_bench_and_cannot_pretend_to_be_one(
+    machines: dict[str, Path], endpoint: str
+) -> None:
+    state = partial(RunnerState, campaign="monday", version="1.0", phase=Phase.DRIVING, began_unix_s=0.0, elapsed_s=0.0)
+    with (
+        process("sim", "--plant", TINY, "--listen", endpoint, "--bus-config", str(machines["vehicle-pc"])),
+        open_rig(connect=endpoint, bus_config=BusConfig.load(machines["bench-pc"])) as link,
+        closing(link.publish_state(state)),
+        open_bus_session(connect=[endpoint], config=BusConfig.load(machines["hall-display"])) as display,
+        open_bus_session(connect=[endpoint], config=BusConfig.load(machines["hall-display"])) as other_display,
+    ):
+        (first,) = find_runners(display, limit_s=5.0).values()
+        with StateFollower(display, KEYS, first) as follower:
+            states = follower.states(5.0)
+            next(states)
+            other_display.put(KEYS.state, encode(state(2**32, first.source, campaign="pretended")))
+            seen = [next(states) for _ in range(3)]
+        assert {one.campaign for one in seen if one is not None} == {"monday"}
+        assert None not in seen
 
 
 def test_who_may_only_listen_hears_everything_and_commands_nothing(machines: dict[str, Path], endpoint: str) -> None:

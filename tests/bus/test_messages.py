@@ -35,6 +35,7 @@ from agvbench.bus.messages.request import (
     decode_sampling,
     decode_time,
 )
+from agvbench.bus.messages.runner_state import Phase, RunnerState, RunProgress, RunResult, decode_runner_state
 from agvbench.bus.messages.truth import Truth, decode_truth
 from agvbench.errors import LinkError, MessageError, PlanError
 from agvbench.registry import own_classes
@@ -115,6 +116,26 @@ agv_identities = st.builds(
 )
 mocap_identities = st.builds(MocapIdentity, text, rate, st.booleans(), st.dictionaries(text, text, max_size=4))
 
+poses = st.builds(Pose, finite, finite, finite)
+positive, small = st.floats(0.0, 1e300), st.integers(0, 1000)
+progresses = st.builds(
+    lambda more, number, *others: RunProgress(number, number + more, *others),
+    small, small, *(text,) * 4, small, small, finite, positive,
+)  # fmt: skip
+results = st.builds(RunResult, text, text, st.none() | finite, st.none() | finite)
+runner_states = st.builds(
+    RunnerState, u64, u32, text, text, st.sampled_from(Phase), positive, positive,
+    run=st.none() | progresses,
+    pose=st.none() | poses,
+    command=st.none() | st.builds(Command, finite, finite, finite),
+    counted=small,
+    rejected=small,
+    faults=st.lists(text, max_size=8).map(tuple),
+    fault_count=small,
+    results=st.lists(results, max_size=8).map(tuple),
+    failure=st.none() | text,
+)  # fmt: skip
+
 CODECS: dict[str, tuple[Any, Callable[[bytes], Any]]] = {
     "command": (commands, decode_command),
     "frames": (frame_messages(), decoder(FramesMessage)),
@@ -127,6 +148,7 @@ CODECS: dict[str, tuple[Any, Callable[[bytes], Any]]] = {
     "time": (st.builds(TimeMessage, finite), decode_time),
     "claim": (st.builds(ClaimMessage, u32), decode_claim),
     "truth": (truths(), decode_truth),
+    "runner_state": (runner_states, decode_runner_state),
 }
 few = settings(max_examples=40, deadline=None)
 every_codec = pytest.mark.parametrize("codec", CODECS.values(), ids=list(CODECS))
@@ -313,6 +335,7 @@ def _one(codec: Any) -> Any:
         "time": TimeMessage(0.0),
         "claim": ClaimMessage(7),
         "truth": Truth(1, 1, 0.0, none, np.empty((0, 3))),
+        "runner_state": RunnerState(1, 7, "campaign", "1.0", Phase.DRIVING, 0.0, 0.0),
     }[name]
 
 

@@ -12,11 +12,11 @@ import pandas as pd
 import pytest
 from report_samples import HOSTILE
 
-from agvbench.reporting import write_report
 from agvbench.reporting.content import Column, plain
 from agvbench.reporting.sections.diagnosis import DiagnosisSection
 from agvbench.reporting.sections.provenance import ProvenanceSection
 from agvbench.reporting.table_files import frame_to_csv
+from agvbench.reporting.write import write_report
 from agvbench.statistics.rest_poses import start_pose
 
 VOID = {"meta", "link", "br", "img", "hr", "input", "path", "use", "rect"}

@@ -87,6 +87,11 @@ SESSION_OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
         "with --against, when to exit with 1: regression (default), any, never, METRIC.STATISTIC>LIMIT; commas between",
     ),
     ("--gate", {"metavar": "FILE"}, "with --against, a TOML file of such rules"),
+    (
+        "--listen",
+        {"metavar": "ENDPOINT"},
+        "let agvbench watch join here, such as tcp/127.0.0.1:7447 (default: no socket is opened)",
+    ),
 )
 _NAMES = "|".join(re.escape(flag) for flag, _, _ in OPTIONS + SESSION_OPTIONS)
 _OWN_OR_OTHERS = re.compile(rf"agvbench [a-z]+[^;,()]*|(?<![\w-])({_NAMES})(?![\w-])")

@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 from agvbench.bus.messages.event import Event
+from agvbench.bus.messages.runner_state import Phase
 from agvbench.campaign import CampaignWriter
 from agvbench.errors import (
     CampaignError,
@@ -34,6 +35,7 @@ from agvbench.running.execution.run_records import (
     stopped_drive,
     times_stopped,
 )
+from agvbench.running.execution.runner_status import RunnerStatus
 from agvbench.running.links import RunnerLink
 from agvbench.running.positioning.placers import Rig, make_placer
 from agvbench.running.positioning.start_pose import notify_operator
@@ -53,7 +55,7 @@ class Bench:
     ``calibrate`` is called once, with the calibration runs that are still `awaited`, when the first order asks for the
     calibrated model; ``corrected`` is the model of the
     condition of that name, if there is one.
-    ``on_progress`` prints to the operator.
+    ``on_progress`` prints to the operator; ``status`` is told what the bench does.
     """
 
     def __init__(
@@ -71,8 +73,10 @@ class Bench:
         timing: Timing = DEFAULT_TIMING,
         limits: QualityLimits = DEFAULT_LIMITS,
         on_progress: Callable[[str], None] = notify_operator,
+        status: RunnerStatus | None = None,
     ) -> None:
         self.settings = settings
+        self.status = status or RunnerStatus(writer.path.name)
         self.link, self.writer = link, writer
         self.nominal, self._calibrate = nominal, calibrate
         self._calibrated: VehicleModel | None = None
@@ -81,7 +85,7 @@ class Bench:
         self._time, self._timing, self._limits = campaign_time, timing, limits
         self._identity = link.identity()
         self._latch, self.pause = Latch(), PauseRequest(writer.path, on_progress)
-        self.log = EventLog(writer, on_progress)
+        self.log = EventLog(writer, on_progress, self.status.report)
         self._recorded, self._session = recorded, session
         self._unseen = 0
         self.awaited: set[str] = set()
@@ -106,6 +110,7 @@ class Bench:
                 raise FlagError("no corrected model", where="--corrected", remedy="give what a diagnosis wrote")
             return self._corrected
         if self._calibrated is None:
+            self.status.enter(Phase.CALIBRATING)
             self._calibrated = self._calibrate(self.awaited)
         return self._calibrated
 
@@ -188,6 +193,9 @@ class Bench:
         run_id = _attempt_id(request, attempt)
         if run_id in self._recorded:
             return self._repeat_unseen(request, self._recorded[run_id])
+        self.status.begin(request, attempt)
+        if self.pause.is_requested():
+            self.status.enter(Phase.PAUSING)
         self.pause.wait(run_id, holding_neutral(self.link, self.nominal.neutral))
         request = self._placed(request, run_id)
         loop = self._closed_loop(request, run_id)
@@ -223,6 +231,7 @@ class Bench:
         run = recorded_run(request, run_id, started_s, status, driven, self._identity.firmware)
         self.writer.append(run)
         self.log.save()
+        self.status.end(run)
         self._time.has_run(started_s, driven.duration_s)
         self._check_seen(run)
         return run
@@ -261,6 +270,7 @@ class Bench:
 
     def _placed(self, request: RunRequest, run_id: str) -> RunRequest:
         """Bring the vehicle to the start; return the request with what the campaign is to say of that."""
+        self.status.enter(Phase.RETURNING if self.settings.place == "auto" else Phase.PLACING)
         placing = self._placer.place(request.start, self._random_key(run_id))
         if placing is None:
             return request
@@ -281,6 +291,7 @@ class Bench:
         loop: ClosedLoop | None,
         at_rest: Callable[[], object],
     ) -> Drive:
+        self.status.enter(Phase.DRIVING)
         return drive(
             self.link,
             loop or request.commands,

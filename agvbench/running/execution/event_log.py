@@ -24,10 +24,17 @@ class EventLog:
         Of the campaign; what an earlier session kept is continued.
     on_progress
         Progress callback: gets the first event of each kind.
+    on_event
+        Gets every event.
     """
 
-    def __init__(self, writer: CampaignWriter, on_progress: Callable[[str], None]) -> None:
-        self._writer, self._on_progress = writer, on_progress
+    def __init__(
+        self,
+        writer: CampaignWriter,
+        on_progress: Callable[[str], None],
+        on_event: Callable[[Event], None] = lambda _: None,
+    ) -> None:
+        self._writer, self._on_progress, self._on_event = writer, on_progress, on_event
         self._rows = recorded_rows(writer.path, EVENTS_TABLE)
         self._saved = self._earlier = len(self._rows)
 
@@ -37,6 +44,7 @@ class EventLog:
         lock_step = link.identity().lock_step  # an adapter's wall clock would differ from campaign to campaign
         known = {row["event"] for row in self._rows[self._earlier :]}
         for event in events:
+            self._on_event(event)
             adapter_s = 0.0 if lock_step else event.t_s
             row = (now_s, run_id, event.role, event.level.name.lower(), event.kind, event.line, adapter_s)
             self._rows.append(dict(zip(_COLUMNS, row, strict=True)))

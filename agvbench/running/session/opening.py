@@ -14,7 +14,9 @@ from typing import Any
 import pandas as pd
 
 from agvbench.adapters import check_specs
+from agvbench.bus.bus_config import BusConfig
 from agvbench.bus.link import VehicleLink
+from agvbench.bus.session import is_open_to_all
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
 from agvbench.campaign.header import FILE_NAME, schema_for
 from agvbench.campaign.lock import locked
@@ -48,12 +50,15 @@ from agvbench.running.execution.campaign_time import (
     idle_notice,
     last_end_s,
 )
-from agvbench.running.links import ContinuousLink
+from agvbench.running.execution.runner_status import RunnerStatus
+from agvbench.running.links import ContinuousLink, RunnerLink
+from agvbench.running.observed_link import ObservedLink
 from agvbench.running.positioning.placers import choose_placer
 from agvbench.running.positioning.start_pose import notify_operator
 from agvbench.running.session.end_pose_bias import read_bias_corrections
 from agvbench.running.session.rig_checks import adapter_options, open_session_rig
 from agvbench.running.session.session import BenchSession
+from agvbench.running.session.state_publication import published_state
 from agvbench.running.session.termination_signals import interruptible
 from agvbench.simulator import load_plant
 from agvbench.types import Run
@@ -70,10 +75,12 @@ def open_session(
     dry_run: bool,
     plan: Sequence[Row] = (),
     on_progress: Callable[[str], None] = notify_operator,
+    listen: str | None = None,
 ) -> Iterator[BenchSession]:
     """Open the session that the options `given` ask for, and close it whatever happens.
 
     ``plan`` lists the runs that it is to drive, as rows of the campaign's table ``planned``; `on_progress` prints it.
+    Others may join the bus at the endpoint `listen`; the session's state is published where others can be on it.
 
     Raises
     ------
@@ -103,7 +110,7 @@ def open_session(
     require_same_inputs(recorded_inputs, inputs)
     if not resume:
         refuse_occupied(given_directory, "resume it, or choose another directory")
-    with interruptible(), open_session_rig(settings, models) as link:
+    with interruptible(), open_session_rig(settings, models, listen) as link:
         choose_placer(settings.place, simulated=link.identity().simulated)
         with locked(given_directory):
             header = _header(directory, settings, models["uncalibrated"], link, resume=resume)
@@ -113,12 +120,17 @@ def open_session(
             _record_plan(writer, settings, plan)
             recorded = _recorded(writer)
             campaign_time = _campaign_time(link, writer, recorded, drives_back=settings.place == "auto")
-            bench = _bench(settings, models, link, writer, recorded, campaign_time, on_progress)
+            is_shared = bool(listen or settings.connect)
+            status = RunnerStatus(writer.path.name)
+            driven = _driven_link(settings, link, status, is_observed=is_shared)
+            bench = _bench(settings, models, driven, writer, recorded, campaign_time, on_progress, status)
             session = session_with(bench=bench, inputs=recorded_files)
             session.notices = _notices(settings, given, given_directory)
+            session.notices += _remote_notice(settings, listen)
             session.notices += idle_notice(recorded.values(), campaign_time.now_s(), settings.session)
             try:
-                with bench.pause.by_signal(), _without_left_out(writer, session):
+                published = published_state(bench, link if is_shared else None)
+                with published, bench.pause.by_signal(), _without_left_out(writer, session):
                     yield session
             finally:
                 bench.close()
@@ -131,6 +143,13 @@ def _notices(settings: BenchSettings, given: Mapping[str, Any], directory: Path)
     return [f"vehicle: {LAB_VEHICLE} of this folder"] * is_found + [
         f"calibration: the campaign's copy {settings.calibration}, since the file given before is gone"
     ] * is_copy
+
+
+def _remote_notice(settings: BenchSettings, listen: str | None) -> list[str]:
+    config = BusConfig.load(settings.bus_config) if settings.bus_config else None
+    if listen is None or not is_open_to_all(listen, config, "--listen"):
+        return []
+    return [f"warning: every peer that reaches {listen} can drive the vehicle; no certificate is required"]
 
 
 def _header(
@@ -192,14 +211,24 @@ def _without_left_out(writer: CampaignWriter, session: BenchSession) -> Iterator
                 writer.write_table(PLANNED_TABLE, pd.DataFrame(kept, columns=list(planned[0])))
 
 
+def _driven_link(settings: BenchSettings, link: VehicleLink, status: RunnerStatus, *, is_observed: bool) -> RunnerLink:
+    """Return what the bench drives with: a simulation that is never reset is driven on; `status` sees exchanges."""
+    driven = ContinuousLink(link) if settings.place == "auto" and link.identity().lock_step else link
+    if not is_observed:
+        return driven
+    status.link = ObservedLink(driven)
+    return status.link
+
+
 def _bench(
     settings: BenchSettings,
     models: Mapping[str, VehicleModel],
-    link: VehicleLink,
+    link: RunnerLink,
     writer: CampaignWriter,
     recorded: Mapping[str, Run],
     campaign_time: CampaignTime,
     on_progress: Callable[[str], None],
+    status: RunnerStatus,
 ) -> Bench:
     def calibrated(awaited: Collection[str]) -> VehicleModel:
         priors = models["uncalibrated"].priors
@@ -211,13 +240,14 @@ def _bench(
         settings,
         nominal=models["uncalibrated"],
         corrected=models.get("corrected"),
-        link=ContinuousLink(link) if settings.place == "auto" and link.identity().lock_step else link,
+        link=link,
         writer=writer,
         campaign_time=campaign_time,
         session=SessionBegan.of(settings.session, recorded.values()),
         calibrate=calibrated,
         recorded=recorded,
         on_progress=on_progress,
+        status=status,
     )
 
 

@@ -34,8 +34,10 @@ def adapter_options(settings: BenchSettings, models: Mapping[str, VehicleModel])
 
 
 @contextmanager
-def open_session_rig(settings: BenchSettings, models: Mapping[str, VehicleModel]) -> Iterator[VehicleLink]:
-    """Open the rig of a session while the context lasts, checked.
+def open_session_rig(
+    settings: BenchSettings, models: Mapping[str, VehicleModel], listen: str | None = None
+) -> Iterator[VehicleLink]:
+    """Open the rig of a session while the context lasts, checked; others may join its bus at the endpoint `listen`.
 
     Raises
     ------
@@ -48,6 +50,11 @@ def open_session_rig(settings: BenchSettings, models: Mapping[str, VehicleModel]
             where=f"vehicle {models['uncalibrated'].name}",
             remedy="leave out --place auto",
         )
+    if listen and settings.connect:
+        raise FlagError(
+            "a session that connects does not listen", where="--listen", value=listen,
+            remedy=f"leave it out; agvbench watch --connect {settings.connect} sees this bench",
+        )  # fmt: skip
     options = adapter_options(settings, models)
     with open_rig(
         agv=settings.agv,
@@ -56,6 +63,7 @@ def open_session_rig(settings: BenchSettings, models: Mapping[str, VehicleModel]
         camera=options.camera,
         seed=options.seed,
         connect=settings.connect or None,
+        listen=[listen] if listen else [],
         bus_config=BusConfig.load(settings.bus_config) if settings.bus_config else None,
         lab=settings.lab,
         vehicle=options.vehicle,

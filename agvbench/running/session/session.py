@@ -88,6 +88,7 @@ class BenchSession:
         """Take note of the runs that were chosen, and of those among them that calibrate: all are awaited."""
         if self._bench is not None:
             self.done = self._bench.done(run_ids)
+            self._bench.status.expect(run_ids)
             self._bench.expect_calibration(calibration)
             if self._bench.is_resumed:
                 self.notices.append(self._bench.outlook(run_ids))
