@@ -167,6 +167,8 @@ def _settings(listen: Sequence[str], connect: Sequence[str], timeout_s: float) -
         "connect/endpoints": list(connect),
         "connect/timeout_ms": int(timeout_s * 1000),
         "connect/exit_on_failure": True,
+        # By default the time between two attempts grows to 4 s: a bench that begins meanwhile would be joined so late.
+        "connect/retry": {"period_init_ms": 200, "period_max_ms": 500, "period_increase_factor": 1.5},
         # A vanished machine (no FIN) is noticed within this time; a vanished process at once.
         "transport/link/tx/lease": 3000,
         # How long a flooded receiver may hold up a sender before its connection is given up.

@@ -39,10 +39,14 @@ class PlannedPaths:
 
         None if the trajectory is not known here, has changed, or leads to another target than the run had.
         """
-        made = self._plan(planned_name(run))
+        made = self.plan(planned_name(run))
         if made is None or not np.allclose(made.target, run.target, rtol=0.0, atol=_SAME_TARGET, equal_nan=True):
             return None
         return made.expected
+
+    def plan(self, name: str) -> Plan | None:
+        """Return the plan of the trajectory `name`; None if it is not known here, or has changed."""
+        return self._plan(name)
 
     def _planned(self, name: str) -> Plan | None:
         if not TRAJECTORY_NAME.fullmatch(name) or name.endswith(".toml"):

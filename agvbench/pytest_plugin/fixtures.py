@@ -16,6 +16,7 @@ from agvbench.pytest_plugin.options import given_options, option, worded
 from agvbench.workflows.bench import COMPARISON_CODE
 
 if TYPE_CHECKING:
+    from agvbench.reporting.viewer.process import LiveView
     from agvbench.running.session.session import BenchSession, Driver
 
 INTERRUPT = pytest.StashKey[KeyboardInterrupt]()
@@ -23,6 +24,8 @@ INTERRUPT = pytest.StashKey[KeyboardInterrupt]()
 STOPPED_IN = pytest.StashKey[str]()
 """The run in which a failure ended the driving."""
 SESSION = pytest.StashKey["BenchSession"]()
+LIVE: pytest.StashKey[LiveView] = pytest.StashKey()
+"""The live view, where there is one."""
 ENDS_PROGRAM = pytest.StashKey[bool]()
 """Whether a benchmark called `sys.exit`."""
 
@@ -41,11 +44,15 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
     if config.option.collectonly or parallel or not any(is_bench(item) for item in session.items):
         return (yield)
     from agvbench.compiled import announcing_compilation
+    from agvbench.reporting.viewer.process import live_view, require_viewer
     from agvbench.running.session.opening import open_session
 
+    is_live = _is_live(config)
     with ExitStack() as stack:
         stack.enter_context(announcing_compilation(_progress_printer(config)))
         try:
+            if is_live:
+                require_viewer(option(config, "--viewer"))
             against = prepare(config, session.items)
             opened = open_session(
                 given_options(config) | chosen(config, session.items),
@@ -55,6 +62,7 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
                 plan=plan_of(session.items),
                 on_progress=_progress_printer(config),
                 listen=option(config, "--listen"),
+                is_observed=is_live,
             )
             config.stash[SESSION] = bench_session = stack.enter_context(opened)
             if against is not None:
@@ -75,6 +83,11 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
         if reporter is not None:
             for notice in bench_session.notices:
                 reporter.write_line(worded(config, notice))
+        if is_live:
+            view = live_view(
+                bench_session.directory, option(config, "--viewer"), _progress_printer(config), bench_session.state
+            )
+            config.stash[LIVE] = stack.enter_context(view)
         try:
             done = yield
             if against is not None:
@@ -88,6 +101,12 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
             config.stash[INTERRUPT] = interrupt
             raise
         return done
+
+
+def _is_live(config: pytest.Config) -> bool:
+    """Whether the session is shown while it drives; a dry run has nothing to show."""
+    is_asked = bool(option(config, "--live") or option(config, "--viewer"))
+    return is_asked and not option(config, "--dry-run")
 
 
 def _progress_printer(config: pytest.Config) -> Callable[[str], None]:

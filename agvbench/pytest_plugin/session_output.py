@@ -13,7 +13,7 @@ from agvbench.campaign.completeness import planned_id
 from agvbench.errors import AgvbenchError, FitError, FlagError, InputError, PlanError
 from agvbench.pytest_plugin.against import against_texts, is_left_out, take_analysis
 from agvbench.pytest_plugin.collection import is_bench, run_name
-from agvbench.pytest_plugin.fixtures import ENDS_PROGRAM, INTERRUPT, SESSION, STOPPED_IN, stop_line
+from agvbench.pytest_plugin.fixtures import ENDS_PROGRAM, INTERRUPT, LIVE, SESSION, STOPPED_IN, stop_line
 from agvbench.pytest_plugin.options import option, worded
 
 if TYPE_CHECKING:
@@ -99,6 +99,8 @@ def pytest_runtest_protocol(item: pytest.Item) -> bool | None:
     if SESSION in stash and stash[SESSION].failure is not None:
         stash[_NOT_DRIVEN] = stash.get(_NOT_DRIVEN, 0) + 1
         return True
+    if LIVE in stash:
+        stash[LIVE].check()
     take_analysis(item)
     if (progress := _progress(item.session)) is None:
         return None

@@ -69,6 +69,12 @@ SESSION_OPTIONS: tuple[tuple[str, dict[str, Any], str], ...] = (
     ("--resume", _FLAG, "go on with an interrupted session: the one in --out, or the last"),
     ("--dry-run", _FLAG, "say what would be driven, for how long and on how much floor; drive nothing"),
     ("--no-report", _FLAG, "write the campaign only, no report"),
+    ("--live", _FLAG, "show the bench in a Rerun viewer, in a process of its own"),
+    (
+        "--viewer",
+        {"metavar": "URL"},
+        "as --live, in a viewer that already runs, such as rerun+http://127.0.0.1:9876/proxy",
+    ),
     (
         "--against",
         {"metavar": "DIR"},

@@ -120,6 +120,11 @@ class Bench:
         return self._latch.failure
 
     @property
+    def is_lock_step(self) -> bool:
+        """Whether time passes only in exchanges."""
+        return self._identity.lock_step
+
+    @property
     def is_resumed(self) -> bool:
         """Whether runs were recorded before this session."""
         return bool(self._recorded)

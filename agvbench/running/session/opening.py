@@ -76,11 +76,13 @@ def open_session(
     plan: Sequence[Row] = (),
     on_progress: Callable[[str], None] = notify_operator,
     listen: str | None = None,
+    is_observed: bool = False,
 ) -> Iterator[BenchSession]:
     """Open the session that the options `given` ask for, and close it whatever happens.
 
     ``plan`` lists the runs that it is to drive, as rows of the campaign's table ``planned``; `on_progress` prints it.
     Others may join the bus at the endpoint `listen`; the session's state is published where others can be on it.
+    ``is_observed`` keeps every exchange for a reader of `BenchSession.state`.
 
     Raises
     ------
@@ -122,7 +124,7 @@ def open_session(
             campaign_time = _campaign_time(link, writer, recorded, drives_back=settings.place == "auto")
             is_shared = bool(listen or settings.connect)
             status = RunnerStatus(writer.path.name)
-            driven = _driven_link(settings, link, status, is_observed=is_shared)
+            driven = _driven_link(settings, link, status, is_observed=is_shared or is_observed)
             bench = _bench(settings, models, driven, writer, recorded, campaign_time, on_progress, status)
             session = session_with(bench=bench, inputs=recorded_files)
             session.notices = _notices(settings, given, given_directory)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from agvbench.bus.state_publisher import StateSource
 from agvbench.campaign.names import controlled_name
 from agvbench.control import ControllerFactory, Reference
 from agvbench.errors import FitError, FlagError, OneOf, PlanError
@@ -78,6 +79,11 @@ class BenchSession:
     def is_dry(self) -> bool:
         """Whether nothing is driven."""
         return self._bench is None
+
+    @property
+    def state(self) -> StateSource | None:
+        """What returns the state of a session in real time; None in a simulation, whose runs are over at once."""
+        return None if self._bench is None or self._bench.is_lock_step else self._bench.status.state
 
     @property
     def failure(self) -> Failure | None:
