@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Generator
-from contextlib import ExitStack, nullcontext
+from collections.abc import Callable, Generator, Iterator
+from contextlib import ExitStack, contextmanager, nullcontext
 from typing import TYPE_CHECKING
 
 import pytest
@@ -43,64 +43,84 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
     parallel = hasattr(config, "workerinput") or getattr(config.option, "dist", "no") != "no"
     if config.option.collectonly or parallel or not any(is_bench(item) for item in session.items):
         return (yield)
-    from agvbench.compiled import announcing_compilation
-    from agvbench.reporting.viewer.process import live_view, require_viewer
-    from agvbench.running.session.opening import open_session
-
-    is_live = _is_live(config)
     with ExitStack() as stack:
-        stack.enter_context(announcing_compilation(_progress_printer(config)))
-        try:
-            if is_live:
-                require_viewer(option(config, "--viewer"))
+        with _ended_as_pytest_does(config):
             against = prepare(config, session.items)
-            opened = open_session(
-                given_options(config) | chosen(config, session.items),
-                out=option(config, "--out"),
-                resume=bool(option(config, "--resume")),
-                dry_run=bool(option(config, "--dry-run")),
-                plan=plan_of(session.items),
-                on_progress=_progress_printer(config),
-                listen=option(config, "--listen"),
-                is_observed=is_live,
-            )
-            config.stash[SESSION] = bench_session = stack.enter_context(opened)
+            bench_session = _opened(session, stack)
             if against is not None:
                 against.begin(bench_session)
                 config.stash[AGAINST] = against
-        except AgvbenchError as error:
-            if isinstance(error, NotComparableError):
-                config.stash[COMPARISON_CODE] = error.exit_code
-            raise pytest.UsageError(worded(config, error)) from None
-        except KeyboardInterrupt as interrupt:
-            config.stash[INTERRUPT] = interrupt
-            raise
-        benches = [item for item in session.items if is_bench(item) and not is_left_out(item)]
-        bench_session.expect(
-            [run_name(item) for item in benches], [run_name(item) for item in benches if phase(item) == 0]
-        )
-        reporter = config.pluginmanager.get_plugin("terminalreporter")
-        if reporter is not None:
-            for notice in bench_session.notices:
-                reporter.write_line(worded(config, notice))
-        if is_live:
-            view = live_view(
-                bench_session.directory, option(config, "--viewer"), _progress_printer(config), bench_session.state
-            )
-            config.stash[LIVE] = stack.enter_context(view)
-        try:
+        _announce(session, bench_session)
+        with _ended_as_pytest_does(config):
+            _show_live(config, bench_session, stack)
             done = yield
             if against is not None:
                 write_analysis(config, against.analyse_last())
             stack.close()
             if against is not None:
                 against.judge()
-        except AgvbenchError as error:
-            raise pytest.UsageError(worded(config, error)) from None
-        except KeyboardInterrupt as interrupt:
-            config.stash[INTERRUPT] = interrupt
-            raise
         return done
+
+
+@contextmanager
+def _ended_as_pytest_does(config: pytest.Config) -> Iterator[None]:
+    """Turn bad input into bad usage, and keep what interrupted the session."""
+    try:
+        yield
+    except AgvbenchError as error:
+        if isinstance(error, NotComparableError):
+            config.stash[COMPARISON_CODE] = error.exit_code
+        raise pytest.UsageError(worded(config, error)) from None
+    except KeyboardInterrupt as interrupt:
+        config.stash[INTERRUPT] = interrupt
+        raise
+
+
+def _opened(session: pytest.Session, stack: ExitStack) -> BenchSession:
+    """Open the session that the options describe, until `stack` is closed."""
+    from agvbench.compiled import announcing_compilation
+    from agvbench.running.session.opening import open_session
+
+    config = session.config
+    if is_live := _is_live(config):
+        from agvbench.reporting.viewer.process import require_viewer
+
+        require_viewer(option(config, "--viewer"))
+    stack.enter_context(announcing_compilation(_progress_printer(config)))
+    opened = open_session(
+        given_options(config) | chosen(config, session.items),
+        out=option(config, "--out"),
+        resume=bool(option(config, "--resume")),
+        dry_run=bool(option(config, "--dry-run")),
+        plan=plan_of(session.items),
+        on_progress=_progress_printer(config),
+        listen=option(config, "--listen"),
+        is_observed=is_live,
+    )
+    config.stash[SESSION] = stack.enter_context(opened)
+    return config.stash[SESSION]
+
+
+def _announce(session: pytest.Session, bench_session: BenchSession) -> None:
+    """Tell the session which runs to expect, and people what the session has to say."""
+    benches = [item for item in session.items if is_bench(item) and not is_left_out(item)]
+    bench_session.expect([run_name(item) for item in benches], [run_name(item) for item in benches if phase(item) == 0])
+    reporter = session.config.pluginmanager.get_plugin("terminalreporter")
+    if reporter is not None:
+        for notice in bench_session.notices:
+            reporter.write_line(worded(session.config, notice))
+
+
+def _show_live(config: pytest.Config, bench_session: BenchSession, stack: ExitStack) -> None:
+    """Show the session in a viewer where that is asked for, until `stack` is closed."""
+    if not _is_live(config):
+        return
+    from agvbench.reporting.viewer.process import live_view
+
+    view = live_view(
+        bench_session.directory, option(config, "--viewer"), _progress_printer(config), bench_session.state
+    )
+    config.stash[LIVE] = stack.enter_context(view)
 
 
 def _is_live(config: pytest.Config) -> bool:
