@@ -56,15 +56,23 @@ def nightly(session: nox.Session) -> None:
 
 @nox.session
 def tests(session: nox.Session) -> None:
-    """Run all tests; those that depend on the wall clock are repeated once where they fail, and listed at the end."""
+    """Run the tests that take seconds; those of the wall clock are repeated once where they fail, and listed."""
     install(session, "test")
-    session.run("pytest", *(session.posargs or SIDE_BY_SIDE))
+    session.run("pytest", *(session.posargs or ("-m", "not slow", *SIDE_BY_SIDE)))
+
+
+@nox.session
+def tests_slow(session: nox.Session) -> None:
+    """Run the tests that take more than ten seconds each: diagnoses of whole campaigns, blind trials, simulations."""
+    install(session, "test")
+    session.run("pytest", *(session.posargs or ("-m", "slow", *SIDE_BY_SIDE)))
 
 
 @nox.session(python=PYTHONS)
 def tests_all(session: nox.Session) -> None:
-    """Run all tests on each supported Python, one after another."""
-    tests(session)
+    """Run all tests, slow ones included, on each supported Python, one after another."""
+    install(session, "test")
+    session.run("pytest", *(session.posargs or SIDE_BY_SIDE))
 
 
 @nox.session(python=PYTHONS[0], venv_backend="uv")

@@ -65,6 +65,7 @@ def test_the_calibrated_maps_are_those_of_the_vehicle(campaigns: tuple[Path, Pat
         assert float(model.speed(pulse_us)) == pytest.approx(float(of_pulses.speed(pulse_us)), abs=1e-4)
 
 
+@pytest.mark.slow
 def test_the_same_effects_are_found(campaigns: tuple[Path, Path], tmp_path: Path) -> None:
     found = []
     for path in campaigns:

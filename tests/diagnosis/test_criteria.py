@@ -27,6 +27,7 @@ def test_every_criterion_has_a_reason(kind):
     assert [field.name for field in fields(kind) if f"``{field.name}``" not in kind.__doc__] == []
 
 
+@pytest.mark.slow
 def test_a_diagnosis_states_the_criteria_that_it_used(tiny_campaign):
     stated = diagnose(tiny_campaign(Tiny())).to_json()["provenance"]["criteria"]
     assert sum(map(len, stated.values())) == sum(len(fields(kind)) for kind in CLASSES)

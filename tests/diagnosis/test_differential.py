@@ -30,6 +30,7 @@ def found(diagnosis: Diagnosis) -> dict[str, float]:
         ({"slip_by_speed": 1.0}, {"lateral_slip.gradient": 1.0}, 0.03),
     ],
 )
+@pytest.mark.slow
 def test_one_cause_is_named_with_its_size(truth, expected, tolerance):
     diagnosis = diagnose(Campaign(Differential(**truth)))
     assert diagnosis.verdict is Verdict.NAMED
@@ -54,6 +55,7 @@ def test_nothing_is_found_where_nothing_is_hidden(seed):
     assert diagnose(Campaign(Differential(), seed=seed)).verdict is Verdict.ADEQUATE
 
 
+@pytest.mark.slow
 def test_five_causes_at_once_are_found_together(tmp_path):
     truth = Differential(yaw_lag_s=0.3, speed_lag_s=0.25, delay_s=0.1, right_wheel=1.02, marker_ahead_m=0.12)
     diagnosis = diagnose(Campaign(truth))

@@ -31,6 +31,7 @@ def lagging():
     return campaign_runs(Tiny(steering_lag_s=0.08))
 
 
+@pytest.mark.slow
 def test_steering_that_stood_before_its_first_command_is_found_out(lagging):
     found = diagnose(InMemory([late(run, 0.39) for run in lagging]))
     assert [effect.name for effect in found.effects] == ["steering_lag"]

@@ -233,6 +233,7 @@ def test_two_kinds_of_repeats_are_evidence_where_a_logged_text_divides_them():
         (by_operator, "operator", "trim_by_logged_column"),
     ],
 )
+@pytest.mark.slow
 def test_a_logged_column_that_matters_is_named_first_and_reduces_the_error(conditions, covariate, term):
     found = diagnose(InMemory(logged_runs(conditions)))
     assert found.verdict is Verdict.UNKNOWN

@@ -44,6 +44,7 @@ def recording(rate: float, jerk: float, seed: int, count: int = 400) -> tuple[np
 
 
 @pytest.mark.parametrize(("rate", "jerk"), [(5.0, 0.02), (20.0, 0.5), (100.0, 2.0), (1000.0, 20.0)])
+@pytest.mark.slow
 def test_the_errors_stated_are_those_made(rate, jerk):
     squares = []
     for seed in range(4):
@@ -55,6 +56,7 @@ def test_the_errors_stated_are_those_made(rate, jerk):
     np.testing.assert_allclose(np.mean(squares, axis=0), np.ones((2, 3)), atol=0.3)
 
 
+@pytest.mark.slow
 def test_noise_and_jerk_are_found():
     t_s, motion, _ = recording(100.0, 2.0, 0, 4000)
     fitted = MotionFilter.fitted([(t_s, motion)])

@@ -52,6 +52,7 @@ def diagnosed():
     return get
 
 
+@pytest.mark.slow
 def test_delay_and_latency_are_not_told_apart_by_any_run_and_it_says_what_would(diagnosed):
     found, _ = diagnosed(Tiny(delay_s=0.1), steps=True)
     named = {found.effects[0].name, *found.effects[0].confounded_with}

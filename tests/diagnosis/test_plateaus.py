@@ -124,6 +124,7 @@ def test_play_is_found_where_a_command_ends_hardly_beyond_it(play):
     assert float(found.model.rear(NEARLY_STRAIGHT)) == pytest.approx(rear_of(NEARLY_STRAIGHT), abs=3e-3)
 
 
+@pytest.mark.slow
 def test_much_play_is_found_too():
     (effect,) = diagnose(driven(MORE_PLAY_RAD)).effects
     assert effect.name == "steering_backlash"

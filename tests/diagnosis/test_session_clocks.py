@@ -65,6 +65,7 @@ def test_a_single_session_has_no_offset():
     assert clock_offsets(Campaign(Differential(), sessions=1).runs, is_differential=True) == {}
 
 
+@pytest.mark.slow
 def test_a_diagnosis_names_the_session_and_predicts_it_as_well_as_the_others():
     runs = late(free_runs(Tiny(steering_lag_s=0.25), runs=2, seconds=24.0), "day 3", 0.15)
     split = [dataclasses.replace(run, split="held_out" if run.session == "day 3" else "fit") for run in runs]

@@ -36,6 +36,7 @@ def test_what_is_kept_of_a_group_is_spread_over_the_session(size, most):
     assert np.ptp(np.diff(at)) <= 1
 
 
+@pytest.mark.slow
 def test_causes_found_in_some_runs_are_measured_in_all(tiny_campaign, monkeypatch):
     campaign = tiny_campaign(Tiny(steering_lag_s=0.15))
     whole = diagnose(campaign)

@@ -39,6 +39,8 @@ QUICK_WITHOUT = ("diagnose",)
 FULL = os.environ.get("AGVBENCH_DOCUMENTS") == "full"
 EVERY_BLOCK = os.environ.get("AGVBENCH_DOCUMENTS") in ("full", "blocks")
 pytestmark = pytest.mark.timeout(7200 if EVERY_BLOCK else 600)
+LONG = {"docs/tutorial.md", "docs/how-to/nightly.md"}
+"""Those of the quick pages that take more than ten seconds."""
 takes_minutes = pytest.mark.skipif(not FULL, reason="takes minutes: nox -s documents")
 
 
@@ -47,7 +49,13 @@ def _options() -> dict[str, str]:
     return options | ({"--seed": os.environ["AGVBENCH_SEED"]} if "AGVBENCH_SEED" in os.environ else {})
 
 
-@pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=takes_minutes) for name in SLOW)])
+PAGES = [
+    *(pytest.param(name, marks=[pytest.mark.slow] if name in LONG else []) for name in QUICK),
+    *(pytest.param(name, marks=takes_minutes) for name in SLOW),
+]
+
+
+@pytest.mark.parametrize("name", PAGES)
 def test_every_shell_block_of_a_page_runs(name, tmp_path):
     page, without = ROOT / name, () if EVERY_BLOCK else QUICK_WITHOUT
     if name in FILES_OF:

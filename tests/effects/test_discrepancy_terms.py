@@ -41,6 +41,7 @@ def test_it_is_declared_as_an_effect_is(term: type[DiscrepancyTerm]) -> None:
 
 
 @pytest.mark.parametrize("term", OF_TIME, ids=[term.name for term in OF_TIME])
+@pytest.mark.slow
 def test_a_change_holds_in_its_part_of_the_campaign_only(term: type[DiscrepancyTerm]) -> None:
     hours = (0.1, 0.5, 0.9)
     runs = [SimulatedRun(COMMANDS, np.linspace(0.2, 4.0, 40), started_h=h) for h in hours]

@@ -69,6 +69,7 @@ def miss(end, target):
 
 
 @pytest.mark.parametrize("spec", HIDDEN)
+@pytest.mark.slow
 def test_a_plant_with_hidden_effects_ends_on_target(spec):
     truth = hidden(spec, 5)
     model = true_model(truth)

@@ -102,6 +102,7 @@ def test_simulator_in_a_process_of_its_own_over_tcp(in_process, tmp_path):
 
 
 @pytest.mark.real_time
+@pytest.mark.slow
 def test_vehicle_and_camera_in_processes_of_their_own(in_process, tmp_path):
     endpoint = f"tcp/127.0.0.1:{(port := free_port())}"
     with running("agv", "sim", "--listen", endpoint, SEED):

@@ -95,6 +95,7 @@ def test_what_calibration_cannot_know_remains(driven: Path) -> None:
     assert errors["5"].position_mm > 20.0
 
 
+@pytest.mark.slow
 def test_the_diagnosis_names_the_wheels_and_the_lags(driven: Path) -> None:
     found: Diagnosis = diagnose(Campaign.open(driven))
     values = {e.name: {name: p.value for name, p in e.parameters.items()} for e in found.effects}

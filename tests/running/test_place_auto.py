@@ -39,6 +39,7 @@ def bench(out: Path, *more: str) -> pd.DataFrame:
     return pd.read_parquet(out / "runs.parquet").set_index("trajectory")
 
 
+@pytest.mark.slow
 def test_a_session_is_driven_without_anybody_and_resumed(tmp_path: Path, give_up: Callable[[Path, str], None]) -> None:
     runs = bench(tmp_path / "first")
     assert runs["status"].tolist() == ["ok", "ok"]

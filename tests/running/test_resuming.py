@@ -69,6 +69,7 @@ def test_what_was_chosen_is_chosen_again(lab, give_up):
     assert {run.run_id for run in Campaign.open(lab / "c")} == first
 
 
+@pytest.mark.slow
 def test_progress_of_a_resumed_session_counts_what_is_left(lab, give_up):
     assert "1/4 runs" in bench(*BEGAN).stdout
     for run_id in ("left-1-r02", "left-0.5-r01"):
@@ -139,6 +140,7 @@ def test_a_model_of_another_vehicle_is_refused_before_anything_moves(lab, change
         assert not (lab / "c" / "runs.parquet").exists()
 
 
+@pytest.mark.slow
 def test_more_benchmarks_may_be_asked_for_than_it_began_with(lab):
     assert bench(*BEGAN).returncode == 0
     assert bench("--resume", "bench_mine.py").returncode == 0

@@ -22,6 +22,7 @@ def _nights(seed, *, series=8, nights=60, correlation=0.0):
     return values
 
 
+@pytest.mark.slow
 def test_a_step_is_found_on_its_night_and_its_interval_covers_it():
     near = covered = 0
     for seed in _SEEDS:

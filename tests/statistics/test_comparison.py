@@ -45,6 +45,7 @@ def alarms(draw, repeats, conditions):
 
 
 @pytest.mark.parametrize("repeats", [5, 10])
+@pytest.mark.slow
 def test_two_campaigns_of_the_same_vehicle_report_a_regression_in_at_most_two_percent(repeats):
     draw = heavy_tailed(np.random.default_rng(20 + repeats))
     assert alarms(draw, repeats, ("calibrated",)) <= 0.02 * PAIRS

@@ -49,6 +49,7 @@ def test_a_blind_trial_from_drive_to_score():
     assert trial.squares_mm2["after"] < 0.2 * trial.squares_mm2["before"]
 
 
+@pytest.mark.slow
 def test_a_pair_left_open_between_a_delay_and_its_true_rival_is_right(monkeypatch):
     """Rivals are looked for per effect, as if it were hidden alone; driving plants for that takes minutes."""
     alone = {"actuation_delay": {"mocap_latency": 0.1}, "battery_droop": {}}

@@ -40,6 +40,7 @@ def nights(tmp_path_factory):
     return lab / "nightly"
 
 
+@pytest.mark.slow
 def test_three_nights_of_a_bench(nights, tmp_path, capsys):
     (nights / "3" / "SHA256SUMS").write_text(
         "".join(
@@ -98,6 +99,7 @@ def test_the_same_campaigns_give_the_same_page(tmp_path, capsys):
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="an administrator may write everywhere")
+@pytest.mark.slow
 def test_campaigns_that_cannot_be_written_are_read_all_the_same(nights, tmp_path, capsys):
     (nights / "3" / "errors.parquet").unlink(missing_ok=True)
     (nights / "3").chmod(0o500)
