@@ -14,7 +14,7 @@ from agvbench.pytest_plugin.options import option, settings_from, worded
 
 if TYPE_CHECKING:
     from agvbench.running.session.session import BenchSession
-    from agvbench.workflows.comparison.bench_gate import BenchGate, JudgedBench
+    from agvbench.workflows.comparison.judged_bench import BenchGate, JudgedBench
     from agvbench.workflows.comparison.sequential_bench import SequentialBench
     from agvbench.workflows.comparison.sequential_record import SequentialRecord
 
@@ -91,8 +91,8 @@ def prepare(config: pytest.Config, items: Sequence[pytest.Item]) -> Against | No
     if directory is None:
         _require_unused(config)
         return None
-    from agvbench.workflows.comparison.bench_gate import BenchGate
     from agvbench.workflows.comparison.decision import FailurePolicy
+    from agvbench.workflows.comparison.judged_bench import BenchGate
     from agvbench.workflows.comparison.sequential_bench import SequentialBench, SequentialOptions
 
     rules = [rule.strip() for rule in (option(config, "--fail-on") or "").split(",") if rule.strip()]

@@ -30,7 +30,7 @@ from agvbench.running.execution.campaign_time import TURNAROUND_S
 from agvbench.running.execution.drive import DEFAULT_TIMING
 from agvbench.running.execution.run_records import RunRequest
 from agvbench.statistics.quantities import DEFINITIONS
-from agvbench.workflows.comparison.bench_gate import JudgedBench
+from agvbench.workflows.comparison.judged_bench import JudgedBench
 from agvbench.workflows.comparison.sequential_record import SequentialRecord
 from agvbench.workflows.report import ReportData, gather
 
