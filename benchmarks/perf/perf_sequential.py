@@ -78,14 +78,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--campaigns", type=int, default=2000)
     parser.add_argument("--repeats", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--json", type=Path)
     arguments = parser.parse_args()
-    rows = [
-        _row(case, noise, spending, arguments.campaigns, arguments.repeats)
-        for spending in Spending
-        for noise in _NOISES
-        for case in CASES
-    ]
+    rows = [_row(case, noise, spending, arguments) for spending in Spending for noise in _NOISES for case in CASES]
     _print_levels(SequentialPlan(arguments.repeats, arguments.repeats, {}), 50 * arguments.campaigns)
     if arguments.json:
         arguments.json.write_text(json.dumps(rows, indent=1), encoding="utf-8")
@@ -116,13 +112,15 @@ def _schedule(plan: SequentialPlan) -> list[tuple[int, float]]:
     return [(n, rank_sum_information(plan.repeats_a, n) / most) for n in due]
 
 
-def _row(case: Case, noise: str, spending: Spending, campaigns: int, repeats: int) -> dict[str, Any]:
+def _row(case: Case, noise: str, spending: Spending, arguments: argparse.Namespace) -> dict[str, Any]:
+    campaigns, repeats = arguments.campaigns, arguments.repeats
     plan = SequentialPlan(repeats, repeats, {}, spending=spending)
-    trials = Trials(case, noise, campaigns, plan)
+    trials = Trials(case, noise, campaigns, plan, arguments.seed)
     stopped = trials.run()
     regression = float(np.mean(stopped.regression))
     row = {
         "spending": str(spending), "noise": noise, "case": case.what, "margin": case.margin, "campaigns": campaigns,
+        "seed": arguments.seed,
         "false_difference": _rate(stopped.false_difference), "false_same": _rate(stopped.false_same),
         "regression": regression, "no_regression": float(np.mean(stopped.decided & ~stopped.regression)),
         "regression_once": trials.regression_once(repeats), "mean_repeats": float(np.mean(stopped.repeats)),
@@ -168,9 +166,9 @@ class Stopped:
 class Trials:
     """Campaigns of one case, drawn once: counts of pairs b > a, b > a + margin and b > a − margin by repeats."""
 
-    def __init__(self, case: Case, noise: str, campaigns: int, plan: SequentialPlan) -> None:
+    def __init__(self, case: Case, noise: str, campaigns: int, plan: SequentialPlan, seed: int) -> None:
         self._case, self._plan, self._campaigns = case, plan, campaigns
-        rng = np.random.default_rng(1)
+        rng = np.random.default_rng(seed)
         draw = rng.standard_normal if noise == "normal" else lambda size: rng.standard_t(3.0, size) / math.sqrt(3.0)
         shifts = np.array(case.shifts)
         self._a = draw((campaigns, _CELLS, plan.repeats_a))

@@ -162,9 +162,11 @@ def test_the_view_at_a_terminal_is_drawn_in_place_and_ctrl_c_leaves_the_bench_al
         drive(opened, "one")
         primary, secondary = pty.openpty()
         environment = os.environ | {"TERM": "xterm-256color", "COLUMNS": "100", "LINES": "30"}
+        before = signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background it may be ignored
         process = subprocess.Popen(
             [*COMMAND, "--connect", endpoint], stdin=secondary, stdout=secondary, stderr=secondary, env=environment
         )
+        signal.signal(signal.SIGINT, before)
         os.close(secondary)
         shown = _read_until(primary, b"last runs")
         drive(opened, "two")
