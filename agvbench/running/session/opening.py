@@ -14,9 +14,7 @@ from typing import Any
 import pandas as pd
 
 from agvbench.adapters import check_specs
-from agvbench.bus.bus_config import BusConfig
 from agvbench.bus.link import VehicleLink
-from agvbench.bus.session import is_open_to_all
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
 from agvbench.campaign.header import FILE_NAME, schema_for
 from agvbench.campaign.lock import locked
@@ -51,14 +49,13 @@ from agvbench.running.execution.campaign_time import (
     last_end_s,
 )
 from agvbench.running.execution.runner_status import RunnerStatus
-from agvbench.running.links import ContinuousLink, RunnerLink
-from agvbench.running.observed_link import ObservedLink
+from agvbench.running.links import RunnerLink
 from agvbench.running.positioning.placers import choose_placer
 from agvbench.running.positioning.start_pose import notify_operator
 from agvbench.running.session.end_pose_bias import read_bias_corrections
+from agvbench.running.session.observers import listening_notice, observed_link, published_state
 from agvbench.running.session.rig_checks import adapter_options, open_session_rig
 from agvbench.running.session.session import BenchSession
-from agvbench.running.session.state_publication import published_state
 from agvbench.running.session.termination_signals import interruptible
 from agvbench.simulator import load_plant
 from agvbench.types import Run
@@ -124,11 +121,11 @@ def open_session(
             campaign_time = _campaign_time(link, writer, recorded, drives_back=settings.place == "auto")
             is_shared = bool(listen or settings.connect)
             status = RunnerStatus(writer.path.name)
-            driven = _driven_link(settings, link, status, is_observed=is_shared or is_observed)
+            driven = observed_link(settings, link, status, is_observed=is_shared or is_observed)
             bench = _bench(settings, models, driven, writer, recorded, campaign_time, on_progress, status)
             session = session_with(bench=bench, inputs=recorded_files)
             session.notices = _notices(settings, given, given_directory)
-            session.notices += _remote_notice(settings, listen)
+            session.notices += listening_notice(settings, listen)
             session.notices += idle_notice(recorded.values(), campaign_time.now_s(), settings.session)
             try:
                 published = published_state(bench, link if is_shared else None)
@@ -145,13 +142,6 @@ def _notices(settings: BenchSettings, given: Mapping[str, Any], directory: Path)
     return [f"vehicle: {LAB_VEHICLE} of this folder"] * is_found + [
         f"calibration: the campaign's copy {settings.calibration}, since the file given before is gone"
     ] * is_copy
-
-
-def _remote_notice(settings: BenchSettings, listen: str | None) -> list[str]:
-    config = BusConfig.load(settings.bus_config) if settings.bus_config else None
-    if listen is None or not is_open_to_all(listen, config, "--listen"):
-        return []
-    return [f"warning: every peer that reaches {listen} can drive the vehicle; no certificate is required"]
 
 
 def _header(
@@ -211,15 +201,6 @@ def _without_left_out(writer: CampaignWriter, session: BenchSession) -> Iterator
         if len(kept) < len(planned):
             with suppress(RecordingError):  # what ended the session is the error to report
                 writer.write_table(PLANNED_TABLE, pd.DataFrame(kept, columns=list(planned[0])))
-
-
-def _driven_link(settings: BenchSettings, link: VehicleLink, status: RunnerStatus, *, is_observed: bool) -> RunnerLink:
-    """Return what the bench drives with: a simulation that is never reset is driven on; `status` sees exchanges."""
-    driven = ContinuousLink(link) if settings.place == "auto" and link.identity().lock_step else link
-    if not is_observed:
-        return driven
-    status.link = ObservedLink(driven)
-    return status.link
 
 
 def _bench(
