@@ -90,6 +90,15 @@ class Pose(NamedTuple):
             wrap_angle(self.heading_rad + other.heading_rad),
         )
 
+    def place(self, points: Floats) -> Floats:
+        """Return points (n, 2) [m], given in this pose's frame, in the frame this pose is given in.
+
+        >>> Pose(1.0, 2.0, math.pi / 2).place(np.array([[1.0, 0.0]])).round(9).tolist()
+        [[1.0, 3.0]]
+        """
+        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        return np.asarray(points @ np.array([[c, s], [-s, c]]) + np.array([self.x_m, self.y_m]))
+
     def relative_to(self, start: Pose) -> Pose:
         """Return this pose in the frame of `start`.
 

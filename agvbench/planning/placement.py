@@ -52,7 +52,7 @@ def _best_heading(points: Floats, workspace: Workspace, headings_deg: Iterable[i
 
 
 def _largest_distance(points: Floats, heading: float, workspace: Workspace) -> float:
-    room = workspace.offsets - (_rotated(points, heading) @ workspace.normals.T).max(axis=0)
+    room = workspace.offsets - (Pose(0.0, 0.0, heading).place(points) @ workspace.normals.T).max(axis=0)
     # normals · start + distance <= room; the objective is the distance.
     constraints = np.column_stack([workspace.normals, np.ones(len(room))])
     return _solve(np.array([0.0, 0.0, -1.0]), constraints, room)[2]
@@ -60,7 +60,7 @@ def _largest_distance(points: Floats, heading: float, workspace: Workspace) -> f
 
 def _most_central(points: Floats, heading: float, workspace: Workspace, distance: float) -> tuple[float, float]:
     """Return the start nearest to where the path's box is centred, among those not more than `_NEARLY_M` worse."""
-    turned = _rotated(points, heading)
+    turned = Pose(0.0, 0.0, heading).place(points)
     room = workspace.offsets - (turned @ workspace.normals.T).max(axis=0) - (distance - _NEARLY_M)
     wanted = workspace.centre - 0.5 * (turned.max(axis=0) + turned.min(axis=0))
     # x, y and their distances from what is wanted, the sum of which is the objective.
@@ -79,11 +79,6 @@ def _solve(objective: Floats, constraints: Floats, limits: Floats) -> list[float
     return [float(value) for value in solution]
 
 
-def _rotated(points: Floats, heading: float) -> Floats:
-    c, s = math.cos(heading), math.sin(heading)
-    return np.asarray(points @ np.array([[c, s], [-s, c]]))
-
-
 def check_fits(swept: Floats, start: Pose, workspace: Workspace, *, where: str) -> None:
     """Raise unless every point of a path that begins at `start` keeps the workspace's margin.
 
@@ -97,7 +92,7 @@ def check_fits(swept: Floats, start: Pose, workspace: Workspace, *, where: str) 
     PlanError
         Saying when and where the path comes too close to the edge.
     """
-    placed = _rotated(swept[:, 1:], start.heading_rad) + np.array([start.x_m, start.y_m])
+    placed = start.place(swept[:, 1:])
     clearances = workspace.clearances(placed)
     if clearances.min() >= workspace.margin_m - 1e-6:
         return

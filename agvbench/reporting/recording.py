@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from agvbench.plot.style import colour, condition_numbers
-from agvbench.reporting.content import plain, plain_sentences
-from agvbench.reporting.viewer.blueprint import FAULTS, blueprint
-from agvbench.reporting.viewer.run_entities import Place, send_floor, send_run, session_workspace
+from agvbench.reporting.content import plain
+from agvbench.reporting.viewer.blueprint import blueprint
+from agvbench.reporting.viewer.run_entities import Place, send_events, send_floor, send_run, session_workspace
 from agvbench.statistics.end_poses import in_order
 from agvbench.workflows.report import ReportData
 
@@ -30,8 +30,5 @@ def write_recording(data: ReportData, path: Path) -> None:
     send_floor(recording, session_workspace(data.path))
     for run in counted:
         send_run(recording, run, colour(numbers[run.condition]), data.planned)
-    for row in data.events.to_dict("records"):
-        recording.set_time("campaign_time", duration=float(row["time_s"]))
-        line = f"{row['run_id']} {row['source']} {row['event']}: {row['text']}"
-        recording.log(FAULTS, rr.TextLog(plain_sentences(line), level=str(row["level"]).upper()))
+    send_events(recording, data.events.to_dict("records"))
     recording.flush()

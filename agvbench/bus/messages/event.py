@@ -5,10 +5,9 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import Self
 
-from msgspec.structs import force_setattr
-
 from agvbench import errors
 from agvbench.bus.messages.codec import MAX_TEXT, Message, Number, Source, Text, decoder
+from agvbench.bus.messages.texts import cut
 from agvbench.registry import own_classes
 
 _ERRORS = {cls.__name__: cls for cls in own_classes(errors, errors.AgvbenchError)}
@@ -51,10 +50,7 @@ class Event(Message, tag="event", frozen=True):
     remedy: Text | None = None
 
     def __post_init__(self) -> None:
-        for name in ("text", *_DETAILS):
-            text = getattr(self, name)
-            if text is not None and (len(text) > MAX_TEXT or not text.isascii()):
-                force_setattr(self, name, text[:MAX_TEXT].encode("utf-8", "replace").decode())
+        cut(self, ("text", *_DETAILS), MAX_TEXT)
 
     @classmethod
     def of_error(

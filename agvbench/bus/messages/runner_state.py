@@ -5,19 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import msgspec
 from msgspec import Meta
 from msgspec.structs import force_setattr
 
 from agvbench.bus.messages.codec import Message, Number, Source, decoder
+from agvbench.bus.messages.texts import cut, short
 from agvbench.errors import MessageError
 from agvbench.types import Command, Pose
 
 MAX_NAME, MAX_LINE, MAX_ENTRIES = 200, 400, 8
 Name = Annotated[str, Meta(max_length=MAX_NAME)]
 Line = Annotated[str, Meta(max_length=MAX_LINE)]
+_Entry = TypeVar("_Entry")
 
 
 class Phase(StrEnum):
@@ -55,7 +57,7 @@ class RunProgress(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     duration_s: float
 
     def __post_init__(self) -> None:
-        _cut(self, ("run_id", "experiment", "trajectory", "condition"), MAX_NAME)
+        cut(self, ("run_id", "experiment", "trajectory", "condition"), MAX_NAME, mark="…")
         if not (math.isfinite(self.t_s) and 0.0 <= self.duration_s < math.inf):
             value, limit = f"{self.t_s} of {self.duration_s} s", "finite, from 0 s"
             raise MessageError("progress of a run is out of range", value=value, limit=limit)
@@ -72,8 +74,8 @@ class RunResult(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     heading_deg: float | None = None
 
     def __post_init__(self) -> None:
-        _cut(self, ("run_id",), MAX_NAME)
-        _cut(self, ("status",), MAX_LINE)
+        cut(self, ("run_id",), MAX_NAME, mark="…")
+        cut(self, ("status",), MAX_LINE, mark="…")
         numbers = [number for number in (self.position_mm, self.heading_deg) if number is not None]
         if not all(map(math.isfinite, numbers)):
             raise MessageError("result of a run is not finite", where=self.run_id, value=numbers)
@@ -112,9 +114,9 @@ class RunnerState(Message, tag="runner_state", frozen=True):
     failure: Line | None = None
 
     def __post_init__(self) -> None:
-        _cut(self, ("campaign", "version"), MAX_NAME)
-        _cut(self, ("failure",), MAX_LINE)
-        force_setattr(self, "faults", tuple(short(line, MAX_LINE) for line in self.faults))
+        cut(self, ("campaign", "version"), MAX_NAME, mark="…")
+        cut(self, ("failure",), MAX_LINE, mark="…")
+        force_setattr(self, "faults", tuple(short(line, MAX_LINE, mark="…") for line in self.faults))
         if not (0.0 <= self.began_unix_s < math.inf and 0.0 <= self.elapsed_s < math.inf):
             value = f"{self.began_unix_s}, {self.elapsed_s} s"
             raise MessageError("times of a runner are out of range", value=value, limit="finite, from 0 s")
@@ -124,27 +126,22 @@ class RunnerState(Message, tag="runner_state", frozen=True):
         _check_entries("faults", self.faults)
         _check_entries("results", self.results)
 
+    def faults_since(self, count: int) -> tuple[Line, ...]:
+        """Return those of `faults` that came after the first `count` of all."""
+        return _last(self.faults, self.fault_count - count)
+
+    def results_since(self, count: int) -> tuple[RunResult, ...]:
+        """Return those of `results` that came after the first `count` runs that were counted or rejected."""
+        return _last(self.results, self.counted + self.rejected - count)
+
+
+def _last(entries: tuple[_Entry, ...], count: int) -> tuple[_Entry, ...]:
+    return entries[len(entries) - min(max(count, 0), len(entries)) :]
+
 
 def _check_entries(name: str, entries: Sequence[object]) -> None:
     if len(entries) > MAX_ENTRIES:
         raise MessageError(f"too many {name} of a runner", value=len(entries), limit=f"at most {MAX_ENTRIES}")
-
-
-def short(text: str, limit: int) -> str:
-    """Return `text` as a message can carry it: cut to `limit` characters, what is no character replaced.
-
-    >>> short("garage-calibrated-r01", 9)
-    'garage-c…'
-    """
-    kept = text if len(text) <= limit else f"{text[: limit - 1]}…"
-    return kept if kept.isascii() else kept.encode("utf-8", "replace").decode()
-
-
-def _cut(struct: msgspec.Struct, names: Sequence[str], limit: int) -> None:
-    for name in names:
-        text = getattr(struct, name)
-        if text is not None and (len(text) > limit or not text.isascii()):
-            force_setattr(struct, name, short(text, limit))
 
 
 decode_runner_state = decoder(RunnerState)

@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from agvbench.bus.keys import Keys
-from agvbench.bus.messages.runner_state import Phase, RunnerState, RunResult
+from agvbench.bus.messages.runner_state import Phase, RunnerState
 from agvbench.reporting.console.state_view import clock, draw_states, ending, print_view, result_text
 from agvbench.reporting.content import plain, plain_sentences
 from agvbench.workflows.watch import SILENT_S, Watched
@@ -65,32 +65,23 @@ class Changes:
 
     def __init__(self, name: str) -> None:
         self._name, self._before = name, ("", "")
-        self._recorded = self._faults = -1
+        self._recorded = self._faults = 0
+        self._is_first = True
 
     def of(self, state: RunnerState) -> Iterator[str]:
         """Yield the lines of `state`."""
         at = clock(state.elapsed_s)
-        if self._recorded < 0:
+        if self._is_first:
             yield f"{at}  watching {plain(state.campaign)} of {self._name}, agvbench {plain(state.version)}"
-        yield from (f"{at}  {result_text(result)}" for result in self._new(state))
-        yield from (f"{at}  fault: {plain_sentences(line)}" for line in self._new_faults(state))
+        yield from (f"{at}  {result_text(result)}" for result in state.results_since(self._recorded))
+        yield from (f"{at}  fault: {plain_sentences(line)}" for line in state.faults_since(self._faults))
+        self._recorded, self._faults, self._is_first = state.counted + state.rejected, state.fault_count, False
         now = (state.phase.value, state.run.run_id if state.run else "")
         if now != self._before and state.phase is not Phase.FINISHED:
             self._before = now
             yield f"{at}  {_doing(state)}"
         if state.phase is Phase.FINISHED:
             yield f"{at}  {ending(state)}"
-
-    def _new(self, state: RunnerState) -> tuple[RunResult, ...]:
-        recorded = state.counted + state.rejected
-        new = len(state.results) if self._recorded < 0 else min(recorded - self._recorded, len(state.results))
-        self._recorded = recorded
-        return state.results[len(state.results) - max(new, 0) :]
-
-    def _new_faults(self, state: RunnerState) -> tuple[str, ...]:
-        new = len(state.faults) if self._faults < 0 else min(state.fault_count - self._faults, len(state.faults))
-        self._faults = state.fault_count
-        return state.faults[len(state.faults) - max(new, 0) :]
 
 
 def _doing(state: RunnerState) -> str:

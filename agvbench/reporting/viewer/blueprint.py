@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from agvbench.reporting.viewer.run_entities import FLOOR, Place
+from agvbench.reporting.viewer.run_entities import FAULTS, FLOOR, Place
 
-LIVE, FAULTS = "/live", "/faults"
+LIVE = "/live"
 
 
 def blueprint(places: Iterable[Place], *, live: bool = False) -> Any:

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
-
-import pandas as pd
 
 from agvbench.campaign import Campaign
 from agvbench.campaign.header import FILE_NAME
+from agvbench.campaign.manifest import PLANNED_TABLE
+from agvbench.campaign.tables.parquet import read_parquet
 from agvbench.metrics.planned_paths import PlannedPaths
+from agvbench.running.configuration.provenance import Row
+from agvbench.running.execution.event_log import EVENTS_TABLE
 from agvbench.types import Run
 
 _TABLES = ("runs", "commands", "poses")
 _BESIDE = (FILE_NAME, "vehicle.toml", "inputs.parquet")
-_EVENTS, _PLANNED = "events.parquet", "planned.parquet"
 
 
 class CampaignFollower:
@@ -29,7 +29,7 @@ class CampaignFollower:
     def __init__(self, directory: Path) -> None:
         self._directory = directory
         self._read: set[str] = set()
-        self._faults = 0
+        self._events = 0
         self._plans: tuple[bool, PlannedPaths] | None = None
 
     def new_runs(self) -> list[tuple[Run, PlannedPaths]]:
@@ -70,24 +70,23 @@ class CampaignFollower:
             self._plans = is_calibrated, PlannedPaths(campaign)
         return self._plans[1]
 
-    def new_faults(self) -> Iterator[tuple[float, str, str]]:
-        """Yield time [s] of the campaign, level and line of the events that were recorded since the last call."""
-        if not (self._directory / _EVENTS).exists():
-            return
-        rows = pd.read_parquet(os.fspath(self._directory / _EVENTS)).to_dict("records")
-        for row in rows[self._faults :]:
-            line = f"{row['run_id']} {row['source']} {row['event']}: {row['text']}"
-            yield float(row["time_s"]), str(row["level"]).upper(), line
-        self._faults = len(rows)
+    def new_events(self) -> list[Row]:
+        """Return the rows of the table of events that were recorded since the last call."""
+        rows = _rows(self._directory / f"{EVENTS_TABLE}.parquet")
+        new, self._events = rows[self._events :], len(rows)
+        return new
 
     def planned_runs(self) -> list[tuple[str, str, str]]:
         """Return trajectory or experiment, condition and name of every run that the session is to drive."""
-        if not (self._directory / _PLANNED).exists():
-            return []
-        rows = pd.read_parquet(os.fspath(self._directory / _PLANNED)).to_dict("records")
+        rows = _rows(self._directory / f"{PLANNED_TABLE}.parquet")
         return [
             (row["trajectory"] or row["experiment"], row["condition"] or "uncalibrated", row["run_id"]) for row in rows
         ]
+
+
+def _rows(path: Path) -> list[Row]:
+    # Not checked against the list of hashes, which is parsed anew each time and grows with every run.
+    return read_parquet(path).to_pylist() if path.exists() else []
 
 
 def _names(folder: Path) -> set[str]:

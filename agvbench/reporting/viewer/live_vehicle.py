@@ -11,15 +11,15 @@ from agvbench.bus.messages.runner_state import Phase, RunnerState
 from agvbench.metrics.planned_paths import PlannedPaths
 from agvbench.planning import Plan
 from agvbench.reporting.content import plain, plain_sentences
-from agvbench.reporting.viewer.blueprint import FAULTS, LIVE
-from agvbench.reporting.viewer.run_entities import ARROW_M
+from agvbench.reporting.viewer.blueprint import LIVE
+from agvbench.reporting.viewer.run_entities import FAULTS, PLANNED, arrow, line
 from agvbench.types import Command, Pose
 
 if TYPE_CHECKING:
     import rerun as rr
 
 _SESSION = "session_time"
-_DRIVEN, _PLANNED = (230, 120, 20), (128, 128, 128)
+_DRIVEN = (230, 120, 20)
 
 
 class LiveVehicle:
@@ -33,8 +33,7 @@ class LiveVehicle:
         self._driven: list[Pose] = []
         self._command: Command | None = None
         self._faults = 0
-        arrow = rr.Arrows3D(vectors=[[ARROW_M, 0.0, 0.0]], colors=[_DRIVEN], radii=[0.015])
-        recording.log(f"{LIVE}/vehicle", arrow, static=True)
+        recording.log(f"{LIVE}/vehicle", arrow(Pose(0.0, 0.0, 0.0), _DRIVEN, 0.015), static=True)
         recording.log(f"{LIVE}/command", rr.SeriesLines(names=list(Command._fields)), static=True)
 
     def show(self, state: RunnerState, plans: PlannedPaths | None) -> None:
@@ -53,8 +52,8 @@ class LiveVehicle:
         if (phase := f"{state.phase.value} {plain(run)}".strip()) != self._phase:
             self._phase = phase
             self._recording.log(f"{LIVE}/phase", rr.TextLog(phase))
-        for line in state.faults[len(state.faults) - min(state.fault_count - self._faults, len(state.faults)) :]:
-            self._recording.log(f"{FAULTS}/live", rr.TextLog(plain_sentences(line), level="WARN"))
+        for fault in state.faults_since(self._faults):
+            self._recording.log(f"{FAULTS}/live", rr.TextLog(plain_sentences(fault), level="WARN"))
         self._faults = state.fault_count
 
     def _log_command(self, command: Command, now_s: float) -> None:
@@ -80,8 +79,7 @@ class LiveVehicle:
             self._run, self._driven = state.run.run_id, []
             self._log_plan(pose, None if plans is None else plans.plan(state.run.trajectory.partition("-")[0]))
         self._driven.append(pose)
-        path = [[x_m, y_m, 0.0] for x_m, y_m, _ in self._driven]
-        self._recording.log(f"{LIVE}/path", rr.LineStrips3D([path], colors=[_DRIVEN], radii=[0.006]))
+        self._recording.log(f"{LIVE}/path", line(np.array(self._driven)[:, :2], _DRIVEN, 0.006))
 
     def _log_plan(self, start: Pose, plan: Plan | None) -> None:
         """Send plan and target of the run that begins at `start`; clear them where there is no plan."""
@@ -91,11 +89,5 @@ class LiveVehicle:
             for name in ("plan", "target"):
                 self._recording.log(f"{LIVE}/{name}", rr.Clear(recursive=False))
             return
-        c, s = math.cos(start.heading_rad), math.sin(start.heading_rad)
-        path = plan.expected[:, 1:3] @ np.array([[c, s], [-s, c]]) + np.array(start[:2])
-        line = rr.LineStrips3D([np.column_stack([path, np.zeros(len(path))])], colors=[_PLANNED], radii=[0.003])
-        self._recording.log(f"{LIVE}/plan", line)
-        target = start.compose(plan.target)
-        ahead = [ARROW_M * math.cos(target.heading_rad), ARROW_M * math.sin(target.heading_rad), 0.0]
-        arrow = rr.Arrows3D(vectors=[ahead], origins=[[*target[:2], 0.0]], colors=[_PLANNED], radii=[0.01])
-        self._recording.log(f"{LIVE}/target", arrow)
+        self._recording.log(f"{LIVE}/plan", line(start.place(plan.expected[:, 1:3]), PLANNED, 0.003))
+        self._recording.log(f"{LIVE}/target", arrow(start.compose(plan.target), PLANNED, 0.01))

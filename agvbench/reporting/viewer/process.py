@@ -138,7 +138,7 @@ class LiveView:
         said = b"" if process.stdout is None else process.stdout.read()
         if process.returncode != 0:
             why = said.decode(errors="replace").strip() or f"its process has ended (exit code {process.returncode})"
-            self._on_progress(f"no live view any more: {why}; the bench goes on without it")
+            self._on_progress(f"no live view any more: {why}; the bench continues without it")
         self._close_pipes(process)
 
     def _close_pipes(self, process: subprocess.Popen[bytes]) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from agvbench.errors import AgvbenchError, FitError
 from agvbench.metrics.measured_run import MeasuredRun, smooth_poses
 from agvbench.metrics.planned_paths import PlannedPaths
 from agvbench.planning import Workspace
-from agvbench.reporting.content import plain
+from agvbench.reporting.content import plain, plain_sentences
 from agvbench.running.configuration.settings import BenchSettings
 from agvbench.statistics.rest_poses import start_pose
 from agvbench.types import Commands, Floats, Pose, Run
@@ -21,10 +22,11 @@ if TYPE_CHECKING:
     import rerun as rr
 
 TIMELINE, PROGRESS = "run_time", "progress_mm"
-FLOOR = "/floor"
+FLOOR, FAULTS = "/floor", "/faults"
 ARROW_M = 0.25
 _RATE_HZ = 60.0
-_PLANNED = (128, 128, 128)
+PLANNED = (128, 128, 128)
+_ORIGIN = Pose(0.0, 0.0, 0.0)
 _COMMANDS, _RESIDUALS = ("drive", "front", "rear"), ("cross-track [mm]", "heading [deg]")
 
 
@@ -63,16 +65,15 @@ def send_floor(recording: rr.RecordingStream, workspace: Workspace | None) -> No
     recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     if workspace is not None:
         corners = _corners(workspace)
-        edge = rr.LineStrips3D([np.vstack([corners, corners[:1]])], colors=[_PLANNED], radii=[0.004])
+        edge = line(np.vstack([corners, corners[:1]]), PLANNED, 0.004)
         recording.log(f"{FLOOR}/workspace", edge, static=True)
 
 
 def _corners(workspace: Workspace) -> Floats:
-    """Return where successive edges of a workspace meet, shape (k, 3)."""
+    """Return where successive edges of a workspace meet, shape (k, 2)."""
     pairs = np.stack([workspace.normals, np.roll(workspace.normals, -1, axis=0)], axis=1)
     offsets = np.stack([workspace.offsets, np.roll(workspace.offsets, -1)], axis=1)
-    corners = np.linalg.solve(pairs, offsets[:, :, None])[:, :, 0]
-    return np.column_stack([corners, np.zeros(len(corners))])
+    return np.asarray(np.linalg.solve(pairs, offsets[:, :, None])[:, :, 0])
 
 
 def send_run(recording: rr.RecordingStream, run: Run, shown: str, plans: PlannedPaths) -> None:
@@ -96,9 +97,8 @@ def _send_motion(recording: rr.RecordingStream, entity: str, poses: Floats, run:
 
     rgb = [int(shown[i : i + 2], 16) for i in (1, 3, 5)]
     flat = np.column_stack([poses[:, 1:3], np.zeros(len(poses))])
-    recording.log(f"{entity}/path", rr.LineStrips3D([flat], colors=[rgb], radii=[0.004]), static=True)
-    arrow = rr.Arrows3D(vectors=[[ARROW_M, 0.0, 0.0]], colors=[rgb], radii=[0.012])
-    recording.log(f"{entity}/vehicle", arrow, static=True)
+    recording.log(f"{entity}/path", line(poses[:, 1:3], rgb, 0.004), static=True)
+    recording.log(f"{entity}/vehicle", arrow(_ORIGIN, rgb, 0.012), static=True)
     turn = np.column_stack([np.zeros((len(poses), 2)), np.sin(poses[:, 3] / 2), np.cos(poses[:, 3] / 2)])
     moved = rr.Transform3D.columns(translation=flat, quaternion=turn)
     recording.send_columns(f"{entity}/vehicle", indexes=[_time(poses[:, 0])], columns=moved)
@@ -116,22 +116,29 @@ def _on_floor(run: Run, path: Floats | None) -> tuple[Floats | None, Pose | None
     except FitError:
         return None, None
     target = start.compose(run.target) if run.target.is_finite else None
-    if path is None:
-        return None, target
-    c, s = np.cos(start.heading_rad), np.sin(start.heading_rad)
-    return path[:, 1:3] @ np.array([[c, s], [-s, c]]) + np.array(start[:2]), target
+    return None if path is None else start.place(path[:, 1:3]), target
 
 
 def _send_plan(recording: rr.RecordingStream, entity: str, path: Floats | None, target: Pose | None) -> None:
+    if path is not None:
+        recording.log(f"{entity}/plan", line(path, PLANNED, 0.002), static=True)
+    if target is not None:
+        recording.log(f"{entity}/target", arrow(target, PLANNED, 0.008), static=True)
+
+
+def line(points: Floats, rgb: Sequence[int], radius_m: float) -> rr.LineStrips3D:
+    """Return a line on the floor through `points`, shape (n, 2) [m]."""
     import rerun as rr
 
-    if path is not None:
-        line = rr.LineStrips3D([np.column_stack([path, np.zeros(len(path))])], colors=[_PLANNED], radii=[0.002])
-        recording.log(f"{entity}/plan", line, static=True)
-    if target is not None:
-        ahead = [ARROW_M * math.cos(target.heading_rad), ARROW_M * math.sin(target.heading_rad), 0.0]
-        arrow = rr.Arrows3D(vectors=[ahead], origins=[[*target[:2], 0.0]], colors=[_PLANNED], radii=[0.008])
-        recording.log(f"{entity}/target", arrow, static=True)
+    return rr.LineStrips3D([np.column_stack([points, np.zeros(len(points))])], colors=[rgb], radii=[radius_m])
+
+
+def arrow(pose: Pose, rgb: Sequence[int], radius_m: float) -> rr.Arrows3D:
+    """Return an arrow on the floor from a pose in the direction of its heading."""
+    import rerun as rr
+
+    ahead = [ARROW_M * math.cos(pose.heading_rad), ARROW_M * math.sin(pose.heading_rad), 0.0]
+    return rr.Arrows3D(vectors=[ahead], origins=[[*pose[:2], 0.0]], colors=[rgb], radii=[radius_m])
 
 
 def _send_residual(recording: rr.RecordingStream, entity: str, run: Run, path: Floats) -> None:
@@ -151,6 +158,21 @@ def _send_residual(recording: rr.RecordingStream, entity: str, run: Run, path: F
     recording.log(f"{entity}/residual", rr.SeriesLines(names=list(_RESIDUALS)), static=True)
     columns = rr.Scalars.columns(scalars=residual)
     recording.send_columns(f"{entity}/residual", indexes=[_time(at_s), progress], columns=columns)
+
+
+def send_fault(recording: rr.RecordingStream, time_s: float, level: str, line: str) -> None:
+    """Send a line about the time `time_s` of the campaign [s]; `level` as in the table of events."""
+    import rerun as rr
+
+    recording.set_time("campaign_time", duration=time_s)
+    recording.log(FAULTS, rr.TextLog(plain_sentences(line), level=level.upper()))
+
+
+def send_events(recording: rr.RecordingStream, rows: Iterable[Mapping[Any, Any]]) -> None:
+    """Send rows of the campaign's table of events as faults."""
+    for row in rows:
+        line = f"{row['run_id']} {row['source']} {row['event']}: {row['text']}"
+        send_fault(recording, float(row["time_s"]), str(row["level"]), line)
 
 
 def _steps(commands: Commands, until_s: float) -> tuple[Floats, Floats]:

@@ -21,12 +21,19 @@ from agvbench.bus.messages.runner_state import decode_runner_state
 from agvbench.campaign.header import FILE_NAME
 from agvbench.errors import AgvbenchError
 from agvbench.plot.style import colour, condition_numbers
-from agvbench.reporting.content import plain, plain_sentences
-from agvbench.reporting.viewer.blueprint import FAULTS, blueprint
+from agvbench.reporting.content import plain
+from agvbench.reporting.viewer.blueprint import blueprint
 from agvbench.reporting.viewer.campaign_follower import CampaignFollower
 from agvbench.reporting.viewer.live_vehicle import LiveVehicle
 from agvbench.reporting.viewer.process import viewer_command
-from agvbench.reporting.viewer.run_entities import Place, send_floor, send_run, session_workspace
+from agvbench.reporting.viewer.run_entities import (
+    Place,
+    send_events,
+    send_fault,
+    send_floor,
+    send_run,
+    session_workspace,
+)
 from agvbench.types import CONDITIONS
 
 if TYPE_CHECKING:
@@ -133,16 +140,8 @@ def _send_new(recording: rr.RecordingStream, follower: CampaignFollower) -> None
         if run.is_ok:
             send_run(recording, run, colour(numbers[run.condition]), plans)
         else:
-            _log_fault(recording, run.started_s, "WARN", f"{run.run_id}: {run.status}")
-    for time_s, level, line in follower.new_faults():
-        _log_fault(recording, time_s, level, line)
-
-
-def _log_fault(recording: rr.RecordingStream, time_s: float, level: str, line: str) -> None:
-    import rerun as rr
-
-    recording.set_time("campaign_time", duration=time_s)
-    recording.log(FAULTS, rr.TextLog(plain_sentences(line), level=level))
+            send_fault(recording, run.started_s, "warn", f"{run.run_id}: {run.status}")
+    send_events(recording, follower.new_events())
 
 
 def _flush(recording: rr.RecordingStream, viewer: Viewer) -> None:
