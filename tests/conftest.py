@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -32,6 +33,18 @@ settings.register_profile(
     derandomize=not ROUNDS,
 )
 settings.load_profile("agvbench")
+
+
+@pytest.fixture
+def free_port() -> Callable[[], int]:
+    """Return what finds a free port of this machine."""
+
+    def find() -> int:
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            return int(probe.getsockname()[1])
+
+    return find
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

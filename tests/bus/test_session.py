@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -45,7 +46,7 @@ def test_a_session_without_endpoints_opens_no_socket() -> None:
         assert list(session.info.transports()) == []
 
 
-def test_nobody_answers() -> None:
+def test_nobody_answers(free_port: Callable[[], int]) -> None:
     port = free_port()
     with pytest.raises(LinkError, match=f"connect tcp/127.0.0.1:{port}: no answer"):
         open_bus_session(connect=[f"tcp/127.0.0.1:{port}"], timeout_s=0.2)
@@ -61,7 +62,7 @@ def test_a_port_that_is_taken() -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_connections_that_never_say_who_they_are_do_not_lock_out_others() -> None:
+def test_connections_that_never_say_who_they_are_do_not_lock_out_others(free_port: Callable[[], int]) -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     address = parse_endpoint(endpoint)[1:]
     with open_bus_session(listen=[endpoint]), ExitStack() as idle:
@@ -70,15 +71,9 @@ def test_connections_that_never_say_who_they_are_do_not_lock_out_others() -> Non
         open_bus_session(connect=[endpoint]).close()
 
 
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 @pytest.mark.slow
 @pytest.mark.real_time
-def test_a_process_leaves_the_bus_without_an_error_where_a_receiver_takes_nothing() -> None:
+def test_a_process_leaves_the_bus_without_an_error_where_a_receiver_takes_nothing(free_port: Callable[[], int]) -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     with ExitStack() as stack:
 

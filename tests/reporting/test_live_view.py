@@ -36,10 +36,8 @@ BENCH = [
 
 
 @pytest.fixture
-def port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+def port(free_port: Callable[[], int]) -> int:
+    return free_port()
 
 
 def until(condition: Callable[[], bool], limit_s: float = 20.0) -> bool:
@@ -117,10 +115,10 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.filterwarnings("ignore:RRD file has no footer")
 def test_a_simulation_arrives_run_by_run(port: int, recorded: Path, tmp_path: Path) -> None:
-    told: list[str] = []
-    with sink(port, tmp_path / "sink.rrd") as server, live_view(recorded, server.url, told.append):
+    messages: list[str] = []
+    with sink(port, tmp_path / "sink.rrd") as server, live_view(recorded, server.url, messages.append):
         pass  # what is recorded by its end is sent
-    assert told == []
+    assert messages == []
     arrived = server.columns()
     assert "/floor/workspace" in arrived
     for run in Campaign.open(recorded):
@@ -175,11 +173,11 @@ def test_a_vehicle_in_real_time_is_shown_while_it_drives(port: int, recorded: Pa
 
 
 def test_a_viewer_that_dies_stops_nothing(port: int, tmp_path: Path) -> None:
-    told: list[str] = []
+    messages: list[str] = []
     path = tmp_path / "campaign"
     with sink(port, tmp_path / "sink.rrd") as server, session(path) as opened:
         drive(opened, "one")
-        with live_view(path, server.url, told.append) as view:
+        with live_view(path, server.url, messages.append) as view:
             size = server.path.stat().st_size
             assert until(lambda: server.path.stat().st_size > size + 20_000, 60.0), "the first run has arrived"
             server.end()
@@ -187,21 +185,21 @@ def test_a_viewer_that_dies_stops_nothing(port: int, tmp_path: Path) -> None:
             checked_s = time.monotonic()
             view.check()
             assert time.monotonic() - checked_s < 0.5
-            assert until(lambda: view.check() or bool(told), 60.0)
+            assert until(lambda: view.check() or bool(messages), 60.0)
         drive(opened, "three")
     assert len(Campaign.open(path)) == 3
-    (line,) = told
-    assert re.fullmatch(r"no live view any more: the Rerun viewer does not answer .*; the bench goes on .*", line)
+    (line,) = messages
+    assert re.fullmatch(r"no live view any more: the Rerun viewer does not answer .*; the bench continues .*", line)
 
 
 def test_a_window_that_cannot_open_is_one_line(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DISPLAY", ":77")
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    told: list[str] = []
-    with live_view(recorded, None, told.append) as view:
-        assert until(lambda: view.check() or bool(told), 60.0)
+    messages: list[str] = []
+    with live_view(recorded, None, messages.append) as view:
+        assert until(lambda: view.check() or bool(messages), 60.0)
     reason = "the Rerun viewer has failed (exit code 1); start rerun to see why"
-    assert told == [f"no live view any more: {reason}; the bench goes on without it"]
+    assert messages == [f"no live view any more: {reason}; the bench continues without it"]
 
 
 @pytest.mark.parametrize(
@@ -239,9 +237,9 @@ def test_a_process_that_hangs_holds_nobody_up(port: int, recorded: Path, tmp_pat
             number, source, "x", "1.0", Phase.DRIVING, 0.0, 1.0, faults=large, fault_count=8, results=results
         )
 
-    told: list[str] = []
+    messages: list[str] = []
     with sink(port, tmp_path / "sink.rrd") as server:
-        view = LiveView(recorded, server.url, told.append, state)
+        view = LiveView(recorded, server.url, messages.append, state)
         try:
             os.kill(view.pid, signal.SIGSTOP)
             time.sleep(2.0)  # more states than a pipe of 64 kB holds
@@ -252,4 +250,4 @@ def test_a_process_that_hangs_holds_nobody_up(port: int, recorded: Path, tmp_pat
             began_s = time.monotonic()
             view.close()
         assert time.monotonic() - began_s < 5.0
-    assert told == ["no live view any more: its process has ended (exit code -9); the bench goes on without it"]
+    assert messages == ["no live view any more: its process has ended (exit code -9); the bench continues without it"]

@@ -93,9 +93,9 @@ def test_the_same_vehicle_is_decided_before_the_last_repeat(lab, capsys):
     record = SequentialRecord.load(lab / "same")
     driven = len(Campaign.open(lab / "same").run_ids)
     assert 3 <= driven == record.repeats < REPEATS
-    told = [line for line in lines if line.startswith("after ")]
-    assert len(told) == len(record.analyses)
-    assert told[-1] == f"after {driven} of at most 8 repeats: 0 of 2 comparisons open; decided: no regression"
+    analyses = [line for line in lines if line.startswith("after ")]
+    assert len(analyses) == len(record.analyses)
+    assert analyses[-1] == f"after {driven} of at most 8 repeats: 0 of 2 comparisons open; decided: no regression"
     assert f"{driven} runs of trajectories driven, {REPEATS - driven} saved" in " ".join(lines)
 
 
@@ -162,17 +162,17 @@ def test_a_decided_session_that_is_resumed_drives_nothing(lab, capsys):
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "message"),
     [
         (["--margin-mm=7"], "--margin-mm: a resumed session keeps its margin: 7.0 (limit: 60.0)"),
         (["--against=begun"], "--against: a resumed session is compared with what it began with: begun"),
     ],
 )
-def test_a_resumed_session_keeps_its_plan(lab, options, told, capsys):
+def test_a_resumed_session_keeps_its_plan(lab, options, message, capsys):
     if not (lab / "begun").exists():
         until_decided("begun", *WIDE)
     assert main(["bench", "--resume", "--out=begun", "--no-report", *options]) == 2
-    assert told in capsys.readouterr().err
+    assert message in capsys.readouterr().err
 
 
 def test_until_cannot_be_added_to_a_session_that_began_without_it(capsys):
@@ -181,7 +181,7 @@ def test_until_cannot_be_added_to_a_session_that_began_without_it(capsys):
 
 
 @pytest.mark.parametrize(
-    ("options", "code", "told"),
+    ("options", "code", "message"),
     [
         (["--until=decided"], 2, "--until: nothing to compare with: decided; give --against DIR"),
         (["--fail-on=any"], 2, "--fail-on: nothing to compare with: any; give --against DIR"),
@@ -201,14 +201,14 @@ def test_until_cannot_be_added_to_a_session_that_began_without_it(capsys):
         (["--until=decided", "--against=incomplete"], 3, "incomplete is incomplete: 8 runs planned, 7 driven"),
     ],
 )
-def test_what_cannot_be_compared_is_said_before_anything_is_driven(lab, options, code, told, capsys, give_up):
+def test_what_cannot_be_compared_is_said_before_anything_is_driven(lab, options, code, message, capsys, give_up):
     if not (lab / "incomplete").exists():
         shutil.copytree(lab / "a", lab / "incomplete")
         give_up(lab / "incomplete", "mine-1-uncalibrated-r05")
     assert bench("never", *options) == code
     errors = capsys.readouterr().err
     assert errors.count("ERROR") == 1
-    assert told in errors
+    assert message in errors
     assert not (lab / "never").exists()
 
 
@@ -225,15 +225,15 @@ def test_until_takes_decided_only(capsys):
 
 
 @pytest.mark.parametrize(
-    ("rules", "code", "told"),
+    ("rules", "code", "message"),
     [
         (["--fail-on=position_error.median>1mm"], 1, "1 of 1 checks failed"),
         (["--fail-on=position_error.median>1000mm,regression"], 0, "0 of 1 checks failed"),
         ([], 0, "No regression shown"),
     ],
 )
-def test_a_gate_decides_the_exit_code_of_a_bench(lab, rules, code, told, capsys):
+def test_a_gate_decides_the_exit_code_of_a_bench(lab, rules, code, message, capsys):
     out = f"gate{code}{len(rules)}"
     assert bench(out, "--against=a", "--seed=3", *rules) == code
-    assert told in " ".join(capsys.readouterr().out.split())
+    assert message in " ".join(capsys.readouterr().out.split())
     assert Completeness.of(Campaign.open(lab / out)).is_complete

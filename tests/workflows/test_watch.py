@@ -7,12 +7,11 @@ import os
 import pty
 import re
 import signal
-import socket
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -35,10 +34,8 @@ COMMAND = [sys.executable, "-c", "import sys; from agvbench.cli import main; sys
 
 
 @pytest.fixture
-def endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+def endpoint(free_port: Callable[[], int]) -> str:
+    return f"tcp/127.0.0.1:{free_port()}"
 
 
 @contextmanager

@@ -55,7 +55,7 @@ class Bench:
     ``calibrate`` is called once, with the calibration runs that are still `awaited`, when the first order asks for the
     calibrated model; ``corrected`` is the model of the
     condition of that name, if there is one.
-    ``on_progress`` prints to the operator; ``status`` is told what the bench does.
+    ``on_progress`` prints to the operator; ``status`` keeps what the bench does.
     """
 
     def __init__(
