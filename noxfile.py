@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import time
 from pathlib import Path
 
 import nox
@@ -18,7 +17,6 @@ nox.options.reuse_existing_virtualenvs = True
 nox.options.sessions = ["lint", "tests", "docs"]
 
 LOCK = "requirements.lock"
-NIGHTS = Path("nightly")
 PYTHONS = ("3.11", "3.12", "3.13")
 SIDE_BY_SIDE = ("-n", "2", "--dist", "worksteal")
 FIRMWARE_PACKAGES = ["make", "gcc", "libc6-dev", "gcc-avr", "avr-libc", "simavr", "libsimavr-dev"]
@@ -39,19 +37,9 @@ def bench(session: nox.Session) -> None:
 
 @nox.session
 def nightly(session: nox.Session) -> None:
-    """Simulate a night, diagnose it, compare it with the last good one; it is the next good one if nothing failed."""
+    """Drive a night, diagnose it, compare it with the last good one: ``agvbench nightly``."""
     install(session)
-    night, last = NIGHTS / time.strftime("%F"), NIGHTS / "last_good.txt"
-    good = NIGHTS / last.read_text(encoding="utf-8").strip() if last.exists() else None
-    calibration = ["--calibration", f"{good}/vehicle.toml"] if good else []
-    session.run("agvbench", "bench", "--seed", "1", *calibration, "--out", str(night), *session.posargs)
-    session.run("agvbench", "diagnose", str(night), "--json", f"{night}/report/diagnosis.json")
-    session.run("agvbench", "history", str(NIGHTS))
-    if good:
-        gate = ["--fail-on", "regression", "--gate", "gate.toml"] if Path("gate.toml").exists() else []
-        files = ["--junit", f"{night}/report/compare.xml", "--markdown", f"{night}/report/compare.md"]
-        session.run("agvbench", "compare", str(good), str(night), *gate, *files)
-    last.write_text(f"{night.name}\n", encoding="utf-8")
+    session.run("agvbench", "nightly", "--seed", "1", *session.posargs)
 
 
 @nox.session

@@ -2,7 +2,7 @@
 
 numba by itself compiles a function again when the file of the function has changed, and not when a file has changed
 whose functions or constants are compiled into it. It lies in ``$NUMBA_CACHE_DIR`` or ``$AGVBENCH_CACHE``, else in the
-user's cache.
+user's cache. The light installation has no numba: functions are then run by Python, with the same results and slower.
 """
 
 from __future__ import annotations
@@ -19,9 +19,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numba
-from numba import config
-from numba.core import event
+try:
+    import numba
+    from numba.core import event
+except ModuleNotFoundError:  # the light installation
+    numba = None
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -30,13 +32,16 @@ COMPILING = "compiling the simulation to machine code (once per machine; takes u
 
 
 def cached_njit(**options: Any) -> Callable[[F], F]:
-    """Return ``numba.njit(cache=True, **options)`` for a function at module level.
+    """Return ``numba.njit(cache=True, **options)`` for a function at module level; without numba, the function itself.
 
     It is compiled again when its file changes, or one of the same package or of agvbench that this imports at its top,
     directly or not.
     """
 
     def decorate(function: F) -> F:
+        if numba is None:
+            return function
+        config = numba.config
         text = Path(inspect.getfile(function)).read_text(encoding="utf-8")
         digest = source_digest(text, "agvbench", function.__module__.partition(".")[0], module=function.__module__)
         with _LOCK:
@@ -53,24 +58,29 @@ def cached_njit(**options: Any) -> Callable[[F], F]:
 @contextmanager
 def announcing_compilation(on_progress: Callable[[str], None]) -> Iterator[None]:
     """Have `on_progress` say once that agvbench is compiled, where no machine code is kept: it takes up to a minute."""
-    with event.install_listener("numba:compile", _FirstCompilation(on_progress)):
+    if numba is None:
+        yield
+        return
+    with event.install_listener("numba:compile", _first_compilation(on_progress)):
         yield
 
 
-class _FirstCompilation(event.Listener):  # type: ignore[misc] # numba is not typed
-    """Reports the first function of agvbench that is compiled; one that is loaded from disk is no event."""
+def _first_compilation(on_progress: Callable[[str], None]) -> Any:
+    """Return what reports the first function of agvbench that is compiled; one loaded from disk is no event."""
 
-    def __init__(self, on_progress: Callable[[str], None]) -> None:
-        self._on_progress, self._reported = on_progress, False
+    class FirstCompilation(event.Listener):  # type: ignore[misc] # numba is not typed
+        reported = False
 
-    def on_start(self, event: Any) -> None:
-        module = event.data["dispatcher"].py_func.__module__
-        if not self._reported and module.startswith("agvbench."):
-            self._reported = True
-            self._on_progress(COMPILING)
+        def on_start(self, event: Any) -> None:
+            module = event.data["dispatcher"].py_func.__module__
+            if not self.reported and module.startswith("agvbench."):
+                self.reported = True
+                on_progress(COMPILING)
 
-    def on_end(self, event: Any) -> None:
-        """Nothing: the first run says that it goes on."""
+        def on_end(self, event: Any) -> None:
+            """Nothing: the first run says that it goes on."""
+
+    return FirstCompilation()
 
 
 def cache_directory() -> Path:

@@ -1,8 +1,9 @@
 """The command line: one file per command in this package, found by name.
 
-A command is a module with ``HELP`` (one line), ``add_arguments(parser)`` and ``run(arguments) -> int``. It
-imports nothing heavy at module level, so that ``agvbench --help`` stays instant; a module whose name starts with
-an underscore is not a command. Every user error ends as one line on standard error and exit code 2.
+A command is a module with ``HELP`` (one line), ``add_arguments(parser)`` and ``run(arguments) -> int``; ``PACKAGES``
+lists what it needs that the light installation leaves out. It imports nothing heavy at module level, so that ``agvbench
+--help`` stays instant; a module whose name starts with an underscore is not a command. Every user error ends as one
+line on standard error and exit code 2.
 """
 
 from __future__ import annotations
@@ -84,6 +85,22 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _require_packages(command: str) -> None:
+    """Refuse a command whose packages the light installation leaves out.
+
+    Raises
+    ------
+    FlagError
+        If one is missing.
+    """
+    import importlib.util
+
+    missing = [name for name in getattr(_commands()[command], "PACKAGES", ()) if importlib.util.find_spec(name) is None]
+    if missing:
+        value = f"missing: {', '.join(missing)}"
+        raise FlagError("needs more than the light installation", value=value, remedy="install agvbench as a whole")
+
+
 def _unknown_option(parser: argparse.ArgumentParser, command: str, given: str) -> FlagError:
     """Return what to say of an argument that the command does not have, with the nearest that it has."""
     if not given.startswith("-"):
@@ -161,6 +178,7 @@ def _run(given: Sequence[str]) -> int:
     _require_utf_8(given)
     if unknown:
         raise _unknown_option(parser, arguments.command, unknown[0])
+    _require_packages(arguments.command)
     return int(arguments.run(arguments))
 
 

@@ -20,6 +20,7 @@ import argparse
 from agvbench.cli import _adapter_arguments as shared
 
 HELP = "run an AGV adapter as its own process, or check it"
+PACKAGES = ("zenoh",)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -34,6 +34,7 @@ import argparse
 from agvbench.running.configuration.session_options import add_options
 
 HELP = "calibrate, drive the eight trajectories, write campaign and report"
+PACKAGES = ("numba", "zenoh")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

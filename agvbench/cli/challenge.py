@@ -20,6 +20,7 @@ import argparse
 from agvbench.running.configuration.session_options import whole_number
 
 HELP = "blind trials of the diagnosis on plants with a hidden effect"
+PACKAGES = ("numba", "zenoh")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -31,6 +31,7 @@ _OF_THE_RIG = (
     "--vehicle-name",
 )  # fmt: skip
 HELP = "find the physical effect that the vehicle model lacks"
+PACKAGES = ("numba",)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

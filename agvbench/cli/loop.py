@@ -34,6 +34,7 @@ import argparse
 from agvbench.running.configuration.session_options import OPTIONS, destination
 
 HELP = "bench, diagnose, correct the model, bench again: before and after"
+PACKAGES = ("numba", "zenoh")
 # The loop decides what is calibrated and corrected, and a calibration to the full is agvbench bench's.
 _DECIDED = {"--calibration", "--corrected", "--remainders", "--full"}
 

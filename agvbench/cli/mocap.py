@@ -22,6 +22,7 @@ from agvbench.errors import FlagError
 from agvbench.running.configuration.session_options import whole_number
 
 HELP = "run a motion capture adapter as its own process, or check it; decode or emulate a NatNet stream"
+PACKAGES = ("zenoh",)
 _TERMINAL_S, _VERBOSE_S = 1.0, 10.0
 
 

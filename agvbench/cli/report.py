@@ -29,16 +29,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the report and print its summary."""
+    from importlib.util import find_spec
+
     from agvbench.reporting.console.tables import print_report, wide_console
     from agvbench.reporting.write import write_report
 
     in_mm, in_deg = margins(arguments)
+    has_rerun = find_spec("rerun") is not None  # the light installation has not
     report = write_report(
         arguments.campaign,
         arguments.out,
         margin_mm=in_mm,
         margin_deg=in_deg,
-        recording=not arguments.no_recording,
+        recording=has_rerun and not arguments.no_recording,
     )
     print_report(wide_console(), report)
+    if not has_rerun and not arguments.no_recording:
+        print("campaign.rrd is left out: rerun-sdk is not installed")
     return 0

@@ -17,6 +17,7 @@ import argparse
 from agvbench.cli import _adapter_arguments as shared
 
 HELP = "run a simulated vehicle and its camera as their own process"
+PACKAGES = ("numba", "zenoh")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

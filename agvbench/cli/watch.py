@@ -18,6 +18,7 @@ import argparse
 from agvbench.running.configuration.session_options import number
 
 HELP = "show what a running bench does, here or on another machine"
+PACKAGES = ("zenoh",)
 _ENDPOINT = "tcp/127.0.0.1:7447"
 
 

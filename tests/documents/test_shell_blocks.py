@@ -34,7 +34,10 @@ SLOW = (
 )
 FILES_OF = {"docs/how-to/write-an-effect.md": "docs/how-to/bring-your-own-plant.md"}
 """The page whose files the reader of a page has already."""
-ELSEWHERE = {"docs/how-to/import-your-csv.md": "tests/campaign/test_campaign_how_to.py"}
+ELSEWHERE = {
+    "docs/how-to/import-your-csv.md": "tests/campaign/test_campaign_how_to.py",
+    "docs/how-to/install.md": "tests/packaging/test_install.py",
+}
 QUICK_WITHOUT = ("diagnose",)
 FULL = os.environ.get("AGVBENCH_DOCUMENTS") == "full"
 EVERY_BLOCK = os.environ.get("AGVBENCH_DOCUMENTS") in ("full", "blocks")

@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import site
-import subprocess
-import sys
-import venv
 import zipfile
 from pathlib import Path
 
@@ -18,39 +13,15 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory):
+def wheel(build_wheel):
     """The wheel that people install."""
-    out = tmp_path_factory.mktemp("dist")
-    command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(out)]
-    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
-    return next(out.glob("*.whl"))
+    return build_wheel(ROOT)
 
 
 @pytest.fixture(scope="module")
-def agvbench(wheel, tmp_path_factory):
+def agvbench(wheel, installed):
     """The command of an environment that has the wheel and this environment's dependencies, not this checkout."""
-    root = tmp_path_factory.mktemp("environment")
-    venv.create(root, with_pip=False)
-    packages = next((root / "lib").glob("python3*")) / "site-packages"
-    zipfile.ZipFile(wheel).extractall(packages)
-    # Only third-party packages: an editable install of the checkout would hide what the wheel lacks.
-    dependencies = root / "dependencies"
-    dependencies.mkdir()
-    for entry in Path(site.getsitepackages()[0]).iterdir():
-        if not entry.name.startswith(("agvbench", "_agvbench", "__editable__", "_editable")):
-            (dependencies / entry.name).symlink_to(entry)
-    # As a site directory: packages there may have files of paths themselves.
-    (packages / "dependencies.pth").write_text(f"import site; site.addsitedir({str(dependencies)!r})")
-    python = root / "bin" / "python"
-
-    def run(*arguments, cwd):
-        environment = {k: v for k, v in os.environ.items() if not k.startswith(("COV_", "PYTEST"))}
-        command = [str(python), "-c", "import sys; from agvbench.cli import main; sys.exit(main())", *arguments]
-        return subprocess.run(
-            command, check=False, cwd=cwd, env=environment, capture_output=True, text=True, timeout=300
-        )
-
-    return run
+    return installed(wheel)
 
 
 def test_the_wheel_carries_what_people_edit_and_no_more(wheel):

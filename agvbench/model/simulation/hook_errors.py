@@ -12,8 +12,6 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-import numba
-
 from agvbench.effects import TIME_HOOKS, Effect
 from agvbench.effects.base import Hook
 from agvbench.effects.declaration import source_of
@@ -41,6 +39,8 @@ def check_hooks(kinds: Iterable[type[Effect]]) -> None:
 
 
 def _check(kind: type[Effect], name: str, hook: Hook) -> None:
+    import numba  # not in the light installation, which simulates no vehicle
+
     is_time = name in TIME_HOOKS
     floats = (numba.float64,) * (is_time + len(kind.parameters()))
     function = compiled(inner=True)(hook)

@@ -1,0 +1,71 @@
+"""``agvbench nightly`` as it is called: two simulated nights, one that got worse, and files that name no night."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from agvbench.cli import main
+from agvbench.cli.nightly import last_good
+from agvbench.errors import FileError
+
+QUICK = ["-k", "trajectory and 1-un", "--repeats", "3", "--exchange", "2", "--no-report"]
+
+
+def _nightly(lab, *options):
+    command = [sys.executable, "-m", "agvbench", "nightly", *QUICK, *options]
+    environment = os.environ | {"COLUMNS": "200"}
+    return subprocess.run(command, cwd=lab, env=environment, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture
+def nights(tmp_path):
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "campaign.toml").touch()
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("listed", "tonight", "expected"),
+    [("", "one", None), ("one\n", "two", "one"), ("one\ntwo\n", "three", "two"), ("one\ntwo\n", "two", "one")],
+)
+def test_the_reference_is_the_newest_good_night_before_tonight(nights, listed, tonight, expected):
+    (nights / "good_nights.txt").write_text(listed)
+    assert last_good(nights, tonight) == (expected and nights / expected)
+
+
+@pytest.mark.parametrize("name", ["gone", "../elsewhere", "/etc"])
+def test_a_name_that_is_no_night_is_refused_before_anything_is_driven(nights, name, capsys):
+    (nights / "good_nights.txt").write_text(f"{name}\n")
+    with pytest.raises(FileError, match="names no campaign"):
+        last_good(nights, "tonight")
+    assert main(["nightly", "--nights", str(nights)]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert sorted(path.name for path in nights.iterdir()) == ["good_nights.txt", "one", "two"]
+
+
+def test_a_gate_with_a_mistake_is_refused_before_anything_is_driven(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "gate.toml").write_text("schema = 1\n[[rule]]\n")
+    assert main(["nightly"]) == 2
+    assert "unknown key 'rule'" in capsys.readouterr().err
+    assert not (tmp_path / "nightly").exists()
+
+
+def test_a_night_is_judged_by_the_one_before_and_kept_only_where_nothing_failed(tmp_path):
+    first = _nightly(tmp_path, "--date", "1")
+    assert first.returncode == 0, first.stdout + first.stderr
+    assert "the first night: compared with none; the last good night now" in first.stdout
+    same = _nightly(tmp_path, "--date", "2", "--seed", "7")
+    assert "compared with nightly/1" in same.stdout
+    (tmp_path / "gate.toml").write_text('schema = 1\n\n[[rules]]\nfail_on = "position_error.median>1mm"\n')
+    worse = _nightly(tmp_path, "--date", "3")
+    assert worse.returncode == 1, worse.stdout + worse.stderr
+    assert "not a good night; the reference stays" in worse.stdout
+    good = (tmp_path / "nightly" / "good_nights.txt").read_text().split()
+    assert good == ["1", "2"] if same.returncode == 0 else good == ["1"]
+    assert (tmp_path / "nightly" / "3" / "report" / "compare.xml").exists()
