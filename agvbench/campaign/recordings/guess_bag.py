@@ -12,13 +12,12 @@ from typing import Any
 import numpy as np
 
 from agvbench.campaign.recordings.bags.bag import Bag, Topic
-from agvbench.campaign.recordings.bags.bag_recording import POSE_FIELDS, read_poses_and_series
+from agvbench.campaign.recordings.bags.bag_recording import POSE_FIELDS, read_content
 from agvbench.campaign.recordings.bags.fields import numbers_in, stamp_ns
 from agvbench.campaign.recordings.guess_columns import (
     AGREES,
     MEASURED,
     Columns,
-    agreement,
     courses,
     mapping_text,
     plain,
@@ -65,7 +64,7 @@ def guess_bag_mapping(path: Path) -> tuple[str, list[str]]:
         columns = Columns(path, {})
         source = _pose(bag, columns.questions)
         signals = _signals(bag, columns, source)
-        poses, series = read_poses_and_series(bag, source, signals)
+        poses, series, _ = read_content(bag, source, signals)
     columns.numbers = {name: one.value for name, one in series.items()}
     columns.keys = {name: _keys(signal) for name, signal in signals.items()}
     position = np.column_stack([poses.x_m, poses.y_m])
@@ -176,7 +175,8 @@ def _time(message: Any, topic: Topic, questions: list[str]) -> Stamp:
 def _ask_about_heading(position: Floats, heading_rad: Floats, columns: Columns) -> None:
     moving, course = courses(position)
     difference = course - heading_rad[1:][moving]
-    if agreement(difference[np.isfinite(difference)]) < AGREES:
+    difference = difference[np.isfinite(difference)]
+    if len(difference) and np.mean(np.cos(2.0 * difference)) < AGREES:  # a vehicle may drive backward
         columns.questions.append("pose: the heading does not follow the direction of travel; which axis is forward?")
 
 

@@ -16,7 +16,7 @@ from agvbench.campaign.header import FILE_NAME, CampaignHeader
 from agvbench.campaign.manifest import sha256
 from agvbench.campaign.recordings.mapping import FileRule, Mapping, find_mapping, load_mapping
 from agvbench.campaign.recordings.reading import read_recording
-from agvbench.campaign.recordings.recording import Recording
+from agvbench.campaign.recordings.recording import Recording, recording_name
 from agvbench.campaign.recordings.segmentation import Account, account_for, cut, why_nothing
 from agvbench.campaign.tables.command_columns import by_role
 from agvbench.campaign.tables.motion_checks import check_motion
@@ -95,7 +95,7 @@ class _Clock:
     def begin(self, recording: Recording) -> float:
         """Return what to add to the recording's time."""
         if self._absolute or not len(recording):
-            return 0.0
+            return recording.origin_s
         offset = self._next_s - float(recording.t_s[0])
         self._next_s += float(recording.t_s[-1] - recording.t_s[0])
         return offset
@@ -114,10 +114,10 @@ def _distinct(files: Sequence[str | Path]) -> list[Path]:
     paths = [Path(file) for file in files]
     if not paths:
         raise FileError("no recordings were given", remedy="name one file or more")
-    stems = [path.stem for path in paths]
-    for path in paths:
-        if stems.count(path.stem) > 1:
-            raise FileError("two recordings have one name", where=path, value=path.stem, remedy="rename one")
+    names = [recording_name(path) for path in paths]
+    for path, name in zip(paths, names, strict=True):
+        if names.count(name) > 1:
+            raise FileError("two recordings have one name", where=path, value=name, remedy="rename one")
     return paths
 
 
@@ -145,7 +145,7 @@ def _run(recording: Recording, rows: slice, number: int, begin_s: float, mapping
     if defaults.command_hold_s is not None:
         extra["command_hold_s"] = defaults.command_hold_s
     return Run(
-        run_id=f"{recording.path.stem}-{number:03d}",
+        run_id=f"{recording.name}-{number:03d}",
         experiment=rule.experiment or defaults.experiment,
         trajectory=rule.trajectory or defaults.trajectory,
         condition=rule.condition or defaults.condition,
@@ -163,13 +163,13 @@ def _run(recording: Recording, rows: slice, number: int, begin_s: float, mapping
 
 def _session(recording: Recording, start_s: float, mapping: Mapping) -> str:
     if mapping.runs.session == "file":
-        return recording.path.stem
+        return recording.name
     if mapping.runs.session == "campaign":
         return mapping.name
-    if start_s < _YEAR_2000_S:
+    if recording.origin_s + start_s < _YEAR_2000_S:
         remedy = 'set runs.session to "file" or "campaign"'
         raise FileError("time does not count from 1970, so its day is unknown", where=recording.path, remedy=remedy)
-    return datetime.datetime.fromtimestamp(start_s, datetime.UTC).date().isoformat()
+    return datetime.datetime.fromtimestamp(recording.origin_s + start_s, datetime.UTC).date().isoformat()
 
 
 def _commands(recording: Recording, rows: slice, start_s: float) -> Commands:

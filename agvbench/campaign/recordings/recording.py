@@ -64,7 +64,8 @@ class Poses:
 class Recording:
     """A recording's rows; every array has shape (rows,).
 
-    ``files`` are the files that it was read from; ``commands`` are in command units and in the clock of the poses.
+    ``files`` are the files that it was read from; ``origin_s`` is what its times count from, in the clock that runs
+    through all recordings [s]; ``commands`` are in command units and in the clock of the poses.
     ``seen`` marks rows with a pose, ``jumped`` those of them that the gate refuses, ``driven`` rows that the vehicle
     drove by itself with a known command, ``cut`` numbers the stretches in which the cut column keeps its value.
     """
@@ -77,9 +78,15 @@ class Recording:
     jumped: Mask
     driven: Mask
     cut: NDArray[np.int64]
+    origin_s: float = 0.0
 
     def __len__(self) -> int:
         return len(self.poses.t_s)
+
+    @property
+    def name(self) -> str:
+        """The name of the recording, from which the ids of its runs are made."""
+        return recording_name(self.path)
 
     @property
     def t_s(self) -> Floats:
@@ -92,6 +99,15 @@ class Recording:
         return self.driven & self.seen & ~self.jumped
 
 
+def recording_name(path: Path) -> str:
+    """Return the name of a recording: that of its file without the ending, or of its directory.
+
+    >>> recording_name(Path("lab/monday.v2.csv"))
+    'monday.v2'
+    """
+    return path.name if path.is_dir() else path.stem
+
+
 def combine(
     path: Path,
     files: tuple[Path, ...],
@@ -100,6 +116,8 @@ def combine(
     commands: Named[str, Series],
     flags: Named[str, Mask],
     cut: NDArray[np.int64] | None = None,
+    *,
+    origin_s: float = 0.0,
 ) -> Recording:
     """Return the recording of these poses and commands (by role); a role without commands stays at neutral.
 
@@ -122,7 +140,8 @@ def combine(
         raise _apart(path, poses, together)
     known_s = together.t_s[0] if len(together) else np.inf
     driven = flags.get("driven", every) & (poses.t_s >= known_s)
-    return Recording(path, files, poses, together, seen, wild, driven, np.zeros(rows, np.int64) if cut is None else cut)
+    stretches = np.zeros(rows, np.int64) if cut is None else cut
+    return Recording(path, files, poses, together, seen, wild, driven, stretches, origin_s)
 
 
 def _together(commands: Named[str, Series], neutral: Named[str, float]) -> Commands:

@@ -6,7 +6,7 @@ from array import array
 from collections.abc import Iterator
 from collections.abc import Mapping as Named
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,16 +45,25 @@ def read_bag_recording(path: Path, mapping: Mapping) -> Recording:
         If the bag, a topic or a field is missing or cannot be read, stamps are zero, or time goes backwards.
     """
     with Bag(path) as bag:
-        poses, series = read_poses_and_series(bag, mapping.pose or PoseSource(), {**mapping.commands, **mapping.flags})
+        content = read_content(bag, mapping.pose or PoseSource(), {**mapping.commands, **mapping.flags})
         files = bag.files
-    commands = {role: series[role] for role in mapping.commands}
-    flags = {name: series[name].held_at(poses.t_s) == 1.0 for name in mapping.flags}
-    return combine(path, files, mapping, poses, commands, flags)
+    commands = {role: content.series[role] for role in mapping.commands}
+    flags = {name: content.series[name].held_at(content.poses.t_s) == 1.0 for name in mapping.flags}
+    return combine(path, files, mapping, content.poses, commands, flags, origin_s=content.origin_s)
 
 
-def read_poses_and_series(
-    bag: Bag, pose: PoseSource, signals: Named[str, Signal | Flag]
-) -> tuple[Poses, dict[str, Series]]:
+class BagContent(NamedTuple):
+    """Poses and, by name, commands and flags of a bag; their times count from ``origin_s`` [s since 1970].
+
+    In seconds since 1970 a float would resolve 0.2 µs only.
+    """
+
+    poses: Poses
+    series: dict[str, Series]
+    origin_s: float
+
+
+def read_content(bag: Bag, pose: PoseSource, signals: Named[str, Signal | Flag]) -> BagContent:
     """Return the poses, and the values of `signals` by name, from the messages of `bag`."""
     poses = _PoseTrack(bag, pose)
     tracks = {name: _SignalTrack(bag, signal) for name, signal in signals.items()}
@@ -64,7 +73,9 @@ def read_poses_and_series(
     for message in bag.messages(list(of_topic)):
         for track in of_topic[message.topic]:
             track.add(message)
-    return poses.poses(), {name: track.series() for name, track in tracks.items()}
+    rows, origin_ns = poses.poses()
+    series = {name: track.series(origin_ns) for name, track in tracks.items()}
+    return BagContent(rows, series, origin_ns * 1e-9)
 
 
 class _Track:
@@ -92,8 +103,11 @@ class _Track:
             raise FileError(what, where=self._path, limit=f"{MAX_MESSAGES}", remedy="split the bag")
         self._ns.append(received_ns if stamp is None else stamp)
 
-    def _in_order(self) -> tuple[NDArray[np.int64], Floats]:
-        """Return the order of the messages by time, and their times [s]; refuse a clock that was set back."""
+    def _in_order(self, origin_ns: int | None = None) -> tuple[NDArray[np.int64], Floats, int]:
+        """Return the order of the messages by time, and their times [s] since `origin_ns`, by default the first.
+
+        A clock that was set back is refused.
+        """
         ns = np.frombuffer(self._ns, np.int64) if len(self._ns) else np.empty(0, np.int64)
         back = np.flatnonzero(np.diff(ns) < -_DISORDER_S * 1e9)
         if len(back):
@@ -102,7 +116,8 @@ class _Track:
             remedy = 'split the bag there, or set time = "received"'
             raise FileError(what, where=self._path, value=f"{step_s:.6g} s", remedy=remedy)
         order = np.argsort(ns, kind="stable").astype(np.int64)
-        return order, np.asarray(ns[order] * 1e-9, np.float64)
+        origin_ns = int(ns[order[:1]].sum()) if origin_ns is None else origin_ns
+        return order, np.asarray((ns[order] - origin_ns) * 1e-9, np.float64), origin_ns
 
 
 class _SignalTrack(_Track):
@@ -131,9 +146,9 @@ class _SignalTrack(_Track):
             return float(str(found).strip().lower() == str(signal.equals).lower())
         return float(self._field.number(content) == signal.equals)
 
-    def series(self) -> Series:
-        """Return the values in order of their times."""
-        order, t_s = self._in_order()
+    def series(self, origin_ns: int) -> Series:
+        """Return the values in order of their times [s] since `origin_ns`."""
+        order, t_s, _ = self._in_order(origin_ns)
         return Series(t_s, np.array(self._values)[order])
 
 
@@ -177,15 +192,16 @@ class _PoseTrack(_Track):
                 value=", ".join(sorted(self._children)[:20]), remedy="name one in pose.child_frame_id",
             )  # fmt: skip
 
-    def poses(self) -> Poses:
-        """Return the poses in order of their times."""
-        order, t_s = self._in_order()
+    def poses(self) -> tuple[Poses, int]:
+        """Return the poses in order of their times [s] since the first, and when that was [ns since 1970]."""
+        order, t_s, origin_ns = self._in_order()
         if not len(order):
             has = ", ".join(sorted(self._children)[:20])
             what = f"topic {self.topic} has no pose of {self._source.child_frame_id} (it has {has})"
             raise FileError(what, where=self._path, remedy="correct pose.child_frame_id")
         rows, source = np.array(self._numbers).reshape(-1, 7)[order], self._source
-        return Poses.of(t_s, *floor_poses(rows[:, :3], rows[:, 3:], source.forward, source.floor_x, source.floor_y))
+        axes = (source.forward, source.floor_x, source.floor_y)
+        return Poses.of(t_s, *floor_poses(rows[:, :3], rows[:, 3:], *axes)), origin_ns
 
 
 def _pose(content: Any) -> tuple[float, ...]:
