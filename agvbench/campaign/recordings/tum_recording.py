@@ -29,7 +29,7 @@ def read_tum_recording(path: Path, mapping: Mapping) -> Recording:
     CampaignError
         If a cell of the CSV is not a number.
     """
-    assert mapping.pose is not None  # noqa: S101 - who calls this has looked
+    assert mapping.pose is not None  # noqa: S101 - read_recording has looked
     poses = read_tum(path, mapping.pose)
     beside = commands_beside(path)
     cells = Cells(beside, mapping)
