@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 MAPPING_FILE = "import.toml"
 POSE, PLAN, TARGET, TWIST, COMMAND = "/pose", "/plan", "/target", "/cmd_vel", "/command/"
 FRAME = "floor"
-_METADATA_VERSION: Final = 8  # 9 writes QoS in a form that ROS 2 Humble and Iron do not read
+_METADATA_VERSION: Final = 8  # 9, of newer ROS 2, states quality of service in another form
 _LONGEST_S = 1e9
 
 

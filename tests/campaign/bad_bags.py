@@ -127,7 +127,7 @@ CASES: Cases = {
     ),
     "mapping-pose-axes": ("a floor whose x and y are one axis", _mapping(_POSE, _POSE + '\nfloor_x = "-y"')),
     "bag-not-installed": ("a bag without the extra `ros`", _not_installed),
-    "bag-absent": ("a bag that does not exist", lambda: _import("b.bag")),
+    "bag-absent": ("a bag that does not exist", lambda: _import("b")),
     "bag-no-metadata": ("a directory that is no bag", _without("metadata.yaml")),
     "bag-no-file": ("a bag whose file was deleted", _without("b.mcap")),
     "bag-foreign": ("a file named `.mcap` that is none", _file("b.mcap", b"t,x,y\n0,0,0\n")),

@@ -24,6 +24,8 @@ def read_recording(path: Path, mapping: Mapping) -> Recording:
         If a cell is not a number.
     """
     of_bags = mapping.pose is not None and mapping.pose.topic is not None
+    if of_bags and not path.exists():
+        raise FileError("does not exist", where=path, remedy="give a bag")
     if of_bags != is_bag(path):
         kinds = ("is no ROS bag", "names topics") if of_bags else ("is a ROS bag", "names none of its topics")
         what = f"{kinds[0]}, but the mapping {kinds[1]}"
