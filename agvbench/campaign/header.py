@@ -191,10 +191,8 @@ class CampaignHeader:
                 error.what, where=place, value=error.value, limit=error.limit, remedy=error.remedy
             ) from None
 
-    def save(self, path: str | Path) -> None:
-        """Write ``campaign.toml``, renamed into place when whole, and list its hash."""
-        import tomli_w
-
+    def to_tables(self) -> dict[str, Any]:
+        """Return the content of ``campaign.toml``, from which `load` makes the same header."""
         described = channels_to_keys(self.channels, self.kinematics)
         of_channels = {key: described.pop(key) for key in ("channels",) if key in described}
         table: dict[str, Any] = {
@@ -214,7 +212,13 @@ class CampaignHeader:
         prediction = {"horizon_s": self.prediction_horizon_s, "stride_s": self.prediction_stride_s}
         if given := {key: value for key, value in prediction.items() if value is not None}:
             table["prediction"] = given
-        record(Path(path).parent, {Path(path).name: tomli_w.dumps(table).encode()})
+        return table
+
+    def save(self, path: str | Path) -> None:
+        """Write ``campaign.toml``, renamed into place when whole, and list its hash."""
+        import tomli_w
+
+        record(Path(path).parent, {Path(path).name: tomli_w.dumps(self.to_tables()).encode()})
 
 
 class Vehicle(msgspec.Struct, frozen=True):

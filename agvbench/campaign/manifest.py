@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -46,6 +46,13 @@ def sha256(path: Path) -> str:
     """Return the SHA-256 of a file, in hexadecimal."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def sha256_of_all(files: Sequence[Path]) -> str:
+    """Return the SHA-256 of a file; of several files that of the list of theirs, as ``sha256sum`` prints it."""
+    if len(files) == 1:
+        return sha256(files[0])
+    return hashlib.sha256(_lines({file.name: sha256(file) for file in files})).hexdigest()
 
 
 class Manifest:

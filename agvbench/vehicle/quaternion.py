@@ -109,6 +109,29 @@ def heading_of(quaternion: Floats, forward: Axis, floor_x: Axis, floor_y: Axis, 
     return np.where(defined, wrap_angle(np.arctan2(left, ahead)), np.nan)
 
 
+def floor_poses(
+    position: Floats, quaternion: Floats, forward: Axis, floor_x: Axis, floor_y: Axis
+) -> tuple[Floats, Floats, Floats]:
+    """Return x, y [m] and heading [rad] on the floor, each of shape (n,), of poses in a tracker's axes.
+
+    Parameters
+    ----------
+    position
+        Positions in tracker axes [m], shape (n, 3).
+    quaternion, forward, floor_x, floor_y
+        As of `heading_of`, `quaternion` of shape (n, 4).
+
+    Examples
+    --------
+    >>> x_m, y_m, heading_rad = floor_poses(
+    ...     np.array([[1.0, 0.2, -3.0]]), np.array([[0.0, 0.0, 0.0, 1.0]]), "x", "x", "-z")
+    >>> float(x_m[0]), float(y_m[0]), float(heading_rad[0])
+    (1.0, 3.0, 0.0)
+    """
+    x_m, y_m = (position @ _unit(axis) for axis in (floor_x, floor_y))
+    return np.asarray(x_m), np.asarray(y_m), heading_of(quaternion, forward, floor_x, floor_y)
+
+
 def _unit(axis: Axis) -> Floats:
     unit = np.zeros(3)
     unit["xyz".index(axis[-1])] = -1.0 if axis.startswith("-") else 1.0

@@ -9,12 +9,18 @@ from rich.console import Console
 from rich.progress import track
 
 from agvbench.campaign import Campaign, import_recordings
+from agvbench.campaign.recordings.bags.bag import is_bag
 from agvbench.campaign.recordings.guess import guess_mapping
+from agvbench.campaign.recordings.guess_bag import topic_lines
 from agvbench.errors import FileError
 
 
-def run_guess(files: Sequence[str], out: str) -> list[str]:
-    """Write the guessed mapping of one recording to the new file `out`; return the questions that it leaves.
+def run_guess(files: Sequence[str], out: str) -> tuple[list[str], list[str]]:
+    """Write the guessed mapping of one recording to the new file `out`.
+
+    Returns
+    -------
+    The topics of the recording if it is a bag, and the questions that the mapping leaves, one line each.
 
     Raises
     ------
@@ -29,12 +35,13 @@ def run_guess(files: Sequence[str], out: str) -> list[str]:
     path = Path(out)
     if path.exists():
         raise FileError("exists already", where=path, remedy="choose another file")
+    topics = topic_lines(Path(files[0])) if is_bag(Path(files[0])) else []
     text, questions = guess_mapping(files[0])
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise FileError(f"cannot be written ({error.strerror})", where=path, remedy="choose another file") from None
-    return questions
+    return topics, questions
 
 
 def run_import(mapping: str, files: Sequence[str], out: str) -> Campaign:

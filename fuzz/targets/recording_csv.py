@@ -20,7 +20,7 @@ class RecordingCsv(FileTarget):
     def __init__(self) -> None:
         super().__init__()
         from agvbench.campaign.recordings.mapping import load_mapping
-        from agvbench.campaign.recordings.recording import read_recording
+        from agvbench.campaign.recordings.reading import read_recording
         from agvbench.campaign.recordings.segmentation import cut
 
         self._mapping, self._recording, self._cut = load_mapping("dart"), read_recording, cut

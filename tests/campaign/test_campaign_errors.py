@@ -9,6 +9,7 @@ import contextlib
 import tempfile
 from pathlib import Path
 
+import bad_bags
 import bad_campaigns
 import bad_imports
 import pytest
@@ -17,14 +18,14 @@ from campaign_samples import MAPPING, recording, write_csv
 from agvbench.cli import main
 from agvbench.errors import AgvbenchError
 
-CASES = bad_campaigns.CASES | bad_imports.CASES
+CASES = bad_campaigns.CASES | bad_imports.CASES | bad_bags.CASES
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "errors-campaign.md"
 _INTRODUCTION = """\
 # Bad input: campaigns and recordings
 
 The table lists data that agvbench cannot read, record or import, each with its error message of one line. `c` is the
-directory of the campaign, `r.csv` a recording and `lab.toml` its mapping. Rows are counted from 1, without the header.
-Every case is a test.
+directory of the campaign, `r.csv` a recording, `b` a bag and `lab.toml` a mapping. Rows are counted from 1, without the
+header. Every case is a test.
 
 | case | input | message |
 |---|---|---|

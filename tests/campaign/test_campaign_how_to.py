@@ -1,4 +1,4 @@
-"""The how-to's example, executed block by block."""
+"""The how-tos' examples, executed block by block."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ import pytest
 from agvbench.campaign import Campaign
 from agvbench.cli import main
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "import-your-csv.md"
+HOW_TO = Path(__file__).resolve().parents[2] / "docs" / "how-to"
+PAGE, ROS_PAGE = HOW_TO / "import-your-csv.md", HOW_TO / "exchange-with-ros.md"
 
 
 def _execute(code: str) -> str:
@@ -51,3 +52,20 @@ def test_the_example_does_what_the_page_says(
         np.testing.assert_allclose(run.frames.y_m, 1.0 - np.cos(turn), atol=1e-9)
         np.testing.assert_allclose(np.unwrap(turn)[-1] - turn[0], 0.5 * run.frames.t_s[-1], atol=1e-9)
         assert math.isclose(run.commands.front[0], 1430.0)
+
+
+def test_the_example_of_a_bag_prints_what_the_page_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"```(\w+)\n(.*?)```", ROS_PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    _execute(next(text for language, text in blocks if language == "python"))
+    commands = [text.splitlines()[-1] for language, text in blocks if language == "sh"]
+    guess, account = [text for language, text in blocks if language == "text"][:2]
+    mapping = next(text for language, text in blocks if language == "toml")
+    for command, printed in ((commands[1], guess), (commands[2], account)):
+        program, *arguments = shlex.split(command)
+        assert program == "agvbench"
+        assert main(arguments) == 0
+        assert _lines(capsys.readouterr().out) == _lines(printed)
+    assert set(_lines(mapping)[1:]) <= set(_lines(Path("bag.toml").read_text(encoding="utf-8")))

@@ -12,6 +12,7 @@ from shell_blocks import blocks
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "how-to" / "write-an-adapter.md"
+ROS_PAGE = ROOT / "docs" / "how-to" / "exchange-with-ros.md"
 
 
 def run_tool(name: str, *arguments: str) -> None:
@@ -30,7 +31,11 @@ def examples(tmp_path_factory):
         if block.language == "python" and block.text.startswith('"""'):
             found.append(folder / block.file)
             found[-1].write_text(block.text, encoding="utf-8")
-    assert [file.name for file in found] == ["my_lab.py", "stand_in.py"]
+    for block in blocks(ROS_PAGE):
+        if block.file == "ros2_lab.py":
+            found.append(folder / block.file)
+            found[-1].write_text(block.text, encoding="utf-8")
+    assert [file.name for file in found] == ["my_lab.py", "stand_in.py", "ros2_lab.py"]
     return [str(file) for file in found]
 
 

@@ -18,6 +18,7 @@ from shell_blocks import execute, shell, write_files
 
 ROOT = Path(__file__).parents[2]
 QUICK = (
+    "docs/how-to/exchange-with-ros.md",
     "docs/how-to/nightly.md",
     "docs/how-to/watch-a-bench.md",
     "docs/how-to/write-a-trajectory.md",

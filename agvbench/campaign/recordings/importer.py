@@ -15,7 +15,8 @@ from agvbench.campaign.campaign import Campaign
 from agvbench.campaign.header import FILE_NAME, CampaignHeader
 from agvbench.campaign.manifest import sha256
 from agvbench.campaign.recordings.mapping import FileRule, Mapping, find_mapping, load_mapping
-from agvbench.campaign.recordings.recording import Recording, read_recording
+from agvbench.campaign.recordings.reading import read_recording
+from agvbench.campaign.recordings.recording import Recording, recording_name
 from agvbench.campaign.recordings.segmentation import Account, account_for, cut, why_nothing
 from agvbench.campaign.tables.command_columns import by_role
 from agvbench.campaign.tables.motion_checks import check_motion
@@ -47,7 +48,7 @@ def import_recordings(
     mapping_path
         A mapping file, or the name of one that ships with agvbench (``"dart"``).
     files
-        CSV files; their names become the runs' ids.
+        CSV files; with a mapping that has ``[pose]``, ROS bags or TUM files. Their names become the runs' ids.
     out
         A directory that does not exist yet or is empty.
     progress
@@ -66,7 +67,7 @@ def import_recordings(
     refuse_occupied(Path(out), "choose another directory")
     runs: list[Run] = []
     accounts: list[Account] = []
-    clock = _Clock(absolute=mapping.columns.time.clock == "absolute")
+    clock = _Clock(absolute=mapping.is_absolute)
     for path in progress(paths):
         recording = read_recording(path, mapping)
         pieces = cut(recording, mapping.runs)
@@ -94,7 +95,7 @@ class _Clock:
     def begin(self, recording: Recording) -> float:
         """Return what to add to the recording's time."""
         if self._absolute or not len(recording):
-            return 0.0
+            return recording.origin_s
         offset = self._next_s - float(recording.t_s[0])
         self._next_s += float(recording.t_s[-1] - recording.t_s[0])
         return offset
@@ -112,11 +113,11 @@ class _Clock:
 def _distinct(files: Sequence[str | Path]) -> list[Path]:
     paths = [Path(file) for file in files]
     if not paths:
-        raise FileError("no recordings were given", remedy="name one CSV file or more")
-    stems = [path.stem for path in paths]
-    for path in paths:
-        if stems.count(path.stem) > 1:
-            raise FileError("two recordings have one name", where=path, value=path.stem, remedy="rename one")
+        raise FileError("no recordings were given", remedy="name one file or more")
+    names = [recording_name(path) for path in paths]
+    for path, name in zip(paths, names, strict=True):
+        if names.count(name) > 1:
+            raise FileError("two recordings have one name", where=path, value=name, remedy="rename one")
     return paths
 
 
@@ -144,7 +145,7 @@ def _run(recording: Recording, rows: slice, number: int, begin_s: float, mapping
     if defaults.command_hold_s is not None:
         extra["command_hold_s"] = defaults.command_hold_s
     return Run(
-        run_id=f"{recording.path.stem}-{number:03d}",
+        run_id=f"{recording.name}-{number:03d}",
         experiment=rule.experiment or defaults.experiment,
         trajectory=rule.trajectory or defaults.trajectory,
         condition=rule.condition or defaults.condition,
@@ -162,38 +163,39 @@ def _run(recording: Recording, rows: slice, number: int, begin_s: float, mapping
 
 def _session(recording: Recording, start_s: float, mapping: Mapping) -> str:
     if mapping.runs.session == "file":
-        return recording.path.stem
+        return recording.name
     if mapping.runs.session == "campaign":
         return mapping.name
-    if start_s < _YEAR_2000_S:
+    if recording.origin_s + start_s < _YEAR_2000_S:
         remedy = 'set runs.session to "file" or "campaign"'
         raise FileError("time does not count from 1970, so its day is unknown", where=recording.path, remedy=remedy)
-    return datetime.datetime.fromtimestamp(start_s, datetime.UTC).date().isoformat()
+    return datetime.datetime.fromtimestamp(recording.origin_s + start_s, datetime.UTC).date().isoformat()
 
 
 def _commands(recording: Recording, rows: slice, start_s: float) -> Commands:
-    """Return the commands of these rows, one row for each change."""
-    values = np.column_stack([getattr(recording, name)[rows] for name in ("drive", "front", "rear")])
+    """Return the commands while these rows were recorded, one row for each change."""
+    commands = recording.commands
+    first = int(np.searchsorted(commands.t_s, start_s, side="right")) - 1  # given before, and held
+    last = int(np.searchsorted(commands.t_s, recording.t_s[rows.stop - 1], side="right"))
+    values = np.column_stack([commands.drive, commands.front, commands.rear])[first:last]
     changed = np.flatnonzero(np.r_[True, np.any(np.diff(values, axis=0) != 0.0, axis=1)])
-    t_s = recording.t_s[rows][changed] - start_s
-    last_of_its_time = np.r_[np.diff(t_s) > 0.0, True]
-    return Commands(t_s[last_of_its_time], *values[changed[last_of_its_time]].T)
+    return Commands(np.maximum(commands.t_s[first:last][changed] - start_s, 0.0), *values[changed].T)
 
 
 def _frames(recording: Recording, rows: slice, start_s: float) -> Frames:
-    tracked = (recording.seen & ~recording.jumped)[rows]
+    poses, tracked = recording.poses, (recording.seen & ~recording.jumped)[rows]
 
     def blank(values: Floats) -> Floats:
         return np.where(tracked, values[rows], np.nan)
 
     return Frames(
         t_s=recording.t_s[rows] - start_s,
-        x_m=blank(recording.x_m),
-        y_m=blank(recording.y_m),
-        heading_rad=blank(recording.heading_rad),
+        x_m=blank(poses.x_m),
+        y_m=blank(poses.y_m),
+        heading_rad=blank(poses.heading_rad),
         tracked=tracked,
-        frame=recording.frame[rows],
-        mean_error_m=recording.mean_error_m[rows],
+        frame=poses.frame[rows],
+        mean_error_m=poses.mean_error_m[rows],
         received_s=np.full(len(tracked), np.nan),
     )
 

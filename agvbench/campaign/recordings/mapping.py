@@ -74,10 +74,21 @@ class QuantityColumn(_Strict, frozen=True):
     offset: _Number = 0.0
 
 
-class Signal(_Strict, frozen=True):
-    """A command column: command = cell · scale + offset, in the unit of its channel."""
+Stamp = Literal["header", "received"]
+"""The time of a message: the stamp of its header, where its type has one, or when it was recorded."""
+
+
+class Source(_Strict, frozen=True):
+    """Where values come from: the column of a table, or a field, with dots, of the messages of a bag's ``topic``."""
 
     column: str
+    topic: str | None = None
+    time: Stamp = "header"
+
+
+class Signal(Source, frozen=True, kw_only=True):
+    """A command column: command = cell · scale + offset, in the unit of its channel."""
+
     scale: _Number = 1.0
     offset: _Number = 0.0
 
@@ -94,21 +105,37 @@ class Quaternion(_Strict, frozen=True):
     floor_y: Axis = "y"
 
 
-class Flag(_Strict, frozen=True):
+class Flag(Source, frozen=True, kw_only=True):
     """True on the rows whose cell equals a value."""
 
-    column: str
     equals: bool | int | float | str
 
 
-class Columns(_Strict, frozen=True):
-    """Which column is what."""
+class PoseSource(_Strict, frozen=True):
+    """The poses of a recording whose commands come from elsewhere: a topic of a bag, or else a TUM file.
 
-    time: Time
-    x: QuantityColumn
-    y: QuantityColumn
+    ``field`` is that of the pose in a message, with dots; by default that of its type. ``child_frame_id`` chooses among
+    transforms. The axes are those of `Quaternion`, for the position, too.
+    """
+
+    topic: str | None = None
+    field: str | None = None
+    child_frame_id: str | None = None
+    time: Stamp = "header"
+    clock: Literal["file", "absolute"] = "file"
+    forward: Axis = "x"
+    floor_x: Axis = "x"
+    floor_y: Axis = "y"
+
+
+class Columns(_Strict, frozen=True):
+    """Which column is what; time and pose are missing where ``[pose]`` says where they are."""
+
     drive: Signal
     front: Signal
+    time: Time | None = None
+    x: QuantityColumn | None = None
+    y: QuantityColumn | None = None
     rear: Signal | None = None
     heading: QuantityColumn | None = None
     quaternion: Quaternion | None = None
@@ -161,12 +188,32 @@ class Mapping(_Strict, frozen=True):
     vehicle: Vehicle
     mocap: Mocap
     columns: Columns
+    pose: PoseSource | None = None
     prediction: PredictionSettings | None = None
     channels: header.ChannelTables | None = None
     csv: Csv = Csv()
     gate: Gate | None = None
     runs: Runs = Runs()
     files: list[FileRule] = []
+
+    @property
+    def is_absolute(self) -> bool:
+        """Whether one clock runs through all files."""
+        source = self.pose or self.columns.time
+        return source is not None and source.clock == "absolute"
+
+    @property
+    def commands(self) -> dict[str, Signal]:
+        """The commands that are mapped, by role."""
+        columns = self.columns
+        signals = {"drive": columns.drive, "front": columns.front, "rear": columns.rear}
+        return {role: signal for role, signal in signals.items() if signal is not None}
+
+    @property
+    def flags(self) -> dict[str, Flag]:
+        """What says which rows count, by name."""
+        flags = {"driven": self.columns.driven, "tracked": self.columns.tracked}
+        return {name: flag for name, flag in flags.items() if flag is not None}
 
     def header(self, path: Path) -> CampaignHeader:
         """Return the campaign's head by this mapping, read from `path`; raise `CampaignError` if it is impossible."""
@@ -206,7 +253,7 @@ def load_mapping(name: str | Path) -> Mapping:
         raise FileError(f"is not TOML ({error})", where=path, remedy="correct the line") from None
     except OSError as error:
         raise FileError(f"cannot be read ({error.strerror})", where=path, remedy="check its permissions") from None
-    mapping = convert(table, Mapping, where=str(path), remedy="see docs/how-to/import-your-csv.md")
+    mapping = convert(table, Mapping, where=str(path), remedy=_SEE)
     _check(mapping, path)
     return mapping
 
@@ -214,37 +261,58 @@ def load_mapping(name: str | Path) -> Mapping:
 def quantities(mapping: Mapping) -> Iterator[tuple[str, QuantityColumn, dict[str, float]]]:
     """Yield each measured column that is mapped: its name, its declaration and the units it may have."""
     columns = mapping.columns
-    yield "x", columns.x, LENGTH
-    yield "y", columns.y, LENGTH
-    if columns.heading:
-        yield "heading", columns.heading, ANGLE
-    if columns.mean_error:
-        yield "mean_error", columns.mean_error, LENGTH
+    known = {"x": LENGTH, "y": LENGTH, "heading": ANGLE, "mean_error": LENGTH}
+    for name, units in known.items():
+        quantity: QuantityColumn | None = getattr(columns, name)
+        if quantity is not None:
+            yield name, quantity, units
 
 
 def _check(mapping: Mapping, path: Path) -> None:
-    columns = mapping.columns
     if mapping.schema != SCHEMA:
         remedy = "install a newer agvbench" if mapping.schema > SCHEMA else f"set schema = {SCHEMA}"
         raise FileError("schema is unknown", where=path, value=mapping.schema, limit=str(SCHEMA), remedy=remedy)
-    if (columns.heading is None) == (columns.quaternion is None):
-        remedy = "give one of columns.heading and columns.quaternion"
-        raise FileError("heading is given twice or not at all", where=path, remedy=remedy)
+    _check_sources(mapping, path)
     for name, quantity, known in quantities(mapping):
         factor(quantity.unit, known, f"{path}: columns.{name}.unit")
-    if columns.time.unit != ISO_8601:
+    columns = mapping.columns
+    if columns.time and columns.time.unit != ISO_8601:
         factor(columns.time.unit, {**TIME, ISO_8601: 1.0}, f"{path}: columns.time.unit")
     if mapping.csv.delimiter not in _DELIMITERS:
         raise FileError(
             "csv.delimiter cannot separate cells", where=path, value=repr(mapping.csv.delimiter),
             limit=OneOf(map(repr, _DELIMITERS)), remedy="save the recording with one of these",
         )  # fmt: skip
-    if columns.quaternion and columns.quaternion.floor_x[-1] == columns.quaternion.floor_y[-1]:
-        where = f"{path}: columns.quaternion"
-        raise FileError("floor_x and floor_y are one axis", where=where, remedy="give two of x, y, z")
+    for name, axes in {"columns.quaternion": columns.quaternion, "pose": mapping.pose}.items():
+        if axes and axes.floor_x[-1] == axes.floor_y[-1]:
+            raise FileError("floor_x and floor_y are one axis", where=f"{path}: {name}", remedy="give two of x, y, z")
     mapping.header(path)
 
 
+def _check_sources(mapping: Mapping, path: Path) -> None:
+    """Check that time, pose and commands have one source each: a CSV; topics of a bag; or a TUM file and a CSV."""
+    columns, pose = mapping.columns, mapping.pose
+    is_bag = pose is not None and pose.topic is not None
+    for name in ("time", "x", "y"):
+        if getattr(columns, name) is None and (pose is None or (name == "time" and not is_bag)):
+            raise FileError(f"key {name!r} is missing", where=f"{path}: columns", remedy=_SEE)
+    if pose is None and (columns.heading is None) == (columns.quaternion is None):
+        remedy = "give one of columns.heading and columns.quaternion"
+        raise FileError("heading is given twice or not at all", where=path, remedy=remedy)
+    unused = ["x", "y", "heading", "quaternion", "mean_error", "frame", "cut"] + ["time"] * is_bag
+    for name in unused if pose else []:
+        if getattr(columns, name) is not None:
+            remedy = "delete it, or [pose]"
+            raise FileError(f"columns.{name} has no meaning beside [pose]", where=path, remedy=remedy)
+    for name, source in {**mapping.commands, **mapping.flags}.items():
+        if is_bag and source.topic is None:
+            raise FileError("key 'topic' is missing", where=f"{path}: columns.{name}", remedy=_SEE_ROS)
+        if source.topic is not None and not is_bag:
+            remedy = "give pose.topic, too, or delete it"
+            raise FileError("names a topic where no pose does", where=f"{path}: columns.{name}", remedy=remedy)
+
+
+_SEE, _SEE_ROS = (f"see docs/how-to/{page}.md" for page in ("import-your-csv", "exchange-with-ros"))
 LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}
 ANGLE = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0, "turn": 2.0 * math.pi}
 TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9}

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.campaign.manifest import sha256
+from agvbench.campaign.manifest import sha256_of_all
 from agvbench.campaign.recordings.mapping import Runs
 from agvbench.campaign.recordings.recording import Recording
 from agvbench.types import Floats
@@ -66,7 +66,7 @@ def account_for(recording: Recording, pieces: list[slice]) -> Account:
         "used": int(np.count_nonzero(used)),
         "runs": len(pieces),
         "seconds": round(sum(float(recording.t_s[rows.stop - 1] - recording.t_s[rows.start]) for rows in pieces), 2),
-        "sha256": sha256(recording.path),
+        "sha256": sha256_of_all(recording.files),
     }
 
 

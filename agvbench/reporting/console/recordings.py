@@ -33,8 +33,10 @@ def print_import(campaign: Campaign, console: Console) -> None:
     console.print(f"runs: {len(campaign)}, sessions: {sessions}, campaign: {campaign.path}", soft_wrap=True)
 
 
-def print_guess(path: str, questions: Iterable[str], console: Console) -> None:
-    """Print where the guessed mapping is, and what it leaves to answer."""
+def print_guess(path: str, topics: Iterable[str], questions: Iterable[str], console: Console) -> None:
+    """Print the topics of a bag, where the guessed mapping is, and what it leaves to answer."""
+    for topic in topics:
+        console.print(topic, soft_wrap=True, highlight=False, markup=False)
     console.print(f"wrote {path}", soft_wrap=True, highlight=False)
     for question in questions:
         console.print(f"  ? {question}", soft_wrap=True, highlight=False, markup=False)
