@@ -83,13 +83,16 @@ def _await_port(port: int, limit_s: float = 120.0) -> None:
         time.sleep(0.1)
 
 
+_NO_PAGE = ("--no-dashboard", "--dashboard-address", "127.0.0.1:0")
+
+
 class DaskCluster:
     """A scheduler and workers as processes of this machine, over TCP on loopback."""
 
     def __init__(self, folder: Path, port: int, *more: str) -> None:
         self.address, self._folder = f"tcp://127.0.0.1:{port}", folder
         self._more, self._processes = more, list[subprocess.Popen[bytes]]()
-        self._start("scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-show", "--no-dashboard")
+        self._start("scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-show", *_NO_PAGE)
         _await_port(port)
 
     def add_worker(self, *more: str) -> subprocess.Popen[bytes]:

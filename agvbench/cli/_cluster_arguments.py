@@ -22,7 +22,7 @@ def add_cluster_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--insecure",
         action="store_true",
-        help="use tcp:// to another machine: whoever is on that network can then run programs here",
+        help="use tcp:// to another machine: every machine of that network can then run programs here",
     )
     for flag, text in (
         ("--tls-ca-file", "certificate of the authority, for tls://"),

@@ -71,8 +71,13 @@ def run_task(function: Callable[..., object], arguments: tuple[Any, ...], versio
     except AgvbenchError as error:
         return msgspec.msgpack.encode(_Answer(cause=_in_one_line(str(error)) or type(error).__name__))
     except (Exception, SystemExit) as error:  # noqa: BLE001 - one task must not end the others
-        return msgspec.msgpack.encode(_Answer(cause=_raised(error), is_internal=True))
+        return failure(error)
     return msgspec.msgpack.encode(_Answer(result=result))
+
+
+def failure(error: BaseException) -> bytes:
+    """Return the answer of a task that raised an error which is not the user's."""
+    return msgspec.msgpack.encode(_Answer(cause=_raised(error), is_internal=True))
 
 
 def outcome_of(key: Key, answer: object, kind: type[Result]) -> Outcome[Key, Result]:

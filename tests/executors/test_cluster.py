@@ -117,7 +117,7 @@ def test_what_a_worker_returns_is_validated(answer):
     assert "\n" not in outcome.cause
 
 
-REFUSED = "whoever answers at this address can run programs here"
+REFUSED = "a program that answers at this address can run code here"
 
 
 @pytest.mark.parametrize(

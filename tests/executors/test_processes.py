@@ -38,6 +38,16 @@ def test_a_result_of_another_type_is_a_failure():
     assert "is no int" in run(executed.text, [(1,)])[0].cause
 
 
+def test_a_function_that_a_process_cannot_import_is_a_failure_with_its_cause(tmp_path, monkeypatch):
+    (tmp_path / "passing.py").write_text("def passes(n): return n")
+    monkeypatch.syspath_prepend(tmp_path)
+    from passing import passes
+
+    (tmp_path / "passing.py").unlink()
+    found = run(passes, [(1,), (2,)], jobs=1)
+    assert [found[n].cause.partition(" (")[0] for n in (0, 1)] == ["ModuleNotFoundError: No module named 'passing'"] * 2
+
+
 def test_a_process_that_dies_is_replaced_and_its_task_run_again(tmp_path):
     found = run(executed.dies, [(str(tmp_path), n, n) for n in range(3)])
     assert found == {n: Done(n, n + 1) for n in range(3)}

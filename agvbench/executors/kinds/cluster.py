@@ -68,7 +68,7 @@ class ClusterExecutor(Executor):
             require_certificates(options)
         elif not (is_loopback(host) or options.insecure):
             raise FlagError(
-                "whoever answers at this address can run programs here, without encryption or certificates",
+                "a program that answers at this address can run code here, without encryption or certificates",
                 where=FLAG, value=options.address, limit="tcp:// on loopback, or tls:// with certificates",
                 remedy="use tls://, or add --insecure on a network that you trust",
             )  # fmt: skip
@@ -103,7 +103,7 @@ class ClusterExecutor(Executor):
                 yield self._outcome(future, self._held.pop(future), kind)
 
     def close(self) -> None:
-        """Cancel what is in flight, and leave; what a worker has begun it ends, and nobody reads it."""
+        """Cancel what is in flight, and leave; what a worker has begun it ends, and its result is dropped."""
         with suppress(Exception):  # the scheduler may be gone
             if self._held:
                 self._client.cancel(list(self._held), force=True)

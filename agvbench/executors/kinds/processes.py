@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 
 from agvbench.errors import FlagError
 from agvbench.executors.executor import RETRIES, Executor, ExecutorOptions, in_flight
-from agvbench.executors.task import VERSIONS, Failed, Key, Outcome, Result, Task, outcome_of, run_task
+from agvbench.executors.task import VERSIONS, Failed, Key, Outcome, Result, Task, failure, outcome_of, run_task
 
 # Not a fork, which would copy the locks of threads that it does not copy, such as those of the bus; nor a spawn of
 # multiprocessing, which would run the user's script once more.
@@ -150,8 +150,18 @@ def serve(number: int) -> None:
     with suppress(EOFError, OSError, _Left):
         sys.path[:] = connection.recv()
         while True:
-            function, arguments, versions = connection.recv()
-            connection.send_bytes(run_task(function, arguments, versions))
+            connection.send_bytes(_answer(connection))
+
+
+def _answer(connection: Connection) -> bytes:
+    """Return the answer to the next task; the failure of one whose function this process cannot import."""
+    try:
+        function, arguments, versions = connection.recv()
+    except (EOFError, OSError):
+        raise
+    except Exception as error:  # noqa: BLE001 - whatever the module raises that is imported
+        return failure(error)
+    return run_task(function, arguments, versions)
 
 
 def _leave(*_: object) -> None:

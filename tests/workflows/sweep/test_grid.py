@@ -138,7 +138,7 @@ def test_a_missing_grid_bad_jobs_and_a_full_directory_are_one_line(folder, capsy
     assert main(["sweep", "grid.toml", "--out", "s", "--resume"]) == 2
     assert "--resume --out: no sweep to resume: s; leave out --resume" in capsys.readouterr().err
     assert main(["sweep", "grid.toml", "--out", "s", "--cluster", "tcp://10.0.0.1:8786"]) == 2
-    assert "--cluster: whoever answers at this address can run programs here" in capsys.readouterr().err
+    assert "--cluster: a program that answers at this address can run code here" in capsys.readouterr().err
     assert not (folder / "s").exists()
 
 
