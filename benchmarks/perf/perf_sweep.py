@@ -20,6 +20,7 @@ import tracemalloc
 from collections.abc import Callable
 from operator import index
 from pathlib import Path
+from random import Random
 
 import msgspec
 from distributed import LocalCluster
@@ -113,13 +114,22 @@ def _run_all(executor: object, tasks: int) -> None:
         raise SystemExit(failed[0].cause)
 
 
+def _another(result: CellResult, draw: Random) -> CellResult:
+    rows = [
+        msgspec.structs.replace(row, medians={name: draw.uniform(0.0, 100.0) for name in row.medians})
+        for row in result.rows
+    ]
+    return msgspec.structs.replace(result, rows=tuple(rows), sha256=draw.randbytes(32).hex())
+
+
 def _print_result_costs(folder: Path, result: CellResult, cells: int) -> None:
-    """Print what recording, resuming and writing take for many cells, all with one result."""
+    """Print what recording, resuming and writing take for many cells, with random numbers in the form of `result`."""
     folder.mkdir()
     grid = Grid(("trajectories",), {}, (Axis("seed", "", range(cells)),))
     first = header(grid.digest, "", diagnose=False)
     store = CellStore.create(folder, first)
-    recorded_s = _timed(lambda: [store.add(Line(cell, result)) for cell in range(cells)])
+    lines = [Line(cell, _another(result, Random(cell))) for cell in range(cells)]  # noqa: S311
+    recorded_s = _timed(lambda: [store.add(line) for line in lines])
     store.close()
     resumed: list[CellStore] = []
     resumed_s = _timed(lambda: resumed.append(CellStore.resume(folder, first, cells)))

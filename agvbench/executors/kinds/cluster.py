@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import math
+import time
 import uuid
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
 _PATIENCE_S = 15.0
+_REFRESH_S = 2.0
 _QUEUED = 2
 """Tasks in flight for each worker: one that runs, and one that waits while the client reads an answer."""
 
@@ -45,6 +48,7 @@ class ClusterExecutor(Executor):
     def __init__(self, client: Client, address: str) -> None:
         self._client, self._address = client, address
         self._held: dict[Future[bytes], Any] = {}
+        self._known, self._asked_s = 1, -math.inf
 
     @classmethod
     def check(cls, options: ExecutorOptions) -> None:
@@ -90,7 +94,7 @@ class ClusterExecutor(Executor):
 
         coming = iter(tasks)
         while True:
-            for task in in_flight(coming, len(self._held), _QUEUED * max(1, len(self._client.nthreads()))):
+            for task in in_flight(coming, len(self._held), _QUEUED * self._workers()):
                 self._held[self._submitted(task)] = task.key
             if not self._held:
                 return
@@ -110,6 +114,13 @@ class ClusterExecutor(Executor):
         self._held.clear()
         with suppress(Exception):
             self._client.close(timeout=_PATIENCE_S)
+
+    def _workers(self) -> int:
+        """Return how many workers there are, at least one; the scheduler is asked from time to time."""
+        now_s = time.monotonic()
+        if now_s >= self._asked_s + _REFRESH_S:
+            self._known, self._asked_s = max(1, len(self._client.nthreads())), now_s
+        return self._known
 
     def _submitted(self, task: Task[Any]) -> Future[bytes]:
         key = f"agvbench-{task.function.__name__}-{uuid.uuid4().hex}"
