@@ -76,7 +76,7 @@ def test_options_of_the_plant_are_kept_and_not_to_be_contradicted(tmp_path):
     for dry_run in (True, False):
         with (
             pytest.raises(
-                FlagError, match="--plant-option: not an option of agvbench.simulator:make_plant: 'backlsh_m'"
+                FlagError, match=r"--plant-option: not an option of agvbench\.simulator:make_plant: 'backlsh_m'"
             ),
             open_session(wrong, out=str(tmp_path / "c"), resume=False, dry_run=dry_run),
         ):
