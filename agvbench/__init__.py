@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from agvbench.types import Pose, Run
     from agvbench.workflows.comparison.compare import compare
     from agvbench.workflows.history import History, history
+    from agvbench.workflows.sweep import sweep
 
 __version__ = "0.2.0"
 __all__ = [
@@ -50,6 +51,7 @@ __all__ = [
     "plot",
     "pose_errors",
     "simulate",
+    "sweep",
     "valid",
     "write_report",
 ]
@@ -69,6 +71,7 @@ if not TYPE_CHECKING:  # mypy would take any name for an attribute of a module w
         "types": ("Pose", "Run"),
         "workflows.comparison.compare": ("compare",),
         "workflows.history": ("History", "history"),
+        "workflows.sweep": ("sweep",),
     }
     _HOMES = {name: package for package, names in _PACKAGES.items() for name in names}
 

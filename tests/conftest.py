@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import os
 import socket
-from collections.abc import Callable
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -70,6 +73,77 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if ROUNDS and hasattr(metafunc.function, "hypothesis"):
         metafunc.fixturenames.append("exploration_round")
         metafunc.parametrize("exploration_round", range(1, ROUNDS + 1))
+
+
+def _await_port(port: int, limit_s: float = 120.0) -> None:
+    end = time.monotonic() + limit_s
+    while time.monotonic() < end:
+        with suppress(OSError), socket.create_connection(("127.0.0.1", port), 1.0):
+            return
+        time.sleep(0.1)
+
+
+_NO_PAGE = ("--no-dashboard", "--dashboard-address", "127.0.0.1:0")
+
+
+class DaskCluster:
+    """A scheduler and workers as processes of this machine, over TCP on loopback."""
+
+    def __init__(self, folder: Path, port: int, *more: str) -> None:
+        self.address, self._folder = f"tcp://127.0.0.1:{port}", folder
+        self._more, self._processes = more, list[subprocess.Popen[bytes]]()
+        self._start("scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-show", *_NO_PAGE)
+        _await_port(port)
+
+    def add_worker(self, *more: str) -> subprocess.Popen[bytes]:
+        """Start a worker with one thread, or with the options `more`."""
+        options = ("--no-nanny", "--no-dashboard", "--local-directory", str(self._folder))
+        return self._start("worker", self.address, *options, *(more or ("--nthreads", "1")))
+
+    def close(self) -> None:
+        """End all processes that were started."""
+        for process in self._processes:
+            process.kill()
+            process.wait()
+
+    def _start(self, what: str, *arguments: str) -> subprocess.Popen[bytes]:
+        program = "import sys; from dask.__main__ import main; sys.exit(main())"
+        command = [sys.executable, "-W", "ignore", "-c", program, what, *arguments, *self._more]
+        helpers = [str(Path(__file__).parent / name) for name in ("executors", "workflows")]
+        path = os.pathsep.join([*helpers, os.environ.get("PYTHONPATH", "")])
+        log = (self._folder / f"{what}-{len(self._processes)}.log").open("wb")
+        environment = os.environ | {"PYTHONPATH": path}
+        with log:
+            process = subprocess.Popen(command, stdout=log, stderr=log, env=environment, cwd=self._folder)
+        self._processes.append(process)
+        return process
+
+
+@pytest.fixture(scope="session")
+def start_cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., DaskCluster]]:
+    """Return what starts a scheduler without workers, with further options of both."""
+    pytest.importorskip("distributed")
+    started = []
+
+    def start(*more: str) -> DaskCluster:
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            port = int(probe.getsockname()[1])
+        started.append(DaskCluster(tmp_path_factory.mktemp("dask"), port, *more))
+        return started[-1]
+
+    yield start
+    for cluster in started:
+        cluster.close()
+
+
+@pytest.fixture(scope="session")
+def dask_cluster(start_cluster: Callable[..., DaskCluster]) -> DaskCluster:
+    """Return a scheduler with two workers that no test ends."""
+    cluster = start_cluster()
+    for _ in range(2):
+        cluster.add_worker()
+    return cluster
 
 
 @pytest.fixture

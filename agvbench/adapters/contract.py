@@ -41,8 +41,9 @@ class AdapterOptions:
     ----------
     vehicle
         The vehicle's name.
-    plant
-        ``MODULE:FACTORY`` or ``FILE.py:FACTORY`` of a simulated vehicle.
+    plant, plant_options
+        ``MODULE:FACTORY`` or ``FILE.py:FACTORY`` of a simulated vehicle, and keyword arguments of the factory by name
+        (``--plant-option NAME=VALUE``); values of a command line are texts.
     seed
         Of the campaign: with a run's key it seeds all that is random in that run.
     channels
@@ -59,6 +60,7 @@ class AdapterOptions:
 
     vehicle: str = "agv1"
     plant: str = DEFAULT_PLANT
+    plant_options: Mapping[str, str | float] = field(default_factory=dict)
     seed: int = 0
     channels: Channels = field(default_factory=lambda: Channels.alike("us"))
     calibration_hash: str = ""
@@ -223,9 +225,14 @@ NO_POSES = np.empty((0, 3))
 
 
 def camera_options(pairs: Iterable[str]) -> dict[str, str]:
-    """Return the camera's parameters by name.
+    """Return the camera's parameters by name, as `named_values` reads them."""
+    return named_values(pairs, "--camera")
 
-    >>> camera_options(["lost=0.01,rate_hz=240", "up=z"])
+
+def named_values(pairs: Iterable[str], flag: str) -> dict[str, str]:
+    """Return what an option `flag` gives by name.
+
+    >>> named_values(["lost=0.01,rate_hz=240", "up=z"], "--camera")
     {'lost': '0.01', 'rate_hz': '240', 'up': 'z'}
 
     Raises
@@ -237,9 +244,7 @@ def camera_options(pairs: Iterable[str]) -> dict[str, str]:
     for pair in filter(None, ",".join(pairs).split(",")):
         name, equals, value = pair.partition("=")
         if not (name and equals and value):
-            raise FlagError(
-                "not a parameter and its value", where="--camera", value=repr(pair), remedy="write NAME=VALUE"
-            )
+            raise FlagError("not a parameter and its value", where=flag, value=repr(pair), remedy="write NAME=VALUE")
         options[name] = value
     return options
 

@@ -23,6 +23,7 @@ def open_rig(
     mocap: str = "sim",
     *,
     plant: str = DEFAULT_PLANT,
+    plant_options: Mapping[str, str | float] | None = None,
     seed: int = 0,
     connect: str | Sequence[str] | None = None,
     listen: Sequence[str] = (),
@@ -42,7 +43,7 @@ def open_rig(
     ----------
     agv, mocap
         Adapter specifications, ``SCHEME`` or ``SCHEME:ADDRESS``; not used with `connect`.
-    plant, seed, channels, calibration_hash, camera
+    plant, plant_options, seed, channels, calibration_hash, camera
         For the adapters (`AdapterOptions`). With `connect`, a simulator that runs with another seed is refused.
     connect
         Endpoints of adapters that run as their own processes, as ``"tcp/127.0.0.1:7447"``; None hosts them here, with
@@ -72,6 +73,7 @@ def open_rig(
             options = AdapterOptions(
                 vehicle=vehicle,
                 plant=plant,
+                plant_options=plant_options or {},
                 seed=seed,
                 channels=channels or Channels.alike("us"),
                 calibration_hash=calibration_hash,

@@ -30,7 +30,7 @@ class SimulatedAgv(AgvAdapter):
     def open(cls, address: str, options: AdapterOptions) -> Self:
         """Make the plant that `address`, else the options, name."""
         options = replace(options, plant=address or options.plant)
-        return cls(load_plant(options.plant)(options.seed), options)
+        return cls(load_plant(options.plant, options.plant_options)(options.seed), options)
 
     def identity(self) -> AgvIdentity:
         """Return the plant's identity."""

@@ -6,7 +6,6 @@ on between all its clients; every other session is a peer.
 
 from __future__ import annotations
 
-import ipaddress
 import json
 import re
 from collections.abc import Iterator, Sequence
@@ -17,6 +16,7 @@ from agvbench.bus.bus_config import BusConfig
 from agvbench.bus.certificates import why_not
 from agvbench.bus.messages.codec import MAX_MESSAGE_BYTES
 from agvbench.errors import LinkError, OneOf
+from agvbench.loopback import is_loopback
 
 if TYPE_CHECKING:
     import zenoh
@@ -49,20 +49,6 @@ def parse_endpoint(endpoint: str, where: str = "endpoint") -> tuple[str, str, in
     if not 0 < port < 65536:
         raise LinkError("port is out of range", where=f"{where} {endpoint}", value=port, limit="1 to 65535")
     return protocol, host, port
-
-
-def is_loopback(host: str) -> bool:
-    """Whether `host` can only be reached from this machine.
-
-    >>> is_loopback("127.0.0.1"), is_loopback("::1"), is_loopback("0.0.0.0")
-    (True, True, False)
-    """
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
 
 
 def is_open_to_all(endpoint: str, config: BusConfig | None = None, where: str = "listen") -> bool:

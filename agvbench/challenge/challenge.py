@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import subprocess
 import sys
 import tempfile
 import time
 import traceback
 from collections.abc import Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from dataclasses import asdict, replace
-from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from agvbench.challenge.scores import Scores, plain, score
 from agvbench.challenge.trial import Trial
 from agvbench.errors import AgvbenchError, FileError, FlagError, PlantError
+from agvbench.executors import Executor, ExecutorOptions, Failed, Outcome, Task, open_executor
 from agvbench.running.configuration.benchmark_files import EXCITATION_RUNS
 from agvbench.simulator.hidden import SealedTruth, indistinguishable_effects, sealed_truth
 from agvbench.simulator.hidden.catalogue import CATALOGUE, NOTHING, recipes
@@ -51,8 +49,11 @@ def run_challenge(
     jobs: int | None,
     json_file: str | None,
     resume: bool = False,
+    cluster: ExecutorOptions | None = None,
 ) -> Scores:
     """Hold the trials with a progress bar, and write the scores if asked for.
+
+    They are held in `jobs` processes, or on a `cluster`; the trials are the same but for their times.
 
     The file is written anew after each trial, so that an interruption loses those under way only; with `resume` the
     trials that it holds are not held again.
@@ -63,6 +64,8 @@ def run_challenge(
         If a number is out of range or a name unknown.
     FileError
         If the JSON file cannot be written or, to resume, read.
+    LinkError
+        If a cluster cannot be used.
     """
     if resume and json_file is None:
         raise FlagError("needs the file to go on with", where="--resume", remedy="add --json FILE")
@@ -87,10 +90,11 @@ def run_challenge(
     done = {one: trial for one, trial in known.items() if trial.verdict != _ERROR}
     wanted = [(s, n) for n in range(first_seed, first_seed + seeds) for s in specs or (NOTHING, *CATALOGUE, *PAIRS)]
     missing = [one for one in wanted if one not in done]
-    for trial in _held(missing, repeats, jobs or os.cpu_count() or 1):
-        done[trial.spec, trial.seed] = trial
-        if file is not None:
-            write_trials(file, repeats, list(done.values()))
+    with open_executor(replace(cluster or ExecutorOptions(), jobs=jobs or 0)) as executor:
+        for trial in _held(missing, repeats, executor):
+            done[trial.spec, trial.seed] = trial
+            if file is not None:
+                write_trials(file, repeats, list(done.values()))
     return score([done[one] for one in sorted(wanted)])
 
 
@@ -179,25 +183,35 @@ def _drive(spec: str, seed: int, repeats: int, directory: Path) -> None:
         raise PlantError("the bench could not drive this plant", where=f"{spec}, seed {seed}", value=said[-300:])
 
 
-def _held(wanted: Sequence[tuple[str, int]], repeats: int, jobs: int) -> Iterator[Trial]:
+def _held(wanted: Sequence[tuple[str, int]], repeats: int, executor: Executor) -> Iterator[Trial]:
     from rich.console import Console
     from rich.progress import track
 
     console = Console(stderr=True)
-    trials = _as_they_end(wanted, repeats, jobs)
-    yield from track(trials, "blind trials", len(wanted), console=console, disable=not console.is_terminal)
+    tasks = (Task(one, hold_trial, (*one, repeats)) for one in wanted)
+    outcomes = executor.run(tasks, Trial)
+    for outcome in track(outcomes, "blind trials", len(wanted), console=console, disable=not console.is_terminal):
+        yield _trial_of(outcome)
 
 
-def _as_they_end(wanted: Sequence[tuple[str, int]], repeats: int, jobs: int) -> Iterator[Trial]:
-    """Hold as many trials at a time as there are jobs; none waits in a queue that an interruption had to work off."""
-    coming = iter(wanted)
-    with ProcessPoolExecutor(jobs) as pool:
-        held = {pool.submit(hold_trial, *one, repeats) for one in islice(coming, jobs)}
-        while held:
-            ended, held = wait(held, return_when=FIRST_COMPLETED)
-            held |= {pool.submit(hold_trial, *one, repeats) for one in islice(coming, len(ended))}
-            for future in ended:
-                yield future.result()
+def _trial_of(outcome: Outcome[tuple[str, int], Trial]) -> Trial:
+    """Return a trial; one whose worker died, again and again, has the answer ``"ERROR"``.
+
+    Raises
+    ------
+    RuntimeError
+        If holding it failed otherwise: an error of the bench or the diagnosis is an answer, this is one of agvbench.
+    """
+    from agvbench.diagnosis import Diagnosis, Verdict
+
+    if not isinstance(outcome, Failed):
+        return outcome.result
+    if outcome.was_raised:
+        raise RuntimeError(outcome.cause)
+    spec, seed = outcome.key
+    unanswered = Diagnosis(Verdict.NOT_IDENTIFIABLE, outcome.cause)
+    trial = unsealed(spec, seed, sealed_truth(spec, seed), unanswered, math.nan)
+    return replace(trial, verdict=_ERROR, error=outcome.cause)
 
 
 SCHEMA = 1

@@ -50,6 +50,13 @@ def add_vehicle_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="MODULE_OR_FILE:FACTORY",
         help="what drives in the simulation (default: %(default)s)",
     )
+    group.add_argument(
+        "--plant-option",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="set a parameter of the plant, such as understeer_s2_per_m2=0.05; several with commas, or again",
+    )
     group.add_argument("--command-unit", choices=("us", "normalised"), help="what it understands (default: us)")
     group.add_argument("--neutral", type=number, metavar="COMMAND", help="where it stands still (default: 1500 or 0)")
     group.add_argument(
@@ -106,7 +113,10 @@ def endpoints(arguments: argparse.Namespace, default_listen: str) -> dict[str, l
 
 def vehicle_options(arguments: argparse.Namespace) -> dict[str, Any]:
     """Return what `add_vehicle_arguments` declares."""
-    return {"plant": arguments.plant, "channels": _channels(arguments)}
+    from agvbench.adapters.contract import named_values
+
+    plant_options = named_values(arguments.plant_option, "--plant-option")
+    return {"plant": arguments.plant, "plant_options": plant_options, "channels": _channels(arguments)}
 
 
 def _channels(arguments: argparse.Namespace) -> Channels:

@@ -11,12 +11,15 @@ examples:
   agvbench challenge --seeds 300 --only nothing               how often a name is given where nothing is hidden
   agvbench challenge --seeds 10 --json challenge.json --resume --markdown   what a whole file says, as tables
   agvbench challenge --first-seed 5000                        unseen vehicles
+  agvbench challenge --seeds 10 --json challenge.json --cluster tcp://127.0.0.1:8786
+                                                              on the workers of a Dask cluster
 """
 
 from __future__ import annotations
 
 import argparse
 
+from agvbench.cli._cluster_arguments import add_cluster_arguments, executor_options
 from agvbench.running.configuration.session_options import whole_number
 
 HELP = "blind trials of the diagnosis on plants with a hidden effect"
@@ -37,6 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", metavar="FILE", dest="json_file", help="write scores and every trial there")
     parser.add_argument("--markdown", action="store_true", help="print the scores as Markdown")
     parser.add_argument("--resume", action="store_true", help="go on with the trials that the JSON file lacks")
+    add_cluster_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -54,6 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
         jobs=arguments.jobs,
         json_file=arguments.json_file,
         resume=arguments.resume,
+        cluster=executor_options(arguments),
     )
     if arguments.markdown:
         print(scores_markdown(scores), end="")

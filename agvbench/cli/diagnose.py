@@ -27,8 +27,8 @@ import argparse
 from agvbench.running.configuration.session_options import OPTIONS, destination, whole_number
 
 _OF_THE_RIG = (
-    "--agv", "--mocap", "--camera", "--plant", "--place", "--workspace", "--connect", "--bus-config", "--lab",
-    "--vehicle-name",
+    "--agv", "--mocap", "--camera", "--plant", "--plant-option", "--place", "--workspace", "--connect", "--bus-config",
+    "--lab", "--vehicle-name",
 )  # fmt: skip
 HELP = "find the physical effect that the vehicle model lacks"
 PACKAGES = ("numba",)

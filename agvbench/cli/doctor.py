@@ -22,8 +22,8 @@ _ON_THE_BUS = "on the bus"
 HELP = "look whether vehicle, cameras and this machine are ready"
 PACKAGES = ("zenoh",)
 _OF_THE_RIG = (
-    "--agv", "--mocap", "--camera", "--plant", "--steering", "--vehicle", "--calibration", "--corrected", "--seed",
-    "--place", "--workspace", "--connect", "--bus-config", "--lab", "--vehicle-name",
+    "--agv", "--mocap", "--camera", "--plant", "--plant-option", "--steering", "--vehicle", "--calibration",
+    "--corrected", "--seed", "--place", "--workspace", "--connect", "--bus-config", "--lab", "--vehicle-name",
 )  # fmt: skip
 
 

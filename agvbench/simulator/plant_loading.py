@@ -7,23 +7,29 @@ import difflib
 import importlib
 import importlib.util
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from types import ModuleType
+from types import MappingProxyType, ModuleType
+from typing import Any
 
 from agvbench.errors import PlantError
 from agvbench.simulator.checked_plant import CheckedPlant, as_plant_error, raised
+from agvbench.simulator.plant_options import plant_keywords
 from agvbench.types import PlantFactory
 
 _SAMPLED = ("agvbench.simulator.hidden:", "agvbench.simulator:random_", "agvbench.simulator.plants:random_")
 _FORM = "write MODULE:FACTORY or path/to/FILE.py:FACTORY"
+_NO_OPTIONS: Mapping[str, str | float] = MappingProxyType({})
 
 
 class CheckedFactory:
-    """A plant factory whose plants are `CheckedPlant`; ``name`` is what the user wrote."""
+    """A plant factory whose plants are `CheckedPlant`; ``name`` is what the user wrote.
 
-    def __init__(self, factory: PlantFactory, name: str) -> None:
-        self._factory, self.name = factory, name
+    It is called with the keyword arguments `keywords` beside the seed.
+    """
+
+    def __init__(self, factory: PlantFactory, name: str, keywords: Mapping[str, Any] = _NO_OPTIONS) -> None:
+        self._factory, self.name, self.keywords = factory, name, keywords
 
     def __call__(self, seed: int) -> CheckedPlant:
         """Return a plant.
@@ -34,13 +40,13 @@ class CheckedFactory:
             If the factory raises, or returns what is no plant.
         """
         try:
-            plant = self._factory(seed)
+            plant = self._factory(seed, **self.keywords)
         except BaseException as error:
             raise raised(error, self.name) from error
         return CheckedPlant(plant, self.name)
 
 
-def load_plant(spec: str) -> CheckedFactory:
+def load_plant(spec: str, options: Mapping[str, str | float] = _NO_OPTIONS) -> CheckedFactory:
     """Return the factory that `spec` names, its plants checked.
 
     Parameters
@@ -48,12 +54,16 @@ def load_plant(spec: str) -> CheckedFactory:
     spec
         ``"package.module:factory"`` or ``"path/to/file.py:factory"``. The factory is called with a seed and returns a
         plant (`agvbench.types.Plant`). A file may import its neighbours, a module may lie in the working directory.
+    options
+        Keyword arguments of the factory, by name, as texts or numbers (`agvbench.simulator.plant_options`).
 
     Raises
     ------
     PlantError
         If the form is wrong, the file or module is missing or fails on import, or the attribute is missing or cannot
         be called.
+    FlagError
+        If the factory has no such option, or an option's value is not of its type.
 
     Examples
     --------
@@ -78,7 +88,7 @@ def load_plant(spec: str) -> CheckedFactory:
             f"factory cannot be called, it is of type {type(factory).__name__}", where=spec,
             remedy="name a function of a seed that returns a plant",
         )  # fmt: skip
-    return CheckedFactory(factory, spec)
+    return CheckedFactory(factory, spec, plant_keywords(factory, options, spec))
 
 
 def seed_samples_vehicle(spec: str) -> bool:

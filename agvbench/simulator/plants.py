@@ -11,6 +11,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from agvbench.simulator.plant_parameters import DIFFERENTIAL, TWO_AXLES, takes, varied
 from agvbench.simulator.random_streams import random_stream
 from agvbench.simulator.vehicle_parameters import (
     Battery,
@@ -124,25 +125,32 @@ SMALL_VEHICLE = SimulatedVehicle(
 of the DART vehicle (Delft); every other constant is free."""
 
 
-def make_plant(seed: int) -> VehiclePlant:
-    """Return the default plant: the thesis' vehicle. Commands in µs, 900…2100, neutral 1500."""
-    return _plant(THESIS_VEHICLE, seed)
+@takes(TWO_AXLES)
+def make_plant(seed: int, **parameters: float | None) -> VehiclePlant:
+    """Return the default plant: the thesis' vehicle. Commands in µs, 900…2100, neutral 1500.
+
+    Here and below `parameters` replace the vehicle's own constants, under the names of
+    `agvbench.simulator.plant_parameters`; None leaves the vehicle's own.
+    """
+    return _plant(THESIS_VEHICLE, seed, parameters)
 
 
-def small_plant(seed: int) -> VehiclePlant:
+@takes(TWO_AXLES)
+def small_plant(seed: int, **parameters: float | None) -> VehiclePlant:
     """Return a small front-steered car. Commands −1…1, neutral 0; `rear` does nothing."""
-    return _plant(SMALL_VEHICLE, seed)
+    return _plant(SMALL_VEHICLE, seed, parameters)
 
 
-def random_plant(seed: int) -> VehiclePlant:
+@takes(TWO_AXLES)
+def random_plant(seed: int, **parameters: float | None) -> VehiclePlant:
     """Return a vehicle drawn at random round the thesis' one; see `random_vehicle`."""
-    return _plant(random_vehicle(seed), seed)
+    return _plant(random_vehicle(seed), seed, parameters)
 
 
-def _plant(vehicle: SimulatedVehicle, seed: int) -> VehiclePlant:
+def _plant(vehicle: SimulatedVehicle, seed: int, parameters: Mapping[str, float | None]) -> VehiclePlant:
     from agvbench.simulator.vehicle_plant import VehiclePlant  # loads numba
 
-    return VehiclePlant(vehicle, seed)
+    return VehiclePlant(varied(vehicle, TWO_AXLES, parameters), seed)
 
 
 def random_vehicle(seed: int) -> SimulatedVehicle:
@@ -197,18 +205,20 @@ def _random_side(full_mps: float, draw: Draw) -> DriveSide:
     return DriveSide(dead_band, knee, full_mps * (reach + knee) / reach, full_mps, draw(0.8, 1.5))
 
 
-def differential_plant(seed: int) -> DifferentialPlant:
+@takes(DIFFERENTIAL)
+def differential_plant(seed: int, **parameters: float | None) -> DifferentialPlant:
     """Return a small robot with two driven wheels. `drive` is a speed [m/s], `front` a yaw rate [rad/s]."""
     from agvbench.simulator.differential import DifferentialPlant, DifferentialVehicle  # loads numba
 
-    return DifferentialPlant(DifferentialVehicle(), seed)
+    return DifferentialPlant(varied(DifferentialVehicle(), DIFFERENTIAL, parameters), seed)
 
 
-def random_differential_plant(seed: int) -> DifferentialPlant:
+@takes(DIFFERENTIAL)
+def random_differential_plant(seed: int, **parameters: float | None) -> DifferentialPlant:
     """Return a differential vehicle drawn at random; see `agvbench.simulator.differential.random_differential`."""
     from agvbench.simulator.differential import DifferentialPlant, random_differential
 
-    return DifferentialPlant(random_differential(seed), seed)
+    return DifferentialPlant(varied(random_differential(seed), DIFFERENTIAL, parameters), seed)
 
 
 PLANTS: Mapping[str, PlantFactory] = MappingProxyType(

@@ -170,7 +170,7 @@ def emulate(options: AdapterOptions, version: str, multicast: str | None, port: 
 
 
 def _stream(server: Emulator, camera: Camera, options: AdapterOptions, stopped: list[int]) -> None:
-    plant = load_plant(options.plant)(options.seed)
+    plant = load_plant(options.plant, options.plant_options)(options.seed)
     plant.reset((0.0, 0.0, 0.0), seed=options.seed)
     tracker = camera.tracker(np.random.default_rng(options.seed))
     clock, period_s, number = WallClock(), 1.0 / camera.rate_hz, 0

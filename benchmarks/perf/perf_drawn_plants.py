@@ -1,46 +1,47 @@
-"""What calibration buys on vehicles drawn at random: whole bench sessions on ``random_plant``, one a seed.
+"""What calibration buys on vehicles drawn at random: a sweep of bench sessions on ``random_plant``, one a seed.
 
 For each trajectory with both conditions: is the calibrated median of end position error, heading error and |Δs| smaller
 than the uncalibrated one?
-Prints the share over all plants and trajectories, and every exception. ``--plants 20 --repeats 10`` by default.
+Prints the share over all plants and trajectories, and every exception. ``--plants 20 --repeats 10`` by default, on two
+processes; ``--cluster tcp://…`` drives them on the workers of a Dask cluster, which share this folder.
 """
 
 from __future__ import annotations
 
 import argparse
-import subprocess
-import sys
 import tempfile
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pandas as pd
 from scipy.stats import binomtest
 
-from agvbench.campaign import Campaign
-from agvbench.statistics import pose_errors
-from agvbench.statistics.quantities import QUANTITIES
+import agvbench
 
 FIRST_SEED = 1000
-PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
-COLUMNS = [quantity.column for quantity in QUANTITIES]
+COLUMNS = ["position_error_mm", "heading_error_deg", "delta_s_mm"]
+GRID = """
+[fixed]
+plant = "agvbench.simulator:random_plant"
+repeats = {repeats}
+
+[grid]
+seed = "{first}..{last}"
+"""
 
 
-def _drive(seed: int, repeats: int, folder: Path) -> pd.DataFrame:
-    out = folder / f"plant{seed}"
-    options = ["--plant=agvbench.simulator:random_plant", f"--seed={seed}", f"--repeats={repeats}", "--no-report"]
-    command = [sys.executable, "-c", PROGRAM, "bench", *options, f"--out={out}"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
-    if done.returncode not in {0, 1}:
-        raise SystemExit(f"seed {seed}: {done.stdout[-2000:]}{done.stderr[-2000:]}")
-    errors = pose_errors(Campaign.open(out))
-    errors = errors[(errors["status"] == "ok") & errors["trajectory"].isin([str(n) for n in range(1, 9)])]
-    return errors.assign(plant=seed)
+def _driven(plants: int, repeats: int, jobs: int, cluster: str) -> pd.DataFrame:
+    """Return the medians of every plant: a row for each trajectory and condition."""
+    with tempfile.TemporaryDirectory() as folder:
+        grid = Path(folder) / "grid.toml"
+        grid.write_text(GRID.format(repeats=repeats, first=FIRST_SEED, last=FIRST_SEED + plants - 1))
+        found = agvbench.sweep(grid, Path(folder) / "sweep", jobs=jobs, cluster=cluster)
+    if failed := found.attrs["failed"]:
+        raise SystemExit("\n".join(f"seed {FIRST_SEED + cell}: {cause}" for cell, cause in failed.items()))
+    return found[found["trajectory"].isin([str(n) for n in range(1, 9)])].rename(columns={"seed": "plant"})
 
 
-def _medians(errors: pd.DataFrame) -> pd.DataFrame:
-    absolute = errors.assign(**{name: errors[name].abs() for name in COLUMNS})
-    table = absolute.pivot_table(index=["plant", "trajectory"], columns="condition", values=COLUMNS, aggfunc="median")
+def _medians(found: pd.DataFrame) -> pd.DataFrame:
+    table = found.pivot(index=["plant", "trajectory"], columns="condition", values=COLUMNS)
     long = table.stack(level=0, future_stack=True).rename_axis(["plant", "trajectory", "quantity"])
     return long.dropna(subset=["uncalibrated", "calibrated"])
 
@@ -50,11 +51,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--plants", type=int, default=20)
     parser.add_argument("--repeats", type=int, default=10)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--cluster", metavar="ADDRESS", default="")
     arguments = parser.parse_args()
-    seeds = range(FIRST_SEED, FIRST_SEED + arguments.plants)
-    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(2) as pool:
-        drives = list(pool.map(lambda seed: _drive(seed, arguments.repeats, Path(folder)), seeds))
-    medians = _medians(pd.concat(drives))
+    medians = _medians(_driven(arguments.plants, arguments.repeats, arguments.jobs, arguments.cluster))
     better = medians["calibrated"] < medians["uncalibrated"]
     for name, cells in [("all", better), *((q, better.xs(q, level="quantity")) for q in COLUMNS)]:
         interval = binomtest(int(cells.sum()), len(cells)).proportion_ci(method="exact")

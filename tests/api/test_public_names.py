@@ -17,7 +17,7 @@ EXPORTED = (
     *("Campaign", "Run", "Pose", "VehicleModel", "Trajectory", "plan", "simulate", "calibrate", "identify", "diagnose"),
     *("Diagnosis", "Verdict", "compare", "pose_errors", "write_report", "AgvbenchError", "plot"),
     *("PoseNoise", "SimulatedRun", "Simulation", "Comparison", "valid"),
-    *("History", "history"),
+    *("History", "history", "sweep"),
 )
 
 

@@ -12,8 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from agvbench.bus.session import is_loopback, open_bus_session, parse_endpoint
+from agvbench.bus.session import open_bus_session, parse_endpoint
 from agvbench.errors import LinkError
+from agvbench.loopback import is_loopback
 
 
 @pytest.mark.parametrize(

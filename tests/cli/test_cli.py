@@ -15,7 +15,19 @@ import agvbench.cli
 from agvbench.cli import main
 
 COMMANDS = sorted(m.name for m in pkgutil.iter_modules(agvbench.cli.__path__) if not m.name.startswith("_"))
-HEAVY = {"numpy", "pandas", "scipy", "numba", "matplotlib", "pyarrow", "zenoh", "rerun", "rich", "msgspec", "jinja2"}
+HEAVY = {
+    "numpy",
+    "pandas",
+    "scipy",
+    "numba",
+    "matplotlib",
+    "pyarrow",
+    "zenoh",
+    "rerun",
+    "rich",
+    "msgspec",
+    "jinja2",
+} | {"distributed", "dask"}
 LONG = "x" * 300
 
 

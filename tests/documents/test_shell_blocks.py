@@ -31,6 +31,7 @@ SLOW = (
     "docs/how-to/control-in-closed-loop.md",
     "docs/how-to/drive-a-differential-vehicle.md",
     "docs/how-to/set-up-a-lab.md",
+    "docs/how-to/sweep-on-many-machines.md",
     "docs/how-to/write-an-effect.md",
 )
 FILES_OF = {"docs/how-to/write-an-effect.md": "docs/how-to/bring-your-own-plant.md"}

@@ -66,6 +66,23 @@ def test_resume_keeps_what_was_begun_and_refuses_contradictions():
         settings_for_resume(saved, {"seed": 8})
 
 
+def test_options_of_the_plant_are_kept_and_not_to_be_contradicted(tmp_path):
+    BenchSettings(plant_option="backlash_m=0.01").save(tmp_path)
+    saved = BenchSettings.load(tmp_path)
+    assert settings_for_resume(saved, {}).plant_option == "backlash_m=0.01"
+    with pytest.raises(FlagError, match=r"--plant-option: .*: backlash_m=0.02 \(limit: backlash_m=0.01\)"):
+        settings_for_resume(saved, {"plant_option": "backlash_m=0.02"})
+    wrong = {"plant_option": "backlsh_m=0.01"}
+    for dry_run in (True, False):
+        with (
+            pytest.raises(
+                FlagError, match=r"--plant-option: not an option of agvbench\.simulator:make_plant: 'backlsh_m'"
+            ),
+            open_session(wrong, out=str(tmp_path / "c"), resume=False, dry_run=dry_run),
+        ):
+            pass
+
+
 def test_cameras_are_told_what_is_wanted_of_them(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     given = {"camera": "rate_hz=60,lost=0"}

@@ -16,6 +16,7 @@ from agvbench.types import Plant, Pose
 DOCS = Path(__file__).parents[2] / "docs" / "reference" / "errors-plants.md"
 RNG = np.random.default_rng(0)
 
+SMALL = "agvbench.simulator:small_plant"
 SOURCES = {
     "my_plant.py": """
         import math
@@ -73,6 +74,10 @@ SOURCES = {
 
         def the_class(seed):
             return Base
+
+        class NeedsMass(Base):
+            def __init__(self, seed, *, mass_kg):
+                pass
         """,
     "syntax.py": "def make_plant(seed:\n",
     "needs.py": "import a_library_that_is_not_there\n",
@@ -121,6 +126,10 @@ CASES = {
     "markers in one place": lambda: Camera(markers=((0.1, 0.0), (0.1, 0.0))),
     "unknown camera option": lambda: Camera.from_options({"losst": 0.1}),
     "camera option is no number": lambda: Camera.from_options({"lost": "some"}),
+    "unknown plant option": lambda: load_plant(SMALL, {"backlsh_m": "0"}),
+    "plant option is no number": lambda: load_plant(SMALL, {"backlash_m": "some"}),
+    "plant option is out of range": lambda: load_plant(SMALL, {"backlash_m": "2"})(0),
+    "plant needs an option": lambda: load_plant("my_plant.py:NeedsMass"),
     "poses do not fit times": lambda: Camera().observe(np.zeros(3), np.zeros((2, 3)), RNG),
 }
 

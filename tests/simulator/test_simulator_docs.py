@@ -8,6 +8,7 @@ from pathlib import Path
 
 from agvbench.simulator import Camera, check_plant
 from agvbench.simulator.plant_contract import CLAUSES
+from agvbench.simulator.plant_parameters import DIFFERENTIAL, TWO_AXLES
 from agvbench.simulator.plants import PLANTS
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -23,6 +24,6 @@ def test_the_plant_of_the_how_to_keeps_the_contract(tmp_path, monkeypatch):
 
 def test_the_reference_names_every_clause_plant_and_option():
     text = (DOCS / "reference" / "simulator.md").read_text()
-    named = set(re.findall(r"`([a-z_]+)`", text)) | set(re.findall(r"agvbench\.simulator:([a-z_]+)", text))
+    named = set(re.findall(r"`([a-z][a-z0-9_]*)`", text)) | set(re.findall(r"agvbench\.simulator:([a-z_]+)", text))
     options = {item.name for item in fields(Camera)} - {"markers"}
-    assert named >= set(CLAUSES) | set(PLANTS) | options
+    assert named >= set(CLAUSES) | set(PLANTS) | options | set(TWO_AXLES) | set(DIFFERENTIAL)

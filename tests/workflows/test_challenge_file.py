@@ -6,16 +6,19 @@ import dataclasses
 import json
 import os
 import re
+import signal
 import subprocess
 from pathlib import Path
 
 import pytest
+import stand_ins
 
 from agvbench.challenge import challenge
 from agvbench.challenge.challenge import hold_trial, known_trials, run_challenge, write_trials
 from agvbench.challenge.trial import Trial
 from agvbench.cli import main
 from agvbench.errors import FileError, FitError, FlagError, PlantError
+from agvbench.executors import ExecutorOptions
 
 LAG = Trial(
     "steering_lag", 3, "library", ("steering_lag",), ("steering_lag",), (), False, False,
@@ -167,3 +170,51 @@ def test_a_plant_that_cannot_be_driven_is_an_answer_that_counts_as_wrong(monkeyp
 
     monkeypatch.setattr(challenge, "_drive", fails)
     assert hold_trial("steering_lag", 3, 5).verdict == "ERROR"
+
+
+def one_that_kills_its_worker(spec, seed, _):
+    """Stand in for a trial that takes all memory, in the process that holds it."""
+    if seed == 4:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return dataclasses.replace(LAG, spec=spec, seed=seed)
+
+
+def test_a_trial_whose_worker_dies_again_and_again_is_an_answer_that_counts_as_wrong(tmp_path, monkeypatch):
+    monkeypatch.setattr(challenge, "hold_trial", one_that_kills_its_worker)
+    file = tmp_path / "challenge.json"
+    scores = run_challenge(2, first_seed=4, specs=["steering_lag"], repeats=5, jobs=2, json_file=str(file))
+    assert scores.errors == ("steering_lag, seed 4: process was killed by SIGKILL, 4 times",)
+    assert same(known_trials(file, 5)["steering_lag", 5], dataclasses.replace(LAG, seed=5))
+
+
+@pytest.mark.real_time
+def test_the_file_of_a_cluster_is_that_of_one_process(tmp_path, monkeypatch, dask_cluster):
+    monkeypatch.setattr(challenge, "hold_trial", stand_ins.trial)
+    found = []
+    for where, jobs in ((ExecutorOptions(), 1), (ExecutorOptions(), 2), (ExecutorOptions(dask_cluster.address), None)):
+        file = tmp_path / "challenge.json"
+        run_challenge(
+            4, first_seed=0, specs=["steering_lag", "nothing"], repeats=5, jobs=jobs, json_file=str(file), cluster=where
+        )
+        found.append(file.read_bytes())
+    assert found[0] == found[1] == found[2]
+    assert len(json.loads(found[0])["each"]) == 8
+
+
+def timeless(file):
+    """Return a file's content without the times, which no two runs share: one for each trial, and their summary."""
+    content = json.loads(file.read_text())
+    assert content.pop("seconds")
+    assert all(trial.pop("seconds") > 0.0 for trial in content["each"])
+    return content
+
+
+@pytest.mark.slow
+@pytest.mark.real_time
+def test_real_trials_of_a_cluster_are_those_of_one_process_but_for_their_times(tmp_path, dask_cluster):
+    found = []
+    for more in (["--jobs=1"], [f"--cluster={dask_cluster.address}"]):
+        file = tmp_path / f"{len(found)}.json"
+        assert main(["challenge", "--only", "nothing", "--repeats=2", f"--json={file}", *more]) == 0
+        found.append(timeless(file))
+    assert found[0] == found[1]

@@ -65,7 +65,7 @@ class SimavrAgv(SimAgv):
     def open(cls, address: str, options: AdapterOptions) -> SimavrAgv:
         """Start the firmware of `address` with the plant that the options name."""
         firmware = FirmwareAddress.parse(address, where=cls.scheme)
-        return cls(load_plant(options.plant)(options.seed), options, firmware)
+        return cls(load_plant(options.plant, options.plant_options)(options.seed), options, firmware)
 
     def identity(self) -> AgvIdentity:
         """Return the vehicle's identity, with its firmware's."""

@@ -69,7 +69,7 @@ class SimavrLiveAgv(LiveAgv):
             raise LinkError(
                 "real time has no phase to choose", where=cls.scheme, value=address, remedy=f"use simavr:{address}"
             )
-        return cls(load_plant(options.plant)(options.seed), options, firmware.version)
+        return cls(load_plant(options.plant, options.plant_options)(options.seed), options, firmware.version)
 
     def identity(self) -> AgvIdentity:
         """Return the plant's identity, with the firmware's."""

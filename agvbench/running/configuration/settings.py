@@ -21,6 +21,8 @@ PLACES = ("auto", "operator", "teleport")
 MAPS = ("default", "thesis")
 STEERINGS = ("abeam", "front", "rear", "opposite", "crab")
 """Those of `agvbench.planning.trajectories.segments.Steering`, which takes longer to import."""
+NAME_VALUE = "NAME=VALUE"
+"""The metavar of options that are several options of a part of the rig, by name."""
 _MOST_REPEATS = 1000
 """A thousand repeats of the shipped benchmarks take days; all runs are planned before the first is driven."""
 _LARGEST_SEED = 2**63 - 1
@@ -55,13 +57,19 @@ class BenchSettings:
     camera: str = _option(
         "",
         "an option of the camera, such as body=blue or rate_hz=240; several with commas, or one after another",
-        metavar="NAME=VALUE",
+        metavar=NAME_VALUE,
         joined=True,
     )
     plant: str = _option(
         "agvbench.simulator:make_plant",
         "simulated plant, MODULE_OR_FILE:FACTORY (default: one of the vehicle's kind, like the thesis' or a robot)",
         metavar="PLANT",
+    )
+    plant_option: str = _option(
+        "",
+        "a parameter of the plant, such as understeer_s2_per_m2=0.05; several with commas, or one after another",
+        metavar=NAME_VALUE,
+        joined=True,
     )
     trajectories: str = _option(
         "",

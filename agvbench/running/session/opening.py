@@ -98,8 +98,8 @@ def open_session(
         steering=settings.steering,
     )
     if dry_run:
-        check_specs(settings.agv, settings.mocap, adapter_options(settings, models))
-        load_plant(settings.plant)
+        check_specs(settings.agv, settings.mocap, options := adapter_options(settings, models))
+        load_plant(options.plant, options.plant_options)
         models.setdefault("calibrated", expected_calibration(settings.vehicle))
         yield session_with(bench=None)
         return

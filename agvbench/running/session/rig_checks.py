@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 from agvbench.adapters import AdapterOptions, open_rig
-from agvbench.adapters.contract import camera_options
+from agvbench.adapters.contract import camera_options, named_values
 from agvbench.bus.bus_config import BusConfig
 from agvbench.bus.link import VehicleLink
 from agvbench.bus.messages.identity import AgvIdentity, Identity
@@ -26,6 +26,7 @@ def adapter_options(settings: BenchSettings, models: Mapping[str, VehicleModel])
     return AdapterOptions(
         vehicle=settings.vehicle_name,
         plant=settings.plant,
+        plant_options=named_values([settings.plant_option], "--plant-option"),
         seed=settings.seed,
         channels=nominal.channels,
         calibration_hash=models["calibrated"].calibration_hash if "calibrated" in models else "",
@@ -60,6 +61,7 @@ def open_session_rig(
         agv=settings.agv,
         mocap=settings.mocap,
         plant=options.plant,
+        plant_options=options.plant_options,
         camera=options.camera,
         seed=options.seed,
         connect=settings.connect or None,

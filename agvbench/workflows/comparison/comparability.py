@@ -15,7 +15,7 @@ from agvbench.simulator import seed_samples_vehicle
 from agvbench.vehicle.channels import Channels
 from agvbench.workflows.comparison.sequential_record import SequentialRecord, stopped_in_words
 
-_VEHICLE = ("agv", "plant")
+_VEHICLE = ("agv", "plant", "plant_option")
 _CAMERA = ("mocap", "camera")
 HASH_DIGITS = 12
 """Of a hash, as versions are known by theirs; the JSON has them whole."""
@@ -156,7 +156,7 @@ def _options(a: Campaign, b: Campaign, names: Sequence[str]) -> Iterator[tuple[s
     """Yield options with their values on both sides, if both campaigns have recorded theirs."""
     if (one := _settings(a)) and (other := _settings(b)):
         for name in names:
-            yield f"--{name}", getattr(one, name) or "none", getattr(other, name) or "none"
+            yield f"--{name.replace('_', '-')}", getattr(one, name) or "none", getattr(other, name) or "none"
 
 
 def _trajectories(a: Campaign, b: Campaign) -> Iterator[str]:

@@ -13,7 +13,10 @@ from agvbench.running.configuration.settings import BenchSettings
 from agvbench.workflows.comparison.comparability import HASH_DIGITS, calibration_hash
 
 _OF_PROGRAM = ("agvbench", "git_revision", "host")
-_OPTIONS = ("agv", "mocap", "camera", "plant", "maps", "steering", "order", "place", "workspace", "exchange")
+_OPTIONS = (
+    *("agv", "mocap", "camera", "plant", "plant_option", "maps"),
+    *("steering", "order", "place", "workspace", "exchange"),
+)
 Facts = Mapping[str, str]
 
 
@@ -54,7 +57,7 @@ def _header(campaign: Path) -> dict[str, str]:
 
 def _options(campaign: Path) -> dict[str, str]:
     settings = BenchSettings.load(campaign)
-    return {f"--{name}": str(getattr(settings, name)) or "none" for name in _OPTIONS}
+    return {f"--{name.replace('_', '-')}": str(getattr(settings, name)) or "none" for name in _OPTIONS}
 
 
 def _trajectories(campaign: Path) -> dict[str, str]:

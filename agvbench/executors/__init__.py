@@ -1,0 +1,17 @@
+"""Run many independent tasks on processes of this machine, or on the workers of a cluster."""
+
+from agvbench.executors.executor import Executor, ExecutorOptions, in_flight
+from agvbench.executors.registry import check_address, open_executor
+from agvbench.executors.task import Done, Failed, Outcome, Task
+
+__all__ = [
+    "Done",
+    "Executor",
+    "ExecutorOptions",
+    "Failed",
+    "Outcome",
+    "Task",
+    "check_address",
+    "in_flight",
+    "open_executor",
+]

@@ -1,0 +1,1 @@
+"""The kinds of executors: one module each, found by `agvbench.executors.registry`."""

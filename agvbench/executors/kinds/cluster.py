@@ -1,0 +1,215 @@
+"""Workers of a Dask cluster, on any number of machines."""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+import uuid
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, ClassVar
+from urllib.parse import urlsplit
+
+from agvbench.errors import FlagError, LinkError
+from agvbench.executors.certificates import require_certificates
+from agvbench.executors.executor import FLAG, Executor, ExecutorOptions, in_flight
+from agvbench.executors.task import (
+    VERSIONS,
+    Failed,
+    Key,
+    Outcome,
+    Result,
+    Task,
+    outcome_of,
+    require_same_versions,
+    run_task,
+    versions,
+)
+from agvbench.loopback import is_loopback
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+_PATIENCE_S = 15.0
+_REFRESH_S = 2.0
+_QUEUED = 2
+"""Tasks in flight for each worker: one that runs, and one that waits while the client reads an answer."""
+
+
+class ClusterExecutor(Executor):
+    """Runs tasks on the workers of a Dask scheduler, which may come and go; each runs one at a time.
+
+    The scheduler gives the tasks of a worker that dies to others, as often as its ``allowed-failures`` says (3).
+    """
+
+    schemes: ClassVar[tuple[str, ...]] = ("tcp", "tls")
+
+    def __init__(self, client: Client, address: str) -> None:
+        self._client, self._address = client, address
+        self._held: dict[Future[bytes], Any] = {}
+        self._known, self._asked_s = 1, -math.inf
+
+    @classmethod
+    def check(cls, options: ExecutorOptions) -> None:
+        """Refuse what is no address, and a connection over a network that nothing protects.
+
+        Python objects come back from a scheduler and its workers as pickles, which can contain any program.
+        """
+        url = urlsplit(options.address)
+        try:
+            host, port = url.hostname, url.port
+        except ValueError:
+            host, port = None, None
+        if not host or not port or url.path or url.query or url.fragment or url.username:
+            raise FlagError(
+                "address cannot be used",
+                where=FLAG,
+                value=repr(options.address),
+                limit="tcp://HOST:PORT, tls://HOST:PORT",
+            )
+        if url.scheme == "tls":
+            require_certificates(options)
+        elif not (is_loopback(host) or options.insecure):
+            raise FlagError(
+                "a program that answers at this address can run code here, without encryption or certificates",
+                where=FLAG, value=options.address, limit="tcp:// on loopback, or tls:// with certificates",
+                remedy="use tls://, or add --insecure on a network that you trust",
+            )  # fmt: skip
+
+    @classmethod
+    def open(cls, options: ExecutorOptions) -> ClusterExecutor:
+        """Connect to a scheduler with at least one worker, whose versions and threads are checked."""
+        client = _connected(options)
+        try:
+            _require_workers(client, options.address)
+        except BaseException:
+            client.close(timeout=_PATIENCE_S)
+            raise
+        return cls(client, options.address)
+
+    def run(self, tasks: Iterable[Task[Key]], kind: type[Result]) -> Iterator[Outcome[Key, Result]]:
+        """Yield the outcome of each task as it ends."""
+        from distributed import wait
+
+        coming = iter(tasks)
+        while True:
+            for task in in_flight(coming, len(self._held), _QUEUED * self._workers()):
+                self._held[self._submitted(task)] = task.key
+            if not self._held:
+                return
+            try:
+                with self._client.as_current():
+                    ended = wait(list(self._held), return_when="FIRST_COMPLETED").done
+            except Exception as error:
+                raise self._gone(error) from error
+            for future in ended:
+                yield self._outcome(future, self._held.pop(future), kind)
+
+    def close(self) -> None:
+        """Cancel what is in flight, and leave; what a worker has begun it ends, and its result is dropped."""
+        with suppress(Exception):  # the scheduler may be gone
+            if self._held:
+                self._client.cancel(list(self._held), force=True)
+        self._held.clear()
+        with suppress(Exception):
+            self._client.close(timeout=_PATIENCE_S)
+
+    def _workers(self) -> int:
+        """Return how many workers there are, at least one; the scheduler is asked from time to time."""
+        now_s = time.monotonic()
+        if now_s >= self._asked_s + _REFRESH_S:
+            self._known, self._asked_s = max(1, len(self._client.nthreads())), now_s
+        return self._known
+
+    def _submitted(self, task: Task[Any]) -> Future[bytes]:
+        key = f"agvbench-{task.function.__name__}-{uuid.uuid4().hex}"
+        return self._client.submit(_run_alone, task.function, task.arguments, VERSIONS, key=key, pure=False)
+
+    def _outcome(self, future: Future[bytes], key: Key, kind: type[Result]) -> Outcome[Key, Result]:
+        status = future.status
+        if status == "finished":
+            try:
+                return outcome_of(key, future.result(timeout=_PATIENCE_S), kind)
+            except Exception as error:  # noqa: BLE001 - the worker that held it died before it was read
+                return Failed(key, f"result was lost: {type(error).__name__} {_line(error)}")
+        if status == "error":
+            cause = future.exception(timeout=_PATIENCE_S)
+            return Failed(key, f"worker died or could not run it: {type(cause).__name__} {_line(cause)}")
+        raise self._gone(status)
+
+    def _gone(self, cause: object) -> LinkError:
+        remedy = "start it, and go on with --resume"
+        return LinkError("scheduler is gone", where=self._address, value=_line(cause) or None, remedy=remedy)
+
+
+def _connected(options: ExecutorOptions) -> Client:
+    try:
+        from distributed import Client, Security
+    except ImportError:
+        raise FlagError(
+            "needs a library that is not installed", where=FLAG, value="distributed",
+            remedy='install it with pip install "agvbench[cluster]"',
+        ) from None  # fmt: skip
+    for name in ("distributed", "distributed.client", "distributed.core", "distributed.comm"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what goes wrong is said in one line, by us
+    is_secured = options.address.startswith("tls://")
+    security = Security(
+        require_encryption=is_secured, tls_ca_file=_text(options.tls_ca_file),
+        tls_client_cert=_text(options.tls_cert), tls_client_key=_text(options.tls_key),
+    ) if is_secured else None  # fmt: skip
+    try:
+        return Client(
+            options.address, security=security, timeout=_PATIENCE_S, set_as_default=False, direct_to_workers=False
+        )
+    except (OSError, TimeoutError) as error:
+        raise LinkError(
+            "no scheduler answers", where=f"{FLAG} {options.address}", value=_line(error),
+            remedy="start one with dask scheduler, and workers with dask worker",
+        ) from None  # fmt: skip
+
+
+def _require_workers(client: Client, address: str) -> None:
+    try:
+        client.wait_for_workers(1, timeout=_PATIENCE_S)
+    except TimeoutError:
+        raise LinkError(
+            f"scheduler has had no worker for {_PATIENCE_S:g} s", where=f"{FLAG} {address}",
+            remedy=f"start some with dask worker {address} --nthreads 1",
+        ) from None  # fmt: skip
+    for name, threads in client.nthreads().items():
+        _require_one_thread(name, threads)
+    try:
+        found = client.run(versions)
+    except Exception as error:
+        raise LinkError(
+            "workers cannot import agvbench", where=f"{FLAG} {address}", value=_line(error),
+            remedy=f"install {' and '.join(VERSIONS)} there",
+        ) from error  # fmt: skip
+    require_same_versions(found, f"{FLAG} {address}")
+
+
+def _require_one_thread(name: str, threads: int) -> None:
+    """Raise `LinkError` unless a worker runs one task at a time: libraries of a diagnosis do not share a process."""
+    if threads != 1:
+        raise LinkError(
+            "worker has several threads", where=name, value=threads, limit="1",
+            remedy="start it with --nthreads 1 --nworkers N",
+        )  # fmt: skip
+
+
+def _run_alone(function: Any, arguments: tuple[Any, ...], client_versions: tuple[str, ...]) -> bytes:
+    """Run a task on this worker, which may have joined after the client looked at all."""
+    from distributed import get_worker
+
+    worker = get_worker()
+    _require_one_thread(worker.address, worker.state.nthreads)
+    return run_task(function, arguments, client_versions)
+
+
+def _text(path: object) -> str | None:
+    return None if path is None else str(path)
+
+
+def _line(error: object) -> str:
+    return " ".join(str(error).split())
