@@ -156,9 +156,9 @@ def test_a_statement_in_the_campaign_counts_and_a_wrong_one_is_one_line(tmp_path
     page = (path / "report" / "report.html").read_text()
     assert "carpet 2" in page
     assert re.search(r'href="\.\./poses\.parquet/r0\.parquet"', page)
+    with pytest.raises(FileError, match="lab"):
+        write_report(path, uncertainty=tmp_path / "lab.toml")
     (path / "campaign.toml").write_text((path / "campaign.toml").read_text().replace("ppm = 500.0", "ppm = -1.0"))
     assert main(["report", str(path)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "campaign.toml: uncertainty: camera_scale_ppm" in line
-    with pytest.raises(FileError, match="lab"):
-        write_report(path, uncertainty=tmp_path / "lab.toml")

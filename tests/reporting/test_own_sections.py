@@ -68,7 +68,7 @@ def test_nothing_in_a_campaign_directory_is_executed(lab, tmp_path):
          "slug 'My tyres' is not made of lower-case letters"),
         (TYRES.replace("def blocks", "def block"), "report_sections/tyres.py: section TyresSection: "),
         (TYRES.replace("(Section)", ""), "report_sections/tyres.py: has no section"),
-        (TYRES + "\n1 / 0\n", "report_sections/tyres.py:19: cannot be imported: ZeroDivisionError"),
+        (TYRES + "\n1 / 0\n", "report_sections/tyres.py:18: cannot be imported: ZeroDivisionError"),
         ("import agvbench.reporting\ndef", "report_sections/tyres.py:2: cannot be imported"),
     ],
 )  # fmt: skip

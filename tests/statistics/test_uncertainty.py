@@ -176,7 +176,7 @@ def test_latency_moves_nothing_at_rest_and_much_on_a_vehicle_that_creeps():
     assert loud.contribution == pytest.approx(15.0 * 0.05 / math.sqrt(3.0), rel=0.15)
 
 
-def test_what_nobody_states_is_listed_and_not_combined():
+def test_what_the_lab_does_not_state_is_listed_and_not_combined():
     rng = np.random.default_rng(0)
     budgets = end_pose_budgets([run_to(end, rng) for end in scattered(rng, 0.01, 0.002, 4)])
     table = component_table(budgets)

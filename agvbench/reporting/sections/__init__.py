@@ -27,7 +27,7 @@ def all_sections() -> list[Section]:
     Raises
     ------
     FileError
-        If an own file cannot be imported, has no section, or one that lacks an attribute or has a slug that is taken.
+        If a file of the lab cannot be imported, has no section, or one without an attribute or with a taken slug.
     """
     found = [section() for section in classes_by_file(__name__, Section)]  # type: ignore[type-abstract]
     taken = {section.slug for section in found}

@@ -29,7 +29,7 @@ _BUDGET = (
     Column("expanded", "U = k·u", 3, explained="Expanded uncertainty: the true mean lies within ± U with 95 %."),
     Column("low", "from", 3, group="mean ± U"),
     Column("high", "to", 3, group="mean ± U"),
-    Column("not_stated", "not stated", 0, explained="Sources that u lacks, since nobody stated them."),
+    Column("not_stated", "not stated", 0, explained="Sources that u lacks, since the lab does not state them."),
 )
 _COMPONENTS = (
     *_KEYS,
@@ -133,7 +133,7 @@ def _not_stated(data: ReportData) -> Iterator[Table]:
     ]
     if rows:
         note = f"Write them under [uncertainty] into lab.toml or campaign.toml ({HOW_TO_STATE})."
-        yield Table("not-stated", "Sources of uncertainty that nobody stated.", _NOT_STATED, rows, note=note)
+        yield Table("not-stated", "Sources of uncertainty that the lab does not state.", _NOT_STATED, rows, note=note)
 
 
 _KEY_OF = {source: key for key, (source, _) in SOURCES.items()}
