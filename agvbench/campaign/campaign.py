@@ -18,6 +18,7 @@ from agvbench.campaign.names import as_texts
 from agvbench.campaign.tables.command_columns import by_role, command_columns
 from agvbench.campaign.tables.consistency import check_commands, check_poses, check_runs
 from agvbench.campaign.tables.motion_checks import check_motion
+from agvbench.campaign.tables.parts import part_name
 from agvbench.campaign.tables.schema import POSES, RUNS, TABLES, numbers
 from agvbench.campaign.tables.source import SUFFIXES, Source
 from agvbench.campaign.tables.timed_table import TimedTable, blank_untracked
@@ -139,6 +140,11 @@ class Campaign:
     def has_table(self, name: str) -> bool:
         """Return whether there is a further table of this name."""
         return any((self.path / f"{name}{suffix}").exists() for suffix in SUFFIXES)
+
+    def recording(self, run_id: str) -> Path:
+        """Return the file with the poses of a run: its part, or the table of all runs."""
+        source = self._sources["poses"]
+        return source.path / part_name(run_id) if source.in_parts else source.path
 
     def table(self, name: str) -> pd.DataFrame:
         """Return a further table (``"events"``, ``"provenance"``, …).

@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import msgspec
 
 from agvbench.campaign.manifest import record
+from agvbench.campaign.uncertainty_statement import read_statement
 from agvbench.errors import CampaignError, FileError, VehicleError
+from agvbench.labels import checked_labels
 from agvbench.text_files import read_toml
 from agvbench.types import Command, CommandUnit
 from agvbench.validation import convert
@@ -52,7 +54,8 @@ class CampaignHeader:
     ``front_axle_m`` and ``rear_axle_m`` [m] are the distances from the markers' centroid to the axles, as in
     `Geometry`; ``driven`` is the driven axle, ``kinematics`` the kind of kinematics; ``channels`` are the units,
     neutral commands and ranges of the command channels; ``prediction_horizon_s`` and ``prediction_stride_s`` [s] say
-    how to cut free driving into predictions.
+    how to cut free driving into predictions. ``labels`` are what the lab notes of the circumstances (tyres, floor),
+    ``uncertainty`` what it states of uncertainties that no run shows (`agvbench.campaign.uncertainty_statement`).
 
     Raises
     ------
@@ -71,14 +74,16 @@ class CampaignHeader:
     prediction_stride_s: float | None = None
     driven: Driven = "both"
     kinematics: Kinematics = "two_axle"
+    labels: Mapping[str, str] = field(default_factory=dict)
+    uncertainty: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         _check_schema(self.schema, FILE_NAME)
-        for field in fields(self):
-            value = getattr(self, field.name)
+        for item in fields(self):
+            value = getattr(self, item.name)
             if isinstance(value, float) and not math.isfinite(value):
                 raise CampaignError(
-                    f"{field.name} is not a finite number", where=FILE_NAME, value=value, remedy="give a number"
+                    f"{item.name} is not a finite number", where=FILE_NAME, value=value, remedy="give a number"
                 )
         self._require_schema(schema_for(self.driven, self.kinematics, self.channels))
         if self.kinematics == "two_axle" and self.front_axle_m + self.rear_axle_m <= 0.0:
@@ -143,9 +148,11 @@ class CampaignHeader:
         _check_schema(table.get("schema"), path)
         remedy = "correct campaign.toml (docs/reference/campaign-directory.md)"
         file = convert(table, _File, where=str(path), error=CampaignError, remedy=remedy)
-        return cls.from_tables(
+        header = cls.from_tables(
             path, file.name, file.vehicle, file.mocap, file.prediction, channels=file.channels, schema=file.schema
         )
+        labels = checked_labels(file.labels, where=f"{path}: labels", error=CampaignError)
+        return replace(header, labels=labels, uncertainty=read_statement(file.uncertainty, path, CampaignError))
 
     @classmethod
     def from_tables(
@@ -212,6 +219,7 @@ class CampaignHeader:
         prediction = {"horizon_s": self.prediction_horizon_s, "stride_s": self.prediction_stride_s}
         if given := {key: value for key, value in prediction.items() if value is not None}:
             table["prediction"] = given
+        table |= {name: dict(of) for name in ("labels", "uncertainty") if (of := getattr(self, name))}
         return table
 
     def save(self, path: str | Path) -> None:
@@ -257,6 +265,8 @@ class _File(msgspec.Struct):
     mocap: Mocap
     prediction: Prediction | None = None
     channels: ChannelTables | None = None
+    labels: dict[str, Any] = {}
+    uncertainty: dict[str, Any] = {}
 
 
 def _channels(where: object, vehicle: Vehicle, tables: ChannelTables | None) -> Channels:

@@ -6,6 +6,7 @@ the Rerun viewer, and prints a summary.
 examples:
   agvbench report campaigns/tonight
   agvbench report campaigns/tonight --out /tmp/report
+  agvbench report campaigns/tonight --against campaigns/monday
   rerun campaigns/tonight/report/campaign.rrd
 """
 
@@ -24,6 +25,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("campaign", metavar="DIR", type=Path, help="campaign directory")
     parser.add_argument("--out", metavar="DIR", type=Path, help="where to write (default: report/ in the campaign)")
     add_margin_arguments(parser, "distances", "headings")
+    parser.add_argument(
+        "--against", metavar="DIR", type=Path, help="campaign to list what changed from (default: the one before)"
+    )
+    parser.add_argument(
+        "--uncertainty", metavar="FILE", type=Path, help="TOML file with [uncertainty] (default: that of the campaign)"
+    )
     parser.add_argument("--no-recording", action="store_true", help="leave out campaign.rrd")
 
 
@@ -42,6 +49,8 @@ def run(arguments: argparse.Namespace) -> int:
         margin_mm=in_mm,
         margin_deg=in_deg,
         recording=has_rerun and not arguments.no_recording,
+        against=arguments.against,
+        uncertainty=arguments.uncertainty,
     )
     print_report(wide_console(), report)
     if not has_rerun and not arguments.no_recording:

@@ -7,6 +7,7 @@ import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from pathlib import Path
 
 Value = str | float | int | None
 _LONGEST = 120
@@ -16,7 +17,7 @@ _LONGEST = 120
 class Column:
     """A column: its name in CSV, its title for people, decimals of its numbers (None: text), and a group of columns.
 
-    Numbers below ``least`` are shown as less than it (p-values).
+    Numbers below ``least`` are shown as less than it (p-values). ``explained`` says in a sentence what the column has.
     """
 
     name: str
@@ -24,6 +25,7 @@ class Column:
     digits: int | None = None
     group: str = ""
     least: float = -math.inf
+    explained: str = ""
 
     def shown(self, value: Value) -> str:
         """Return `value` as people read it: rounded, with a real minus sign, empty where there is none."""
@@ -48,7 +50,10 @@ def spans(columns: Sequence[Column]) -> list[tuple[str, int]]:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows under columns. The first column's value heads a group of rows where ``grouped``."""
+    """Rows under columns. The first column's value heads a group of rows where ``grouped``.
+
+    ``files`` are those of the rows, one each, where rows have files; the first cell links to it, unless ``grouped``.
+    """
 
     slug: str
     caption: str
@@ -56,6 +61,7 @@ class Table:
     rows: Sequence[Sequence[Value]]
     grouped: bool = False
     note: str = ""
+    files: Sequence[Path] = ()
 
     def shown_rows(self) -> list[list[str]]:
         """Return every cell as people read it."""
@@ -86,13 +92,17 @@ class Panel:
 
 @dataclass(frozen=True)
 class FigureBlock:
-    """Panels beside each other, as many as fit; ``legend`` pairs names with the number of a condition's colour."""
+    """Panels beside each other, as many as fit; ``legend`` pairs names with the number of a condition's colour.
+
+    Panels are ``wide`` or ``small`` or neither.
+    """
 
     slug: str
     caption: str
     panels: Sequence[Panel]
     legend: Sequence[tuple[str, int]] = ()
     wide: bool = False
+    small: bool = False
 
 
 @dataclass(frozen=True)
@@ -110,7 +120,31 @@ class Bullets:
     items: Sequence[str]
 
 
-Block = Paragraph | Bullets | Table | FigureBlock
+@dataclass(frozen=True)
+class Links:
+    """Files that belong to a page, each with the words for it."""
+
+    files: Sequence[tuple[str, Path]]
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Blocks below a summary, which a reader opens; ``sketch`` is a small SVG beside the summary."""
+
+    summary: str
+    blocks: Sequence[Block]
+    sketch: str = ""
+
+
+Block = Paragraph | Bullets | Table | FigureBlock | Links | Fold
+
+
+def tables_in(blocks: Sequence[Block]) -> list[Table]:
+    """Return the tables among blocks, folded ones too, in their order."""
+    found: list[Table] = []
+    for block in blocks:
+        found += [block] if isinstance(block, Table) else tables_in(block.blocks) if isinstance(block, Fold) else []
+    return found
 
 
 @dataclass(frozen=True)
@@ -128,8 +162,8 @@ class Content:
 
     @property
     def tables(self) -> list[Table]:
-        """Return the section's tables."""
-        return [block for block in self.blocks if isinstance(block, Table)]
+        """Return the section's tables, folded ones too."""
+        return tables_in(self.blocks)
 
 
 def plain(text: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import statistics
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,21 +28,24 @@ from agvbench.reporting.content import (
     Bullets,
     Column,
     Content,
+    FigureBlock,
+    Links,
     Paragraph,
     Table,
     Value,
     plain,
     plain_sentences,
 )
+from agvbench.reporting.drawn_sections import drawn_sections
 from agvbench.reporting.progress import track
-from agvbench.reporting.sections import all_sections
 from agvbench.reporting.sections.diagnosis import diagnosis_blocks
-from agvbench.reporting.write import TABLES, page_texts
+from agvbench.reporting.sections.headline import cloud_figure
+from agvbench.reporting.write import HTML, TABLES, page_texts, subtitle_of, write_report
 from agvbench.statistics.equivalence import Bias
 from agvbench.statistics.quantities import COMPONENT_DEFINITIONS, COMPONENTS, DEFINITIONS
 from agvbench.types import CONDITIONS
 from agvbench.workflows.diagnosis_files import ShownDiagnosis, items, mapping, read_diagnosis
-from agvbench.workflows.report import gather
+from agvbench.workflows.report import ReportData, gather
 
 _NOTE = (
     f"{COMPONENT_DEFINITIONS} Bias: mean of the signed errors; sd: standard deviation of one repeat. The last column "
@@ -70,22 +73,23 @@ class LoopReport:
 
 
 def write_loop_report(loop: Loop) -> LoopReport:
-    """Write ``report.html``, ``report.md`` and tables into the loop's directory.
+    """Write ``report.html``, ``report.md`` and tables into the loop's directory, and the reports of both campaigns.
 
     Raises
     ------
     CampaignError
-        If the second campaign cannot be read.
+        If a campaign cannot be read.
     FileError
         If the directory cannot be written.
     """
     data = gather(loop.after, track=lambda runs, total: track(runs, total, what="reading runs"))
     rows, ends = before_after(data.errors), end_positions(data.errors)
-    own = _sections(loop, rows, ends)
-    said = {section.slug for section in own}
-    sections = [*own, *(section.content(data) for section in all_sections() if section.slug not in said)]
-    subtitle = f"{plain(data.header.vehicle_name)} · {len(data.runs)} runs"
-    texts = dict(page_texts(f"Loop {plain(loop.directory.name)}", subtitle, sections))
+    own = _sections(loop, rows, ends, data)
+    sections = [*own, *map(_without_clouds, drawn_sections(data, but={section.slug for section in own}))]
+    title = f"Loop {plain(loop.directory.name)}"
+    texts = dict(page_texts(title, subtitle_of(data), sections, loop.directory))
+    for campaign in (loop.before, loop.after):
+        write_report(campaign, recording=False)
     try:
         (loop.directory / TABLES).mkdir(exist_ok=True)
         for name, text in texts.items():
@@ -167,15 +171,24 @@ def _narrow(table: Table, rows: Sequence[BeforeAfter]) -> Table:
     return Table(table.slug, table.caption, columns, shown)
 
 
-def _sections(loop: Loop, rows: Sequence[BeforeAfter], ends: Sequence[EndPosition]) -> list[Content]:
+def _sections(loop: Loop, rows: Sequence[BeforeAfter], ends: Sequence[EndPosition], data: ReportData) -> list[Content]:
     said = list(_said(loop.plans))
     blocks: list[Block] = [Paragraph(sentence, lead=True) for sentence in _headline(loop, rows, ends)]
+    blocks += cloud_figure(data, slug="before-after-ends", small=False)
+    reports = {"the campaign that was diagnosed": loop.before, "the campaign that compares the conditions": loop.after}
+    links = Links([(f"Report of {words}: {path.name}", path / "report" / HTML) for words, path in reports.items()])
     tables = [end_position_table(ends), before_after_table(rows)]
     return [
-        Content("before-after", "Before and after", [*blocks, *tables]),
+        Content("before-after", "Before and after", [*blocks, links, *tables]),
         Content("diagnosis", "What the calibrated model lacks", _diagnosis(loop)),
         Content("plans", "What corrected plans compensate", [_plans(loop.plans), *([Bullets(said)] if said else [])]),
     ]
+
+
+def _without_clouds(content: Content) -> Content:
+    """Return a section without the figure that stands at the top of this page already."""
+    blocks = [b for b in content.blocks if not (isinstance(b, FigureBlock) and b.slug == "clouds")]
+    return replace(content, blocks=blocks)
 
 
 def _headline(loop: Loop, rows: Sequence[BeforeAfter], ends: Sequence[EndPosition]) -> Iterator[str]:

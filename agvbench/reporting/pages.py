@@ -1,22 +1,26 @@
-"""Report pages: one HTML file without scripts, fonts or pictures from elsewhere; and sections as Markdown."""
+"""Report pages: one HTML file with nothing from elsewhere, readable without its script; and sections as Markdown."""
 
 from __future__ import annotations
 
 import html
+import os
 import re
 from collections.abc import Iterator, Sequence
+from pathlib import Path
+from urllib.parse import quote
 
 from agvbench.plot.style import MARKERS
-from agvbench.reporting.content import Block, Bullets, Content, FigureBlock, Paragraph, Table, spans
+from agvbench.reporting.content import Block, Bullets, Content, FigureBlock, Fold, Links, Paragraph, Table, spans
 from agvbench.resources import resource_directory
 
 _SHAPES = {"o": "●", "s": "■", "^": "▲", "D": "◆", "v": "▼", "P": "✚"}
 
 
-def to_html(title: str, subtitle: str, sections: Sequence[Content]) -> str:
+def to_html(title: str, subtitle: str, sections: Sequence[Content], *, beside: Path | None = None) -> str:
     """Return the report as one HTML document.
 
-    Everything is escaped but the drawings, which `agvbench.reporting.figures` made.
+    Everything is escaped but the drawings, which `agvbench.reporting.figures` made. Links to files of the directory
+    that holds `beside`, the directory of the document, are relative to it; others are absolute.
     """
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -32,12 +36,29 @@ def to_html(title: str, subtitle: str, sections: Sequence[Content]) -> str:
         "bullets": lambda block: isinstance(block, Bullets),
         "table": lambda block: isinstance(block, Table),
         "drawing": lambda block: isinstance(block, FigureBlock),
+        "links": lambda block: isinstance(block, Links),
+        "fold": lambda block: isinstance(block, Fold),
     }
     environment.filters["spans"] = spans
     environment.filters["labelled"] = _labelled
+    environment.filters["address"] = lambda file: file_address(file, beside)
     environment.filters["shape"] = lambda index: _SHAPES[MARKERS[index % len(MARKERS)]]
     template = environment.get_template("report.html.j2")
     return template.render(title=title, subtitle=subtitle, sections=sections)
+
+
+def file_address(file: Path, beside: Path | None) -> str:
+    """Return the address of a file for a link: relative if it lies in the directory that holds `beside`.
+
+    >>> file_address(Path("/c/tonight/poses.parquet/a b.parquet"), Path("/c/tonight/report"))
+    '../poses.parquet/a%20b.parquet'
+    >>> file_address(Path("/c/tonight/poses.csv"), Path("/tmp"))
+    'file:///c/tonight/poses.csv'
+    """
+    file = file.absolute()
+    if beside is not None and file.is_relative_to(beside.absolute().parent):
+        return quote(Path(os.path.relpath(file, beside.absolute())).as_posix())
+    return file.as_uri()
 
 
 def _labelled(svg: str, label: str) -> str:
@@ -75,6 +96,13 @@ def _block(block: Block) -> Iterator[str]:
             yield from (f"- {escape(item)}" for item in items)
         case Table():
             yield from _table(block)
+        case Links(files):
+            yield from (f"- {escape(words)}: {escape(str(file))}" for words, file in files)
+        case Fold(summary, blocks):
+            yield f"**{escape(summary)}**"
+            for inner in blocks:
+                yield ""
+                yield from _block(inner)
         case FigureBlock(caption=caption):
             yield f"*Figure (in report.html): {escape(caption)}*"
 

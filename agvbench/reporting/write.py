@@ -15,13 +15,15 @@ from agvbench.diagnosis import Diagnosis
 from agvbench.errors import FileError, RecordingError
 from agvbench.metrics.table import write_metrics
 from agvbench.reporting.content import Content, plain
+from agvbench.reporting.drawn_sections import drawn_sections
 from agvbench.reporting.pages import to_html, to_markdown
 from agvbench.reporting.progress import track
 from agvbench.reporting.recording import write_recording
-from agvbench.reporting.sections import all_sections
 from agvbench.reporting.sections.diagnosis import DiagnosisSection, diagnosis_blocks
 from agvbench.reporting.table_files import frame_to_csv, to_csv, to_latex
+from agvbench.running.configuration.lab_file import LabFile
 from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM
+from agvbench.statistics.uncertainty.tables import budgets_to_json, component_table
 from agvbench.workflows.diagnosis_files import shown
 from agvbench.workflows.output_files import write_file
 from agvbench.workflows.report import ReportData, gather
@@ -29,9 +31,9 @@ from agvbench.workflows.report import ReportData, gather
 HTML, MARKDOWN, TABLES = "report.html", "report.md", "tables"
 
 
-def page_texts(title: str, subtitle: str, sections: Sequence[Content]) -> Iterator[tuple[str, str]]:
-    """Yield the name of each file, in a directory of its own, and its text."""
-    yield HTML, to_html(title, subtitle, sections)
+def page_texts(title: str, subtitle: str, sections: Sequence[Content], out: Path) -> Iterator[tuple[str, str]]:
+    """Yield the name of each file, in the directory `out`, and its text."""
+    yield HTML, to_html(title, subtitle, sections, beside=out)
     yield MARKDOWN, to_markdown(title, sections)
     for table in (table for section in sections for table in section.tables):
         yield f"{TABLES}/{table.slug}.csv", to_csv(table)
@@ -57,6 +59,8 @@ def write_report(
     margin_mm: float = MARGIN_MM,
     margin_deg: float = MARGIN_DEG,
     recording: bool = True,
+    against: str | Path | None = None,
+    uncertainty: str | Path | None = None,
 ) -> WrittenReport:
     """Write the report of `campaign` into the directory `out`, and its metrics as ``errors.parquet`` beside its runs.
 
@@ -73,6 +77,10 @@ def write_report(
         The noise band of comparisons between conditions.
     recording
         Whether to write the ``.rrd``, which takes most of the disk space.
+    against
+        The campaign to list differences from; without it, the last earlier one of this vehicle in the same folder.
+    uncertainty
+        A TOML file with a table ``[uncertainty]``, such as ``lab.toml``; without it, that of the campaign counts.
 
     Raises
     ------
@@ -81,22 +89,23 @@ def write_report(
     CampaignError
         If the campaign cannot be read.
     FileError
-        If `out` cannot be written.
+        If `out` cannot be written, `uncertainty` not be read, or an own section not be drawn.
     """
     data = gather(
         as_campaign(campaign).path,
         margin_mm=margin_mm,
         margin_deg=margin_deg,
+        against=None if against is None else Path(against),
+        uncertainty=None if uncertainty is None else LabFile.load(Path(uncertainty)).uncertainty,
         track=lambda runs, total: track(runs, total, what="reading runs"),
     )
     out = data.path / "report" if out is None else Path(out)
     with suppress(RecordingError):
         write_metrics(data.path, data.metrics)
     try:
-        registry = all_sections()
+        sections = drawn_sections(data)
         with made_folder(out):
-            sections = [s.content(data) for s in track(registry, len(registry), what="drawing")]
-            files = [_write(out / name, text) for name, text in _texts(data, sections)]
+            files = [_write(out / name, text) for name, text in _texts(data, sections, out)]
             if recording:
                 _replace(out / RECORDING, partial(_record, data))
                 files.append(out / RECORDING)
@@ -113,11 +122,18 @@ def _record(data: ReportData, path: Path) -> None:
         raise OSError(f"{RECORDING}: {error}") from None
 
 
-def _texts(data: ReportData, sections: Sequence[Content]) -> Iterator[tuple[str, str]]:
-    subtitle = f"{plain(data.header.vehicle_name)} · {len(data.runs)} runs"
-    yield from page_texts(plain(data.header.name), subtitle, sections)
+def subtitle_of(data: ReportData) -> str:
+    """Return the vehicle, the number of runs, and the labels."""
+    labels = ", ".join(f"{name} {value}" for name, value in data.header.labels.items())
+    return " · ".join(filter(None, [plain(data.header.vehicle_name), f"{len(data.runs)} runs", plain(labels)]))
+
+
+def _texts(data: ReportData, sections: Sequence[Content], out: Path) -> Iterator[tuple[str, str]]:
+    yield from page_texts(plain(data.header.name), subtitle_of(data), sections, out)
     yield f"{TABLES}/pose_errors.csv", frame_to_csv(data.errors)
     yield f"{TABLES}/metrics.csv", frame_to_csv(data.metrics)
+    yield f"{TABLES}/uncertainty_components_all.csv", frame_to_csv(component_table(data.budgets))
+    yield f"{TABLES}/uncertainty.json", budgets_to_json(data.budgets)
 
 
 def _write(path: Path, text: str) -> Path:

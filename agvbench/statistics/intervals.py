@@ -141,3 +141,18 @@ class Proportion:
     def value(self) -> float:
         """The share itself; NaN of nothing."""
         return self.count / self.total if self.total else math.nan
+
+
+def failure_bound(failures: int, total: int) -> float:
+    """Return the one-sided 95 % upper bound of a failure probability (Clopper and Pearson 1934); NaN of no attempts.
+
+    With no failure in n attempts it is 1 − 0.05^(1/n).
+
+    >>> round(failure_bound(0, 10), 4), round(failure_bound(0, 59), 4)
+    (0.2589, 0.0495)
+    """
+    from scipy.stats import binomtest
+
+    if not total:
+        return math.nan
+    return float(binomtest(failures, total, alternative="less").proportion_ci(CONFIDENCE, method="exact").high)

@@ -28,7 +28,11 @@ _LEAST_M, _LEAST_RAD = 1e-4, 2e-4
 
 @dataclass(frozen=True)
 class RestPose:
-    """A pose at rest in the floor frame, with standard errors [m, m, rad] (NaN from a single frame)."""
+    """A pose at rest in the floor frame, with standard errors [m, m, rad] (NaN from a single frame).
+
+    ``speed_mps`` and ``turn_rate_radps`` are what the two halves of the window say of motion in it, noise included; NaN
+    from fewer than eight frames.
+    """
 
     pose: Pose
     stderr_x_m: float
@@ -36,6 +40,13 @@ class RestPose:
     stderr_heading_rad: float
     frames: int
     left_out: int
+    speed_mps: float = math.nan
+    turn_rate_radps: float = math.nan
+
+    @property
+    def stderr_position_m(self) -> float:
+        """Return the standard error [m] of the position along any one direction."""
+        return math.hypot(self.stderr_x_m, self.stderr_y_m) / math.sqrt(2.0)
 
 
 def start_pose(run: Run) -> RestPose:
@@ -118,7 +129,18 @@ def _mean_pose(window: Frames) -> RestPose:
         kept[:] = True
     x, y, h = window.x_m[kept], window.y_m[kept], turned[kept]
     pose = Pose(float(x.mean()), float(y.mean()), wrap_angle(heading + float(h.mean())))
-    return RestPose(pose, _stderr(x), _stderr(y), _stderr(h), len(x), len(window) - len(x))
+    velocity = _velocities(window.t_s[kept], x, y, h)
+    errors = _stderr(x), _stderr(y), _stderr(h)
+    return RestPose(pose, *errors, len(x), len(window) - len(x), math.hypot(*velocity[:2]), velocity[2])
+
+
+def _velocities(t_s: Floats, *columns: Floats) -> list[float]:
+    """Return the difference of the means of both halves of each column, per time between them."""
+    if len(t_s) < _FEWEST_FRAMES:
+        return [math.nan] * len(columns)
+    half = len(t_s) // 2
+    apart_s = float(t_s[half:].mean() - t_s[:half].mean())
+    return [float(values[half:].mean() - values[:half].mean()) / apart_s for values in columns]
 
 
 def _unwrapped(heading: Floats) -> tuple[float, Floats]:

@@ -146,14 +146,9 @@ def pose_error(start: RestPose, end: RestPose, target: Pose) -> PoseError:
         delta_heading_rad=wrap_angle(reached.heading_rad - target.heading_rad),
         along_m=reached.x_m - target.x_m,
         across_m=reached.y_m - target.y_m,
-        stderr_position_m=math.hypot(_position_stderr(start), _position_stderr(end)),
+        stderr_position_m=math.hypot(start.stderr_position_m, end.stderr_position_m),
         stderr_heading_rad=math.hypot(start.stderr_heading_rad, end.stderr_heading_rad),
     )
-
-
-def _position_stderr(rest: RestPose) -> float:
-    """Return the standard error [m] of a position along any one direction."""
-    return math.hypot(rest.stderr_x_m, rest.stderr_y_m) / math.sqrt(2.0)
 
 
 @dataclass(frozen=True)

@@ -46,6 +46,9 @@ def _fill(root: Path, kinematics: Kinematics) -> None:
             uncalibrated_vehicle().save(root / "vehicle.toml")
         shutil.copy(_TEMPLATES / "README.md", root / "README.md")
         shutil.copy(_TEMPLATES / "noxfile.py.txt", root / "noxfile.py")
+        shutil.copy(_TEMPLATES / "lab.toml", root / "lab.toml")
+        (root / "report_sections").mkdir()
+        shutil.copy(_TEMPLATES / "battery.py.txt", root / "report_sections" / "battery.py.example")
         (root / ".gitignore").write_text("campaigns/\n.nox/\n", encoding="utf-8")
     except BaseException:
         for entry in root.iterdir():

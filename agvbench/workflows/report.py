@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from agvbench.campaign import Campaign, CampaignHeader
+from agvbench.campaign.uncertainty_statement import evaluations
 from agvbench.errors import InputError
 from agvbench.metrics.planned_paths import PlannedPaths
 from agvbench.metrics.table import metrics_of_runs
 from agvbench.statistics import Comparison, bias_and_spread, compare_errors, end_pose_table, pose_errors, valid
 from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM, checked_margins
 from agvbench.statistics.end_poses import in_order
+from agvbench.statistics.pose_accuracy import completions, pose_accuracies
+from agvbench.statistics.uncertainty.end_pose_budgets import EndPoseBudget, end_pose_budgets
 from agvbench.types import Frames, Run
 from agvbench.workflows.calibration import CalibrationCurves, read_calibration_curves
 from agvbench.workflows.diagnosis_files import ShownDiagnosis, read_diagnosis
+from agvbench.workflows.report_changes import CampaignChanges, changes_since_before
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -66,7 +70,9 @@ class ReportData:
     repeatability, ``comparisons`` every condition against the next one, ``quality`` one row per run. ``problems`` are
     sentences about what could not be read or compared; ``events`` are what adapters
     reported; ``planned`` are the planned paths, ``metrics`` what `metric_table` returns; ``diagnosis`` lies in the
-    directory, or None.
+    directory, or None. ``budgets`` are the uncertainty budgets of mean end pose errors, ``accuracy`` what
+    `pose_accuracies` returns and ``completions`` what `completions` does. ``changes`` are since the campaign before, or
+    None where there is none. ``recordings`` are the files of the runs' poses, by run id.
     """
 
     path: Path
@@ -81,9 +87,14 @@ class ReportData:
     events: pd.DataFrame
     planned: PlannedPaths
     metrics: pd.DataFrame
+    budgets: list[EndPoseBudget]
+    accuracy: pd.DataFrame
+    completions: pd.DataFrame
+    recordings: Mapping[str, Path]
     provenance: dict[str, str] = field(default_factory=dict)
     problems: list[str] = field(default_factory=list)
     diagnosis: ShownDiagnosis | None = None
+    changes: CampaignChanges | None = None
 
     @property
     def conditions(self) -> list[str]:
@@ -92,7 +103,13 @@ class ReportData:
 
 
 def gather(
-    path: str | Path, *, margin_mm: float = MARGIN_MM, margin_deg: float = MARGIN_DEG, track: Tracker | None = None
+    path: str | Path,
+    *,
+    margin_mm: float = MARGIN_MM,
+    margin_deg: float = MARGIN_DEG,
+    against: Path | None = None,
+    uncertainty: Mapping[str, Any] | None = None,
+    track: Tracker | None = None,
 ) -> ReportData:
     """Read the campaign in directory `path` and compute what a report says about it.
 
@@ -102,13 +119,18 @@ def gather(
         A campaign directory.
     margin_mm, margin_deg
         The noise band of comparisons between conditions.
+    against
+        The campaign to list differences from; without it, the last earlier one of this vehicle in the same folder.
+    uncertainty
+        What the lab states, as `agvbench.campaign.uncertainty_statement.read_statement` returns it; without it, what
+        the campaign's header has.
     track
         Wraps the runs while they are read, to show progress: called with the runs and their number.
 
     Raises
     ------
     CampaignError
-        If the campaign cannot be read.
+        If the campaign, or `against`, cannot be read.
     FlagError
         If a margin is negative or not finite.
     """
@@ -132,9 +154,16 @@ def gather(
         events=_events(campaign, problems),
         planned=planned,
         metrics=metrics_of_runs(runs, planned),
+        budgets=end_pose_budgets(
+            runs, evaluations(campaign.header.uncertainty if uncertainty is None else uncertainty)
+        ),
+        accuracy=pose_accuracies(errors),
+        completions=completions(errors),
+        recordings={run.run_id: campaign.recording(run.run_id) for run in runs},
         provenance=_provenance(campaign, problems),
         problems=problems,
         diagnosis=read_diagnosis(campaign.path),
+        changes=changes_since_before(campaign.path, against),
     )
 
 

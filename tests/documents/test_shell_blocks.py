@@ -26,6 +26,7 @@ QUICK = (
 )
 SLOW = (
     "docs/how-to/add-a-metric.md",
+    "docs/how-to/add-a-report-section.md",
     "docs/how-to/bring-your-own-plant.md",
     "docs/how-to/close-the-loop.md",
     "docs/how-to/control-in-closed-loop.md",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import unquote
 
 import pytest
 from opened_page import WINDOWS, opened
@@ -33,6 +34,17 @@ def test_reports_are_accessible_and_fit_every_window(browser: Browser, campaign:
             assert shown.hosts == {""}
             assert shown.width_px <= width_px
             assert shown.accessibility_findings() == []
+
+
+def test_everything_that_is_folded_is_accessible_too(browser: Browser, campaign: Path) -> None:
+    for width_px, scheme in WINDOWS:
+        with opened(browser, (campaign / PAGES[0]).as_uri(), width_px=width_px, scheme=scheme) as shown:
+            shown.page.evaluate("document.querySelectorAll('details').forEach((fold) => { fold.open = true; })")
+            assert shown.width_px <= width_px
+            assert shown.accessibility_findings() == []
+            link = shown.page.locator("#runs td a").first.get_attribute("href")
+            assert link is not None
+            assert (campaign / "report" / unquote(link)).is_file()
 
 
 def test_figures_say_what_they_show(browser: Browser, campaign: Path) -> None:

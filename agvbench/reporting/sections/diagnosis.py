@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +22,7 @@ from agvbench.reporting.content import (
     plain_sentences,
 )
 from agvbench.reporting.figures.style import MUTED, ON_PAGE, dress, new_figure, to_svg
+from agvbench.reporting.next_steps import diagnose_command
 from agvbench.reporting.sections.base import Section
 from agvbench.types import Floats
 from agvbench.workflows.diagnosis_files import (
@@ -73,14 +72,8 @@ class DiagnosisSection(Section):
     def blocks(self, data: ReportData) -> Sequence[Block]:
         """Return verdict, tables and pictures, or how to get them."""
         if data.diagnosis is None:
-            return [Paragraph(f"No diagnosis lies here: {_command(data.path)} makes one.")]
+            return [Paragraph(f"No diagnosis lies here: {diagnose_command(data.path)} makes one.")]
         return diagnosis_blocks(data.diagnosis)
-
-
-def _command(campaign: Path) -> str:
-    """Return the command that diagnoses this campaign, for a shell."""
-    directory, file = (quote(plain_sentences(str(path))) for path in (campaign, campaign / "diagnosis.json"))
-    return f"agvbench diagnose {directory} --json {file}"
 
 
 def diagnosis_blocks(shown: ShownDiagnosis) -> list[Block]:
@@ -90,9 +83,7 @@ def diagnosis_blocks(shown: ShownDiagnosis) -> list[Block]:
         return [
             Paragraph(" ".join(plain_sentences(problem) for problem in shown.problems) or "The diagnosis is empty.")
         ]
-    provenance = mapping(content.get("provenance"))
-    verdict = plain_sentences(f"{content.get('verdict')}: {provenance.get('why', '')}")
-    blocks: list[Block] = [Paragraph(verdict, lead=True)]
+    blocks: list[Block] = [Paragraph(verdict_in_words(content), lead=True)]
     blocks += [table for table in (_effects(content), _errors(content), _states(content)) if table.rows]
     said = (
         *left_in_words(content), *fit_in_words(content), *sessions_in_words(content), *remedies_in_words(content),
@@ -106,6 +97,12 @@ def diagnosis_blocks(shown: ShownDiagnosis) -> list[Block]:
     else:
         blocks += _pictures(shown.residuals)
     return blocks
+
+
+def verdict_in_words(content: Mapping[str, Any]) -> str:
+    """Return the verdict of a diagnosis and its reason."""
+    why = mapping(content.get("provenance")).get("why", "")
+    return plain_sentences(f"{content.get('verdict')}: {why}")
 
 
 def _effects(content: Mapping[str, Any]) -> Table:

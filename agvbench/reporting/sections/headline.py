@@ -1,4 +1,4 @@
-"""What calibration bought, in plain words."""
+"""The first screen: what calibration bought in plain words, where runs ended, the diagnosis, and what to do next."""
 
 from __future__ import annotations
 
@@ -7,8 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from agvbench.reporting.content import Block, Bullets, Paragraph, plain, plain_sentences
+from agvbench.plot.style import condition_numbers
+from agvbench.plot.target_frame import in_target_frame
+from agvbench.reporting.content import Block, Bullets, FigureBlock, Panel, Paragraph, plain, plain_sentences
+from agvbench.reporting.figures.clouds import draw_cloud, scale_of
+from agvbench.reporting.figures.style import legend
+from agvbench.reporting.next_steps import next_steps
 from agvbench.reporting.sections.base import Section
+from agvbench.reporting.sections.diagnosis import verdict_in_words
 from agvbench.statistics import Comparison, ComparisonVerdict, Difference, valid
 from agvbench.statistics.comparison_summary import describe, note_of
 from agvbench.statistics.differences import ALL
@@ -24,10 +30,19 @@ _BOUGHT = {
     ("uncalibrated", "corrected"): "Calibration and correction",
 }
 _MOST_NAMED = 6
+_PLAIN = (
+    "The end position error is the distance between where a run stopped and where it was to stop, as the cameras "
+    "measured it. The heading error is how far the vehicle then pointed past its target heading."
+)
+_CLOUDS = (
+    "Where every run stopped, seen from its target (the cross; ahead is to the right). The ring has a radius of "
+    "{ring_mm:g} mm, the same in each panel. An ellipse holds a further run with 95 % probability, if end positions "
+    "are normally distributed; it needs four repeats."
+)
 
 
 class HeadlineSection(Section):
-    """One sentence per pair of conditions, what the errors are, what got worse and what the repeats could not say."""
+    """One sentence per pair of conditions, the end poses, the verdict of the diagnosis, what is next, and details."""
 
     slug, title, order = "headline", "In short", 10
 
@@ -36,8 +51,33 @@ class HeadlineSection(Section):
         lead = [Paragraph(sentence, lead=True) for sentence in _lead(data)]
         said = (item for comparison in data.comparisons for item in _details(comparison))
         details = list(dict.fromkeys((*said, *data.problems)))
-        defined = [Paragraph(DEFINITIONS)] if len(data.end_poses) else []
-        return [*lead, *defined, *([Bullets(details)] if details else [])]
+        blocks: list[Block] = [*lead]
+        if len(data.end_poses):
+            blocks += [Paragraph(_PLAIN), *cloud_figure(data)]
+        if data.diagnosis is not None and data.diagnosis.content:
+            blocks.append(Paragraph(f"Diagnosis: {verdict_in_words(data.diagnosis.content)}"))
+        blocks.append(Paragraph(f"Next: {' '.join(next_steps(data))}"))
+        blocks += [Bullets(details)] if details else []
+        return [*blocks, Paragraph(DEFINITIONS)] if len(data.end_poses) else blocks
+
+
+def cloud_figure(data: ReportData, *, slug: str = "clouds", small: bool = True) -> Iterator[FigureBlock]:
+    """Yield a figure of end positions with their ellipses, a panel per trajectory, all with one scale."""
+    counted, numbers = valid(data.errors), condition_numbers(data.conditions)
+    if counted.empty:
+        return
+    by_trajectory = {
+        str(name): {n: in_target_frame(rows[rows["condition"] == c]) for c, n in numbers.items()}
+        for name, rows in counted.groupby("trajectory", sort=False)
+    }
+    ring_mm, half_mm = scale_of(by_trajectory.values())
+    scale = {"ring_mm": ring_mm, "half_mm": half_mm}
+    panels = [
+        Panel(plain(name), draw_cloud({n: points for n, points in ends.items() if len(points)}, **scale))
+        for name, ends in by_trajectory.items()
+    ]
+    named = legend({c: n for c, n in numbers.items() if c in set(counted["condition"])})
+    yield FigureBlock(slug, _CLOUDS.format(ring_mm=ring_mm), panels, named, small=small)
 
 
 def _lead(data: ReportData) -> list[str]:

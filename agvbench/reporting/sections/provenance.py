@@ -33,6 +33,7 @@ def _facts(data: ReportData) -> Iterator[tuple[str, str]]:
         yield "kinematics", f"differential, axle {header.rear_axle_m} m behind the markers' centroid"
     else:
         yield "axles before and behind the markers' centroid", f"{header.front_axle_m} m, {header.rear_axle_m} m"
+    yield "labels", ", ".join(f"{name} {value}" for name, value in header.labels.items())
     yield "commands", str(header.channels)
     yield "motion capture", f"{header.mocap_rate_hz:g} Hz"
     yield "firmware", _distinct(run.firmware for run in data.runs)

@@ -12,6 +12,7 @@ from typing import Any
 import tomli_w
 
 from agvbench.errors import FileError, FlagError, OneOf
+from agvbench.labels import labels_given
 from agvbench.running.supervision.limits import DEFAULT_SAFETY
 from agvbench.text_files import read_toml
 
@@ -127,6 +128,12 @@ class BenchSettings:
         "resumed after the vehicle was charged, re-mounted or trimmed: a new name for the runs from now on",
         metavar="NAME",
     )
+    label: str = _option(
+        "",
+        "what to note of the circumstances, such as tyres=new; several with commas, or one after another",
+        metavar="NAME=VALUE",
+        joined=True,
+    )
     lab: str = _option("lab", "name of the lab on the bus (default: lab)", metavar="NAME")
     vehicle_name: str = _option(
         "agv1", "name of the vehicle on the bus, and of its body (default: agv1)", metavar="NAME"
@@ -147,6 +154,7 @@ class BenchSettings:
             f"from {least:g} s",
             "leave it out",
         )
+        labels_given(self.label)
         for option in fields(self):
             choices = option.metadata.get("keywords", {}).get("choices")
             if choices:

@@ -21,9 +21,11 @@ from agvbench.campaign.lock import locked
 from agvbench.campaign.manifest import PLANNED_TABLE
 from agvbench.campaign.writer import refuse_occupied
 from agvbench.errors import CampaignError, RecordingError
+from agvbench.labels import labels_given
 from agvbench.model import VehicleModel
 from agvbench.planning import Workspace
 from agvbench.running.configuration.campaign_directory import choose_directory, has_runs
+from agvbench.running.configuration.lab_file import LabFile
 from agvbench.running.configuration.provenance import (
     INPUTS_TABLE,
     RecordedInputs,
@@ -100,6 +102,7 @@ def open_session(
     if dry_run:
         check_specs(settings.agv, settings.mocap, options := adapter_options(settings, models))
         load_plant(options.plant, options.plant_options)
+        LabFile.of_folder()
         models.setdefault("calibrated", expected_calibration(settings.vehicle))
         yield session_with(bench=None)
         return
@@ -147,8 +150,8 @@ def _notices(settings: BenchSettings, given: Mapping[str, Any], directory: Path)
 def _header(
     directory: Path, settings: BenchSettings, nominal: VehicleModel, link: VehicleLink, *, resume: bool
 ) -> CampaignHeader:
-    """Return the campaign's header; a session that is resumed keeps the names that it began with."""
-    identity = link.identity()
+    """Return the campaign's header; a session that is resumed keeps the names and statements that it began with."""
+    identity, lab = link.identity(), LabFile.of_folder()
     header = CampaignHeader(
         schema=schema_for(nominal.geometry.driven, nominal.geometry.kinematics, nominal.channels),
         name=directory.resolve().name,
@@ -159,10 +162,13 @@ def _header(
         mocap_rate_hz=identity.mocap_rate_hz,
         driven=nominal.geometry.driven,
         kinematics=nominal.geometry.kinematics,
+        labels={**lab.labels, **labels_given(settings.label)},
+        uncertainty=lab.uncertainty,
     )
     if resume and (directory / FILE_NAME).exists():
         stored = CampaignHeader.load(directory / FILE_NAME)
-        return replace(header, name=stored.name, vehicle_name=stored.vehicle_name)
+        kept = ("name", "vehicle_name", "labels", "uncertainty")
+        return replace(header, **{name: getattr(stored, name) for name in kept})
     return header
 
 

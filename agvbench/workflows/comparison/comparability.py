@@ -181,13 +181,21 @@ def _calibrations(a: Campaign, b: Campaign) -> Iterator[str]:
         )
 
 
+def _labels(a: Campaign, b: Campaign) -> Iterator[str]:
+    one, other = a.header.labels, b.header.labels
+    names = [name for name in dict.fromkeys((*one, *other)) if one.get(name) != other.get(name)]
+    if names:
+        words = (f"{name} {one.get(name, 'none')} and {other.get(name, 'none')}" for name in names)
+        yield f"The labels differ: {', '.join(words)}."
+
+
 def _sequentially_stopped(a: Campaign, b: Campaign) -> Iterator[str]:
     for side in (a, b):
         if (record := SequentialRecord.load(side.path)) is not None and record.analyses:
             yield stopped_in_words(side.path, record)
 
 
-_NOTES = (_vehicles, _sampled_vehicles, _cameras, _trajectories, _calibrations, _sequentially_stopped)
+_NOTES = (_vehicles, _sampled_vehicles, _cameras, _trajectories, _calibrations, _labels, _sequentially_stopped)
 
 
 def calibration_hash(campaign: Path) -> str:

@@ -18,6 +18,7 @@ _OPTIONS = (
     *("steering", "order", "place", "workspace", "exchange"),
 )
 Facts = Mapping[str, str]
+LABEL = "label "
 
 
 def facts_of(campaign: Path, firmware: str) -> Facts:
@@ -35,9 +36,20 @@ def changed(before: Facts, after: Facts) -> Iterator[str]:
     >>> list(changed({"firmware": "2.0", "host": "lab"}, {"firmware": "2.1"}))
     ['firmware 2.0 → 2.1']
     """
-    for name, value in after.items():
-        if before.get(name, value) != value:
-            yield f"{name} {before[name]} → {value}"
+    for name, was, value in differences(before, after):
+        yield f"{name} {was} → {value}"
+
+
+def differences(before: Facts, after: Facts) -> Iterator[tuple[str, str, str]]:
+    """Yield name and both values of each fact that both campaigns record and that differs.
+
+    A label that only one of them has differs, too: it is "" in the other.
+    """
+    labels = (name for name in before if name.startswith(LABEL) and name not in after)
+    for name in (*after, *labels):
+        one, other = (side.get(name, "" if name.startswith(LABEL) else None) for side in (before, after))
+        if one is not None and other is not None and one != other:
+            yield name, one, other
 
 
 def _program(campaign: Path) -> dict[str, str]:
@@ -46,11 +58,11 @@ def _program(campaign: Path) -> dict[str, str]:
 
 
 def _header(campaign: Path) -> dict[str, str]:
-    header = vars(CampaignHeader.load(campaign / FILE_NAME))
-    left_out = ("schema", "name", "prediction_horizon_s", "prediction_stride_s")
-    return {
+    header = CampaignHeader.load(campaign / FILE_NAME)
+    left_out = ("schema", "name", "prediction_horizon_s", "prediction_stride_s", "labels", "uncertainty")
+    return {f"{LABEL}{name}": value for name, value in header.labels.items()} | {
         name: f"{value:g}" if isinstance(value, float) else str(value)
-        for name, value in header.items()
+        for name, value in vars(header).items()
         if name not in left_out
     }
 

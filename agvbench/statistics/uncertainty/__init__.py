@@ -1,0 +1,1 @@
+"""Uncertainty budgets after the GUM."""

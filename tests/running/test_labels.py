@@ -1,0 +1,96 @@
+"""Labels and stated uncertainties: from the option and ``lab.toml`` into the campaign, compare and history."""
+
+import pytest
+
+from agvbench.campaign import Campaign
+from agvbench.campaign.header import CampaignHeader
+from agvbench.cli import main
+from agvbench.errors import CampaignError, FileError
+from agvbench.labels import checked_labels
+from agvbench.running.configuration.lab_file import LabFile
+from agvbench.workflows.comparison.comparability import comparability
+from agvbench.workflows.history.facts import changed, facts_of
+from agvbench.workflows.init import make_lab
+
+BENCH = ["bench", "trajectories", "--trajectories", "1", "--repeats", "1", "--no-report", "-k", "uncalibrated"]
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory):
+    """Return a lab folder with ``lab.toml`` and two campaigns, ``monday`` and ``tuesday``."""
+    folder = tmp_path_factory.mktemp("labels") / "lab"
+    make_lab(folder)
+    text = (folder / "lab.toml").read_text(encoding="utf-8")
+    text = text.replace('# tyres = "new" ', 'tyres = "new" ').replace("# camera_position_mm", "camera_position_mm")
+    (folder / "lab.toml").write_text(text, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        assert main([*BENCH, "--out", "monday"]) == 0
+        assert main([*BENCH, "--out", "tuesday", "--label", "tyres=worn", "--label", "carpet=2"]) == 0
+        # What is resumed keeps what it began with, whatever the lab states now.
+        (folder / "lab.toml").write_text("[labels]\ndriver = 'other'\n", encoding="utf-8")
+        assert main(["bench", "--no-report", "--resume", "--out", "tuesday"]) == 0
+    return folder
+
+
+def test_labels_and_statements_travel_into_the_campaign(lab):
+    monday, tuesday = (CampaignHeader.load(lab / name / "campaign.toml") for name in ("monday", "tuesday"))
+    assert monday.labels == {"tyres": "new"}
+    assert monday.uncertainty == tuesday.uncertainty == {"camera_position_mm": 0.3}
+    assert tuesday.labels == {"tyres": "worn", "carpet": "2"}
+
+
+def test_differing_labels_are_noted_by_compare_and_history(lab):
+    monday, tuesday = lab / "monday", lab / "tuesday"
+    notes = comparability(Campaign.open(monday), Campaign.open(tuesday)).notes
+    assert "The labels differ: tyres new and worn, carpet none and 2." in notes
+    phrases = list(changed(facts_of(monday, ""), facts_of(tuesday, "")))
+    assert "label tyres new → worn" in phrases
+    assert "label carpet  → 2" in phrases
+
+
+def test_a_resumed_session_refuses_another_label(lab, capsys, monkeypatch):
+    monkeypatch.chdir(lab)
+    assert main(["bench", "--no-report", "--resume", "--out", "tuesday", "--label", "tyres=new"]) == 2
+    assert "--label: a resumed session drives what it began with" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("tyres", "--label: is no label: 'tyres'; give NAME=VALUE"),
+        ("=new", "--label: label has no such name: ''"),
+        ("tyres=", "--label.tyres: label cannot be used: ''"),
+        ("tyres=" + "x" * 81, "label cannot be used"),
+    ],
+)
+def test_a_label_that_cannot_be_used_is_one_line(given, said, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["bench", "--dry-run", "--label", given]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert said in line
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[label]\nx = 1\n", "lab.toml: unknown key 'label'; did you mean 'labels'?"),
+        ("[labels]\nx = true\n", "lab.toml: labels.x: label cannot be used: True"),
+        ("[labels]\n'a b' = 1\n", "lab.toml: labels: label has no such name: 'a b'"),
+        ("[uncertainty]\nclock_ms = 'slow'\n", "lab.toml: uncertainty: clock_ms: value cannot be used"),
+        ("[labels\n", "lab.toml: is not TOML"),
+    ],
+)
+def test_a_lab_file_that_cannot_be_used_is_one_line(text, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "lab.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(FileError) as error:
+        LabFile.of_folder()
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_too_many_labels_are_refused():
+    with pytest.raises(CampaignError, match="has too many labels: 33"):
+        checked_labels({f"l{k}": k for k in range(33)}, where="labels", error=CampaignError)
