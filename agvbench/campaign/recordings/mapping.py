@@ -107,9 +107,11 @@ class Columns(_Strict, frozen=True):
     time: Time
     x: QuantityColumn
     y: QuantityColumn
-    drive: Signal
-    front: Signal
+    drive: Signal | None = None
+    front: Signal | None = None
     rear: Signal | None = None
+    left: Signal | None = None
+    right: Signal | None = None
     heading: QuantityColumn | None = None
     quaternion: Quaternion | None = None
     mean_error: QuantityColumn | None = None
@@ -242,7 +244,27 @@ def _check(mapping: Mapping, path: Path) -> None:
     if columns.quaternion and columns.quaternion.floor_x[-1] == columns.quaternion.floor_y[-1]:
         where = f"{path}: columns.quaternion"
         raise FileError("floor_x and floor_y are one axis", where=where, remedy="give two of x, y, z")
-    mapping.header(path)
+    _check_commands(mapping, path, mapping.header(path))
+
+
+def _check_commands(mapping: Mapping, path: Path, header: CampaignHeader) -> None:
+    """Raise `FileError` unless the command columns are those of the vehicle's channels."""
+    needed: tuple[str, ...] = ("drive", "front")
+    other: tuple[str, ...] = ("left", "right")
+    if header.channels.wheels is not None:
+        needed, other = other, (*needed, "rear")
+    for name in needed:
+        if getattr(mapping.columns, name) is None:
+            raise FileError(
+                "a command column is missing", where=path, value=f"columns.{name}",
+                remedy=f'add [columns.{name}] with column = "…"; [channels] says which commands the vehicle takes',
+            )  # fmt: skip
+    for name in other:
+        if getattr(mapping.columns, name) is not None:
+            raise FileError(
+                "is no command of this vehicle", where=path, value=f"columns.{name}", limit=OneOf(needed),
+                remedy=f"delete [columns.{name}], or correct [channels]",
+            )  # fmt: skip
 
 
 LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}

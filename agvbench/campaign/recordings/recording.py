@@ -16,8 +16,9 @@ from agvbench.campaign.recordings.mapping import ISO_8601, TIME, Flag, Mapping, 
 from agvbench.campaign.tables.csv_text import read_csv_text
 from agvbench.campaign.tables.schema import UNKNOWN_COUNT, ColumnSpec, Kind, fill_columns, type_columns
 from agvbench.errors import FileError
-from agvbench.types import Floats
+from agvbench.types import Command, Floats
 from agvbench.vehicle.quaternion import heading_of
+from agvbench.vehicle.wheels import WheelCommand
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ def read_recording(path: Path, mapping: Mapping) -> Recording:
     wild = np.zeros(len(t_s), np.bool_)
     if mapping.gate:
         wild[seen] = jumped(t_s[seen], measured["x"][seen], measured["y"][seen], heading[seen], mapping.gate)
-    commands = {name: _held(cells, name) for name in ("drive", "front", "rear")}
+    commands = _commands(cells)
     known_command = np.all([np.isfinite(command) for command in commands.values()], axis=0)
     return Recording(
         path,
@@ -136,11 +137,20 @@ def _heading(cells: Cells) -> Floats:
     return heading_of(np.column_stack(parts), quaternion.forward, quaternion.floor_x, quaternion.floor_y)
 
 
+def _commands(cells: Cells) -> dict[str, Floats]:
+    """Return the commands by role; those of wheels as the speed and yaw rate of the body."""
+    header = cells.mapping.header(cells.path)
+    neutral = {name: np.full(len(cells.table), getattr(header.neutral, name)) for name in Command._fields}
+    if (wheels := header.channels.wheels) is not None:
+        body = wheels.body(*(_held(cells, name) for name in WheelCommand._fields))
+        return neutral | dict(zip(("drive", "front"), body, strict=True))
+    mapped = [name for name in Command._fields if getattr(cells.mapping.columns, name) is not None]
+    return neutral | {name: _held(cells, name) for name in mapped}
+
+
 def _held(cells: Cells, name: str) -> Floats:
-    """Return a command column in which an empty cell repeats the one before; neutral if it is not mapped."""
+    """Return a command column in which an empty cell repeats the one before."""
     signal = getattr(cells.mapping.columns, name)
-    if signal is None:
-        return np.full(len(cells.table), getattr(cells.mapping.header(cells.path).neutral, name))
     values = cells.number(signal.column, signal.scale, signal.offset)
     last = np.maximum.accumulate(np.where(np.isfinite(values), np.arange(len(values)), -1))
     return np.where(last >= 0, values[last], np.nan)

@@ -93,6 +93,7 @@ def check_rig(models: Mapping[str, VehicleModel], settings: BenchSettings, link:
 def check_commands(models: Mapping[str, VehicleModel], identity: AgvIdentity | Identity) -> None:
     """Raise `VehicleError` unless the models, by condition, command the vehicle in its unit, about its neutral."""
     for condition, model in models.items():
+        _check_wheels(model, identity, _OPTIONS[condition])
         for role in ROLES:
             said, true = getattr(model.channels, role), getattr(identity.channels, role)
             for what, ours, theirs in _differences(said, true, role):
@@ -100,6 +101,16 @@ def check_commands(models: Mapping[str, VehicleModel], identity: AgvIdentity | I
                     f"the vehicle {what} than its file says", where=model.name, value=ours, limit=theirs,
                     remedy=f"give the right file with {_OPTIONS[condition]}",
                 )  # fmt: skip
+
+
+def _check_wheels(model: VehicleModel, identity: AgvIdentity | Identity, option: str) -> None:
+    said, true = model.channels.wheels, identity.channels.wheels
+    if said != true:
+        kind = "commands of the body"
+        raise VehicleError(
+            "the vehicle takes other wheel commands than its file says", where=model.name, value=str(said or kind),
+            limit=str(true or kind), remedy=f"give the right file with {option}",
+        )  # fmt: skip
 
 
 def _differences(said: Channel, true: Channel, role: Role) -> Iterator[tuple[str, object, object]]:
