@@ -13,7 +13,7 @@ import pytest
 from agvbench.calibration import calibrate
 from agvbench.campaign import Campaign, CampaignHeader
 from agvbench.diagnosis import Diagnosis, Verdict, diagnose
-from agvbench.errors import FitError, VehicleError
+from agvbench.errors import FitError
 from agvbench.model import VehicleModel
 from agvbench.model.examples import example_path
 from agvbench.running.session.opening import open_session
@@ -125,17 +125,11 @@ def test_too_few_straights_are_one_line(tmp_path: Path) -> None:
             opened.model("calibrated")
 
 
-def test_it_has_no_rear_axle_and_does_not_drive_back(tmp_path: Path) -> None:
+def test_it_has_no_rear_axle(tmp_path: Path) -> None:
     with open_session(OPTIONS, out=str(tmp_path / "a"), resume=False, dry_run=False) as opened:
         driver = opened.driver("rear", experiment="free", repeat=1)
         with pytest.raises(NotDrivenError, match="does not steer its rear axle"):
             driver.hold(for_s=2.0, drive=0.5, rear=0.5)
-    options = OPTIONS | {"place": "auto"}
-    with (
-        pytest.raises(VehicleError, match="only a vehicle with steered axles drives back to its start"),
-        open_session(options, out=str(tmp_path / "b"), resume=False, dry_run=False),
-    ):
-        pass
 
 
 def test_a_turn_on_the_spot_stays_on_the_spot(tmp_path: Path) -> None:

@@ -44,12 +44,6 @@ def open_session_rig(
     AgvbenchError
         If an adapter cannot be opened, or `check_rig` refuses the rig.
     """
-    if settings.place == "auto":
-        models["uncalibrated"].geometry.require_two_axles(
-            "only a vehicle with steered axles drives back to its start",
-            where=f"vehicle {models['uncalibrated'].name}",
-            remedy="leave out --place auto",
-        )
     if listen and settings.connect:
         raise FlagError(
             "a session that connects does not listen", where="--listen", value=listen,
