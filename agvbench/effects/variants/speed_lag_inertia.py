@@ -27,7 +27,11 @@ class SpeedLagInertia(Variant):
     reference: ClassVar[str] = (
         "speed controller with integral action on a motor, as in textbooks of control (Ogata 2010, section 5.3)"
     )
-    limits: ClassVar[str] = "a linear controller: limits of the force do not act beside it"
+    limits: ClassVar[str] = (
+        "a linear controller: limits of the force do not act beside it; the drives of steered axles have the other "
+        "variants of speed_lag"
+    )
+    needs_differential: ClassVar[bool] = True
     equivalents: ClassVar[Mapping[str, Mapping[str, float]]] = {
         "speed_lag.accelerate_s": {"time_constant_s": 1.0},
         "speed_lag.brake_s": {"time_constant_s": 1.0},
