@@ -104,10 +104,12 @@ def test_the_diagnosis_names_the_wheels_and_the_lags(driven: Path) -> None:
     bend = apart / mean / TRUTH.true_track_m
     assert values["wheel_diameter_mismatch"]["curvature_per_m"] == pytest.approx(bend, abs=0.003)
     assert values["marker_offset"]["forward_m"] == pytest.approx(TRUTH.marker_forward_m - 0.05, abs=0.001)
-    # The wheels have a lag of 2 ζ / ω after a delay of 2 to 3 frames; a response of second order begins like a delay.
-    late_s = 2.0 * TRUTH.damping_ratio / TRUTH.natural_frequency_rad_per_s + 0.05
+    # The wheels have a lag of 2 ζ / ω and an inertia of 1 / ω after a delay of 2 to 3 frames.
+    lag_s = 2.0 * TRUTH.damping_ratio / TRUTH.natural_frequency_rad_per_s
     delay_s = float(np.mean(list(values["actuation_delay"].values())))
-    assert values["wheel_lag"]["time_constant_s"] + delay_s == pytest.approx(late_s, abs=0.01)
+    assert values["wheel_lag"]["time_constant_s"] == pytest.approx(lag_s, abs=0.01)
+    assert values["wheel_lag"]["inertia_s"] == pytest.approx(1.0 / TRUTH.natural_frequency_rad_per_s, abs=0.01)
+    assert delay_s == pytest.approx(0.05, abs=0.01)
     assert found.verdict in (Verdict.NAMED, Verdict.AMBIGUOUS)
     errors = found.held_out.errors["end_position_mm"]
     assert errors["after"] < 1.3 * errors["floor"]
