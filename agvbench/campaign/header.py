@@ -120,7 +120,12 @@ class CampaignHeader:
 
     @property
     def command_columns(self) -> Mapping[str, str]:
-        """The columns of the commands table, by role: the names of the channels where each has its own table."""
+        """The columns of the commands table, by role: the names of the channels where each has its own table.
+
+        Wheel commands have the places of drive and front; see `agvbench.campaign.tables.command_columns`.
+        """
+        if self.channels.wheels is not None:
+            return {"drive": "left", "front": "right"}
         return channel_names("two_axle" if self.channels.common else self.kinematics)
 
     @property
@@ -241,8 +246,8 @@ class Vehicle(msgspec.Struct, frozen=True):
     kinematics: Kinematics = "two_axle"
 
 
-ChannelTables = dict[str, dict[str, str | float]]
-"""The tables ``[channels.NAME]``."""
+ChannelTables = dict[str, dict[str, str | float] | float]
+"""The tables ``[channels.NAME]``, and the lengths of wheel commands beside them."""
 
 
 class Mocap(msgspec.Struct, frozen=True):

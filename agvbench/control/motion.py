@@ -91,8 +91,12 @@ class Actuation:
             return float(channel.inverse(high if wanted > 0.0 else low))
 
     def clipped(self, command: Command) -> Command:
-        """Return a finite `command` clipped to the range of each channel, of its unit and of its map."""
-        return Command(*(self._clipped(role, getattr(command, role)) for role in Command._fields))
+        """Return a finite `command` clipped to the range of each channel, of its unit and of its map.
+
+        Where a wheel of a differential vehicle saturates, both slow down, and the curvature is kept.
+        """
+        own = Command(*(self._clipped(role, getattr(command, role)) for role in Command._fields))
+        return self.model.channels.limited(own)
 
     def _clipped(self, role: str, command: float) -> float:
         allowed = command_range(getattr(self.model.channels, role))

@@ -119,7 +119,7 @@ class Effect:
         ``REAR_WAIT`` and ``DRIVE_WAIT``.
     aim
         Called when a command takes effect, which is in ``DRIVE_COMMAND`` …; may change the aims and the dynamics of the
-        actuators: ``FRONT_AIM`` … ``BRAKE_LAG``, ``STEERING_INERTIA`` … ``BRAKING_LIMIT``.
+        actuators: ``FRONT_AIM`` … ``BRAKE_LAG``, ``STEERING_INERTIA`` … ``BRAKING_LIMIT``, ``DRIVE_INERTIA``.
     steer
         Called at every time of evaluation, as all hooks below; may change ``FRONT`` and ``REAR``.
     drive

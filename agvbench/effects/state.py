@@ -53,6 +53,8 @@ DRAGGED = 49
 REAR_LAG_RATIO = 50
 # Width of the backlash of the rear axle.
 REAR_BACKLASH = 51
+# A drive of second order: τ of τ² v̈ + lag v̇ = aim − v, without limits of v̇.
+DRIVE_INERTIA = 52
 # What the lab logged about the run, each column standardised; 0 where nothing was logged.
-LOGGED, LOGGED_COUNT = 52, 16
+LOGGED, LOGGED_COUNT = 53, 16
 SIZE = LOGGED + LOGGED_COUNT

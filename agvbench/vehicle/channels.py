@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal, Self, get_args
+from typing import Literal, Self
 
-from agvbench.errors import OneOf, VehicleError
+from agvbench.errors import VehicleError
 from agvbench.types import Command, Commands, CommandUnit
-from agvbench.vehicle.fields import coerce_float
+from agvbench.vehicle.channel import Channel
 from agvbench.vehicle.geometry import Geometry
+from agvbench.vehicle.wheels import Wheels
+
+__all__ = ["ROLES", "Channel", "Channels", "Quantity", "Role", "TableUnit", "channels_of", "quantity_of"]
 
 Role = Literal["front", "rear", "drive"]
 """A command channel, by the name of its column in the table of commands."""
@@ -21,68 +24,26 @@ TableUnit = Literal["us", "normalised", "si", "channels"]
 
 
 @dataclass(frozen=True)
-class Channel:
-    """The commands that one channel takes.
-
-    Parameters
-    ----------
-    unit
-        ``"us"``, ``"normalised"`` or ``"si"``, as in `CommandUnit`.
-    neutral
-        Command at which the drive stands and an axle steers (about) straight.
-    low, high
-        Lowest and highest command; infinite where no range is stated.
-
-    Raises
-    ------
-    VehicleError
-        If the unit is unknown, `neutral` is not finite, or low < high and low ≤ neutral ≤ high do not hold.
-    """
-
-    unit: CommandUnit
-    neutral: float
-    low: float = -math.inf
-    high: float = math.inf
-
-    def __post_init__(self) -> None:
-        if self.unit not in get_args(CommandUnit):
-            limit = OneOf(get_args(CommandUnit))
-            raise VehicleError("unknown unit", where="unit", value=repr(self.unit), limit=limit)
-        coerce_float(self, "neutral")
-        coerce_float(self, "low", "high", allow_infinite=True)
-        if not self.low < self.high:
-            raise VehicleError("is not below high", where="low", value=f"{self.low:g}", limit=f"below {self.high:g}")
-        if not self.low <= self.neutral <= self.high:
-            raise VehicleError("is out of range", where="neutral", value=f"{self.neutral:g}", limit=self.range_text)
-
-    @property
-    def is_bounded(self) -> bool:
-        """Whether a range is stated."""
-        return math.isfinite(self.low) or math.isfinite(self.high)
-
-    def holds(self, command: float) -> bool:
-        """Return whether a command is within the range."""
-        return self.low <= command <= self.high
-
-    @property
-    def range_text(self) -> str:
-        """The range in words."""
-        return f"{self.low:g}…{self.high:g}"
-
-    def __str__(self) -> str:
-        return f"{self.unit}, neutral {self.neutral:g}{f', {self.range_text}' if self.is_bounded else ''}"
-
-
-@dataclass(frozen=True)
 class Channels:
     """The command channels of a vehicle: each has its own unit, neutral and range.
 
-    A differential vehicle has no rear axle: its `rear` is its `front`, and its rear command stays at neutral.
+    A differential vehicle has no rear axle: its `rear` is its `front`, and its rear command stays at neutral. If it is
+    commanded by two wheel speeds, `wheels` describes them, and the other channels are those of the body.
     """
 
     drive: Channel
     front: Channel
     rear: Channel
+    wheels: Wheels | None = None
+
+    @classmethod
+    def of_wheels(cls, wheels: Wheels) -> Self:
+        """Return the channels of a differential vehicle that is commanded by two wheel speeds."""
+        return cls(wheels.drive, wheels.front, wheels.front, wheels)
+
+    def limited(self, command: Command) -> Command:
+        """Return the command that is carried out where a wheel saturates; see `Wheels.limited`."""
+        return command if self.wheels is None else self.wheels.limited(command)
 
     @classmethod
     def alike(cls, unit: CommandUnit, neutral: float | None = None) -> Self:
@@ -123,10 +84,15 @@ class Channels:
     def __str__(self) -> str:
         if (common := self.common) is not None:
             return str(common)
+        if self.wheels is not None:
+            return str(self.wheels)
         return "; ".join(f"{role} {getattr(self, role)}" for role in Command._fields)
 
     def require_within(self, commands: Commands, *, where: object) -> None:
         """Raise `VehicleError` at `where` for the first of `commands` that is out of its channel's range."""
+        if self.wheels is not None:
+            self.wheels.require_within(commands, where=where)
+            return
         for role in ROLES:
             channel: Channel = getattr(self, role)
             for value in getattr(commands, role):

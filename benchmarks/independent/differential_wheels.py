@@ -422,6 +422,23 @@ def speed_lag(world: World, rng: Rng, scale: float) -> Effect:
 
 
 @cause("inside")
+def motor_inertia(world: World, rng: Rng, scale: float) -> Effect:
+    """Both wheels' speed controllers are of second order, and so are speed and yaw rate; integrated by Verlet steps."""
+    period = float(rng.uniform(0.06, 0.12)) * scale
+    damping = float(rng.uniform(0.7, 1.1))
+    rates = [np.zeros(len(world.runs)) for _ in range(4)]
+
+    def setpoint(v: Array, w: Array) -> Pair:
+        for k, aim in ((0, v), (2, w)):
+            push = (aim - rates[k]) / period**2 - 2.0 * damping / period * rates[k + 1]
+            rates[k + 1] = rates[k + 1] + STEP_S * push
+            rates[k] = rates[k] + STEP_S * rates[k + 1]
+        return rates[0], rates[2]
+
+    return Effect({"inertia_s": period, "time_constant_s": 2.0 * damping * period}, setpoint=setpoint)
+
+
+@cause("inside")
 def steering_lag(world: World, rng: Rng, scale: float) -> Effect:
     """First-order lag of the yaw rate."""
     tau = float(rng.uniform(0.08, 0.25)) * scale

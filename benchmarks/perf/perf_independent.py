@@ -52,7 +52,9 @@ ALWAYS_TRUE: Mapping[str, frozenset[str]] = {
 
 That of both wheels of a differential vehicle resembles a delay of 5 ms.
 """
-NAMES: Mapping[str, Mapping[str, str]] = {"differential_wheels": {"steering_rate_limit": "yaw_acceleration_limit"}}
+NAMES: Mapping[str, Mapping[str, str]] = {
+    "differential_wheels": {"steering_rate_limit": "yaw_acceleration_limit", "motor_inertia": "wheel_lag"}
+}
 """Causes that the library knows by another name on such a vehicle."""
 ABSORBED: Mapping[str, frozenset[str]] = {"differential_wheels": frozenset({"drive_dead_band", "mocap_scale"})}
 """Causes that free maps absorb: they need no name."""

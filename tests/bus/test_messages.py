@@ -360,9 +360,9 @@ def test_every_class_of_error_arrives(kind: type[errors.AgvbenchError]) -> None:
 @every_codec
 def test_another_encoding_is_refused_with_the_remedy(codec: Any) -> None:
     fields = msgspec.msgpack.decode(encode(_one(codec)))[1]
-    later = ([6, fields], [6, {**fields, "more": 1}], [6], [6, "a", "b"], [4, fields], [2**64 - 1, fields])
+    later = ([7, fields], [7, {**fields, "more": 1}], [7], [7, "a", "b"], [4, fields], [2**64 - 1, fields])
     for payload in (b"AGVB\x03" + bytes(59), b"AGVB\x01", *map(msgspec.msgpack.encode, later)):
-        with pytest.raises(MessageError, match=r"another encoding: \d+ \(limit: 5\); install the same agvbench"):
+        with pytest.raises(MessageError, match=r"another encoding: \d+ \(limit: 6\); install the same agvbench"):
             codec[1](payload)
 
 

@@ -24,9 +24,17 @@ COMMANDS = Commands(STEPS, np.array([900.0, 900.0, 1100.0, 1500.0]), np.array([1
 TIMES = np.linspace(0.0, 5.0, 60)
 
 
-def drive(*effects):
-    vehicle = example_vehicle("thesis").with_effects(*effects)
-    return vehicle.rollout([COMMANDS], np.array([[0.1, -0.2, 0.3]]), [TIMES], [0.5])[0]
+ROBOT_COMMANDS = Commands(STEPS, np.array([0.3, 0.3, -0.2, 0.0]), np.array([0.5, -0.8, 0.4, 0.0]), np.zeros(4))
+
+
+def drive(*effects, vehicle="thesis"):
+    model = example_vehicle(vehicle).with_effects(*effects)
+    commands = COMMANDS if vehicle == "thesis" else ROBOT_COMMANDS
+    return model.rollout([commands], np.array([[0.1, -0.2, 0.3]]), [TIMES], [0.5])[0]
+
+
+def kind_of(form: type[Variant]) -> str:
+    return "differential" if form.needs_differential else "thesis"
 
 
 @each_form
@@ -41,10 +49,10 @@ def test_it_is_declared_as_an_effect_is(form: type[Variant]) -> None:
 def test_a_vehicle_file_keeps_it_and_drives_with_it(form: type[Variant], tmp_path: Path) -> None:
     effect = form(**{p.name: p.scale for p in form.parameters()})
     assert effect_from_toml(tomllib.loads(tomli_w.dumps(effect.to_toml()))) == effect
-    example_vehicle("thesis").with_effects(effect).save(tmp_path / "vehicle.toml")
+    example_vehicle(kind_of(form)).with_effects(effect).save(tmp_path / "vehicle.toml")
     loaded = VehicleModel.load(tmp_path / "vehicle.toml")
     assert loaded.effects == (effect,)
-    moved = drive(effect) - drive()
+    moved = drive(effect, vehicle=kind_of(form)) - drive(vehicle=kind_of(form))
     assert np.hypot(moved[:, 0], moved[:, 1]).max() > 1e-3
 
 
@@ -69,4 +77,7 @@ def test_at_null_it_leaves_the_librarys_law_alone(form: type[Variant]) -> None:
     effect = library(**{p.name: p.scale for p in library.parameters()})
     # Hardly anything, but in the simulation that has all laws.
     laws = {law.name: law for law in (form(), FORMS["lateral_slip_power"](loss=1e-12))}
-    np.testing.assert_allclose(drive(effect, *laws.values()), drive(effect), atol=1e-6)
+    vehicle = kind_of(form)
+    np.testing.assert_allclose(
+        drive(effect, *laws.values(), vehicle=vehicle), drive(effect, vehicle=vehicle), atol=1e-6
+    )

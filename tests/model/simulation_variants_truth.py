@@ -259,6 +259,8 @@ def true_form(name: str, values: dict[str, float], start: tuple[float, float, fl
         speed = ramped_up(speed, drives, values["acceleration_mps2"], values["brake_s"], end)
     if name == "speed_lag_coasting":
         speed = coasted(speed, drives, values["acceleration_mps2"], values["coast_s"], end)
+    if name == "speed_lag_inertia":
+        speed = second_order(speed, 0.0, drives, values["time_constant_s"], values["inertia_s"], end)
     if name == "speed_lag_spring_back":
         speed = sprung(speed, drives, values, end)
     smoothing = values.get("time_constant_s", 0.0) if name == "mocap_latency_smoothing" else 0.0

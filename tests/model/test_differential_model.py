@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 
 from agvbench.campaign import CampaignHeader
 from agvbench.effects import CorneringSpeedLoss, SpeedLag, SteeringLag, WheelDiameterMismatch
+from agvbench.effects.variants import effect_variants
 from agvbench.errors import CampaignError, VehicleError
 from agvbench.model import VehicleModel
 from agvbench.types import Commands, Floats
@@ -71,6 +72,31 @@ def test_rollouts_agree_with_dop853(seed: int, lag_s: float, speed_lag_s: float,
     ours = turtle(lag_s, speed_lag_s, curvature).rollout([commands], [(0.0, 0.0, 0.0)], [t])[0]
     expected = truth(t, times, commanded, lag_s, speed_lag_s, curvature)
     np.testing.assert_allclose(ours, expected, rtol=0.0, atol=5e-5)
+
+
+@pytest.mark.parametrize(("lag_s", "inertia_s"), [(0.11, 0.07), (0.05, 0.1), (0.4, 0.05), (0.1, 0.05)])
+def test_wheels_of_second_order_agree_with_dop853(lag_s: float, inertia_s: float) -> None:
+    times = np.array([0.0, 0.7, 1.0, 1.15, 2.0, 2.8])
+    commanded = np.array([[0.4, 0.3], [0.4, -1.0], [-0.3, 0.8], [0.2, 0.0], [0.0, 1.2], [0.0, 0.0]])
+    t = np.linspace(0.0, 5.0, 150)
+
+    def rate(_: float, s: Floats, left: float, right: float) -> list[float]:
+        forward, yaw = 0.5 * (s[3] + s[5]), (s[5] - s[3]) / 0.4
+        wheels = [(aim - w - lag_s * a) / inertia_s**2 for aim, w, a in ((left, s[3], s[4]), (right, s[5], s[6]))]
+        return [forward * np.cos(s[2]), forward * np.sin(s[2]), yaw, s[4], wheels[0], s[6], wheels[1]]
+
+    state, out = np.array([-0.15, *[0.0] * 6]), np.empty((len(t), 3))
+    for begin, end, (v, w) in zip(times, [*times[1:], 6.0], commanded, strict=True):
+        own = (t >= begin) & (t < end)
+        at = np.append(t[own], end)
+        wheels = (v - 0.2 * w, v + 0.2 * w)
+        solved = solve_ivp(rate, (begin, end), state, "DOP853", t_eval=at, args=wheels, rtol=1e-10, atol=1e-12)
+        out[own], state = solved.y[:3, :-1].T, solved.y[:, -1]
+    expected = np.column_stack([out[:, 0] + 0.15 * np.cos(out[:, 2]), out[:, 1] + 0.15 * np.sin(out[:, 2]), out[:, 2]])
+    robot = turtle().with_effects(effect_variants()["wheel_lag_inertia"](lag_s, inertia_s))
+    zeros = np.zeros(len(times))
+    ours = robot.rollout([Commands(times, *commanded.T, zeros)], [(0.0, 0.0, 0.0)], [t])[0]
+    np.testing.assert_allclose(ours, expected, rtol=0.0, atol=5e-6)
 
 
 @given(forward=st.floats(-2.0, 2.0), yaw=st.floats(-5.0, 5.0))

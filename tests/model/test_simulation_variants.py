@@ -35,6 +35,9 @@ SIZES = [
     ("speed_lag_ramp", {"acceleration_mps2": 0.5, "braking_mps2": 0.35}),
     ("speed_lag_ramp_up", {"acceleration_mps2": 0.5, "brake_s": 0.2}),
     ("speed_lag_coasting", {"acceleration_mps2": 0.5, "coast_s": 0.2}),
+    ("speed_lag_inertia", {"time_constant_s": 0.2, "inertia_s": 0.1}),
+    ("speed_lag_inertia", {"time_constant_s": 0.12, "inertia_s": 0.15}),
+    ("speed_lag_inertia", {"time_constant_s": 0.5, "inertia_s": 0.1}),
     (
         "speed_lag_spring_back",
         {"forward_mps2": 0.5, "backward_mps2": 0.9, "coast_s": 0.4, "spring_per_s2": 2.5, "relaxation_s": 0.5},
@@ -95,6 +98,8 @@ def test_a_window_of_smoothed_poses_begins_as_in_a_steady_motion():
         (("steering_rate_limit_acceleration", (1.2, math.inf)), ("steering_rate_limit", (1.2,))),
         (("speed_lag_spring_back", (0.5, 0.5, 0.2, 0.0, 0.5)), ("speed_lag_coasting", (0.5, 0.2))),
         (("speed_lag_spring_back", (0.5, 0.5, 0.2, 1e-6, 0.5)), ("speed_lag_coasting", (0.5, 0.2))),
+        (("speed_lag_inertia", (0.2, 0.0)), ("speed_lag", (0.2, 0.2))),
+        (("speed_lag_inertia", (0.2, 1e-3)), ("speed_lag", (0.2, 0.2))),
         (("mocap_latency_smoothing", (0.07, 0.0)), ("mocap_latency", (0.07,))),
         (("mocap_latency_smoothing", (0.0, 1e-4)), ("mocap_latency", (1e-4,))),
         (("actuation_delay_servos", (0.07, 0.07)), ("actuation_delay", (0.07,))),
@@ -136,6 +141,13 @@ def test_critical_damping_is_no_edge():
     near = [simulated([effect_variants()["steering_lag_inertia"](0.2, tau)]) for tau in (0.1 - 1e-9, 0.1, 0.1 + 1e-9)]
     np.testing.assert_allclose(near[1] - near[0], near[2] - near[1], atol=2e-6)
     np.testing.assert_allclose(near[0], near[2], atol=2e-6)
+
+
+def test_a_drive_that_overshoots_many_times_comes_to_rest_and_reverses():
+    """A damping of 0.1: the speed crosses zero several times after a stop, and before it after a start backward."""
+    values = {"time_constant_s": 0.06, "inertia_s": 0.3}
+    predicted = simulated([effect_variants()["speed_lag_inertia"](**values)])
+    np.testing.assert_allclose(predicted, true_form("speed_lag_inertia", values, START, FRAMES), atol=1e-5)
 
 
 @pytest.mark.parametrize(

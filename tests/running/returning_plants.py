@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from agvbench.simulator import make_plant, small_plant
+from agvbench.simulator import differential_plant, make_plant, random_differential_plant, small_plant
 from agvbench.simulator.hidden import make_hidden_plant
 from agvbench.types import Plant
 
@@ -32,6 +32,16 @@ class Told:
 def default(seed: int) -> Told:
     """Return the default plant."""
     return Told(make_plant(seed))
+
+
+def differential(seed: int) -> Told:
+    """Return the differential plant, whose markers are 3 mm off the centre line."""
+    return Told(differential_plant(seed))
+
+
+def random_differential(seed: int) -> Told:
+    """Return a random differential plant."""
+    return Told(random_differential_plant(seed))
 
 
 def small(seed: int) -> Told:

@@ -73,7 +73,7 @@ class LiveAgv(SimulatedAgv):
     def _hold(self, command: Command) -> None:
         with self._lock:
             self._advance_to(self._clock.now())
-            self._held = command
+            self._held = self._options.channels.limited(command)
 
     def _advance_to(self, now_s: float) -> tuple[float, float, float] | None:
         if self._sampling is None:

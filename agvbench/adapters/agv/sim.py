@@ -79,7 +79,8 @@ class SimAgv(SimulatedAgv):
         return self._advance_through(self._instants(sampling, end_s))
 
     def _hold(self, command: Command, from_s: float) -> None:
-        """Change the command at `from_s`: until then the old one held."""
+        """Change the command at `from_s`: until then the old one held. Where a wheel saturates, both slow down."""
+        command = self._options.channels.limited(command)
         if command != self._held:
             if from_s - self._plant_s > _SLACK_S:
                 self._plant.advance(*self._held, from_s - self._plant_s)

@@ -59,6 +59,8 @@ DIALECTS = {1: Dialect("deg", 30, 150, checksums=False), 2: Dialect("us", 600, 2
 
 def check_channels(channels: Channels, *, where: object = None) -> None:
     """Raise `LinkError` unless commands are in microseconds and the drive stops where the firmware's watchdog does."""
+    if channels.wheels is not None:
+        raise LinkError("the firmware takes no wheel commands", where=where, value=str(channels.wheels))
     for role in ROLES:
         if (unit := getattr(channels, role).unit) != "us":
             raise LinkError("the firmware takes microseconds", where=where, value=unit, limit="command unit us")

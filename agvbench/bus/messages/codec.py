@@ -16,7 +16,7 @@ from msgspec import Meta
 
 from agvbench.errors import MessageError, OneOf
 
-VERSION = 5
+VERSION = 6
 ENCODING = "application/msgpack"
 """The encoding that Zenoh carries beside every payload."""
 MAX_ROWS = 8192
@@ -56,7 +56,7 @@ class _Body(msgspec.Struct):
     type: str
 
 
-_Version = Literal[5]
+_Version = Literal[6]
 _Message = TypeVar("_Message", bound=Message)
 _MALFORMED = (msgspec.MsgspecError, UnicodeDecodeError, RecursionError)
 

@@ -15,8 +15,10 @@ from agvbench.campaign import header
 from agvbench.campaign.header import SCHEMA, CampaignHeader
 from agvbench.errors import FileError, InputError, OneOf
 from agvbench.text_files import read_toml
+from agvbench.types import Command
 from agvbench.validation import convert
 from agvbench.vehicle.quaternion import Axis
+from agvbench.vehicle.wheels import WheelCommand
 
 ISO_8601 = "iso8601"
 _DELIMITERS = ",;\t|: /#&!~^*%$"
@@ -131,12 +133,14 @@ class PoseSource(_Strict, frozen=True):
 class Columns(_Strict, frozen=True):
     """Which column is what; time and pose are missing where ``[pose]`` says where they are."""
 
-    drive: Signal
-    front: Signal
+    drive: Signal | None = None
+    front: Signal | None = None
     time: Time | None = None
     x: QuantityColumn | None = None
     y: QuantityColumn | None = None
     rear: Signal | None = None
+    left: Signal | None = None
+    right: Signal | None = None
     heading: QuantityColumn | None = None
     quaternion: Quaternion | None = None
     mean_error: QuantityColumn | None = None
@@ -204,10 +208,9 @@ class Mapping(_Strict, frozen=True):
 
     @property
     def commands(self) -> dict[str, Signal]:
-        """The commands that are mapped, by role."""
-        columns = self.columns
-        signals = {"drive": columns.drive, "front": columns.front, "rear": columns.rear}
-        return {role: signal for role, signal in signals.items() if signal is not None}
+        """The commands that are mapped, by role or wheel."""
+        signals = {name: getattr(self.columns, name) for name in (*Command._fields, *WheelCommand._fields)}
+        return {name: signal for name, signal in signals.items() if signal is not None}
 
     @property
     def flags(self) -> dict[str, Flag]:
@@ -286,7 +289,27 @@ def _check(mapping: Mapping, path: Path) -> None:
     for name, axes in {"columns.quaternion": columns.quaternion, "pose": mapping.pose}.items():
         if axes and axes.floor_x[-1] == axes.floor_y[-1]:
             raise FileError("floor_x and floor_y are one axis", where=f"{path}: {name}", remedy="give two of x, y, z")
-    mapping.header(path)
+    _check_commands(mapping, path, mapping.header(path))
+
+
+def _check_commands(mapping: Mapping, path: Path, header: CampaignHeader) -> None:
+    """Raise `FileError` unless the command columns are those of the vehicle's channels."""
+    needed: tuple[str, ...] = ("drive", "front")
+    other: tuple[str, ...] = ("left", "right")
+    if header.channels.wheels is not None:
+        needed, other = other, (*needed, "rear")
+    for name in needed:
+        if getattr(mapping.columns, name) is None:
+            raise FileError(
+                "a command column is missing", where=path, value=f"columns.{name}",
+                remedy=f'add [columns.{name}] with column = "…"; [channels] says which commands the vehicle takes',
+            )  # fmt: skip
+    for name in other:
+        if getattr(mapping.columns, name) is not None:
+            raise FileError(
+                "is no command of this vehicle", where=path, value=f"columns.{name}", limit=OneOf(needed),
+                remedy=f"delete [columns.{name}], or correct [channels]",
+            )  # fmt: skip
 
 
 def _check_sources(mapping: Mapping, path: Path) -> None:

@@ -9,12 +9,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.campaign.header import CampaignHeader
 from agvbench.campaign.recordings.jump_detection import jumped
 from agvbench.campaign.recordings.mapping import Mapping
 from agvbench.campaign.tables.schema import UNKNOWN_COUNT
 from agvbench.errors import FileError
 from agvbench.types import Commands, Floats
 from agvbench.vehicle.channels import ROLES
+from agvbench.vehicle.wheels import WheelCommand
 
 Mask = NDArray[np.bool_]
 
@@ -135,7 +137,7 @@ def combine(
     if mapping.gate:
         positions = (poses.x_m[seen], poses.y_m[seen], poses.heading_rad[seen])
         wild[seen] = jumped(poses.t_s[seen], *positions, mapping.gate)
-    together = _together(commands, mapping.header(path).neutral._asdict())
+    together = _together(commands, mapping.header(path))
     if rows and len(together) and poses.t_s[-1] < together.t_s[0]:
         raise _apart(path, poses, together)
     known_s = together.t_s[0] if len(together) else np.inf
@@ -144,13 +146,14 @@ def combine(
     return Recording(path, files, poses, together, seen, wild, driven, stretches, origin_s)
 
 
-def _together(commands: Named[str, Series], neutral: Named[str, float]) -> Commands:
-    """Return one row for each time at which a command was given, once all are known."""
+def _together(commands: Named[str, Series], header: CampaignHeader) -> Commands:
+    """Return one row for each time at which a command was given, once all are known; wheels as the body's motion."""
     times = np.unique(np.concatenate([series.t_s for series in commands.values()]))
-    held = {
-        role: commands[role].held_at(times) if role in commands else np.full(len(times), neutral[role])
-        for role in ROLES
-    }
+    held = {name: series.held_at(times) for name, series in commands.items()}
+    if (wheels := header.channels.wheels) is not None:
+        body = wheels.body(*(held[name] for name in WheelCommand._fields))
+        held = dict(zip(("drive", "front"), body, strict=True))
+    held = {role: held.get(role, np.full(len(times), getattr(header.neutral, role))) for role in ROLES}
     known = np.isfinite(np.column_stack(list(held.values()))).all(axis=1)
     return Commands(t_s=times[known], **{role: values[known] for role, values in held.items()})
 

@@ -1,4 +1,7 @@
-"""The columns of the commands table: by role in memory, and in files by the names that the head gives the channels."""
+"""The columns of the commands table: by role in memory, and in files by the names that the head gives the channels.
+
+Commands of wheels are converted to commands of the body where they are read, and back where they are written.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,8 @@ import pyarrow as pa
 
 from agvbench.campaign.header import CampaignHeader
 from agvbench.campaign.tables.schema import COMMANDS, ColumnSpec
-from agvbench.types import Command
+from agvbench.types import Command, Commands, Floats
+from agvbench.vehicle.wheels import WheelCommand
 
 
 def command_columns(header: CampaignHeader) -> tuple[ColumnSpec, ...]:
@@ -31,4 +35,15 @@ def by_role(table: pa.Table, header: CampaignHeader) -> pa.Table:
     for role in Command._fields:
         if role not in names:
             table = table.append_column(role, pa.array(np.full(len(table), getattr(header.neutral, role))))
+    if (wheels := header.channels.wheels) is not None:
+        left, right = (table[role].to_numpy().astype(np.float64) for role in ("drive", "front"))
+        for role, values in zip(("drive", "front"), wheels.body(left, right), strict=True):
+            table = table.set_column(table.column_names.index(role), role, pa.array(values, from_pandas=False))
     return table
+
+
+def file_columns(commands: Commands, header: CampaignHeader) -> dict[str, Floats]:
+    """Return the columns (n,) of a campaign's commands table in files, by name."""
+    if (wheels := header.channels.wheels) is not None:
+        return dict(zip(WheelCommand._fields, wheels.wheels(commands.drive, commands.front), strict=True))
+    return {name: getattr(commands, role) for role, name in header.command_columns.items()}

@@ -20,11 +20,13 @@ from agvbench.campaign.tables.timed_table import TimedTable
 from agvbench.errors import CampaignError, OneOf
 from agvbench.types import RUN_OK, CommandUnit, Floats, RunStatus
 from agvbench.vehicle.channels import Channel
+from agvbench.vehicle.wheels import WheelCommand
 
 FIRST_COMMAND_TOLERANCE_S = 60.0
 CLOCK_TOLERANCE_S = 600.0
 FARTHEST_M = 500.0
 WIDEST_HEADING_RAD = 100.0
+_DECIMALS = 9
 
 
 class _Limits(NamedTuple):
@@ -115,10 +117,8 @@ def check_commands(commands: TimedTable, status: list[str], header: CampaignHead
     for column, name in {"t_s": "t_s", **names}.items():
         values = commands.column(column)
         _refuse(commands, ~np.isfinite(values), f"{name} is not a finite number", values, remedy="correct it")
-    for role, name in names.items():
-        channel: Channel = getattr(header.channels, role)
+    for name, channel, values in _named_channels(commands, header):
         low, high, remedy = _command_limits(channel, name)
-        values = commands.column(role)
         outside = (values < low) | (values > high)
         _refuse(commands, outside, f"{name} is out of range", values, f"{low:g}…{high:g}", remedy)
     t_s = commands.column("t_s")
@@ -130,6 +130,17 @@ def check_commands(commands: TimedTable, status: list[str], header: CampaignHead
     remedy = "t_s counts from the first command: shift the run's commands and poses"
     limit = f"within {FIRST_COMMAND_TOLERANCE_S:g} s of 0"
     _refuse(commands, late, "t_s of the first command is not 0", t_s, limit, remedy)
+
+
+def _named_channels(commands: TimedTable, header: CampaignHeader) -> list[tuple[str, Channel, Floats]]:
+    """Return name, channel and values (n,) of each column that the file has."""
+    drive, front = commands.column("drive"), commands.column("front")
+    if (wheels := header.channels.wheels) is not None:
+        own = zip(WheelCommand._fields, wheels.channels, wheels.wheels(drive, front), strict=True)
+        # A command at the end of the range may be beyond it by the rounding of both conversions.
+        return [(name, channel, np.round(values, _DECIMALS)) for name, channel, values in own]
+    roles = header.command_columns.items()
+    return [(name, getattr(header.channels, role), commands.column(role)) for role, name in roles]
 
 
 def _command_limits(channel: Channel, name: str) -> _Limits:

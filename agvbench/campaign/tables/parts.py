@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow as pa
 
 from agvbench.campaign.header import CampaignHeader
+from agvbench.campaign.tables.command_columns import file_columns
 from agvbench.errors import CampaignError
 from agvbench.types import Run
 
@@ -78,8 +79,8 @@ def _runs_part(run: Run) -> pa.Table:
 def _commands_part(run: Run, header: CampaignHeader) -> pa.Table:
     """Return the run's rows of the commands table."""
     commands = run.commands
-    names = {"t_s": "t_s", **header.command_columns}
-    columns = {name: _floats(getattr(commands, role)) for role, name in names.items()}
+    given = {"t_s": commands.t_s, **file_columns(commands, header)}
+    columns = {name: _floats(values) for name, values in given.items()}
     return pa.table({"run_id": pa.repeat(run.run_id, len(commands)), **columns})
 
 

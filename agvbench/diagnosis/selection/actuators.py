@@ -26,6 +26,7 @@ SERVOS = ("actuation_delay", "steering_lag", "steering_rate_limit")
 MOTORS = (*SERVOS, "yaw_acceleration_limit", "speed_lag", "wheel_lag")
 _DELAY, _EVEN, _UNEVEN = "actuation_delay", "steering_lag_inertia", "steering_lag_uneven"
 _LAG, _SPEED, _WHEELS = "steering_lag", "speed_lag", "wheel_lag"
+_SPEED_INERT, _WHEELS_INERT = "speed_lag_inertia", "wheel_lag_inertia"
 # Of a response of second order with critical damping: its inertia over its lag.
 _CRITICAL = 0.5
 _LEAST_LAG_S = 0.02
@@ -67,21 +68,23 @@ def separate_lag_from_delay(selection: Selection, selector: Selector) -> Selecti
 
 
 def _with_lag_and_delay(extended: Selector, chosen: ScoredModel, slow: list[str]) -> ScoredModel | None:
-    """Return the model with a delay and lags of second order in place of the effects `slow`; None if it diverges."""
+    """Return the model with a delay and lags in place of the effects `slow`; None if it diverges.
+
+    Of several descriptions, a longer one is preferred if it gains.
+    """
     own = chosen.fit.effect_values()
     kept = [value for key, value in own.items() if key.partition(".")[0] not in slow]
     others = tuple(name for name in chosen.names if name not in slow)
     maps = chosen.fit.parameters[: extended.batch.maps.size]
     responses = _motors(own, slow) if extended.batch.geometry.is_differential else _servos(own, slow)
-    found = []
+    best: ScoredModel | None = None
     for names, values in responses.items():
         start = np.r_[maps, kept, values]
         starts = frozenset(one for one in chosen.starts if one[0] not in slow) | {("lag and delay", start.tobytes())}
         with suppress(np.linalg.LinAlgError):  # the fit diverged
-            found.append(extended.score((*others, *names), start, chosen.fit, starts=starts))
-    if len(found) == len(responses) and found[0].deviance < found[-1].deviance + extended.min_gain:
-        return found[0]
-    return found[-1] if found else None
+            model = extended.score((*others, *names), start, chosen.fit, starts=starts)
+            best = model if best is None or model.deviance <= best.deviance - extended.min_gain else best
+    return best
 
 
 def _servos(own: Mapping[str, float], slow: list[str]) -> dict[tuple[str, ...], list[float]]:
@@ -100,16 +103,21 @@ def _motors(own: Mapping[str, float], slow: list[str]) -> dict[tuple[str, ...], 
     """Return effects with initial values: the motors of a differential vehicle, which set speed and yaw rate.
 
     Where both start at once, a delay resembles the lags of both, and neither lag alone describes them: half of the
-    response is taken for a delay. The wheels have one lag, or speed and yaw rate have one each.
+    response is taken for a delay. The wheels have one lag, or speed and yaw rate have one each, of either order: a
+    controller of second order begins like a delay.
     """
     yaw, _, drive = _responses_s(own, slow)
     values = {key.partition(".")[2]: value for key, value in own.items() if key.partition(".")[0] in slow}
     drive += 0.5 * (values.get("accelerate_s", 0.0) + values.get("brake_s", 0.0))
     delay = 0.5 * min(yaw, drive)
     lags = max(yaw - delay, _LEAST_LAG_S), max(drive - delay, _LEAST_LAG_S)
+    mean = 0.5 * sum(lags)
+    inert = [[lag, _CRITICAL * lag] for lag in (mean, *lags)]
     return {
-        (_DELAY, _WHEELS): [delay, 0.5 * sum(lags)],
+        (_DELAY, _WHEELS): [delay, mean],
+        (_DELAY, _WHEELS_INERT): [delay, *inert[0]],
         (_DELAY, _LAG, _SPEED): [delay, lags[0], lags[1], lags[1]],
+        (_DELAY, _EVEN, _SPEED_INERT): [delay, *inert[1], *inert[2]],
     }
 
 

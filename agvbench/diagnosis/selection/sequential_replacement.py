@@ -10,6 +10,7 @@ from dataclasses import replace
 
 from agvbench.diagnosis.criteria import SELECTION, VARIANT
 from agvbench.diagnosis.selection.actuators import CAMERA
+from agvbench.diagnosis.selection.candidates import applies
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import ExcludedAlternative, Selection, Selector
 from agvbench.diagnosis.selection.variants import variant_candidates, with_extended_library
@@ -102,7 +103,9 @@ def _in_place_of(extended: Selector, base: ScoredModel, current: ScoredModel, na
     without = extended.without_effect(base, current, name)
     causes = {cause_of(present) for present in current.names}
     likely = VARIANT.min_gain_share * (without.fit.total_loss - current.fit.total_loss)
-    others = [other for other in {*extended.candidates, *effect_variants()} if cause_of(other) not in causes]
+    geometry = extended.batch.geometry
+    variants = {other for other, kind in effect_variants().items() if applies(kind, geometry)}
+    others = [other for other in {*extended.candidates, *variants} if cause_of(other) not in causes]
     models = {
         other: extended.with_effect(without, other)
         for other in sorted(others)

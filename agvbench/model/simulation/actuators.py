@@ -1,11 +1,11 @@
 # mypy: warn-return-any=False
 """Servos and drive while one command is in force, in closed form.
 
-A servo obeys δ̇ = (aim − δ) / lag within ± rate: it ramps while the rate limit is active, and then its gap decays. Its
-motion is monotone, so that the position of the axle behind a backlash follows from the initial positions. Servos of
-second order are in `agvbench.model.simulation.servos`. The drive obeys v̇ = (aim − v) / lag within limits of v̇, as a
-servo does; to reverse it brakes to rest first. An elastic drive train without power obeys an equation of second order
-in v, that of a servo with inertia. An array, the *plan*, holds all of this.
+A servo obeys δ̇ = (aim − δ) / lag within ± rate (`agvbench.model.simulation.gaps`). Its motion is monotone, so that the
+position of the axle behind a backlash follows from the initial positions. Servos of second order are in
+`agvbench.model.simulation.servos`. The drive obeys v̇ = (aim − v) / lag within limits of v̇, as a servo does; to reverse
+it brakes to rest first. A drive with inertia, and an elastic drive train without power, obey an equation of second
+order in v, that of a servo with inertia. An array, the *plan*, holds all of this.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from agvbench.effects.state import (
     BRAKING_LIMIT,
     COAST_RELAXATION,
     COAST_SPRING,
+    DRIVE_INERTIA,
     FRONT,
     FRONT_AIM,
     FRONT_BACKLASH,
@@ -34,6 +35,17 @@ from agvbench.effects.state import (
     STEERING_RATE,
 )
 from agvbench.model.compiled import compiled
+from agvbench.model.simulation.gaps import (
+    GAP_SETTLED_S,
+    GAP_SIZE,
+    RAMP_STEP_S,
+    SHORTEST_S,
+    gap_at,
+    kink_s,
+    plan_gap,
+    reaches_s,
+    within_gap,
+)
 from agvbench.model.simulation.servos import (
     CRUISED_S,
     FIRST_ORDER,
@@ -45,6 +57,7 @@ from agvbench.model.simulation.servos import (
     TURNS_S,
     WAY_SIZE,
     closes_s,
+    crosses_s,
     longest_step,
     plan_inert,
     plan_limited,
@@ -53,91 +66,47 @@ from agvbench.model.simulation.servos import (
 from agvbench.types import Floats
 
 # A plan: for each servo, then for the drive. Times are seconds since the command took effect.
-# A gap closes by a ramp and a decay: initial size, rate of the ramp, time constant of the decay, end of the ramp with
-# the gap left there, settling time.
-_GAP, _RATE, _LAG, _RAMPED_S, _RAMPED_GAP, _SETTLED_S = range(6)
-# A servo: such a gap, or a response of second order in the same place; then aim, direction and half the
+# A servo: a gap of first order, or a response of second order in the same place; then aim, direction and half the
 # backlash and the position of its axle.
 _AIM, _DIRECTION, _HALF_BACKLASH, _AXLE = range(WAY_SIZE, WAY_SIZE + 4)
 _SERVO_SIZE = WAY_SIZE + 4
 _FRONT, _REAR = 0, _SERVO_SIZE
 # The drive: its initial gap, and if it reverses the gap from rest.
 _FIRST = 2 * _SERVO_SIZE
-_SECOND = _FIRST + 6
-_SPEED_AIM, _SPEED_DIRECTION, _RESTS_S = range(_SECOND + 6, _SECOND + 9)
-_ORDER = _SECOND + 9
-# An elastic drive train without power: whether it is the drive's equation, its windup and constants, its response.
-_SPRINGS, _WINDUP, _SPRING, _COAST_LAG, _RELAXATION = range(_SECOND + 10, _SECOND + 15)
-_COAST = _SECOND + 15
-_EVENTS = _COAST + WAY_SIZE
+_SECOND = _FIRST + GAP_SIZE
+_SPEED_AIM, _SPEED_DIRECTION, _RESTS_S, _ORDER = range(_SECOND + GAP_SIZE, _SECOND + GAP_SIZE + 4)
+# A drive of second order: which equation it has, and the response of its speed, whose gap is speed − aim. An elastic
+# drive train has a windup and constants.
+_DRIVE_ORDER, _WINDUP, _SPRING, _COAST_LAG, _RELAXATION = range(_ORDER + 1, _ORDER + 6)
+_RESPONSE = _ORDER + 6
+_EVENTS = _RESPONSE + WAY_SIZE
 _EVENT_COUNT = 11
 PLAN_SIZE = _EVENTS + _EVENT_COUNT
+_PLAIN, _ELASTIC, _INERTIAL = range(3)
 
 # Servos and drive between commands: positions of the servos and of their axles, the drive's speed and that which
-# commands have made it recently, the servos' rates, the windup of the drive train [m], and the mean square of the speed
-# that commands have made recently.
-SERVOS_SIZE = 10
+# commands have made it recently, the servos' rates, the windup of the drive train [m], the mean square of the speed
+# that commands have made recently, and the acceleration of a drive of second order.
+SERVOS_SIZE = 11
 
-# Below this gap [rad, m/s] an actuator counts as settled.
-_SETTLED = 1e-7
-# Length of a step in time constants: the first one, and its growth per time constant.
-_FIRST_STEP, _STEP_GROWTH = 0.7, 0.25
-# The longest step while a servo or the drive ramps, and how close to a kink counts as there [s].
-_RAMP_STEP_S, _TOGETHER = 0.1, 1e-12
+# How close to a kink counts as there [s].
+_TOGETHER = 1e-12
 # With backlash and a servo of second order kinks are not computed: steps are short [s].
 _BACKLASH_STEP_S = 0.005
-# Invalid parameters must not make the loop endless [s].
-_SHORTEST_S = 1e-6
 # A smaller inertia oscillates faster than any camera resolves, and would need a step per oscillation.
 _LEAST_INERTIA_S = 1e-3
 
 
 @compiled(inner=True)
-def _plan_gap(plan: Floats, at: int, gap: float, lag: float, rate: float) -> None:
-    plan[at + _GAP], plan[at + _LAG], plan[at + _RATE] = gap, lag, rate
-    plan[at + _RAMPED_S], plan[at + _RAMPED_GAP] = 0.0, gap if lag > 0.0 else 0.0
-    if rate < math.inf and gap > rate * lag:
-        plan[at + _RAMPED_S], plan[at + _RAMPED_GAP] = gap / rate - lag, rate * lag
-    ramped, left = plan[at + _RAMPED_S], plan[at + _RAMPED_GAP]
-    plan[at + _SETTLED_S] = ramped + lag * math.log(left / _SETTLED) if left > _SETTLED else ramped
-
-
-@compiled(inner=True)
-def _gap(plan: Floats, at: int, tau: float) -> float:
-    """Return the rest of a gap `tau` seconds after it began to close."""
-    if tau >= plan[at + _SETTLED_S]:
-        return 0.0
-    if tau < plan[at + _RAMPED_S]:
-        return plan[at + _GAP] - plan[at + _RATE] * tau
-    return plan[at + _RAMPED_GAP] * math.exp((plan[at + _RAMPED_S] - tau) / plan[at + _LAG])
-
-
-@compiled(inner=True)
-def _reaches(plan: Floats, at: int, gap: float) -> float:
-    """Return the time at which the rest of a gap is `gap`; ∞ if it never is."""
-    if gap <= _SETTLED or gap >= plan[at + _GAP]:
-        return math.inf
-    if gap >= plan[at + _RAMPED_GAP]:
-        return (plan[at + _GAP] - gap) / plan[at + _RATE]
-    return plan[at + _RAMPED_S] + plan[at + _LAG] * math.log(plan[at + _RAMPED_GAP] / gap)
-
-
-@compiled(inner=True)
-def _kink(plan: Floats, at: int) -> float:
-    """Return the end of a ramp; ∞ if there is none."""
-    return plan[at + _RAMPED_S] if plan[at + _RAMPED_S] > 0.0 else math.inf
-
-
-@compiled(inner=True)
 def _plan_servo(plan: Floats, servo: int, position: float, axle: float, aim: float, lag: float, rate: float) -> None:
-    _plan_gap(plan, servo, abs(aim - position), lag, rate)
+    plan_gap(plan, servo, abs(aim - position), lag, rate)
     plan[servo + _AIM], plan[servo + _DIRECTION], plan[servo + _AXLE] = aim, math.copysign(1.0, aim - position), axle
     events, direction, half = _EVENTS + 4 * (servo > 0), plan[servo + _DIRECTION], plan[servo + _HALF_BACKLASH]
-    plan[events] = _kink(plan, servo)
-    plan[events + 1] = plan[servo + _SETTLED_S]
+    plan[events] = kink_s(plan, servo)
+    plan[events + 1] = plan[servo + GAP_SETTLED_S]
     # The axle begins to follow; the axle passes the middle.
-    plan[events + 2] = _reaches(plan, servo, direction * (aim - axle) - half) if half > 0.0 else math.inf
-    plan[events + 3] = _reaches(plan, servo, direction * aim - half)
+    plan[events + 2] = reaches_s(plan, servo, direction * (aim - axle) - half) if half > 0.0 else math.inf
+    plan[events + 3] = reaches_s(plan, servo, direction * aim - half)
 
 
 @compiled(inner=True)
@@ -164,14 +133,24 @@ def _plan_drive(
     plan[_SPEED_AIM], plan[_SPEED_DIRECTION], plan[_RESTS_S] = aim, math.copysign(1.0, aim - speed), math.inf
     plan[_EVENTS + 10] = math.inf
     if abs(aim) > abs(speed) and speed * aim >= 0.0:
-        _plan_gap(plan, _FIRST, abs(aim - speed), accelerate, speeding)
+        plan_gap(plan, _FIRST, abs(aim - speed), accelerate, speeding)
     else:
-        _plan_gap(plan, _FIRST, abs(aim - speed), brake, braking)
+        plan_gap(plan, _FIRST, abs(aim - speed), brake, braking)
     if speed * aim < 0.0:
-        plan[_RESTS_S] = _reaches(plan, _FIRST, abs(aim))
-        _plan_gap(plan, _SECOND, abs(aim), accelerate, speeding)
-        plan[_EVENTS + 10] = plan[_RESTS_S] + _kink(plan, _SECOND)
-    plan[_EVENTS + 8], plan[_EVENTS + 9] = plan[_RESTS_S], _kink(plan, _FIRST)
+        plan[_RESTS_S] = reaches_s(plan, _FIRST, abs(aim))
+        plan_gap(plan, _SECOND, abs(aim), accelerate, speeding)
+        plan[_EVENTS + 10] = plan[_RESTS_S] + kink_s(plan, _SECOND)
+    plan[_EVENTS + 8], plan[_EVENTS + 9] = plan[_RESTS_S], kink_s(plan, _FIRST)
+
+
+@compiled(inner=True)
+def _plan_inertia(plan: Floats, speed: float, acceleration: float, lag: float, inertia: float) -> None:
+    """Compute the response to τ² v̈ + lag v̇ = aim − v, in place of that of first order; it is linear, also at rest."""
+    aim = plan[_SPEED_AIM]
+    plan[_DRIVE_ORDER], plan[_RESTS_S], plan[_EVENTS + 10] = _INERTIAL, math.inf, math.inf
+    plan_inert(plan, _RESPONSE, speed - aim, acceleration, lag, inertia)
+    plan[_EVENTS + 8] = closes_s(plan, _RESPONSE) if aim == 0.0 else crosses_s(plan, _RESPONSE, -aim)
+    plan[_EVENTS + 9] = plan[_RESPONSE + SETTLED_S]
 
 
 @compiled(inner=True)
@@ -179,19 +158,19 @@ def _plan_coasting(plan: Floats, speed: float, windup: float, state: Floats) -> 
     """Compute v̈ + (1 / T + 1 / R) v̇ + (1 / (T R) + k) v = 0 from v̇ = −v / T − k w and ẇ = v − w / R."""
     lag, spring, relaxation = state[BRAKE_LAG], state[COAST_SPRING], state[COAST_RELAXATION]
     plan[_WINDUP], plan[_RELAXATION], plan[_SPRING], plan[_COAST_LAG] = windup, relaxation, spring, lag
-    plan[_SPRINGS] = 1.0 if spring > 0.0 and lag > 0.0 and state[SPEED_AIM] == 0.0 else 0.0
-    if plan[_SPRINGS] > 0.0:
+    if spring > 0.0 and lag > 0.0 and state[SPEED_AIM] == 0.0:
+        plan[_DRIVE_ORDER] = _ELASTIC
         stiffness = 1.0 / (lag * relaxation) + spring
         damping = (1.0 / lag + 1.0 / relaxation) / stiffness
-        plan_inert(plan, _COAST, speed, -speed / lag - spring * windup, damping, 1.0 / math.sqrt(stiffness))
-        plan[_EVENTS + 8], plan[_EVENTS + 9] = closes_s(plan, _COAST), plan[_COAST + SETTLED_S]
+        plan_inert(plan, _RESPONSE, speed, -speed / lag - spring * windup, damping, 1.0 / math.sqrt(stiffness))
+        plan[_EVENTS + 8], plan[_EVENTS + 9] = closes_s(plan, _RESPONSE), plan[_RESPONSE + SETTLED_S]
 
 
 @compiled(inner=True)
 def _windup(plan: Floats, tau: float) -> float:
-    if plan[_SPRINGS] == 0.0:  # it relaxes under power
+    if plan[_DRIVE_ORDER] != _ELASTIC:  # it relaxes under power
         return plan[_WINDUP] * math.exp(-tau / plan[_RELAXATION]) if plan[_RELAXATION] < math.inf else 0.0
-    speed, rate = way_at(plan, _COAST, INERT, tau)
+    speed, rate = way_at(plan, _RESPONSE, INERT, tau)
     return -(rate + speed / plan[_COAST_LAG]) / plan[_SPRING]
 
 
@@ -215,6 +194,10 @@ def plan_command(plan: Floats, state: Floats, servos: Floats) -> None:
     accelerate, brake = state[ACCELERATE_LAG], state[BRAKE_LAG]
     speeding, braking = state[ACCELERATION_LIMIT], state[BRAKING_LIMIT]
     _plan_drive(plan, servos[4], state[SPEED_AIM], accelerate, brake, speeding, braking)
+    plan[_DRIVE_ORDER] = _PLAIN
+    if state[DRIVE_INERTIA] >= _LEAST_INERTIA_S:
+        grows = servos[4] * state[SPEED_AIM] >= 0.0 and abs(state[SPEED_AIM]) > abs(servos[4])
+        _plan_inertia(plan, servos[4], servos[10], accelerate if grows else brake, state[DRIVE_INERTIA])
     _plan_coasting(plan, servos[4], servos[8], state)
 
 
@@ -226,7 +209,7 @@ def _follow(plan: Floats, servo: int, axle: float, position: float) -> float:
 
 @compiled(inner=True)
 def _position(plan: Floats, servo: int, tau: float) -> float:
-    return plan[servo + _AIM] - plan[servo + _DIRECTION] * _gap(plan, servo, tau)
+    return plan[servo + _AIM] - plan[servo + _DIRECTION] * gap_at(plan, servo, tau)
 
 
 @compiled(inner=True)
@@ -250,13 +233,15 @@ def _way_axle(plan: Floats, servo: int, tau: float) -> float:
 def _speed(plan: Floats, tau: float) -> float:
     aim, direction = plan[_SPEED_AIM], plan[_SPEED_DIRECTION]
     if tau < plan[_RESTS_S]:
-        return aim - direction * _gap(plan, _FIRST, tau)
-    return aim - direction * _gap(plan, _SECOND, tau - plan[_RESTS_S])
+        return aim - direction * gap_at(plan, _FIRST, tau)
+    return aim - direction * gap_at(plan, _SECOND, tau - plan[_RESTS_S])
 
 
 @compiled(inner=True)
 def _speed_any_order(plan: Floats, tau: float) -> float:
-    return way_at(plan, _COAST, INERT, tau)[0] if plan[_SPRINGS] > 0.0 else _speed(plan, tau)
+    if plan[_DRIVE_ORDER] == _PLAIN:
+        return _speed(plan, tau)
+    return plan[_SPEED_AIM] + way_at(plan, _RESPONSE, INERT, tau)[0]
 
 
 @compiled(inner=True)
@@ -281,6 +266,7 @@ def actuate_any_order(plan: Floats, tau: float, state: Floats) -> None:
 def leave_command(plan: Floats, tau: float, servos: Floats) -> None:
     """Put positions, rates and speed at `tau`, where another command takes effect, into `servos`."""
     servos[4], servos[8] = _speed_any_order(plan, tau), _windup(plan, tau)
+    servos[10] = 0.0 if plan[_DRIVE_ORDER] == _PLAIN else way_at(plan, _RESPONSE, INERT, tau)[1]
     if plan[_ORDER] == FIRST_ORDER:
         servos[0], servos[1] = _position(plan, _FRONT, tau), _position(plan, _REAR, tau)
         servos[2] = _follow(plan, _FRONT, plan[_FRONT + _AXLE], servos[0])
@@ -293,42 +279,26 @@ def leave_command(plan: Floats, tau: float, servos: Floats) -> None:
 
 
 @compiled(inner=True)
-def _within(longest: float, lag: float, since: float) -> float:
-    if lag <= 0.0:
-        return longest
-    return min(longest, max(_SHORTEST_S, _FIRST_STEP * lag + _STEP_GROWTH * max(0.0, since)))
-
-
-@compiled(inner=True)
-def _within_gap(plan: Floats, at: int, tau: float, longest: float) -> float:
-    if tau < plan[at + _RAMPED_S]:
-        return min(longest, _RAMP_STEP_S)
-    if tau < plan[at + _SETTLED_S]:
-        return _within(longest, plan[at + _LAG], tau - plan[at + _RAMPED_S])
-    return longest
-
-
-@compiled(inner=True)
 def _within_way(plan: Floats, servo: int, tau: float, longest: float) -> float:
     if tau >= plan[servo + SETTLED_S]:
         return longest
-    step = min(longest, _RAMP_STEP_S if plan[servo + _HALF_BACKLASH] == 0.0 else _BACKLASH_STEP_S)
-    return max(_SHORTEST_S, longest_step(plan, servo, plan[_ORDER], tau, step))
+    step = min(longest, RAMP_STEP_S if plan[servo + _HALF_BACKLASH] == 0.0 else _BACKLASH_STEP_S)
+    return max(SHORTEST_S, longest_step(plan, servo, plan[_ORDER], tau, step))
 
 
 @compiled(inner=True)
 def step_length(plan: Floats, tau: float, longest: float) -> float:
     """Return the length of a step from `tau`: at most to the next kink, and short while a lag is active."""
     if plan[_ORDER] == FIRST_ORDER:
-        step = _within_gap(plan, _REAR, tau, _within_gap(plan, _FRONT, tau, longest))
+        step = within_gap(plan, _REAR, tau, within_gap(plan, _FRONT, tau, longest))
     else:
         step = _within_way(plan, _REAR, tau, _within_way(plan, _FRONT, tau, longest))
-    if plan[_SPRINGS] > 0.0:
-        step = max(_SHORTEST_S, longest_step(plan, _COAST, INERT, tau, step))
+    if plan[_DRIVE_ORDER] != _PLAIN:
+        step = max(SHORTEST_S, longest_step(plan, _RESPONSE, INERT, tau, step))
     elif tau >= plan[_RESTS_S]:
-        step = _within_gap(plan, _SECOND, tau - plan[_RESTS_S], step)
+        step = within_gap(plan, _SECOND, tau - plan[_RESTS_S], step)
     else:
-        step = _within_gap(plan, _FIRST, tau, step)
+        step = within_gap(plan, _FIRST, tau, step)
     for i in range(_EVENT_COUNT):
         to_event = plan[_EVENTS + i] - tau
         if _TOGETHER < to_event < step:

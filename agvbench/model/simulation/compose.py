@@ -31,7 +31,7 @@ from agvbench.model.simulation import step as simulation_step
 _PARTS = (simulation_frames, simulation_step, simulation_level, simulation_loop)
 _INSIDE = {simulation_stages.__name__, *(part.__name__ for part in _PARTS)}
 _ACTUATE, _ACTUATE_ANY_ORDER = "actuate", "actuate_any_order"
-_SECOND_ORDER = {"STEERING_INERTIA", "STEERING_ACCELERATION", "COAST_SPRING"}
+_SECOND_ORDER = {"STEERING_INERTIA", "STEERING_ACCELERATION", "COAST_SPRING", "DRIVE_INERTIA"}
 
 
 @cache

@@ -23,6 +23,7 @@ from agvbench.effects.state import (
     COAST_SPRING,
     DISTANCE,
     DRIVE_COMMAND,
+    DRIVE_INERTIA,
     DRIVE_WAIT,
     FRONT_AIM,
     FRONT_BACKLASH,
@@ -104,7 +105,7 @@ def _obey(
     s[FRONT_BACKLASH] = s[REAR_BACKLASH] = 0.0
     s[STEERING_INERTIA], s[STEERING_ACCELERATION], s[REAR_LAG_RATIO] = 0.0, math.inf, 1.0
     s[ACCELERATION_LIMIT] = s[BRAKING_LIMIT] = math.inf
-    s[COAST_SPRING], s[COAST_RELAXATION] = 0.0, math.inf
+    s[COAST_SPRING], s[COAST_RELAXATION], s[DRIVE_INERTIA] = 0.0, math.inf, 0.0
     aim(s, p)
 
 
@@ -187,7 +188,7 @@ def _drive_run(
             # At rest with settled axles before the first command.
             servos[0] = servos[2] = s[FRONT_AIM]
             servos[1] = servos[3] = s[REAR_AIM]
-            servos[4] = servos[5] = servos[6] = servos[7] = servos[8] = servos[9] = 0.0
+            servos[4] = servos[5] = servos[6] = servos[7] = servos[8] = servos[9] = servos[10] = 0.0
             now = min(begin, end)
         elif now < begin:
             until = min(begin, end)

@@ -27,6 +27,7 @@ _SETTLED = 1e-7
 # Length of a step in time constants: the first one, and its growth per time constant.
 _FIRST_STEP, _STEP_GROWTH = 0.7, 0.25
 _LONG = 20.0
+_BISECTIONS = 50
 
 
 @compiled(inner=True)
@@ -73,6 +74,29 @@ def closes_s(plan: Floats, way: int) -> float:
     """Return when the gap of a response with inertia is first zero, c g + s (g′ + decay g) = 0; ∞ if it never is."""
     gap = plan[way + GAP]
     return _first_root(gap, -plan[way + GAP_RATE] - plan[way + _DECAY] * gap, plan[way + _SQUARE])
+
+
+@compiled(inner=True)
+def crosses_s(plan: Floats, way: int, level: float) -> float:
+    """Return when a response with inertia first has the gap `level`, between its initial gap and zero; ∞ if not.
+
+    There is no closed form: it is bisected up to the reversal behind the level.
+    """
+    beyond = plan[way + GAP] > level
+    if level == 0.0 or (level > 0.0) != beyond:
+        return math.inf
+    low, high = 0.0, min(plan[way + TURNS_S], plan[way + SETTLED_S])
+    if (_inert(plan, way, high)[0] > level) == beyond:
+        high = min(plan[way + TURNS_S] + plan[way + TURNS_EVERY_S], plan[way + SETTLED_S])
+    if high == math.inf or (_inert(plan, way, high)[0] > level) == beyond:
+        return math.inf
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        if (_inert(plan, way, middle)[0] > level) == beyond:
+            low = middle
+        else:
+            high = middle
+    return high
 
 
 @compiled(inner=True)

@@ -11,7 +11,9 @@ from agvbench.errors import FlagError, OneOf, PlacingError, RunStoppedError
 from agvbench.model import VehicleModel
 from agvbench.planning import Workspace
 from agvbench.running.links import RunnerLink
-from agvbench.running.positioning.automatic_return.returner import Returner, ReturnResult
+from agvbench.running.positioning.automatic_return.pose_returner import ReturnResult
+from agvbench.running.positioning.automatic_return.returner import Returner
+from agvbench.running.positioning.automatic_return.turn_and_drive import TurnAndDrive
 from agvbench.running.positioning.start_pose import notify_operator, wait_for_start, wait_until_seen
 from agvbench.running.quality import QualityLimits
 from agvbench.running.supervision.supervisor import Supervisor
@@ -102,7 +104,8 @@ class Auto(Placer):
 
     def __init__(self, rig: Rig) -> None:
         super().__init__(rig)
-        self._returner = Returner(rig.link, rig.model, rig.workspace, rig.supervisor)
+        kind = TurnAndDrive if rig.model.geometry.is_differential else Returner
+        self._returner = kind(rig.link, rig.model, rig.workspace, rig.supervisor)
         self._is_simulated = rig.link.identity().simulated
         self._stands = not self._is_simulated
 

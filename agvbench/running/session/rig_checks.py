@@ -45,12 +45,6 @@ def open_session_rig(
     AgvbenchError
         If an adapter cannot be opened, or `check_rig` refuses the rig.
     """
-    if settings.place == "auto":
-        models["uncalibrated"].geometry.require_two_axles(
-            "only a vehicle with steered axles drives back to its start",
-            where=f"vehicle {models['uncalibrated'].name}",
-            remedy="leave out --place auto",
-        )
     if listen and settings.connect:
         raise FlagError(
             "a session that connects does not listen", where="--listen", value=listen,
@@ -95,6 +89,7 @@ def check_rig(models: Mapping[str, VehicleModel], settings: BenchSettings, link:
 def check_commands(models: Mapping[str, VehicleModel], identity: AgvIdentity | Identity) -> None:
     """Raise `VehicleError` unless the models, by condition, command the vehicle in its unit, about its neutral."""
     for condition, model in models.items():
+        _check_wheels(model, identity, _OPTIONS[condition])
         for role in ROLES:
             said, true = getattr(model.channels, role), getattr(identity.channels, role)
             for what, ours, theirs in _differences(said, true, role):
@@ -102,6 +97,16 @@ def check_commands(models: Mapping[str, VehicleModel], identity: AgvIdentity | I
                     f"the vehicle {what} than its file says", where=model.name, value=ours, limit=theirs,
                     remedy=f"give the right file with {_OPTIONS[condition]}",
                 )  # fmt: skip
+
+
+def _check_wheels(model: VehicleModel, identity: AgvIdentity | Identity, option: str) -> None:
+    said, true = model.channels.wheels, identity.channels.wheels
+    if said != true:
+        kind = "commands of the body"
+        raise VehicleError(
+            "the vehicle takes other wheel commands than its file says", where=model.name, value=str(said or kind),
+            limit=str(true or kind), remedy=f"give the right file with {option}",
+        )  # fmt: skip
 
 
 def _differences(said: Channel, true: Channel, role: Role) -> Iterator[tuple[str, object, object]]:

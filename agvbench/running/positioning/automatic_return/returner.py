@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-
 from agvbench.errors import PlacingError, PlanError
 from agvbench.model import VehicleModel
 from agvbench.planning import Workspace
@@ -14,24 +11,9 @@ from agvbench.running.positioning.automatic_return.command_mapping import Comman
 from agvbench.running.positioning.automatic_return.leg_drive import DEFAULT_RETURN, LegDrive, ReturnLimits
 from agvbench.running.positioning.automatic_return.motion_interface import MotionInterface
 from agvbench.running.positioning.automatic_return.online_adaptation import OnlineAdaptation
-from agvbench.running.rest_detection import is_at_rest, pose_before
+from agvbench.running.positioning.automatic_return.pose_returner import PoseReturner
 from agvbench.running.supervision.supervisor import Supervisor
 from agvbench.types import Pose, wrap_angle
-
-
-@dataclass(frozen=True)
-class ReturnResult:
-    """How a vehicle came to its start: time taken [s], ways driven, and how far off it was seen at rest [m, rad]."""
-
-    duration_s: float
-    attempts: int
-    position_error_m: float
-    heading_error_rad: float
-
-    def columns(self) -> dict[str, object]:
-        """Return what a campaign's runs table says of it."""
-        return {f"placing_{name}": value for name, value in vars(self).items()}
-
 
 _SHARE = 0.5
 _FARTHEST_M, _FARTHEST_RAD = 0.03, 0.06
@@ -91,8 +73,8 @@ _LEADS = (2.7, 2.0, 1.4)
 """Of the wheelbase: the straight into the start, on which errors die off."""
 
 
-class Returner:
-    """Brings one vehicle to start poses, and adapts to it as it does.
+class Returner(PoseReturner):
+    """Brings one vehicle with steered axles to start poses, and adapts to it as it does.
 
     Parameters
     ----------
@@ -112,60 +94,15 @@ class Returner:
         supervisor: Supervisor,
         limits: ReturnLimits = DEFAULT_RETURN,
     ) -> None:
-        self._link, self._supervisor, self._command_mapping = link, supervisor, CommandMapping(model)
-        self._workspace, self._limits = workspace, limits
-        self._online_adaptation = OnlineAdaptation()
+        super().__init__(link, model, workspace, supervisor, limits)
+        self._command_mapping, self._online_adaptation = CommandMapping(model), OnlineAdaptation()
 
-    def bring_to(self, start: Pose) -> ReturnResult:
-        """Drive to `start` (floor frame) and return how it went; the vehicle stands still, its commands neutral.
+    def _begin(self, start: Pose) -> None:
+        self._goal_offset = GoalOffset(start)
 
-        Raises
-        ------
-        SafetyStopError
-            If the supervisor stopped the vehicle.
-        PlacingError
-            If there is no way inside the workspace, or the vehicle is not there after all attempts, or does not follow
-            its commands.
-        LinkError
-            If the bus or an adapter fails.
-        """
-        motion_interface = MotionInterface(self._link, self._supervisor)
-        try:
-            return self._bring_to(start, motion_interface)
-        except BaseException:
-            # As in a run: before anything else the vehicle stands still.
-            self._link.stop()
-            raise
-
-    def _bring_to(self, start: Pose, motion_interface: MotionInterface) -> ReturnResult:
-        limits, goal_offset = self._limits, GoalOffset(start)
-        for attempt in range(limits.most_attempts + 1):
-            seen = self._look(motion_interface)
-            off_m, off_rad = math.dist(seen[:2], start[:2]), abs(wrap_angle(seen.heading_rad - start.heading_rad))
-            if max(off_m / limits.position_m, off_rad / limits.heading_rad) <= limits.reserve:
-                return ReturnResult(motion_interface.now_s, attempt, off_m, off_rad)
-            goal_offset.update(seen)
-            if attempt < limits.most_attempts:
-                self._drive_return_path(seen, goal_offset, motion_interface)
-        raise PlacingError(
-            "the vehicle did not come to its start", where=self._link.keys.root,
-            value=f"{off_m * 1e3:.1f} mm and {math.degrees(off_rad):.2f}° off after {limits.most_attempts} attempts",
-            limit=f"{limits.position_m * 1e3:g} mm and {math.degrees(limits.heading_rad):g}°",
-            remedy="put it there by hand, and go on with --resume",
-        )  # fmt: skip
-
-    def _look(self, motion_interface: MotionInterface) -> Pose:
-        """Return where the vehicle stands, once it does."""
-        motion_interface.begin()
-        until_s = motion_interface.now_s + self._limits.settle_limit_s
-        while True:
-            frames = motion_interface.hold(self._command_mapping.neutral, self._limits.look_s)
-            seen = pose_before(frames, motion_interface.now_s)
-            if seen is not None and is_at_rest(frames, until_s=motion_interface.now_s):
-                return seen
-            if motion_interface.now_s >= until_s:
-                raise PlacingError("the vehicle does not come to rest", where=self._link.keys.root,
-                                limit=f"{self._limits.settle_limit_s:g} s")  # fmt: skip
+    def _attempt(self, seen: Pose, start: Pose, motion_interface: MotionInterface) -> None:
+        self._goal_offset.update(seen)
+        self._drive_return_path(seen, self._goal_offset, motion_interface)
 
     def _drive_return_path(self, seen: Pose, goal_offset: GoalOffset, motion_interface: MotionInterface) -> None:
         """Drive a way until its end, or until the vehicle is astray."""
