@@ -51,7 +51,7 @@ def _comparison(data: ReportData) -> Iterator[str]:
 
 def _diagnosis(data: ReportData) -> Iterator[str]:
     if data.diagnosis is None:
-        if len(data.end_poses):
+        if any(run.status == RUN_OK for run in data.runs):
             yield f"Find the effect that the calibrated model lacks: {diagnose_command(data.path)}."
         return
     verdict = data.diagnosis.content.get("verdict")

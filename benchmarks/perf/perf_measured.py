@@ -5,7 +5,7 @@ ahead, with 95 % intervals over stretches, for the error due to noise, the stati
 held, constant velocity, and the model found; and for each effect what it does to what was held out. At the end, the
 error 2 s ahead relative to the static maps. The recordings are looked for in ``$AGVBENCH_MEASURED``, else in a folder
 ``shared/measured`` beside the project's. Run with ``python benchmarks/perf/perf_measured.py [VEHICLE ...]
-[--brief] [--figure FILE.svg]``; the figure is that of DART.
+[--brief] [--markdown] [--figures DIR]``; a figure VEHICLE.svg is written for each vehicle.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from rich.box import HEAVY_HEAD, MARKDOWN, Box
 from rich.console import Console
 from rich.table import Table
 
@@ -75,14 +76,16 @@ def recordings(vehicle: str) -> list[Path]:
     return sorted((Path(where) if where else ROOT.parent / "shared" / "measured").glob(f"{vehicle}/*.csv"))
 
 
-def report(console: Console, title: str, found: Diagnosis, seconds: float, *, brief: bool) -> list[dict[str, Any]]:
+def report(
+    console: Console, title: str, found: Diagnosis, seconds: float, *, brief: bool, style: Box
+) -> list[dict[str, Any]]:
     console.print(f"\n{title} ({seconds:.0f} s): {found.verdict}")
     for effect in found.effects:
         values = ", ".join(f"{name} {e.value:.3g} ± {e.stderr:.2g} {e.unit}" for name, e in effect.parameters.items())
         others = f"; or {', '.join(effect.confounded_with)}" if effect.confounded_with else ""
         console.print(f"  {effect.name}: {values}{others}")
     windows = found.provenance["windows"]
-    table = Table("recording", "ahead", "windows", "floor", *PREDICTORS.values(), title="position error, mm")
+    table = Table("recording", "ahead", "windows", "floor", *PREDICTORS.values(), title="position error, mm", box=style)
     rows = [row for row in windows["recordings"] if row["held_out"]]
     for row in rows:
         for key in (key for key in row if key.startswith("ahead_")):
@@ -92,7 +95,8 @@ def report(console: Console, title: str, found: Diagnosis, seconds: float, *, br
     console.print(table)
     if brief:
         return rows
-    each = Table("effect", "kept", "gain", "error with it", "without", title="effects on the days held out, mm")
+    columns = ("effect", "kept", "gain", "error with it", "without")
+    each = Table(*columns, title="effects on what was held out, mm", box=style)
     for name, entry in windows["effects"].items():
         errors = entry["held_out_position_mm"]
         word = "yes" if entry["kept"] else "no: extrapolates" if entry["extrapolates"] else "no"
@@ -130,9 +134,10 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
     figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
 
 
-def summary(rows: Sequence[tuple[str, list[dict[str, Any]]]]) -> Table:
+def summary(rows: Sequence[tuple[str, list[dict[str, Any]]]], style: Box) -> Table:
     """Return the errors 2 s ahead of each split, over all its windows, relative to the static maps."""
-    table = Table("split", "windows", "static, mm", *list(PREDICTORS.values())[1:], title="relative to the static maps")
+    columns = ("split", "windows", "static, mm", *list(PREDICTORS.values())[1:])
+    table = Table(*columns, title="relative to the static maps", box=style)
     for title, recorded in rows:
         count = sum(row["windows"] for row in recorded)
         error = {
@@ -151,10 +156,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("vehicles", nargs="*", default=list(SPLITS), metavar="VEHICLE")
     parser.add_argument("--brief", action="store_true")
-    parser.add_argument("--figure", type=Path, metavar="FILE")
+    parser.add_argument("--markdown", action="store_true", help="tables in Markdown")
+    parser.add_argument("--figures", type=Path, metavar="DIR")
     wanted = parser.parse_args(arguments)
-    console = Console(width=None if sys.stdout.isatty() else 150)
-    drawn: list[dict[str, Any]] = []
+    console, style = Console(width=None if sys.stdout.isatty() else 150), MARKDOWN if wanted.markdown else HEAVY_HEAD
     total: list[tuple[str, list[dict[str, Any]]]] = []
     for vehicle in wanted.vehicles:
         if not (files := recordings(vehicle)):
@@ -162,16 +167,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return 2
         with tempfile.TemporaryDirectory() as directory:
             campaign = import_recordings(vehicle, files, Path(directory) / vehicle)
+            drawn: dict[str, dict[str, Any]] = {}
             for held in SPLITS[vehicle]:
                 begin = time.perf_counter()
                 found = diagnose(Split(campaign, held))
                 title = f"{vehicle}: {held.title}"
-                rows = report(console, title, found, time.perf_counter() - begin, brief=wanted.brief)
+                rows = report(console, title, found, time.perf_counter() - begin, brief=wanted.brief, style=style)
                 total.append((title, rows))
-                drawn += rows if vehicle == "dart" and len(held.files) == 1 else []
-    console.print(summary(total))
-    if wanted.figure:
-        draw(drawn, wanted.figure)
+                drawn = {row["recording"]: row for row in rows} | drawn  # of several splits, the first
+        if wanted.figures:
+            draw(list(drawn.values()), wanted.figures / f"{vehicle}.svg")
+    console.print(summary(total, style))
     return 0
 
 

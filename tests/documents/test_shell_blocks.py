@@ -20,6 +20,7 @@ ROOT = Path(__file__).parents[2]
 QUICK = (
     "docs/how-to/exchange-with-ros.md",
     "docs/how-to/nightly.md",
+    "docs/how-to/use-recordings.md",
     "docs/how-to/watch-a-bench.md",
     "docs/how-to/write-a-trajectory.md",
     "docs/tutorial.md",
