@@ -40,6 +40,7 @@ from agvbench.cli._cluster_arguments import add_cluster_arguments, executor_opti
 from agvbench.running.configuration.session_options import whole_number
 
 HELP = "bench sessions over a grid of options, on this machine or a cluster"
+PACKAGES = ("numba", "zenoh")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -21,6 +21,9 @@ DEFAULT = ("calibration", "trajectories")
 # The command line has imported agvbench before pytest looks for plugins, which does no harm here.
 _IN_PROCESS = "ignore:Module already imported:pytest.PytestAssertRewriteWarning"
 
+# Where Hypothesis is installed, its plugin takes a second to import; properties are no benchmarks.
+_UNUSED = "no:hypothesispytest"
+
 
 def run_benchmarks(
     names: Sequence[str],
@@ -45,7 +48,7 @@ def run_benchmarks(
         began = _begun_with(options.get("out"))
         names, only = began.benchmarks, only or began.only
     files = [str(find_benchmark(name)) for name in names or DEFAULT]
-    quiet = ["-q", "--strict-markers", "-p", "no:cacheprovider", "-W", _IN_PROCESS]
+    quiet = ["-q", "--strict-markers", "-p", "no:cacheprovider", "-p", _UNUSED, "-W", _IN_PROCESS]
     arguments = [*files, *quiet, SHORT_NAMES, *_flags(options)]
     if only:
         arguments += ["-k", only]

@@ -43,6 +43,7 @@ def test_a_command_that_needs_more_says_what(light, command, tmp_path):
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_it_reports_exports_and_keeps_a_history(light, campaign, tmp_path):
     report = light("report", str(campaign), cwd=tmp_path)
     assert report.returncode == 0, report.stderr

@@ -46,6 +46,7 @@ def test_what_is_installed_can_build_the_firmware(agvbench, tmp_path, monkeypatc
     assert "built, and can be simulated" in " ".join(agvbench("doctor", "--agv=simavr", cwd=tmp_path).stdout.split())
 
 
+@pytest.mark.slow
 def test_init_and_bench_work_in_an_empty_folder(agvbench, tmp_path):
     made = agvbench("init", "lab", cwd=tmp_path)
     assert made.returncode == 0, made.stderr

@@ -8,6 +8,13 @@ from agvbench.model import example_path
 
 pytest_plugins = ["pytester"]
 
+
+@pytest.fixture(autouse=True)
+def _without_hypothesis(monkeypatch):
+    """Without the plugin of Hypothesis, which takes a third of the time of each pytest here."""
+    monkeypatch.setenv("PYTEST_ADDOPTS", "-p no:hypothesispytest")
+
+
 BENCHMARK = """
     '''Benchmarks of agvbench.'''
     import pytest
