@@ -89,7 +89,7 @@ _COMPLETIONS = (
 _NOTE = (
     "Evaluated after JCGM 100:2008 (GUM). Noise of the camera at the rest poses is in the scatter of repeats, and is "
     "not added to it, except by how much it enlarges distances. Repeats of one session count as independent; what is "
-    "the same in every run enters as far as it is stated. The budget is of the mean; medians stand in the other tables. "
+    "the same in every run enters as far as it is stated. The budget is of the mean; other tables have medians. "
     "The mean end position error is the mean of distances, and not AP, the distance of the mean position. The heading "
     "error is signed here; other tables show magnitudes."
 )
