@@ -10,6 +10,7 @@ from agvbench.reporting.content import plain_sentences
 from agvbench.running.configuration.provenance import SIMULATED_TIME
 from agvbench.statistics import ComparisonVerdict
 from agvbench.statistics.differences import ALL
+from agvbench.statistics.uncertainty.end_pose_budgets import key_to_state
 from agvbench.types import RUN_OK
 from agvbench.workflows.diagnosis_files import mapping, next_in_words
 from agvbench.workflows.report import ReportData
@@ -65,5 +66,7 @@ def _diagnosis(data: ReportData) -> Iterator[str]:
 
 def _statement(data: ReportData) -> Iterator[str]:
     is_simulated = data.provenance.get("time") == SIMULATED_TIME
-    if data.budgets and not data.header.uncertainty and not is_simulated:
-        yield "State the uncertainties of the cameras in lab.toml ([uncertainty]): no repeat shows them."
+    keys = dict.fromkeys(key for one in data.budgets for c in one.budget.components if (key := key_to_state(c)))
+    cameras = [key for key in keys if key.startswith("camera_")]
+    if cameras and not is_simulated:
+        yield f"State {', '.join(cameras)} in lab.toml ([uncertainty]): no repeat shows these uncertainties."

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from agvbench.bus.messages.event import NOT_AS_PLANNED, Event, Level
+from agvbench.campaign.attempts import STILL_MOVING
 from agvbench.running.rest_detection import is_at_rest, pose_before
 from agvbench.types import RUN_OK, Frames, Outcome, Pose, RunStatus, wrap_angle
 
@@ -56,7 +57,7 @@ class Quality:
         if not self.rests_before:
             yield "moving before the first command"
         if not self.rests_after:
-            yield "still moving when the run ended"
+            yield STILL_MOVING
 
 
 def not_as_planned(events: Sequence[Event]) -> Event | None:

@@ -18,6 +18,7 @@ from agvbench.signals import MAD_TO_STD
 from agvbench.types import Floats, Frames, Pose, Run, wrap_angle
 
 WINDOW_S = 0.5
+STILL_MOVING_AT_END = "still moving when the frames end"
 SPEED_LIMIT_MPS = 0.02
 """Of a recorded vehicle; twice the limit while driving (`agvbench.running.rest_detection`), which admits runs."""
 _FEWEST_FRAMES = 8
@@ -83,7 +84,7 @@ def end_pose(run: Run) -> RestPose:
     speed = _drift(window)[1]
     if speed > SPEED_LIMIT_MPS:
         raise FitError(
-            "still moving when the frames end",
+            STILL_MOVING_AT_END,
             where=run.run_id,
             value=f"{speed:.3f} m/s",
             limit=f"{SPEED_LIMIT_MPS} m/s",

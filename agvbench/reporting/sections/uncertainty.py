@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 from agvbench.campaign.uncertainty_statement import HOW_TO_STATE
 from agvbench.reporting.content import Block, Column, Fold, Paragraph, Table, Value
 from agvbench.reporting.sections.base import Section
-from agvbench.statistics.uncertainty.budget import Role
-from agvbench.statistics.uncertainty.end_pose_budgets import SOURCES
+from agvbench.statistics.uncertainty.end_pose_budgets import key_to_state
+from agvbench.statistics.uncertainty.propagation import SOURCES
 from agvbench.statistics.uncertainty.tables import budget_table, component_table
 from agvbench.workflows.report import ReportData
 
@@ -23,23 +23,43 @@ _BUDGET = (
     Column("unit", "unit"),
     Column("repeats", "n", 0, explained="Repeats that count."),
     Column("mean", "mean", 3),
-    Column("combined", "u", 3, explained="Combined standard uncertainty of the mean."),
+    Column("combined", "u", 3, explained="Combined standard uncertainty of the mean; of one run: of the camera only."),
     Column("degrees_of_freedom", "ν", 1, explained="Effective degrees of freedom after Welch and Satterthwaite."),
-    Column("coverage_factor", "k", 2, explained="Coverage factor for 95 %, from Student's t with ν."),
-    Column("expanded", "U = k·u", 3, explained="Expanded uncertainty: the true mean lies within ± U with 95 %."),
-    Column("low", "from", 3, group="mean ± U"),
+    Column(
+        "coverage_factor",
+        "k",
+        2,
+        explained="For 95 %, from Student's t with ν; assumes a nearly normal result (JCGM 100, G.6.5).",
+    ),
+    Column(
+        "expanded",
+        "U = k·u",
+        3,
+        explained="Expanded uncertainty: the true mean lies within ± U with 95 %. One run has none.",
+    ),
+    Column("low", "from", 3, group="mean ± U", explained="A distance is not negative: not below zero."),
     Column("high", "to", 3, group="mean ± U"),
-    Column("not_stated", "not stated", 0, explained="Sources that u lacks, since the lab does not state them."),
+    Column(
+        "not_stated",
+        "not stated",
+        0,
+        explained="Sources that u lacks: not stated by the lab, or not known from these runs.",
+    ),
 )
 _COMPONENTS = (
     *_KEYS,
     Column("quantity", "mean of"),
     Column("source", "source"),
-    Column("evaluation", "type", explained="A: from the scatter of repeats. B: from other knowledge."),
+    Column("evaluation", "type", explained="A: by statistics of repeated observations. B: by other means."),
     Column("distribution", "distribution"),
     Column("standard_uncertainty", "standard uncertainty", 4),
     Column("source_unit", "unit"),
-    Column("sensitivity", "sensitivity", 4, explained="Change of the mean per change of the source."),
+    Column(
+        "sensitivity",
+        "sensitivity",
+        4,
+        explained="Change of the mean per change of the source, over 1.96 standard uncertainties.",
+    ),
     Column("contribution", "contribution", 4, explained="Sensitivity times standard uncertainty [mm or deg]."),
     Column("degrees_of_freedom", "ν", 1),
     Column("role", "role"),
@@ -57,20 +77,27 @@ _ACCURACY = (
 _COMPLETIONS = (
     *_KEYS,
     Column("attempts", "attempts", 0),
-    Column("aborted", "aborted", 0),
-    Column("left_out", "no attempt", 0, explained="Rejected for the recording, or without a measured end pose."),
-    Column("bound", "failure probability at most [%]", 1),
+    Column("not_completed", "not completed", 0, explained="Left the workspace, did not come to rest, or was aborted."),
+    Column(
+        "left_out",
+        "no attempt",
+        0,
+        explained="Ended by camera, operator or installation, rejected for the recording, or without an end pose.",
+    ),
+    Column("bound", "not completed with a probability of at most [%]", 1),
 )
 _NOTE = (
     "Evaluated after JCGM 100:2008 (GUM). Noise of the camera at the rest poses is in the scatter of repeats, and is "
-    "not added to it. Repeats count as independent; what is the same in every run enters as far as it is stated. The "
-    "budget is of the mean; medians stand in the other tables."
+    "not added to it, except by how much it enlarges distances. Repeats of one session count as independent; what is "
+    "the same in every run enters as far as it is stated. The budget is of the mean; other tables have medians. "
+    "The mean end position error is the mean of distances, and not AP, the distance of the mean position. The heading "
+    "error is signed here; other tables show magnitudes."
 )
 _NOTE_ACCURACY = (
     "Terms and formulas of ISO 9283, which tests manipulators; ISO 18646-2 measures pose accuracy and repeatability of "
     "mobile service robots, too. AP is the distance from the commanded position to the mean of the attained ones. RP "
     "is the mean distance of the attained positions from their mean, plus three times the standard deviation S of this "
-    "distance. Here the repeats are those of the campaign."
+    "distance. ISO 9283 drives 30 cycles; fewer give too small an RP, and fewer than three none."
 )
 _NOTE_COMPLETIONS = (
     "The exact one-sided 95 % bound after Clopper and Pearson: with no failure in n attempts it is 1 − 0.05^(1/n), "
@@ -98,7 +125,9 @@ class UncertaintySection(Section):
         caption = "Mean end pose errors with their expanded uncertainty, 95 %."
         budgets = Table("uncertainty", caption, _BUDGET, _rows(budget_table(data.budgets), _BUDGET), True, _NOTE)
         components = component_table(data.budgets)
-        components = components[components["role"] != Role.NOT_STATED].assign(value=components["remark"])
+        parts = [c for one in data.budgets for c in one.budget.components]
+        is_shown = [key_to_state(c) is None for c in parts]
+        components = components[is_shown].assign(value=components["remark"])
         shown = Table(
             "uncertainty-components", "Components of each budget.", _COMPONENTS, _rows(components, _COMPONENTS), True
         )
@@ -124,16 +153,12 @@ def _not_stated(data: ReportData) -> Iterator[Table]:
     largest: dict[str, dict[str, float]] = {}
     for one in data.budgets:
         for c in one.budget.components:
-            if c.role is Role.NOT_STATED and c.source in _KEY_OF:
-                by_unit = largest.setdefault(c.source, {"mm": math.nan, "deg": math.nan})
+            if (key := key_to_state(c)) is not None:
+                by_unit = largest.setdefault(key, {"mm": math.nan, "deg": math.nan})
                 by_unit[one.budget.unit] = max(abs(c.sensitivity), by_unit[one.budget.unit])
     rows: list[list[Value]] = [
-        [source, f"{_KEY_OF[source]} = …", found["mm"], found["deg"], SOURCES[_KEY_OF[source]][1]]
-        for source, found in largest.items()
+        [SOURCES[key][0], f"{key} = …", found["mm"], found["deg"], SOURCES[key][1]] for key, found in largest.items()
     ]
     if rows:
         note = f"Write them under [uncertainty] into lab.toml or campaign.toml ({HOW_TO_STATE})."
         yield Table("not-stated", "Sources of uncertainty that the lab does not state.", _NOT_STATED, rows, note=note)
-
-
-_KEY_OF = {source: key for key, (source, _) in SOURCES.items()}

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from agvbench.campaign.attempts import CONTROLLER_NEVER_ENDS
 from agvbench.campaign.names import CONTROLLER
 from agvbench.control import ControlInput, Controller, ControllerFactory, Demand, Motion, Reference
 from agvbench.errors import AgvbenchError, ControllerError, FlagError
@@ -167,7 +168,7 @@ class ClosedLoop:
 
     def _overtime(self) -> tuple[None, float]:
         limit_s = self._control.limit_s
-        self.complaint = f"the controller {self._control.name} did not end the run (limit: {limit_s:.1f} s)"
+        self.complaint = f"the controller {self._control.name} {CONTROLLER_NEVER_ENDS} (limit: {limit_s:.1f} s)"
         return None, 0.0
 
     def _look(self, seen: list[Frames]) -> None:

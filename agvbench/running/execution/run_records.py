@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from agvbench.campaign import CampaignWriter
+from agvbench.campaign.attempts import INTERRUPTED
 from agvbench.campaign.completeness import planned_id
 from agvbench.errors import CampaignError, SafetyStopError
 from agvbench.running.execution.closed_loop import ClosedLoop, Control
@@ -63,7 +64,7 @@ def aborted_run(
     request: RunRequest, run_id: str, started_s: float, error: BaseException, frames: Frames, firmware: str
 ) -> Run:
     """Return what is left of a run that `error` ended: its frames, and the commands sent until the last of them."""
-    why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error) or type(error).__name__
+    why = INTERRUPTED if isinstance(error, KeyboardInterrupt) else str(error) or type(error).__name__
     last_s = float(np.max(frames.t_s))
     sent = np.asarray(request.commands.t_s <= max(last_s, 0.0))
     commands = Commands(*(column[sent] for column in vars(request.commands).values()))

@@ -13,6 +13,9 @@ from enum import StrEnum
 
 from agvbench.statistics.intervals import CONFIDENCE
 
+REPEATS = "repeats"
+"""The source that is the scatter between repeats; without its size a budget has no interval."""
+
 
 class Role(StrEnum):
     """What a component does in its budget."""
@@ -32,13 +35,14 @@ class Component:
     source
         What is uncertain.
     evaluation
-        ``A`` (by statistics of repeats) or ``B`` (otherwise).
+        ``A`` (by statistics of repeated observations) or ``B`` (by other means).
     distribution
         Behind the standard uncertainty.
     standard_uncertainty, unit
         Of the source; NaN where it is not stated.
     sensitivity
-        Change of the result per change of the source, in the unit of the result per `unit`.
+        Change of the result per change of the source, in the unit of the result per `unit`; a secant where it was
+        computed with a finite step.
     degrees_of_freedom
         Infinite where the standard uncertainty counts as exactly known.
     role
@@ -85,9 +89,14 @@ class Budget:
 
     @property
     def coverage_factor(self) -> float:
-        """The factor k for 95 %, from Student's t distribution with the effective degrees of freedom."""
+        """The factor k for 95 %, from Student's t distribution with the effective degrees of freedom.
+
+        It assumes that the result is nearly normal (JCGM 100:2008, G.6.5). NaN without repeats.
+        """
         from scipy.special import ndtri, stdtrit
 
+        if not self.is_repeated:
+            return math.nan
         probability = 0.5 + CONFIDENCE / 2.0
         freedom = self.degrees_of_freedom
         return float(stdtrit(freedom, probability)) if math.isfinite(freedom) else float(ndtri(probability))
@@ -99,8 +108,8 @@ class Budget:
 
     @property
     def is_repeated(self) -> bool:
-        """Whether repeats are among the components; without them the uncertainty is that of one run."""
-        return any(c.evaluation == "A" for c in self._combined)
+        """Whether the scatter of repeats is known; without it the combined uncertainty is that of one run."""
+        return not any(c.source == REPEATS and c.role is Role.NOT_STATED for c in self.components)
 
     @property
     def _combined(self) -> list[Component]:

@@ -1,40 +1,40 @@
 """Uncertainty budgets of end pose errors: per trajectory and condition, of the mean over repeats.
 
-The results are the mean end position error [mm] and the mean heading error [deg]. Noise of the camera at the rest poses
-differs from run to run: the scatter of repeats contains it, so it is shown and not added. What is the same in every
-run shows in no repeat: it enters as far as the lab states it (`agvbench.campaign.uncertainty_statement`).
+The results are the mean end position error [mm] and the mean signed heading error [deg]. Noise of the camera at the
+rest poses differs from run to run: the scatter of repeats contains it, so it is shown and not added; only by how much
+it enlarges distances is added. What is the same in every run shows in no repeat: it enters as far as the lab states it
+(`agvbench.campaign.uncertainty_statement`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
 
 from agvbench.campaign.uncertainty_statement import Evaluation
-from agvbench.errors import FitError
 from agvbench.statistics.quantities import HEADING, POSITION, Quantity
-from agvbench.statistics.rest_poses import RestPose, end_pose, start_pose
-from agvbench.statistics.uncertainty.budget import Budget, Component, Role
-from agvbench.types import Floats, Pose, Run, wrap_angle
+from agvbench.statistics.uncertainty.budget import REPEATS, Budget, Component, Role
+from agvbench.statistics.uncertainty.propagation import (
+    CLOCK,
+    SOURCES,
+    enlargement_by_noise,
+    heading_contribution,
+    position_contribution,
+)
+from agvbench.statistics.uncertainty.repeats import At, Repeats, RestPoses, mean_square_root, rest_poses
+from agvbench.types import Floats, Run
 
-_PER_DEG = math.pi / 180.0
+SIGNED_HEADING = replace(HEADING, name="heading error, signed")
 _ONE_RUN = "one repeat: drive more (bench --repeats)"
+_FEW_FRAMES = "too few frames at rest: raise the frame rate"
 _STATED = "stated"
-REPEATS = "repeats"
-CLOCK = "clock_ms"
-SOURCES = {
-    "camera_position_mm": ("camera: position at start and end, per axis", "mm"),
-    "camera_scale_ppm": ("camera: scale of lengths", "ppm"),
-    "camera_heading_deg": ("camera: heading at start and end", "deg"),
-    "marker_offset_mm": ("centroid of the markers on the vehicle, per axis", "mm"),
-    "heading_alignment_deg": ("alignment of the markers' heading", "deg"),
-    CLOCK: ("capture clock and latency", "ms"),
-}
-"""What a lab can state, by key of ``[uncertainty]``: in words, and the unit of the standard uncertainty."""
+_BY_DELAY = "limits ± longest delay of frames, times the speed at rest; lacks a constant latency before the stamp"
+_AT: tuple[At, At] = ("start", "end")
+_Contribution = Callable[[Repeats, str, float], float]
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,12 @@ class EndPoseBudget:
     repeats: int
     budget: Budget
 
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The mean ± U; a distance is not negative, so its interval ends at zero. NaN without repeats."""
+        low, high = (self.budget.estimate + sign * self.budget.expanded for sign in (-1.0, 1.0))
+        return (0.0 if self.quantity is POSITION and low < 0.0 else low), high
+
 
 def end_pose_budgets(runs: Iterable[Run], stated: Mapping[str, Evaluation] | None = None) -> list[EndPoseBudget]:
     """Return two budgets for each trajectory and condition, in the order of their first runs.
@@ -58,7 +64,7 @@ def end_pose_budgets(runs: Iterable[Run], stated: Mapping[str, Evaluation] | Non
     stated
         Type B evaluations by key of `SOURCES`.
     """
-    return budgets_of([one for run in runs if run.is_ok and run.target.is_finite for one in _measured(run)], stated)
+    return budgets_of([one for run in runs if run.is_ok and run.target.is_finite for one in rest_poses(run)], stated)
 
 
 def budgets_of(measured: list[RestPoses], stated: Mapping[str, Evaluation] | None = None) -> list[EndPoseBudget]:
@@ -68,167 +74,107 @@ def budgets_of(measured: list[RestPoses], stated: Mapping[str, Evaluation] | Non
     for (trajectory, condition), group in groupby(
         sorted(measured, key=lambda one: first[one.key]), lambda one: one.key
     ):
-        sample = _Sample(list(group))
-        for quantity, budget in ((POSITION, _position), (HEADING, _heading)):
-            found.append(EndPoseBudget(trajectory, condition, quantity, len(sample.runs), budget(sample, stated or {})))
+        repeats = Repeats(list(group))
+        for quantity, budget in ((POSITION, _position), (SIGNED_HEADING, _heading)):
+            found.append(EndPoseBudget(trajectory, condition, quantity, len(repeats), budget(repeats, stated or {})))
     return found
 
 
-@dataclass(frozen=True)
-class RestPoses:
-    """One run by its rest poses (floor frame), its target (start frame) and the delay of its frames.
+def key_to_state(component: Component) -> str | None:
+    """Return the key of ``[uncertainty]`` by which a lab adds a component that is not stated; None for others."""
+    is_open = component.role is Role.NOT_STATED and math.isfinite(component.sensitivity)
+    return _KEY_OF.get(component.source) if is_open else None
 
-    ``key`` is trajectory and condition; ``delay_s`` is the median time from capture to receipt, NaN if not recorded.
+
+_KEY_OF = {source: key for key, (source, _) in SOURCES.items()}
+
+
+def _position(repeats: Repeats, stated: Mapping[str, Evaluation]) -> Budget:
+    components = [_of_repeats(repeats, repeats.distance, "mm")]
+    for at in _AT:
+        errors = 1e3 * repeats.column(at, "stderr_position_m")
+        components.append(_noise(f"camera noise: {at} position", repeats, errors, "mm", 1.0, at))
+    headings = np.degrees(repeats.column("start", "stderr_heading_rad"))
+    lever = math.radians(mean_square_root(repeats.across_path))
+    components.append(_noise("camera noise: start heading", repeats, headings, "deg", lever, "start"))
+    if len(repeats) > 1:
+        components.append(_enlargement(repeats))
+    systematic = _systematic(repeats, stated, list(SOURCES), position_contribution)
+    return Budget(float(repeats.distance.mean()), "mm", [*components, *systematic])
+
+
+def _heading(repeats: Repeats, stated: Mapping[str, Evaluation]) -> Budget:
+    components = [_of_repeats(repeats, repeats.heading, "deg")]
+    for at in _AT:
+        errors = np.degrees(repeats.column(at, "stderr_heading_rad"))
+        components.append(_noise(f"camera noise: {at} heading", repeats, errors, "deg", 1.0, at))
+    systematic = _systematic(repeats, stated, ["camera_heading_deg", CLOCK], heading_contribution)
+    return Budget(float(repeats.heading.mean()), "deg", [*components, *systematic])
+
+
+def _of_repeats(repeats: Repeats, values: Floats, unit: str) -> Component:
+    """Return the type A component: the standard deviation of the mean of `values`, shape (n,).
+
+    Repeats of one session share what changes between sessions. With two sessions or more the component is computed
+    from session means, too, and the one with the wider 95 % interval counts.
     """
+    from scipy.special import stdtrit
 
-    key: tuple[str, str]
-    target: Pose
-    start: RestPose
-    end: RestPose
-    delay_s: float = math.nan
-
-
-def _measured(run: Run) -> Iterator[RestPoses]:
-    try:
-        start, end = start_pose(run), end_pose(run)
-    except FitError:
-        return
-    delays = run.frames.received_s - run.frames.t_s
-    known = delays[np.isfinite(delays)]
-    delay_s = float(np.median(known)) if len(known) else math.nan
-    yield RestPoses((run.trajectory, run.condition), run.target, start, end, delay_s)
-
-
-class _Sample:
-    """The repeats of one trajectory under one condition, in the start frame.
-
-    ``reached`` and ``error`` have shape (n, 2) [mm], ``heading`` and ``rotation`` (n,) [deg and rad]; ``outward`` are
-    unit vectors of the error, zero where there is none: the gradient of the end position error.
-    """
-
-    def __init__(self, runs: list[RestPoses]) -> None:
-        self.runs = runs
-        ends = [one.end.pose.relative_to(one.start.pose) for one in runs]
-        targets = [one.target for one in runs]
-        self.reached = 1e3 * np.array([end[:2] for end in ends])
-        self.error = self.reached - 1e3 * np.array([target[:2] for target in targets])
-        self.rotation = np.array([end.heading_rad for end in ends])
-        turned = [wrap_angle(end.heading_rad - to.heading_rad) for end, to in zip(ends, targets, strict=True)]
-        self.heading = np.degrees(turned)
-        self.distance = np.hypot(*self.error.T)
-        self.outward = self.error / np.where(self.distance > 0.0, self.distance, 1.0)[:, np.newaxis]
-
-    @property
-    def across_path(self) -> Floats:
-        """Change of the end position error per rotation of the start frame, shape (n,) [mm/rad]."""
-        x, y = self.reached.T
-        return np.asarray(self.outward[:, 0] * y - self.outward[:, 1] * x)
-
-    @property
-    def along_path(self) -> Floats:
-        """Change of the end position error per relative change of all lengths, shape (n,) [mm]."""
-        return np.asarray(np.sum(self.outward * self.reached, axis=1))
-
-    @property
-    def lever(self) -> Floats:
-        """Change of the mean end position error per offset (2,) of the centroid on the vehicle [1]."""
-        c, s = np.cos(self.rotation) - 1.0, np.sin(self.rotation)
-        x, y = self.outward.T
-        return np.array([np.mean(c * x + s * y), np.mean(c * y - s * x)])
-
-    def noise(self, values: Floats) -> float:
-        """Return the standard uncertainty of a mean over repeats from those (n,) of single runs; NaN if unknown."""
-        known = values[np.isfinite(values)]
-        return math.sqrt(float(np.mean(known**2)) / len(self.runs)) if len(known) else math.nan
-
-    def frames(self, at: str) -> float:
-        """Return the pooled degrees of freedom of the rest poses ``start`` or ``end``."""
-        return float(max(1, sum(getattr(one, at).frames - 1 for one in self.runs)))
-
-    @property
-    def delay_ms(self) -> float:
-        """The median delay between capture and receipt [ms]; NaN if not recorded."""
-        return 1e3 * float(np.median([one.delay_s for one in self.runs]))
-
-    def at_rest(self, name: str) -> float:
-        """Return the root mean square of a velocity at both rest poses together; what noise makes of it is in it."""
-        squares = [getattr(pose, name) ** 2 for one in self.runs for pose in (one.start, one.end)]
-        known = [square for square in squares if math.isfinite(square)]
-        return math.sqrt(2.0 * float(np.mean(known))) if known else 0.0
-
-
-def _position(sample: _Sample, stated: Mapping[str, Evaluation]) -> Budget:
-    middle = float(np.hypot(*sample.outward.mean(axis=0)))
-    turning = sample.across_path * _PER_DEG
-    sensitivities = {
-        "camera_position_mm": math.sqrt(2.0) * middle,
-        "camera_scale_ppm": 1e-6 * float(sample.along_path.mean()),
-        "camera_heading_deg": float(turning.mean()),
-        "marker_offset_mm": float(np.hypot(*sample.lever)),
-        "heading_alignment_deg": float(turning.mean()),
-        CLOCK: sample.at_rest("speed_mps"),  # mm/ms
-    }
-    components = [_repeats(sample.distance, "mm")]
-    role = _role_of_noise(sample)
-    for at in ("start", "end"):
-        errors = np.array([1e3 * getattr(one, at).stderr_position_m for one in sample.runs])
-        components.append(_noise(f"camera noise: {at} position", sample, errors, "mm", 1.0, at, role))
-    headings = np.degrees([one.start.stderr_heading_rad for one in sample.runs])
-    lever = math.sqrt(float(np.mean(turning**2)))
-    components.append(_noise("camera noise: start heading", sample, headings, "deg", lever, "start", role))
-    return Budget(float(sample.distance.mean()), "mm", [*components, *_systematic(sample, stated, sensitivities)])
-
-
-def _heading(sample: _Sample, stated: Mapping[str, Evaluation]) -> Budget:
-    turn_rate = math.degrees(sample.at_rest("turn_rate_radps"))
-    sensitivities = {"camera_heading_deg": math.sqrt(2.0), CLOCK: 1e-3 * turn_rate}
-    components = [_repeats(sample.heading, "deg")]
-    for at in ("start", "end"):
-        errors = np.degrees([getattr(one, at).stderr_heading_rad for one in sample.runs])
-        components.append(_noise(f"camera noise: {at} heading", sample, errors, "deg", 1.0, at, _role_of_noise(sample)))
-    return Budget(float(sample.heading.mean()), "deg", [*components, *_systematic(sample, stated, sensitivities)])
-
-
-def _repeats(values: Floats, unit: str) -> Component:
-    """Return the type A component: the standard deviation of the mean of `values`, shape (n,)."""
-    n = len(values)
+    n, names = len(values), repeats.sessions
     if n < 2:
         return Component(REPEATS, "A", "t", math.nan, unit, 1.0, math.nan, Role.NOT_STATED, _ONE_RUN)
-    mean = float(np.std(values, ddof=1)) / math.sqrt(n)
-    return Component(REPEATS, "A", "t", mean, unit, 1.0, n - 1.0, remark=f"mean of {n}")
+    single = float(np.std(values, ddof=1)) / math.sqrt(n)
+    runs = Component(REPEATS, "A", "t", single, unit, 1.0, n - 1.0, remark=f"mean of {n}")
+    if len(names) < 2:
+        return runs
+    spread = _between([values[repeats.of_session(name)] for name in names])
+    remark = f"mean of {n}, from the means of {len(names)} sessions"
+    sessions = Component(REPEATS, "A", "t", spread, unit, 1.0, len(names) - 1.0, remark=remark)
+    return max(runs, sessions, key=lambda c: c.standard_uncertainty * float(stdtrit(c.degrees_of_freedom, 0.975)))
 
 
-def _role_of_noise(sample: _Sample) -> Role:
-    return Role.IN_REPEATS if len(sample.runs) > 1 else Role.COMBINED
+def _between(groups: Sequence[Floats]) -> float:
+    """Return the standard deviation of the mean over all values, from the means of groups of any sizes.
+
+    It is that of the groups' mean if all are of one size; otherwise groups weigh by their size.
+    """
+    values = np.concatenate(groups)
+    sums = [float(np.sum(group - values.mean())) for group in groups]
+    return math.hypot(*sums) / len(values) * math.sqrt(len(groups) / (len(groups) - 1.0))
 
 
-def _noise(
-    source: str, sample: _Sample, errors: Floats, unit: str, sensitivity: float, at: str, role: Role
-) -> Component:
-    uncertainty = sample.noise(errors)
+def _noise(source: str, repeats: Repeats, errors: Floats, unit: str, sensitivity: float, at: At) -> Component:
+    uncertainty = mean_square_root(errors) / math.sqrt(len(repeats))
     if not math.isfinite(uncertainty):
-        lacking = "one frame at rest: raise the frame rate"
-        return Component(source, "B", "normal", math.nan, unit, sensitivity, math.nan, Role.NOT_STATED, lacking)
-    return Component(
-        source, "B", "normal", uncertainty, unit, sensitivity, sample.frames(at), role, "from frames at rest"
-    )
+        return Component(source, "A", "t", math.nan, unit, sensitivity, math.nan, Role.NOT_STATED, _FEW_FRAMES)
+    role = Role.IN_REPEATS if len(repeats) > 1 else Role.COMBINED
+    freedom = repeats.frames(at)
+    return Component(source, "A", "t", uncertainty, unit, sensitivity, freedom, role, "from frames at rest")
+
+
+def _enlargement(repeats: Repeats) -> Component:
+    """Return the component for noise that enlarges distances; the mean is not corrected for it (F.2.4.5)."""
+    bias, source = enlargement_by_noise(repeats), "camera noise: enlarges distances"
+    if not math.isfinite(bias):
+        return Component(source, "B", "", math.nan, "mm", 1.0, math.nan, Role.NOT_STATED, _FEW_FRAMES)
+    return Component(source, "B", "bias", abs(bias), "mm", 1.0, math.inf, remark="estimated; the mean is not corrected")
 
 
 def _systematic(
-    sample: _Sample, stated: Mapping[str, Evaluation], sensitivities: Mapping[str, float]
+    repeats: Repeats, stated: Mapping[str, Evaluation], keys: Sequence[str], contribution: _Contribution
 ) -> Iterator[Component]:
     """Yield what is the same in every run: stated, or from delays, or not stated."""
-    for key, sensitivity in sensitivities.items():
+    for key in keys:
         source, unit = SOURCES[key]
-        remark = _STATED
-        evaluation = stated.get(key)
-        if evaluation is None and key == CLOCK and sample.delay_ms > 0.0:
+        evaluation, remark = stated.get(key), _STATED
+        if evaluation is None and key == CLOCK and repeats.delay_ms > 0.0:
             # A frame is captured before it is received: its time is wrong by no more than its delay.
-            evaluation = Evaluation(sample.delay_ms / math.sqrt(3.0), "rectangular")
-            remark = "limits ± delay of frames; times the speed at rest"
-        if evaluation is None:
-            how = f"state {key} in [uncertainty]"
+            evaluation, remark = Evaluation(repeats.delay_ms / math.sqrt(3.0), "rectangular"), _BY_DELAY
+        size = 1.0 if evaluation is None else evaluation.standard_uncertainty
+        sensitivity = contribution(repeats, key, size) / size
+        if evaluation is None or not math.isfinite(sensitivity):
+            how = f"state {key} in [uncertainty]" if math.isfinite(sensitivity) else _FEW_FRAMES
             yield Component(source, "B", "", math.nan, unit, sensitivity, math.nan, Role.NOT_STATED, how)
         else:
-            numbers = evaluation.standard_uncertainty, unit, sensitivity, evaluation.degrees_of_freedom
-            yield Component(source, "B", evaluation.distribution, *numbers, remark=remark)
+            freedom = evaluation.degrees_of_freedom
+            yield Component(source, "B", evaluation.distribution, size, unit, sensitivity, freedom, remark=remark)

@@ -28,7 +28,7 @@ COMPONENT_COLUMNS = (*_KEYS, *_OF_COMPONENT)
 def budget_table(budgets: Sequence[EndPoseBudget]) -> pd.DataFrame:
     """Return one row per budget: mean, combined standard uncertainty, degrees of freedom, k, U and mean ± U for 95 %.
 
-    ``not_stated`` counts the sources that the combined uncertainty lacks.
+    One run has neither k nor U. ``not_stated`` counts the sources that the combined uncertainty lacks.
     """
     import pandas as pd
 
@@ -67,7 +67,7 @@ def _result(one: EndPoseBudget) -> Iterator[float]:
     budget = one.budget
     mean, expanded = budget.estimate, budget.expanded
     yield from (mean, budget.combined, budget.degrees_of_freedom, budget.coverage_factor, expanded)
-    yield from (mean - expanded, mean + expanded)
+    yield from one.interval
     yield sum(c.role is Role.NOT_STATED for c in budget.components)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from agvbench.campaign.attempts import CAMERA_AHEAD, CAMERA_SET_BACK
 from agvbench.running.supervision.rule import Rule, Slice
 
 
@@ -27,7 +28,7 @@ class ClockRule(Rule):
         back_s = before_s - t_s
         limit = f"{self.limits.clock_s:g} s"
         if seen.ahead_s > self.limits.clock_s:
-            return "camera's clock is ahead", f"poses from {seen.ahead_s:.2f} s in the future", limit
+            return CAMERA_AHEAD, f"poses from {seen.ahead_s:.2f} s in the future", limit
         if back_s > self.limits.clock_s:
-            return "camera's clock was set back", f"poses {back_s:.2f} s older than those before", limit
+            return CAMERA_SET_BACK, f"poses {back_s:.2f} s older than those before", limit
         return None

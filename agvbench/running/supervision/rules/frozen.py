@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from agvbench.campaign.attempts import CAMERA_FROZEN
 from agvbench.running.supervision.rule import Rule, Slice
 
 
@@ -38,4 +39,4 @@ class FrozenRule(Rule):
         flickers = self.limits.flickers or self._seen_to_flicker
         if not flickers or min(still_s, seen.driving_s) <= self.limits.frozen_s:
             return None
-        return "tracking is frozen", f"the same pose for {still_s:.2f} s", f"{self.limits.frozen_s:g} s"
+        return CAMERA_FROZEN, f"the same pose for {still_s:.2f} s", f"{self.limits.frozen_s:g} s"

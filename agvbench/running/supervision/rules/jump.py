@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from agvbench.campaign.attempts import POSE_JUMPED
 from agvbench.running.supervision.rule import Rule, Slice
 from agvbench.types import Floats
 
@@ -29,4 +30,4 @@ class JumpRule(Rule):
         self._velocity = (place - before[1]) / since_s
         if off_m <= self.limits.jump_m:
             return None
-        return "pose jumped", f"{off_m:.2f} m from where the vehicle was going", f"{self.limits.jump_m:g} m"
+        return POSE_JUMPED, f"{off_m:.2f} m from where the vehicle was going", f"{self.limits.jump_m:g} m"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from agvbench.campaign.attempts import LEAVES_WORKSPACE
 from agvbench.running.supervision.rule import Rule, Slice
 from agvbench.types import Floats
 
@@ -31,4 +32,4 @@ class VolumeRule(Rule):
         if clearance_m >= 0.0:
             return None
         at = f"{-clearance_m:.2f} m outside {self.workspace.name}, from {np.hypot(*velocity):.2f} m/s"
-        return "vehicle is leaving the capture volume", f"would come to rest {at}", "0 m"
+        return LEAVES_WORKSPACE, f"would come to rest {at}", "0 m"
