@@ -306,7 +306,7 @@ def test_any_reader_of_messagepack_can_read_a_message() -> None:
     one = np.array([1.5])
     frames = Frames(one, one + 1.0, one + 2.0, one, np.array([True]), np.array([7]), one, one)
     version, fields = msgspec.msgpack.decode(encode(FramesMessage(3, 1, pack_columns(frames), 2, FrameClock.ADAPTER)))
-    assert (version, fields["type"], fields["sequence"], fields["count"], fields["clock"]) == (5, "frames", 3, 1, 1)
+    assert (version, fields["type"], fields["sequence"], fields["count"], fields["clock"]) == (6, "frames", 3, 1, 1)
     assert struct.unpack("<6dqB", fields["columns"]) == (1.5, 2.5, 3.5, 1.5, 1.5, 1.5, 7, 1)
     version, fields = msgspec.msgpack.decode(encode(CommandMessage(1, 0.5, Command(1700.0, 1500.0, 1400.0), 0.1)))
     assert (fields["command"], fields["hold_s"]) == ([1700.0, 1500.0, 1400.0], 0.1)

@@ -53,7 +53,7 @@ def test_the_verdict_of_a_diagnosis_and_its_next_step_stand_on_the_first_screen(
         ("one condition", "under a second condition"),
         ("all rejected", "1 of 1 runs do not count"),
         ("eight trajectories", "agvbench diagnose"),
-        ("free driving", "Nothing is open"),
+        ("free driving", "agvbench diagnose"),
     ],
 )
 def test_next_steps_follow_from_the_report(report_data, kind, words):

@@ -13,6 +13,7 @@ from agvbench.statistics.uncertainty.end_pose_budgets import SOURCES, budgets_of
 from agvbench.statistics.uncertainty.repeats import RestPoses
 from agvbench.types import Pose
 
+pytestmark = pytest.mark.slow
 CAMPAIGNS = 2000
 FRAMES = 15
 TARGET = np.array([1.0, 1.0, math.pi / 2])
