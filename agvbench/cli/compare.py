@@ -157,4 +157,4 @@ def _write(
     if arguments.junit:
         write_junit(arguments.junit, comparison, checks, failing=failing)
     if arguments.markdown:
-        write_markdown(arguments.markdown, comparison, checks, known)
+        write_markdown(arguments.markdown, comparison, checks, known, failing=failing)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from agvbench.errors import InputError, OneOf
-from agvbench.metrics.gate_rules import STATISTICS, GateRule, Statistic
+from agvbench.metrics.gate_rules import SIGNED, STATISTICS, TWO_SIDED, GateRule, Statistic
 from agvbench.statistics.differences import ALPHA
 from agvbench.statistics.hypothesis_tests import holm_tarone, minimum_attainable_p, rank_test, tarone_testable
 from agvbench.types import RUN_OK, Floats
@@ -89,15 +89,22 @@ def check_gate(
     for rule in rules:
         found = list(_checks(rule, b, a, conditions, resamples, seed))
         if not found:
-            raise InputError(
-                "the rule applies to no trajectory and condition of the campaigns", where="gate", value=rule.text,
-                limit=OneOf(sorted(set(b["metric"]))), remedy="drive them, or correct the rule",
-            )  # fmt: skip
+            raise _unused(rule, b)
         checks += [check for check, _ in found]
         minimum_p += [least for _, least in found]
     decided = sorted(_decided(checks, minimum_p, alpha), key=_severity)
     order = list(dict.fromkeys(check.rule for check in decided))
     return sorted(decided, key=lambda check: order.index(check.rule))
+
+
+def _unused(rule: GateRule, b: pd.DataFrame) -> InputError:
+    """Return what to say of a rule that applies to nothing, with what was driven."""
+    what = "the rule applies to no trajectory and condition of the campaigns"
+    rows = b[b["metric"] == rule.metric]
+    driven = sorted({f"{one.trajectory} {one.condition}" for one in rows.itertuples()})
+    value = " ".join([rule.text, *(f"[{', '.join(names)}]" for names in (rule.trajectories, rule.conditions) if names)])
+    limit = OneOf(driven or sorted(set(b["metric"])))
+    return InputError(what, where="gate", value=value, limit=limit, remedy="drive them, or correct the rule")
 
 
 def _checks(
@@ -125,10 +132,9 @@ def _checks(
         label = " → ".join(conditions) if conditions else condition
         counts = len(earlier), len(values)
         pending = GateVerdict.INCONCLUSIVE
-        yield (
-            GateCheck(rule, trajectory, label, *counts, past, float(statistic(values)), rule.allowed(past), p, pending),
-            least,
-        )
+        present = float(statistic(values))
+        allowed = rule.allowed(past, present)
+        yield GateCheck(rule, trajectory, label, *counts, past, present, allowed, p, pending), least
 
 
 def _least_p(rule: GateRule, n_a: int, n_b: int, resamples: int) -> float:
@@ -136,16 +142,16 @@ def _least_p(rule: GateRule, n_a: int, n_b: int, resamples: int) -> float:
     if not rule.is_growth:
         return 1.0
     exact = minimum_attainable_p(n_a, n_b)
-    if rule.statistic in ("mean", "sd"):
-        return max(exact, 1.0 / (resamples + 1))
+    if rule.statistic in ("mean", "bias", "sd"):
+        return (2.0 if rule.statistic in TWO_SIDED else 1.0) * max(exact, 1.0 / (resamples + 1))
     return exact if rule.statistic == "median" else 2.0 * exact
 
 
 def _values(table: pd.DataFrame, rule: GateRule) -> dict[tuple[str, str], Floats]:
-    """Return the values of a rule's metric by trajectory and condition: absolute ones, or signed ones for ``sd``."""
+    """Return the values of a rule's metric by trajectory and condition: absolute or signed ones."""
     rows = table[(table["metric"] == rule.metric) & (table["status"] == RUN_OK)]
     groups = rows.groupby(["trajectory", "condition"], sort=False)["value"]
-    signed = rule.statistic == "sd"
+    signed = rule.statistic in SIGNED
     found = {(str(t), str(c)): values.to_numpy(dtype=float) for (t, c), values in groups}
     return {cell: values if signed else np.abs(values) for cell, values in found.items()}
 
@@ -155,10 +161,14 @@ def growth_p_value(rule: GateRule, a: Floats, b: Floats, *, resamples: int = RES
 
     The values of `b` are divided by the allowed growth, or shifted by it, so that both samples are exchangeable where
     the growth is exactly the allowed one; those of ``sd`` are centred first. ``median`` is tested by rank sums, and
-    ``mean`` and ``sd`` by permutation. Few repeats hardly have a 95th percentile: ``p95`` and ``max`` take twice the
-    smaller p-value of both tests (Bonferroni).
+    ``mean`` and ``sd`` by permutation; ``bias`` likewise, in both directions (twice the smaller p-value). Few repeats
+    hardly have a 95th percentile: ``p95`` and ``max`` take twice the smaller p-value of both tests (Bonferroni).
     """
     statistic = STATISTICS[rule.statistic]
+    if rule.statistic in TWO_SIDED:
+        allowed = abs(rule.allowed(float(statistic(a))) - float(statistic(a)))
+        sides = ((a, b - allowed), (-a, -b - allowed))
+        return min(1.0, 2.0 * min(_permutation_p(statistic, *side, resamples, seed) for side in sides))
     if rule.statistic == "sd":
         a, b = a - np.mean(a), b - np.mean(b)
     reduced = b / _ratio(rule, float(statistic(a))) if _scales(rule) else b - rule.limit
@@ -195,7 +205,7 @@ def _decided(checks: Sequence[GateCheck], minimum_p: Sequence[float], alpha: flo
     corrected = dict(zip(growth, holm_tarone([checks[k].p_value for k in growth], least, alpha), strict=True))
     testable = dict(zip(growth, tarone_testable(least, alpha), strict=True))
     for k, check in enumerate(checks):
-        exceeds = check.now > check.allowed
+        exceeds = check.rule.is_exceeded(check.before, check.now)
         if k not in corrected:
             yield replace(check, verdict=GateVerdict.FAIL if exceeds else GateVerdict.PASS)
         elif not testable[k]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from collections.abc import Callable, Collection, Mapping
@@ -24,9 +25,13 @@ STATISTICS: Mapping[str, Statistic] = {
     "mean": lambda values: np.mean(values, axis=-1),
     "p95": lambda values: np.percentile(values, 95.0, axis=-1),
     "max": lambda values: np.max(values, axis=-1),
+    "bias": lambda values: np.mean(values, axis=-1),
     "sd": lambda values: np.std(values, axis=-1) * np.sqrt(values.shape[-1] / max(1, values.shape[-1] - 1)),
 }
-"""Statistics over repeats, along the last axis: of absolute values, ``sd`` of signed ones."""
+"""Statistics over repeats, along the last axis: of absolute values, those in `SIGNED` of signed ones."""
+SIGNED = frozenset({"bias", "sd"})
+TWO_SIDED = frozenset({"bias"})
+"""Statistics whose limits hold in both directions: a vehicle may drift to either side."""
 _RULE = re.compile(
     r"(?P<metric>\w+)\.(?P<statistic>\w+)\s*>\s*(?P<plus>\+?)(?P<limit>\d+(?:\.\d+)?)\s*(?P<unit>%|[^\d\s%+.-]\S*)?"
 )
@@ -85,16 +90,32 @@ class GateRule:
             raise FlagError("unknown statistic", where=where, value=statistic, limit=OneOf(STATISTICS))
         unit = match["unit"] or metric.unit
         if unit not in ("%", metric.unit):
-            raise FlagError("has another unit than its metric", where=where, value=text, limit=metric.unit)
+            remedy = f"write {match['limit']}{metric.unit}"
+            raise FlagError(
+                "has another unit than its metric", where=where, value=text, limit=metric.unit, remedy=remedy
+            )
         if unit == "%" and not match["plus"]:
             raise FlagError("a limit in % is a growth", where=where, value=text, remedy=f"write >+{match['limit']}%")
         return cls(text.strip(), metric.name, statistic, float(match["limit"]), unit, metric.unit, bool(match["plus"]))
 
-    def allowed(self, before: float) -> float:
-        """Return the largest value of the statistic that is allowed where it was `before`."""
-        if not self.is_growth:
-            return self.limit
-        return before * (1.0 + self.limit / 100.0) if self.unit == "%" else before + self.limit
+    def allowed(self, before: float, now: float = math.inf) -> float:
+        """Return the value of the statistic up to which it is allowed where it was `before`; of two, that nearer `now`.
+
+        A limit on growth in both directions is one on each side of `before`.
+        """
+        share = abs(before) * self.limit / 100.0 if self.unit == "%" else self.limit
+        if self.statistic in TWO_SIDED:
+            centre = before if self.is_growth else 0.0
+            return centre + math.copysign(share, now - centre)
+        return before + share if self.is_growth else self.limit
+
+    def is_exceeded(self, before: float, now: float) -> bool:
+        """Return whether the statistic `now` is beyond what is allowed where it was `before`."""
+        allowed = self.allowed(before, now)
+        if self.statistic not in TWO_SIDED:
+            return now > allowed
+        centre = before if self.is_growth else 0.0
+        return abs(now - centre) > abs(allowed - centre)
 
     def applies_to(self, trajectory: str, condition: str) -> bool:
         """Return whether it limits this trajectory and condition."""

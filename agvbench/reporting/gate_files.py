@@ -33,8 +33,9 @@ def gate_table(checks: Sequence[GateCheck]) -> Table:
         Column("verdict", "verdict"),
     ]
     note = (
-        "A rule on growth fails where the statistic is beyond what is allowed and the growth is shown by a one-sided "
-        "test, corrected for all rows. Inconclusive: so few repeats cannot show any growth."
+        "A rule on growth fails where the statistic is beyond what is allowed and the growth is shown by a "
+        "one-sided test at 1 %, corrected for all rows; bias has two sides. Inconclusive: so few repeats cannot show "
+        "any growth."
     )
     return Table("gate", f"Gate: {gate_sentence(checks)}", columns, [_row(check) for check in checks], note=note)
 
@@ -120,24 +121,33 @@ def _properties(case: ET.Element, values: dict[str, float], unit: str) -> None:
     ET.SubElement(inside, "property", name="unit", value=unit)
 
 
-def write_markdown(path: Path, comparison: Comparison, checks: Sequence[GateCheck], known: Comparability) -> None:
+def write_markdown(
+    path: Path, comparison: Comparison, checks: Sequence[GateCheck], known: Comparability, *, failing: bool = True
+) -> None:
     """Write a comparison and its gate as Markdown, for a pull request or the summary of a job.
+
+    Without `failing`, verdicts of the comparison do not decide: the gate comes first.
 
     Raises
     ------
     FileError
         If the file cannot be written.
     """
-    section = Content("comparison", headline(comparison), tuple(_blocks(comparison, checks, known)))
+    said = headline(comparison) if failing or not checks else f"Gate: {gate_sentence(checks)}"
+    section = Content("comparison", said, tuple(_blocks(comparison, checks, known, failing=failing)))
     title = f"{plain(comparison.name_b)} against {plain(comparison.name_a)}"
     text = to_markdown(title, [section])
     write_file("--markdown", path, lambda file: file.write_text(f"{text}\n", encoding="utf-8"))
 
 
-def _blocks(comparison: Comparison, checks: Sequence[GateCheck], known: Comparability) -> Iterator[Block]:
+def _blocks(
+    comparison: Comparison, checks: Sequence[GateCheck], known: Comparability, *, failing: bool
+) -> Iterator[Block]:
     if known.sentences:
         yield Bullets(known.sentences)
     if checks:
         yield gate_table(checks)
+        if not failing:
+            yield Paragraph(f"The rules decide. The verdicts below do not: {headline(comparison)}")
     yield comparison_table(comparison, "comparison")
     yield from (Paragraph(remark) for remark in comparison.remarks)

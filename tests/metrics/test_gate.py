@@ -5,17 +5,19 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from xml.etree import ElementTree as ET
 
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import binomtest
 
 from agvbench.errors import AgvbenchError, FileError, FlagError, InputError
 from agvbench.metrics.gate import GateVerdict, check_gate
 from agvbench.metrics.gate_rules import GateRule, read_gate
 
-_UNITS = {"position_error": "mm", "heading_error": "deg", "driving_time": "s"}
+_UNITS = {"position_error": "mm", "across_error": "mm", "heading_error": "deg", "driving_time": "s"}
 
 
 def _table(values, *, metric="position_error", status="ok", condition="calibrated"):
@@ -50,6 +52,40 @@ def test_a_growth_beyond_the_limit_fails_and_a_smaller_one_does_not(statistic, l
     b = {t: values + (25.0 if t == "3" else 0.5) for t, values in _noise(2).items()}
     found = _verdicts(f"position_error.{statistic}>{limit}", _table(b), _table(a))
     assert [t for t, verdict in found.items() if verdict is GateVerdict.FAIL] == ["3"]
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_drift_from_one_side_to_the_other_is_seen_by_bias_and_not_by_absolute_statistics(side):
+    # Two standard deviations of the repeats, from half of it on one side to half of it on the other.
+    rng = np.random.default_rng(5)
+    a = {t: rng.normal(-4.0 * side, 4.0, 20) for t in "123"}
+    b = {t: -values for t, values in a.items()}
+    tables = _table(b, metric="across_error"), _table(a, metric="across_error")
+    assert set(_verdicts("across_error.bias>+0mm", *tables).values()) == {GateVerdict.FAIL}
+    assert set(_verdicts("across_error.mean>+0mm", *tables).values()) == {GateVerdict.PASS}
+    assert set(_verdicts("across_error.bias>+20mm", *tables).values()) == {GateVerdict.PASS}
+    assert {check.allowed for check in check_gate([GateRule.parse("across_error.bias>2mm")], tables[0])} == {2.0 * side}
+
+
+def test_bias_rarely_fails_where_nothing_has_changed():
+    failed = 0
+    for seed in range(300):
+        rng = np.random.default_rng([6, seed])
+        a, b = (_table({"1": rng.normal(3.0, 4.0, 10)}, metric="across_error") for _ in range(2))
+        failed += _verdicts("across_error.bias>+0mm", b, a, resamples=2000)["1"] is GateVerdict.FAIL
+    assert binomtest(failed, 300, 0.01).pvalue > 1e-3
+
+
+def test_an_absolute_limit_on_bias_holds_on_both_sides():
+    b = _table({"1": [-8.0, -6.0], "2": [8.0, 6.0], "3": [-8.0, 8.0]}, metric="across_error")
+    fail, passed = GateVerdict.FAIL, GateVerdict.PASS
+    assert _verdicts("across_error.bias>5mm", b) == {"1": fail, "2": fail, "3": passed}
+
+
+def test_a_rule_for_what_was_not_driven_says_what_was():
+    rule = replace(GateRule.parse("position_error.median>5mm"), trajectories=("figure_eight",))
+    with pytest.raises(InputError, match=r"figure_eight.*1 calibrated"):
+        check_gate([rule], _table({"1": [1.0, 2.0]}))
 
 
 def test_dispersion_that_grows_fails_whatever_its_mean():

@@ -27,6 +27,7 @@ from agvbench.running.supervision.supervisor import Supervisor
 from agvbench.simulator.differential import DifferentialVehicle
 from agvbench.statistics.run_errors import run_error
 from agvbench.types import Command, Commands, Pose
+from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -200,3 +201,13 @@ def test_an_adapter_takes_its_channels_from_a_vehicle_file(tmp_path: Path, capsy
     assert "front normalised, neutral 0.5, 0…1" in " ".join(capsys.readouterr().out.split())
     assert main([*arguments, "--neutral", "1500"]) == 2
     assert "--neutral: the vehicle file says this" in capsys.readouterr().err
+
+
+def test_the_default_plant_is_refused_for_a_vehicle_whose_commands_it_does_not_take(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    vehicle = nominal_model("car", Geometry(0.15, 0.15), Channels.alike("normalised"))
+    vehicle.save(tmp_path / "vehicle.toml")
+    assert main(["bench", "--vehicle", "vehicle.toml", "--dry-run"]) == 2
+    said = capsys.readouterr()
+    assert "the plant that is simulated by default takes pulses in µs" in said.out + said.err
+    assert "--plant my_plant.py:make_plant" in said.out + said.err

@@ -61,11 +61,13 @@ def panel_title(name: str, target: Pose) -> str:
 
     >>> panel_title("6", Pose(1.0, -1.0, -math.pi / 2))
     '6: to (1, −1) m, −90°'
+    >>> panel_title("8", Pose(-3.3e-16, 3.7e-32, 0.0))
+    '8: to (0, 0) m, 0°'
     """
     if not name:
         return ""
     numbers = (target.x_m, target.y_m, math.degrees(target.heading_rad))
-    x, y, heading = (f"{value + 0.0:.3g}".replace("-", "−") for value in numbers)
+    x, y, heading = (f"{round(value, 6) + 0.0:.3g}".replace("-", "−") for value in numbers)
     return plain(f"{name}: to ({x}, {y}) m, {heading}°")
 
 

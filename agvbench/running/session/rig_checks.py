@@ -23,6 +23,7 @@ _OPTIONS = {"uncalibrated": "--vehicle", "calibrated": "--calibration", "correct
 def adapter_options(settings: BenchSettings, models: Mapping[str, VehicleModel]) -> AdapterOptions:
     """Return the options of a session's adapters."""
     nominal = models["uncalibrated"]
+    _require_plant_in_unit(settings, nominal)
     return AdapterOptions(
         vehicle=settings.vehicle_name,
         plant=settings.plant,
@@ -32,6 +33,18 @@ def adapter_options(settings: BenchSettings, models: Mapping[str, VehicleModel])
         calibration_hash=models["calibrated"].calibration_hash if "calibrated" in models else "",
         camera=camera_options([settings.camera]),
     )
+
+
+def _require_plant_in_unit(settings: BenchSettings, nominal: VehicleModel) -> None:
+    """Refuse the plant that is simulated by default for a vehicle whose commands it does not understand."""
+    unit = nominal.channels.drive.unit
+    if settings.agv == "sim" and not settings.connect and settings.plant == BenchSettings.plant and unit != "us":
+        raise FlagError(
+            "the plant that is simulated by default takes pulses in µs", where="--plant", value=settings.plant,
+            limit=f"the vehicle takes commands in {unit}",
+            remedy="give a plant of this vehicle, such as --plant my_plant.py:make_plant "
+            "(docs/how-to/bring-your-own-plant.md)",
+        )  # fmt: skip
 
 
 @contextmanager

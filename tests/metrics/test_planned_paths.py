@@ -1,0 +1,42 @@
+"""The path that a run was to drive: at the times of its own commands, whatever the calibration moved by micrometres."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from agvbench.campaign import Campaign
+from agvbench.metrics.planned_paths import PlannedPaths
+from agvbench.workflows.bench import run_benchmarks
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    out = tmp_path_factory.mktemp("planned") / "campaign"
+    options = {"repeats": 1, "trajectories": "1,5", "exchange": 2.0, "no_report": True, "out": str(out)}
+    assert run_benchmarks([], options) == 0
+    return Campaign.open(out)
+
+
+def _runs(campaign):
+    return {(run.trajectory, run.condition): run for run in campaign if run.experiment == "trajectory"}
+
+
+def test_each_condition_has_the_same_path_at_the_times_of_its_commands(campaign):
+    runs, paths = _runs(campaign), PlannedPaths(campaign)
+    for trajectory in ("1", "5"):
+        uncalibrated, calibrated = (runs[trajectory, name] for name in ("uncalibrated", "calibrated"))
+        nominal, fitted = paths.of(uncalibrated), paths.of(calibrated)
+        np.testing.assert_array_equal(nominal[:, 1:], fitted[:, 1:])
+        assert nominal[-1, 0] == pytest.approx(uncalibrated.commands.t_s[-1])
+        assert fitted[-1, 0] == pytest.approx(calibrated.commands.t_s[-1])
+        assert abs(nominal[-1, 0] - fitted[-1, 0]) > 0.01
+
+
+def test_a_target_that_a_calibration_moved_by_a_tenth_of_a_millimetre_is_the_same(campaign):
+    run, paths = _runs(campaign)["5", "uncalibrated"], PlannedPaths(campaign)
+    moved, other = (replace(run, target=run.target._replace(x_m=run.target.x_m + by)) for by in (1e-4, 1e-2))
+    assert paths.of(moved) is not None
+    assert paths.of(other) is None
