@@ -37,7 +37,7 @@ _PASSED = {"diagnose": (0, 2)}
 """Exit codes that do not fail the night, where they are not 0 alone; 2: the campaign is too small for a diagnosis."""
 _SIGNALLED = 128
 """Exit codes from here on are those of steps that a signal ended."""
-_SET_HERE = frozenset({"--out", "--resume", "--dry-run", "--against", "--until", "--fail-on"})
+_SET_HERE = frozenset({"--out", "--resume", "--dry-run", "--against", "--until", "--fail-on", "--no-report"})
 """Options of a bench that a night sets itself, or that it has no use for."""
 
 
@@ -106,7 +106,12 @@ def _bench(arguments: argparse.Namespace, night: Path, good: Path | None) -> int
     from agvbench.running.configuration.campaign_directory import has_session
     from agvbench.workflows.bench import run_benchmarks
 
-    options = vars(arguments) | {"out": str(night), "resume": has_session(night) or None, "gate": None}
+    options = vars(arguments) | {
+        "out": str(night),
+        "resume": has_session(night) or None,
+        "gate": None,
+        "no_report": True,
+    }
     calibrated = good / "vehicle.toml" if good else None
     if calibrated is not None and calibrated.is_file() and arguments.calibration is None:
         options["calibration"] = str(calibrated)
@@ -119,7 +124,8 @@ def _judged(arguments: argparse.Namespace, night: Path, good: Path | None, gate:
 
     files = night / "report"
     steps = {
-        "diagnose": ["diagnose", str(night), "--json", str(files / "diagnosis.json")],
+        "diagnose": ["diagnose", str(night), "--json", str(night / "diagnosis.json")],
+        "report": ["report", str(night)],
         "history": ["history", str(arguments.nights)],
     }
     if good is not None:

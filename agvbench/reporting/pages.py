@@ -52,7 +52,7 @@ def file_address(file: Path, beside: Path | None) -> str:
 
     >>> file_address(Path("/c/tonight/poses.parquet/a b.parquet"), Path("/c/tonight/report"))
     '../poses.parquet/a%20b.parquet'
-    >>> file_address(Path("/c/tonight/poses.csv"), Path("/tmp"))
+    >>> file_address(Path("/c/tonight/poses.csv"), Path("/home/lab/report"))
     'file:///c/tonight/poses.csv'
     """
     file = file.absolute()

@@ -153,7 +153,7 @@ class Wheels:
 
         >>> wheel = Channel("us", 1500.0, 1000.0, 2000.0)
         >>> Wheels(wheel, wheel).command(Command(400.0, 600.0, 0.0))
-        WheelCommand(left=1300.0, right=2000.0)
+        WheelCommand(left=1400.0, right=2000.0)
         """
         body = self.limited(command)
         values = self.wheels(body.drive, body.front)

@@ -12,7 +12,7 @@ from agvbench.cli import main
 from agvbench.cli.nightly import last_good
 from agvbench.errors import FileError
 
-QUICK = ["-k", "trajectory and 1-un", "--repeats", "3", "--exchange", "2", "--no-report"]
+QUICK = ["-k", "trajectory and 1-un", "--repeats", "3", "--exchange", "2"]
 
 
 def _nightly(lab, *options):
