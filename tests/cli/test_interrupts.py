@@ -37,7 +37,7 @@ BENCH = ["bench", "trajectories", "-k", "1-uncalibrated", "--repeats=1", "--out=
         ("argparse", ["--help"], "agvbench: interrupted"),
         ("numpy", ["plan"], "agvbench plan: interrupted"),
         ("agvbench.pytest_plugin.collection", BENCH, "agvbench bench: interrupted"),
-        ("zenoh", BENCH, "ended by Ctrl-C, nothing was driven"),
+        ("zenoh.zenoh", BENCH, "ended by Ctrl-C, nothing was driven"),
         ("agvbench.reporting.write", BENCH, "agvbench bench: interrupted: no report; agvbench report c writes it"),
     ],
 )

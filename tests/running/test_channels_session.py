@@ -207,7 +207,7 @@ def test_the_default_plant_is_refused_for_a_vehicle_whose_commands_it_does_not_t
     monkeypatch.chdir(tmp_path)
     vehicle = nominal_model("car", Geometry(0.15, 0.15), Channels.alike("normalised"))
     vehicle.save(tmp_path / "vehicle.toml")
-    assert main(["bench", "--vehicle", "vehicle.toml", "--dry-run"]) == 2
+    assert main(["bench", "--vehicle", "vehicle.toml"]) == 2
     said = capsys.readouterr()
     assert "the plant that is simulated by default takes pulses in µs" in said.out + said.err
     assert "--plant my_plant.py:make_plant" in said.out + said.err

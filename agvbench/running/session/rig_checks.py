@@ -23,7 +23,6 @@ _OPTIONS = {"uncalibrated": "--vehicle", "calibrated": "--calibration", "correct
 def adapter_options(settings: BenchSettings, models: Mapping[str, VehicleModel]) -> AdapterOptions:
     """Return the options of a session's adapters."""
     nominal = models["uncalibrated"]
-    _require_plant_in_unit(settings, nominal)
     return AdapterOptions(
         vehicle=settings.vehicle_name,
         plant=settings.plant,
@@ -63,6 +62,7 @@ def open_session_rig(
             "a session that connects does not listen", where="--listen", value=listen,
             remedy=f"leave it out; agvbench watch --connect {settings.connect} sees this bench",
         )  # fmt: skip
+    _require_plant_in_unit(settings, models["uncalibrated"])
     options = adapter_options(settings, models)
     with open_rig(
         agv=settings.agv,
