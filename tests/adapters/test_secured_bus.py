@@ -64,6 +64,7 @@ def stand(link: VehicleLink, steps: range) -> None:
         link.control_cycle(NEUTRAL, t_s=0.1 * step, hold_s=0.1)
 
 
+@pytest.mark.slow
 def test_a_campaign_with_vehicle_camera_and_bench_on_a_secured_bus(
     machines: dict[str, Path], endpoint: str, tmp_path: Path
 ) -> None:

@@ -45,6 +45,7 @@ def test_json_and_vehicle_of_a_whole_command(adequate, tmp_path, capsys):
     assert float(model.front(1300.0)) == pytest.approx(0.274, abs=0.003)
 
 
+@pytest.mark.slow
 def test_the_same_campaign_gives_the_same_file(adequate, tmp_path):
     files = [tmp_path / name for name in ("a.json", "b.json")]
     for file in files:

@@ -23,6 +23,7 @@ def test_a_declared_driven_axle_leaves_nothing_to_find(tiny_campaign, driven, sh
     assert found.model.geometry.driven == driven
 
 
+@pytest.mark.slow
 def test_a_cause_beside_a_driven_rear_axle_is_named_with_its_size(tiny_campaign):
     found = diagnose(declared(tiny_campaign(Tiny(front_drive_share=0.0, cornering_loss=0.05)), "rear"))
     assert [effect.name for effect in found.effects] == ["cornering_speed_loss"]

@@ -41,12 +41,14 @@ def test_what_maps_absorb_is_not_identifiable(nothing):
     assert "calibration" in nothing.states["drive_dead_band"].why
 
 
+@pytest.mark.slow
 def test_an_effect_too_small_to_be_selected_is_within_its_bound(tiny_campaign):
     found = diagnose(tiny_campaign(Tiny(play_rad=0.02)))
     assert found.effects == ()
     assert found.states["steering_backlash"].bounds["width_rad"].value > 0.02
 
 
+@pytest.mark.slow
 def test_steering_that_never_changes_while_driving_cannot_exclude_a_lag(tiny_campaign):
     campaign = tiny_campaign(Tiny())
     steady = type(campaign)([run for run in campaign if run.experiment != "step"])

@@ -69,6 +69,7 @@ def test_one_effect(simulation, name):
     assert error(simulation, {name: SIZES[name]}) < 2e-6
 
 
+@pytest.mark.slow
 def test_every_pair_of_effects(simulation):
     errors = {pair: error(simulation, {name: SIZES[name] for name in pair}) for pair in PAIRS}
     worst = max(errors, key=errors.__getitem__)

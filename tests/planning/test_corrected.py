@@ -89,6 +89,7 @@ def test_a_plant_with_hidden_effects_ends_on_target(spec):
 
 
 @pytest.mark.parametrize("name", ["1", "4", "6"])
+@pytest.mark.slow
 def test_what_a_model_is_known_to_miss_is_taken_off_its_aim(name):
     truth, trajectory = hidden("lateral_slip_and_cornering_speed_loss"), load_trajectory(name)
     model = true_model(truth).with_effects(effect_kinds()["lateral_slip"]())  # all but the slip

@@ -56,6 +56,7 @@ def test_a_gate_with_a_mistake_is_refused_before_anything_is_driven(tmp_path, mo
     assert not (tmp_path / "nightly").exists()
 
 
+@pytest.mark.slow
 def test_a_night_is_judged_by_the_one_before_and_kept_only_where_nothing_failed(tmp_path):
     first = _nightly(tmp_path, "--date", "1")
     assert first.returncode == 0, first.stdout + first.stderr
