@@ -79,7 +79,7 @@ def over_the_bus_in_another_unit(monkeypatch):
         return real(**options | {"channels": Channels.alike("us")})
 
     monkeypatch.setattr(rig_checks, "open_rig", in_microseconds)
-    opened(vehicle=str(example_path("front_steered")))()
+    opened(vehicle=str(example_path("front_steered")), plant="agvbench.simulator:random_plant")()
 
 
 def driven(**arguments):
@@ -134,6 +134,7 @@ CASES = {
     "`--resume --out begum` beside `begun`": resumed_elsewhere,
     "`--resume --seed 2` after `--seed 1`": resumed_with_another_seed,
     "`--vehicle` in −1…1, vehicle in µs, over the bus": over_the_bus_in_another_unit,
+    "`--vehicle` in −1…1, without `--plant`": opened(vehicle=str(example_path("front_steered"))),
     "`--resume` of runs without `bench.toml`": resumed_without("bench.toml"),
     "`--resume` without `campaign.toml`": resumed_without("campaign.toml"),
     "`agvbench bench nosuch`": lambda: find_benchmark("nosuch"),
