@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -9,14 +11,15 @@ import pytest
 
 from agvbench.campaign import Campaign
 from agvbench.metrics.planned_paths import PlannedPaths
-from agvbench.workflows.bench import run_benchmarks
 
 
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory):
     out = tmp_path_factory.mktemp("planned") / "campaign"
-    options = {"repeats": 1, "trajectories": "1,5", "exchange": 2.0, "no_report": True, "out": str(out)}
-    assert run_benchmarks([], options) == 0
+    options = ["--repeats", "1", "--trajectories", "1,5", "--exchange", "2", "--no-report", "--out", str(out)]
+    command = [sys.executable, "-m", "agvbench", "bench", *options]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
     return Campaign.open(out)
 
 

@@ -1,5 +1,8 @@
 """Labels and stated uncertainties: from the option and ``lab.toml`` into the campaign, compare and history."""
 
+import subprocess
+import sys
+
 import pytest
 
 from agvbench.campaign import Campaign
@@ -23,14 +26,19 @@ def lab(tmp_path_factory):
     text = (folder / "lab.toml").read_text(encoding="utf-8")
     text = text.replace('# tyres = "new" ', 'tyres = "new" ').replace("# camera_position_mm", "camera_position_mm")
     (folder / "lab.toml").write_text(text, encoding="utf-8")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        assert main([*BENCH, "--out", "monday"]) == 0
-        assert main([*BENCH, "--out", "tuesday", "--label", "tyres=worn", "--label", "carpet=2"]) == 0
-        # What is resumed keeps what it began with, whatever the lab states now.
-        (folder / "lab.toml").write_text("[labels]\ndriver = 'other'\n", encoding="utf-8")
-        assert main(["bench", "--no-report", "--resume", "--out", "tuesday"]) == 0
+    _run(folder, *BENCH, "--out", "monday")
+    _run(folder, *BENCH, "--out", "tuesday", "--label", "tyres=worn", "--label", "carpet=2")
+    # What is resumed keeps what it began with, whatever the lab states now.
+    (folder / "lab.toml").write_text("[labels]\ndriver = 'other'\n", encoding="utf-8")
+    _run(folder, "bench", "--no-report", "--resume", "--out", "tuesday")
     return folder
+
+
+def _run(folder, *arguments):
+    """Run a command in a process of its own: sessions of other tests of this process have loaded other folders."""
+    command = [sys.executable, "-m", "agvbench", *arguments]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_labels_and_statements_travel_into_the_campaign(lab):
