@@ -54,6 +54,10 @@ class PoseReturner(ABC):
     ) -> None:
         self._link, self._model, self._supervisor = link, model, supervisor
         self._workspace, self._limits = workspace, limits
+        self._set_up()
+
+    def _set_up(self) -> None:  # noqa: B027  (not every vehicle is learned)
+        """Prepare what is learned of the vehicle, from one start to the next."""
 
     def bring_to(self, start: Pose) -> ReturnResult:
         """Drive to `start` (floor frame) and return how it went; the vehicle stands still, its commands neutral.

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from agvbench.errors import PlacingError, PlanError
-from agvbench.model import VehicleModel
-from agvbench.planning import Workspace
 from agvbench.planning.shortest_paths.return_path import GearLeg, Guided, plan_return_path
-from agvbench.running.links import RunnerLink
 from agvbench.running.positioning.automatic_return.command_mapping import CommandMapping
-from agvbench.running.positioning.automatic_return.leg_drive import DEFAULT_RETURN, LegDrive, ReturnLimits
+from agvbench.running.positioning.automatic_return.leg_drive import LegDrive
 from agvbench.running.positioning.automatic_return.motion_interface import MotionInterface
 from agvbench.running.positioning.automatic_return.online_adaptation import OnlineAdaptation
 from agvbench.running.positioning.automatic_return.pose_returner import PoseReturner
-from agvbench.running.supervision.supervisor import Supervisor
 from agvbench.types import Pose, wrap_angle
 
 _SHARE = 0.5
@@ -74,28 +70,10 @@ _LEADS = (2.7, 2.0, 1.4)
 
 
 class Returner(PoseReturner):
-    """Brings one vehicle with steered axles to start poses, and adapts to it as it does.
+    """Brings one vehicle with steered axles to start poses, and adapts to it; parameters as for `PoseReturner`."""
 
-    Parameters
-    ----------
-    link, supervisor
-        What to drive with; the supervisor's rules hold here as they do in runs.
-    model
-        The nominal model; it may be wrong in every number, but not in the sense of its commands.
-    workspace
-        Where to stay.
-    """
-
-    def __init__(
-        self,
-        link: RunnerLink,
-        model: VehicleModel,
-        workspace: Workspace,
-        supervisor: Supervisor,
-        limits: ReturnLimits = DEFAULT_RETURN,
-    ) -> None:
-        super().__init__(link, model, workspace, supervisor, limits)
-        self._command_mapping, self._online_adaptation = CommandMapping(model), OnlineAdaptation()
+    def _set_up(self) -> None:
+        self._command_mapping, self._online_adaptation = CommandMapping(self._model), OnlineAdaptation()
 
     def _begin(self, start: Pose) -> None:
         self._goal_offset = GoalOffset(start)

@@ -18,12 +18,9 @@ import numpy as np
 
 from agvbench.errors import PlacingError, VehicleError
 from agvbench.model import VehicleModel
-from agvbench.planning import Workspace
-from agvbench.running.links import RunnerLink
-from agvbench.running.positioning.automatic_return.leg_drive import DEFAULT_RETURN, TICK_S, ReturnLimits
+from agvbench.running.positioning.automatic_return.leg_drive import TICK_S
 from agvbench.running.positioning.automatic_return.motion_interface import MotionInterface
 from agvbench.running.positioning.automatic_return.pose_returner import PoseReturner
-from agvbench.running.supervision.supervisor import Supervisor
 from agvbench.types import Command, Floats, Pose, wrap_angle
 from agvbench.vehicle.channels import Channel, Role
 
@@ -43,16 +40,8 @@ _LEAST_TURN_RAD, _LEARNED_SHARE, _FARTHEST_LEVER_M = 0.5, 0.7, 0.05
 class TurnAndDrive(PoseReturner):
     """Brings one differential vehicle to start poses; parameters as for `PoseReturner`."""
 
-    def __init__(
-        self,
-        link: RunnerLink,
-        model: VehicleModel,
-        workspace: Workspace,
-        supervisor: Supervisor,
-        limits: ReturnLimits = DEFAULT_RETURN,
-    ) -> None:
-        super().__init__(link, model, workspace, supervisor, limits)
-        self._stated = np.array([-model.geometry.rear_axle_m, 0.0])
+    def _set_up(self) -> None:
+        self._stated = np.array([-self._model.geometry.rear_axle_m, 0.0])
         self._lever = self._stated.copy()  # from the markers' centroid to the pivot, in the vehicle frame [m]
 
     def _attempt(self, seen: Pose, start: Pose, motion_interface: MotionInterface) -> None:
