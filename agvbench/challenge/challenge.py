@@ -8,7 +8,6 @@ import subprocess
 import sys
 import tempfile
 import time
-import traceback
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -16,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 from agvbench.challenge.scores import Scores, plain, score
 from agvbench.challenge.trial import Trial
-from agvbench.errors import AgvbenchError, FileError, FlagError, PlantError
-from agvbench.executors import Executor, ExecutorOptions, Failed, Outcome, Task, open_executor
+from agvbench.errors import FileError, FlagError, PlantError
+from agvbench.executors import Executor, ExecutorOptions, Failed, Outcome, Task, cause_of, open_executor
 from agvbench.running.configuration.benchmark_files import EXCITATION_RUNS
 from agvbench.simulator.hidden import SealedTruth, indistinguishable_effects, sealed_truth
 from agvbench.simulator.hidden.catalogue import CATALOGUE, NOTHING, recipes
@@ -73,9 +72,9 @@ def run_challenge(
         raise FlagError(
             "too few to score", where="--seeds, --repeats", value=f"{seeds}, {repeats}", limit="from 1, from 2"
         )
-    for where, value, least in (("--first-seed", first_seed, 0), ("--jobs", 1 if jobs is None else jobs, 1)):
-        if value < least:
-            raise FlagError("is too small", where=where, value=value, limit=f"at least {least}")
+    if first_seed < 0:
+        raise FlagError("is too small", where="--first-seed", value=first_seed, limit="at least 0")
+    options = replace(cluster or ExecutorOptions(), jobs=jobs)
     for where, value, most in (("--seeds", seeds, _MOST_SEEDS), ("--first-seed", first_seed, 2**62)):
         if value > most:
             raise FlagError("is too large", where=where, value=value, limit=f"at most {most}")
@@ -90,7 +89,7 @@ def run_challenge(
     done = {one: trial for one, trial in known.items() if trial.verdict != _ERROR}
     wanted = [(s, n) for n in range(first_seed, first_seed + seeds) for s in specs or (NOTHING, *CATALOGUE, *PAIRS)]
     missing = [one for one in wanted if one not in done]
-    with open_executor(replace(cluster or ExecutorOptions(), jobs=jobs or 0)) as executor:
+    with open_executor(options) as executor:
         for trial in _held(missing, repeats, executor):
             done[trial.spec, trial.seed] = trial
             if file is not None:
@@ -114,19 +113,10 @@ def hold_trial(spec: str, seed: int, repeats: int) -> Trial:
             found, error = diagnose(Campaign.open(directory)), ""
         # Hours of other trials must not be lost for one that has no answer, be it for an internal error.
         except Exception as failure:  # noqa: BLE001
-            found, error = Diagnosis(Verdict.NOT_IDENTIFIABLE, str(failure)), _cause(failure)
+            found, error = Diagnosis(Verdict.NOT_IDENTIFIABLE, str(failure)), cause_of(failure)
         seconds = time.process_time() - began
     trial = unsealed(spec, seed, sealed_truth(spec, seed), found, seconds)
     return replace(trial, verdict=_ERROR, error=error) if error else trial
-
-
-def _cause(error: Exception) -> str:
-    """Return in one line what an error says; of an internal error also its type, and where it was raised."""
-    said = " ".join(str(error).split())
-    if isinstance(error, AgvbenchError):
-        return said
-    last = traceback.extract_tb(error.__traceback__)[-1]
-    return f"{type(error).__name__}: {said} ({Path(last.filename).name}, line {last.lineno}, in {last.name})"
 
 
 def unsealed(spec: str, seed: int, truth: SealedTruth, found: Diagnosis, seconds: float) -> Trial:

@@ -59,7 +59,6 @@ def run(arguments: argparse.Namespace) -> int:
     """Drive the cells; return the exit code."""
     from dataclasses import replace
 
-    from agvbench.errors import FlagError
     from agvbench.executors import check_address
     from agvbench.reporting.console.sweep import print_plan, print_sweep
     from agvbench.reporting.console.tables import wide_console
@@ -67,9 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
     from agvbench.workflows.sweep import run_sweep
     from agvbench.workflows.sweep.grid import read_grid
 
-    if arguments.jobs is not None and arguments.jobs < 1:
-        raise FlagError("is too small", where="--jobs", value=arguments.jobs, limit="at least 1")
-    options = replace(executor_options(arguments), jobs=arguments.jobs or 0)
+    options = replace(executor_options(arguments), jobs=arguments.jobs)
     if arguments.dry_run:
         check_address(options)
         print_plan(wide_console(), read_grid(arguments.grid))

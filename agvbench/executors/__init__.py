@@ -2,7 +2,7 @@
 
 from agvbench.executors.executor import Executor, ExecutorOptions, in_flight
 from agvbench.executors.registry import check_address, open_executor
-from agvbench.executors.task import Done, Failed, Outcome, Task
+from agvbench.executors.task import Done, Failed, Outcome, Task, cause_of
 
 __all__ = [
     "Done",
@@ -11,6 +11,7 @@ __all__ = [
     "Failed",
     "Outcome",
     "Task",
+    "cause_of",
     "check_address",
     "in_flight",
     "open_executor",

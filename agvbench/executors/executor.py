@@ -10,6 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import ClassVar, Self, TypeVar
 
+from agvbench.errors import FlagError
 from agvbench.executors.task import Key, Outcome, Result, Task
 
 RETRIES = 3
@@ -27,19 +28,28 @@ class ExecutorOptions:
     address
         ``tcp://HOST:PORT`` or ``tls://HOST:PORT`` of a scheduler; "" for processes of this machine.
     jobs
-        Tasks at a time on this machine; 0 for one per processor. A cluster runs one on each worker.
+        Tasks at a time on this machine; None for one per processor. A cluster runs one on each worker.
     insecure
         Connect without encryption to a scheduler on another machine.
     tls_ca_file, tls_cert, tls_key
         Certificate of the authority, and certificate and key of this client, for ``tls://``.
+
+    Raises
+    ------
+    FlagError
+        If `jobs` is below one.
     """
 
     address: str = ""
-    jobs: int = 0
+    jobs: int | None = None
     insecure: bool = False
     tls_ca_file: Path | None = None
     tls_cert: Path | None = None
     tls_key: Path | None = None
+
+    def __post_init__(self) -> None:
+        if self.jobs is not None and self.jobs < 1:
+            raise FlagError("is too small", where="--jobs", value=self.jobs, limit="at least 1")
 
 
 class Executor(ABC):

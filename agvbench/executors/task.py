@@ -69,7 +69,7 @@ def run_task(function: Callable[..., object], arguments: tuple[Any, ...], versio
     try:
         result = msgspec.Raw(msgspec.msgpack.encode(function(*arguments), enc_hook=_plain))
     except AgvbenchError as error:
-        return msgspec.msgpack.encode(_Answer(cause=_in_one_line(str(error)) or type(error).__name__))
+        return msgspec.msgpack.encode(_Answer(cause=cause_of(error)))
     except (Exception, SystemExit) as error:  # noqa: BLE001 - one task must not end the others
         return failure(error)
     return msgspec.msgpack.encode(_Answer(result=result))
@@ -77,7 +77,7 @@ def run_task(function: Callable[..., object], arguments: tuple[Any, ...], versio
 
 def failure(error: BaseException) -> bytes:
     """Return the answer of a task that raised an error which is not the user's."""
-    return msgspec.msgpack.encode(_Answer(cause=_raised(error), is_internal=True))
+    return msgspec.msgpack.encode(_Answer(cause=cause_of(error), is_internal=True))
 
 
 def outcome_of(key: Key, answer: object, kind: type[Result]) -> Outcome[Key, Result]:
@@ -87,10 +87,10 @@ def outcome_of(key: Key, answer: object, kind: type[Result]) -> Outcome[Key, Res
     try:
         decoded = msgspec.msgpack.decode(answer, type=_Answer)
         if decoded.cause:
-            return Failed(key, _in_one_line(decoded.cause), was_raised=decoded.is_internal)
+            return Failed(key, in_one_line(decoded.cause), was_raised=decoded.is_internal)
         return Done(key, msgspec.msgpack.decode(decoded.result, type=kind))
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        return Failed(key, f"worker returned what is no {kind.__name__}: {_in_one_line(str(error))}")
+        return Failed(key, f"worker returned what is no {kind.__name__}: {in_one_line(error)}")
 
 
 def require_same_versions(workers: dict[str, Any], address: str) -> None:
@@ -119,12 +119,15 @@ def _named(names: Any) -> str:
     return " and ".join(map(str, names))
 
 
-def _raised(error: BaseException) -> str:
-    """Return what an error says, its type, and where it was raised."""
-    said = f"{type(error).__name__}: {_in_one_line(str(error))}"
+def cause_of(error: BaseException) -> str:
+    """Return in one line what an error says; of an internal error also its type, and where it was raised."""
+    said = in_one_line(error)
+    if isinstance(error, AgvbenchError):
+        return said or type(error).__name__
     last = traceback.extract_tb(error.__traceback__)[-1]
-    return f"{said} ({Path(last.filename).name}, line {last.lineno}, in {last.name})"
+    return f"{type(error).__name__}: {said} ({Path(last.filename).name}, line {last.lineno}, in {last.name})"
 
 
-def _in_one_line(text: str) -> str:
-    return " ".join(text.split())
+def in_one_line(said: object) -> str:
+    """Return a text without line breaks."""
+    return " ".join(str(said).split())

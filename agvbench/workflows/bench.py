@@ -10,7 +10,14 @@ import pytest
 from agvbench.errors import INTERNAL_ERROR_EXIT_CODE, FlagError
 from agvbench.running.configuration.benchmark_files import find_benchmark
 from agvbench.running.configuration.campaign_directory import choose_directory
-from agvbench.running.configuration.session_options import OPTIONS, SESSION_OPTIONS, SHORT_NAMES, destination, prefixed
+from agvbench.running.configuration.session_options import (
+    OPTIONS,
+    PYTEST_PREFIX,
+    SESSION_OPTIONS,
+    SHORT_NAMES,
+    as_flag,
+    destination,
+)
 from agvbench.running.configuration.settings import SETTINGS_FILE, BenchSettings
 
 _SIGNALLED = 128
@@ -99,11 +106,5 @@ def _begun_with(out: str | None) -> BenchSettings:
 
 
 def _flags(options: Mapping[str, Any]) -> list[str]:
-    flags: list[str] = []
-    for flag, _, _ in OPTIONS + SESSION_OPTIONS:
-        value = options.get(destination(flag))
-        if value is True:
-            flags.append(prefixed(flag))
-        elif value is not None and value is not False:
-            flags.append(f"{prefixed(flag)}={value}")
-    return flags
+    known = [flag for flag, _, _ in OPTIONS + SESSION_OPTIONS]
+    return [text for flag in known for text in as_flag(flag, options.get(destination(flag)), PYTEST_PREFIX)]

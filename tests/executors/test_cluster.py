@@ -167,7 +167,7 @@ def test_files_that_are_no_certificates_are_one_line(certificates, tmp_path):
     wrong.write_text("no certificate")
     for files in ((wrong, certificate, key), (certificate, wrong, key), (certificate, certificate, tmp_path / "none")):
         with pytest.raises(FileError) as caught:
-            check_address(ExecutorOptions("tls://10.0.0.1:8786", 0, False, *files))
+            check_address(ExecutorOptions("tls://10.0.0.1:8786", None, False, *files))
         assert "\n" not in str(caught.value)
 
 
@@ -178,7 +178,7 @@ def test_a_scheduler_over_tls_takes_a_client_with_certificates_and_no_other(star
     cluster = start_cluster("--protocol", "tls", *files)
     cluster.address = cluster.address.replace("tcp://", "tls://")
     cluster.add_worker()
-    options = ExecutorOptions(cluster.address, 0, False, certificate, certificate, key)
+    options = ExecutorOptions(cluster.address, None, False, certificate, certificate, key)
     with open_executor(options) as executor:
         assert [o.result for o in executor.run([Task(0, executed.square, (3.0,))], float)] == [9.0]
     monkeypatch.setattr("agvbench.executors.kinds.cluster._PATIENCE_S", 2.0)

@@ -21,6 +21,7 @@ from agvbench.executors.task import (
     Outcome,
     Result,
     Task,
+    in_one_line,
     outcome_of,
     require_same_versions,
     run_task,
@@ -132,15 +133,15 @@ class ClusterExecutor(Executor):
             try:
                 return outcome_of(key, future.result(timeout=_PATIENCE_S), kind)
             except Exception as error:  # noqa: BLE001 - the worker that held it died before it was read
-                return Failed(key, f"result was lost: {type(error).__name__} {_line(error)}")
+                return Failed(key, f"result was lost: {type(error).__name__} {in_one_line(error)}")
         if status == "error":
             cause = future.exception(timeout=_PATIENCE_S)
-            return Failed(key, f"worker died or could not run it: {type(cause).__name__} {_line(cause)}")
+            return Failed(key, f"worker died or could not run it: {type(cause).__name__} {in_one_line(cause)}")
         raise self._gone(status)
 
     def _gone(self, cause: object) -> LinkError:
         remedy = "start it, and go on with --resume"
-        return LinkError("scheduler is gone", where=self._address, value=_line(cause) or None, remedy=remedy)
+        return LinkError("scheduler is gone", where=self._address, value=in_one_line(cause) or None, remedy=remedy)
 
 
 def _connected(options: ExecutorOptions) -> Client:
@@ -164,7 +165,7 @@ def _connected(options: ExecutorOptions) -> Client:
         )
     except (OSError, TimeoutError) as error:
         raise LinkError(
-            "no scheduler answers", where=f"{FLAG} {options.address}", value=_line(error),
+            "no scheduler answers", where=f"{FLAG} {options.address}", value=in_one_line(error),
             remedy="start one with dask scheduler, and workers with dask worker",
         ) from None  # fmt: skip
 
@@ -183,7 +184,7 @@ def _require_workers(client: Client, address: str) -> None:
         found = client.run(versions)
     except Exception as error:
         raise LinkError(
-            "workers cannot import agvbench", where=f"{FLAG} {address}", value=_line(error),
+            "workers cannot import agvbench", where=f"{FLAG} {address}", value=in_one_line(error),
             remedy=f"install {' and '.join(VERSIONS)} there",
         ) from error  # fmt: skip
     require_same_versions(found, f"{FLAG} {address}")
@@ -209,7 +210,3 @@ def _run_alone(function: Any, arguments: tuple[Any, ...], client_versions: tuple
 
 def _text(path: object) -> str | None:
     return None if path is None else str(path)
-
-
-def _line(error: object) -> str:
-    return " ".join(str(error).split())

@@ -11,7 +11,6 @@ from contextlib import suppress
 from multiprocessing.connection import Connection, Pipe, wait
 from typing import Any, ClassVar
 
-from agvbench.errors import FlagError
 from agvbench.executors.executor import RETRIES, Executor, ExecutorOptions, in_flight
 from agvbench.executors.task import VERSIONS, Failed, Key, Outcome, Result, Task, failure, outcome_of, run_task
 
@@ -32,9 +31,7 @@ class ProcessExecutor(Executor):
 
     @classmethod
     def check(cls, options: ExecutorOptions) -> None:
-        """Refuse a number of jobs below one; 0 is one per processor."""
-        if options.jobs < 0:
-            raise FlagError("is too small", where="--jobs", value=options.jobs, limit="at least 1")
+        """Refuse nothing: processes of this machine need no address."""
 
     @classmethod
     def open(cls, options: ExecutorOptions) -> ProcessExecutor:
@@ -64,7 +61,7 @@ class ProcessExecutor(Executor):
                     yield outcome_of(task.key, answer, kind)
 
     def close(self) -> None:
-        """End every process; one that runs a task is told to by SIGTERM."""
+        """End every process, by SIGTERM where it runs a task."""
         for worker in self._workers:
             worker.end()
         for worker in self._workers:

@@ -118,6 +118,18 @@ def prefixed(flag: str, prefix: str = PYTEST_PREFIX) -> str:
     return prefix + flag.removeprefix("--")
 
 
+def as_flag(flag: str, value: Any, prefix: str = "--") -> list[str]:
+    """Return an option with its value as a command line has it; nothing of None and False.
+
+    >>> as_flag("--seed", 3), as_flag("--full", True), as_flag("--full", False)
+    (['--seed=3'], ['--full'], [])
+    """
+    if value is None or value is False:
+        return []
+    name = prefixed(flag, prefix)
+    return [name] if value is True else [f"{name}={value}"]
+
+
 def in_pytest(text: str) -> str:
     """Return a message with the options of ``agvbench bench`` under their names in pytest; other commands keep theirs.
 

@@ -18,7 +18,6 @@ import msgspec
 from agvbench.errors import AgvbenchError
 from agvbench.workflows.sweep.lab_files import LabFiles
 
-_PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
 _DONE = (0, 1)  # 1: some run was never driven well enough; the others count
 _SAID = 300
 MARK = "cells.jsonl"
@@ -115,7 +114,7 @@ class _Process:
             If the command ends with another code.
         """
         with (logs / "log").open("w+b") as log:
-            command = [sys.executable, "-c", _PROGRAM, *arguments]
+            command = [sys.executable, "-m", "agvbench", *arguments]
             with _killed_on_error(
                 subprocess.Popen(command, cwd=self._folder, stdin=subprocess.DEVNULL, stdout=log, stderr=log)  # noqa: S603
             ) as process:

@@ -15,7 +15,7 @@ from typing import Any
 import msgspec
 
 from agvbench.adapters import check_specs
-from agvbench.adapters.contract import AdapterOptions, named_values
+from agvbench.adapters.contract import named_values
 from agvbench.adapters.impairment.spec import unimpaired
 from agvbench.errors import AgvbenchError, FileError, OneOf
 from agvbench.planning.trajectories.loading import driven_trajectories, load_trajectory
@@ -23,6 +23,7 @@ from agvbench.planning.workspace import Workspace
 from agvbench.running.configuration.benchmark_files import find_benchmark
 from agvbench.running.configuration.settings import BenchSettings
 from agvbench.running.configuration.vehicles import known_models, with_lab_vehicle
+from agvbench.running.session.rig_checks import adapter_options
 from agvbench.simulator import load_plant
 from agvbench.text_files import read_toml
 from agvbench.validation import convert
@@ -158,12 +159,9 @@ def _check_options(options: dict[str, Any], checked: set[str]) -> None:
     Workspace.parse(settings.workspace)
     for name in driven_trajectories(settings.trajectories) if settings.trajectories else ():
         load_trajectory(name)
-    models = known_models(settings)
-    camera = named_values([settings.camera], "--camera")
-    plant_options = named_values([settings.plant_option], "--plant-option")
-    channels = models["uncalibrated"].channels
-    check_specs(settings.agv, settings.mocap, AdapterOptions(camera=camera, channels=channels))
-    load_plant(settings.plant, plant_options)(settings.seed)
+    rig = adapter_options(settings, known_models(settings))
+    check_specs(settings.agv, settings.mocap, rig)
+    load_plant(rig.plant, rig.plant_options)(rig.seed)
 
 
 def _require_simulated(settings: BenchSettings) -> None:

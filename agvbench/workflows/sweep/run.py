@@ -13,6 +13,7 @@ from agvbench.campaign.lock import locked
 from agvbench.campaign.writer import refuse_occupied
 from agvbench.errors import FlagError
 from agvbench.executors import Executor, ExecutorOptions, Failed, Outcome, Task, check_address, open_executor
+from agvbench.running.configuration.session_options import as_flag
 from agvbench.workflows.sweep.cell import CellRequest, CellResult, drive_cell
 from agvbench.workflows.sweep.grid import Grid, read_grid
 from agvbench.workflows.sweep.lab_files import LabFiles
@@ -76,17 +77,11 @@ def sweep(
     AgvbenchError
         If the grid, the directory or the cluster cannot be used.
     """
-    options = ExecutorOptions(cluster, jobs=_jobs(jobs))
+    options = ExecutorOptions(cluster, jobs=jobs)
     result = run_sweep(Path(grid), Path(out), options, resume=resume, keep=keep, diagnose=diagnose)
     frame = read_results(result.directory)
     frame.attrs["failed"] = dict(result.failed)
     return frame
-
-
-def _jobs(jobs: int | None) -> int:
-    if jobs is not None and jobs < 1:
-        raise FlagError("is too small", where="--jobs", value=jobs, limit="at least 1")
-    return jobs or 0
 
 
 def run_sweep(
@@ -162,14 +157,7 @@ def flags(options: Mapping[str, Any]) -> tuple[str, ...]:
     >>> flags({"seed": 3, "full": True, "plant_option": "backlash_m=0.01"})
     ('--seed=3', '--full', '--plant-option=backlash_m=0.01')
     """
-    made = []
-    for name, value in options.items():
-        flag = f"--{name.replace('_', '-')}"
-        if value is True:
-            made.append(flag)
-        elif value is not False:
-            made.append(f"{flag}={value}")
-    return tuple(made)
+    return tuple(text for name, value in options.items() for text in as_flag(f"--{name.replace('_', '-')}", value))
 
 
 def first_command(grid: Grid) -> str:

@@ -82,12 +82,7 @@ class CellStore:
         RecordingError
             If the disk refuses.
         """
-        place = self._append(msgspec.json.encode(line))
-        if line.error:
-            self.failed[line.cell] = line.error
-        else:
-            self.failed.pop(line.cell, None)
-            self.places[line.cell] = place
+        _note(line, self._append(msgspec.json.encode(line)), self.places, self.failed)
 
     def results(self) -> Iterator[tuple[int, CellResult]]:
         """Yield the cells that have a result, in their order; one at a time is in memory."""
@@ -139,15 +134,20 @@ def _read(path: Path, header: Header, cells: int) -> tuple[dict[int, int], dict[
                     raise FileError(
                         "has a cell that the grid lacks", where=path, value=line.cell, limit=f"below {cells}"
                     )
-                if line.error:
-                    failed[line.cell] = line.error
-                else:
-                    failed.pop(line.cell, None)
-                    places[line.cell] = end
+                _note(line, end, places, failed)
             end += len(text)
     if end == 0:
         raise FileError("no sweep to resume: its first line is missing", where=path, remedy=_REMEDY)
     return places, failed, end
+
+
+def _note(line: Line, place: int, places: dict[int, int], failed: dict[int, str]) -> None:
+    """Take note of a line that begins at `place`: a result counts in place of an earlier failure."""
+    if line.error:
+        failed[line.cell] = line.error
+    else:
+        failed.pop(line.cell, None)
+        places[line.cell] = place
 
 
 def _decoded(text: bytes, kind: type[T], path: Path, place: int) -> T:
