@@ -78,7 +78,7 @@ def _first_compilation(on_progress: Callable[[str], None]) -> Any:
                 on_progress(COMPILING)
 
         def on_end(self, event: Any) -> None:
-            """Nothing: the first run says that it goes on."""
+            """Nothing: the first run shows that it has ended."""
 
     return FirstCompilation()
 

@@ -2,7 +2,8 @@
 
 The night is the campaign NIGHTS/DATE. It is driven with the calibration of the last good night, if there is one, and
 compared with that night. If nothing failed, it is added to the good nights (NIGHTS/good_nights.txt). Called again on
-the same day, the command goes on with an interrupted night. Every option of agvbench bench can be given.
+the same day, the command continues an interrupted night. Options are those of agvbench bench, but for those that a
+night sets itself: directory, resumption and comparison.
 
 A file gate.toml beside you, or another one with --gate, limits statistics of metrics: see agvbench compare --help.
 
@@ -22,7 +23,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from agvbench.running.configuration.session_options import add_options
+from agvbench.running.configuration.session_options import add_options, as_flag
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -60,10 +61,13 @@ def run(arguments: argparse.Namespace) -> int:
     import time
 
     from agvbench.cli._option_values import check_values
+    from agvbench.errors import FlagError
     from agvbench.reporting.console.tables import wide_console
     from agvbench.workflows.comparison.decision import FailurePolicy
 
     check_values(vars(arguments))
+    if arguments.date is not None and not _is_name(arguments.date):
+        raise FlagError("is no name of a directory", where="--date", value=repr(arguments.date), limit="without /")
     gate = _gate(arguments)
     FailurePolicy.parse([], gate)  # a mistake in it is said before an evening is driven
     console = wide_console()
@@ -88,18 +92,26 @@ def last_good(nights: Path, tonight: str) -> Path | None:
         If the file that names it cannot be read, or names no campaign of `nights`.
     """
     from agvbench.errors import FileError
+
+    names = [name for name in _good_nights(nights) if name != tonight]
+    if not names:
+        return None
+    if not _is_name(names[-1]) or not (nights / names[-1] / "campaign.toml").is_file():
+        remedy = f"remove the line, or the file: the last line is the name of a campaign in {nights}/"
+        raise FileError("names no campaign", where=nights / _GOOD, value=names[-1], remedy=remedy)
+    return nights / names[-1]
+
+
+def _is_name(text: str) -> bool:
+    """Return whether a text can be the name of a directory, and no path out of the one that it lies in."""
+    return bool(text.strip()) and text != ".." and Path(text).name == text
+
+
+def _good_nights(nights: Path) -> list[str]:
     from agvbench.text_files import read_text
 
     file = nights / _GOOD
-    if not file.exists():
-        return None
-    names = [name for name in read_text(file).splitlines() if name.strip() and name != tonight]
-    if not names:
-        return None
-    if Path(names[-1]).name != names[-1] or not (nights / names[-1] / "campaign.toml").is_file():
-        remedy = f"remove the line, or the file: the last line is the name of a campaign in {nights}/"
-        raise FileError("names no campaign", where=file, value=names[-1], remedy=remedy)
-    return nights / names[-1]
+    return [name for name in read_text(file).splitlines() if name.strip()] if file.exists() else []
 
 
 def _bench(arguments: argparse.Namespace, night: Path, good: Path | None) -> int:
@@ -146,19 +158,15 @@ def _gate(arguments: argparse.Namespace) -> Path | None:
 def _limits(arguments: argparse.Namespace, gate: Path | None) -> list[str]:
     """Return the options of the comparison: margins, and a gate beside the verdicts where there is one."""
     given = ["--fail-on", "regression", "--gate", str(gate)] if gate else []
-    margins = {"--margin-mm": arguments.margin_mm, "--margin-deg": arguments.margin_deg}
-    return given + [text for flag, value in margins.items() if value is not None for text in (flag, str(value))]
+    return [*given, *as_flag("--margin-mm", arguments.margin_mm), *as_flag("--margin-deg", arguments.margin_deg)]
 
 
 def _keep(nights: Path, name: str) -> None:
     """Add the name to those of the good nights; that it was there already, of a night judged again, does no harm."""
-    from agvbench.text_files import read_text
     from agvbench.workflows.output_files import write_file
 
-    path = nights / _GOOD
-    names = [*(read_text(path).splitlines() if path.exists() else ()), name]
-    text = "".join(f"{one}\n" for one in dict.fromkeys(names))
-    write_file("--nights", path, lambda file: file.write_text(text, encoding="utf-8"))
+    text = "".join(f"{one}\n" for one in dict.fromkeys([*_good_nights(nights), name]))
+    write_file("--nights", nights / _GOOD, lambda file: file.write_text(text, encoding="utf-8"))
 
 
 def _summarise(console: Console, codes: dict[str, int], night: Path, good: Path | None, *, is_good: bool) -> None:

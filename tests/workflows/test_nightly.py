@@ -70,3 +70,11 @@ def test_a_night_is_judged_by_the_one_before_and_kept_only_where_nothing_failed(
     good = (tmp_path / "nightly" / "good_nights.txt").read_text().split()
     assert good == ["1", "2"] if same.returncode == 0 else good == ["1"]
     assert (tmp_path / "nightly" / "3" / "report" / "compare.xml").exists()
+
+
+@pytest.mark.parametrize("name", ["a/b", "..", "/etc/x", " "])
+def test_a_night_whose_name_is_a_path_is_refused_before_anything_is_driven(tmp_path, monkeypatch, capsys, name):
+    monkeypatch.chdir(tmp_path)
+    assert main(["nightly", "--date", name]) == 2
+    assert "--date: is no name of a directory" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

@@ -131,7 +131,7 @@ class BenchSettings:
     label: str = _option(
         "",
         "what to note of the circumstances, such as tyres=new; several with commas, or one after another",
-        metavar="NAME=VALUE",
+        metavar=NAME_VALUE,
         joined=True,
     )
     lab: str = _option("lab", "name of the lab on the bus (default: lab)", metavar="NAME")
