@@ -17,7 +17,7 @@ from ros_bags import DIFFERENTIAL, KINDS, Sent, driven, write_bag
 from rosbags.interfaces import Connection, MessageDefinition, MessageDefinitionFormat
 
 from agvbench.campaign import import_recordings
-from agvbench.campaign.recordings.bags import memory
+from agvbench.campaign.recordings.bags import bag as bag_module
 from agvbench.campaign.recordings.bags.definitions import typestore_for
 from agvbench.cli import main
 from agvbench.errors import AgvbenchError, FileError
@@ -69,7 +69,7 @@ def test_a_bag_that_decompresses_into_more_than_the_limit_is_refused(tmp_path):
     (tmp_path / "lab.toml").write_text(DIFFERENTIAL)
     before = resource.getrlimit(resource.RLIMIT_DATA), resource.getrlimit(resource.RLIMIT_FSIZE)
     with (
-        mock.patch.object(memory, "MAX_BYTES", 32 << 20),
+        mock.patch.object(bag_module, "MAX_BYTES", 32 << 20),
         pytest.raises(FileError, match=r"b: takes too much memory to read|Allocation error|allocate"),
     ):
         import_recordings(tmp_path / "lab.toml", [bag], tmp_path / "c")

@@ -43,12 +43,16 @@ _NAME = re.compile(r"[\w/~.:-]+", re.ASCII)
 def topic_lines(path: Path) -> list[str]:
     """Return a line for each topic of a bag: its name, type, number of messages and mean rate."""
     with Bag(path) as bag:
-        width = max((len(topic.name) for topic in bag.topics), default=0)
-        return [
-            visible(f"{topic.name:{width}}  {topic.type}, {topic.count} messages")
-            + (f", {(topic.count - 1) / bag.duration_s:.4g} Hz" if topic.count > 1 and bag.duration_s else "")
-            for topic in bag.topics
-        ]
+        return _lines(bag)
+
+
+def _lines(bag: Bag) -> list[str]:
+    width = max((len(topic.name) for topic in bag.topics), default=0)
+    return [
+        visible(f"{topic.name:{width}}  {topic.type}, {topic.count} messages")
+        + (f", {(topic.count - 1) / bag.duration_s:.4g} Hz" if topic.count > 1 and bag.duration_s else "")
+        for topic in bag.topics
+    ]
 
 
 def guess_bag_mapping(path: Path) -> tuple[str, list[str]]:
@@ -59,8 +63,8 @@ def guess_bag_mapping(path: Path) -> tuple[str, list[str]]:
     FileError
         If the bag cannot be read, or no topic looks like a pose or a command.
     """
-    comments = [f"# {line}" for line in topic_lines(path)]
     with Bag(path) as bag:
+        comments = [f"# {line}" for line in _lines(bag)]
         columns = Columns(path, {})
         source = _pose(bag, columns.questions)
         signals = _signals(bag, columns, source)

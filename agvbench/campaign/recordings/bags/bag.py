@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import resource
 from collections.abc import Collection, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
-from agvbench.campaign.recordings.bags.memory import limited_memory
 from agvbench.errors import AgvbenchError, FileError
 from agvbench.text_files import read_text, require_regular
 
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 METADATA = "metadata.yaml"
 _FILES = (".bag", ".mcap", ".db3")
+MAX_BYTES = 4 << 30
+"""Of memory that reading a bag may take: a few kB may decompress into TB."""
+MAX_TEMPORARY_BYTES = 64 << 30
 _REINDEX = "restore it from a copy, or repair it (ros2 bag reindex, mcap recover, rosbag reindex)"
 
 
@@ -64,7 +67,7 @@ class Bag:
     def __enter__(self) -> Self:
         with ExitStack() as stack:
             self._files = _files_of(self.path)
-            stack.enter_context(limited_memory())
+            stack.enter_context(_limited_memory())
             self._reader = self._open(stack)
             self._stack = stack.pop_all()
         return self
@@ -178,3 +181,25 @@ def _files_of(path: Path) -> tuple[Path, ...]:
     except UnicodeDecodeError:
         raise FileError("is not UTF-8 text", where=path / METADATA, remedy=_REINDEX) from None
     return files
+
+
+@contextmanager
+def _limited_memory() -> Iterator[None]:
+    """Let this process take at most `MAX_BYTES` more while the context lasts, and write files to a limit.
+
+    The libraries that read bags decompress whatever the file says; beyond the limit they raise `MemoryError`.
+    """
+    limits = {kind: resource.getrlimit(kind) for kind in (resource.RLIMIT_DATA, resource.RLIMIT_FSIZE)}
+    for (kind, (soft, hard)), wanted in zip(limits.items(), (_taken() + MAX_BYTES, MAX_TEMPORARY_BYTES), strict=True):
+        lower = [limit for limit in (soft, hard) if limit != resource.RLIM_INFINITY]
+        resource.setrlimit(kind, (min([wanted, *lower]), hard))
+    try:
+        yield
+    finally:
+        for kind, limit in limits.items():
+            resource.setrlimit(kind, limit)
+
+
+def _taken() -> int:
+    """Return the bytes that count against the limit now: the sixth number of ``statm``, in pages (proc(5))."""
+    return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[5]) * resource.getpagesize()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from array import array
 from collections.abc import Iterator
 from collections.abc import Mapping as Named
@@ -78,7 +79,7 @@ def read_content(bag: Bag, pose: PoseSource, signals: Named[str, Signal | Flag])
     return BagContent(rows, series, origin_ns * 1e-9)
 
 
-class _Track:
+class _Track(ABC):
     """The times and numbers of one source, collected message by message."""
 
     def __init__(self, bag: Bag, topic: str | None, time: Stamp) -> None:
@@ -87,9 +88,9 @@ class _Track:
         self._path, self._time = bag.path, time
         self._ns = array("q")
 
+    @abstractmethod
     def add(self, message: Message) -> None:
         """Take what the source needs from a message."""
-        raise NotImplementedError
 
     def _stamp(self, message: Any, received_ns: int) -> None:
         stamp = stamp_ns(message) if self._time == "header" else None
