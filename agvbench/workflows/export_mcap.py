@@ -15,8 +15,9 @@ from agvbench.campaign.tables.parts import part_name
 from agvbench.errors import FileError, FitError
 from agvbench.metrics.planned_paths import PlannedPaths
 from agvbench.statistics.rest_poses import start_pose
-from agvbench.types import Floats, Pose, Run
+from agvbench.types import Command, Commands, Floats, Pose, Run
 from agvbench.vehicle.channel_tables import channel_names
+from agvbench.vehicle.wheels import WheelCommand
 from agvbench.workflows.export_tum import Exported
 from agvbench.workflows.history.folders import dated
 
@@ -116,9 +117,10 @@ class _Messages:
         self.store = get_typestore(Stores.ROS2_HUMBLE)
         self._header = campaign.header
         self._began_ns = int(dated(campaign.path).at.timestamp()) * 1_000_000_000
-        channels = campaign.header.channels
-        used = [getattr(channels, role) for role in channel_names(campaign.header.kinematics)]
-        self.is_twist = campaign.header.kinematics == "differential" and all(c.unit == "si" for c in used)
+        channels, kinematics = campaign.header.channels, campaign.header.kinematics
+        is_si = all(getattr(channels, role).unit == "si" for role in channel_names(kinematics))
+        self._wheels = channels.wheels
+        self.is_twist = kinematics == "differential" and is_si and self._wheels is None
 
     def poses(self, run: Run) -> Iterator[_Entry]:
         """Yield the tracked poses."""
@@ -131,13 +133,21 @@ class _Messages:
     def commands(self, run: Run) -> Iterator[_Entry]:
         """Yield the commands, and before them that of a vehicle that stands."""
         commands, seen_s = run.commands, run.frames.t_s[run.frames.tracked]
+        neutral = self._header.neutral if self._wheels is None else self._wheels.neutral
         if len(seen_s) and len(commands) and seen_s.min() < commands.t_s[0]:
-            yield from self._command(self._ns(run, float(seen_s.min())), self._header.neutral._asdict())
-        for index in range(len(commands)):
-            yield from self._command(self._ns(run, float(commands.t_s[index])), commands.at(index)._asdict())
+            yield from self._command(self._ns(run, float(seen_s.min())), neutral._asdict())
+        values = self._of_channels(commands)
+        for index, t_s in enumerate(commands.t_s.tolist()):
+            yield from self._command(self._ns(run, t_s), {name: float(of[index]) for name, of in values.items()})
+
+    def _of_channels(self, commands: Commands) -> dict[str, Floats]:
+        """Return the commands (n,) of each channel, by role or wheel."""
+        if self._wheels is None:
+            return {role: getattr(commands, role) for role in Command._fields}
+        return dict(zip(WheelCommand._fields, self._wheels.wheels(commands.drive, commands.front), strict=True))
 
     def _command(self, ns: int, command: dict[str, float]) -> Iterator[_Entry]:
-        for topic, column, role in self.command_fields():
+        for topic, column, channel in self.command_fields():
             if self.is_twist and column.endswith("linear.x"):
                 linear, angular = (
                     self._new("geometry_msgs/msg/Vector3", *numbers)
@@ -146,12 +156,14 @@ class _Messages:
                 twist = self._new("geometry_msgs/msg/Twist", linear, angular)
                 yield _Entry(ns, topic, self._new("geometry_msgs/msg/TwistStamped", self._stamped(ns), twist))
             elif not self.is_twist:
-                yield _Entry(ns, topic, self._new("std_msgs/msg/Float64", command[role]))
+                yield _Entry(ns, topic, self._new("std_msgs/msg/Float64", command[channel]))
 
     def command_fields(self) -> list[tuple[str, str, str]]:
-        """Return topic, field and role of each command channel."""
+        """Return topic and field of each command channel, and its role or wheel."""
         if self.is_twist:
             return [(TWIST, "twist.linear.x", "drive"), (TWIST, "twist.angular.z", "front")]
+        if self._wheels is not None:
+            return [(f"{COMMAND}{wheel}", "data", wheel) for wheel in WheelCommand._fields]
         names = channel_names(self._header.kinematics)
         return [(f"{COMMAND}{name}", "data", role) for role, name in names.items()]
 
@@ -216,7 +228,7 @@ def _write_mapping(path: Path, header: CampaignHeader, runs: Sequence[Run], mess
         | ({"session": run.session} if run.session else {})
         for run in runs
     ]
-    fields = {role: {"topic": topic, "column": column} for topic, column, role in messages.command_fields()}
+    fields = {channel: {"topic": topic, "column": column} for topic, column, channel in messages.command_fields()}
     table = header.to_tables() | {
         "schema": 1,
         "pose": {"topic": POSE, "clock": "absolute"},

@@ -15,11 +15,13 @@ from mcap_ros2.decoder import DecoderFactory
 from own_campaigns import line_campaign
 
 from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter, import_recordings
+from agvbench.campaign.header import schema_for
 from agvbench.cli import main
 from agvbench.errors import FileError
 from agvbench.statistics.rest_poses import start_pose
 from agvbench.types import Commands, Frames, Pose, Run
 from agvbench.vehicle.channels import Channel, Channels
+from agvbench.vehicle.wheels import Wheels
 from agvbench.workflows.export_mcap import MAPPING_FILE, export_mcap
 
 SI = Channels.alike("si")
@@ -126,6 +128,33 @@ def test_export_and_import_give_the_same_poses_and_commands(
     assert (imported.session, imported.firmware) == ("noon", "2")
     assert campaign.header.channels == header.channels
     assert campaign.header.geometry == header.geometry
+
+
+@pytest.mark.parametrize(
+    "wheels",
+    [
+        Wheels(Channel("si", 0.0, -1.0, 1.0), Channel("si", 0.0, -1.0, 1.0), track_m=0.3),
+        Wheels(Channel("us", 1500.0, 1000.0, 2000.0), Channel("us", 1480.0, 1000.0, 2000.0)),
+    ],
+)
+def test_commands_of_two_wheels_are_exported_and_imported_as_such(tmp_path, wheels):
+    header = CampaignHeader(
+        schema_for("both", "differential", Channels.of_wheels(wheels)), "lab", "rover", 0.0, 0.05,
+        Channels.of_wheels(wheels), 100.0, kinematics="differential",
+    )  # fmt: skip
+    t_s = np.arange(0.0, 3.0, 0.01)
+    frames = np.column_stack([t_s, 0.1 * t_s, 0.0 * t_s, 0.0 * t_s])
+    share = np.array([[0.0, 0.2, 0.1], [1.0, -0.1, 0.3], [2.0, 0.0, 0.0]])
+    scale = 1.0 if wheels.unit == "si" else 500.0
+    run = a_run(header, frames, np.column_stack([share[:, 0], scale * share[:, 1:], np.zeros(3)]))
+    write(tmp_path / "camp", header, run)
+    campaign = again(tmp_path)
+    (imported,) = list(campaign)
+    assert campaign.header.channels == header.channels
+    np.testing.assert_allclose(imported.commands.drive, run.commands.drive, atol=1e-9)
+    np.testing.assert_allclose(imported.commands.front, run.commands.front, atol=1e-9)
+    topics = decoded(next((tmp_path / "mcap").rglob("*.mcap")))
+    assert {"/command/left", "/command/right"} <= set(topics)
 
 
 def _channels(header: CampaignHeader) -> list[Channel]:
