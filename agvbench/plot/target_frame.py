@@ -69,6 +69,12 @@ def in_target_frame(rows: pd.DataFrame) -> Floats:
     return np.array([[1e3 * x, 1e3 * y, heading] for x, y, heading in seen]).reshape(-1, 3)
 
 
+def ends_by_condition(rows: pd.DataFrame, numbers: Mapping[str, int]) -> dict[int, Floats]:
+    """Return what `in_target_frame` does by the number of the condition, of those that have rows."""
+    ends = {number: in_target_frame(rows[rows["condition"] == name]) for name, number in numbers.items()}
+    return {number: points for number, points in ends.items() if len(points)}
+
+
 def draw_ends(axes: Axes, ends: Mapping[int, Floats], ink: Ink) -> float:
     """Draw end poses with their medians, in a square about the target; return half its width [mm].
 

@@ -40,7 +40,7 @@ from agvbench.reporting.drawn_sections import drawn_sections
 from agvbench.reporting.progress import track
 from agvbench.reporting.sections.diagnosis import diagnosis_blocks
 from agvbench.reporting.sections.headline import cloud_figure
-from agvbench.reporting.write import HTML, TABLES, page_texts, subtitle_of, write_report
+from agvbench.reporting.write import HTML, TABLES, page_texts, subtitle_of, write_gathered, write_report
 from agvbench.statistics.equivalence import Bias
 from agvbench.statistics.quantities import COMPONENT_DEFINITIONS, COMPONENTS, DEFINITIONS
 from agvbench.types import CONDITIONS
@@ -88,8 +88,8 @@ def write_loop_report(loop: Loop) -> LoopReport:
     sections = [*own, *map(_without_clouds, drawn_sections(data, but={section.slug for section in own}))]
     title = f"Loop {plain(loop.directory.name)}"
     texts = dict(page_texts(title, subtitle_of(data), sections, loop.directory))
-    for campaign in (loop.before, loop.after):
-        write_report(campaign, recording=False)
+    write_report(loop.before, recording=False)
+    write_gathered(data, recording=False)
     try:
         (loop.directory / TABLES).mkdir(exist_ok=True)
         for name, text in texts.items():

@@ -99,6 +99,11 @@ def write_report(
         uncertainty=None if uncertainty is None else LabFile.load(Path(uncertainty)).uncertainty,
         track=lambda runs, total: track(runs, total, what="reading runs"),
     )
+    return write_gathered(data, out, recording=recording)
+
+
+def write_gathered(data: ReportData, out: str | Path | None = None, *, recording: bool = True) -> WrittenReport:
+    """Write the report of a campaign that was gathered already; parameters and errors are those of `write_report`."""
     out = data.path / "report" if out is None else Path(out)
     with suppress(RecordingError):
         write_metrics(data.path, data.metrics)

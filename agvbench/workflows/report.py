@@ -24,7 +24,7 @@ from agvbench.statistics.uncertainty.end_pose_budgets import EndPoseBudget, end_
 from agvbench.types import Frames, Run
 from agvbench.workflows.calibration import CalibrationCurves, read_calibration_curves
 from agvbench.workflows.diagnosis_files import ShownDiagnosis, read_diagnosis
-from agvbench.workflows.report_changes import CampaignChanges, changes_since_before
+from agvbench.workflows.report_changes import CampaignChanges, changes_since_before, firmware_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -163,7 +163,7 @@ def gather(
         provenance=_provenance(campaign, problems),
         problems=problems,
         diagnosis=read_diagnosis(campaign.path),
-        changes=changes_since_before(campaign.path, against),
+        changes=changes_since_before(campaign.path, against, firmware=firmware_of(run.firmware for run in runs)),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -23,10 +23,13 @@ class CampaignChanges:
     differences: Sequence[tuple[str, str, str]]
 
 
-def changes_since_before(campaign: Path, against: Path | None = None) -> CampaignChanges | None:
+def changes_since_before(
+    campaign: Path, against: Path | None = None, *, firmware: str | None = None
+) -> CampaignChanges | None:
     """Return what differs from the campaign `against`, or else from the last one of this vehicle in the same folder.
 
-    None where there is no earlier one. Campaigns that cannot be read are passed over, but for `against`.
+    None where there is no earlier one. Campaigns that cannot be read are passed over, but for `against`. `firmware` is
+    what `firmware_of` returns of the campaign's runs; without it they are read.
 
     Raises
     ------
@@ -40,8 +43,13 @@ def changes_since_before(campaign: Path, against: Path | None = None) -> Campaig
     before = against or _before(campaign)
     if before is None:
         return None
-    sides = (facts_of(side, _firmware(side)) for side in (before, campaign))
-    return CampaignChanges(before, dated(before).at, tuple(differences(*sides)))
+    now = facts_of(campaign, _firmware(campaign) if firmware is None else firmware)
+    return CampaignChanges(before, dated(before).at, tuple(differences(facts_of(before, _firmware(before)), now)))
+
+
+def firmware_of(names: Iterable[str]) -> str:
+    """Return the firmware that runs name, several with commas, in the order of the runs."""
+    return ", ".join(dict.fromkeys(str(name) for name in names if name))
 
 
 def _before(campaign: Path) -> Path | None:
@@ -70,7 +78,6 @@ def _beside(campaign: Path) -> Iterator[tuple[datetime, Path]]:
 def _firmware(campaign: Path) -> str:
     """Return the firmware that the runs of a campaign name, several with commas; "" where they cannot be read."""
     try:
-        named = Campaign.open(campaign).runs["firmware"]
+        return firmware_of(Campaign.open(campaign).runs["firmware"])
     except AgvbenchError:
         return ""
-    return ", ".join(dict.fromkeys(str(name) for name in named if name))

@@ -56,9 +56,7 @@ def draw_cloud(ends: Mapping[int, Floats], *, ring_mm: float, half_mm: float) ->
 
 
 def _outline(ends: Floats) -> list[Floats]:
-    """Return the points (n, 2) [mm], and their ellipse (m, 2) [mm] where they have one; nothing without points."""
-    if not len(ends):
-        return []
+    """Return the points (n, 2) [mm], n > 0, and their ellipse (m, 2) [mm] where they have one."""
     points = ends[:, :2]
     ellipse = prediction_ellipse(points)
     return [points] if ellipse is None else [points, (ellipse[0][:, np.newaxis] + ellipse[1] @ _CIRCLE).T]

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from agvbench.plot.style import condition_numbers
-from agvbench.plot.target_frame import draw_ends, in_target_frame
+from agvbench.plot.target_frame import draw_ends, ends_by_condition
 from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph
 from agvbench.reporting.figures.style import ON_PAGE, dress, legend, new_figure, panel_title, to_svg
 from agvbench.reporting.sections.base import Section
@@ -40,10 +40,8 @@ class EndPoseFigureSection(Section):
 
 def _panels(counted: pd.DataFrame, numbers: dict[str, int]) -> Iterator[Panel]:
     for index, (name, rows) in enumerate(counted.groupby("trajectory", sort=False)):
-        ends = {n: in_target_frame(rows[rows["condition"] == c]) for c, n in numbers.items()}
-        drawn = {n: points for n, points in ends.items() if len(points)}
         target = Pose(*rows[[f"target_{axis}" for axis in _POSE]].iloc[0])
-        yield Panel(panel_title(str(name), target), _drawing(drawn, f"end-pose-{index}"))
+        yield Panel(panel_title(str(name), target), _drawing(ends_by_condition(rows, numbers), f"end-pose-{index}"))
 
 
 def _drawing(ends: Mapping[int, Floats], name: str) -> str:

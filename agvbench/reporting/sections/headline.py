@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from agvbench.plot.style import condition_numbers
-from agvbench.plot.target_frame import in_target_frame
+from agvbench.plot.target_frame import ends_by_condition
 from agvbench.reporting.content import Block, Bullets, FigureBlock, Panel, Paragraph, plain, plain_sentences
 from agvbench.reporting.figures.clouds import draw_cloud, scale_of
 from agvbench.reporting.figures.style import legend
@@ -66,16 +66,11 @@ def cloud_figure(data: ReportData, *, slug: str = "clouds", small: bool = True) 
     counted, numbers = valid(data.errors), condition_numbers(data.conditions)
     if counted.empty:
         return
-    by_trajectory = {
-        str(name): {n: in_target_frame(rows[rows["condition"] == c]) for c, n in numbers.items()}
-        for name, rows in counted.groupby("trajectory", sort=False)
-    }
+    grouped = counted.groupby("trajectory", sort=False)
+    by_trajectory = {str(name): ends_by_condition(rows, numbers) for name, rows in grouped}
     ring_mm, half_mm = scale_of(by_trajectory.values())
     scale = {"ring_mm": ring_mm, "half_mm": half_mm}
-    panels = [
-        Panel(plain(name), draw_cloud({n: points for n, points in ends.items() if len(points)}, **scale))
-        for name, ends in by_trajectory.items()
-    ]
+    panels = [Panel(plain(name), draw_cloud(ends, **scale)) for name, ends in by_trajectory.items()]
     named = legend({c: n for c, n in numbers.items() if c in set(counted["condition"])})
     yield FigureBlock(slug, _CLOUDS.format(ring_mm=ring_mm), panels, named, small=small)
 
