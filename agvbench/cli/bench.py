@@ -11,6 +11,7 @@ examples:
   agvbench bench --place auto                     between runs the vehicle drives itself back to the start
   agvbench bench --plant my_plant.py:make_plant   your own simulated plant
   agvbench bench --trajectories garage,figure_eight   these in place of the eight
+  agvbench bench --conditions calibrated          calibrate, then drive under this condition only
   agvbench bench --listen tcp/127.0.0.1:7447      agvbench watch shows it in another terminal
   agvbench bench --live                           a Rerun viewer shows it
   agvbench bench endurance                        another benchmark: bench_endurance.py

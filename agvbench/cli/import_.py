@@ -7,9 +7,9 @@ docs/how-to/import-your-csv.md and docs/how-to/exchange-with-ros.md show how to 
 pip install 'agvbench[ros]'. Every row that is left out is counted, on the console and in the campaign's import.parquet.
 
 examples:
-  agvbench import --guess monday.csv --out lab.toml
+  agvbench import --guess monday.csv --out mapping.toml
   agvbench import --mapping dart.toml recordings/*.csv --out campaigns/dart
-  agvbench import --mapping lab.toml monday.csv tuesday.csv --out campaigns/lab
+  agvbench import --mapping mapping.toml monday.csv tuesday.csv --out campaigns/lab
   agvbench import --guess rosbag2_2026_11_25/ --out bag.toml
   agvbench import --mapping bag.toml rosbag2_2026_11_25/ old.bag --out campaigns/ros
 """

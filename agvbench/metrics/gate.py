@@ -115,7 +115,10 @@ def _checks(
     resamples: int,
     seed: int,
 ) -> Iterator[tuple[GateCheck, float]]:
-    """Yield the checks of a rule before correction, each with the smallest p-value that its test could give."""
+    """Yield the checks of a rule before correction, each with the smallest p-value that its test could give.
+
+    Their verdicts are those of the statistics alone.
+    """
     if rule.is_growth and a is None:
         raise InputError("a limit on growth needs an earlier campaign", where="gate", value=rule.text)
     now, before = _values(b, rule), {} if a is None else _values(a, rule)
@@ -127,19 +130,22 @@ def _checks(
             continue
         statistic = STATISTICS[rule.statistic]
         past = float(statistic(earlier)) if len(earlier) else np.nan
-        p = growth_p_value(rule, earlier, values, resamples=resamples, seed=seed) if rule.is_growth else np.nan
+        applied = rule.with_repeats(float(STATISTICS["sd"](earlier))) if rule.is_growth else rule
+        p = growth_p_value(applied, earlier, values, resamples=resamples, seed=seed) if rule.is_growth else np.nan
         least = _least_p(rule, len(earlier), len(values), resamples)
         label = " → ".join(conditions) if conditions else condition
         counts = len(earlier), len(values)
-        pending = GateVerdict.INCONCLUSIVE
         present = float(statistic(values))
-        allowed = rule.allowed(past, present)
-        yield GateCheck(rule, trajectory, label, *counts, past, present, allowed, p, pending), least
+        uncorrected = GateVerdict.FAIL if applied.is_exceeded(past, present) else GateVerdict.PASS
+        yield (
+            GateCheck(rule, trajectory, label, *counts, past, present, applied.allowed(past, present), p, uncorrected),
+            least,
+        )
 
 
 def _least_p(rule: GateRule, n_a: int, n_b: int, resamples: int) -> float:
     """Return the smallest p-value that the test of a rule could give."""
-    if not rule.is_growth:
+    if not rule.is_growth or (rule.unit == "sd" and n_a < 2):
         return 1.0
     exact = minimum_attainable_p(n_a, n_b)
     if rule.statistic in ("mean", "bias", "sd"):
@@ -205,13 +211,12 @@ def _decided(checks: Sequence[GateCheck], minimum_p: Sequence[float], alpha: flo
     corrected = dict(zip(growth, holm_tarone([checks[k].p_value for k in growth], least, alpha), strict=True))
     testable = dict(zip(growth, tarone_testable(least, alpha), strict=True))
     for k, check in enumerate(checks):
-        exceeds = check.rule.is_exceeded(check.before, check.now)
         if k not in corrected:
-            yield replace(check, verdict=GateVerdict.FAIL if exceeds else GateVerdict.PASS)
+            yield check
         elif not testable[k]:
-            yield replace(check, p_value=1.0)
+            yield replace(check, p_value=1.0, verdict=GateVerdict.INCONCLUSIVE)
         else:
-            failed = exceeds and corrected[k] <= alpha
+            failed = check.verdict is GateVerdict.FAIL and corrected[k] <= alpha
             yield replace(check, p_value=corrected[k], verdict=GateVerdict.FAIL if failed else GateVerdict.PASS)
 
 

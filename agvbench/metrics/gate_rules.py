@@ -32,6 +32,8 @@ STATISTICS: Mapping[str, Statistic] = {
 SIGNED = frozenset({"bias", "sd"})
 TWO_SIDED = frozenset({"bias"})
 """Statistics whose limits hold in both directions: a vehicle may drift to either side."""
+SHIFTED = ("median", "mean", "bias")
+"""Statistics that move as much as all values do: their growth may be limited in standard deviations of a repeat."""
 _RULE = re.compile(
     r"(?P<metric>\w+)\.(?P<statistic>\w+)\s*>\s*(?P<plus>\+?)(?P<limit>\d+(?:\.\d+)?)\s*(?P<unit>%|[^\d\s%+.-]\S*)?"
 )
@@ -49,7 +51,7 @@ class GateRule:
     metric, statistic
         Names.
     limit
-        In `unit`, or in per cent with ``"%"``.
+        In `unit`: that of the metric, ``"%"``, or ``"sd"`` for standard deviations of the earlier campaign's repeats.
     metric_unit
         The unit of the metric.
     is_growth
@@ -89,14 +91,21 @@ class GateRule:
         if statistic not in STATISTICS:
             raise FlagError("unknown statistic", where=where, value=statistic, limit=OneOf(STATISTICS))
         unit = match["unit"] or metric.unit
-        if unit not in ("%", metric.unit):
+        if unit not in ("%", "sd", metric.unit):
             remedy = f"write {match['limit']}{metric.unit}"
             raise FlagError(
                 "has another unit than its metric", where=where, value=text, limit=metric.unit, remedy=remedy
             )
-        if unit == "%" and not match["plus"]:
-            raise FlagError("a limit in % is a growth", where=where, value=text, remedy=f"write >+{match['limit']}%")
+        if unit in ("%", "sd") and not match["plus"]:
+            remedy = f"write >+{match['limit']}{unit}"
+            raise FlagError(f"a limit in {unit} is a growth", where=where, value=text, remedy=remedy)
+        if unit == "sd" and statistic not in SHIFTED:
+            raise FlagError("a limit in sd is on another statistic", where=where, value=text, limit=OneOf(SHIFTED))
         return cls(text.strip(), metric.name, statistic, float(match["limit"]), unit, metric.unit, bool(match["plus"]))
+
+    def with_repeats(self, sd: float) -> GateRule:
+        """Return the rule with its limit in the metric's unit, where the standard deviation of a repeat was `sd`."""
+        return replace(self, limit=self.limit * sd, unit=self.metric_unit) if self.unit == "sd" else self
 
     def allowed(self, before: float, now: float = math.inf) -> float:
         """Return the value of the statistic up to which it is allowed where it was `before`; of two, that nearer `now`.

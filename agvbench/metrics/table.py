@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,7 @@ from agvbench.campaign.arguments import as_campaign
 from agvbench.campaign.atomic_files import write_atomically
 from agvbench.campaign.manifest import MANIFEST_FILE, check_file, record
 from agvbench.campaign.tables.parquet import read_parquet, to_parquet
-from agvbench.errors import CampaignError, RecordingError
+from agvbench.errors import CampaignError, FileError, RecordingError
 from agvbench.metrics.measured_run import MeasuredRun
 from agvbench.metrics.metric import Metric
 from agvbench.metrics.planned_paths import PlannedPaths
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 FILE = "errors.parquet"
 OF_RUN = ("run_id", "experiment", "trajectory", "condition", "repeat", "session", "firmware", "started_s", "status")
 COLUMNS = (*OF_RUN, "metric", "value", "unit")
+_METRIC = COLUMNS.index("metric")
 
 
 def metric_table(campaign: Campaign | str | Path) -> pd.DataFrame:
@@ -54,21 +55,35 @@ def metric_table(campaign: Campaign | str | Path) -> pd.DataFrame:
     return metrics_of_runs(opened, PlannedPaths(opened))
 
 
-def metrics_of_runs(runs: Iterable[Run], paths: PlannedPaths) -> pd.DataFrame:
-    """Return what `metric_table` returns, of runs that were read already and the planned paths of their campaign."""
+def metrics_of_runs(
+    runs: Iterable[Run], paths: PlannedPaths, failures: dict[str, FileError] | None = None
+) -> pd.DataFrame:
+    """Return what `metric_table` returns, of runs that were read already and the planned paths of their campaign.
+
+    With `failures`, a metric that cannot be evaluated has no row, and its first error is put there by its name.
+    """
     import pandas as pd
 
-    metrics = tuple(all_metrics().values())
     aimed = (MeasuredRun.of(run, paths.of(run)) for run in runs if run.target.is_finite)
-    return pd.DataFrame([row for run in aimed for row in _rows(run, metrics)], columns=list(COLUMNS))
+    rows = [row for run in aimed for row in _rows(run, all_metrics(), failures)]
+    return pd.DataFrame([row for row in rows if row[_METRIC] not in (failures or {})], columns=list(COLUMNS))
 
 
-def _rows(run: MeasuredRun, metrics: Iterable[Metric]) -> Iterator[tuple[object, ...]]:
+def _rows(
+    run: MeasuredRun, metrics: Mapping[str, Metric], failures: dict[str, FileError] | None
+) -> Iterator[tuple[object, ...]]:
     named = [getattr(run, name) for name in OF_RUN]
     named[OF_RUN.index("session")] = run.session or ""
-    for metric in metrics:
-        if math.isfinite(value := metric.of(run)):
-            yield (*named, metric.name, value, metric.unit)
+    for name, metric in metrics.items():
+        try:
+            value = math.nan if failures and name in failures else metric.of(run)
+        except FileError as error:
+            if failures is None:
+                raise
+            failures[name] = error
+            continue
+        if math.isfinite(value):
+            yield (*named, name, value, metric.unit)
 
 
 def write_metrics(directory: Path, table: pd.DataFrame) -> Path:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import pytest
 
-from agvbench.errors import AgvbenchError, InputError
+from agvbench.errors import AgvbenchError, FlagError, InputError, OneOf
 from agvbench.pytest_plugin.options import option, settings_from, worded
 
 if TYPE_CHECKING:
@@ -143,11 +143,14 @@ def _arrange(config: pytest.Config, items: list[pytest.Item], benches: list[pyte
         text = "--corrected: no corrected model; give the vehicle file that a diagnosis wrote"
         raise pytest.UsageError(worded(config, text))
     left_out = {*undriven, *unknown, *other_kind}
-    driven = [item for item in benches if item not in left_out]
+    drivable = [item for item in benches if item not in left_out]
+    _require_conditions(config, settings, drivable)
+    not_asked = _of_other_conditions(drivable, settings)
+    driven = [item for item in drivable if item not in not_asked]
     driven = ordered(driven, settings.order, seed=settings.seed, phase=phase, repeat=repeat, name=run_name)
     items[:] = [item for item in items if not is_bench(item)] + driven
-    if undriven:
-        config.hook.pytest_deselected(items=undriven)
+    if deselected := [*undriven, *not_asked]:
+        config.hook.pytest_deselected(items=deselected)
 
 
 def chosen(config: pytest.Config, items: Iterable[pytest.Item]) -> dict[str, Any]:
@@ -231,6 +234,25 @@ def _check_names(items: Iterable[pytest.Item]) -> None:
 
 def _is_corrected(item: pytest.Item) -> bool:
     return parameters(item).get("condition") == "corrected"
+
+
+def _of_other_conditions(benches: Iterable[pytest.Item], settings: BenchSettings) -> list[pytest.Item]:
+    """Return the benchmarks under other conditions than those of ``--conditions``; those without one are driven."""
+    asked = settings.asked_conditions
+    conditions = {item: parameters(item).get("condition") for item in benches}
+    return [item for item, given in conditions.items() if asked and given is not None and given not in asked]
+
+
+def _require_conditions(config: pytest.Config, settings: BenchSettings, benches: Iterable[pytest.Item]) -> None:
+    found = {str(given["condition"]) for item in benches if "condition" in (given := parameters(item))}
+    for name in settings.asked_conditions:
+        if name not in found:
+            remedy = (
+                "give a vehicle file with --corrected" if name == "corrected" else "correct it, or choose other runs"
+            )
+            what, limit = "no run to drive is under this condition", OneOf(sorted(found)) if found else None
+            error = FlagError(what, where="--conditions", value=name, limit=limit, remedy=remedy)
+            raise pytest.UsageError(worded(config, error))
 
 
 def _condition_applies(item: pytest.Item) -> bool:

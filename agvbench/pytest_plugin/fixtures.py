@@ -28,6 +28,8 @@ LIVE: pytest.StashKey[LiveView] = pytest.StashKey()
 """The live view, where there is one."""
 ENDS_PROGRAM = pytest.StashKey[bool]()
 """Whether a benchmark called `sys.exit`."""
+IS_REPORTED = pytest.StashKey[bool]()
+"""Whether all of the campaign could be reported at the end."""
 
 
 @pytest.fixture
@@ -142,9 +144,12 @@ def _progress_printer(config: pytest.Config) -> Callable[[str], None]:
     return on_progress
 
 
-@pytest.hookimpl(trylast=True)
-def pytest_sessionfinish(session: pytest.Session) -> None:
-    """End with the exit code that shells know of the signal that ended the session, or that of a set-up that failed."""
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_sessionfinish(session: pytest.Session) -> Generator[None, object, object]:
+    """End with the exit code that shells know of the signal that ended the session, or that of what failed.
+
+    pytest's terminal reporter writes the report within this hook.
+    """
     stash = session.config.stash
     if INTERRUPT in stash:
         from agvbench.running.session.termination_signals import exit_code
@@ -154,6 +159,10 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         session.exitstatus = stash[COMPARISON_CODE] = code
     elif ENDS_PROGRAM in stash or (SESSION in stash and stash[SESSION].failure is not None):
         session.exitstatus = pytest.ExitCode.INTERRUPTED
+    result = yield
+    if not stash.get(IS_REPORTED, True) and session.exitstatus == pytest.ExitCode.OK:
+        session.exitstatus = pytest.ExitCode.USAGE_ERROR
+    return result
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:

@@ -13,7 +13,7 @@ from agvbench.campaign.completeness import planned_id
 from agvbench.errors import AgvbenchError, FitError, FlagError, InputError, PlanError
 from agvbench.pytest_plugin.against import against_texts, is_left_out, take_analysis
 from agvbench.pytest_plugin.collection import is_bench, run_name
-from agvbench.pytest_plugin.fixtures import ENDS_PROGRAM, INTERRUPT, LIVE, SESSION, STOPPED_IN, stop_line
+from agvbench.pytest_plugin.fixtures import ENDS_PROGRAM, INTERRUPT, IS_REPORTED, LIVE, SESSION, STOPPED_IN, stop_line
 from agvbench.pytest_plugin.options import option, worded
 
 if TYPE_CHECKING:
@@ -233,6 +233,9 @@ def _conclude(terminalreporter: pytest.TerminalReporter, config: pytest.Config, 
     else:
         for line in session.events:
             terminalreporter.write_line(worded(config, line))
-        terminalreporter.write_line(bench_summary(shown(session.directory), report=not option(config, "--no-report")))
+        text, config.stash[IS_REPORTED] = bench_summary(
+            shown(session.directory), report=not option(config, "--no-report")
+        )
+        terminalreporter.write_line(text)
         for text in against_texts(config):
             terminalreporter.write_line(text)

@@ -100,9 +100,9 @@ def _difference_case(suite: ET.Element, d: Difference, comparison: Comparison, *
 def _check_case(suite: ET.Element, check: GateCheck) -> None:
     case = _case(suite, f"{check.trajectory}.{check.condition}", check.rule.text)
     counts = {"repeats_a": check.repeats_a, "repeats_b": check.repeats_b}
-    _properties(case, {**counts, "before": check.before, "now": check.now, "allowed": check.allowed}, check.rule.unit)
+    unit, digits = check.rule.metric_unit, all_metrics()[check.rule.metric].digits
+    _properties(case, {**counts, "before": check.before, "now": check.now, "allowed": check.allowed}, unit)
     if check.verdict is GateVerdict.FAIL:
-        unit, digits = check.rule.metric_unit, all_metrics()[check.rule.metric].digits
         message = f"{check.now:.{digits}f} {unit}, allowed {check.allowed:.{digits}f} {unit}"
         ET.SubElement(case, "failure", message=message, type="gate")
     elif check.verdict is GateVerdict.INCONCLUSIVE:

@@ -50,7 +50,7 @@ class Quality:
             yield f"gap of {self.longest_gap_s:.2f} s without pose (limit: {limits.gap_s:.2f} s)"
         if not self.start_position_error_m <= limits.start_position_m:
             off_mm, limit_mm = self.start_position_error_m * 1e3, limits.start_position_m * 1e3
-            yield f"start {off_mm:.0f} mm off (limit: {limit_mm:.0f} mm)"
+            yield f"start {off_mm:.1f} mm off (limit: {limit_mm:.0f} mm)"
         if not self.start_heading_error_rad <= limits.start_heading_rad:
             off_deg, limit_deg = math.degrees(self.start_heading_error_rad), math.degrees(limits.start_heading_rad)
             yield f"start heading {off_deg:.1f}° off (limit: {limit_deg:.1f}°)"

@@ -13,7 +13,7 @@ import numpy as np
 
 from agvbench.campaign import Campaign, CampaignHeader
 from agvbench.campaign.uncertainty_statement import evaluations
-from agvbench.errors import InputError
+from agvbench.errors import FileError, InputError
 from agvbench.metrics.planned_paths import PlannedPaths
 from agvbench.metrics.table import metrics_of_runs
 from agvbench.statistics import Comparison, bias_and_spread, compare_errors, end_pose_table, pose_errors, valid
@@ -68,11 +68,12 @@ class ReportData:
 
     ``errors`` is what `pose_errors` returns, ``end_poses`` the table of tables 8.3–8.10, ``spread`` accuracy apart from
     repeatability, ``comparisons`` every condition against the next one, ``quality`` one row per run. ``problems`` are
-    sentences about what could not be read or compared; ``events`` are what adapters
-    reported; ``planned`` are the planned paths, ``metrics`` what `metric_table` returns; ``diagnosis`` lies in the
-    directory, or None. ``budgets`` are the uncertainty budgets of mean end pose errors, ``accuracy`` what
-    `pose_accuracies` returns and ``completions`` what `completions` does. ``changes`` are since the campaign before, or
-    None where there is none. ``recordings`` are the files of the runs' poses, by run id.
+    sentences about what could not be read or compared, ``failures`` the errors of own metrics that cannot be
+    evaluated, by name; ``events`` are what adapters reported. ``planned`` are the planned paths, ``metrics`` what
+    `metric_table` returns; ``diagnosis`` lies in the directory, or None. ``budgets`` are the uncertainty budgets of
+    mean end pose errors, ``accuracy`` what `pose_accuracies` returns and ``completions`` what `completions` does.
+    ``changes`` are since the campaign before, or None where there is none. ``recordings`` are the files of the runs'
+    poses, by run id.
     """
 
     path: Path
@@ -93,6 +94,7 @@ class ReportData:
     recordings: Mapping[str, Path]
     provenance: dict[str, str] = field(default_factory=dict)
     problems: list[str] = field(default_factory=list)
+    failures: Mapping[str, FileError] = field(default_factory=dict)
     diagnosis: ShownDiagnosis | None = None
     changes: CampaignChanges | None = None
 
@@ -140,7 +142,9 @@ def gather(
     runs = list(tracked)
     errors = pose_errors(runs)
     problems: list[str] = []
-    planned = PlannedPaths(campaign)
+    planned, failures = PlannedPaths(campaign), dict[str, FileError]()
+    metrics = metrics_of_runs(runs, planned, failures)
+    problems += [f"The metric {name} is left out: {error}" for name, error in failures.items()]
     return ReportData(
         path=campaign.path,
         header=campaign.header,
@@ -153,7 +157,7 @@ def gather(
         curves=read_calibration_curves(campaign),
         events=_events(campaign, problems),
         planned=planned,
-        metrics=metrics_of_runs(runs, planned),
+        metrics=metrics,
         budgets=end_pose_budgets(
             runs, evaluations(campaign.header.uncertainty if uncertainty is None else uncertainty)
         ),
@@ -162,6 +166,7 @@ def gather(
         recordings={run.run_id: campaign.recording(run.run_id) for run in runs},
         provenance=_provenance(campaign, problems),
         problems=problems,
+        failures=failures,
         diagnosis=read_diagnosis(campaign.path),
         changes=changes_since_before(campaign.path, against, firmware=firmware_of(run.firmware for run in runs)),
     )

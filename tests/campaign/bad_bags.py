@@ -18,8 +18,8 @@ from agvbench.campaign.recordings.guess import guess_mapping
 
 
 def _import(path: str | Path, mapping: str = DIFFERENTIAL) -> None:
-    Path("lab.toml").write_text(mapping)
-    import_recordings("lab.toml", [path], "c")
+    Path("mapping.toml").write_text(mapping)
+    import_recordings("mapping.toml", [path], "c")
 
 
 def _bag(sent: list[Sent] | None = None, mapping: str = DIFFERENTIAL, kind: str = "mcap") -> Callable[[], None]:

@@ -19,8 +19,8 @@ def _import(mapping: str = MAPPING, *, files: tuple[str, ...] = ("r.csv",), **ch
         if values is not None:
             columns[name] = values
     write_csv(Path("r.csv"), columns)
-    Path("lab.toml").write_text(mapping)
-    import_recordings("lab.toml", files, "c")
+    Path("mapping.toml").write_text(mapping)
+    import_recordings("mapping.toml", files, "c")
 
 
 def _mapping(old: str, new: str) -> Callable[[], None]:

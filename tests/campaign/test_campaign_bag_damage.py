@@ -47,14 +47,14 @@ def test_a_damaged_bag_is_imported_or_refused_in_one_line(kind, length, flips, w
     for where, change in flips:
         damaged[int(where * len(damaged))] ^= change
     folder = tmp_path_factory.mktemp("damaged")
-    (folder / "lab.toml").write_text(DIFFERENTIAL)
+    (folder / "mapping.toml").write_text(DIFFERENTIAL)
     file.write_bytes(damaged)
     bag = file.parent if (file.parent / "metadata.yaml").exists() else file
     refused = ""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            import_recordings(folder / "lab.toml", [bag], folder / "c")
+            import_recordings(folder / "mapping.toml", [bag], folder / "c")
         except AgvbenchError as error:
             refused = str(error)
     file.write_bytes(data)
@@ -66,15 +66,15 @@ def test_a_bag_that_decompresses_into_more_than_the_limit_is_refused(tmp_path):
     log = Sent(driven()[-1].ns, "/log", lambda make: make("std_msgs/String", "0" * (128 << 20)))
     bag = write_bag(tmp_path, "b", "mcap zstd", [*driven(), log])
     assert (bag / "b.mcap").stat().st_size < 1 << 20
-    (tmp_path / "lab.toml").write_text(DIFFERENTIAL)
+    (tmp_path / "mapping.toml").write_text(DIFFERENTIAL)
     before = resource.getrlimit(resource.RLIMIT_DATA), resource.getrlimit(resource.RLIMIT_FSIZE)
     with (
         mock.patch.object(bag_module, "MAX_BYTES", 32 << 20),
         pytest.raises(FileError, match=r"b: takes too much memory to read|Allocation error|allocate"),
     ):
-        import_recordings(tmp_path / "lab.toml", [bag], tmp_path / "c")
+        import_recordings(tmp_path / "mapping.toml", [bag], tmp_path / "c")
     assert (resource.getrlimit(resource.RLIMIT_DATA), resource.getrlimit(resource.RLIMIT_FSIZE)) == before
-    assert len(import_recordings(tmp_path / "lab.toml", [bag], tmp_path / "c")) == 1
+    assert len(import_recordings(tmp_path / "mapping.toml", [bag], tmp_path / "c")) == 1
 
 
 def connection(definition: str, kind: str = "my_msgs/msg/Own") -> Connection:
@@ -115,10 +115,10 @@ def test_a_type_with_another_name_than_an_identifier_is_refused(name):
 
 
 def test_without_rosbags_the_command_says_what_to_install(tmp_path):
-    (tmp_path / "lab.toml").write_text(DIFFERENTIAL)
+    (tmp_path / "mapping.toml").write_text(DIFFERENTIAL)
     bag = write_bag(tmp_path, "b", "mcap", driven())
     program = "import sys; sys.modules['rosbags'] = None; from agvbench.cli import main; sys.exit(main(sys.argv[1:]))"
-    for arguments in (["--mapping", "lab.toml"], ["--guess"]):
+    for arguments in (["--mapping", "mapping.toml"], ["--guess"]):
         command = [sys.executable, "-c", program, "import", *arguments, bag.name, "--out", "c"]
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
         assert done.returncode == 2
@@ -140,11 +140,11 @@ def test_reading_a_csv_and_asking_for_help_do_not_load_rosbags(tmp_path, capsys)
 
 def test_a_pipe_is_not_waited_for(tmp_path, capsys):
     os.mkfifo(tmp_path / "b.bag")
-    (tmp_path / "lab.toml").write_text(DIFFERENTIAL)
+    (tmp_path / "mapping.toml").write_text(DIFFERENTIAL)
     arguments = [
         "import",
         "--mapping",
-        str(tmp_path / "lab.toml"),
+        str(tmp_path / "mapping.toml"),
         str(tmp_path / "b.bag"),
         "--out",
         str(tmp_path / "c"),

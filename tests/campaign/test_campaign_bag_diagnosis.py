@@ -71,7 +71,7 @@ def recorded(folder: Path, kind: str, *, is_differential: bool) -> list[Path]:
 @pytest.mark.parametrize(("kind", "is_differential"), [("mcap", True), ("ros1", False)])
 def test_bags_are_guessed_imported_and_diagnosed(kind, is_differential, tmp_path, capsys):
     bags = list(map(str, recorded(tmp_path, kind, is_differential=is_differential)))
-    mapping, out, answer = (str(tmp_path / name) for name in ("lab.toml", "c", "answer.json"))
+    mapping, out, answer = (str(tmp_path / name) for name in ("mapping.toml", "c", "answer.json"))
     assert main(["import", "--guess", bags[0], "--out", mapping]) == 0
     assert main(["import", "--mapping", mapping, *bags, "--out", out]) == 0
     campaign = Campaign.open(out)

@@ -17,8 +17,8 @@ from agvbench.cli import main
 
 def guessed(folder: Path, recording: Path) -> tuple[Campaign, str, list[str]]:
     text, questions = guess_mapping(recording)
-    (folder / "lab.toml").write_text(text.replace("shortest_s = 2.0", "shortest_s = 0.1"), encoding="utf-8")
-    return import_recordings(folder / "lab.toml", [recording], folder / "c"), text, questions
+    (folder / "mapping.toml").write_text(text.replace("shortest_s = 2.0", "shortest_s = 0.1"), encoding="utf-8")
+    return import_recordings(folder / "mapping.toml", [recording], folder / "c"), text, questions
 
 
 def sent_with(*more: Sent, pose: str = "pose_stamped", without: str = "") -> list[Sent]:
@@ -81,11 +81,11 @@ def test_what_the_topics_leave_open_is_asked(tmp_path):
 
 def test_the_command_lists_the_topics(tmp_path, capsys):
     bag = write_bag(tmp_path, "monday", "sqlite3", driven())
-    assert main(["import", "--guess", str(bag), "--out", str(tmp_path / "lab.toml")]) == 0
+    assert main(["import", "--guess", str(bag), "--out", str(tmp_path / "mapping.toml")]) == 0
     printed = capsys.readouterr().out.splitlines()
     assert printed[0].startswith("/cmd_vel  geometry_msgs/msg/Twist, 21 messages, ")
     assert printed[1].startswith("/pose     geometry_msgs/msg/PoseStamped, 60 messages, ")
-    assert f"# {printed[0]}" in (tmp_path / "lab.toml").read_text(encoding="utf-8").splitlines()
+    assert f"# {printed[0]}" in (tmp_path / "mapping.toml").read_text(encoding="utf-8").splitlines()
 
 
 def test_a_tum_file_with_its_commands(tmp_path):

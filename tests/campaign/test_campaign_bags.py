@@ -17,8 +17,8 @@ from agvbench.cli import main
 
 
 def imported(folder: Path, sent: list[Sent], mapping: str = DIFFERENTIAL, *, kind: str = "mcap") -> Campaign:
-    (folder / "lab.toml").write_text(mapping, encoding="utf-8")
-    return import_recordings(folder / "lab.toml", [write_bag(folder, "monday", kind, sent)], folder / "c")
+    (folder / "mapping.toml").write_text(mapping, encoding="utf-8")
+    return import_recordings(folder / "mapping.toml", [write_bag(folder, "monday", kind, sent)], folder / "c")
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -147,7 +147,7 @@ def test_stamps_that_are_out_of_order_by_a_little_are_sorted(tmp_path: Path) -> 
 
 
 def test_bags_are_placed_in_one_clock_and_hashed(tmp_path: Path) -> None:
-    (tmp_path / "lab.toml").write_text(DIFFERENTIAL.replace("[runs]", '[runs]\nsession = "day"'))
+    (tmp_path / "mapping.toml").write_text(DIFFERENTIAL.replace("[runs]", '[runs]\nsession = "day"'))
     later = [message._replace(ns=message.ns + 86_400 * 10**9) for message in driven()]
     later = [m for m in later if m.topic == "/cmd_vel"]
     later += [
@@ -158,7 +158,7 @@ def test_bags_are_placed_in_one_clock_and_hashed(tmp_path: Path) -> None:
         write_bag(tmp_path, "b.v2", "sqlite3", sorted(later, key=lambda m: m.ns)),
         write_bag(tmp_path, "a.v2", "mcap", driven()),
     ]
-    campaign = import_recordings(tmp_path / "lab.toml", bags, tmp_path / "c")
+    campaign = import_recordings(tmp_path / "mapping.toml", bags, tmp_path / "c")
     assert campaign.runs["run_id"].tolist() == ["a.v2-001", "b.v2-001"]
     assert campaign.runs["session"].tolist() == ["2023-11-14", "2023-11-15"]
     assert campaign.runs["started_s"].tolist() == pytest.approx([0.0, 86400.0], abs=1e-6)
@@ -195,9 +195,9 @@ def test_each_pose_has_the_command_that_held_then(poses_ns, commands_ns, numbers
 
 
 def test_the_command_line_imports_a_bag(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "lab.toml").write_text(DIFFERENTIAL, encoding="utf-8")
+    (tmp_path / "mapping.toml").write_text(DIFFERENTIAL, encoding="utf-8")
     bag = write_bag(tmp_path, "monday", "mcap", driven())
-    assert main(["import", "--mapping", str(tmp_path / "lab.toml"), f"{bag}/", "--out", str(tmp_path / "c")]) == 0
+    assert main(["import", "--mapping", str(tmp_path / "mapping.toml"), f"{bag}/", "--out", str(tmp_path / "c")]) == 0
     out = capsys.readouterr().out
     assert "monday" in out
     assert "runs: 1, sessions: 1" in out

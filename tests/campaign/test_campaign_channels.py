@@ -215,8 +215,8 @@ heading = { column = "heading_rad", unit = "rad" }
 drive = { column = "throttle" }
 front = { column = "steering" }
 """
-    (tmp_path / "lab.toml").write_text(start + tables_ + columns)
-    campaign = import_recordings(tmp_path / "lab.toml", [recording(tmp_path / "r.csv")], tmp_path / "c")
+    (tmp_path / "mapping.toml").write_text(start + tables_ + columns)
+    campaign = import_recordings(tmp_path / "mapping.toml", [recording(tmp_path / "r.csv")], tmp_path / "c")
     assert campaign.header.schema == 4
     assert campaign.header.neutral == (1500.0, 0.5, 0.0)
     (run,) = campaign
@@ -228,7 +228,7 @@ def test_a_guess_gives_steering_from_0_to_1_its_own_channel(tmp_path: Path) -> N
     path = recording(tmp_path / "r.csv")
     text, questions = guess_mapping(path)
     assert any(question.startswith("steering: never negative") for question in questions)
-    (tmp_path / "lab.toml").write_text(text, encoding="utf-8")
-    header = import_recordings(tmp_path / "lab.toml", [path], tmp_path / "c").header
+    (tmp_path / "mapping.toml").write_text(text, encoding="utf-8")
+    header = import_recordings(tmp_path / "mapping.toml", [path], tmp_path / "c").header
     assert header.neutral == (1500.0, 0.5, 0.5)
     assert (header.channels.drive.unit, header.channels.front) == ("us", Channel("normalised", 0.5, 0.0, 1.0))

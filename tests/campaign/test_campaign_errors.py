@@ -24,8 +24,8 @@ _INTRODUCTION = """\
 # Bad input: campaigns and recordings
 
 The table lists data that agvbench cannot read, record or import, each with its error message of one line. `c` is the
-directory of the campaign, `r.csv` a recording, `b` a bag and `lab.toml` a mapping. Rows are counted from 1, without the
-header. Every case is a test.
+directory of the campaign, `r.csv` a recording, `b` a bag and `mapping.toml` a mapping. Rows are counted from 1,
+without the header. Every case is a test.
 
 | case | input | message |
 |---|---|---|
@@ -63,9 +63,9 @@ def test_the_command_prints_one_line_and_exits_with_2(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    Path("lab.toml").write_text(MAPPING)
+    Path("mapping.toml").write_text(MAPPING)
     write_csv(Path("r.csv"), recording() | {"X": ["?"] * 60})
-    assert main(["import", "--mapping", "lab.toml", "r.csv", "--out", "c"]) == 2
+    assert main(["import", "--mapping", "mapping.toml", "r.csv", "--out", "c"]) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
     assert printed.err == "agvbench import: r.csv: row 1: X is not a number: '?'; correct the cell\n"

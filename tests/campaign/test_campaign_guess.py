@@ -63,8 +63,8 @@ def imported(directory: Path, style: str) -> tuple[Campaign, list[str]]:
     columns, delimiter = written(style)
     recording = write_csv(directory / "monday.csv", columns, delimiter=delimiter)
     text, questions = guess_mapping(recording)
-    (directory / "lab.toml").write_text(text, encoding="utf-8")
-    return import_recordings(directory / "lab.toml", [recording], directory / "c"), questions
+    (directory / "mapping.toml").write_text(text, encoding="utf-8")
+    return import_recordings(directory / "mapping.toml", [recording], directory / "c"), questions
 
 
 @pytest.mark.parametrize("style", STYLES)
@@ -82,6 +82,15 @@ def test_a_recording_is_imported_as_it_was_driven(style, tmp_path):
     assert campaign.header.channels == Channels.alike(unit)
     assert campaign.header.geometry.is_differential is (style == "differential")
     assert campaign.header.mocap_rate_hz == pytest.approx(RATE_HZ, rel=0.01)
+
+
+def test_a_decimal_comma_is_guessed(tmp_path):
+    recording = write_csv(tmp_path / "r.csv", written("plain")[0], delimiter=";")
+    recording.write_text(recording.read_text(encoding="utf-8").replace(".", ","), encoding="utf-8")
+    text, _ = guess_mapping(recording)
+    (tmp_path / "mapping.toml").write_text(text, encoding="utf-8")
+    (run,) = import_recordings(tmp_path / "mapping.toml", [recording], tmp_path / "c")
+    np.testing.assert_allclose(run.frames.x_m, drive()["x"], atol=1e-6)
 
 
 def test_what_no_column_tells_is_asked(tmp_path):
@@ -124,7 +133,7 @@ def test_a_recording_that_cannot_be_guessed_is_refused(change, message, tmp_path
 
 def test_the_command_writes_the_mapping_and_says_what_to_answer(tmp_path, capsys):
     recording = write_csv(tmp_path / "r.csv", written("plain")[0])
-    out = tmp_path / "lab.toml"
+    out = tmp_path / "mapping.toml"
     assert main(["import", "--guess", str(recording), "--out", str(out)]) == 0
     printed = capsys.readouterr().out
     assert f"wrote {out}" in printed
@@ -135,7 +144,7 @@ def test_the_command_writes_the_mapping_and_says_what_to_answer(tmp_path, capsys
 @pytest.mark.parametrize("case", ["exists", "two", "missing"])
 def test_a_bad_request_is_one_line(case, tmp_path, capsys):
     recording = write_csv(tmp_path / "r.csv", written("plain")[0])
-    out = tmp_path / "lab.toml"
+    out = tmp_path / "mapping.toml"
     if case == "exists":
         out.write_text("", encoding="utf-8")
     files = {"exists": [recording], "two": [recording, recording], "missing": [tmp_path / "none.csv"]}[case]

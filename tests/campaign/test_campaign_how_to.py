@@ -39,7 +39,7 @@ def test_the_example_does_what_the_page_says(
     assert [language for language, _ in blocks] == ["python", "toml", "sh", "text", "python", "text"]
     make, mapping, command, account, look, listing = (text for _, text in blocks)
     _execute(make)
-    Path("lab.toml").write_text(mapping, encoding="utf-8")
+    Path("mapping.toml").write_text(mapping, encoding="utf-8")
     program, *arguments = shlex.split(command)
     assert program == "agvbench"
     assert main(arguments) == 0

@@ -18,10 +18,10 @@ from agvbench.vehicle.quaternion import heading_of
 
 
 def _imported(directory: Path, mapping: str = MAPPING, **recordings: dict[str, list[object]]) -> Campaign:
-    (directory / "lab.toml").write_text(mapping, encoding="utf-8")
+    (directory / "mapping.toml").write_text(mapping, encoding="utf-8")
     delimiter = ";" if 'delimiter = ";"' in mapping else ","
     files = [write_csv(directory / f"{name}.csv", table, delimiter=delimiter) for name, table in recordings.items()]
-    return import_recordings(directory / "lab.toml", files, directory / "c")
+    return import_recordings(directory / "mapping.toml", files, directory / "c")
 
 
 def test_units_axes_and_held_commands(tmp_path: Path) -> None:
@@ -161,9 +161,9 @@ def _multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 
 def test_the_command_tells_what_became_of_the_rows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "lab.toml").write_text(MAPPING)
+    (tmp_path / "mapping.toml").write_text(MAPPING)
     files = [str(write_csv(tmp_path / f"{name}.csv", recording())) for name in ("one", "two")]
-    assert main(["import", "--mapping", str(tmp_path / "lab.toml"), *files, "--out", str(tmp_path / "c")]) == 0
+    assert main(["import", "--mapping", str(tmp_path / "mapping.toml"), *files, "--out", str(tmp_path / "c")]) == 0
     out = capsys.readouterr().out
     assert "one.csv" in out
     assert "120" in out
@@ -173,7 +173,7 @@ def test_the_command_tells_what_became_of_the_rows(tmp_path: Path, capsys: pytes
 @pytest.mark.parametrize("is_new", [True, False])
 def test_an_import_that_cannot_be_written_to_its_end_leaves_no_campaign(is_new: bool, tmp_path: Path) -> None:
     """A campaign with some of its runs would pass for a whole one."""
-    (tmp_path / "lab.toml").write_text(MAPPING)
+    (tmp_path / "mapping.toml").write_text(MAPPING)
     long = recording(6000) | {"Z": [-5.0 * row + row * 7919 % 1009 / 1009 for row in range(6000)]}
     files = [write_csv(tmp_path / "a.csv", recording()), write_csv(tmp_path / "b.csv", long)]
     out = tmp_path / "c"
@@ -183,10 +183,10 @@ def test_an_import_that_cannot_be_written_to_its_end_leaves_no_campaign(is_new: 
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
     try:
         with pytest.raises(RecordingError, match=r"c: cannot be written .*; free some space, or choose another"):
-            import_recordings(tmp_path / "lab.toml", files, out)
+            import_recordings(tmp_path / "mapping.toml", files, out)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert not out.exists() if is_new else not list(out.iterdir())
-    campaign = import_recordings(tmp_path / "lab.toml", files, out)
+    campaign = import_recordings(tmp_path / "mapping.toml", files, out)
     assert campaign.run_ids == ["a-001", "b-001"]
     assert not list(out.glob(".tmp*"))

@@ -54,7 +54,7 @@ def test_measured_recordings_are_read_and_their_conversions_refused(lab: str, tm
     files = sorted((MEASURED / lab).glob("*.csv"))
     if not files:
         pytest.skip(f"no recordings in {MEASURED}: set AGVBENCH_MEASURED")
-    mapping = tmp_path / "lab.toml"
+    mapping = tmp_path / "mapping.toml"
     mapping.write_text(MAPPED.format(*LABS.get(lab, LABS["eth"])))
     campaign = import_recordings("dart" if lab == "dart" else mapping, files, tmp_path / "c")
     tables = {"runs": campaign.runs, "commands": campaign.commands, "poses": campaign.poses}
@@ -147,7 +147,7 @@ def test_every_command_refuses_in_one_line(command, tmp_path, monkeypatch, capsy
 def test_an_import_in_another_unit_leaves_nothing_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     write_csv(Path("r.csv"), recording(200) | {"X": [0.0] * 200, "Z": [-0.5 * row for row in range(200)]})
-    Path("lab.toml").write_text(MAPPING.replace('unit = "mm"', 'unit = "m"'))
-    with pytest.raises(CampaignError, match=r"lab.toml: run r-001: x_m and y_m are not in metres: .* 50 m/s"):
-        import_recordings("lab.toml", ["r.csv"], "c")
+    Path("mapping.toml").write_text(MAPPING.replace('unit = "mm"', 'unit = "m"'))
+    with pytest.raises(CampaignError, match=r"mapping.toml: run r-001: x_m and y_m are not in metres: .* 50 m/s"):
+        import_recordings("mapping.toml", ["r.csv"], "c")
     assert not Path("c").exists()

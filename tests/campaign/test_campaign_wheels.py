@@ -77,8 +77,8 @@ def wheel_recording(tmp_path: Path) -> Path:
 
 def test_a_recording_of_wheel_commands_is_imported(tmp_path: Path) -> None:
     columns = 'left = { column = "L", scale = 0.01 }\nright = { column = "R", scale = 0.01 }'
-    (tmp_path / "lab.toml").write_text(wheel_mapping(columns), encoding="utf-8")
-    campaign = import_recordings(tmp_path / "lab.toml", [wheel_recording(tmp_path)], tmp_path / "c")
+    (tmp_path / "mapping.toml").write_text(wheel_mapping(columns), encoding="utf-8")
+    campaign = import_recordings(tmp_path / "mapping.toml", [wheel_recording(tmp_path)], tmp_path / "c")
     assert campaign.header.channels.wheels == WHEELS
     commands = next(iter(Campaign.open(tmp_path / "c"))).commands
     np.testing.assert_allclose(commands.t_s, [0.0, 0.3])
@@ -100,7 +100,7 @@ def test_a_recording_of_wheel_commands_is_imported(tmp_path: Path) -> None:
 def test_a_mapping_with_other_commands_than_its_channels_is_one_line(
     tmp_path: Path, columns: str, message: str
 ) -> None:
-    (tmp_path / "lab.toml").write_text(wheel_mapping(columns), encoding="utf-8")
+    (tmp_path / "mapping.toml").write_text(wheel_mapping(columns), encoding="utf-8")
     with pytest.raises(FileError, match=message) as caught:
-        import_recordings(tmp_path / "lab.toml", [wheel_recording(tmp_path)], tmp_path / "c")
+        import_recordings(tmp_path / "mapping.toml", [wheel_recording(tmp_path)], tmp_path / "c")
     assert "\n" not in str(caught.value)

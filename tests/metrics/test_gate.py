@@ -76,6 +76,21 @@ def test_bias_rarely_fails_where_nothing_has_changed():
     assert binomtest(failed, 300, 0.01).pvalue > 1e-3
 
 
+@pytest.mark.parametrize(("drift_sd", "verdict"), [(0.5, GateVerdict.PASS), (-3.5, GateVerdict.FAIL)])
+def test_a_limit_may_be_given_in_standard_deviations_of_the_earlier_repeats(drift_sd, verdict):
+    rng = np.random.default_rng(8)
+    a, b = rng.normal(0.0, 4.0, 20), rng.normal(4.0 * drift_sd, 4.0, 20)
+    tables = _table({"3": b}, metric="across_error"), _table({"3": a}, metric="across_error")
+    (check,) = check_gate([GateRule.parse("across_error.bias>+1.5sd")], *tables)
+    assert check.verdict is verdict
+    assert abs(check.allowed - np.mean(a)) == pytest.approx(1.5 * np.std(a, ddof=1))
+
+
+def test_one_earlier_repeat_has_no_standard_deviation():
+    tables = _table({"3": np.arange(200.0)}), _table({"3": [1.0]})
+    assert _verdicts("position_error.mean>+1sd", *tables) == {"3": GateVerdict.INCONCLUSIVE}
+
+
 def test_an_absolute_limit_on_bias_holds_on_both_sides():
     b = _table({"1": [-8.0, -6.0], "2": [8.0, 6.0], "3": [-8.0, 8.0]}, metric="across_error")
     fail, passed = GateVerdict.FAIL, GateVerdict.PASS
@@ -137,6 +152,8 @@ def test_conditions_are_compared_as_named_and_rejected_runs_do_not_count():
         ("speed.p95>5mm", "unknown metric"),
         ("position_error.p95>5cm", "has another unit than its metric"),
         ("position_error.p95>5%", r"a limit in % is a growth: .*write >\+5%"),
+        ("position_error.bias>2sd", r"a limit in sd is a growth: .*write >\+2sd"),
+        ("position_error.p95>+2sd", r"a limit in sd is on another statistic: .*one of: median, mean, bias"),
     ],
 )
 def test_what_is_no_rule_is_refused(text, message):

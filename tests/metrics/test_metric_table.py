@@ -150,6 +150,24 @@ def test_a_bench_writes_own_metrics_and_those_that_ship(lab):
     assert "cross-track error, RMS" in report
 
 
+def test_a_mistake_in_one_metric_costs_no_other(tmp_path):
+    (tmp_path / "metrics").mkdir()
+    mistaken = _OWN.replace("run.driven[:, 2]", "run.logged['battery']")
+    (tmp_path / "metrics" / "own.py").write_text(mistaken + _OWN.replace("farthest_left", "second"), encoding="utf-8")
+    only = ["-k", "trajectory and 1-un", "--repeats", "1", "--out", "camp"]
+    said = "metrics/own.py:9: metric farthest_left, run trajectory-1-uncalibrated-r01: cannot be evaluated: "
+    driven = _agvbench(tmp_path, "bench", *only)
+    assert driven.returncode == 2, driven.stdout
+    assert f"metric farthest_left is left out: {said}" in " ".join(driven.stdout.split())
+    reported = _agvbench(tmp_path, "report", "camp", "--no-recording")
+    assert (reported.returncode, said in reported.stderr) == (2, True)
+    metrics = set(read_metrics(tmp_path / "camp")["metric"])
+    assert {"position_error", "second"} <= metrics
+    assert "farthest_left" not in metrics
+    page = (tmp_path / "camp" / "report" / "report.html").read_text(encoding="utf-8")
+    assert "The metric farthest_left is left out: " in page
+
+
 def test_the_file_is_listed_and_damage_is_found(lab, tmp_path):
     campaign = Campaign.open(lab / "camp").check()
     assert "errors.parquet" in (campaign.path / "SHA256SUMS").read_text(encoding="utf-8")

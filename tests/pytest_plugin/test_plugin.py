@@ -49,6 +49,30 @@ def collected(pytester, *options):
 
 
 @pytest.mark.usefixtures("bench_file")
+def test_only_the_conditions_that_are_asked_for_are_driven(pytester):
+    assert collected(pytester, "--agvbench-repeats=1", "--agvbench-conditions=calibrated") == [
+        "steering_front[0.5-r01]",
+        "steering_front[0.5-r02]",
+        "trajectory[3-calibrated-r01]",
+        "trajectory[5-calibrated-r01]",
+    ]
+
+
+@pytest.mark.usefixtures("bench_file")
+@pytest.mark.parametrize(
+    ("conditions", "more", "said"),
+    [
+        ("fast", (), "fast (one of: calibrated, uncalibrated); correct it"),
+        ("calibrated", ("-k", "steering"), "calibrated; correct it"),
+    ],
+)
+def test_a_condition_that_nothing_has_is_refused(pytester, conditions, more, said):
+    result = pytester.runpytest_subprocess(f"--agvbench-conditions={conditions}", *more)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines([f"*--agvbench-conditions: no run to drive is under this condition: {said}*"])
+
+
+@pytest.mark.usefixtures("bench_file")
 def test_calibration_first_repeats_interleaved_and_no_uncalibrated_half_speed(pytester):
     assert collected(pytester, "--agvbench-repeats=2") == [
         "steering_front[0.5-r01]",

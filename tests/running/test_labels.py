@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -11,6 +12,7 @@ from agvbench.cli import main
 from agvbench.errors import CampaignError, FileError
 from agvbench.labels import checked_labels
 from agvbench.running.configuration.lab_file import LabFile
+from agvbench.running.configuration.vehicles import with_lab_vehicle
 from agvbench.workflows.comparison.comparability import comparability
 from agvbench.workflows.history.facts import changed, facts_of
 from agvbench.workflows.init import make_lab
@@ -61,6 +63,18 @@ def test_differing_labels_are_noted_by_compare_and_history(lab):
 def test_a_resumed_session_refuses_another_label(lab):
     said = _run(lab, "bench", "--no-report", "--resume", "--out", "tuesday", "--label", "tyres=new", expected=2)
     assert "--label: a resumed session drives what it began with" in said
+
+
+def test_the_plant_of_the_lab_folder_is_simulated(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("lab.toml").write_text('[simulation]\nplant = "fast_car.py:make_car"\n', encoding="utf-8")
+    assert main(["bench", "--dry-run"]) == 2
+    assert "fast_car.py" in capsys.readouterr().err
+    assert with_lab_vehicle({})["plant"] == "fast_car.py:make_car"
+    assert with_lab_vehicle({"plant": "other.py:make"})["plant"] == "other.py:make"
+    Path("lab.toml").write_text("[simulation]\nplant = 3\n", encoding="utf-8")
+    assert main(["bench", "--dry-run"]) == 2
+    assert "lab.toml: simulation.plant: value cannot be used: 3" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,7 @@ def test_a_gap_is_told_even_where_the_share_is_good():
 
 
 def test_a_wrong_start_is_told_in_millimetres_and_degrees():
-    assert status(frames_of(), start=START._replace(x_m=0.53)).startswith("rejected: start 30 mm off")
+    assert status(frames_of(), start=START._replace(x_m=0.53)).startswith("rejected: start 30.0 mm off")
     turned = START._replace(heading_rad=math.radians(-177.0))
     assert status(frames_of(), start=turned).startswith("rejected: start heading 3.5° off")
 

@@ -15,7 +15,7 @@ import numpy as np
 from agvbench.campaign.recordings.bags.bag import is_bag
 from agvbench.campaign.recordings.guess_bag import guess_bag_mapping
 from agvbench.campaign.recordings.guess_columns import AGREES, Columns, Motion, agreement, courses, mapping_text, moves
-from agvbench.campaign.recordings.mapping import ANGLE, LENGTH, TIME, PoseSource
+from agvbench.campaign.recordings.mapping import ANGLE, LENGTH, TIME, Csv, PoseSource
 from agvbench.campaign.recordings.tum_recording import commands_beside, read_tum
 from agvbench.campaign.tables.csv_text import read_csv_text
 from agvbench.errors import FileError, OneOf
@@ -42,28 +42,30 @@ def guess_mapping(path: Path | str) -> tuple[str, list[str]]:
         return guess_bag_mapping(path)
     if path.suffix == ".tum":
         return _guess_tum(path)
-    delimiter = _delimiter(path)
-    columns = Columns(path, _numbers(path, delimiter))
+    csv = _csv_of(path)
+    columns = Columns(path, _numbers(path, csv))
     pose, motion = _pose(columns)
-    return mapping_text(columns, [], _csv_table(delimiter), pose, motion), columns.questions
+    return mapping_text(columns, [], _csv_table(csv), pose, motion), columns.questions
 
 
 def _guess_tum(path: Path) -> tuple[str, list[str]]:
     """Return the mapping of a TUM file and of the CSV of its commands."""
     poses, beside = read_tum(path, PoseSource()), commands_beside(path)
-    delimiter = _delimiter(beside)
-    columns = Columns(path, _numbers(beside, delimiter))
+    csv = _csv_of(beside)
+    columns = Columns(path, _numbers(beside, csv))
     time, unit, _ = _time(columns)
     is_absolute = poses.t_s[0] > _EPOCH_S
-    tables = _csv_table(delimiter) | {"pose": [f'clock = "{"absolute" if is_absolute else "file"}"']}
+    tables = _csv_table(csv) | {"pose": [f'clock = "{"absolute" if is_absolute else "file"}"']}
     motion = (poses.t_s, np.column_stack([poses.x_m, poses.y_m]), poses.heading_rad)
     pose = [f'time = {{ column = "{time}", unit = "{unit}" }}']
     return mapping_text(columns, [], tables, pose, motion), columns.questions
 
 
-def _csv_table(delimiter: str) -> dict[str, list[str]]:
-    """Return the table of the delimiter, unless it is the default."""
-    return {} if delimiter == "," else {"csv": [f'delimiter = "{delimiter}"'.replace("\t", "\\t")]}
+def _csv_table(csv: Csv) -> dict[str, list[str]]:
+    """Return the table of what is not as usual."""
+    lines = [f'delimiter = "{csv.delimiter}"'.replace("\t", "\\t")] if csv.delimiter != "," else []
+    lines += [f'decimal = "{csv.decimal}"'] if csv.decimal != "." else []
+    return {"csv": lines} if lines else {}
 
 
 def _pose(columns: Columns) -> tuple[list[str], Motion]:
@@ -83,18 +85,21 @@ def _pose(columns: Columns) -> tuple[list[str], Motion]:
     return lines, (t_s, position, sign * _FACTORS[angle] * columns.numbers[heading])
 
 
-def _delimiter(path: Path) -> str:
+def _csv_of(path: Path) -> Csv:
+    """Return how a CSV is written, as its first two lines show: between other delimiters a comma is a decimal one."""
     try:
         with path.open(encoding="utf-8", errors="replace") as file:
-            header = file.readline(1 << 16)
+            header, row = file.readline(1 << 16), file.readline(1 << 16)
     except OSError as error:
         raise FileError(f"cannot be read ({error.strerror})", where=path, remedy="give a CSV recording") from None
-    return max(_DELIMITERS, key=header.count)
+    delimiter = max(_DELIMITERS, key=header.count)
+    has_comma = delimiter != "," and re.search(r"\d,\d", row) is not None
+    return Csv(delimiter=delimiter, decimal="," if has_comma else ".")
 
 
-def _numbers(path: Path, delimiter: str) -> dict[str, Floats]:
+def _numbers(path: Path, csv: Csv) -> dict[str, Floats]:
     """Return the columns that are numbers; an empty cell is NaN, and true and false are 1 and 0."""
-    table = read_csv_text(path, columns=(), delimiter=delimiter)
+    table = read_csv_text(path, columns=(), delimiter=csv.delimiter, decimal=csv.decimal)
     found = {}
     for name in table.column_names:
         column = table[name]

@@ -20,6 +20,7 @@ def read_csv_text(
     *,
     columns: Collection[str] | None = None,
     delimiter: str = ",",
+    decimal: str = ".",
     encoding: str = "utf-8",
     skip_rows: int = 0,
 ) -> pa.Table:
@@ -32,7 +33,7 @@ def read_csv_text(
     columns
         The columns that stay text, for the caller to convert and to say which cell cannot be; by default all. The
         others get the type that all their cells have.
-    delimiter, encoding, skip_rows
+    delimiter, decimal, encoding, skip_rows
         How it is written, and how many lines come before the header.
 
     Raises
@@ -50,7 +51,7 @@ def read_csv_text(
                 encoding=encoding, column_names=names, skip_rows=skip_rows + 1, use_threads=False
             ),
             parse_options=pa_csv.ParseOptions(delimiter=delimiter),
-            convert_options=pa_csv.ConvertOptions(column_types=text, strings_can_be_null=False),
+            convert_options=pa_csv.ConvertOptions(column_types=text, strings_can_be_null=False, decimal_point=decimal),
         )
     except (pa.ArrowException, UnicodeDecodeError) as error:
         reason = str(error).splitlines()[0].removeprefix("CSV parse error: ")[:120]

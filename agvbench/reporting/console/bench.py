@@ -121,21 +121,28 @@ def _reach(request: RunRequest, plan: Plan) -> float:
     return float(np.abs(floor).max() + longest_axle + DEFAULT_MARGIN_M)
 
 
-def bench_summary(directory: Path, *, report: bool) -> str:
+def bench_summary(directory: Path, *, report: bool) -> tuple[str, bool]:
     """Return the summary of the campaign in `directory`, after writing its report where that is wanted.
 
-    What cannot be reported is said, not raised: the campaign is recorded all the same.
+    What cannot be reported is said, not raised: the campaign is recorded all the same. The second value is whether
+    everything could be reported.
     """
     try:
         if not report:
             data, defined = gather(directory), Text(f"{DEFINITIONS}\n")
             write_metrics(directory, data.metrics)
-            return as_text(Group(*_end_poses(data, defined), Text(f"campaign: {directory}")))
+            where = [*_failures(data), Text(f"campaign: {directory}")]
+            return as_text(Group(*_end_poses(data, defined), *where)), not data.failures
         written = write_report(directory)
     except AgvbenchError as error:
-        return f"no report: {error}\ncampaign: {directory}"
-    where = [Text(f"campaign: {directory}"), Text(f"report:   {written.files[0]}")]
-    return as_text(Group(*_end_poses(written.data), *said_first(written), Text(""), *where))
+        return f"no report: {error}\ncampaign: {directory}", False
+    where = [*_failures(written.data), Text(f"campaign: {directory}"), Text(f"report:   {written.files[0]}")]
+    text = as_text(Group(*_end_poses(written.data), *said_first(written), Text(""), *where))
+    return text, not written.data.failures
+
+
+def _failures(data: ReportData) -> list[Text]:
+    return [Text(f"metric {name} is left out: {error}") for name, error in data.failures.items()]
 
 
 def sequential_text(record: SequentialRecord, driven: int, saved: int) -> str:

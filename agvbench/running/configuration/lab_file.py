@@ -1,4 +1,4 @@
-"""``lab.toml`` of the lab folder: labels of every campaign from here, and the uncertainties that the lab states."""
+"""``lab.toml`` of the lab folder: labels of every campaign from here, uncertainties that the lab states, its plant."""
 
 from __future__ import annotations
 
@@ -19,17 +19,26 @@ from agvbench.validation import convert
 LAB_FILE = "lab.toml"
 
 
+class _Simulation(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    plant: str = ""
+
+
 class _File(msgspec.Struct, forbid_unknown_fields=True):
     labels: dict[str, Any] = {}
     uncertainty: dict[str, Any] = {}
+    simulation: _Simulation = _Simulation()
 
 
 @dataclass(frozen=True)
 class LabFile:
-    """What a lab states of itself: ``labels`` by name, ``uncertainty`` as `CampaignHeader` has it."""
+    """What a lab states of itself: ``labels`` by name, ``uncertainty`` as `CampaignHeader` has it.
+
+    ``plant`` is simulated here where no other is named; "" for the usual one.
+    """
 
     labels: Mapping[str, str] = field(default_factory=dict)
     uncertainty: Mapping[str, Any] = field(default_factory=dict)
+    plant: str = ""
 
     @classmethod
     def of_folder(cls) -> LabFile:
@@ -58,4 +67,4 @@ class LabFile:
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise FileError("is not TOML", where=path, value=error, remedy="correct the line") from None
         labels = checked_labels(file.labels, where=f"{path}: labels", error=FileError)
-        return cls(labels, read_statement(file.uncertainty, path, FileError))
+        return cls(labels, read_statement(file.uncertainty, path, FileError), file.simulation.plant)

@@ -28,7 +28,7 @@ _MOST_REPEATS = 1000
 """A thousand repeats of the shipped benchmarks take days; all runs are planned before the first is driven."""
 _LARGEST_SEED = 2**63 - 1
 # What may differ between a session and the one that resumes it: none of these changes what is driven.
-_FREE_ON_RESUME = frozenset({"benchmarks", "only", "connect", "bus_config", "lab", "exchange", "session"})
+_FREE_ON_RESUME = frozenset({"benchmarks", "only", "conditions", "connect", "bus_config", "lab", "exchange", "session"})
 # A fault that was rehearsed may be taken away, or another one put in.
 _MAY_HAVE_FAULTS = ("agv", "mocap", "camera")
 
@@ -75,6 +75,12 @@ class BenchSettings:
     trajectories: str = _option(
         "",
         "names or .toml files, with commas or one after another (default: the eight, and your own in trajectories/)",
+        metavar="NAME",
+        joined=True,
+    )
+    conditions: str = _option(
+        "",
+        "conditions to drive, such as calibrated; several with commas, or one after another (default: all)",
         metavar="NAME",
         joined=True,
     )
@@ -160,6 +166,11 @@ class BenchSettings:
             if choices:
                 value, allowed = getattr(self, option.name), (option.default, *choices)
                 _check(value in allowed, f"--{option.name}", value, OneOf(choices), "choose one of these")
+
+    @property
+    def asked_conditions(self) -> tuple[str, ...]:
+        """The conditions to drive; none for all."""
+        return tuple(filter(None, (name.strip() for name in self.conditions.split(","))))
 
     @classmethod
     def given(cls, options: Mapping[str, Any]) -> BenchSettings:

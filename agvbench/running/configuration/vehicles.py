@@ -10,6 +10,7 @@ from typing import Any
 
 from agvbench.errors import AgvbenchError
 from agvbench.model import VehicleModel, nominal_model, thesis_vehicle
+from agvbench.running.configuration.lab_file import LabFile
 from agvbench.running.configuration.settings import BenchSettings
 from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
@@ -26,16 +27,29 @@ def lab_vehicle() -> str:
 
 
 def with_lab_vehicle(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the options `given`, by default with the lab folder's vehicle and a simulated plant of its kind."""
+    """Return the options `given`, by default with the lab folder's vehicle and plant, or a plant of its kind.
+
+    Raises
+    ------
+    FileError
+        If ``lab.toml`` cannot be read.
+    """
     options = {"vehicle": lab_vehicle(), **given}
     return options if "plant" in given else {"plant": default_plant(options["vehicle"]), **options}
 
 
 def default_plant(vehicle: str) -> str:
-    """Return the simulated plant of the kind of the vehicle file `vehicle`, else that of the thesis' vehicle.
+    """Return the plant that the lab folder names, else one of the kind of the vehicle file `vehicle`.
 
-    A file that cannot be read is refused where it is used.
+    Without a vehicle it is that of the thesis' vehicle. A vehicle that cannot be read is refused where it is used.
+
+    Raises
+    ------
+    FileError
+        If ``lab.toml`` cannot be read.
     """
+    if plant := LabFile.of_folder().plant:
+        return plant
     with suppress(AgvbenchError):
         if vehicle and VehicleModel.load(vehicle).geometry.is_differential:
             return DIFFERENTIAL_PLANT

@@ -25,7 +25,7 @@ from agvbench.labels import labels_given
 from agvbench.model import VehicleModel
 from agvbench.planning import Workspace
 from agvbench.running.configuration.campaign_directory import choose_directory, has_runs
-from agvbench.running.configuration.lab_file import LabFile
+from agvbench.running.configuration.lab_file import LAB_FILE, LabFile
 from agvbench.running.configuration.provenance import (
     INPUTS_TABLE,
     RecordedInputs,
@@ -142,9 +142,12 @@ def _notices(settings: BenchSettings, given: Mapping[str, Any], directory: Path)
     """Return what was decided without being asked for."""
     is_found = settings.vehicle == LAB_VEHICLE and "vehicle" not in given
     is_copy = settings.calibration == str(directory / VEHICLE_FILE)
-    return [f"vehicle: {LAB_VEHICLE} of this folder"] * is_found + [
-        f"calibration: the campaign's copy {settings.calibration}, since the file given before is gone"
-    ] * is_copy
+    is_lab_plant = "plant" not in given and settings.agv == "sim" and settings.plant == LabFile.of_folder().plant
+    return (
+        [f"vehicle: {LAB_VEHICLE} of this folder"] * is_found
+        + [f"plant: {settings.plant}, from {LAB_FILE}"] * is_lab_plant
+        + [f"calibration: the campaign's copy {settings.calibration}, since the file given before is gone"] * is_copy
+    )
 
 
 def _header(
