@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType, ModuleType
@@ -54,6 +54,17 @@ def named_metric(name: str, *, where: str) -> Metric:
     if name not in all_metrics():
         raise FlagError("unknown metric", where=where, value=name, limit=OneOf(all_metrics()))
     return all_metrics()[name]
+
+
+def title_of(name: str) -> str:
+    """Return what tables print for a metric; its name where `all_metrics` does not know it."""
+    return all_metrics()[name].title if name in all_metrics() else name
+
+
+def in_registry_order(names: Iterable[str]) -> list[str]:
+    """Return metrics by name in the order of `all_metrics`, each once; those that it does not know come last."""
+    known, given = list(all_metrics()), dict.fromkeys(names)
+    return [*(name for name in known if name in given), *(name for name in given if name not in known)]
 
 
 def _metrics_in(module: ModuleType) -> list[Metric]:

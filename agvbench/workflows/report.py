@@ -168,7 +168,9 @@ def gather(
         problems=problems,
         failures=failures,
         diagnosis=read_diagnosis(campaign.path),
-        changes=changes_since_before(campaign.path, against, firmware=firmware_of(run.firmware for run in runs)),
+        changes=changes_since_before(
+            campaign.path, against, firmware=firmware_of(run.firmware for run in runs), metrics=metrics
+        ),
     )
 
 

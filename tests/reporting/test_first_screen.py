@@ -21,7 +21,7 @@ from agvbench.reporting.sections.runs import RunsSection
 from agvbench.reporting.sections.uncertainty import UncertaintySection
 from agvbench.reporting.write import write_report
 from agvbench.workflows.diagnosis_files import ShownDiagnosis
-from agvbench.workflows.report_changes import changes_since_before
+from agvbench.workflows.report_changes import changes_since_before, medians_before_and_now
 
 SMALL = {"repeats": 2, "rate_hz": 30.0, "trajectories": ("6_forward_right",), "calibration": False}
 
@@ -110,8 +110,22 @@ def test_what_differs_from_the_last_campaign_of_this_vehicle_is_listed(tmp_path)
 def test_nothing_changed_is_said(report_data, tmp_path):
     data = report_data("one condition")
     changes = changes_since_before(data.path, data.path)
-    (said,) = ChangesSection().blocks(replace(data, changes=changes))
-    assert "Nothing that is recorded differs" in said.text
+    said, medians = ChangesSection().blocks(replace(data, changes=changes))
+    assert "No setting, file or label that is recorded differs" in said.text
+    assert "end position error" in {row[0] for row in medians.rows}
+    assert all(row[-1] == 0.0 for row in medians.rows)
+
+
+def test_medians_before_and_now_are_of_the_trajectories_that_both_drove():
+    columns = ["trajectory", "condition", "metric", "unit", "status", "value"]
+    was = [("1", "calibrated", "across_error", "mm", "ok", v) for v in (-10.0, 2.0, 3.0)]
+    was += [("2", "calibrated", "across_error", "mm", "ok", 99.0)]
+    now = [("1", "calibrated", "across_error", "mm", status, v) for status, v in (("ok", 5.0), ("rejected: gap", 70.0))]
+    (row,) = medians_before_and_now(*(pd.DataFrame(rows, columns=columns) for rows in (was, now))).to_dict("records")
+    assert row == {
+        "metric": "across_error", "unit": "mm", "condition": "calibrated",
+        "runs_before": 3, "median_before": 3.0, "runs_now": 1, "median_now": 5.0,
+    }  # fmt: skip
 
 
 def test_uncertainty_is_written_as_json_and_csv(campaigns, tmp_path):

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from agvbench.metrics.registry import all_metrics
+from agvbench.metrics.registry import all_metrics, in_registry_order, title_of
 from agvbench.reporting.content import Block, Column, Paragraph, Table, Value, plain
 from agvbench.reporting.sections.base import Section
 from agvbench.statistics.descriptive import five_numbers
@@ -41,21 +41,20 @@ class MetricsSection(Section):
         if not rows:
             return [Paragraph("No run has a planned path, or another metric than those of its end pose.")]
         known = all_metrics()
-        named = dict.fromkeys(data.metrics["metric"])
-        said = [f"{_title(m)}: {plain(known[m].definition)}" for m in named if m in known and m not in _SHOWN_ELSEWHERE]
+        named = in_registry_order(data.metrics["metric"])
+        said = [
+            f"{title_of(m)}: {plain(known[m].definition)}" for m in named if m in known and m not in _SHOWN_ELSEWHERE
+        ]
         return [Table("metrics", _CAPTION, _COLUMNS, rows, grouped=True, note=" ".join(said))]
 
 
 def _rows(data: ReportData) -> Iterator[list[Value]]:
     table = data.metrics
     counted = table[(table["status"] == RUN_OK) & ~table["metric"].isin(_SHOWN_ELSEWHERE)]
-    for (trajectory, metric), group in counted.groupby(["trajectory", "metric"], sort=False):
-        unit = str(group["unit"].iloc[0])
-        for condition in in_order(group["condition"]):
-            values = np.abs(group["value"][group["condition"] == condition].to_numpy(dtype=float))
-            yield [str(trajectory), _title(str(metric)), unit, condition, len(values), *five_numbers(values)]
-
-
-def _title(metric: str) -> str:
-    known = all_metrics().get(metric)
-    return metric if known is None else known.title
+    for trajectory, of_trajectory in counted.groupby("trajectory", sort=False):
+        for metric in in_registry_order(of_trajectory["metric"]):
+            group = of_trajectory[of_trajectory["metric"] == metric]
+            unit = str(group["unit"].iloc[0])
+            for condition in in_order(group["condition"]):
+                values = np.abs(group["value"][group["condition"] == condition].to_numpy(dtype=float))
+                yield [str(trajectory), title_of(metric), unit, condition, len(values), *five_numbers(values)]
