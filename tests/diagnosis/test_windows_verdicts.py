@@ -46,6 +46,13 @@ def test_a_steering_lag_is_named_with_its_size(lagging):
         assert errors[name]["after"] < 0.2 * errors[name]["before"]
 
 
+def test_residuals_along_the_way_shrink_to_what_noise_leaves(lagging):
+    residuals = lagging.residuals
+    assert set(residuals["held_out"]) == {False, True}
+    held = residuals[residuals["held_out"]]
+    assert held["after_turning"].abs().median() < 0.3 * held["before_turning"].abs().median()
+
+
 def test_each_recording_is_told_with_every_predictor(lagging):
     windows = json.loads(lagging.to_text())["provenance"]["windows"]
     assert (windows["horizon_s"], windows["stride_s"]) == (2.0, 1.0)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
-from ompl import base as ompl_base
 from planning_truth import end_of
 
 from agvbench.errors import PlanError
@@ -15,8 +14,8 @@ from agvbench.planning.shortest_paths.pieces import length_of
 from agvbench.types import Pose
 
 PLANNERS = {
-    "dubins": (dubins, ompl_base.DubinsStateSpace),
-    "reeds_shepp": (reeds_shepp, ompl_base.ReedsSheppStateSpace),
+    "dubins": (dubins, "DubinsStateSpace"),
+    "reeds_shepp": (reeds_shepp, "ReedsSheppStateSpace"),
 }
 ORIGIN = Pose(0.0, 0.0, 0.0)
 coordinates = st.floats(-5.0, 5.0)
@@ -56,7 +55,8 @@ def ompl_lengths(space, starts, goals):
 @pytest.mark.parametrize("name", PLANNERS)
 @pytest.mark.parametrize("radius_m", [0.22, 0.7, 3.0])
 def test_a_hundred_thousand_lengths_agree_with_ompl(name, radius_m):
-    module, space = PLANNERS[name]
+    base = pytest.importorskip("ompl.base", reason="ompl has no wheel for this Python")
+    module, space = PLANNERS[name][0], getattr(base, PLANNERS[name][1])
     starts, goals = random_pairs(100_000 // 3 + 1, seed=int(100 * radius_m))
     ours = module.shortest_lengths(starts, goals, radius_m)
     np.testing.assert_allclose(ours, ompl_lengths(space(radius_m), starts, goals), rtol=0.0, atol=1e-9)

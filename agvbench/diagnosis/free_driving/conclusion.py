@@ -19,6 +19,7 @@ from agvbench.diagnosis.findings.effect_states import effect_states
 from agvbench.diagnosis.findings.estimates import named_effects
 from agvbench.diagnosis.findings.omitted_effects import omitted_effects
 from agvbench.diagnosis.findings.prior_checks import check_priors, provenance_of, with_contradictions, with_evidence
+from agvbench.diagnosis.findings.residual_table import with_residuals
 from agvbench.diagnosis.free_driving.drive_level import DriveLevel
 from agvbench.diagnosis.free_driving.errors import QUANTITIES, by_recording, repeatability_squares, rms, squares
 from agvbench.diagnosis.free_driving.predictors import change_by_speed_error, constant_velocity, prior_model, speed_held
@@ -77,7 +78,7 @@ class WindowConclusion:
         rest = self._dependences(poses) if _above(held_out, RESIDUAL.within_repeatability) else []
         far = self._far_above_noise(held_out)
         verdict, why = with_contradictions(*_verdict(effects, rest, far), checks)
-        return Diagnosis(
+        found = Diagnosis(
             verdict,
             why,
             effects,
@@ -91,6 +92,7 @@ class WindowConclusion:
             | provenance_of(checks),
             states=effect_states(chosen.fit, effects, omitted),
         )
+        return with_residuals(found, self.assessment, self.held, before, poses)
 
     def _fit_provenance(self, horizon: Horizon, predicted: dict[str, Floats], perturbed: Floats) -> dict[str, object]:
         """Return the provenance of the fit, with the errors of each predictor and each effect."""
