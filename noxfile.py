@@ -25,6 +25,9 @@ FIRMWARE_PACKAGES = ["make", "gcc", "libc6-dev", "gcc-avr", "avr-libc", "simavr"
 def install(session: nox.Session, *extras: str) -> None:
     """Install agvbench for editing, with exactly the versions of the lock file."""
     wanted = f".[{','.join(extras)}]" if extras else "."
+    if "test" in extras:
+        # Tests start hundreds of processes: one that finds no byte code compiles for seconds what it imports.
+        session.env |= {"UV_COMPILE_BYTECODE": "1", "PYTHONDONTWRITEBYTECODE": ""}
     session.install("--quiet", "-c", LOCK, "-e", wanted)
 
 

@@ -65,7 +65,7 @@ def read_cells(campaign: Path) -> MetricCells:
 
 def _reduced(table: pa.Table, path: Path) -> MetricCells:
     try:
-        texts = {name: _encoded(table[name]) for name in _TEXTS}
+        texts = {name: encoded(table[name]) for name in _TEXTS}
         values = table["value"].cast(pa.float64()).to_numpy()
     except (pa.ArrowException, TypeError, ValueError):
         raise CampaignError("has a column of another type", where=path, remedy=remedy_for(path)) from None
@@ -78,7 +78,7 @@ def _reduced(table: pa.Table, path: Path) -> MetricCells:
     return _cells([texts[name][0] for name in KEYS], codes, values[counts], ", ".join(filter(None, firmware)))
 
 
-def _encoded(column: pa.ChunkedArray) -> tuple[tuple[str, ...], Codes]:
+def encoded(column: pa.ChunkedArray) -> tuple[tuple[str, ...], Codes]:
     """Return the distinct texts of a column and the number of each row's; an empty cell has the text ""."""
     whole = column.combine_chunks()
     if not isinstance(whole.type, pa.DictionaryType):

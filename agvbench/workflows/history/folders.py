@@ -14,7 +14,7 @@ from agvbench.campaign.header import FILE_NAME
 from agvbench.campaign.tables.parquet import read_parquet
 from agvbench.errors import AgvbenchError, CampaignError
 
-_PROVENANCE = "provenance.parquet"
+PROVENANCE = "provenance.parquet"
 _DATE_IN_NAME = re.compile(r"(?<!\d)(\d{4})-?(\d{2})-?(\d{2})(?:[T_-](\d{2})[:.-]?(\d{2})(?:[:.-]?(\d{2}))?)?(?!\d)")
 
 
@@ -62,7 +62,7 @@ def dated(campaign: Path) -> Dated:
     OSError
         If there is no ``campaign.toml``.
     """
-    if (began := _began(campaign / _PROVENANCE)) is not None:
+    if (began := _began(campaign / PROVENANCE)) is not None:
         return Dated(began, DatedBy.PROVENANCE)
     if (named := _date_in_name(campaign.name)) is not None:
         return Dated(named, DatedBy.NAME)

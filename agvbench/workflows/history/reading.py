@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -12,16 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from agvbench.campaign.header import FILE_NAME, CampaignHeader
 from agvbench.campaign.names import as_texts
 from agvbench.errors import AgvbenchError, CampaignError, FlagError, InputError, OneOf
 from agvbench.metrics.registry import all_metrics
 from agvbench.statistics.change_points import ORDERS, ChangePoint, ChangePoints, find_steps
 from agvbench.statistics.end_poses import in_order
 from agvbench.types import Floats
-from agvbench.workflows.history.cells import MetricCells, read_cells
+from agvbench.workflows.history.cache import CampaignCache, ReadCampaign
 from agvbench.workflows.history.facts import Facts, changed, facts_of
-from agvbench.workflows.history.folders import Dated, campaigns_below, dated
+from agvbench.workflows.history.folders import campaigns_below
 from agvbench.workflows.history.nights import Nights, named, nights_of
 from agvbench.workflows.history.result import History
 
@@ -31,17 +29,6 @@ if TYPE_CHECKING:
 ALPHA = 0.05
 Track = Callable[[Iterable[Path], int], Iterable[Path]]
 """Wraps the directories while they are read, to show progress: called with them and their number."""
-
-
-@dataclass(frozen=True)
-class _Read:
-    """A campaign that was read; ``name`` is its path below the folder."""
-
-    path: Path
-    name: str
-    driven: Dated
-    vehicle: str
-    cells: MetricCells
 
 
 def history(
@@ -97,16 +84,16 @@ def history(
     )
 
 
-def _read_all(folder: Path, track: Track | None) -> tuple[list[_Read], list[str]]:
+def _read_all(folder: Path, track: Track | None) -> tuple[list[ReadCampaign], list[str]]:
     """Return the campaigns below a folder in the order of their dates, and a line for each that cannot be read."""
     if not folder.is_dir():
         what = "is not a directory" if folder.exists() else "does not exist"
         raise InputError(what, where=folder, remedy="give a folder with campaigns")
-    read, unread = list[_Read](), list[str]()
+    cache, read, unread = CampaignCache(folder), list[ReadCampaign](), list[str]()
     paths = list(campaigns_below(folder, unread.append))
     for path in track(paths, len(paths)) if track else paths:
         try:
-            read.append(_read(path, folder))
+            read.append(cache.read(path))
         except AgvbenchError as error:
             unread.append(str(error))
         except OSError as error:
@@ -114,13 +101,8 @@ def _read_all(folder: Path, track: Track | None) -> tuple[list[_Read], list[str]
     if not any(len(one.cells.repeats) for one in read):
         why = f" that can be read (the first: {unread[0]})" if unread else " with a run that counts" if paths else ""
         raise InputError(f"has no campaign{why}", where=folder, remedy="give a folder with campaigns")
-    read.sort(key=lambda one: (one.driven.at, one.name))
-    return read, unread
-
-
-def _read(path: Path, folder: Path) -> _Read:
-    header = CampaignHeader.load(path / FILE_NAME)
-    return _Read(path, path.relative_to(folder).as_posix(), dated(path), header.vehicle_name, read_cells(path))
+    cache.keep(read)
+    return sorted(read, key=lambda one: (one.driven.at, one.name)), unread
 
 
 def _chosen(nights: Nights, metrics: str | Collection[str] | None, conditions: str | Collection[str] | None) -> Nights:
@@ -139,14 +121,14 @@ def _chosen(nights: Nights, metrics: str | Collection[str] | None, conditions: s
     return Nights(series, nights.trajectories, nights.repeats[kept], nights.median[kept], nights.spread[kept])
 
 
-def _campaigns(read: Sequence[_Read]) -> pd.DataFrame:
+def _campaigns(read: Sequence[ReadCampaign]) -> pd.DataFrame:
     import pandas as pd
 
     rows = [(k, r.name, r.driven.at, str(r.driven.by), r.vehicle, r.cells.firmware) for k, r in enumerate(read)]
     return pd.DataFrame(rows, columns=["night", "campaign", "driven", "dated_by", "vehicle", "firmware"])
 
 
-def _night_table(nights: Nights, read: Sequence[_Read]) -> pd.DataFrame:
+def _night_table(nights: Nights, read: Sequence[ReadCampaign]) -> pd.DataFrame:
     import pandas as pd
 
     table = nights.table()
@@ -187,7 +169,7 @@ _CHANGE_COLUMNS = (
 )
 
 
-def _change_table(nights: Nights, found: ChangePoints, read: Sequence[_Read]) -> pd.DataFrame:
+def _change_table(nights: Nights, found: ChangePoints, read: Sequence[ReadCampaign]) -> pd.DataFrame:
     import pandas as pd
 
     facts = cache(lambda night: facts_of(read[night].path, read[night].cells.firmware))
@@ -202,14 +184,14 @@ def _change_table(nights: Nights, found: ChangePoints, read: Sequence[_Read]) ->
     return table.iloc[order].reset_index(drop=True)
 
 
-def _where(step: ChangePoint, read: Sequence[_Read]) -> Iterator[Any]:
+def _where(step: ChangePoint, read: Sequence[ReadCampaign]) -> Iterator[Any]:
     numbers = step.night, step.earliest, step.latest
     for night in numbers:
         yield from (read[night].name, read[night].driven.at)
     yield from numbers
 
 
-def _facts(step: ChangePoint, read: Sequence[_Read], facts: Callable[[int], Facts]) -> Iterator[tuple[str, str]]:
+def _facts(step: ChangePoint, read: Sequence[ReadCampaign], facts: Callable[[int], Facts]) -> Iterator[tuple[str, str]]:
     """Yield what changed from night to night within the interval of a step, with the campaign that brought it."""
     for before, after in pairwise(range(step.last_before, step.latest + 1)):
         for phrase in changed(facts(before), facts(after)):
