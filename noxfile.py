@@ -27,7 +27,7 @@ def install(session: nox.Session, *extras: str) -> None:
     wanted = f".[{','.join(extras)}]" if extras else "."
     if "test" in extras:
         # Tests start hundreds of processes: one that finds no byte code compiles for seconds what it imports.
-        session.env |= {"UV_COMPILE_BYTECODE": "1", "PYTHONDONTWRITEBYTECODE": ""}
+        session.env.update({"UV_COMPILE_BYTECODE": "1", "PYTHONDONTWRITEBYTECODE": ""})
     session.install("--quiet", "-c", LOCK, "-e", wanted)
 
 

@@ -7,6 +7,7 @@ the cache is a table like those of campaigns; one that is damaged or of another 
 from __future__ import annotations
 
 import hashlib
+import time
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -30,6 +31,7 @@ from agvbench.workflows.history.folders import PROVENANCE, Dated, DatedBy, dated
 _READ_FROM = (FILE_NAME, FILE, PROVENANCE)
 _VERSION = f"{__version__}-1"
 """Of the program, and of how it reduces a campaign."""
+_UNUSED_S = 90 * 86400.0
 _OF_CAMPAIGN = ("campaign", "stamp", "driven", "dated_by", "vehicle", "firmware")
 _NUMBERS = ("repeats", "median", "spread")
 
@@ -90,6 +92,13 @@ class CampaignCache:
         with suppress(OSError, pa.ArrowException):
             self._file.parent.mkdir(parents=True, exist_ok=True)
             write_atomically(self._file, to_parquet(_table(list(now.values()))), durable=False)
+            self._delete_unused()
+
+    def _delete_unused(self) -> None:
+        """Delete what was kept of folders that nobody asked for in a long time."""
+        for file in self._file.parent.glob("*.parquet"):
+            if time.time() - file.stat().st_mtime > _UNUSED_S:
+                file.unlink(missing_ok=True)
 
     def _load(self) -> Iterator[ReadCampaign]:
         table = read_parquet(self._file, plain=False)
