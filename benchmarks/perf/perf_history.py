@@ -9,6 +9,7 @@ Run with ``python benchmarks/perf/perf_history.py [--campaigns N] [--histories N
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 import tempfile
@@ -135,14 +136,23 @@ def false_steps(histories: int, noise: Noise, nights: int) -> Proportion:
 
 def seconds(folder: Path) -> Iterator[tuple[str, float]]:
     """Yield what was done and its time [s]: the history in a warm process, and the command."""
+    with tempfile.TemporaryDirectory() as few:
+        write_campaigns(Path(few), 12)
+        history(few)
+    began = time.perf_counter()
     history(folder)
+    yield (
+        f"agvbench.history of {len(list(folder.iterdir()))} campaigns × {RUNS} runs, none read before",
+        time.perf_counter() - began,
+    )
     times = []
-    for _ in range(3):
+    for night in range(3):
+        os.utime(folder / f"night-{night:04d}" / FILE)
         began = time.perf_counter()
         found = history(folder)
         times.append(time.perf_counter() - began)
     assert "firmware 2.0 → 2.1" in {fact for facts in found.changes["facts"] for _, fact in facts}
-    yield f"agvbench.history of {len(found.campaigns)} campaigns × {RUNS} runs, best of 3", min(times)
+    yield "the same with one campaign that is new, best of 3", min(times)
     began = time.perf_counter()
     command = [sys.executable, "-m", "agvbench", "history", str(folder)]
     subprocess.run(command, check=True, capture_output=True)  # noqa: S603
@@ -167,7 +177,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         write_campaigns(Path(name), given.campaigns)
         for k, (what, took) in enumerate(seconds(Path(name))):
-            add(what, f"{took:.1f} s", "" if k else f"≤ {BOUND_S:g} s", is_met=bool(k) or took <= BOUND_S)
+            add(what, f"{took:.1f} s", f"≤ {BOUND_S:g} s" if k == 1 else "", is_met=k != 1 or took <= BOUND_S)
     for size, within, noise in ((2.5, 1, Noise()), (2.0, 2, Noise()), (2.0, 2, Noise(0.3))):
         near, covered, others = steps_found(given.histories, size, within, noise)
         bound = "" if noise.correlation else f"≥ {LEAST_FOUND:.0%}"

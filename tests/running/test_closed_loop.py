@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from agvbench.campaign import Campaign
+from agvbench.campaign.names import planned_name
 from agvbench.control import Motion, PurePursuit, Stanley
 from agvbench.errors import ControllerError, FlagError, PlanError
 from agvbench.model import example_path
@@ -45,6 +46,15 @@ def test_a_controller_ends_much_nearer_to_the_target_than_the_plan(condition, tm
         for make in (PurePursuit, Stanley):
             run = controlled(session, make, "figure_eight", run_id=make.__name__, condition=condition)
             assert run.error.position_mm < open_loop.error.position_mm / 5
+
+
+def test_controllers_that_differ_in_parameters_have_names_of_their_own(tmp_path):
+    with opened(tmp_path / "c") as session:
+        controlled(session, partial(PurePursuit, lookahead_m=0.2), controller_name="ahead-0.2")
+        with pytest.raises(FlagError, match="controller_name: name cannot be used: a/b"):
+            controlled(session, PurePursuit, run_id="other", controller_name="a/b")
+    run = Campaign.open(tmp_path / "c").run("closed")
+    assert (run.trajectory, run.extra["controller"], planned_name(run)) == ("5-ahead-0.2", "ahead-0.2", "5")
 
 
 def test_what_was_sent_and_how_late_poses_were_is_recorded(tmp_path):

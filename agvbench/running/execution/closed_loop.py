@@ -23,6 +23,7 @@ from agvbench.running.rest_detection import pose_before
 from agvbench.types import Command, Commands, Frames, Pose
 
 DEFAULT_PERIOD_S = 0.1
+_NAME = re.compile(r"[A-Za-z0-9_.-]{0,60}")
 _PERIODS_S = (0.02, 0.5)
 """A camera of 100 Hz sees two frames in the shortest; a vehicle's host stops it after the longest."""
 
@@ -39,18 +40,24 @@ class Control:
         What the controller is to follow.
     period_s
         The control cycle [s].
+    called
+        How messages and the runs table call the controller; by default by the factory's name.
 
     Raises
     ------
     FlagError
-        If the control cycle is out of range.
+        If the control cycle is out of range, or the name is not of letters, digits, ``_``, ``.`` and ``-``.
     """
 
     make_controller: ControllerFactory
     reference: Reference
     period_s: float = DEFAULT_PERIOD_S
+    called: str = ""
 
     def __post_init__(self) -> None:
+        if not _NAME.fullmatch(self.called):
+            limit = "at most 60 letters, digits, _ . -"
+            raise FlagError("name cannot be used", where="controller_name", value=self.called, limit=limit)
         low, high = _PERIODS_S
         if not low <= self.period_s <= high:
             value, limit = f"{self.period_s:g} s", f"{low:g} to {high:g} s"
@@ -58,7 +65,9 @@ class Control:
 
     @property
     def name(self) -> str:
-        """How messages and the runs table call the controller: the factory's name, such as ``"PurePursuit"``."""
+        """How messages and the runs table call the controller: the name given, or ``"PurePursuit"`` of its factory."""
+        if self.called:
+            return self.called
         made: Any = getattr(self.make_controller, "func", self.make_controller)  # of functools.partial
         return re.sub(r"\W", "", str(getattr(made, "__name__", type(made).__name__)))
 

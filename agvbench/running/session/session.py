@@ -261,21 +261,26 @@ class Driver:
         *,
         condition: str,
         period_s: float = DEFAULT_PERIOD_S,
+        controller_name: str = "",
     ) -> DrivenRun:
         """Drive the trajectory `name` closed loop: a controller commands the vehicle every `period_s` [s].
 
         `make_controller` makes it for each attempt; `condition` says with which model its motions become commands. The
-        run's trajectory is called by both names, such as ``figure_eight-PurePursuit``.
+        run's trajectory is called by both names, such as ``figure_eight-PurePursuit``. Controllers that differ in their
+        parameters take a `controller_name`, or they count as repeats of each other.
 
         Raises
         ------
         ControllerError
             If the controller fails or returns what cannot be commanded; the vehicle was stopped, the run is aborted.
         FlagError, PlanError, RunRejectedError, LinkError
-            As `trajectory`. A controller that does not end the run is rejected.
+            As `trajectory`, and if `controller_name` or `period_s` cannot be used. A controller that does not end the
+            run is rejected.
         """
         planned = self._planned(name, condition)
-        control = Control(make_controller, Reference(planned, self._session.model(condition)), period_s)
+        control = Control(
+            make_controller, Reference(planned, self._session.model(condition)), period_s, controller_name
+        )
         with self._planning():
             control.controller(self._run_id)  # what it cannot follow is said before anything moves, or in a dry run
         name = controlled_name(planned.trajectory.name, control.name)
