@@ -1,4 +1,4 @@
-"""The command line: one file per command in this package, found by name.
+"""The command line: one file per command in the packages of this one, found by name.
 
 A command is a module with ``HELP`` (one line), ``add_arguments(parser)`` and ``run(arguments) -> int``; ``PACKAGES``
 lists what it needs that the light installation leaves out. It imports nothing heavy at module level, so that ``agvbench
@@ -13,14 +13,18 @@ import importlib
 import os
 import pkgutil
 import sys
-from collections.abc import Iterable, Sequence
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
 from types import ModuleType
 from typing import NoReturn
 
 from agvbench import __version__
+from agvbench.cli import analysis, driving, laboratory
 from agvbench.cli._failures import EXIT_CODE, Interrupts
 from agvbench.errors import AgvbenchError, FlagError
 
+_DESCRIPTION = "Does the vehicle do what is commanded, what does calibration buy, and what does the model lack?"
+_NAME_WIDTH, _HELP_WIDTH = 11, 79
 _EPILOG = """\
 exit codes: 0 done; 1 the answer is "no" (compare: a regression,
 diagnose --check: not adequate, bench: a run failed, doctor: not ready,
@@ -33,26 +37,37 @@ shell completion: eval "$(register-python-argcomplete agvbench)"
 """
 
 
+_GROUPS = (driving, analysis, laboratory)
+"""The packages of commands, as ``agvbench --help`` lists them."""
+
 # Our matrices have a hundred rows: more threads only wait for one another, and add up in another order.
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-class _CommandList(argparse.RawDescriptionHelpFormatter):
-    """Leaves room for the longest command's name: argparse forgets that commands are indented."""
-
-    def __init__(self, prog: str) -> None:
-        super().__init__(prog, max_help_position=16)
-        self._action_max_length = 14
+def _modules_in(group: ModuleType) -> dict[str, str]:
+    """Return the full name of the module of each command in a package."""
+    modules = sorted(m.name for m in pkgutil.iter_modules(group.__path__) if not m.name.startswith("_"))
+    return {name.removesuffix("_"): f"{group.__name__}.{name}" for name in modules}
 
 
 def _command_names() -> dict[str, str]:
-    """Return the module of each command."""
-    modules = sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_"))
-    return {name.removesuffix("_"): name for name in modules}
+    """Return the module of each command, by group."""
+    return {name: module for group in _GROUPS for name, module in _modules_in(group).items()}
 
 
 def _commands() -> dict[str, ModuleType]:
-    return {name: importlib.import_module(f"{__name__}.{module}") for name, module in _command_names().items()}
+    return {name: importlib.import_module(module) for name, module in _command_names().items()}
+
+
+def _listed(commands: Mapping[str, ModuleType]) -> str:
+    """Return what each command is for, under the titles of their groups."""
+    lines = []
+    for group in _GROUPS:
+        lines += ["", f"{str(group.__doc__).rstrip('.')}:"]
+        for name in _modules_in(group):
+            first, further = f"  {name:<{_NAME_WIDTH}}", " " * (_NAME_WIDTH + 2)
+            lines += textwrap.wrap(commands[name].HELP, _HELP_WIDTH, initial_indent=first, subsequent_indent=further)
+    return "\n".join(lines)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -64,19 +79,21 @@ class _Parser(argparse.ArgumentParser):
 
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of ``agvbench`` with every command of this package."""
+    commands = _commands()
     parser = _Parser(
         prog="agvbench",
-        description="Does the vehicle do what is commanded, what does calibration buy, and what does the model lack?",
+        description=f"{_DESCRIPTION}\n{_listed(commands)}",
         epilog=_EPILOG,
-        formatter_class=_CommandList,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"agvbench {__version__}")
-    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for name, module in _commands().items():
+    subparsers = parser.add_subparsers(
+        dest="command", metavar="COMMAND", required=True, help="one of these; agvbench COMMAND --help explains it"
+    )
+    for name, module in commands.items():
         sub = subparsers.add_parser(
             name,
             allow_abbrev=False,
-            help=module.HELP,
             description=module.__doc__,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )

@@ -10,7 +10,8 @@ from functools import partial
 
 import pytest
 
-from agvbench.cli import effects, main
+from agvbench.cli import main
+from agvbench.cli.analysis import effects
 from agvbench.errors import FitError
 
 PROGRAM = """

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from agvbench.cli import effects, main
+from agvbench.cli import main
+from agvbench.cli.analysis import effects
 
 
 @pytest.fixture

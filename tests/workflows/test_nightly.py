@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from agvbench.cli import main
-from agvbench.cli.nightly import last_good
+from agvbench.cli.driving.nightly import last_good
 from agvbench.errors import FileError
 
 QUICK = ["-k", "trajectory and 1-un", "--repeats", "3", "--exchange", "2"]

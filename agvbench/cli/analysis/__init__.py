@@ -1,0 +1,1 @@
+"""Read, analyse and compare what was driven."""
