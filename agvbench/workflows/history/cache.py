@@ -95,7 +95,7 @@ class CampaignCache:
             self._delete_unused()
 
     def _delete_unused(self) -> None:
-        """Delete what was kept of folders that nobody asked for in a long time."""
+        """Delete what was kept of folders whose history was not asked for in a long time."""
         for file in self._file.parent.glob("*.parquet"):
             if time.time() - file.stat().st_mtime > _UNUSED_S:
                 file.unlink(missing_ok=True)

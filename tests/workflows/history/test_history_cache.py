@@ -78,7 +78,7 @@ def test_a_cache_that_cannot_be_written_costs_nothing_but_time(nights, tmp_path)
     assert len(history(nights).campaigns) == 12
 
 
-def test_what_nobody_asked_for_in_a_long_time_is_deleted(nights, tmp_path):
+def test_what_was_not_asked_for_in_a_long_time_is_deleted(nights, tmp_path):
     (tmp_path / "cache" / "history").mkdir(parents=True)
     old = tmp_path / "cache" / "history" / "old.parquet"
     old.write_bytes(b"")
