@@ -11,7 +11,7 @@ from agvbench.reporting.console.tables import console_table
 from agvbench.reporting.content import Column, Table, Value
 from agvbench.workflows.sweep import SweepResult
 from agvbench.workflows.sweep.grid import Grid
-from agvbench.workflows.sweep.results import ERROR, incomplete_cells, ranked_cells
+from agvbench.workflows.sweep.results import incomplete_cells, ranked_cells
 from agvbench.workflows.sweep.run import first_command
 
 if TYPE_CHECKING:
@@ -26,10 +26,10 @@ def print_sweep(console: Console, result: SweepResult) -> None:
     ranked = ranked_cells(result.directory, result.grid)
     ends = ranked if len(ranked) <= 2 * _SHOWN else None
     if ends is not None:
-        _print_cells(console, "cells by median end position error", result.grid, ends)
+        _print_cells(console, "cells by median end position error (mm)", result.grid, ends)
     else:
-        _print_cells(console, "smallest median end position errors", result.grid, ranked.head(_SHOWN))
-        _print_cells(console, "largest median end position errors", result.grid, ranked.tail(_SHOWN))
+        _print_cells(console, "smallest median end position errors (mm)", result.grid, ranked.head(_SHOWN))
+        _print_cells(console, "largest median end position errors (mm)", result.grid, ranked.tail(_SHOWN))
     failed = list(result.failed.items())
     for cell, cause in failed[:_FAILED_SHOWN]:
         console.print(Text(f"failed: cell {cell} ({_named(result.grid, cell)}): {cause}", style="red"), soft_wrap=True)
@@ -55,9 +55,11 @@ def print_plan(console: Console, grid: Grid) -> None:
 def _print_cells(console: Console, caption: str, grid: Grid, cells: pd.DataFrame) -> None:
     names = [axis.name for axis in grid.axes]
     axes = [Column(name, name) for name in names]
-    columns = [Column("cell", "cell", 0), *axes, Column("n", "n", 0), Column(ERROR, "median (mm)", 1)]
+    conditions = list(cells.columns[2 + len(names) :])
+    medians = [Column(name, name, 1) for name in conditions]
+    columns = [Column("cell", "cell", 0), *axes, Column("n", "n", 0), *medians]
     rows: list[list[Value]] = [
-        [int(row["cell"]), *(str(row[name]) for name in names), int(row["n"]), float(row[ERROR])]
+        [int(row["cell"]), *(str(row[name]) for name in names), int(row["n"]), *(float(row[c]) for c in conditions)]
         for row in cells.to_dict("records")
     ]
     if rows:

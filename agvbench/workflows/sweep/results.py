@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 
 from agvbench.campaign.atomic_files import replace_whole
 from agvbench.errors import RecordingError
+from agvbench.statistics.end_poses import in_order
 from agvbench.workflows.sweep.axes import OPTIONS, Axis, as_text
 from agvbench.workflows.sweep.cell import CellResult, Row
 from agvbench.workflows.sweep.grid import Grid
@@ -112,20 +113,24 @@ def read_results(directory: Path) -> pd.DataFrame:
 
 
 def ranked_cells(directory: Path, grid: Grid) -> pd.DataFrame:
-    """Return the median end position error [mm] of each cell over its rows, the smallest first.
+    """Return the median end position error [mm] of each cell over its trajectories, for each condition.
 
-    Columns: ``cell``, a column for each axis, ``n`` and ``position_error_mm``; cells without one are left out.
+    Columns: ``cell``, a column for each axis, ``n``, and one for each condition in their usual order; the smallest
+    under the last condition comes first. Cells without an end position error are left out.
     """
     import pandas as pd
 
     names = [axis.name for axis in grid.axes]
     known = set(pq.read_schema(directory / PARQUET).names)
     if ERROR not in known:
-        return pd.DataFrame(columns=["cell", *names, "n", ERROR])
-    frame = pq.read_table(directory / PARQUET, columns=["cell", *names, "n", ERROR]).to_pandas()
-    of = {**dict.fromkeys(names, "first"), "n": "sum", ERROR: "median"}
-    ranked: pd.DataFrame = frame.dropna(subset=[ERROR]).groupby("cell", as_index=False).agg(of)
-    return ranked.sort_values([ERROR, "cell"], ignore_index=True)
+        return pd.DataFrame(columns=["cell", *names, "n"])
+    frame = pq.read_table(directory / PARQUET, columns=["cell", *names, "condition", "n", ERROR]).to_pandas()
+    frame = frame.dropna(subset=[ERROR])
+    cells = frame.groupby("cell").agg({**dict.fromkeys(names, "first"), "n": "sum"})
+    conditions = in_order(frame["condition"])
+    medians = frame.pivot_table(index="cell", columns="condition", values=ERROR, aggfunc="median")[conditions]
+    ranked: pd.DataFrame = cells.join(medians).reset_index()
+    return ranked.sort_values([*reversed(conditions), "cell"], ignore_index=True)
 
 
 def incomplete_cells(directory: Path) -> int:

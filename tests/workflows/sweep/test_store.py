@@ -50,6 +50,8 @@ def test_the_tables_do_not_depend_on_the_order_in_which_cells_end(tmp_path):
     assert set(frame["named"]) == {"steering_lag, x"}
     assert ranked_cells(tmp_path / "0", GRID)["cell"].tolist() == [5, 4, 3, 2, 1, 0]
     assert ranked_cells(tmp_path / "0", GRID)["n"].tolist() == [3] * 6
+    conditions = frame["condition"].unique().tolist()
+    assert list(ranked_cells(tmp_path / "0", GRID).columns) == ["cell", "seed", "plant_option.grip", "n", *conditions]
 
 
 def test_a_cell_without_runs_has_a_row(tmp_path):
