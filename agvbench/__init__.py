@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from agvbench.statistics import Comparison, pose_errors, valid
     from agvbench.types import Pose, Run
     from agvbench.workflows.comparison.compare import compare
-    from agvbench.workflows.history import History, history
+    from agvbench.workflows.history.reading import history
+    from agvbench.workflows.history.result import History
     from agvbench.workflows.sweep import sweep
 
 __version__ = "0.2.0"
@@ -70,7 +71,8 @@ if not TYPE_CHECKING:  # mypy would take any name for an attribute of a module w
         "statistics": ("Comparison", "pose_errors", "valid"),
         "types": ("Pose", "Run"),
         "workflows.comparison.compare": ("compare",),
-        "workflows.history": ("History", "history"),
+        "workflows.history.reading": ("history",),
+        "workflows.history.result": ("History",),
         "workflows.sweep": ("sweep",),
     }
     _HOMES = {name: package for package, names in _PACKAGES.items() for name in names}

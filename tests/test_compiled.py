@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from agvbench.compiled import COMPILING
 
 LAW = """
@@ -78,6 +80,7 @@ with announcing_compilation(print):
 """
 
 
+@pytest.mark.slow
 def test_compiling_is_said_once_and_only_where_nothing_is_kept(tmp_path):
     environment = os.environ | {"AGVBENCH_CACHE": str(tmp_path)}
     command = [sys.executable, "-c", TELLING]

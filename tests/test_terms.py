@@ -1,4 +1,4 @@
-"""The check of terms: a rejected word is reported with its line, and the project itself uses none."""
+"""The check of terms: a rejected word is reported with its line."""
 
 import importlib.util
 from pathlib import Path
@@ -63,6 +63,6 @@ def test_other_words_code_and_what_is_allowed_are_not(check_terms, tmp_path, fil
     assert check_terms.main([str(project(tmp_path, file, text))]) == 0
 
 
-def test_the_project_uses_none(check_terms):
+def test_the_glossary_rejects_words(check_terms):
+    # That the project uses none of them is a check of ``nox -s lint``.
     assert len(check_terms.rejected_words((ROOT / check_terms.GLOSSARY).read_text(encoding="utf-8"))) > 20
-    assert check_terms.complaints(ROOT) == []

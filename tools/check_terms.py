@@ -12,6 +12,7 @@ import re
 import sys
 import tokenize
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -81,6 +82,7 @@ def complaints(root: Path) -> list[str]:
     glossary = (root / GLOSSARY).read_text(encoding="utf-8")
     rejected = rejected_words(glossary)
     anything = re.compile("|".join(_spaced(entry.word) for entry in rejected) or "(?!)", re.I)
+    has_any = cache(lambda part: anything.search(part) is not None)  # the same identifiers stand everywhere
     found: list[tuple[str, int, str, str]] = []
     pages = [path for path in (root / "README.md", *sorted((root / "docs").rglob("*.md"))) if path.is_file()]
     for path in (*sorted((root / "agvbench").rglob("*.py")), *pages):
@@ -90,7 +92,7 @@ def complaints(root: Path) -> list[str]:
         parts = _texts_of_code(text) if path.suffix == ".py" else [(1, _NO_PROSE.sub(_blank, text))]
         words = [entry for entry in rejected if not name.startswith(entry.paths)]
         for line, part in parts:
-            for entry in words if anything.search(part) else ():
+            for entry in words if has_any(part) else ():
                 found += ((name, line + part.count("\n", 0, at), *entry[:2]) for at in entry.hits(part))
     return [f"{name}:{line}: {word}: use {instead}" for name, line, word, instead in dict.fromkeys(sorted(found))]
 

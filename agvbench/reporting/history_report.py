@@ -30,8 +30,7 @@ from agvbench.reporting.figures.style import legend
 from agvbench.reporting.pages import to_html
 from agvbench.reporting.progress import track
 from agvbench.statistics.end_poses import in_order
-from agvbench.workflows.history import History
-from agvbench.workflows.history.result import NIGHTS_FILE
+from agvbench.workflows.history.result import NIGHTS_FILE, History
 
 PAGE = "history.html"
 _FACTS_SHOWN = 6

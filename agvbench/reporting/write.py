@@ -7,11 +7,11 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from agvbench.campaign import Campaign
 from agvbench.campaign.arguments import as_campaign
 from agvbench.campaign.atomic_files import made_folder, replace_whole
-from agvbench.diagnosis import Diagnosis
 from agvbench.errors import FileError, RecordingError
 from agvbench.metrics.table import write_metrics
 from agvbench.reporting.content import Content, plain
@@ -27,6 +27,9 @@ from agvbench.statistics.uncertainty.tables import budgets_to_json, component_ta
 from agvbench.workflows.diagnosis_files import shown
 from agvbench.workflows.output_files import write_file
 from agvbench.workflows.report import ReportData, gather
+
+if TYPE_CHECKING:
+    from agvbench.diagnosis import Diagnosis
 
 HTML, MARKDOWN, TABLES = "report.html", "report.md", "tables"
 

@@ -106,7 +106,7 @@ def prediction_ellipse(points: Floats) -> tuple[Floats, Floats] | None:
     they lie on a line. The squared Mahalanobis distance of a new point from the mean is (n + 1)(n − 1)·2/(n (n − 2))
     times an F with 2 and n − 2 degrees of freedom (Hotelling's T²).
     """
-    from scipy.stats import f
+    from scipy.special import fdtri  # not scipy.stats, which takes half a second to import
 
     n = len(points)
     if n < 4:
@@ -115,5 +115,5 @@ def prediction_ellipse(points: Floats) -> tuple[Floats, Floats] | None:
     variances, directions = np.linalg.eigh(np.cov(points.T))
     if variances[0] <= 1e-9 * variances[1]:
         return None
-    limit = 2.0 * (n + 1.0) * (n - 1.0) / (n * (n - 2.0)) * float(f.ppf(0.95, 2, n - 2))
+    limit = 2.0 * (n + 1.0) * (n - 1.0) / (n * (n - 2.0)) * float(fdtri(2, n - 2, 0.95))
     return centre, np.asarray(directions * np.sqrt(limit * variances))

@@ -35,8 +35,8 @@ from agvbench.statistics.change_points import find_steps
 from agvbench.statistics.intervals import Proportion
 from agvbench.types import Floats
 from agvbench.vehicle.channels import Channels
-from agvbench.workflows.history import history
 from agvbench.workflows.history.nights import Nights
+from agvbench.workflows.history.reading import history
 
 RUNS, TRAJECTORIES, CONDITIONS = 366, 8, ("uncalibrated", "calibrated", "corrected")
 SERIES, NIGHTS, REPEATS, MARGIN = 36, 60, 3, 15

@@ -51,6 +51,7 @@ def test_a_delay_is_left_open_between_command_and_camera():
 
 
 @pytest.mark.parametrize("seed", range(2))
+@pytest.mark.slow
 def test_nothing_is_found_where_nothing_is_hidden(seed):
     assert diagnose(Campaign(Differential(), seed=seed)).verdict is Verdict.ADEQUATE
 

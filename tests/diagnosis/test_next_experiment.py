@@ -97,6 +97,7 @@ def _steps(commands):
         yield (commands.t_s[k + 1] - commands.t_s[k], *commands.at(k))
 
 
+@pytest.mark.slow
 def test_steering_that_never_changes_while_driving_leaves_its_lag_open_and_a_run_pins_it(diagnosed):
     found, selection = diagnosed(Tiny(), steps=False)
     flat = unidentified(selection.chosen.fit, candidates(GEOMETRY))

@@ -113,6 +113,7 @@ def test_maps_beside_play_lie_half_of_it_farther_from_neutral():
     assert MAPS.beside(values, SteeringLag, np.array([0.2])) == pytest.approx(values)
 
 
+@pytest.mark.slow
 def test_play_is_found_where_a_command_ends_hardly_beyond_it(play):
     found = diagnose(play)
     assert found.verdict is Verdict.NAMED

@@ -72,6 +72,7 @@ def test_two_effects_are_both_named(tiny_campaign):
     assert {effect.name for effect in found.effects} == {"steering_lag", "lateral_slip"}
 
 
+@pytest.mark.slow
 def test_a_slow_patch_of_floor_is_unknown_and_depends_on_place(tiny_campaign):
     found = diagnose(tiny_campaign(Tiny(slow_patch=0.1)))
     assert found.verdict is Verdict.UNKNOWN

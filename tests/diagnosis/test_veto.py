@@ -88,6 +88,7 @@ def test_a_cause_that_makes_it_worse_is_withdrawn(found, spoilt):
     assert said == ["steering_lag: rejected in validation: the validation runs are predicted better without"]
 
 
+@pytest.mark.slow
 def test_test_runs_change_no_name_and_no_parameter(tiny_campaign):
     tiring, opposite = (list(tiny_campaign(Tiny(droop_per_hour=droop))) for droop in (0.1, -0.1))
     readings = read_runs(tiring, HEADER.neutral)

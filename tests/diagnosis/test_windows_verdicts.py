@@ -75,6 +75,7 @@ def test_every_effect_is_listed_with_what_it_does_to_sessions_held_out(lagging):
     assert {"lateral_slip", "speed_lag", "mocap_latency"} < set(effects)
 
 
+@pytest.mark.slow
 def test_a_corrected_vehicle_with_another_law_is_diagnosed_again(lagging, tmp_path):
     law = effect_variants()["steering_lag_inertia"](time_constant_s=0.25, inertia_s=0.01)
     replace(lagging.model, effects=(law,)).save(tmp_path / "corrected.toml")

@@ -46,7 +46,12 @@ QUICK_WITHOUT = ("diagnose",)
 FULL = os.environ.get("AGVBENCH_DOCUMENTS") == "full"
 EVERY_BLOCK = os.environ.get("AGVBENCH_DOCUMENTS") in ("full", "blocks")
 pytestmark = pytest.mark.timeout(7200 if EVERY_BLOCK else 600)
-LONG = {"docs/tutorial.md", "docs/how-to/nightly.md"}
+LONG = {
+    "docs/tutorial.md",
+    "docs/how-to/nightly.md",
+    "docs/how-to/watch-a-bench.md",
+    "docs/how-to/exchange-with-ros.md",
+}
 """Those of the quick pages that take more than ten seconds."""
 takes_minutes = pytest.mark.skipif(not FULL, reason="takes minutes: nox -s documents")
 

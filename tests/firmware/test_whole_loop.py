@@ -25,6 +25,7 @@ def bench(directory: Path, vehicle: Path, *more: str) -> subprocess.CompletedPro
     )
 
 
+@pytest.mark.slow
 def test_a_campaign_with_firmware_is_recorded_and_the_same_again(tmp_path: Path) -> None:
     vehicle = tmp_path / "vehicle.toml"
     thesis_vehicle().save(vehicle)

@@ -16,6 +16,7 @@ from scipy.stats import binomtest
 from agvbench.errors import AgvbenchError, FileError, FlagError, InputError
 from agvbench.metrics.gate import GateVerdict, check_gate
 from agvbench.metrics.gate_rules import GateRule, read_gate
+from agvbench.model import example_path
 
 _UNITS = {"position_error": "mm", "across_error": "mm", "heading_error": "deg", "driving_time": "s"}
 
@@ -203,7 +204,9 @@ def test_growth_needs_an_earlier_campaign():
 def campaign(tmp_path_factory):
     """Return the folder of a campaign of trajectory 5, uncalibrated and calibrated, seven repeats each."""
     folder = tmp_path_factory.mktemp("gate")
-    done = _agvbench(folder, "bench", "--repeats", "7", "--trajectories", "5", "--seed", "3", "--out", "camp")
+    calibrated = ("--calibration", str(example_path("thesis")), "--exchange", "2", "--no-report")
+    driven = ("trajectories", "--trajectories", "5", "--repeats", "7", "--seed", "3")
+    done = _agvbench(folder, "bench", *driven, *calibrated, "--out", "camp")
     assert done.returncode == 0, done.stdout + done.stderr
     return folder
 

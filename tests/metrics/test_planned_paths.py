@@ -11,13 +11,15 @@ import pytest
 
 from agvbench.campaign import Campaign
 from agvbench.metrics.planned_paths import PlannedPaths
+from agvbench.model import example_path
 
 
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory):
     out = tmp_path_factory.mktemp("planned") / "campaign"
     options = ["--repeats", "1", "--trajectories", "1,5", "--exchange", "2", "--no-report", "--out", str(out)]
-    command = [sys.executable, "-m", "agvbench", "bench", *options]
+    calibrated = ["--calibration", str(example_path("thesis"))]
+    command = [sys.executable, "-m", "agvbench", "bench", "trajectories", *options, *calibrated]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return Campaign.open(out)

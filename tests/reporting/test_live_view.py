@@ -192,6 +192,7 @@ def test_a_viewer_that_dies_stops_nothing(port: int, tmp_path: Path) -> None:
     assert re.fullmatch(r"no live view any more: the Rerun viewer does not answer .*; the bench continues .*", line)
 
 
+@pytest.mark.slow
 def test_a_window_that_cannot_open_is_one_line(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DISPLAY", ":77")
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)

@@ -83,6 +83,7 @@ def test_again_in_process(in_process, tmp_path):
     assert bench(tmp_path / "campaign") == in_process
 
 
+@pytest.mark.slow
 def test_told_for_longer_at_a_time(in_process, tmp_path):
     assert bench(tmp_path / "campaign", "--exchange=2") == in_process
 

@@ -49,6 +49,7 @@ def test_a_vehicle_keeps_its_name(tmp_path):
             assert CampaignHeader.load(tmp_path / "c" / FILE_NAME).vehicle_name == "red car"
 
 
+@pytest.mark.slow
 def test_a_folder_with_a_car_drives_its_own_trajectory_too_and_steers_in_front(tmp_path):
     example_vehicle("front_steered").save(tmp_path / "vehicle.toml")
     (tmp_path / "trajectories").mkdir()

@@ -59,6 +59,7 @@ def bench(*arguments):
     return subprocess.run(command, capture_output=True, text=True, check=False, env=os.environ)
 
 
+@pytest.mark.slow
 def test_what_was_chosen_is_chosen_again(lab, give_up):
     assert bench(*BEGAN).returncode == 0
     first = {run.run_id for run in Campaign.open(lab / "c")}
@@ -130,6 +131,7 @@ def test_one_that_drives_back_itself_begins_at_other_random_numbers_too(tmp_path
         (Channels.alike("normalised"), "the vehicle takes commands in another unit than its file says: normalised"),
     ],
 )
+@pytest.mark.slow
 def test_a_model_of_another_vehicle_is_refused_before_anything_moves(lab, changed, line):
     dataclasses.replace(thesis_vehicle(), channels=changed).save(lab / "other.toml")
     for option in ("--calibration", "--corrected"):

@@ -128,12 +128,14 @@ def test_a_slipped_servo_is_a_regression(lab, capsys):
     assert float(properties["position_mm"]) > 100.0
 
 
+@pytest.mark.slow
 def test_margins_within_the_repeatability_are_not_decided(lab):
     assert until_decided("narrow", "--margin-mm=0.01", "--margin-deg=0.001", "--repeats=5") == 3
     assert len(Campaign.open(lab / "narrow").run_ids) == 5
     assert [analysis["repeats"] for analysis in analyses(lab / "narrow")] == [3, 4, 5]
 
 
+@pytest.mark.slow
 def test_an_interrupted_session_goes_on_as_if_it_had_not_been(lab, capsys):
     until_decided("whole", *NARROWER)
     (lab / "stop").write_text("r05")
@@ -151,6 +153,7 @@ def test_an_interrupted_session_goes_on_as_if_it_had_not_been(lab, capsys):
     assert Completeness.of(Campaign.open(lab / "parts")).is_complete
 
 
+@pytest.mark.slow
 def test_a_decided_session_that_is_resumed_drives_nothing(lab, capsys):
     until_decided("again", *WIDE)
     before = analyses(lab / "again")

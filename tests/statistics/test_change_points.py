@@ -37,6 +37,7 @@ def test_a_step_is_found_on_its_night_and_its_interval_covers_it():
 
 
 @pytest.mark.parametrize(("correlation", "most"), [(0.0, 0.05), (0.4, 0.08)])
+@pytest.mark.slow
 def test_series_without_a_step_rarely_have_one(correlation, most):
     found = [any(find_steps(_nights(seed, correlation=correlation), alpha=0.05).of) for seed in _SEEDS]
     assert np.mean(found) <= most + 3.0 * np.sqrt(most / len(_SEEDS))

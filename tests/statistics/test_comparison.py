@@ -60,6 +60,7 @@ def test_so_do_two_campaigns_under_two_conditions_each(noise, repeats):
 
 
 @pytest.mark.parametrize(("noise", "least"), [(normal, 0.9), pytest.param(heavy_tailed, 0.85, marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_a_shift_of_three_sd_in_one_of_twenty_eight_comparisons_is_found(noise, least):
     draw = noise(np.random.default_rng(31))
     base = {(t, c): (20.0, 2.0) for t in TARGETS for c in ("uncalibrated", "calibrated")}

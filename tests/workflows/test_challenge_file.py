@@ -179,6 +179,7 @@ def one_that_kills_its_worker(spec, seed, _):
     return dataclasses.replace(LAG, spec=spec, seed=seed)
 
 
+@pytest.mark.slow
 def test_a_trial_whose_worker_dies_again_and_again_is_an_answer_that_counts_as_wrong(tmp_path, monkeypatch):
     monkeypatch.setattr(challenge, "hold_trial", one_that_kills_its_worker)
     file = tmp_path / "challenge.json"

@@ -36,6 +36,7 @@ def test_a_loop_does_not_go_on_after_a_fault_stopped_its_bench(tmp_path):
     assert [run.is_ok for run in runs] == [True, True, False]
 
 
+@pytest.mark.slow
 def test_whoever_ends_the_loop_ends_its_bench_which_stops_the_vehicle_first(tmp_path):
     process = start(tmp_path)
     parts = tmp_path / "x" / BEFORE / "runs.parquet"

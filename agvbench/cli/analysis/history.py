@@ -44,8 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     from agvbench.reporting.console.tables import wide_console
     from agvbench.reporting.history_report import write_history
     from agvbench.reporting.progress import track
-    from agvbench.workflows.history import history
-    from agvbench.workflows.history.reading import ALPHA
+    from agvbench.workflows.history.reading import ALPHA, history
     from agvbench.workflows.history.result import write_json
 
     found = history(

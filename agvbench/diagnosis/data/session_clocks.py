@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit  # not scipy.stats, which takes half a second to import
 
 from agvbench.calibration.measurement.windows import held_command
 from agvbench.diagnosis.criteria import SESSION_CLOCK
@@ -283,5 +283,5 @@ def _against(one: _Estimate, rest: list[_Estimate]) -> tuple[float, float]:
 
 
 def _is_significant(value: float, stderr: float, blocks: int, sessions: int) -> bool:
-    critical = float(student.isf(0.5 * SESSION_CLOCK.alpha / sessions, max(blocks - 1, 1)))
+    critical = -float(stdtrit(max(blocks - 1, 1), 0.5 * SESSION_CLOCK.alpha / sessions))
     return abs(value) > max(SESSION_CLOCK.min_offset_s, critical * stderr)

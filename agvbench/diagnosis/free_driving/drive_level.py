@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from agvbench.calibration.measurement.windows import held_command
 from agvbench.diagnosis.criteria import FREE_DRIVING_LEVEL
@@ -141,7 +141,7 @@ def _level(session: _Session, rest: list[_Session], sessions: int) -> DriveLevel
     difference = float(np.mean(one) - np.mean(other))
     pooled = (np.sum((one - np.mean(one)) ** 2) + np.sum((other - np.mean(other)) ** 2)) / freedom
     stderr = session.inflation * float(np.sqrt(pooled * (1.0 / len(one) + 1.0 / len(other))))
-    critical = float(student.isf(0.5 * FREE_DRIVING_LEVEL.alpha / sessions, freedom))
+    critical = -float(stdtrit(freedom, 0.5 * FREE_DRIVING_LEVEL.alpha / sessions))
     significant = abs(difference) > max(FREE_DRIVING_LEVEL.min_deviation, critical * stderr)
     return DriveLevel(float(np.exp(difference)), float(np.exp(difference)) * stderr, significant)
 

@@ -10,7 +10,7 @@ from rich.text import Text
 from agvbench.reporting.console.tables import console_table
 from agvbench.reporting.content import plain_sentences
 from agvbench.reporting.history_report import WrittenHistory, changes_table, series_table
-from agvbench.workflows.history import History
+from agvbench.workflows.history.result import History
 
 _UNREAD_SHOWN = 10
 

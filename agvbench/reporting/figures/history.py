@@ -11,8 +11,8 @@ from agvbench.plot.style import colour, literal, marker
 from agvbench.reporting.content import plain
 from agvbench.reporting.figures.style import MUTED, PAPER, dress, new_figure, to_svg
 from agvbench.types import Floats
-from agvbench.workflows.history import History
 from agvbench.workflows.history.nights import ALL
+from agvbench.workflows.history.result import History
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,7 +9,7 @@ import pytest
 from history_samples import write_night, write_nights
 
 from agvbench.metrics.table import FILE, read_metrics, write_metrics
-from agvbench.workflows.history import history
+from agvbench.workflows.history.reading import history
 
 
 @pytest.fixture
