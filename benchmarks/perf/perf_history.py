@@ -31,8 +31,8 @@ from agvbench.campaign.manifest import record
 from agvbench.campaign.tables.parquet import to_parquet
 from agvbench.metrics import all_metrics
 from agvbench.metrics.table import FILE
-from agvbench.statistics.change_points import find_steps
 from agvbench.statistics.intervals import Proportion
+from agvbench.statistics.steps.change_points import find_steps
 from agvbench.types import Floats
 from agvbench.vehicle.channels import Channels
 from agvbench.workflows.history.nights import Nights

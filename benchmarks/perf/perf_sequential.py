@@ -23,13 +23,13 @@ import numpy as np
 from scipy.special import ndtr
 from scipy.stats import binomtest
 
-from agvbench.statistics.group_sequential import (
+from agvbench.statistics.repeats.group_sequential import (
     Spending,
     level_of,
     rank_sum_information,
     sequential_p_table,
 )
-from agvbench.statistics.sequential import SequentialPlan
+from agvbench.statistics.repeats.sequential import SequentialPlan
 from agvbench.types import Floats
 
 _TRAJECTORIES = 8

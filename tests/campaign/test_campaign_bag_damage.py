@@ -130,8 +130,8 @@ def test_without_rosbags_the_command_says_what_to_install(tmp_path):
 
 def test_reading_a_csv_and_asking_for_help_do_not_load_rosbags(tmp_path, capsys):
     program = (
-        "import sys, agvbench, agvbench.campaign.recordings.importer, agvbench.workflows.import_recordings\n"
-        "import agvbench.workflows.export_mcap\n"
+        "import sys, agvbench, agvbench.campaign.recordings.importer, agvbench.workflows.exchange.import_recordings\n"
+        "import agvbench.workflows.exchange.export_mcap\n"
         "print(any(name.startswith('rosbags') for name in sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)

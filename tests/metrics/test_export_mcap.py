@@ -22,7 +22,7 @@ from agvbench.statistics.rest_poses import start_pose
 from agvbench.types import Commands, Frames, Pose, Run
 from agvbench.vehicle.channels import Channel, Channels
 from agvbench.vehicle.wheels import Wheels
-from agvbench.workflows.export_mcap import MAPPING_FILE, export_mcap
+from agvbench.workflows.exchange.export_mcap import MAPPING_FILE, export_mcap
 
 SI = Channels.alike("si")
 MIXED = Channels(Channel("us", 1500.0, 1000.0, 2000.0), *[Channel("normalised", 0.5, 0.0, 1.0)] * 2)

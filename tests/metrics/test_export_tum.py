@@ -7,7 +7,7 @@ import pytest
 from own_campaigns import line_campaign
 
 from agvbench.errors import FileError
-from agvbench.workflows.export_tum import export_tum
+from agvbench.workflows.exchange.export_tum import export_tum
 
 
 def test_files_hold_time_position_and_heading_in_the_start_frame(tmp_path):

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agvbench.statistics.change_points import FEWEST, SHORTEST, find_steps
+from agvbench.statistics.steps.change_points import FEWEST, SHORTEST, find_steps
 
 _SEEDS = range(60)
 

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binom, norm
 
-from agvbench.statistics.group_sequential import (
+from agvbench.statistics.hypothesis_tests import rank_test
+from agvbench.statistics.repeats.group_sequential import (
     Spending,
     critical_values,
     crossing_probability,
@@ -16,7 +17,6 @@ from agvbench.statistics.group_sequential import (
     sequential_p,
     spent,
 )
-from agvbench.statistics.hypothesis_tests import rank_test
 
 FIVE = tuple((k / 5, k / 5) for k in range(1, 6))
 SPENDING = list(Spending)

@@ -9,7 +9,7 @@ from scipy.stats import binom
 
 from agvbench.errors import FlagError, InputError
 from agvbench.statistics import ComparisonVerdict, compare_errors
-from agvbench.statistics.sample_size import plan_repeats, power_of_same, power_of_worse
+from agvbench.statistics.repeats.sample_size import plan_repeats, power_of_same, power_of_worse
 
 _TRAJECTORIES = ("1", "5", "6")
 

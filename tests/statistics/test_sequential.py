@@ -11,11 +11,11 @@ from statistics_samples import error_table
 
 from agvbench.statistics import ComparisonVerdict
 from agvbench.statistics.differences import ALL
-from agvbench.statistics.group_sequential import rank_sum_information
 from agvbench.statistics.hypothesis_tests import hochberg, rank_test
 from agvbench.statistics.matching import match_cells
 from agvbench.statistics.quantities import END_POSE
-from agvbench.statistics.sequential import (
+from agvbench.statistics.repeats.group_sequential import rank_sum_information
+from agvbench.statistics.repeats.sequential import (
     Analysis,
     Decision,
     Observation,

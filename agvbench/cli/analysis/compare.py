@@ -107,7 +107,7 @@ def _plan(arguments: argparse.Namespace, console: Console) -> int:
     from agvbench.errors import FlagError
     from agvbench.reporting.console.tables import print_planned_repeats
     from agvbench.statistics import pose_errors
-    from agvbench.statistics.sample_size import plan_repeats
+    from agvbench.statistics.repeats.sample_size import plan_repeats
 
     if arguments.b is not None:
         raise FlagError(

@@ -32,8 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the files and print how many."""
     from agvbench.reporting.progress import track
-    from agvbench.workflows.export_mcap import MAPPING_FILE, export_mcap
-    from agvbench.workflows.export_tum import export_tum
+    from agvbench.workflows.exchange.export_mcap import MAPPING_FILE, export_mcap
+    from agvbench.workflows.exchange.export_tum import export_tum
 
     is_mcap = arguments.format == "mcap"
     export = export_mcap if is_mcap else export_tum

@@ -39,7 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
     from rich.console import Console
 
     from agvbench.reporting.console.recordings import print_guess, print_import
-    from agvbench.workflows.import_recordings import run_guess, run_import
+    from agvbench.workflows.exchange.import_recordings import run_guess, run_import
 
     if arguments.guess:
         print_guess(arguments.out, *run_guess(arguments.files, arguments.out), Console())

@@ -9,7 +9,7 @@ from agvbench.reporting.content import Column, Table, Value
 from agvbench.statistics import ComparisonVerdict
 from agvbench.statistics.differences import ALL
 from agvbench.statistics.quantities import END_POSE
-from agvbench.statistics.sequential import Decision, SequentialVerdict
+from agvbench.statistics.repeats.sequential import Decision, SequentialVerdict
 from agvbench.workflows.comparison.sequential_record import SequentialRecord
 
 _ORDER = (

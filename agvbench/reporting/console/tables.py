@@ -18,14 +18,14 @@ from agvbench.reporting.gate_files import gate_sentence, gate_table
 from agvbench.statistics.comparison_summary import headline, notes_in_words
 from agvbench.statistics.differences import ALL
 from agvbench.statistics.quantities import COMPONENT_DEFINITIONS, DEFINITIONS
-from agvbench.statistics.sample_size import plan_in_words
+from agvbench.statistics.repeats.sample_size import plan_in_words
 
 if TYPE_CHECKING:
     from agvbench.metrics.gate import GateCheck
     from agvbench.reporting.write import WrittenReport
     from agvbench.statistics import Comparison, Difference
     from agvbench.statistics.intervals import Interval
-    from agvbench.statistics.sample_size import PlannedRepeats
+    from agvbench.statistics.repeats.sample_size import PlannedRepeats
     from agvbench.workflows.report import ReportData
 
 _VERDICT_STYLES = {

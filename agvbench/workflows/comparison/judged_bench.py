@@ -11,7 +11,7 @@ from agvbench.running.configuration.settings import BenchSettings
 from agvbench.running.configuration.vehicles import uncalibrated_vehicle
 from agvbench.statistics import Comparison
 from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM, checked_margins
-from agvbench.statistics.sequential import Decision
+from agvbench.statistics.repeats.sequential import Decision
 from agvbench.workflows.comparison.comparability import Comparability, comparability, require_comparable
 from agvbench.workflows.comparison.compare import compare
 from agvbench.workflows.comparison.decision import FailurePolicy, exit_code

@@ -20,7 +20,7 @@ from agvbench.statistics import pose_errors, valid
 from agvbench.statistics.comparison import MARGIN_DEG, MARGIN_MM, checked_margins
 from agvbench.statistics.matching import match_cells, same_target
 from agvbench.statistics.quantities import END_POSE
-from agvbench.statistics.sequential import Decision, SequentialPlan, analyse, compared_keys
+from agvbench.statistics.repeats.sequential import Decision, SequentialPlan, analyse, compared_keys
 from agvbench.types import Floats
 from agvbench.workflows.comparison.comparability import require_comparable
 from agvbench.workflows.comparison.sequential_record import FILE, SequentialRecord

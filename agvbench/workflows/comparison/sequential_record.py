@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from agvbench.errors import FileError
-from agvbench.statistics.group_sequential import Schedule, Spending, critical_values
-from agvbench.statistics.sequential import (
+from agvbench.statistics.repeats.group_sequential import Schedule, Spending, critical_values
+from agvbench.statistics.repeats.sequential import (
     Analysis,
     Decision,
     Observation,

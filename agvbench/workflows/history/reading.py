@@ -14,8 +14,8 @@ import numpy as np
 from agvbench.campaign.names import as_texts
 from agvbench.errors import AgvbenchError, CampaignError, FlagError, InputError, OneOf
 from agvbench.metrics.registry import all_metrics
-from agvbench.statistics.change_points import ORDERS, ChangePoint, ChangePoints, find_steps
 from agvbench.statistics.end_poses import in_order
+from agvbench.statistics.steps.change_points import ORDERS, ChangePoint, ChangePoints, find_steps
 from agvbench.types import Floats
 from agvbench.workflows.history.cache import CampaignCache, ReadCampaign
 from agvbench.workflows.history.facts import Facts, changed, facts_of

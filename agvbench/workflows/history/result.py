@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from agvbench.notebook_html import heading_html, table_html
-from agvbench.statistics.change_points import FEWEST
+from agvbench.statistics.steps.change_points import FEWEST
 from agvbench.workflows.output_files import write_file
 
 if TYPE_CHECKING:

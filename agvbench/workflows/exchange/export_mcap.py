@@ -18,7 +18,7 @@ from agvbench.statistics.rest_poses import start_pose
 from agvbench.types import Command, Commands, Floats, Pose, Run
 from agvbench.vehicle.channel_tables import channel_names
 from agvbench.vehicle.wheels import WheelCommand
-from agvbench.workflows.export_tum import Exported
+from agvbench.workflows.exchange.export_tum import Exported
 from agvbench.workflows.history.folders import dated
 
 if TYPE_CHECKING:

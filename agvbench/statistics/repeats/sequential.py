@@ -1,10 +1,10 @@
 """A comparison that is analysed after every round of repeats, until each difference is decided.
 
 Differences are tested as in `agvbench.statistics.comparison`: by rank sums, and against both ends of the margin. Their
-p-values at each analysis become sequential p-values (`agvbench.statistics.group_sequential`), which allow for all
-analyses. These are corrected for all comparisons: after Holm for worse and better, after Hochberg for the same within
-the margin. The chance of any false difference in one direction is at most `SequentialPlan.alpha`, that of any false
-"same" `SequentialPlan.alpha_same`, over all comparisons and analyses.
+p-values at each analysis become sequential p-values (`agvbench.statistics.repeats.group_sequential`), which allow for
+all analyses. These are corrected for all comparisons: after Holm for worse and better, after Hochberg for the same
+within the margin. The chance of any false difference in one direction is at most `SequentialPlan.alpha`, that of any
+false "same" `SequentialPlan.alpha_same`, over all comparisons and analyses.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from agvbench.statistics.differences import (
     decide,
     raw_differences,
 )
-from agvbench.statistics.group_sequential import Schedule, Spending, rank_sum_information, sequential_p
 from agvbench.statistics.hypothesis_tests import hochberg, holm, minimum_attainable_p
 from agvbench.statistics.matching import Cell
 from agvbench.statistics.quantities import END_POSE
+from agvbench.statistics.repeats.group_sequential import Schedule, Spending, rank_sum_information, sequential_p
 
 FEWEST_REPEATS = 3
 """Before the first analysis: two repeats decide nothing."""

@@ -2,7 +2,7 @@
 
 The number of steps is chosen by penalised least squares (PELT; Killick, Fearnhead and Eckley 2012, Journal of the
 American Statistical Association 107, 1590–1598), as `ruptures` computes it. The penalty is a quantile of the largest
-gain in series without a step (`agvbench.statistics.step_null`).
+gain in series without a step (`agvbench.statistics.steps.step_null`).
 """
 
 from __future__ import annotations
@@ -16,7 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.statistics.intervals import CONFIDENCE
-from agvbench.statistics.step_null import autocorrelation, inflation, largest_gains, resolution, successive_variance
+from agvbench.statistics.steps.step_null import (
+    autocorrelation,
+    inflation,
+    largest_gains,
+    resolution,
+    successive_variance,
+)
 from agvbench.types import Floats
 
 FEWEST = 10

@@ -1,0 +1,1 @@
+"""How many repeats: planned before they are driven, or decided while they are."""

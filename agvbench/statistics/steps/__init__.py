@@ -1,0 +1,1 @@
+"""Steps over nights: where they are, and whether chance would find them."""

@@ -1,0 +1,1 @@
+"""Recordings of other programs in, and campaigns out."""
