@@ -24,12 +24,15 @@ from agvbench.cli._failures import EXIT_CODE, Interrupts
 from agvbench.errors import AgvbenchError, FlagError
 
 _DESCRIPTION = "Does the vehicle do what is commanded, what does calibration buy, and what does the model lack?"
+_PIPE_CLOSED = 128 + 13
+"""As shells know it of a program that SIGPIPE ended: neither a success nor the answer "no"."""
 _NAME_WIDTH, _HELP_WIDTH = 11, 79
 _EPILOG = """\
 exit codes: 0 done; 1 the answer is "no" (compare: a regression,
 diagnose --check: not adequate, bench: a run failed, doctor: not ready,
 mocap --check, agv --check: the adapter breaks its contract);
 130, 143, 129 ended by Ctrl-C, SIGTERM, SIGHUP, the vehicle stopped first;
+141 the reader of the output has gone (head);
 2 bad input or set-up, with one line that says what to do;
 3 inconclusive (compare: a campaign is incomplete or not comparable);
 70 a mistake of agvbench itself, with the file to report.
@@ -168,10 +171,12 @@ def main(argv: Sequence[str] | None = None) -> int:
             why = f": {interrupt}" if str(interrupt) else ""
             print(f"{program}: interrupted{why}", file=sys.stderr)
             return int(getattr(interrupt, "exit_code", EXIT_CODE))  # another signal than Ctrl-C brings its own
-        except BrokenPipeError:
-            # The reader (head, less) has gone: no output is needed any more.
+        except (BrokenPipeError, SystemExit) as error:
+            # rich ends the program where it finds that the reader (head, less) has gone.
+            if isinstance(error, SystemExit) and not isinstance(error.__context__, BrokenPipeError):
+                raise
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return 0
+            return _PIPE_CLOSED
         except Exception as error:  # noqa: BLE001 - whatever it is, users should not have to read a traceback
             if not interrupts.pressed:
                 from agvbench.cli._failures import report_internal_error

@@ -39,6 +39,7 @@ class GateVerdict(StrEnum):
 class GateCheck:
     """A rule on one trajectory and condition: the statistic before (NaN without) and now, and what is allowed.
 
+    ``is_beyond`` says whether the statistic itself is beyond what is allowed, whether or not chance explains it.
     ``p_value`` is that of a growth beyond the limit, corrected for all checks; NaN where the limit is absolute. A check
     is inconclusive where no difference of so few repeats could be significant.
     """
@@ -51,6 +52,7 @@ class GateCheck:
     before: float
     now: float
     allowed: float
+    is_beyond: bool
     p_value: float
     verdict: GateVerdict
 
@@ -115,10 +117,7 @@ def _checks(
     resamples: int,
     seed: int,
 ) -> Iterator[tuple[GateCheck, float]]:
-    """Yield the checks of a rule before correction, each with the smallest p-value that its test could give.
-
-    Their verdicts are those of the statistics alone.
-    """
+    """Yield the checks of a rule before correction, each with the smallest p-value that its test could give."""
     if rule.is_growth and a is None:
         raise InputError("a limit on growth needs an earlier campaign", where="gate", value=rule.text)
     now, before = _values(b, rule), {} if a is None else _values(a, rule)
@@ -136,9 +135,9 @@ def _checks(
         label = " → ".join(conditions) if conditions else condition
         counts = len(earlier), len(values)
         present = float(statistic(values))
-        uncorrected = GateVerdict.FAIL if applied.is_exceeded(past, present) else GateVerdict.PASS
+        limit, pending = (applied.allowed(past, present), applied.is_exceeded(past, present)), GateVerdict.INCONCLUSIVE
         yield (
-            GateCheck(rule, trajectory, label, *counts, past, present, applied.allowed(past, present), p, uncorrected),
+            GateCheck(rule, trajectory, label, *counts, past, present, *limit, p, pending),
             least,
         )
 
@@ -212,11 +211,11 @@ def _decided(checks: Sequence[GateCheck], minimum_p: Sequence[float], alpha: flo
     testable = dict(zip(growth, tarone_testable(least, alpha), strict=True))
     for k, check in enumerate(checks):
         if k not in corrected:
-            yield check
+            yield replace(check, verdict=GateVerdict.FAIL if check.is_beyond else GateVerdict.PASS)
         elif not testable[k]:
-            yield replace(check, p_value=1.0, verdict=GateVerdict.INCONCLUSIVE)
+            yield replace(check, p_value=1.0)
         else:
-            failed = check.verdict is GateVerdict.FAIL and corrected[k] <= alpha
+            failed = check.is_beyond and corrected[k] <= alpha
             yield replace(check, p_value=corrected[k], verdict=GateVerdict.FAIL if failed else GateVerdict.PASS)
 
 

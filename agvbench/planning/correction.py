@@ -10,7 +10,7 @@ import numpy as np
 from agvbench.effects import Stage
 from agvbench.model import VehicleModel
 from agvbench.planning.end_pose_prediction import Departure, EndPoseError, coasting_path, rest_poses
-from agvbench.planning.leg import Leg, axles_swept
+from agvbench.planning.leg import Leg, axles_swept, stops
 from agvbench.planning.legs import legs_of
 from agvbench.planning.placement import check_fits
 from agvbench.planning.planner import Plan, commands_of, plan
@@ -104,8 +104,9 @@ def corrected_plan(
     commands = commands_of(shot.legs, model)
     path = coasting_path(model, commands, departure)
     swept = axles_swept(path, model.geometry)
+    needed = np.concatenate([swept, stops(path)])
     if workspace is not None:
-        check_fits(swept, departure.start, workspace, where=trajectory.name)
+        check_fits(needed, departure.start, workspace, where=trajectory.name)
     before, after = (
         EndPoseError(Pose(*end).compose(end_pose_bias), made.target) for end in ends([legs, shot.legs]).tolist()
     )
@@ -120,7 +121,7 @@ def corrected_plan(
         expected=path,
         floor_m=(width, height),
         start=departure.start,
-        swept=swept,
+        swept=needed,
         correction=correction,
     )
 

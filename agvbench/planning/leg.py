@@ -12,6 +12,7 @@ from agvbench.errors import PlanError
 from agvbench.model import VehicleModel
 from agvbench.planning.trajectories.segments import Arc, Straight, axle_speed
 from agvbench.planning.trajectories.trajectory import Trajectory
+from agvbench.planning.workspace import DEFAULT_MARGIN_M, STOPPING_S
 from agvbench.types import Floats, Pose, wrap_angle
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.kinematics import body_motion
@@ -129,6 +130,22 @@ def swept(legs: Sequence[Leg], geometry: Geometry) -> Floats:
         x, y, heading = advance(leg, pose, np.array([leg.duration_s]), geometry)[0].tolist()
         t, pose = t + leg.duration_s, (x, y, heading)
     return np.concatenate(rows)
+
+
+def stops(path: Floats) -> Floats:
+    """Return when and where a vehicle on a `path` (n, 4) of t, x, y, heading would come to rest if it were stopped.
+
+    A supervisor stops a vehicle that could not come to rest inside the workspace. Where that takes more than the
+    workspace's margin, the point lies so far ahead of the path; slower motion has no point. Shape (m, 3): t [s], x [m],
+    y [m].
+    """
+    step = np.diff(path[:, 1:3], axis=0)
+    velocity = step / np.maximum(np.diff(path[:, 0]), 1e-9)[:, None]
+    speed = np.hypot(*velocity.T)
+    ahead_m = STOPPING_S * speed - DEFAULT_MARGIN_M
+    at = np.flatnonzero(ahead_m > 0.0)
+    rest = path[1:, 1:3][at] + velocity[at] * (ahead_m[at] / speed[at])[:, None]
+    return np.column_stack([path[1:, 0][at], rest])
 
 
 def _axles(t_s: Floats, poses: Floats, geometry: Geometry) -> Floats:

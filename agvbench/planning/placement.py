@@ -96,7 +96,8 @@ def check_fits(swept: Floats, start: Pose, workspace: Workspace, *, where: str) 
     clearances = workspace.clearances(placed)
     if clearances.min() >= workspace.margin_m - 1e-6:
         return
-    first = int(np.argmax(clearances < workspace.margin_m - 1e-6))
+    outside = np.flatnonzero(clearances < workspace.margin_m - 1e-6)
+    first = outside[np.argmin(swept[outside, 0])]
     x, y = placed[first]
     raise PlanError(
         f"path leaves the workspace {workspace.name} after {swept[first, 0]:.1f} s at ({x:.2f}, {y:.2f}) m",

@@ -9,7 +9,7 @@ import numpy as np
 
 from agvbench.errors import PlanError, UnsuitedVehicleError, VehicleError
 from agvbench.model import VehicleModel
-from agvbench.planning.leg import Leg, end_pose, sample, swept
+from agvbench.planning.leg import Leg, end_pose, sample, stops, swept
 from agvbench.planning.legs import legs_of
 from agvbench.planning.placement import best_start, check_fits, does_not_fit
 from agvbench.planning.trajectories.shapes import CommandTable
@@ -49,7 +49,7 @@ class Plan:
         Where the vehicle's axles are.
     swept
         When and where the axles' centres pass in the start frame, shape (m, 3): t [s], x [m], y [m]; of circles driven
-        over and over only the first.
+        over and over only the first. Then where a fast vehicle would come to rest if it were stopped (`stops`).
     """
 
     trajectory: Trajectory
@@ -123,7 +123,7 @@ def _made(trajectory: Trajectory, model: VehicleModel) -> Plan:
         floor_m=(width, height),
         start=_ORIGIN,
         geometry=model.geometry,
-        swept=passed,
+        swept=np.concatenate([passed, stops(expected)]),
     )
 
 

@@ -45,8 +45,11 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
     parallel = hasattr(config, "workerinput") or getattr(config.option, "dist", "no") != "no"
     if config.option.collectonly or parallel or not any(is_bench(item) for item in session.items):
         return (yield)
+    from agvbench.metrics.registry import all_metrics  # only here: it loads numpy
+
     with ExitStack() as stack:
         with _ended_as_pytest_does(config):
+            all_metrics()  # a mistake in one of the lab's is said before anything is driven
             against = prepare(config, session.items)
             bench_session = _opened(session, stack)
             if against is not None:

@@ -34,8 +34,9 @@ def gate_table(checks: Sequence[GateCheck]) -> Table:
     ]
     note = (
         "A rule on growth fails where the statistic is beyond what is allowed and the growth is shown by a "
-        "one-sided test at 1 %, corrected for all rows; bias has two sides. Inconclusive: so few repeats cannot show "
-        "any growth."
+        "one-sided test at 1 %, corrected for all rows; bias has two sides. Beyond by chance: repeats that scatter so "
+        "do not show that the limit is exceeded; a rule that shall find such a growth has a lower limit. Inconclusive: "
+        "so few repeats cannot show any growth."
     )
     return Table("gate", f"Gate: {gate_sentence(checks)}", columns, [_row(check) for check in checks], note=note)
 
@@ -53,10 +54,15 @@ def gate_sentence(checks: Sequence[GateCheck]) -> str:
     return f"{failed} of {len(checks)} checks failed, {unclear} inconclusive, {passed} passed"
 
 
+def _verdict(check: GateCheck) -> str:
+    """Return the verdict in words: what is beyond its limit and passes must not look like what is within."""
+    return f"{check.verdict}{', beyond by chance' if check.verdict is GateVerdict.PASS and check.is_beyond else ''}"
+
+
 def _row(check: GateCheck) -> list[Value]:
     repeats = f"{check.repeats_a}, {check.repeats_b}" if check.repeats_a else str(check.repeats_b)
     names = check.rule.text, check.trajectory, check.condition, repeats
-    return [*names, check.before, check.now, check.allowed, check.rule.metric_unit, check.p_value, str(check.verdict)]
+    return [*names, check.before, check.now, check.allowed, check.rule.metric_unit, check.p_value, _verdict(check)]
 
 
 def write_junit(path: Path, comparison: Comparison, checks: Sequence[GateCheck], *, failing: bool) -> None:

@@ -25,6 +25,7 @@ _SIGNALLED = 128
 COMPARISON_CODE = pytest.StashKey[int]()
 """The exit code of the comparison with an earlier campaign, where it ends the session."""
 DEFAULT = ("calibration", "trajectories")
+"""What is driven where no benchmark is named; the first only where no calibration is given."""
 # The command line has imported agvbench before pytest looks for plugins, which does no harm here.
 _IN_PROCESS = "ignore:Module already imported:pytest.PytestAssertRewriteWarning"
 
@@ -54,7 +55,8 @@ def run_benchmarks(
     if options.get("resume") and not names:
         began = _begun_with(options.get("out"))
         names, only = began.benchmarks, only or began.only
-    files = [str(find_benchmark(name)) for name in names or DEFAULT]
+    usual = DEFAULT[1:] if options.get("calibration") else DEFAULT
+    files = [str(find_benchmark(name)) for name in names or usual]
     quiet = ["-q", "--strict-markers", "-p", "no:cacheprovider", "-p", _UNUSED, "-W", _IN_PROCESS]
     arguments = [*files, *quiet, SHORT_NAMES, *_flags(options)]
     if only:

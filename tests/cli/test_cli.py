@@ -93,6 +93,16 @@ def test_a_reader_that_left_is_no_error():
     assert "Traceback" not in done.stderr
 
 
+def test_a_reader_that_left_is_neither_success_nor_the_answer_no():
+    program = (
+        "import sys, rich, agvbench.cli as c;"
+        " c._run = lambda given: [rich.print('x' * 99) for _ in range(2000)];"
+        " sys.exit(c.main(['effects']))"
+    )
+    command = ["bash", "-c", f"'{sys.executable}' -c \"{program}\" | head -c 10; exit ${{PIPESTATUS[0]}}"]
+    assert subprocess.run(command, capture_output=True, text=True, check=False).returncode == 141
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [

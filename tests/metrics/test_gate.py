@@ -17,6 +17,7 @@ from agvbench.errors import AgvbenchError, FileError, FlagError, InputError
 from agvbench.metrics.gate import GateVerdict, check_gate
 from agvbench.metrics.gate_rules import GateRule, read_gate
 from agvbench.model import example_path
+from agvbench.reporting.gate_files import gate_table
 
 _UNITS = {"position_error": "mm", "across_error": "mm", "heading_error": "deg", "driving_time": "s"}
 
@@ -85,6 +86,15 @@ def test_a_limit_may_be_given_in_standard_deviations_of_the_earlier_repeats(drif
     (check,) = check_gate([GateRule.parse("across_error.bias>+1.5sd")], *tables)
     assert check.verdict is verdict
     assert abs(check.allowed - np.mean(a)) == pytest.approx(1.5 * np.std(a, ddof=1))
+
+
+def test_what_is_beyond_by_chance_passes_and_says_so():
+    rng = np.random.default_rng(8)
+    a, b = rng.normal(0.0, 4.0, 10), rng.normal(8.0, 4.0, 10)
+    tables = _table({"3": b}, metric="across_error"), _table({"3": a}, metric="across_error")
+    (check,) = check_gate([GateRule.parse("across_error.bias>+1.5sd")], *tables)
+    assert (check.verdict, check.is_beyond) == (GateVerdict.PASS, True)
+    assert gate_table([check]).rows[0][-1] == "pass, beyond by chance"
 
 
 def test_one_earlier_repeat_has_no_standard_deviation():

@@ -168,6 +168,15 @@ def test_a_mistake_in_one_metric_costs_no_other(tmp_path):
     assert "The metric farthest_left is left out: " in page
 
 
+def test_a_metric_that_cannot_be_imported_is_said_before_anything_is_driven(tmp_path):
+    (tmp_path / "metrics").mkdir()
+    (tmp_path / "metrics" / "own.py").write_text(_OWN + "def half(:\n", encoding="utf-8")
+    driven = _agvbench(tmp_path, "bench", "--out", "camp")
+    assert driven.returncode == 2
+    assert "metrics/own.py:10: cannot be imported" in driven.stdout + driven.stderr
+    assert not (tmp_path / "camp").exists()
+
+
 def test_the_file_is_listed_and_damage_is_found(lab, tmp_path):
     campaign = Campaign.open(lab / "camp").check()
     assert "errors.parquet" in (campaign.path / "SHA256SUMS").read_text(encoding="utf-8")

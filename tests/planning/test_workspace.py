@@ -1,6 +1,7 @@
 """Workspaces, and where a path is placed in them."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,9 @@ from hypothesis import strategies as st
 from agvbench.errors import InputError, PlanError
 from agvbench.planning import Workspace, place, plan, trajectory_from_table
 from agvbench.planning.placement import best_start
+from agvbench.running.configuration.vehicles import uncalibrated_vehicle
 from agvbench.types import Pose
+from agvbench.vehicle.maps import FullSpeedOrStop
 
 SQUARE = [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)]
 points_in_a_box = st.lists(
@@ -132,3 +135,16 @@ def test_leaving_the_workspace_is_told_with_time_and_place(nominal):
     # The front axle is 0.181 m ahead and may come within 0.25 m of the edge at 2 m.
     t = 0.5 + (2.0 - 0.25 - 0.181) / 0.32
     assert f"after {t:.1f} s at (0.00, 1.7" in str(error.value)
+
+
+@pytest.mark.parametrize("speed_mps", [0.3, 1.0, 1.5])
+def test_a_vehicle_that_is_stopped_anywhere_comes_to_rest_inside(speed_mps):
+    drive = FullSpeedOrStop(900.0, 1500.0, 2100.0, output_low=speed_mps, output_high=-speed_mps)
+    workspace = Workspace.circle(5.0)
+    made = plan(straight(3.4), replace(uncalibrated_vehicle(), drive=drive), workspace=workspace)
+    x_m, y_m = (made.start.place(made.expected[:, 1:3])).T
+    velocity = np.column_stack([np.gradient(x_m, made.expected[:, 0]), np.gradient(y_m, made.expected[:, 0])])
+    rest = np.column_stack([x_m, y_m]) + 0.6 * velocity
+    assert workspace.clearances(rest).min() > -1e-3
+    with pytest.raises(PlanError):
+        plan(straight(5.0 - 0.6 * speed_mps), replace(uncalibrated_vehicle(), drive=drive), workspace=workspace)

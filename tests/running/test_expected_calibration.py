@@ -10,7 +10,7 @@ import pytest
 
 from agvbench.campaign import CampaignHeader
 from agvbench.campaign.header import FILE_NAME
-from agvbench.model import example_vehicle, thesis_vehicle
+from agvbench.model import example_path, example_vehicle, thesis_vehicle
 from agvbench.running.configuration.vehicles import expected_calibration, uncalibrated_vehicle
 from agvbench.running.session.opening import open_session
 from agvbench.running.session.session import NotDrivenError
@@ -47,6 +47,18 @@ def test_a_vehicle_keeps_its_name(tmp_path):
     for resume in (False, True):
         with open_session(options, out=str(tmp_path / "c"), resume=resume, dry_run=False):
             assert CampaignHeader.load(tmp_path / "c" / FILE_NAME).vehicle_name == "red car"
+
+
+def test_where_a_calibration_is_given_none_is_driven(tmp_path):
+    command = [sys.executable, "-m", "agvbench", "bench", "--dry-run", "--trajectories", "5", "--repeats", "2"]
+    given = ["--calibration", str(example_path("thesis"))]
+    without, with_one = (
+        subprocess.run([*command, *more], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+        for more in ([], given)
+    )
+    assert "steering_front" in without
+    assert "steering_front" not in with_one
+    assert "trajectory" in with_one
 
 
 @pytest.mark.slow

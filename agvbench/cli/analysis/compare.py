@@ -7,9 +7,11 @@ own metrics. Shows by how much the mean end position moved. Two campaigns that d
 chance of at most 1 %. What is missing from a campaign, and differences between vehicles, cameras, trajectories and
 calibrations, are listed first.
 
-A gate limits a statistic (median, mean, p95, max, sd) of a metric over the repeats of each trajectory: --fail-on
+A gate limits a statistic (median, mean, p95, max, bias, sd) of a metric over the repeats of each trajectory: --fail-on
 METRIC.STATISTIC>LIMIT, or a TOML file of rules. A limit with a plus sign is a growth since A, which must be shown by a
-test (a chance of at most 1 % over all rules where nothing has grown); one without is a limit on B.
+test (a chance of at most 1 % over all rules where nothing has grown); one without is a limit on B. The unit is that of
+the metric, %, or sd: standard deviations of the repeats of A. A growth must be shown to be beyond its limit: to find a
+drift to either side of 2 sd, write a lower one, such as across_error.bias>+0.5sd.
 
 examples:
   agvbench compare campaigns/last-night campaigns/tonight
@@ -18,6 +20,7 @@ examples:
   agvbench compare A B --conditions calibrated corrected     calibrated of A, corrected of B
   agvbench compare A B --metrics cross_track_rms,driving_time
   agvbench compare A B --fail-on 'position_error.p95>+10%' --fail-on 'cross_track_rms.median>12mm'
+  agvbench compare A B --fail-on 'across_error.bias>+0.5sd'  fail where it drifts to either side
   agvbench compare A B --gate gate.toml --junit compare.xml --markdown summary.md
   agvbench compare A --plan --margin-mm 5      how many repeats will decide, before B is driven
 

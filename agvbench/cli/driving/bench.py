@@ -44,7 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "benchmarks",
         nargs="*",
         metavar="BENCHMARK",
-        help="files bench_NAME.py, or NAME for one beside you or shipped (default: calibration trajectories)",
+        help="files bench_NAME.py, or NAME for one beside you or shipped (default: calibration trajectories; with "
+        "--calibration trajectories)",
     )
     parser.add_argument("-k", dest="only", metavar="EXPRESSION", help="only benchmarks whose names match, as in pytest")
     add_options(parser.add_argument)

@@ -116,7 +116,7 @@ def _good_nights(nights: Path) -> list[str]:
 
 def _bench(arguments: argparse.Namespace, night: Path, good: Path | None) -> int:
     from agvbench.running.configuration.campaign_directory import has_session
-    from agvbench.workflows.bench import run_benchmarks
+    from agvbench.workflows.bench import DEFAULT, run_benchmarks
 
     options = vars(arguments) | {
         "out": str(night),
@@ -127,7 +127,8 @@ def _bench(arguments: argparse.Namespace, night: Path, good: Path | None) -> int
     calibrated = good / "vehicle.toml" if good else None
     if calibrated is not None and calibrated.is_file() and arguments.calibration is None:
         options["calibration"] = str(calibrated)
-    return run_benchmarks(arguments.benchmarks, options, only=arguments.only)
+    # A diagnosis needs the calibration runs of the night, too, whichever calibration its plans use.
+    return run_benchmarks(arguments.benchmarks or DEFAULT, options, only=arguments.only)
 
 
 def _judged(arguments: argparse.Namespace, night: Path, good: Path | None, gate: Path | None) -> dict[str, int]:

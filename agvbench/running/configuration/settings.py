@@ -90,7 +90,9 @@ class BenchSettings:
         choices=STEERINGS,
     )
     vehicle: str = _option("", "vehicle.toml before calibration (default: nominal maps)", metavar="FILE")
-    calibration: str = _option("", "calibrated vehicle.toml (default: calibrate in this session)", metavar="FILE")
+    calibration: str = _option(
+        "", "calibrated vehicle.toml, in place of driving the calibration in this session", metavar="FILE"
+    )
     corrected: str = _option(
         "", "vehicle.toml with effects, for the condition corrected (default: not driven)", metavar="FILE"
     )

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from agvbench.bus.state_publisher import StateSource
+from agvbench.campaign.attempts import LEAVES_WORKSPACE
 from agvbench.campaign.names import controlled_name
 from agvbench.control import ControllerFactory, Reference
 from agvbench.errors import FitError, FlagError, OneOf, PlanError
@@ -367,9 +368,9 @@ class Driver:
         )
         run = self._session.run(request, planned)
         if not run.is_ok:
-            raise RunRejectedError(
-                "no attempt counted", where=self._run_id, value=run.status, remedy="see the campaign's rejected runs"
-            )
+            bends = "give a larger --workspace, or a vehicle.toml with its trim: the vehicle bends off its planned path"
+            remedy = bends if LEAVES_WORKSPACE in str(run.status) else "see the campaign's rejected runs"
+            raise RunRejectedError("no attempt counted", where=self._run_id, value=run.status, remedy=remedy)
         self._session.concluded(self._run_id)  # whatever the benchmark says of it then: it was driven
         self._session.last_driven = DrivenRun.of(run)
         return self._session.last_driven

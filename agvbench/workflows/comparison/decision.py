@@ -123,5 +123,6 @@ def _check(check: GateCheck) -> dict[str, Any]:
         "repeats": {"a": check.repeats_a, "b": check.repeats_b},
         **{name: value if math.isfinite(value) else None for name, value in numbers.items()},
         "unit": check.rule.metric_unit,
+        "beyond": check.is_beyond,
         "verdict": str(check.verdict),
     }

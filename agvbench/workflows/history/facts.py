@@ -8,7 +8,7 @@ from pathlib import Path
 
 from agvbench.campaign.header import FILE_NAME, CampaignHeader
 from agvbench.errors import AgvbenchError
-from agvbench.running.configuration.provenance import INPUTS_TABLE, recorded_rows, recorded_trajectories
+from agvbench.running.configuration.provenance import INPUTS_TABLE, recorded_rows
 from agvbench.running.configuration.settings import BenchSettings
 from agvbench.workflows.comparison.comparability import HASH_DIGITS, calibration_hash
 
@@ -24,7 +24,7 @@ LABEL = "label "
 def facts_of(campaign: Path, firmware: str) -> Facts:
     """Return what a campaign records about itself, by name; what it does not record, or cannot be read, is left out."""
     found = {"firmware": firmware, "calibration": calibration_hash(campaign)[:HASH_DIGITS]}
-    for read in (_program, _header, _options, _trajectories):
+    for read in (_program, _header, _options, _files):
         with suppress(AgvbenchError, OSError, KeyError):
             found |= read(campaign)
     return {name: value for name, value in found.items() if value}
@@ -72,8 +72,11 @@ def _options(campaign: Path) -> dict[str, str]:
     return {f"--{name.replace('_', '-')}": str(getattr(settings, name)) or "none" for name in _OPTIONS}
 
 
-def _trajectories(campaign: Path) -> dict[str, str]:
-    rows = recorded_rows(campaign, INPUTS_TABLE)
-    names = recorded_trajectories(rows)
-    hashes = {str(row["input"]): str(row["sha256"])[:HASH_DIGITS] for row in rows}
-    return {name: digest for name, digest in hashes.items() if name.removeprefix("trajectory ") in names}
+def _files(campaign: Path) -> dict[str, str]:
+    """Return the hashes of trajectories, benchmarks and option files; that of the calibration is a fact of its own."""
+    hashes = {str(row["input"]): str(row["sha256"]) for row in recorded_rows(campaign, INPUTS_TABLE)}
+    return {
+        f"file of {name}" if name.startswith("--") else name: digest[:HASH_DIGITS]
+        for name, digest in hashes.items()
+        if name != "--calibration"
+    }

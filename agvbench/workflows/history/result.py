@@ -67,7 +67,8 @@ class History:
         """What was found, in one sentence."""
         tested, nights = int(self.series["sd"].notna().sum()), len(self.campaigns)
         if not tested:
-            return f"No series has enough nights to find a step: {nights} nights, at least {FEWEST} are needed."
+            most = int(self.series["nights"].max())
+            return f"No series has enough nights to find a step: at most {most} nights, at least {FEWEST} are needed."
         found = len(self.changes)
         return f"{found or 'No'} step{'s' * (found != 1)} in {tested} series of {nights} nights."
 
