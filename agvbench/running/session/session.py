@@ -24,6 +24,7 @@ from agvbench.planning import (
     plan,
     steered,
 )
+from agvbench.planning.leg import stops
 from agvbench.planning.trajectories.shapes import CommandTable
 from agvbench.running.command_shares import Shares, falling, held
 from agvbench.running.configuration.provenance import RecordedInputs, trajectory_inputs
@@ -208,6 +209,9 @@ class BenchSession:
 
 
 _LEAST_SHARE = 0.2
+_TRIM_SHARE = 0.06
+"""Of full steering: 1.5° of 25°, about what a servo horn is off by half a tooth."""
+Steps = Sequence[tuple[float, Mapping[str, float]]]
 
 
 class NotDrivenError(Exception):
@@ -321,7 +325,7 @@ class Driver:
             )
         return self.steps(fitting or steps[-1])
 
-    def steps(self, steps: Sequence[tuple[float, Mapping[str, float]]]) -> DrivenRun:
+    def steps(self, steps: Steps) -> DrivenRun:
         """Hold several commands one after another: (duration [s], shares of full command) each."""
         with self._planning():
             planned = self._held(steps)
@@ -336,21 +340,30 @@ class Driver:
             self._session.not_applicable.add(self._run_id)
             raise
 
-    def _fits(self, steps: Sequence[tuple[float, Mapping[str, float]]]) -> bool:
+    def _fits(self, steps: Steps) -> bool:
+        """Return whether the workspace has room for these steps: of a fast vehicle, also with a trim to either side.
+
+        Its long arcs are bent by metres if it steers other than its nominal maps say.
+        """
         try:
-            self._held(steps)
+            made = self._held(steps)
+            for bend in (-_TRIM_SHARE, _TRIM_SHARE) if len(stops(made.expected)) else ():
+                bent = self._as_trajectory(_bent(steps, bend))
+                plan(bent, self._session.nominal, workspace=self._session.workspace, start=made.start)
         except (PlanError, UndrivableError):
             return False
         return True
 
-    def _held(self, steps: Sequence[tuple[float, Mapping[str, float]]]) -> Plan:
-        shares = self._session.shares
-        if shares.rear == 0.0 and any(step.get("rear") for _, step in steps):
+    def _held(self, steps: Steps) -> Plan:
+        if self._session.shares.rear == 0.0 and any(step.get("rear") for _, step in steps):
             self._session.not_applicable.add(self._run_id)
             raise NotDrivenError("this vehicle does not steer its rear axle")
-        commands = held(self._session.nominal, [(duration_s, shares.command(**step)) for duration_s, step in steps])
-        trajectory = _as_trajectory(self._experiment, commands, self._session.nominal.channels.table_unit)
-        return self._session.plan(trajectory, "uncalibrated")
+        return self._session.plan(self._as_trajectory(steps), "uncalibrated")
+
+    def _as_trajectory(self, steps: Steps) -> Trajectory:
+        nominal, shares = self._session.nominal, self._session.shares
+        commands = held(nominal, [(duration_s, shares.command(**step)) for duration_s, step in steps])
+        return _as_trajectory(self._experiment, commands, nominal.channels.table_unit)
 
     def _drive(
         self, planned: Plan, condition: str, *, trajectory: str | None = None, control: Control | None = None
@@ -374,6 +387,14 @@ class Driver:
         self._session.concluded(self._run_id)  # whatever the benchmark says of it then: it was driven
         self._session.last_driven = DrivenRun.of(run)
         return self._session.last_driven
+
+
+def _bent(steps: Steps, bend: float) -> Steps:
+    """Return steps with shares of the front command that are moved by `bend`, within full command."""
+    return [
+        (duration_s, {**step, "front": max(-1.0, min(1.0, step.get("front", 0.0) + bend))})
+        for duration_s, step in steps
+    ]
 
 
 def _as_trajectory(name: str, commands: Commands, unit: TableUnit) -> Trajectory:
