@@ -16,6 +16,7 @@ def declared(campaign: InMemory, driven: str) -> InMemory:
 
 
 @pytest.mark.parametrize(("driven", "share"), [("rear", 0.0), ("front", 1.0)])
+@pytest.mark.slow
 def test_a_declared_driven_axle_leaves_nothing_to_find(tiny_campaign, driven, share):
     found = diagnose(declared(tiny_campaign(Tiny(front_drive_share=share)), driven))
     assert found.verdict is Verdict.ADEQUATE

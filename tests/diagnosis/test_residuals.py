@@ -80,6 +80,7 @@ def test_without_repeats_there_is_no_floor():
     assert lack_of_fit(missed, np.arange(160)) is None
 
 
+@pytest.mark.slow
 def test_scatter_alone_is_no_lack_of_fit():
     p_values = [lack_of_fit(scattered(seed, scatter_m=0.004, common_m=0.0), GROUP) for seed in range(200)]
     assert np.mean(np.array(p_values) < 0.05) < 0.11

@@ -45,6 +45,7 @@ def test_one_session_with_another_clock_is_found_from_its_first_seconds_too(offs
     assert found.value_s == pytest.approx(offset_s, abs=max(3.0 * found.stderr_s, 0.015))
 
 
+@pytest.mark.slow
 def test_steered_axles_tell_it_by_their_curvature():
     runs = late(free_runs(Tiny(steering_lag_s=0.15), sessions=3, runs=2), "day 1", 0.12)
     offsets = clock_offsets(runs, is_differential=False)

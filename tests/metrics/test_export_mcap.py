@@ -105,6 +105,7 @@ TIMES = st.lists(st.integers(0, 50_000), min_size=2, max_size=12, unique=True).m
     numbers=st.lists(SMALL, min_size=36, max_size=36),
     lost=st.sets(st.integers(1, 10)),
 )
+@pytest.mark.slow
 def test_export_and_import_give_the_same_poses_and_commands(
     kind, frames_ms, commands_ms, before_ms, numbers, lost, tmp_path_factory
 ):

@@ -110,6 +110,7 @@ def test_interrupt_stops_the_vehicle_keeps_the_run_as_aborted_and_can_be_resumed
     assert successful == uninterrupted
 
 
+@pytest.mark.slow
 def test_resuming_with_another_seed_is_refused_in_one_line(tmp_path):
     directory = tmp_path / "campaign"
     first = start(directory, "-k", "bench_drive and r01 and 0.0")

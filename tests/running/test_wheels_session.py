@@ -56,6 +56,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_it_drives_as_the_same_vehicle_with_body_commands(folder: Path) -> None:
     body = drive_some(folder / "body.toml", folder / "body")
     wheels = drive_some(folder / "wheels.toml", folder / "wheels")

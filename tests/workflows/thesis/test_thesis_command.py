@@ -9,7 +9,8 @@ import sys
 
 import pytest
 
-from agvbench.cli import main, thesis
+from agvbench.cli import main
+from agvbench.cli.analysis import thesis
 from agvbench.thesis import section_names, thesis_sections
 from agvbench.thesis.errata import errata_section, printed_speed, printed_yaw_rate
 from agvbench.thesis.refits.alternative_maps import maps_section
