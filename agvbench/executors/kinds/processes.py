@@ -145,9 +145,12 @@ def serve(number: int) -> None:
     signal.signal(signal.SIGTERM, _leave)
     connection = Connection(number)
     with suppress(EOFError, OSError, _Left):
-        sys.path[:] = connection.recv()
-        while True:
-            connection.send_bytes(_answer(connection))
+        try:
+            sys.path[:] = connection.recv()
+            while True:
+                connection.send_bytes(_answer(connection))
+        finally:  # it ends already: in what Python tidies up now, an exception would be printed
+            signal.signal(signal.SIGTERM, signal.SIG_IGN)
 
 
 def _answer(connection: Connection) -> bytes:
