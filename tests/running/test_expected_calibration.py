@@ -100,10 +100,11 @@ ARC = {"for_s": 8.0, "drive": 1.0, "front": 0.0, "least_s": 4.0, "slower": True}
 def test_calibration_runs_are_as_long_and_fast_as_the_floor_allows(tmp_path):
     assert held_for(tmp_path, 0.32, **ARC) == (8.0, 1.0)
     shorter_s, share = held_for(tmp_path, 1.0, **ARC)
-    assert 4.5 < shorter_s < 5.5
+    # 6.1 m less two margins, the axles and 0.35 m more for stopping; less where a trim of 1.5° bends it to either side.
+    assert 4.0 < shorter_s < 4.9
     assert share == 1.0
     least_s, share = held_for(tmp_path, 3.0, **ARC)
     assert least_s == 4.0
-    assert 0.35 < share < 0.45
+    assert 0.30 < share < 0.40
     with pytest.raises(NotDrivenError, match="too fast for this floor: 2 s of it do not fit"):
         held_for(tmp_path, 3.0, for_s=6.0, drive=1.0, least_s=2.0)
