@@ -7,7 +7,7 @@
     def bench_my_turn(drive, condition):
         drive.trajectory("my_turn.toml", condition=condition)
 
-Fixtures: ``drive`` (see `agvbench.running.session.session.Driver`) and ``bench`` (the session). Marks: ``repeats``,
+Fixtures: ``drive`` (see `agvbench.running.session.driver.Driver`) and ``bench`` (the session). Marks: ``repeats``,
 ``grid``, ``kinematics``, ``experiment``. The plugin is found through its entry point and declares options
 ``--agvbench-…``. Marks, fixtures and hooks are registered when the first file of benchmarks is found: other sessions of
 pytest see none of them.

@@ -17,7 +17,8 @@ from agvbench.workflows.bench import COMPARISON_CODE
 
 if TYPE_CHECKING:
     from agvbench.reporting.viewer.process import LiveView
-    from agvbench.running.session.session import BenchSession, Driver
+    from agvbench.running.session.driver import Driver
+    from agvbench.running.session.session import BenchSession
 
 INTERRUPT = pytest.StashKey[KeyboardInterrupt]()
 """What ended the session before its time."""

@@ -116,7 +116,7 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, object, o
     """Count what was not driven, for a reason that is no failure, as skipped."""
     if not is_bench(pyfuncitem):
         return (yield)
-    from agvbench.running.session.session import NotDrivenError
+    from agvbench.running.session.driver import NotDrivenError
 
     try:
         return (yield)

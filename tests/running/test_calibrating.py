@@ -13,8 +13,9 @@ from agvbench.errors import FitError, LinkError
 from agvbench.model import Prior, VehicleModel, thesis_vehicle
 from agvbench.running.configuration.vehicles import uncalibrated_vehicle
 from agvbench.running.execution.calibration import RUNS_DIGEST, VEHICLE_FILE
+from agvbench.running.session.driver import NotDrivenError
 from agvbench.running.session.opening import open_session
-from agvbench.running.session.session import BenchSession, NotDrivenError
+from agvbench.running.session.session import BenchSession
 
 SHARES = (-0.8, -0.4, 0.4, 0.8)
 RUNS = {f"{axle}{share}": (axle, share) for axle in ("front", "rear", "drive") for share in SHARES}

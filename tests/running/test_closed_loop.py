@@ -14,8 +14,8 @@ from agvbench.campaign.names import planned_name
 from agvbench.control import Motion, PurePursuit, Stanley
 from agvbench.errors import ControllerError, FlagError, PlanError
 from agvbench.model import example_path
+from agvbench.running.session.driver import NotDrivenError, RunRejectedError
 from agvbench.running.session.opening import open_session
-from agvbench.running.session.session import NotDrivenError, RunRejectedError
 from agvbench.types import Command
 
 CALIBRATED = {"calibration": str(example_path("thesis")), "seed": 3}

@@ -16,8 +16,9 @@ from agvbench.diagnosis import Diagnosis, Verdict, diagnose
 from agvbench.errors import FitError
 from agvbench.model import VehicleModel
 from agvbench.model.examples import example_path
+from agvbench.running.session.driver import NotDrivenError
 from agvbench.running.session.opening import open_session
-from agvbench.running.session.session import BenchSession, NotDrivenError
+from agvbench.running.session.session import BenchSession
 from agvbench.simulator.differential import DifferentialVehicle
 from agvbench.statistics.run_errors import run_error
 from agvbench.types import Run

@@ -14,8 +14,8 @@ from agvbench.model import example_path
 from agvbench.running.configuration.benchmark_files import find_benchmark
 from agvbench.running.configuration.settings import BenchSettings
 from agvbench.running.execution.calibration import calibrate_campaign
+from agvbench.running.session.driver import Driver
 from agvbench.running.session.opening import open_session
-from agvbench.running.session.session import Driver
 from agvbench.vehicle.channels import Channels
 from agvbench.workflows.init import make_lab
 

@@ -12,8 +12,8 @@ from agvbench.campaign import CampaignHeader
 from agvbench.campaign.header import FILE_NAME
 from agvbench.model import example_path, example_vehicle, thesis_vehicle
 from agvbench.running.configuration.vehicles import expected_calibration, uncalibrated_vehicle
+from agvbench.running.session.driver import NotDrivenError
 from agvbench.running.session.opening import open_session
-from agvbench.running.session.session import NotDrivenError
 from agvbench.workflows.init import make_lab
 
 

@@ -23,8 +23,8 @@ from agvbench.running.configuration.campaign_directory import shown
 from agvbench.running.execution.calibration import VEHICLE_FILE
 from agvbench.running.execution.run_records import attempts_by_run
 from agvbench.running.positioning.placers import PLACERS, Auto
+from agvbench.running.session.driver import NotDrivenError
 from agvbench.running.session.opening import open_session
-from agvbench.running.session.session import NotDrivenError
 from agvbench.vehicle.channels import Channels
 from agvbench.workflows.bench import run_benchmarks
 

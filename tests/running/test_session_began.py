@@ -14,8 +14,8 @@ from agvbench.running.configuration.settings import BenchSettings, settings_for_
 from agvbench.running.execution import campaign_time as session_began
 from agvbench.running.execution.campaign_time import SessionBegan, idle_notice, last_end_s
 from agvbench.running.session import rig_checks
+from agvbench.running.session.driver import Driver
 from agvbench.running.session.opening import open_session
-from agvbench.running.session.session import Driver
 from agvbench.types import NO_TARGET, Commands, Frames, Run
 
 HOUR_S = 3600.0

@@ -23,8 +23,9 @@ from agvbench.bus.session import bus_session
 from agvbench.campaign import Campaign
 from agvbench.errors import FlagError, LinkError
 from agvbench.running.execution.pause import PAUSE_FILE
+from agvbench.running.session.driver import RunRejectedError
 from agvbench.running.session.opening import open_session
-from agvbench.running.session.session import BenchSession, RunRejectedError
+from agvbench.running.session.session import BenchSession
 from agvbench.statistics import run_error
 from agvbench.workflows.watch import watched_states
 
