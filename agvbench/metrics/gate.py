@@ -135,11 +135,9 @@ def _checks(
         label = " → ".join(conditions) if conditions else condition
         counts = len(earlier), len(values)
         present = float(statistic(values))
-        limit, pending = (applied.allowed(past, present), applied.is_exceeded(past, present)), GateVerdict.INCONCLUSIVE
-        yield (
-            GateCheck(rule, trajectory, label, *counts, past, present, *limit, p, pending),
-            least,
-        )
+        limit = applied.allowed(past, present), applied.is_exceeded(past, present)
+        pending = GateVerdict.INCONCLUSIVE
+        yield GateCheck(rule, trajectory, label, *counts, past, present, *limit, p, pending), least
 
 
 def _least_p(rule: GateRule, n_a: int, n_b: int, resamples: int) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -65,25 +65,28 @@ def metrics_of_runs(
     import pandas as pd
 
     aimed = (MeasuredRun.of(run, paths.of(run)) for run in runs if run.target.is_finite)
-    rows = [row for run in aimed for row in _rows(run, all_metrics(), failures)]
+    rows = [row for run in aimed for row in _rows(run, failures)]
     return pd.DataFrame([row for row in rows if row[_METRIC] not in (failures or {})], columns=list(COLUMNS))
 
 
-def _rows(
-    run: MeasuredRun, metrics: Mapping[str, Metric], failures: dict[str, FileError] | None
-) -> Iterator[tuple[object, ...]]:
+def _rows(run: MeasuredRun, failures: dict[str, FileError] | None) -> Iterator[tuple[object, ...]]:
     named = [getattr(run, name) for name in OF_RUN]
     named[OF_RUN.index("session")] = run.session or ""
-    for name, metric in metrics.items():
+    for metric in all_metrics().values():
+        if math.isfinite(value := _value(metric, run, failures)):
+            yield (*named, metric.name, value, metric.unit)
+
+
+def _value(metric: Metric, run: MeasuredRun, failures: dict[str, FileError] | None) -> float:
+    """Return the number of a run, NaN where it has none; with `failures` also of a metric that fails or has failed."""
+    if failures is None:
+        return metric.of(run)
+    if metric.name not in failures:
         try:
-            value = math.nan if failures and name in failures else metric.of(run)
+            return metric.of(run)
         except FileError as error:
-            if failures is None:
-                raise
-            failures[name] = error
-            continue
-        if math.isfinite(value):
-            yield (*named, name, value, metric.unit)
+            failures[metric.name] = error
+    return math.nan
 
 
 def write_metrics(directory: Path, table: pd.DataFrame) -> Path:

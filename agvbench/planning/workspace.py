@@ -12,12 +12,12 @@ from agvbench.errors import InputError
 from agvbench.types import Floats
 
 DEFAULT_MARGIN_M = 0.25
+"""Half of the vehicle's width, its overhang, and room to brake: 0.10 m from full speed (thesis 8.1)."""
 STOPPING_S = 0.6
 """So long [s], at full speed, a vehicle drives on until it was seen, stopped and has come to rest: 0.1 s between two
 looks, up to 0.1 s until a frame and a command have arrived, 0.3 s of braking (thesis 8.1: 0.59 s at half of the speed),
 and 0.1 s for a vehicle that is faster than its nominal maps.
 """
-"""Half of the vehicle's width, its overhang, and room to brake: 0.10 m from full speed (thesis 8.1)."""
 _FORMS = "circle:DIAMETER, ellipse:WIDTHxHEIGHT, rectangle:WIDTHxHEIGHT or polygon:X,Y X,Y X,Y … (m)"
 _TANGENTS = 360
 

@@ -55,6 +55,6 @@ def run(arguments: argparse.Namespace) -> int:
     print_report(wide_console(), report)
     if not has_rerun and not arguments.no_recording:
         print("campaign.rrd is left out: rerun-sdk is not installed")
-    for failure in report.data.failures.values():
-        raise failure
+    if failures := report.data.failures:
+        raise next(iter(failures.values()))
     return 0

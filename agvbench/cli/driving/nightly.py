@@ -127,8 +127,10 @@ def _bench(arguments: argparse.Namespace, night: Path, good: Path | None) -> int
     calibrated = good / "vehicle.toml" if good else None
     if calibrated is not None and calibrated.is_file() and arguments.calibration is None:
         options["calibration"] = str(calibrated)
-    # A diagnosis needs the calibration runs of the night, too, whichever calibration its plans use.
-    return run_benchmarks(arguments.benchmarks or DEFAULT, options, only=arguments.only)
+    # A diagnosis needs the calibration runs of the night, too, whichever calibration its plans use. What is resumed
+    # drives what it began with.
+    benchmarks = arguments.benchmarks or (() if options["resume"] else DEFAULT)
+    return run_benchmarks(benchmarks, options, only=arguments.only)
 
 
 def _judged(arguments: argparse.Namespace, night: Path, good: Path | None, gate: Path | None) -> dict[str, int]:
