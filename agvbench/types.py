@@ -8,10 +8,12 @@ Units are SI and radians; commands are in the vehicle's own unit (µs of servo p
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
-from typing import Literal, NamedTuple, Protocol, Self, TypeVar, runtime_checkable
+from functools import wraps
+from typing import Concatenate, Literal, NamedTuple, ParamSpec, Protocol, Self, TypeVar, runtime_checkable
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +64,8 @@ CALIBRATION_EXPERIMENTS = ("steering_front", "steering_rear", "steering_opposite
 """The experiments whose runs hold one command each, for static maps."""
 
 
+P = ParamSpec("P")
+T = TypeVar("T")
 _Angle = TypeVar("_Angle", float, Floats)
 
 
@@ -146,9 +150,9 @@ class Commands:
         return Command(float(self.drive[index]), float(self.front[index]), float(self.rear[index]))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Frames:
-    """Motion capture frames of one vehicle, in order of arrival; every array has shape (n,).
+    """Motion capture frames of one vehicle, in order of arrival; every array has shape (n,) and is not changed.
 
     ``t_s`` [s] is the capture time in the run's clock (0 = first command published; frames at rest before
     it are negative); ``x_m``, ``y_m`` [m] and ``heading_rad`` [rad] are in the floor frame and NaN where
@@ -185,6 +189,21 @@ class Frames:
     def select(self, mask: NDArray[np.bool_] | NDArray[np.int64]) -> Frames:
         """Return the frames that a boolean mask or an index array chooses."""
         return Frames(*(getattr(self, f.name)[mask] for f in fields(self)))
+
+
+def kept_by_frames(measure: Callable[Concatenate[Frames, P], T]) -> Callable[Concatenate[Frames, P], T]:
+    """Return `measure`, which keeps what it found for as long as the frames exist: a report asks it many times."""
+    found: WeakKeyDictionary[Frames, dict[object, T]] = WeakKeyDictionary()
+
+    @wraps(measure)
+    def kept(frames: Frames, /, *args: P.args, **kwargs: P.kwargs) -> T:
+        of_frames = found.setdefault(frames, {})
+        key = (args, *kwargs.items())
+        if key not in of_frames:
+            of_frames[key] = measure(frames, *args, **kwargs)
+        return of_frames[key]
+
+    return kept
 
 
 class TimeSeries(NamedTuple):

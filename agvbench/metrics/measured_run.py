@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from agvbench.metrics.path_matching import PathErrors, track_path
 from agvbench.statistics.rest_poses import start_pose
 from agvbench.statistics.run_errors import RunError, run_error
-from agvbench.types import Floats, Frames, Pose, Run
+from agvbench.types import Floats, Frames, Pose, Run, kept_by_frames
+
+if TYPE_CHECKING:
+    from agvbench.metrics.path_matching import PathErrors
 
 _JUMP_M = 0.1
 _NEIGHBOURS = 5
@@ -67,7 +70,11 @@ class MeasuredRun(Run):
     @cached_property
     def tracking(self) -> PathErrors | None:
         """The driven poses against the planned path at the same progress; None without a planned path."""
-        return None if self.planned is None else track_path(self.driven, self.planned)
+        if self.planned is None:
+            return None
+        from agvbench.metrics.path_matching import track_path  # numba takes a third of a second to import
+
+        return track_path(self.driven, self.planned)
 
 
 def in_start_frame(poses: Floats, start: Pose) -> Floats:
@@ -79,6 +86,7 @@ def in_start_frame(poses: Floats, start: Pose) -> Floats:
     return moved
 
 
+@kept_by_frames
 def smooth_poses(frames: Frames) -> Floats:
     """Return every tracked pose in order of capture and without jumps, shape (n, 4): t [s], x, y [m], heading [rad].
 
@@ -92,5 +100,5 @@ def smooth_poses(frames: Frames) -> Floats:
     half = _NEIGHBOURS // 2
     padded = np.pad(poses[:, 1:3], ((half, half), (0, 0)), mode="reflect")
     windows = np.lib.stride_tricks.sliding_window_view(padded, _NEIGHBOURS, axis=0)
-    away = np.hypot(*(poses[:, 1:3] - np.median(windows, axis=2)).T)
+    away = np.hypot(*(poses[:, 1:3] - np.sort(windows, axis=2)[:, :, half]).T)
     return np.asarray(poses[away <= _JUMP_M])

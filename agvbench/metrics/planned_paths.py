@@ -12,6 +12,7 @@ from agvbench.campaign import Campaign
 from agvbench.campaign.manifest import sha256
 from agvbench.campaign.names import planned_name
 from agvbench.errors import AgvbenchError
+from agvbench.metrics.measured_run import MeasuredRun
 from agvbench.model import VehicleModel, thesis_vehicle
 from agvbench.planning import Plan, load_trajectory, plan, steered
 from agvbench.planning.trajectories.loading import trajectory_file
@@ -46,6 +47,10 @@ class PlannedPaths:
         if made is None or not np.allclose(made.target, run.target, rtol=0.0, atol=_SAME_TARGET, equal_nan=True):
             return None
         return _as_commanded(made, run) if run.condition == "uncalibrated" else made.expected
+
+    def measured(self, run: Run) -> MeasuredRun:
+        """Return `run` with its planned path, where it has one."""
+        return MeasuredRun.of(run, self.of(run))
 
     def plan(self, name: str) -> Plan | None:
         """Return the plan of the trajectory `name`; None if it is not known here, or has changed."""

@@ -19,7 +19,6 @@ from agvbench.metrics.measured_run import MeasuredRun
 from agvbench.metrics.metric import Metric
 from agvbench.metrics.planned_paths import PlannedPaths
 from agvbench.metrics.registry import all_metrics
-from agvbench.types import Run
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,20 +51,17 @@ def metric_table(campaign: Campaign | str | Path) -> pd.DataFrame:
         If a metric of the lab cannot be imported or evaluated.
     """
     opened = as_campaign(campaign)
-    return metrics_of_runs(opened, PlannedPaths(opened))
+    return metrics_of_runs(map(PlannedPaths(opened).measured, opened))
 
 
-def metrics_of_runs(
-    runs: Iterable[Run], paths: PlannedPaths, failures: dict[str, FileError] | None = None
-) -> pd.DataFrame:
-    """Return what `metric_table` returns, of runs that were read already and the planned paths of their campaign.
+def metrics_of_runs(runs: Iterable[MeasuredRun], failures: dict[str, FileError] | None = None) -> pd.DataFrame:
+    """Return what `metric_table` returns, of runs that were read already.
 
     With `failures`, a metric that cannot be evaluated has no row, and its first error is put there by its name.
     """
     import pandas as pd
 
-    aimed = (MeasuredRun.of(run, paths.of(run)) for run in runs if run.target.is_finite)
-    rows = [row for run in aimed for row in _rows(run, failures)]
+    rows = [row for run in runs if run.target.is_finite for row in _rows(run, failures)]
     return pd.DataFrame([row for row in rows if row[_METRIC] not in (failures or {})], columns=list(COLUMNS))
 
 

@@ -174,9 +174,14 @@ def plain(text: str) -> str:
     >>> plain("slalom\x1b\n 2") == "slalom\ufffd 2"
     True
     """
-    kept = "".join("\ufffd" if unicodedata.category(c) in {"Cc", "Cf", "Cs"} and not c.isspace() else c for c in text)
+    kept = text if text.isprintable() else "".join(map(_shown, text))
     line = " ".join(kept.split())
     return line if len(line) <= _LONGEST else f"{line[: _LONGEST - 1]}…"
+
+
+def _shown(character: str) -> str:
+    is_control = unicodedata.category(character) in {"Cc", "Cf", "Cs"} and not character.isspace()
+    return "\ufffd" if is_control else character
 
 
 def plain_sentences(text: str) -> str:

@@ -89,7 +89,7 @@ def write_loop_report(loop: Loop) -> LoopReport:
     title = f"Loop {plain(loop.directory.name)}"
     texts = dict(page_texts(title, subtitle_of(data), sections, loop.directory))
     write_report(loop.before, recording=False)
-    write_gathered(data, recording=False)
+    write_gathered(data)
     try:
         (loop.directory / TABLES).mkdir(exist_ok=True)
         for name, text in texts.items():

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from agvbench.campaign import Campaign
 from agvbench.campaign.arguments import as_campaign
-from agvbench.campaign.atomic_files import made_folder, replace_whole
+from agvbench.campaign.atomic_files import made_folder, replace_file
 from agvbench.errors import FileError, RecordingError
 from agvbench.metrics.table import write_metrics
 from agvbench.reporting.content import Content, plain
 from agvbench.reporting.drawn_sections import drawn_sections
 from agvbench.reporting.pages import to_html, to_markdown
 from agvbench.reporting.progress import track
-from agvbench.reporting.recording import write_recording
+from agvbench.reporting.recording import recorder
 from agvbench.reporting.sections.diagnosis import DiagnosisSection, diagnosis_blocks
 from agvbench.reporting.table_files import frame_to_csv, to_csv, to_latex
 from agvbench.running.configuration.lab_file import LabFile
@@ -94,40 +93,41 @@ def write_report(
     FileError
         If `out` cannot be written, `uncertainty` not be read, or an own section not be drawn.
     """
-    data = gather(
-        as_campaign(campaign).path,
-        margin_mm=margin_mm,
-        margin_deg=margin_deg,
-        against=None if against is None else Path(against),
-        uncertainty=None if uncertainty is None else LabFile.load(Path(uncertainty)).uncertainty,
-        track=lambda runs, total: track(runs, total, what="reading runs"),
-    )
-    return write_gathered(data, out, recording=recording)
+    opened = as_campaign(campaign)
+    out = opened.path / "report" if out is None else Path(out)
+    with _writable(out), recorder(opened, out / RECORDING) if recording else nullcontext(lambda _: None) as record:
+        data = gather(
+            opened,
+            track=lambda runs, total: track(runs, total, what="reading runs"),
+            on_read=record,
+            margin_mm=margin_mm,
+            margin_deg=margin_deg,
+            against=None if against is None else Path(against),
+            uncertainty=None if uncertainty is None else LabFile.load(Path(uncertainty)).uncertainty,
+        )
+        written = write_gathered(data, out)
+    return replace(written, files=[*written.files, out / RECORDING]) if recording else written
 
 
-def write_gathered(data: ReportData, out: str | Path | None = None, *, recording: bool = True) -> WrittenReport:
+def write_gathered(data: ReportData, out: str | Path | None = None) -> WrittenReport:
     """Write the report of a campaign that was gathered already; parameters and errors are those of `write_report`."""
     out = data.path / "report" if out is None else Path(out)
     with suppress(RecordingError):
         write_metrics(data.path, data.metrics)
+    sections = drawn_sections(data)
+    with _writable(out):
+        return WrittenReport(data, sections, [_write(out / name, text) for name, text in _texts(data, sections, out)])
+
+
+@contextmanager
+def _writable(out: Path) -> Iterator[None]:
+    """Make the directory `out`; where it cannot be written, say so."""
     try:
-        sections = drawn_sections(data)
         with made_folder(out):
-            files = [_write(out / name, text) for name, text in _texts(data, sections, out)]
-            if recording:
-                _replace(out / RECORDING, partial(_record, data))
-                files.append(out / RECORDING)
+            yield
     except OSError as error:
         why = error.strerror or str(error)
         raise FileError(f"cannot be written ({why})", where=out, remedy="choose another directory with --out") from None
-    return WrittenReport(data, sections, files)
-
-
-def _record(data: ReportData, path: Path) -> None:
-    try:
-        write_recording(data, path)
-    except RuntimeError as error:  # rerun's word for a full disk
-        raise OSError(f"{RECORDING}: {error}") from None
 
 
 def subtitle_of(data: ReportData) -> str:
@@ -146,16 +146,8 @@ def _texts(data: ReportData, sections: Sequence[Content], out: Path) -> Iterator
 
 def _write(path: Path, text: str) -> Path:
     with made_folder(path.parent):
-        _replace(path, lambda file: file.write_text(text, encoding="utf-8"))
+        replace_file(path, lambda file: file.write_text(text, encoding="utf-8"))
     return path
-
-
-def _replace(path: Path, write: Callable[[Path], object]) -> None:
-    """Have `write` write `path`: a device directly, a file of an earlier report by a whole one or not at all."""
-    if path.exists() and not path.is_file():
-        write(path)
-    else:
-        replace_whole(path.resolve(), write, durable=False)
 
 
 def write_diagnosis_report(found: Diagnosis, path: str | Path) -> Path:

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.errors import FitError
-from agvbench.signals import MAD_TO_STD
-from agvbench.types import Floats, Frames, Pose, Run, wrap_angle
+from agvbench.signals import MAD_TO_STD, median
+from agvbench.types import Floats, Frames, Pose, Run, kept_by_frames, wrap_angle
 
 WINDOW_S = 0.5
 STILL_MOVING_AT_END = "still moving when the frames end"
@@ -58,11 +58,17 @@ def start_pose(run: Run) -> RestPose:
     FitError
         If no frame was tracked before the first command.
     """
-    frames = _tracked(run.frames)
-    before = frames.select(frames.t_s <= 0.0)
-    if len(before) == 0:
+    rest = _before_first_command(run.frames)
+    if rest is None:
         raise FitError("no tracked frame at rest before the first command", where=run.run_id)
-    return _mean_pose(before.select(before.t_s > before.t_s[-1] - WINDOW_S))
+    return rest
+
+
+@kept_by_frames
+def _before_first_command(frames: Frames) -> RestPose | None:
+    frames = _tracked(frames)
+    before = frames.select(frames.t_s <= 0.0)
+    return _mean_pose(before.select(before.t_s > before.t_s[-1] - WINDOW_S)) if len(before) else None
 
 
 def end_pose(run: Run) -> RestPose:
@@ -76,12 +82,9 @@ def end_pose(run: Run) -> RestPose:
         If no frame was tracked after the stop, or the vehicle still moves when the frames end.
     """
     stop_s = float(run.commands.t_s[-1]) if len(run.commands) else 0.0
-    frames = _tracked(run.frames)
-    after = frames.select(frames.t_s > stop_s)
-    if len(after) == 0:
+    rest, speed = _after_stop(run.frames, stop_s)
+    if rest is None:
         raise FitError("no tracked frame after the stop", where=run.run_id)
-    window = _settled(after.select(after.t_s > after.t_s[-1] - WINDOW_S))
-    speed = _drift(window)[1]
     if speed > SPEED_LIMIT_MPS:
         raise FitError(
             STILL_MOVING_AT_END,
@@ -89,7 +92,18 @@ def end_pose(run: Run) -> RestPose:
             value=f"{speed:.3f} m/s",
             limit=f"{SPEED_LIMIT_MPS} m/s",
         )
-    return _mean_pose(window)
+    return rest
+
+
+@kept_by_frames
+def _after_stop(frames: Frames, stop_s: float) -> tuple[RestPose | None, float]:
+    """Return the pose of the settled window after `stop_s`, None without frames, and the speed [m/s] in it."""
+    frames = _tracked(frames)
+    after = frames.select(frames.t_s > stop_s)
+    if not len(after):
+        return None, 0.0
+    window = _settled(after.select(after.t_s > after.t_s[-1] - WINDOW_S))
+    return _mean_pose(window), _drift(window)[1]
 
 
 def _tracked(frames: Frames) -> Frames:
@@ -114,11 +128,11 @@ def _drift(window: Frames) -> tuple[float, float, float]:
         return 0.0, 0.0, 0.0
     half = len(window) // 2
     older, newer = np.arange(half), np.arange(half, len(window))
-    moved = math.hypot(*(float(np.median(v[newer]) - np.median(v[older])) for v in (window.x_m, window.y_m)))
-    apart_s = float(np.median(window.t_s[newer]) - np.median(window.t_s[older]))
+    moved = math.hypot(*(median(v[newer]) - median(v[older]) for v in (window.x_m, window.y_m)))
+    apart_s = median(window.t_s[newer]) - median(window.t_s[older])
     # The noise is read from second differences, which steady motion does not change.
     bends = np.concatenate([np.diff(window.x_m, 2), np.diff(window.y_m, 2)])
-    noise = MAD_TO_STD * float(np.median(np.abs(bends))) / math.sqrt(6.0)
+    noise = MAD_TO_STD * median(np.abs(bends)) / math.sqrt(6.0)
     tolerance = _LEAST_M + 4.0 * 1.2533 * noise * math.sqrt(2.0 / half)
     return moved, max(0.0, moved - tolerance) / apart_s, tolerance
 
@@ -146,13 +160,13 @@ def _velocities(t_s: Floats, *columns: Floats) -> list[float]:
 
 def _unwrapped(heading: Floats) -> tuple[float, Floats]:
     """Return a central heading and every heading's wrapped distance from it."""
-    centre = math.atan2(float(np.median(np.sin(heading))), float(np.median(np.cos(heading))))
+    centre = math.atan2(median(np.sin(heading)), median(np.cos(heading)))
     return centre, np.angle(np.exp(1j * (heading - centre)))
 
 
 def _wild(values: Floats, least: float) -> NDArray[np.bool_]:
-    away = np.abs(values - np.median(values))
-    wild: NDArray[np.bool_] = away > _WILD_SCALES * max(least, MAD_TO_STD * float(np.median(away)))
+    away = np.abs(values - median(values))
+    wild: NDArray[np.bool_] = away > _WILD_SCALES * max(least, MAD_TO_STD * median(away))
     return wild
 
 

@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from agvbench.campaign import Campaign, CampaignHeader
+from agvbench.campaign.arguments import as_campaign
 from agvbench.campaign.uncertainty_statement import evaluations
 from agvbench.errors import FileError, InputError
+from agvbench.metrics.measured_run import MeasuredRun
 from agvbench.metrics.planned_paths import PlannedPaths
 from agvbench.metrics.table import metrics_of_runs
 from agvbench.statistics import Comparison, bias_and_spread, compare_errors, end_pose_table, pose_errors, valid
@@ -69,8 +71,8 @@ class ReportData:
     ``errors`` is what `pose_errors` returns, ``end_poses`` the table of tables 8.3–8.10, ``spread`` accuracy apart from
     repeatability, ``comparisons`` every condition against the next one, ``quality`` one row per run. ``problems`` are
     sentences about what could not be read or compared, ``failures`` the errors of own metrics that cannot be
-    evaluated, by name; ``events`` are what adapters reported. ``planned`` are the planned paths, ``metrics`` what
-    `metric_table` returns; ``diagnosis`` lies in the directory, or None. ``budgets`` are the uncertainty budgets of
+    evaluated, by name; ``events`` are what adapters reported. ``metrics`` are what `metric_table` returns;
+    ``diagnosis`` lies in the directory, or None. ``budgets`` are the uncertainty budgets of
     mean end pose errors, ``accuracy`` what `pose_accuracies` returns and ``completions`` what `completions` does.
     ``changes`` are since the campaign before, or None where there is none. ``recordings`` are the files of the runs'
     poses, by run id.
@@ -78,7 +80,7 @@ class ReportData:
 
     path: Path
     header: CampaignHeader
-    runs: list[Run]
+    runs: list[MeasuredRun]
     errors: pd.DataFrame
     end_poses: pd.DataFrame
     spread: pd.DataFrame
@@ -86,7 +88,6 @@ class ReportData:
     quality: pd.DataFrame
     curves: CalibrationCurves
     events: pd.DataFrame
-    planned: PlannedPaths
     metrics: pd.DataFrame
     budgets: list[EndPoseBudget]
     accuracy: pd.DataFrame
@@ -105,20 +106,21 @@ class ReportData:
 
 
 def gather(
-    path: str | Path,
+    source: Campaign | str | Path,
     *,
     margin_mm: float = MARGIN_MM,
     margin_deg: float = MARGIN_DEG,
     against: Path | None = None,
     uncertainty: Mapping[str, Any] | None = None,
     track: Tracker | None = None,
+    on_read: Callable[[Sequence[MeasuredRun]], object] = lambda _: None,
 ) -> ReportData:
-    """Read the campaign in directory `path` and compute what a report says about it.
+    """Read a campaign and compute what a report says about it.
 
     Parameters
     ----------
-    path
-        A campaign directory.
+    source
+        A campaign, or its directory.
     margin_mm, margin_deg
         The noise band of comparisons between conditions.
     against
@@ -128,6 +130,8 @@ def gather(
         the campaign's header has.
     track
         Wraps the runs while they are read, to show progress: called with the runs and their number.
+    on_read
+        Called with the runs once they are read.
 
     Raises
     ------
@@ -137,13 +141,14 @@ def gather(
         If a margin is negative or not finite.
     """
     checked_margins(margin_mm, margin_deg)
-    campaign = Campaign.open(path)
+    campaign = as_campaign(source)
     tracked = track(campaign, len(campaign)) if track else iter(campaign)
-    runs = list(tracked)
+    runs = list(map(PlannedPaths(campaign).measured, tracked))
+    on_read(runs)
     errors = pose_errors(runs)
     problems: list[str] = []
-    planned, failures = PlannedPaths(campaign), dict[str, FileError]()
-    metrics = metrics_of_runs(runs, planned, failures)
+    failures = dict[str, FileError]()
+    metrics = metrics_of_runs(runs, failures)
     problems += [f"The metric {name} is left out: {error}" for name, error in failures.items()]
     return ReportData(
         path=campaign.path,
@@ -155,8 +160,7 @@ def gather(
         comparisons=_between_conditions(errors, margin_mm, margin_deg, problems),
         quality=run_quality(runs, rate_hz=campaign.header.mocap_rate_hz),
         curves=read_calibration_curves(campaign),
-        events=_events(campaign, problems),
-        planned=planned,
+        events=reported_events(campaign, problems),
         metrics=metrics,
         budgets=end_pose_budgets(
             runs, evaluations(campaign.header.uncertainty if uncertainty is None else uncertainty)
@@ -209,8 +213,8 @@ def _between_conditions(
 EVENT_COLUMNS = ("time_s", "run_id", "source", "level", "event", "text")
 
 
-def _events(campaign: Campaign, problems: list[str]) -> pd.DataFrame:
-    """Return what adapters and link reported, as far as the campaign says so; no rows where it does not."""
+def reported_events(campaign: Campaign, problems: list[str]) -> pd.DataFrame:
+    """Return what adapters and link reported, no rows where the campaign does not say; `problems` get what is wrong."""
     import pandas as pd
 
     nothing = pd.DataFrame(columns=list(EVENT_COLUMNS))

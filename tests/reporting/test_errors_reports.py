@@ -44,7 +44,7 @@ def test_a_disk_that_is_full_when_the_recording_is_written_is_one_line(folder, t
     (tmp_path / "campaign.rrd").symlink_to("/dev/full")
     assert main(["report", str(folder / "c"), "--out", str(tmp_path)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"agvbench report: {tmp_path}: cannot be written (campaign.rrd: ")
+    assert line.startswith(f"agvbench report: {tmp_path / 'campaign.rrd'}: cannot be written (")
     assert "No space left on device" in line
 
 

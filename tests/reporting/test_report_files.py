@@ -11,8 +11,9 @@ from urllib.parse import unquote
 import numpy as np
 import pandas as pd
 import pytest
-from report_samples import HOSTILE
+from report_samples import HOSTILE, make_campaign
 
+from agvbench.errors import FileError
 from agvbench.reporting.content import Column, plain
 from agvbench.reporting.sections.diagnosis import DiagnosisSection
 from agvbench.reporting.sections.provenance import ProvenanceSection
@@ -163,7 +164,10 @@ def test_plain_text_has_no_control_characters_and_fits_a_line():
 def recorded(report):
     """Return the columns of the recording by entity: {path: {time or component: values}}."""
     chunks = pytest.importorskip("rerun.chunk", reason="this Rerun SDK cannot read recordings")
-    path = next(p for p in report.files if p.name == "campaign.rrd")
+    return _columns(chunks, next(p for p in report.files if p.name == "campaign.rrd"))
+
+
+def _columns(chunks, path):
     found = {}
     for chunk in chunks.RrdReader(str(path)).stream().to_chunks():
         columns = chunk.to_record_batch().to_pydict()
@@ -201,6 +205,30 @@ def test_recording_shows_where_each_run_was_to_go(report, recorded):
             (driven,) = columns["path"]["LineStrips3D:strips"][0]
             assert planned[-1][:2] == pytest.approx(target[:2], abs=1e-4)
             assert planned[0][:2] == pytest.approx(driven[0][:2], abs=0.01)
+
+
+@pytest.fixture(scope="module")
+def many(tmp_path_factory):
+    """Return a campaign of so many runs that a process of its own records them."""
+    path = tmp_path_factory.mktemp("many") / "campaign"
+    return make_campaign(path, repeats=55, trajectories=["5_forward_left"], rate_hz=30.0)
+
+
+def test_many_runs_are_recorded_by_a_process_of_their_own(many, tmp_path):
+    chunks = pytest.importorskip("rerun.chunk", reason="this Rerun SDK cannot read recordings")
+    report = write_report(many, tmp_path)
+    found = _columns(chunks, tmp_path / "campaign.rrd")
+    for run in (run for run in report.data.runs if run.is_ok):
+        (moved,) = (columns for entity, columns in found.items() if entity.endswith(f"/{run.run_id}/vehicle"))
+        assert moved["run_time"][0].total_seconds() == pytest.approx(run.frames.t_s[0], abs=0.1)
+        assert len(moved["run_time"]) > 0.9 * len(run.frames)
+
+
+def test_a_disk_that_is_full_is_said_of_many_runs_too(many, tmp_path):
+    (tmp_path / "campaign.rrd").symlink_to("/dev/full")
+    with pytest.raises(FileError, match="No space left") as said:
+        write_report(many, tmp_path)
+    assert said.value.where == tmp_path / "campaign.rrd"
 
 
 def test_sections_with_nothing_to_show_are_listed_at_the_end(campaigns, tmp_path):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from agvbench.plot.style import condition_numbers
 from agvbench.plot.target_frame import draw_ends, ends_by_condition
 from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph
-from agvbench.reporting.figures.style import ON_PAGE, dress, legend, new_figure, panel_title, to_svg
+from agvbench.reporting.figures.style import ON_PAGE, dress, legend, new_panel, panel_title, to_svg
 from agvbench.reporting.sections.base import Section
 from agvbench.statistics import valid
 from agvbench.types import Floats, Pose
@@ -45,7 +45,7 @@ def _panels(counted: pd.DataFrame, numbers: dict[str, int]) -> Iterator[Panel]:
 
 
 def _drawing(ends: Mapping[int, Floats], name: str) -> str:
-    figure = new_figure(3.1, 2.9)
+    figure = new_panel(3.1, 2.9)
     axes = figure.add_subplot()
     dress(axes, x="ahead of target [mm]", y="left of target [mm]")
     draw_ends(axes, ends, ON_PAGE)

@@ -9,7 +9,7 @@ import numpy as np
 from agvbench.plot.driven_paths import draw_group, draw_start_and_target, drawn_path, from_start, tip
 from agvbench.plot.style import condition_numbers
 from agvbench.reporting.content import Block, FigureBlock, Panel, Paragraph
-from agvbench.reporting.figures.style import ON_PAGE, dress, legend, new_figure, panel_title, to_svg
+from agvbench.reporting.figures.style import ON_PAGE, dress, legend, new_panel, panel_title, to_svg
 from agvbench.reporting.sections.base import Section
 from agvbench.statistics.end_poses import in_order
 from agvbench.types import Floats, Pose, Run
@@ -75,7 +75,7 @@ def draw_paths(paths: Mapping[int, Sequence[Floats]], name: str, *, target: Pose
     """
     low, high = _extent([path for group in paths.values() for path in group], target)
     width, height = high - low
-    figure = new_figure(size_in, 0.55 + (size_in - 0.65) * height / width)
+    figure = new_panel(size_in, 0.6 + (size_in - 0.9) * height / width)
     axes = figure.add_subplot()
     dress(axes, x="x [m]", y="y [m]", size=10.0 if target else 9.0)
     for index, group in paths.items():

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from agvbench.reporting.viewer.run_entities import FAULTS, FLOOR, Place
 
 LIVE = "/live"
+_MOST_TABS = 20
 
 
 def blueprint(places: Iterable[Place], *, live: bool = False) -> Any:
@@ -15,11 +16,11 @@ def blueprint(places: Iterable[Place], *, live: bool = False) -> Any:
     import rerun.blueprint as rrb
 
     everything = rrb.Spatial3DView(origin="/", contents=[f"{FLOOR}/**", "/runs/**"], name="All runs")
-    tabs: dict[str, dict[str, list[Any]]] = {}
+    tabs: dict[str, dict[str, list[Place]]] = {}
     for place in places:
-        tabs.setdefault(place.trajectory, {}).setdefault(place.condition, []).append(_one_run(place))
+        tabs.setdefault(place.trajectory, {}).setdefault(place.condition, []).append(place)
     inside = [
-        rrb.Tabs(*(rrb.Tabs(*views, name=condition) for condition, views in conditions.items()), name=trajectory)
+        rrb.Tabs(*(rrb.Tabs(*_views(runs), name=condition) for condition, runs in conditions.items()), name=trajectory)
         for trajectory, conditions in tabs.items()
     ]
     first = [_now()] if live else []
@@ -34,6 +35,16 @@ def _now() -> Any:
     commands = rrb.TimeSeriesView(origin=LIVE, contents=[f"{LIVE}/command"], name="Commands")
     log = rrb.TextLogView(origin=LIVE, contents=[f"{LIVE}/phase", f"{FAULTS}/**"], name="Phases and faults")
     return rrb.Vertical(floor, rrb.Horizontal(commands, log), row_shares=[3, 1], name="Now")
+
+
+def _views(places: Sequence[Place]) -> list[Any]:
+    """Return a tab for each run of a condition, or one for all of them where they are many: tabs stand side by side."""
+    if len(places) <= _MOST_TABS:
+        return [_one_run(place) for place in places]
+    import rerun.blueprint as rrb
+
+    runs = places[0].entity.rpartition("/")[0]
+    return [rrb.Spatial3DView(origin="/", contents=[f"{FLOOR}/**", f"{runs}/**"], name=f"{len(places)} runs")]
 
 
 def _one_run(place: Place) -> Any:

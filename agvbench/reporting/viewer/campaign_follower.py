@@ -10,10 +10,10 @@ from agvbench.campaign import Campaign
 from agvbench.campaign.header import FILE_NAME
 from agvbench.campaign.manifest import PLANNED_TABLE
 from agvbench.campaign.tables.parquet import read_parquet
+from agvbench.metrics.measured_run import MeasuredRun
 from agvbench.metrics.planned_paths import PlannedPaths
 from agvbench.running.configuration.provenance import Row
 from agvbench.running.execution.event_log import EVENTS_TABLE
-from agvbench.types import Run
 
 _TABLES = ("runs", "commands", "poses")
 _BESIDE = (FILE_NAME, "vehicle.toml", "inputs.parquet")
@@ -32,17 +32,16 @@ class CampaignFollower:
         self._events = 0
         self._plans: tuple[bool, PlannedPaths] | None = None
 
-    def new_runs(self) -> list[tuple[Run, PlannedPaths]]:
-        """Return the runs that were recorded since the last call, with the planned paths of their campaign."""
+    def new_runs(self) -> list[MeasuredRun]:
+        """Return the runs that were recorded since the last call, with their planned paths."""
         names = self._new_parts()
         if not names:
             return []
         with tempfile.TemporaryDirectory(prefix="agvbench-live-") as folder:
             campaign = Campaign.open(self._linked(Path(folder), names))
-            runs = list(campaign)
-            plans = self._planned_paths(campaign)
+            runs = list(map(self._planned_paths(campaign).measured, campaign))
         self._read.update(names)
-        return [(run, plans) for run in runs]
+        return runs
 
     def plans(self) -> PlannedPaths | None:
         """Return the planned paths, once a run was read."""

@@ -11,7 +11,6 @@ import numpy as np
 
 from agvbench.errors import AgvbenchError, FitError
 from agvbench.metrics.measured_run import MeasuredRun, smooth_poses
-from agvbench.metrics.planned_paths import PlannedPaths
 from agvbench.planning import Workspace
 from agvbench.reporting.content import plain, plain_sentences
 from agvbench.running.configuration.settings import BenchSettings
@@ -76,7 +75,7 @@ def _corners(workspace: Workspace) -> Floats:
     return np.asarray(np.linalg.solve(pairs, offsets[:, :, None])[:, :, 0])
 
 
-def send_run(recording: rr.RecordingStream, run: Run, shown: str, plans: PlannedPaths) -> None:
+def send_run(recording: rr.RecordingStream, run: MeasuredRun, shown: str) -> None:
     """Send a run as columns of the whole run, in the colour `shown`.
 
     Row by row, as the vehicle drives, a pose takes the viewer and this process 200 times as long.
@@ -85,10 +84,9 @@ def send_run(recording: rr.RecordingStream, run: Run, shown: str, plans: Planned
     poses = _thinned(smooth_poses(run.frames))
     if len(poses) >= 2:
         _send_motion(recording, entity, poses, run, shown)
-    path = plans.of(run)
-    _send_plan(recording, entity, *_on_floor(run, path))
-    if path is not None:
-        _send_residual(recording, entity, run, path)
+    _send_plan(recording, entity, *_on_floor(run))
+    if run.planned is not None:
+        _send_residual(recording, entity, run, run.planned)
 
 
 def _send_motion(recording: rr.RecordingStream, entity: str, poses: Floats, run: Run, shown: str) -> None:
@@ -109,14 +107,14 @@ def _send_motion(recording: rr.RecordingStream, entity: str, poses: Floats, run:
         recording.send_columns(f"{entity}/commands", indexes=[_time(at)], columns=columns)
 
 
-def _on_floor(run: Run, path: Floats | None) -> tuple[Floats | None, Pose | None]:
+def _on_floor(run: MeasuredRun) -> tuple[Floats | None, Pose | None]:
     """Return the planned path (n, 2) [m] and the target in the floor frame, from the measured start; None without."""
     try:
         start = start_pose(run).pose
     except FitError:
         return None, None
     target = start.compose(run.target) if run.target.is_finite else None
-    return None if path is None else start.place(path[:, 1:3]), target
+    return None if run.planned is None else start.place(run.planned[:, 1:3]), target
 
 
 def _send_plan(recording: rr.RecordingStream, entity: str, path: Floats | None, target: Pose | None) -> None:
@@ -141,12 +139,12 @@ def arrow(pose: Pose, rgb: Sequence[int], radius_m: float) -> rr.Arrows3D:
     return rr.Arrows3D(vectors=[ahead], origins=[[*pose[:2], 0.0]], colors=[rgb], radii=[radius_m])
 
 
-def _send_residual(recording: rr.RecordingStream, entity: str, run: Run, path: Floats) -> None:
+def _send_residual(recording: rr.RecordingStream, entity: str, run: MeasuredRun, path: Floats) -> None:
     """Send the residual along the path: over its length, and over the time at which the plan is there."""
     import rerun as rr
 
     try:
-        errors = MeasuredRun.of(run, path).tracking
+        errors = run.tracking
     except FitError:
         return
     if errors is None:

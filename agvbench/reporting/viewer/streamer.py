@@ -136,9 +136,9 @@ def stream(directory: Path, url: str, states: StateInput) -> None:
 def _send_new(recording: rr.RecordingStream, follower: CampaignFollower) -> None:
     """Send what was recorded since the last look."""
     numbers = condition_numbers(list(CONDITIONS))
-    for run, plans in follower.new_runs():
+    for run in follower.new_runs():
         if run.is_ok:
-            send_run(recording, run, colour(numbers[run.condition]), plans)
+            send_run(recording, run, colour(numbers[run.condition]))
         else:
             send_fault(recording, run.started_s, "warn", f"{run.run_id}: {run.status}")
     send_events(recording, follower.new_events())

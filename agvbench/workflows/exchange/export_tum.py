@@ -13,7 +13,6 @@ from agvbench.campaign.arguments import as_campaign
 from agvbench.campaign.atomic_files import made_folder, replace_whole
 from agvbench.campaign.tables.parts import part_name
 from agvbench.errors import FileError, FitError
-from agvbench.metrics.measured_run import MeasuredRun
 from agvbench.metrics.planned_paths import PlannedPaths
 from agvbench.types import Floats, Run
 
@@ -68,7 +67,7 @@ def export_tum(
 
 
 def _poses(run: Run, paths: PlannedPaths) -> Iterator[tuple[str, Floats]]:
-    measured = MeasuredRun.of(run, paths.of(run) if run.target.is_finite else None)
+    measured = paths.measured(run)
     yield DRIVEN, measured.driven
     if measured.planned is not None:
         yield PLANNED, measured.planned
