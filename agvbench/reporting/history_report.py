@@ -57,7 +57,7 @@ _SERIES = (
 _CAPTION = (
     "Mean over trajectories of the medians of absolute values, a point per night; the band is ± two standard errors "
     "that the repeatability causes. A dashed line is a step, the shaded nights are the 95 % interval of its night, "
-    "grey lines are levels."
+    "grey lines are levels. A ring is a night that lacks trajectories of other nights, whose values are estimated."
 )
 
 

@@ -53,6 +53,8 @@ def _draw(axes: Axes, rows: pd.DataFrame, steps: pd.DataFrame, number: int) -> N
     axes.fill_between(nights, values - band, values + band, color=shown, alpha=0.15, linewidth=0.0)
     mark = marker(number) if len(nights) <= _MOST_MARKERS else None
     axes.plot(nights, values, color=shown, linewidth=0.8, marker=mark, markersize=3.5, markeredgecolor=PAPER)
+    estimated = rows["lacking"].to_numpy() > 0
+    axes.plot(nights[estimated], values[estimated], "o", color=shown, markersize=6.0, markerfacecolor="none")
     for night, earliest, latest in steps[["night", "earliest_night", "latest_night"]].to_numpy(dtype=float):
         axes.axvspan(earliest - 1.0, latest, color=shown, alpha=0.12, linewidth=0.0)
         axes.axvline(night - 0.5, color=shown, linewidth=1.2, linestyle="--")

@@ -61,8 +61,9 @@ class Nights:
         """Return one row per night, series and trajectory, those over all trajectories first.
 
         Columns ``night`` (its number), ``condition``, ``metric``, ``unit``, ``trajectory`` ("" for all), ``repeats``,
-        ``value``, ``repeatability`` (standard deviation of repeats) and ``stderr``, the standard error of the value
-        that the repeatability causes: a median of normal repeats has √(π/2) times that of their mean.
+        ``value``, ``repeatability`` (standard deviation of repeats), ``stderr``, the standard error of the value
+        that the repeatability causes: a median of normal repeats has √(π/2) times that of their mean, and ``lacking``,
+        how many trajectories of other nights this one lacks, whose value is estimated as `value` says.
         """
         import pandas as pd
 
@@ -70,11 +71,14 @@ class Nights:
         value = np.concatenate([self.value[:, np.newaxis], self.median], axis=1)
         spread = np.concatenate([self.repeatability[:, np.newaxis], self.spread], axis=1)
         stderr = np.sqrt(np.pi / 2.0 / repeats.clip(1)) * spread
+        is_lacking = (self.repeats == 0) & self.repeats.any(axis=2, keepdims=True)
+        lacking = np.concatenate([is_lacking.sum(axis=1, keepdims=True), np.zeros_like(self.repeats)], axis=1)
         series, trajectory, night = np.nonzero(repeats)
         at = series, trajectory, night
         texts = {name: named([kind[k] for kind in self.series], series) for k, name in enumerate(KEYS[:3])}
         way = {"trajectory": named((ALL, *self.trajectories), trajectory)}
         numbers = {"repeats": repeats[at], "value": value[at], "repeatability": spread[at], "stderr": stderr[at]}
+        numbers["lacking"] = lacking[at]
         return pd.DataFrame({"night": night} | texts | way | numbers)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from history_samples import BEGAN, METRICS, write_night, write_nights
 import agvbench
 from agvbench.campaign import CampaignHeader
 from agvbench.errors import FlagError, InputError
+from agvbench.reporting.figures.history import draw_history
 from agvbench.vehicle.channels import Channels
 from agvbench.workflows.history.facts import changed, facts_of
 from agvbench.workflows.history.result import write_json
@@ -71,6 +73,10 @@ def test_nightly_values_are_means_of_medians_of_absolute_values(tmp_path):
     assert list(table["repeats"]) == [6, 3, 3]
 
 
+def _whole(found):
+    return replace(found, nights=found.nights.assign(lacking=0))
+
+
 def test_a_trajectory_that_some_nights_lack_makes_no_step(tmp_path):
     rng = np.random.default_rng(1)
     for night in range(30):
@@ -82,6 +88,10 @@ def test_a_trajectory_that_some_nights_lack_makes_no_step(tmp_path):
     found = agvbench.history(tmp_path)
     assert found.changes.empty
     assert found.series["sd"].iloc[0] < 0.2
+    over_all = found.nights[found.nights["trajectory"] == ""].set_index("night")
+    assert list(over_all["lacking"]) == [0] * 15 + [1] * 15
+    ringed, plain = (draw_history(h, "position_error", "mm", {"calibrated": 0}) for h in (found, _whole(found)))
+    assert ringed.count("<use") == plain.count("<use") + 15
 
 
 def test_campaigns_are_ordered_by_provenance_then_by_name_then_by_file(tmp_path):
