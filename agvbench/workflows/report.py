@@ -25,6 +25,7 @@ from agvbench.statistics.pose_accuracy import completions, pose_accuracies
 from agvbench.statistics.uncertainty.end_pose_budgets import EndPoseBudget, end_pose_budgets
 from agvbench.types import Frames, Run
 from agvbench.workflows.calibration import CalibrationCurves, read_calibration_curves
+from agvbench.workflows.comparison.kept import read_comparison
 from agvbench.workflows.diagnosis_files import ShownDiagnosis, read_diagnosis
 from agvbench.workflows.report_changes import CampaignChanges, changes_since_before, firmware_of
 
@@ -74,7 +75,8 @@ class ReportData:
     evaluated, by name; ``events`` are what adapters reported. ``metrics`` are what `metric_table` returns;
     ``diagnosis`` lies in the directory, or None. ``budgets`` are the uncertainty budgets of
     mean end pose errors, ``accuracy`` what `pose_accuracies` returns and ``completions`` what `completions` does.
-    ``changes`` are since the campaign before, or None where there is none. ``recordings`` are the files of the runs'
+    ``changes`` are since the campaign before, or None where there is none. ``compared`` are sentences about the
+    comparison that lies in the directory. ``recordings`` are the files of the runs'
     poses, by run id.
     """
 
@@ -98,6 +100,7 @@ class ReportData:
     failures: Mapping[str, FileError] = field(default_factory=dict)
     diagnosis: ShownDiagnosis | None = None
     changes: CampaignChanges | None = None
+    compared: tuple[str, ...] = ()
 
     @property
     def conditions(self) -> list[str]:
@@ -172,6 +175,7 @@ def gather(
         problems=problems,
         failures=failures,
         diagnosis=read_diagnosis(campaign.path),
+        compared=read_comparison(campaign.path),
         changes=changes_since_before(
             campaign.path, against, firmware=firmware_of(run.firmware for run in runs), metrics=metrics
         ),

@@ -20,7 +20,9 @@ from agvbench.reporting.sections.headline import HeadlineSection
 from agvbench.reporting.sections.runs import RunsSection
 from agvbench.reporting.sections.uncertainty import UncertaintySection
 from agvbench.reporting.write import write_report
+from agvbench.workflows.comparison.kept import read_comparison
 from agvbench.workflows.diagnosis_files import ShownDiagnosis
+from agvbench.workflows.report import gather
 from agvbench.workflows.report_changes import changes_since_before, medians_before_and_now
 
 SMALL = {"repeats": 2, "rate_hz": 30.0, "trajectories": ("6_forward_right",), "calibration": False}
@@ -45,6 +47,28 @@ def test_the_verdict_of_a_diagnosis_and_its_next_step_stand_on_the_first_screen(
     said = [block.text for block in HeadlineSection().blocks(data) if isinstance(block, Paragraph)]
     assert "Diagnosis: NAMED: steering lag explains the residual" in said
     assert any("bench --corrected" in sentence for sentence in said)
+
+
+def test_the_comparison_that_lies_in_the_campaign_and_its_failed_checks_stand_on_the_first_screen(tmp_path):
+    night, before = (samples.make_campaign(tmp_path / name, extra_mm=mm) for name, mm in (("b", 60.0), ("a", 0.0)))
+    rule = "position_error.median>100mm"
+    kept = ["--json", str(night / "comparison.json")]
+    assert main(["compare", str(before), str(night), "--fail-on", rule, *kept]) in (0, 1, 3)
+    said = [block.text for block in HeadlineSection().blocks(gather(night)) if isinstance(block, Paragraph)]
+    (against,) = (sentence for sentence in said if sentence.startswith("Against"))
+    assert str(before) in against
+    (gate,) = (sentence for sentence in said if sentence.startswith("Gate: "))
+    written = json.loads((night / "comparison.json").read_text())["gate"]
+    failed = [check for check in written if check["verdict"] == "fail"]
+    assert failed
+    assert gate.startswith(f"Gate: {len(failed)} of {len(written)} checks failed: {rule} ({failed[0]['trajectory']}")
+
+
+@pytest.mark.parametrize("content", ["", "{}", '{"a": 1, "headline": "x"}', '{"a": "x", "headline": "x", "gate": [1]}'])
+def test_a_comparison_that_cannot_be_read_is_said(tmp_path, content):
+    (tmp_path / "comparison.json").write_text(content)
+    (line,) = read_comparison(tmp_path)
+    assert line.startswith("comparison.json cannot be read: ")
 
 
 @pytest.mark.parametrize(

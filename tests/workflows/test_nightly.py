@@ -70,6 +70,7 @@ def test_a_night_is_judged_by_the_one_before_and_kept_only_where_nothing_failed(
     good = (tmp_path / "nightly" / "good_nights.txt").read_text().split()
     assert good == ["1", "2"] if same.returncode == 0 else good == ["1"]
     assert (tmp_path / "nightly" / "3" / "report" / "compare.xml").exists()
+    assert "checks failed: position\\_error.median" in (tmp_path / "nightly" / "3" / "report" / "report.md").read_text()
 
 
 @pytest.mark.parametrize("name", ["a/b", "..", "/etc/x", " "])

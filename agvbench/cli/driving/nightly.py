@@ -136,16 +136,15 @@ def _bench(arguments: argparse.Namespace, night: Path, good: Path | None) -> int
 def _judged(arguments: argparse.Namespace, night: Path, good: Path | None, gate: Path | None) -> dict[str, int]:
     """Return the exit code of each step that follows the bench; an interruption ends all."""
     from agvbench.cli import main
+    from agvbench.workflows.comparison.kept import JSON as COMPARISON
 
     files = night / "report"
-    steps = {
-        "diagnose": ["diagnose", str(night), "--json", str(night / "diagnosis.json")],
-        "report": ["report", str(night)],
-        "history": ["history", str(arguments.nights)],
-    }
+    steps = {"diagnose": ["diagnose", str(night), "--json", str(night / "diagnosis.json")]}
     if good is not None:
         written = ["--junit", str(files / "compare.xml"), "--markdown", str(files / "compare.md")]
+        written += ["--json", str(night / COMPARISON)]  # the report says what it found
         steps["compare"] = ["compare", str(good), str(night), *_limits(arguments, gate), *written]
+    steps |= {"report": ["report", str(night)], "history": ["history", str(arguments.nights)]}
     codes: dict[str, int] = {}
     for step, command in steps.items():
         codes[step] = main(command)

@@ -51,7 +51,7 @@ class HeadlineSection(Section):
         lead = [Paragraph(sentence, lead=True) for sentence in _lead(data)]
         said = (item for comparison in data.comparisons for item in _details(comparison))
         details = list(dict.fromkeys((*said, *data.problems)))
-        blocks: list[Block] = [*lead]
+        blocks: list[Block] = [*lead, *(Paragraph(plain_sentences(sentence)) for sentence in data.compared)]
         if len(data.end_poses):
             blocks += [Paragraph(_PLAIN), *cloud_figure(data)]
         if data.diagnosis is not None and data.diagnosis.content:
