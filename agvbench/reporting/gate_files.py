@@ -113,6 +113,7 @@ def _check_case(suite: ET.Element, check: GateCheck) -> None:
         ET.SubElement(case, "failure", message=message, type="gate")
     elif check.verdict is GateVerdict.INCONCLUSIVE:
         ET.SubElement(case, "skipped", message="too few repeats to show any growth")
+    ET.SubElement(case, "system-out").text = _verdict(check)
 
 
 def _case(suite: ET.Element, place: str, name: str) -> ET.Element:

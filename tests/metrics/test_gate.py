@@ -240,6 +240,7 @@ def test_compare_fails_by_rules_and_writes_what_ci_reads(campaign):
     assert suites["gate"].get("failures") == "1"
     names = {p.get("name") for p in suites["gate"].iter("property")}
     assert {"before", "now", "allowed", "unit"} <= names
+    assert [text.text for text in suites["gate"].iter("system-out")] == ["fail"]
     assert suites["comparison"].get("failures") == "0"  # rules alone decide
     content = json.loads((campaign / "j.json").read_text(encoding="utf-8"))
     assert content["gate"][0]["verdict"] == "fail"
