@@ -130,7 +130,7 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
         axes.bar(places, heights, 0.18, yerr=spread, label=label, capsize=2)
     axes.set_xticks(range(len(rows)), [Path(row["recording"]).stem for row in rows])
     axes.set_ylabel("position error 2 s ahead, mm (rms)")
-    axes.legend(frameon=False, ncols=4)
+    axes.legend(frameon=False, ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
 
 
