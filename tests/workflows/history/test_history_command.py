@@ -51,7 +51,7 @@ def test_three_nights_of_a_bench(nights, tmp_path, capsys):
     )
     assert main(["history", str(nights), "--json", str(tmp_path / "h.json")]) == 0
     out = " ".join(capsys.readouterr().out.split())
-    assert "No series has enough nights to find a step: 3 nights, at least 10 are needed." in out
+    assert "No series has enough nights to find a step: at most 3 nights, at least 10 are needed." in out
     made = json.loads((tmp_path / "h.json").read_text(encoding="utf-8"))
     assert [campaign["campaign"] for campaign in made["campaigns"]] == ["1", "2", "3"]
     assert {campaign["dated_by"] for campaign in made["campaigns"]} == {"provenance"}
