@@ -13,14 +13,27 @@ MAD_TO_STD = 1.4826
 """Standard deviation of a normal distribution in units of the median of its absolute deviations (1/Φ⁻¹(3/4))."""
 
 
+def medians(values: Floats) -> Floats:
+    """Return the medians over the last axis of finite values (…, n), n > 0, by sorting.
+
+    For a few hundred values this takes a quarter of the time of NumPy's median, and for one row a tenth.
+
+    >>> medians(np.array([[3.0, 1.0, 2.0], [4.0, 6.0, 5.0]]))
+    array([2., 5.])
+    """
+    ascending, half = np.sort(values, axis=-1), values.shape[-1] // 2
+    if values.shape[-1] % 2:
+        return np.asarray(ascending[..., half])
+    return np.asarray((ascending[..., half - 1] + ascending[..., half]) / 2.0)
+
+
 def median(values: Floats) -> float:
-    """Return the median of finite values (n,), n > 0, of a few hundred at most: a tenth of the time of NumPy's.
+    """Return the median of finite values (n,), n > 0.
 
     >>> median(np.array([3.0, 1.0, 2.0])), median(np.array([4.0, 1.0, 2.0, 3.0]))
     (2.0, 2.5)
     """
-    ascending, half = np.sort(values), len(values) // 2
-    return float(ascending[half] if len(values) % 2 else (ascending[half - 1] + ascending[half]) / 2.0)
+    return float(medians(values))
 
 
 def robust_std(residual: Floats) -> float:

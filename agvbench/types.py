@@ -64,8 +64,8 @@ CALIBRATION_EXPERIMENTS = ("steering_front", "steering_rear", "steering_opposite
 """The experiments whose runs hold one command each, for static maps."""
 
 
-P = ParamSpec("P")
-T = TypeVar("T")
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
 _Angle = TypeVar("_Angle", float, Floats)
 
 
@@ -191,12 +191,12 @@ class Frames:
         return Frames(*(getattr(self, f.name)[mask] for f in fields(self)))
 
 
-def kept_by_frames(measure: Callable[Concatenate[Frames, P], T]) -> Callable[Concatenate[Frames, P], T]:
+def kept_by_frames(measure: Callable[Concatenate[Frames, _P], _T]) -> Callable[Concatenate[Frames, _P], _T]:
     """Return `measure`, which keeps what it found for as long as the frames exist: a report asks it many times."""
-    found: WeakKeyDictionary[Frames, dict[object, T]] = WeakKeyDictionary()
+    found: WeakKeyDictionary[Frames, dict[object, _T]] = WeakKeyDictionary()
 
     @wraps(measure)
-    def kept(frames: Frames, /, *args: P.args, **kwargs: P.kwargs) -> T:
+    def kept(frames: Frames, /, *args: _P.args, **kwargs: _P.kwargs) -> _T:
         of_frames = found.setdefault(frames, {})
         key = (args, *kwargs.items())
         if key not in of_frames:

@@ -51,14 +51,6 @@ def replace_whole(path: Path, write: Callable[[Path], object], *, durable: bool 
         _force_to_disk(path.parent)
 
 
-def replace_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Have `write` write `path`: a device directly, an earlier file by a whole one or not at all."""
-    if path.exists() and not path.is_file():
-        write(path)
-    else:
-        replace_whole(path.resolve(), write, durable=False)
-
-
 @contextmanager
 def made_folder(path: Path) -> Iterator[None]:
     """Make the folder `path` and those above it; if the context fails, those that are new and empty are removed."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from agvbench.signals import medians
 from agvbench.statistics.rest_poses import start_pose
 from agvbench.statistics.run_errors import RunError, run_error
 from agvbench.types import Floats, Frames, Pose, Run, kept_by_frames
@@ -100,5 +101,5 @@ def smooth_poses(frames: Frames) -> Floats:
     half = _NEIGHBOURS // 2
     padded = np.pad(poses[:, 1:3], ((half, half), (0, 0)), mode="reflect")
     windows = np.lib.stride_tricks.sliding_window_view(padded, _NEIGHBOURS, axis=0)
-    away = np.hypot(*(poses[:, 1:3] - np.sort(windows, axis=2)[:, :, half]).T)
+    away = np.hypot(*(poses[:, 1:3] - medians(windows)).T)
     return np.asarray(poses[away <= _JUMP_M])

@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 
 from agvbench.campaign import Campaign
-from agvbench.campaign.atomic_files import replace_file
 from agvbench.errors import FileError
 from agvbench.executors import Executor, ExecutorOptions, Failed, Task, open_executor
 from agvbench.metrics.measured_run import MeasuredRun
@@ -17,8 +16,10 @@ from agvbench.plot.style import colour, condition_numbers
 from agvbench.reporting.content import plain
 from agvbench.reporting.viewer.recording_file import Recorded, import_rerun, write_recording_file
 from agvbench.statistics.end_poses import in_order
+from agvbench.workflows.output_files import write_file
 from agvbench.workflows.report import reported_events
 
+_FLAG = "--out"
 _OWN_PROCESS_RUNS = 100
 """From this number of runs on, a process of its own saves more than its start takes."""
 
@@ -39,14 +40,19 @@ def recorder(campaign: Campaign, path: Path) -> Iterator[Callable[[Sequence[Meas
         If it cannot be written.
     """
     if len(campaign) < _OWN_PROCESS_RUNS:
+        # Written last: on a disk that is full, Rerun's messages about it may hold up this process.
         given = list[Sequence[MeasuredRun]]()
         yield given.append
         for runs in given:
-            _replace(path, partial(write_recording_file, _shown(campaign, runs)))
+            write_file(_FLAG, path, partial(write_recording_file, _shown(campaign, runs)))
         return
     with open_executor(ExecutorOptions(jobs=1)) as process, ThreadPoolExecutor(1) as thread:
         begun = [thread.submit(_run, process, Task("imports", import_rerun, ()))]
-        yield lambda runs: begun.append(thread.submit(_replace, path, partial(_write, process, _shown(campaign, runs))))
+
+        def begin(runs: Sequence[MeasuredRun]) -> None:
+            begun.append(thread.submit(write_file, _FLAG, path, partial(_write, process, _shown(campaign, runs))))
+
+        yield begin
         for done in begun:
             done.result()
 
@@ -57,13 +63,6 @@ def _shown(campaign: Campaign, runs: Sequence[MeasuredRun]) -> Recorded:
     events = reported_events(campaign, []).to_dict("records")
     counted = [run for run in runs if run.is_ok]
     return Recorded(plain(campaign.header.name), campaign.path, counted, colours, events)
-
-
-def _replace(path: Path, write: Callable[[Path], None]) -> None:
-    try:
-        replace_file(path, write)
-    except FileError as error:
-        raise FileError(error.what, where=path, remedy="choose another directory with --out") from None
 
 
 def _write(process: Executor, shown: Recorded, path: Path) -> None:

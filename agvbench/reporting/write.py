@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from agvbench.campaign import Campaign
 from agvbench.campaign.arguments import as_campaign
-from agvbench.campaign.atomic_files import made_folder, replace_file
+from agvbench.campaign.atomic_files import made_folder, replace_whole
 from agvbench.errors import FileError, RecordingError
 from agvbench.metrics.table import write_metrics
 from agvbench.reporting.content import Content, plain
@@ -95,7 +95,8 @@ def write_report(
     """
     opened = as_campaign(campaign)
     out = opened.path / "report" if out is None else Path(out)
-    with _writable(out), recorder(opened, out / RECORDING) if recording else nullcontext(lambda _: None) as record:
+    stated = None if uncertainty is None else LabFile.load(Path(uncertainty)).uncertainty
+    with recorder(opened, out / RECORDING) if recording else nullcontext(lambda _: None) as record:
         data = gather(
             opened,
             track=lambda runs, total: track(runs, total, what="reading runs"),
@@ -103,7 +104,7 @@ def write_report(
             margin_mm=margin_mm,
             margin_deg=margin_deg,
             against=None if against is None else Path(against),
-            uncertainty=None if uncertainty is None else LabFile.load(Path(uncertainty)).uncertainty,
+            uncertainty=stated,
         )
         written = write_gathered(data, out)
     return replace(written, files=[*written.files, out / RECORDING]) if recording else written
@@ -114,20 +115,14 @@ def write_gathered(data: ReportData, out: str | Path | None = None) -> WrittenRe
     out = data.path / "report" if out is None else Path(out)
     with suppress(RecordingError):
         write_metrics(data.path, data.metrics)
-    sections = drawn_sections(data)
-    with _writable(out):
-        return WrittenReport(data, sections, [_write(out / name, text) for name, text in _texts(data, sections, out)])
-
-
-@contextmanager
-def _writable(out: Path) -> Iterator[None]:
-    """Make the directory `out`; where it cannot be written, say so."""
     try:
+        sections = drawn_sections(data)
         with made_folder(out):
-            yield
+            files = [_write(out / name, text) for name, text in _texts(data, sections, out)]
     except OSError as error:
         why = error.strerror or str(error)
         raise FileError(f"cannot be written ({why})", where=out, remedy="choose another directory with --out") from None
+    return WrittenReport(data, sections, files)
 
 
 def subtitle_of(data: ReportData) -> str:
@@ -146,8 +141,16 @@ def _texts(data: ReportData, sections: Sequence[Content], out: Path) -> Iterator
 
 def _write(path: Path, text: str) -> Path:
     with made_folder(path.parent):
-        replace_file(path, lambda file: file.write_text(text, encoding="utf-8"))
+        _replace(path, lambda file: file.write_text(text, encoding="utf-8"))
     return path
+
+
+def _replace(path: Path, write: Callable[[Path], object]) -> None:
+    """Have `write` write `path`: a device directly, a file of an earlier report by a whole one or not at all."""
+    if path.exists() and not path.is_file():
+        write(path)
+    else:
+        replace_whole(path.resolve(), write, durable=False)
 
 
 def write_diagnosis_report(found: Diagnosis, path: str | Path) -> Path:

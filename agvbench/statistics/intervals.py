@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from agvbench.signals import medians
 from agvbench.types import Floats
 
 RESAMPLES = 4000
@@ -79,9 +80,7 @@ def average_difference_interval(
 def _resampled_medians(values: Floats, resamples: int, rng: np.random.Generator) -> Floats:
     if len(values) < FEWEST:
         return np.full(resamples, np.nan)
-    drawn = np.sort(values[rng.integers(0, len(values), (resamples, len(values)))], axis=1)  # a quarter of np.median's
-    half = len(values) // 2
-    return np.asarray(drawn[:, half] if len(values) % 2 else (drawn[:, half - 1] + drawn[:, half]) / 2.0, dtype=float)
+    return medians(values[rng.integers(0, len(values), (resamples, len(values)))]).astype(float)
 
 
 def _interval(estimate: float, resampled: Floats) -> Interval:

@@ -222,7 +222,7 @@ def reported_events(campaign: Campaign, problems: list[str]) -> pd.DataFrame:
     import pandas as pd
 
     nothing = pd.DataFrame(columns=list(EVENT_COLUMNS))
-    if not _has_table(campaign, "events"):
+    if not campaign.has_table("events"):
         return nothing
     try:
         return campaign.table("events")[list(EVENT_COLUMNS)]
@@ -231,13 +231,9 @@ def reported_events(campaign: Campaign, problems: list[str]) -> pd.DataFrame:
         return nothing
 
 
-def _has_table(campaign: Campaign, name: str) -> bool:
-    return any((campaign.path / f"{name}{suffix}").exists() for suffix in (".parquet", ".csv"))
-
-
 def _provenance(campaign: Campaign, problems: list[str]) -> dict[str, str]:
     """Return the provenance table, if there is one, as names and values."""
-    if not _has_table(campaign, "provenance"):
+    if not campaign.has_table("provenance"):
         return {}
     try:
         table = campaign.table("provenance")
