@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from agvbench.errors import FlagError
-from agvbench.running.configuration.session_options import number, whole_number
+from agvbench.running.configuration.option_types import number, whole_number
 
 if TYPE_CHECKING:
     from agvbench.adapters.contract import AdapterOptions

@@ -6,9 +6,7 @@ import errno
 import os
 import signal
 import sys
-import tempfile
 import threading
-import traceback
 from types import FrameType, TracebackType
 from typing import Self
 
@@ -30,6 +28,8 @@ def report_internal_error(command: str, error: Exception) -> int:
         return 2
     if os.environ.get(DEBUG):
         raise error
+    import traceback
+
     last = traceback.extract_tb(error.__traceback__)[-1]
     what = " ".join(f"{type(error).__name__} {error}".split())
     print(
@@ -41,6 +41,9 @@ def report_internal_error(command: str, error: Exception) -> int:
 
 
 def _kept(error: Exception) -> str:
+    import tempfile
+    import traceback
+
     lines = traceback.format_exception(error)
     try:
         handle, path = tempfile.mkstemp(prefix="agvbench-", suffix=".traceback.txt")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from agvbench.running.configuration.session_options import number
+from agvbench.running.configuration.option_types import number
 
 
 def add_margin_arguments(parser: argparse.ArgumentParser, in_mm: str, in_deg: str) -> None:

@@ -20,7 +20,7 @@ from __future__ import annotations
 import argparse
 
 from agvbench.cli._cluster_arguments import add_cluster_arguments, executor_options
-from agvbench.running.configuration.session_options import whole_number
+from agvbench.running.configuration.option_types import whole_number
 
 HELP = "blind trials of the diagnosis on plants with a hidden effect"
 PACKAGES = ("numba", "zenoh")

@@ -37,7 +37,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from agvbench.cli._margins import add_margin_arguments, margins
-from agvbench.running.configuration.session_options import number
+from agvbench.running.configuration.option_types import number
 
 if TYPE_CHECKING:
     from rich.console import Console

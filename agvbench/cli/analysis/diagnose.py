@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import argparse
 
-from agvbench.running.configuration.session_options import OPTIONS, destination, whole_number
+from agvbench.running.configuration.option_types import whole_number
 
 _OF_THE_RIG = (
     "--agv", "--mocap", "--camera", "--plant", "--plant-option", "--place", "--workspace", "--connect", "--bus-config",
@@ -36,6 +36,8 @@ PACKAGES = ("numba",)
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
+    from agvbench.running.configuration.session_options import OPTIONS
+
     parser.add_argument("directory", metavar="DIR", help="a campaign directory")
     parser.add_argument("--json", metavar="FILE", dest="json_file", help="write the diagnosis there")
     parser.add_argument("--out", metavar="FILE", help="write the corrected vehicle there")
@@ -65,6 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from agvbench.reporting.console.diagnosis import print_diagnosis
     from agvbench.reporting.progress import searching
+    from agvbench.running.configuration.session_options import destination
     from agvbench.workflows.diagnose import run_diagnose
 
     console = Console()

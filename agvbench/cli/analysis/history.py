@@ -21,7 +21,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from agvbench.running.configuration.session_options import number
+from agvbench.running.configuration.option_types import number
 
 HELP = "trends over every campaign under a folder, and the nights on which they stepped"
 

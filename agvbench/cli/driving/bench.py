@@ -32,14 +32,14 @@ from __future__ import annotations
 
 import argparse
 
-from agvbench.running.configuration.session_options import add_options
-
 HELP = "calibrate, drive the eight trajectories, write campaign and report"
 PACKAGES = ("numba", "zenoh")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
+    from agvbench.running.configuration.session_options import add_options
+
     parser.add_argument(
         "benchmarks",
         nargs="*",

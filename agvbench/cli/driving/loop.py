@@ -31,8 +31,6 @@ from __future__ import annotations
 
 import argparse
 
-from agvbench.running.configuration.session_options import OPTIONS, destination
-
 HELP = "bench, diagnose, correct the model, bench again: before and after"
 PACKAGES = ("numba", "zenoh")
 # The loop decides what is calibrated and corrected, and a calibration to the full is agvbench bench's.
@@ -41,6 +39,8 @@ _DECIDED = {"--calibration", "--corrected", "--remainders", "--full"}
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
+    from agvbench.running.configuration.session_options import OPTIONS
+
     for flag, keywords, text in OPTIONS:
         if flag not in _DECIDED:
             parser.add_argument(flag, help=text, **keywords)
@@ -60,6 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Go round the loop and write its report; return the exit code."""
     from agvbench.cli._option_values import check_values
+    from agvbench.running.configuration.session_options import OPTIONS, destination
 
     check_values(vars(arguments))
     from agvbench.loop.loop import run_loop

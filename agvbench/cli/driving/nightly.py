@@ -23,8 +23,6 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from agvbench.running.configuration.session_options import add_options, as_flag
-
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -44,6 +42,8 @@ _SET_HERE = frozenset({"--out", "--resume", "--dry-run", "--against", "--until",
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
+    from agvbench.running.configuration.session_options import add_options
+
     parser.add_argument("benchmarks", nargs="*", metavar="BENCHMARK", help="as in agvbench bench")
     parser.add_argument("-k", dest="only", metavar="EXPRESSION", help="only benchmarks whose names match, as in pytest")
     parser.add_argument("--nights", metavar="DIR", type=Path, default=Path("nightly"), help="all nights (nightly/)")
@@ -159,6 +159,8 @@ def _gate(arguments: argparse.Namespace) -> Path | None:
 
 def _limits(arguments: argparse.Namespace, gate: Path | None) -> list[str]:
     """Return the options of the comparison: margins, and a gate beside the verdicts where there is one."""
+    from agvbench.running.configuration.session_options import as_flag
+
     given = ["--fail-on", "regression", "--gate", str(gate)] if gate else []
     return [*given, *as_flag("--margin-mm", arguments.margin_mm), *as_flag("--margin-deg", arguments.margin_deg)]
 

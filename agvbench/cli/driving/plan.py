@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from agvbench.errors import FlagError, PlanError
-from agvbench.running.configuration.session_options import number, whole_number
+from agvbench.running.configuration.option_types import number, whole_number
 
 if TYPE_CHECKING:
     from agvbench.planning import DryRun

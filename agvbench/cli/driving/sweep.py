@@ -37,7 +37,7 @@ import argparse
 from pathlib import Path
 
 from agvbench.cli._cluster_arguments import add_cluster_arguments, executor_options
-from agvbench.running.configuration.session_options import whole_number
+from agvbench.running.configuration.option_types import whole_number
 
 HELP = "bench sessions over a grid of options, on this machine or a cluster"
 PACKAGES = ("numba", "zenoh")

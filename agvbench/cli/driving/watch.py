@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import argparse
 
-from agvbench.running.configuration.session_options import number
+from agvbench.running.configuration.option_types import number
 
 HELP = "show what a running bench does, here or on another machine"
 PACKAGES = ("zenoh",)

@@ -16,7 +16,6 @@ from __future__ import annotations
 import argparse
 
 from agvbench.errors import FlagError
-from agvbench.running.configuration.session_options import OPTIONS, destination
 
 _ON_THE_BUS = "on the bus"
 HELP = "look whether vehicle, cameras and this machine are ready"
@@ -29,6 +28,8 @@ _OF_THE_RIG = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments: those of ``agvbench bench`` that say with what is driven."""
+    from agvbench.running.configuration.session_options import OPTIONS
+
     for flag, keywords, text in OPTIONS:
         if flag == "--mocap":
             said = f"{text}; without ADAPTER, beside --connect: the camera on the bus, alone"
@@ -42,6 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     from agvbench.adapters import AdapterOptions, check_specs
     from agvbench.adapters.contract import camera_options
     from agvbench.reporting.console.doctor import print_finding
+    from agvbench.running.configuration.session_options import destination
     from agvbench.running.configuration.settings import BenchSettings
     from agvbench.running.configuration.vehicles import with_lab_vehicle
     from agvbench.workflows.doctor import FindingState, Lab, examine

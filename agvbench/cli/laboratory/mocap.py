@@ -19,7 +19,7 @@ from pathlib import Path
 
 from agvbench.cli import _adapter_arguments as shared
 from agvbench.errors import FlagError
-from agvbench.running.configuration.session_options import whole_number
+from agvbench.running.configuration.option_types import whole_number
 
 HELP = "run a motion capture adapter as its own process, or check it; decode or emulate a NatNet stream"
 PACKAGES = ("zenoh",)

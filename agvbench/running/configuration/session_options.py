@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import Field, fields
 from typing import Any
 
+from agvbench.running.configuration.option_types import number, whole_number
 from agvbench.running.configuration.settings import BenchSettings
 
 PYTEST_PREFIX = "--agvbench-"
@@ -24,26 +25,6 @@ class Joined(argparse.Action):
         """Add a value to those before."""
         before = getattr(namespace, self.dest, None)
         setattr(namespace, self.dest, f"{before},{values}" if before else values)
-
-
-def whole_number(text: str) -> int:
-    """Return the whole number that an option says in the digits 0 to 9, without separators.
-
-    Raises
-    ------
-    ArgumentTypeError
-        If it says none.
-    """
-    if not re.fullmatch(r"[+-]?[0-9]{1,30}", text):
-        raise argparse.ArgumentTypeError(f"not a whole number: {text!r}")
-    return int(text)
-
-
-def number(text: str) -> float:
-    """Return the number that an option says, as `whole_number` with a point and an exponent, or nan or inf."""
-    if not re.fullmatch(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?|nan|[+-]?inf", text):
-        raise argparse.ArgumentTypeError(f"not a number: {text!r}")
-    return float(text)
 
 
 # Not given is None everywhere, so that a resumed session can distinguish given options from defaults.
