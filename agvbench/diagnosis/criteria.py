@@ -114,6 +114,12 @@ class SelectionCriteria:
     ``trimmed_share``
         Share of the groups of runs with the largest gains, and of those with the smallest, without which an effect must
         still gain.
+    ``likely_share``
+        Share of an effect's gain in fit that another must be predicted to take, to first order, to be fitted in its
+        place. Runs from rest have a criterion of their own.
+    ``group_by_gain``
+        Whether an effect of a group that was fitted together is judged by ``min_gain`` alone. It was not searched for
+        among many, and a time constant of which only a lower bound is known has no finite standard error.
     ``wald_alpha``
         Level at which the parameters of an effect must differ from their null values, with errors clustered by group.
     ``camera_share``
@@ -127,6 +133,8 @@ class SelectionCriteria:
     alternative_margin: float = 10.0
     min_relative_change: float = 0.15
     trimmed_share: float = 0.05
+    likely_share: float = 0.1
+    group_by_gain: bool = False
     wald_alpha: float = 1e-4
     camera_share: float = 0.1
     min_gain_of_initial_steering: float = 20.0
@@ -314,7 +322,7 @@ DATA = DataCriteria()
 MAPS = MapCriteria()
 FIT = FitCriteria()
 SELECTION = SelectionCriteria()
-FREE_DRIVING = SelectionCriteria(min_relative_change=0.3, trimmed_share=0.0)
+FREE_DRIVING = SelectionCriteria(min_relative_change=0.3, trimmed_share=0.0, group_by_gain=True)
 """Criteria for windows of free driving. Their residuals are mostly systematic, so that a small change of the prediction
 is no evidence; blocks of fast driving may be few, so that only one block is left out at each end."""
 

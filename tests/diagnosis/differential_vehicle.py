@@ -32,6 +32,7 @@ class Differential:
     yaw_lag_s: float = 0.0
     yaw_acceleration: float = np.inf
     delay_s: float = 0.0
+    further_speed_delay_s: float = 0.0
     camera_delay_s: float = 0.0
     right_wheel: float = 1.0
     marker_ahead_m: float = 0.1
@@ -57,13 +58,14 @@ def drive(truth: Differential, seconds: float, rng: np.random.Generator) -> tupl
     """Return commands and frames of one drive."""
     v_command, w_command = joystick(seconds, rng)
     t = np.arange(0.0, seconds, _STEP_S)
-    commanded = np.clip(((t - truth.delay_s) / _COMMAND_S + 1e-9).astype(int), 0, len(v_command) - 1)
+    late_s = truth.delay_s + np.array([truth.further_speed_delay_s, 0.0])
+    v_at, w_at = (np.clip(((t - s) / _COMMAND_S + 1e-9).astype(int), 0, len(v_command) - 1) for s in late_s)
     v = w = 0.0
     x, y, heading = rng.uniform(-1.0, 1.0, 3)
     path = np.empty((len(t), 3))
     for k in range(len(t)):
         path[k] = x, y, heading
-        v_aim, w_aim = truth.speed_gain * v_command[commanded[k]], truth.yaw_gain * w_command[commanded[k]]
+        v_aim, w_aim = truth.speed_gain * v_command[v_at[k]], truth.yaw_gain * w_command[w_at[k]]
         v += (v_aim - v) * (_STEP_S / truth.speed_lag_s if truth.speed_lag_s else 1.0)
         most = truth.yaw_acceleration * _STEP_S
         w += np.clip((w_aim - w) * (_STEP_S / truth.yaw_lag_s if truth.yaw_lag_s else 1.0), -most, most)

@@ -59,6 +59,20 @@ def test_the_state_on_a_circle_is_that_of_the_circle(speed, yaw):
     np.testing.assert_allclose(window.start, truth, atol=2e-4 * (1.0 + speed * yaw * yaw))
     assert window.speed_mps == pytest.approx(speed, rel=0.02)
     assert window.recent_speed_mps == pytest.approx(speed, rel=0.01)
+    assert window.yaw_rate[0] == pytest.approx(yaw, abs=0.02 * (1.0 + abs(yaw)))
+
+
+def test_an_uncertain_yaw_rate_counts_less_beside_the_commands():
+    weights = [cut(arc(0.8, 0.9, noise))[0].yaw_rate[1] for noise in (1e-5, 1e-3)]
+    precise, noisy = (_with_heading_noise(arc(0.8, 0.9), deviation) for deviation in (1e-4, 0.05))
+    assert min(weights) > 0.9  # noise of the position says nothing of the heading
+    assert cut(precise)[0].yaw_rate[1] > 0.99 > 2.0 * cut(noisy)[0].yaw_rate[1] > 0.0
+
+
+def _with_heading_noise(run: Run, deviation: float) -> Run:
+    noise = np.random.default_rng(1).normal(0.0, deviation, len(run.frames))
+    frames = dataclasses.replace(run.frames, heading_rad=run.frames.heading_rad + noise)
+    return dataclasses.replace(run, frames=frames)
 
 
 def test_the_naive_predictor_goes_on_along_the_circle():
@@ -157,6 +171,19 @@ def test_a_direction_that_was_never_driven_mirrors_the_other(readings):
     speed = maps.weights("drive", command) @ np.arange(6.0, 0.0, -1.0)
     np.testing.assert_allclose(speed, -speed[::-1])
     assert speed[0] > 0.0
+
+
+def test_nodes_span_the_commands_of_other_runs_in_driven_directions(readings):
+    wide = dataclasses.replace(
+        readings.runs[1],
+        commands=Commands(
+            np.arange(4.0), NEUTRAL + np.array([-650.0, 0.0, 200.0, 450.0]), np.array([700.0] * 4), np.zeros(4)
+        ),
+    )
+    alone, both = (smooth_maps(readings.runs, NEUTRAL_COMMAND, 9, 6, others) for others in ([], [wide]))
+    assert both.nodes["drive"].min() == NEUTRAL - 650.0 < alone.nodes["drive"].min()
+    assert (both.nodes["drive"] < NEUTRAL).all()
+    assert both.nodes["front"].min() == 700.0 < alone.nodes["front"].min()
 
 
 def test_runs_from_rest_stay_runs_and_free_driving_becomes_windows():

@@ -115,7 +115,7 @@ def test_few_long_recordings_on_a_mirrored_floor_are_refused():
 
 def test_an_angle_that_no_axle_has_is_the_limit_in_the_corrected_vehicle():
     readings = read_windows(free_runs(Tiny(), sessions=2, runs=1), Horizon(2.0, 1.0), NEUTRAL_COMMAND)
-    fitted = static_maps(readings, FREE_HEADER.geometry, NEUTRAL_COMMAND)
+    fitted = static_maps(readings, readings.runs, FREE_HEADER.geometry, NEUTRAL_COMMAND)
     maps = fitted.predictor.maps
     wild = fitted.parameters.copy()
     wild[maps.slices()["front"]] *= 100.0

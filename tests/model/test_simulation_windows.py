@@ -50,3 +50,32 @@ def test_a_speed_that_has_not_lasted_tells_no_level():
     start = np.array([[0.0, 0.0, 0.0, 0.8, 0.4]])
     poses = simulation.predict(settled, simulation.nulls.copy(), start, nodal_deviation=0.1)
     np.testing.assert_allclose(poses[:, 0], 0.4 * (T - BEGINS_S), atol=1e-6)
+
+
+TWO_AXLES, DIFFERENTIAL = Geometry(0.2, 0.1), Geometry(0.0, 0.1, kinematics="differential")
+
+
+@pytest.mark.parametrize(("geometry", "turn"), [(TWO_AXLES, 0.25), (DIFFERENTIAL, -0.3)])
+def test_a_window_begins_with_the_yaw_rate_that_was_seen(geometry, turn):
+    one = np.array([-100.0])
+    run = SimulatedRun(Commands(one, one * 0 + 1000.0, one * 0 + 1500, one * 0 + 1500), T, begins_s=BEGINS_S)
+    simulation = Simulation(geometry, NEUTRAL, [run])
+    settled = np.array([[0.1, 0.0, 0.0], [0.1, 0.0, 0.4]])
+    slow = parameters(simulation, steering_lag__time_constant_s=1e4)
+    poses = simulation.predict(settled, slow, np.array([[0.0, 0.0, 0.0, 0.4, 0.4, turn, 1.0]]))
+    np.testing.assert_allclose(poses[:, 2], turn * (T - BEGINS_S), rtol=5e-3)
+    # Without a weight the vehicle turns as its commands before the window made it turn.
+    held = simulation.predict(settled, slow, np.array([[0.0, 0.0, 0.0, 0.4, 0.4, turn, 0.0]]))
+    before = 0.1 if geometry.is_differential else 0.4 * np.tan(0.1) / 0.3
+    np.testing.assert_allclose(held[:, 2], before * (T - BEGINS_S), rtol=0.02)
+    between = simulation.predict(settled, slow, np.array([[0.0, 0.0, 0.0, 0.4, 0.4, turn, 0.5]]))
+    np.testing.assert_allclose(between[:, 2], 0.5 * (poses[:, 2] + held[:, 2]), atol=0.02)
+
+
+def test_a_yaw_rate_that_steering_cannot_change_leaves_the_axle():
+    simulation, settled = window(front=0.2)
+    slow = parameters(simulation, steering_lag__time_constant_s=1e4)
+    standing = simulation.predict(settled, slow, np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 3.0, 1.0]]))
+    assert np.isfinite(standing).all()
+    usual = simulation.predict(settled, slow, np.array([[0.0, 0.0, 0.0, 0.0]]))
+    np.testing.assert_allclose(standing, usual, atol=1e-9)

@@ -49,7 +49,8 @@ class Readings:
     frames at rest. ``started_h`` (R,) [h] is the time since the session began. ``group`` (R,) is the same number for
     runs with the same commands, and for windows of one block. ``refused`` maps the id of each excluded run to the
     reason. ``initial_states`` are those of windows; None for runs from rest. ``preset`` is True if the axles had
-    settled at each run's first steering command before it was given, and False if they were at neutral. ``priors`` are
+    settled at each run's first steering command before it was given, and False if they were at neutral; windows begin
+    with the axle angles of earlier commands if it is True, and with the measured yaw rate otherwise. ``priors`` are
     separate measurements of the effects' parameters, which belong to the evidence of every model. ``logged`` are the
     columns that the lab logged. ``clock_offsets`` are those of sessions of free driving.
     """
@@ -117,7 +118,8 @@ class Readings:
         ]
 
     def _preset(self, commands: Commands) -> tuple[float, float] | None:
-        return (float(commands.front[0]), float(commands.rear[0])) if self.preset else None
+        from_rest = self.initial_states is None
+        return (float(commands.front[0]), float(commands.rear[0])) if self.preset and from_rest else None
 
     @property
     def begins_s(self) -> Floats:
@@ -173,6 +175,7 @@ def read_windows(
         np.array([w.speed_mps for w in windows]),
         np.array([w.speed_stderr for w in windows]),
         np.array([w.recent_speed_mps for w in windows]),
+        np.array([w.yaw_rate for w in windows]).reshape(-1, 2),
         np.array([w.constant_velocity for w in windows]).reshape(-1, 3),
         np.array([w.noise for w in windows]).reshape(-1, 2),
         np.array([recording_of(w.run) for w in windows], dtype=np.str_),

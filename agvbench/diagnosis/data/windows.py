@@ -40,6 +40,8 @@ _DEFAULT_HORIZON_S, _DEFAULT_STRIDE_S = 2.0, 1.0
 _NEAR_S, _NEAR_INTERVALS, _USUAL_INTERVALS = 0.04, 0.6, 0.9
 _LATCHED_M = 1e-3
 _MAX_SPEED_STDERR = 0.25
+# Standard error of a yaw rate that commands predict, as a share of the usual yaw rate.
+_PREDICTED_YAW_STDERR = 0.5
 _RECENT_SPANS = 4.0
 _MIN_FRAMES = 6
 _HELD_S = 1e3
@@ -65,7 +67,8 @@ class InitialStates:
     """The initial states of W windows; arrays of shape (W,) unless stated otherwise.
 
     ``t_s``: time on the run's clock. ``speed_mps`` and ``speed_stderr``: longitudinal speed of the marker centroid and
-    its standard error. ``recent_speed_mps``: its weighted mean over the recent past. ``constant_velocity`` (W, 3):
+    its standard error. ``recent_speed_mps``: its weighted mean over the recent past. ``yaw_rate`` (W, 2): yaw rate
+    [rad/s], and its weight beside that of the commands before the window. ``constant_velocity`` (W, 3):
     longitudinal and lateral velocity [m/s] and yaw rate [rad/s] over the last `CONSTANT_VELOCITY_S`. ``noise`` (W, 2):
     standard deviation of one frame in position [m] and heading [rad]. ``recording`` and ``session``: names.
     """
@@ -74,6 +77,7 @@ class InitialStates:
     speed_mps: Floats
     speed_stderr: Floats
     recent_speed_mps: Floats
+    yaw_rate: Floats
     constant_velocity: Floats
     noise: Floats
     recording: NDArray[np.str_]
@@ -101,6 +105,7 @@ class Window:
     speed_mps: float
     speed_stderr: float
     recent_speed_mps: float
+    yaw_rate: Floats
     constant_velocity: Floats
     noise: Floats
 
@@ -116,19 +121,27 @@ def horizon_of(header: HeaderLike, runs: Iterable[Run]) -> Horizon | None:
 
 @dataclass(frozen=True)
 class RecordedMotion:
-    """What the runs of one recording have in common: the motion ``filter`` and the ``typical_speed_mps``."""
+    """What the runs of one recording have in common: the motion ``filter`` and root mean squares of the motion."""
 
     filter: MotionFilter
     typical_speed_mps: float
+    typical_yaw_rate_radps: float
 
     @classmethod
     def of(cls, runs: Iterable[Run]) -> RecordedMotion:
         """Return it from the usable frames of the `runs` of a recording."""
         tracks = [track for track in map(unwrapped_track, runs) if len(track[0]) >= _MIN_FRAMES]
         fitted = MotionFilter.fitted(tracks)
-        speeds = [fitted.states(*track).longitudinal_speed()[_MIN_FRAMES - 1 :] for track in tracks]
-        typical = float(np.sqrt(np.mean(np.concatenate(speeds) ** 2))) if speeds else 0.0
-        return cls(fitted, max(typical, SPEED_LIMIT_MPS))
+        states = [fitted.states(*track) for track in tracks]
+        speed, yaw_rate = (
+            _root_mean_square([values[_MIN_FRAMES - 1 :] for values in every])
+            for every in ([s.longitudinal_speed() for s in states], [s.velocity[:, 2] for s in states])
+        )
+        return cls(fitted, max(speed, SPEED_LIMIT_MPS), yaw_rate)
+
+
+def _root_mean_square(parts: list[Floats]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) if parts else 0.0
 
 
 def unwrapped_track(run: Run) -> tuple[Floats, Floats]:
@@ -154,8 +167,8 @@ class _Track:
     t_s: Floats
     motion: Floats
     states: MotionStates
-    noise: Floats
-    typical_speed_mps: float
+    recorded: RecordedMotion
+    turns_on_the_spot: bool
 
     @cached_property
     def near_s(self) -> float:
@@ -180,7 +193,19 @@ class _Track:
     @cached_property
     def max_stderr_mps(self) -> float:
         """The largest standard error of an initial speed of zero [m/s]: a share of the recording's speeds."""
-        return _MAX_SPEED_STDERR * self.typical_speed_mps
+        return _MAX_SPEED_STDERR * self.recorded.typical_speed_mps
+
+    @cached_property
+    def yaw_rate(self) -> Floats:
+        """The yaw rate after each frame [rad/s] and its weight (n, 2), as of a Kalman update.
+
+        Before it, the commands predict the yaw rate to a share of the usual one. With steered axles that is the less,
+        the slower the vehicle is.
+        """
+        typical, speed = self.recorded.typical_yaw_rate_radps, np.abs(self.speed) / self.recorded.typical_speed_mps
+        usual = typical * (np.ones_like(speed) if self.turns_on_the_spot else np.minimum(speed, 1.0))
+        predicted, measured = (_PREDICTED_YAW_STDERR * usual) ** 2, self.states.velocity_stderr[:, 2] ** 2
+        return np.column_stack([self.states.velocity[:, 2], predicted / (predicted + measured)])
 
 
 def cut_windows(
@@ -199,7 +224,7 @@ def cut_windows(
     t_s, motion = unwrapped_track(run)
     _require_frames(run, t_s, horizon)
     fitted = recorded.filter
-    track = _Track(t_s, motion, fitted.states(t_s, motion), fitted.noise, recorded.typical_speed_mps)
+    track = _Track(t_s, motion, fitted.states(t_s, motion), recorded, turns_on_the_spot)
     first_s = max(float(t_s[0]) + SUPPORT_S, float(t_s[_MIN_FRAMES - 1]), _first_prediction_s(run))
     begins_s = np.arange(first_s, float(t_s[-1]) - horizon.horizon_s + track.near_s, horizon.stride_s)
     last = np.searchsorted(t_s, begins_s + 1e-9, side="right") - 1
@@ -316,8 +341,9 @@ def _window(run: Run, horizon: Horizon, track: _Track, last: int) -> Window | No
         float(track.speed[last]),
         float(track.speed_stderr[last]),
         _recent_speed(t[recent], track.motion[recent]),
+        track.yaw_rate[last],
         _constant_velocity(t[recent], track.motion[recent]),
-        track.noise,
+        track.recorded.filter.noise,
     )
 
 

@@ -224,7 +224,7 @@ class LevenbergMarquardt:
             )
             residual = residual - np.einsum("rkcm,rm->rkc", linear.by_random_effects, move) * seen
             point = Point(state.parameters, state.random_effects + move, residual)
-            before, state = state.variance_components, self._updated(point, state, inverse)
+            before, state = state.variance_components, self._updated(point, state, inverse, linear)
             if before.change_to(state.variance_components) < _MIN_CHANGE:
                 break
         return state, self.evaluate(state, linear)
@@ -280,7 +280,7 @@ class LevenbergMarquardt:
         """
         start, near = evaluation.loss, evaluation.linear.by_first(self.predictor.maps.size)
         point = self._step_solver(state, evaluation).full(self._point(state, evaluation), evaluation.terms)
-        now = self._updated(point, state, evaluation.terms.inner_inverse)
+        now = self._updated(point, state, evaluation.terms.inner_inverse, evaluation.linear)
         for _ in range(FIT.non_monotone_steps):
             try:
                 evaluation = self.evaluate(now, near)
@@ -294,7 +294,7 @@ class LevenbergMarquardt:
     def _step(self, state: FitState, evaluation: Evaluation) -> tuple[FitState, Step]:
         """Return the state after a step that does not increase the objective, and the step."""
         taken = self._step_solver(state, evaluation).step(self._point(state, evaluation), evaluation.terms)
-        return self._updated(taken.point, state, evaluation.terms.inner_inverse), taken
+        return self._updated(taken.point, state, evaluation.terms.inner_inverse, evaluation.linear), taken
 
     def _step_solver(self, state: FitState, evaluation: Evaluation) -> StepSolver:
         return StepSolver(self.predictor, evaluation.linear, state.variance_components, self.bounds)
@@ -303,8 +303,13 @@ class LevenbergMarquardt:
     def _point(state: FitState, evaluation: Evaluation) -> Point:
         return Point(state.parameters, state.random_effects, evaluation.residual)
 
-    def _updated(self, point: Point, state: FitState, inner_inverse: Floats) -> FitState:
+    def _updated(self, point: Point, state: FitState, inner_inverse: Floats, linear: Linearised) -> FitState:
         variance_components = update_variance_components(
-            self.predictor, point.residual, point.random_effects, inner_inverse, state.variance_components
+            self.predictor,
+            point.residual,
+            point.random_effects,
+            inner_inverse,
+            linear.by_random_effects,
+            state.variance_components,
         )
         return FitState(point.parameters, point.random_effects, variance_components)

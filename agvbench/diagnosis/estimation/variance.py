@@ -111,12 +111,18 @@ def update_variance_components(
     residual: Floats,
     random_effects: Floats,
     inner_inverse: Floats,
+    by_random_effects: Floats,
     variance_components: VarianceComponents,
 ) -> VarianceComponents:
-    """Return the estimate from residuals (R, K, 3), random effects (R, 6) and their covariances (R, 6, 6)."""
+    """Return the estimate from residuals (R, K, 3), random effects (R, 6) and their covariances (R, 6, 6).
+
+    The derivatives of the poses `by_random_effects` are (R, K, 3, 6).
+    """
     seen = predictor.readings.seen
     if predictor.readings.initial_states is not None:
-        return _update_window_variance_components(predictor, residual, variance_components)
+        # The start pose is estimated from the window itself, and takes as much of its error (EM algorithm).
+        taken = np.einsum("rkcm,rmn,rkcn->rkc", by_random_effects, inner_inverse, by_random_effects, optimize=True)
+        return _update_window_variance_components(predictor, residual**2 + taken, variance_components)
     count = float(seen.sum())
     position = np.sqrt(np.sum(residual[..., :2] ** 2 * seen[..., None]) / (2.0 * count))
     heading = np.sqrt(np.sum(residual[..., 2] ** 2 * seen) / count)
@@ -129,16 +135,17 @@ def update_variance_components(
 
 
 def _update_window_variance_components(
-    predictor: Predictor, residual: Floats, variance_components: VarianceComponents
+    predictor: Predictor, squares: Floats, variance_components: VarianceComponents
 ) -> VarianceComponents:
+    """Return the estimate from the expected squares of the errors (R, K, 3)."""
     seen = predictor.readings.seen
     temper, _ = tempering(predictor)
-    e = residual * seen[..., None] / scale_of(variance_components)
-    _, robust_weight = student(predictor, temper * np.sum(e * e, axis=(1, 2)))
+    scaled = squares * seen[..., None] / scale_of(variance_components) ** 2
+    _, robust_weight = student(predictor, temper * np.sum(scaled, axis=(1, 2)))
     weight = seen * robust_weight[:, None]
     total = np.maximum(seen.sum(axis=0), 1.0)
-    position = np.sqrt(np.sum(residual[..., :2] ** 2 * weight[..., None], axis=(0, 2)) / (2.0 * total))
-    heading = np.sqrt(np.sum(residual[..., 2] ** 2 * weight, axis=0) / total)
+    position = np.sqrt(np.sum(squares[..., :2] * weight[..., None], axis=(0, 2)) / (2.0 * total))
+    heading = np.sqrt(np.sum(squares[..., 2] * weight, axis=0) / total)
     # Position and heading share the growth of position, which is the quantity to be predicted.
     growth = np.maximum(position, _MIN_M) / max(float(position[-1]), _MIN_M)
     return VarianceComponents(

@@ -32,6 +32,7 @@ from agvbench.diagnosis.result import Diagnosis, HeldOut, NamedEffect, Verdict
 from agvbench.diagnosis.selection.candidates import bounds_of
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection
+from agvbench.effects.variants import cause_of
 from agvbench.types import Floats
 
 
@@ -105,6 +106,7 @@ class WindowConclusion:
                 "stride_s": horizon.stride_s,
                 "level_scatter": float(batch.nodal_deviation),
                 "redundancy": batch.autocorrelation_time,
+                "initial_steering": "earlier commands" if batch.readings.preset else "measured yaw rate",
                 "sessions": self._sessions(),
                 "recordings": by_recording(self.assessment, predicted, perturbed, self.held, self.context.seed),
                 "effects": self._effect_errors(predicted["after"]),
@@ -167,17 +169,17 @@ class WindowConclusion:
         """
         chosen = self.selection.chosen
         out: dict[str, dict[str, object]] = {}
-        now = self._error(poses)
+        now, causes = self._error(poses), {cause_of(name) for name in chosen.names}
         for name in self.selector.candidates:
-            if name in self.selector.given:
-                continue
             kept = name in chosen.names
+            if name in self.selector.given or (not kept and cause_of(name) in causes):
+                continue
             if kept:
                 other: ScoredModel | None = self.selector.without_effect(self.selection.base, chosen, name)
             else:
                 other = self.selector.known((*chosen.names, name))
             error = None if other is None else self._error(self._poses(other))
-            out[name] = {
+            out[cause_of(name)] = {
                 "kept": kept,
                 "gain": self.selection.gains[name] if kept else chosen.deviance - other.deviance if other else 0.0,
                 "extrapolates": name in self.selector.extrapolating,

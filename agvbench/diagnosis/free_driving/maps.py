@@ -24,11 +24,18 @@ _MIN_SPEED_MPS = 0.05
 
 
 def smooth_maps(
-    runs: Sequence[Run], neutral: Command, steering: int, drive: int, *, is_differential: bool = False
+    runs: Sequence[Run],
+    neutral: Command,
+    steering: int,
+    drive: int,
+    others: Sequence[Run] = (),
+    *,
+    is_differential: bool = False,
 ) -> NodalMaps:
     """Return nodal maps with a node at every level, or with evenly spaced nodes if there are many levels.
 
-    Nodes are evenly spaced and not at quantiles, because driving on another day may use other levels more often.
+    Nodes are evenly spaced and not at quantiles, because driving on another day may use other levels more often. They
+    span the commands of the `runs` and those of the `others` in the directions that the `runs` drive.
     """
     found = nodal_maps(runs, neutral, is_differential=is_differential)
     nodes = dict(found.nodes)
@@ -40,12 +47,22 @@ def smooth_maps(
             commanded = commanded[commanded != getattr(neutral, role)]
         if len(np.unique(commanded)) <= _MANY_LEVELS:
             continue
+        further = np.concatenate([np.empty(0), *(getattr(run.commands, role) for run in others)])
+        commanded = np.concatenate([commanded, _in_driven_directions(further, commanded, role, found)])
         if role not in found.zero_at_neutral:
             nodes[role] = np.linspace(commanded.min(), commanded.max(), steering)
         else:
             count = drive if role == "drive" else (steering + 1) // 2
             nodes[role] = _on_each_side(commanded, count, getattr(neutral, role))
     return replace(found, nodes=nodes)
+
+
+def _in_driven_directions(further: Floats, commanded: Floats, role: str, maps: NodalMaps) -> Floats:
+    """Return the `further` commands to whose side of neutral some were `commanded`; all, if neutral is no zero."""
+    if role not in maps.zero_at_neutral:
+        return further
+    neutral = getattr(maps.neutral, role)
+    return further[np.isin(np.sign(further - neutral), np.sign(commanded - neutral))]
 
 
 def _on_each_side(commanded: Floats, count: int, neutral: float) -> Floats:

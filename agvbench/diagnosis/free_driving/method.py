@@ -26,9 +26,11 @@ from agvbench.diagnosis.method import Method
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.result import Diagnosis
+from agvbench.diagnosis.selection.actuators import ACTUATORS, separate_channels
 from agvbench.diagnosis.selection.candidates import given_effects
+from agvbench.diagnosis.selection.initial_steering import reconsider_initial_steering
 from agvbench.diagnosis.selection.stepwise import Selection
-from agvbench.diagnosis.selection.variants import candidates_for
+from agvbench.diagnosis.selection.variants import candidates_for, with_extended_library
 from agvbench.errors import CampaignError
 from agvbench.types import Command, Run
 from agvbench.vehicle.geometry import Geometry
@@ -103,14 +105,26 @@ class FreeDriving(Method[SelectedFromWindows]):
         """Select effects in evenly spaced training windows."""
         fitted = readings.select(thinned(np.flatnonzero(split.training), DATA.max_fitted_windows))
         self.on_progress(f"{len(fitted)} training windows, {np.count_nonzero(split.test)} test windows")
-        static = static_maps(fitted, self.context.geometry, self.context.header.neutral)
+        static = static_maps(fitted, readings.runs, self.context.geometry, self.context.header.neutral)
         levels = self._drive_levels(readings, split, static)
         selector = self._selector(readings, split, static, levels)
-        return SelectedFromWindows(static, selector, selector.select(), levels)
+        selection, selector = self._selected_effects(selector)
+        return SelectedFromWindows(static, selector, selection, levels)
+
+    @staticmethod
+    def _selected_effects(selector: WindowSelector) -> tuple[Selection, WindowSelector]:
+        """Return the effects, with delays and lags of the channels where these predict better, and their selector."""
+        selection, selector = reconsider_initial_steering(selector.select(), selector)
+        separate = separate_channels(selection, selector)
+        if separate is selection:
+            return selection, selector
+        extended = with_extended_library(selector)
+        return extended.select(separate.chosen, ACTUATORS), extended
 
     def conclude(self, readings: Readings, split: Split, selected: SelectedFromWindows) -> Diagnosis:
         """Open the test windows, and return the diagnosis."""
         self.on_progress("computing the errors of the test windows")
+        readings = replace(readings, preset=selected.selector.batch.readings.preset)
         trained = thinned(np.flatnonzero(split.training), DATA.max_assessed_windows)
         assessed = np.sort(np.r_[np.flatnonzero(split.test), trained])
         return WindowConclusion(
@@ -172,11 +186,15 @@ def _has_sessions(readings: Readings) -> bool:
     return readings.initial_states is not None and len(np.unique(readings.initial_states.session)) > 1
 
 
-def static_maps(fitted: Readings, geometry: Geometry, neutral: Command) -> Fit:
-    """Return the static maps fitted to the windows, with the number of nodes by Schwarz's criterion."""
+def static_maps(fitted: Readings, runs: Sequence[Run], geometry: Geometry, neutral: Command) -> Fit:
+    """Return the static maps fitted to the windows, with the number of nodes by Schwarz's criterion.
+
+    Their nodes span the commands of all `runs`, too: beyond those of the fitted windows, the prior of smoothness
+    continues a map with its slope.
+    """
     best: tuple[float, Fit] | None = None
     for steering, drive in NODES:
-        maps = smooth_maps(fitted.runs, neutral, steering, drive, is_differential=geometry.is_differential)
+        maps = smooth_maps(fitted.runs, neutral, steering, drive, runs, is_differential=geometry.is_differential)
         start = start_values_of_windows(maps, fitted, geometry)
         found = fit(Predictor(Batch(fitted, maps, geometry)), start, np.empty((0, 2)))
         total = float(found.loss.sum()) + maps.size * float(np.log(len(fitted)))

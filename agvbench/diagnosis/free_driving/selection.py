@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import ClassVar
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Self
 
 import numpy as np
 
 from agvbench.diagnosis.criteria import FREE_DRIVING, SelectionCriteria
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
+from agvbench.diagnosis.selection.actuators import CAMERA
 from agvbench.diagnosis.selection.candidates import default_candidate
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selector
 from agvbench.effects import effect_kinds
+from agvbench.effects.variants import cause_of
 from agvbench.types import Floats
 
 _EXTRAPOLATION_QUANTILE = 0.98
@@ -32,6 +35,38 @@ class WindowSelector(Selector):
     criteria: ClassVar[SelectionCriteria] = FREE_DRIVING
     test_batch: Batch | None = None
     extrapolating: set[str] = field(default_factory=set)
+
+    def for_batch(self, batch: Batch) -> Self:
+        """Return a selector with the same candidates and test windows for another batch, with an empty cache."""
+        test = self.test_batch
+        if test is not None:
+            test = test.with_kinds(batch.kinds).with_preset(preset=batch.readings.preset)
+        return replace(super().for_batch(batch), test_batch=test)
+
+    def preferred(self, models: list[ScoredModel]) -> ScoredModel:
+        """Return the model of least deviance, without a latency of the camera if another predicts as well."""
+        best = super().preferred(models)
+        others = [model for model in models if CAMERA not in model.names and best.is_matched_by(model)]
+        return super().preferred(others) if others and CAMERA in best.names else best
+
+    def alternatives(
+        self, base: ScoredModel, current: ScoredModel, among: Mapping[str, Iterable[str]] | None = None
+    ) -> dict[str, dict[str, float]]:
+        """Return the alternatives of each effect; by default among those that are predicted to take a part of its gain.
+
+        A fit of windows takes seconds. To first order, a latency is predicted to take a fifth of what a delay gains.
+        """
+        if among is None:
+            among = {name: list(self._likely(base, current, name)) for name in self._added_effects(current)}
+        return super().alternatives(base, current, among)
+
+    def _likely(self, base: ScoredModel, current: ScoredModel, name: str) -> Iterator[str]:
+        """Yield the candidates that may take the place of the effect called `name`."""
+        without, causes = self.without_effect(base, current, name), {cause_of(n) for n in current.names}
+        least = self.criteria.likely_share * (without.fit.total_loss - current.fit.total_loss)
+        for other in self.candidates:
+            if cause_of(other) not in causes and self.predicted_gain(without, other) >= least:
+                yield other
 
     def meets_criterion(self, without: ScoredModel, with_it: ScoredModel, *, of_group: bool = False) -> bool:
         """Return whether the added effects meet the criterion, are within their bounds and do not extrapolate."""

@@ -139,6 +139,13 @@ class Batch:
         level = self.nodal_deviation
         return Batch(self.readings, self.maps, self.geometry, level, self.autocorrelation_time, kinds)
 
+    def with_preset(self, *, preset: bool) -> Batch:
+        """Return this batch under a hypothesis on the initial steering; see `Readings`."""
+        readings = replace(self.readings, preset=preset)
+        return Batch(
+            readings, self.maps, self.geometry, self.nodal_deviation, self.autocorrelation_time, kinds=self.kinds
+        )
+
     def with_priors(self, priors: tuple[Prior, ...]) -> Batch:
         """Return this batch with other priors of the effects' parameters; both share the packed runs."""
         other = copy(self)

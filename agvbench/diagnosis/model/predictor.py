@@ -93,7 +93,7 @@ class Predictor:
         return self.batch.smoothness.loss(parameters) + self.physical.loss(parameters[self.maps.size :])
 
     def settled(self, parameters: Floats) -> tuple[Floats, Floats]:
-        """Return steady-state angles and speed of every row (rows, 3), and initial states (R, 5)."""
+        """Return steady-state angles and speed of every row (rows, 3), and initial states (R, 7)."""
         return self._inputs(parameters, np.zeros((len(self.readings), len(RANDOM_EFFECTS))))
 
     def all_parameters(self, parameters: Floats) -> Floats:
@@ -106,18 +106,20 @@ class Predictor:
         return values
 
     def _inputs(self, parameters: Floats, random_effects: Floats) -> tuple[Floats, Floats]:
-        """Return steady-state values of every row (rows, 3) and initial states (runs, 5)."""
+        """Return steady-state values of every row (rows, 3) and initial states (R, 7)."""
         where, run = self.maps.slices(), self.batch.base.row_runs
         values = [self.batch.weights[role] @ parameters[where[role]] for role in ROLES]
         most = MAX_YAW_RATE if self.batch.geometry.is_differential else MAX_ANGLE_RAD
         front, rear = (np.clip(values[k] + random_effects[run, 3 + k], -most, most) for k in (0, 1))
         front = np.where(self.batch.acting["front"], front, 0.0)
         speed = np.where(self.batch.acting["drive"], values[2] * np.exp(random_effects[run, 5]), 0.0)
-        initial = np.zeros((len(self.readings), 5))
+        initial = np.zeros((len(self.readings), 7))
         initial[:, :3] = self.readings.start + random_effects[:, :3]
         if self.readings.initial_states is not None:
             initial[:, 3] = self.readings.initial_states.speed_mps
             initial[:, 4] = self.readings.initial_states.recent_speed_mps
+            if not self.readings.preset:
+                initial[:, 5:] = self.readings.initial_states.yaw_rate
         return np.column_stack([front, rear, speed]), initial
 
     def predict(self, parameters: Floats, random_effects: Floats | None = None) -> Floats:

@@ -7,6 +7,9 @@ backward becomes a difference between neighbouring commands, and is not seen.
 The slope of a map is a random walk over the commands, so that the map is an integrated Wiener process (Wahba, JRSS B
 40, 1978), observed with a small independent deviation of each level. Changes of slope have Student's t distribution:
 end stops and dead bands are kinks, which few nodes have.
+
+Free driving needs the prior as much, although its nodes are few: its commands are steered by a person, so that levels
+are driven unequally often, and errors of windows are many times as large as those of runs.
 """
 
 from __future__ import annotations
@@ -60,18 +63,16 @@ class SmoothnessPrior:
 
     @classmethod
     def of(cls, maps: NodalMaps, readings: Readings) -> SmoothnessPrior:
-        """Return the prior for these maps; windows of free driving have none, because their nodes are coarse."""
+        """Return the prior for these maps, whose typical values are those of the `readings`."""
         rows: list[Floats] = []
         scales: list[float] = []
-        if readings.initial_states is None:
-            speed_mps = typical_speed_mps(readings)
-            for role, own in maps.slices().items():
-                size = speed_mps if role == "drive" else _TYPICAL_ANGLE_RAD
-                neutral = getattr(maps.neutral, role) if role in maps.zero_at_neutral else None
-                for row, scale in _slope_changes(maps.nodes[role], neutral, size):
-                    rows.append(np.zeros(maps.size))
-                    rows[-1][own] = row
-                    scales.append(scale)
+        sizes = _typical_values(maps, readings)
+        for role, own in maps.slices().items():
+            neutral = getattr(maps.neutral, role) if role in maps.zero_at_neutral else None
+            for row, scale in _slope_changes(maps.nodes[role], neutral, sizes[role]):
+                rows.append(np.zeros(maps.size))
+                rows[-1][own] = row
+                scales.append(scale)
         return cls(np.reshape(rows, (len(rows), maps.size)), np.asarray(scales))
 
     def terms(self, parameters: Floats) -> PriorTerms:
@@ -93,13 +94,26 @@ class SmoothnessPrior:
         return float((freedom + 1.0) * np.sum(np.log1p(z * z / freedom)))
 
 
+def _typical_values(maps: NodalMaps, readings: Readings) -> dict[str, float]:
+    """Return a typical value of each map at the end of its range: angles, a speed, or a yaw rate."""
+    turns = np.abs(np.diff(readings.poses[..., 2], axis=1))
+    front = _fast(readings, turns) if "front" in maps.zero_at_neutral else _TYPICAL_ANGLE_RAD
+    return {"front": front, "rear": _TYPICAL_ANGLE_RAD, "drive": typical_speed_mps(readings)}
+
+
 def typical_speed_mps(readings: Readings) -> float:
     """Return the speed that the vehicle exceeds in a twentieth of its samples."""
-    steps = np.hypot(*np.moveaxis(np.diff(readings.poses[..., :2], axis=1), -1, 0))
+    steps = np.diff(readings.poses[..., :2], axis=1)
+    return _fast(readings, np.hypot(steps[..., 0], steps[..., 1]))
+
+
+def _fast(readings: Readings, steps: Floats) -> float:
+    """Return the rate of change that the vehicle exceeds in a twentieth of its samples, from `steps` between them."""
     both = readings.seen[:, 1:] & readings.seen[:, :-1]
     duration_s = np.diff(readings.t_s, axis=1)
     moving = both & (duration_s > 0.0)
-    return float(np.quantile(steps[moving] / duration_s[moving], _FAST_QUANTILE)) if moving.any() else 1.0
+    fast = float(np.quantile(steps[moving] / duration_s[moving], _FAST_QUANTILE)) if moving.any() else 0.0
+    return fast or 1.0
 
 
 def _slope_changes(nodes: Floats, neutral: float | None, size: float) -> list[tuple[Floats, float]]:

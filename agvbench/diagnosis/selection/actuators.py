@@ -24,6 +24,7 @@ CAMERA = "mocap_latency"
 ACTUATORS = ("actuation_delay", "steering_lag", "speed_lag", "wheel_lag")
 SERVOS = ("actuation_delay", "steering_lag", "steering_rate_limit")
 MOTORS = (*SERVOS, "yaw_acceleration_limit", "speed_lag", "wheel_lag")
+_SERVOS_DELAY = "actuation_delay_servos"
 _DELAY, _EVEN, _UNEVEN = "actuation_delay", "steering_lag_inertia", "steering_lag_uneven"
 _LAG, _SPEED, _WHEELS = "steering_lag", "speed_lag", "wheel_lag"
 _SPEED_INERT, _WHEELS_INERT = "speed_lag_inertia", "wheel_lag_inertia"
@@ -65,6 +66,50 @@ def separate_lag_from_delay(selection: Selection, selector: Selector) -> Selecti
     }
     alternatives = {name: selection.alternatives.get(name, {}) | others for name in slow}
     return replace(selection, alternatives=selection.alternatives | alternatives)
+
+
+def separate_channels(selection: Selection, selector: Selector) -> Selection:
+    """Return the selection with a delay of each channel and a lag of each, if they predict better.
+
+    While a vehicle drives, speed and steering answer at times of their own. One delay of all commands, or of the
+    camera, resembles the slower of them, and the lag of the other leaves no gain beside it.
+    """
+    chosen = selection.chosen
+    slow = [name for name in chosen.names if cause_of(name) in (CAMERA, *MOTORS) and name not in selector.given]
+    has_common_delay = {CAMERA, _DELAY} & {cause_of(name) for name in slow}
+    if not has_common_delay or {*MOTORS} & {cause_of(name) for name in selector.given}:
+        return selection
+    extended = with_extended_library(selector)
+    model = _with_channels(extended, chosen, slow)
+    if model is None or model.gain_over(chosen) < SELECTION.min_gain:
+        return selection
+    separate = _replaced(selection, selector, extended, model, ACTUATORS)
+    more = len(separate.chosen.names) - len(chosen.names)
+    gains = separate.chosen.gain_over(chosen) > SELECTION.min_gain * max(more, 1)
+    return separate if gains else selection
+
+
+def _with_channels(extended: Selector, chosen: ScoredModel, slow: list[str]) -> ScoredModel | None:
+    """Return the model with delays and lags of the channels in place of the effects `slow`; None if it diverges.
+
+    The response of the steering is first taken for a delay beside its lag, and then for a lag alone.
+    """
+    own = chosen.fit.effect_values()
+    response, _, drive = _responses_s(own, slow)
+    values = {key.partition(".")[2]: value for key, value in own.items() if key.partition(".")[0] in slow}
+    lag, up, down = (
+        max(values.get(name, 0.0), _LEAST_LAG_S) for name in ("time_constant_s", "accelerate_s", "brake_s")
+    )
+    kept = [value for key, value in own.items() if key.partition(".")[0] not in slow]
+    names = (*(name for name in chosen.names if name not in slow), _SERVOS_DELAY, _LAG, _SPEED)
+    maps = chosen.fit.parameters[: extended.batch.maps.size]
+    models = []
+    for delay, time_constant in ((max(response - lag, 0.0), lag), (0.0, max(response, _LEAST_LAG_S))):
+        start = np.r_[maps, kept, delay, drive, time_constant, up, down]
+        starts = frozenset(one for one in chosen.starts if one[0] not in slow) | {("channels", start.tobytes())}
+        with suppress(np.linalg.LinAlgError):  # the fit diverged
+            models.append(extended.score(names, start, chosen.fit, starts=starts))
+    return min(models, key=lambda model: model.deviance, default=None)
 
 
 def _with_lag_and_delay(extended: Selector, chosen: ScoredModel, slow: list[str]) -> ScoredModel | None:

@@ -3,19 +3,19 @@
 Some benches leave the axles at neutral between runs, others set them long before the clock starts, and no campaign
 records which. The initial state matters only to effects that delay the axles. There a wrong assumption mimics another
 effect: a servo that is already at its target seems infinitely fast. The runs therefore decide between both hypotheses.
+
+Windows of free driving begin with the yaw rate that was measured, or with the axle angles that the commands before
+them result in. The measured one is noisy and late, the commanded one as wrong as the model: the windows decide, too.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from agvbench.diagnosis.criteria import SELECTION
 from agvbench.diagnosis.estimation.score_test import first_order_gain
-from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.candidates import default_candidate
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
-from agvbench.diagnosis.selection.stepwise import Selection, Selector
+from agvbench.diagnosis.selection.stepwise import AnySelector, Selection, Selector
 from agvbench.effects.variants import cause_of
 
 STEERING_DYNAMICS = ("steering_lag", "steering_rate_limit", "steering_backlash")
@@ -38,7 +38,7 @@ def choose_initial_steering(selector: Selector) -> Selector:
     return other if at_first < at_neutral - SELECTION.min_gain else selector
 
 
-def reconsider_initial_steering(selection: Selection, selector: Selector) -> tuple[Selection, Selector]:
+def reconsider_initial_steering(selection: Selection, selector: AnySelector) -> tuple[Selection, AnySelector]:
     """Repeat the selection under the other hypothesis if the selected model predicts clearly better under it."""
     chosen = selection.chosen
     if not set(STEERING_DYNAMICS) & {cause_of(name) for name in chosen.names}:
@@ -49,11 +49,9 @@ def reconsider_initial_steering(selection: Selection, selector: Selector) -> tup
     return other.select(), other
 
 
-def under_other_initial_steering(selector: Selector) -> Selector:
+def under_other_initial_steering(selector: AnySelector) -> AnySelector:
     """Return a selector of the same runs under the other hypothesis."""
-    batch = selector.batch
-    readings = replace(batch.readings, preset=not batch.readings.preset)
-    return selector.for_batch(Batch(readings, batch.maps, batch.geometry, kinds=batch.kinds))
+    return selector.for_batch(selector.batch.with_preset(preset=not selector.batch.readings.preset))
 
 
 def _predicted_gain(selector: Selector, base: ScoredModel, name: str) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from typing import ClassVar, Self, TypeVar
 
 import numpy as np
 
@@ -59,30 +59,37 @@ class Selector(FittedModels):
     @property
     def min_gain(self) -> float:
         """The least gain of an effect, corrected for the number of candidates."""
-        return SELECTION.min_gain + 2.0 * math.log(max(len(self.candidates), 1))
+        return self.criteria.min_gain + 2.0 * math.log(max(len(self.candidates), 1))
 
-    def for_batch(self, batch: Batch) -> Selector:
+    def for_batch(self, batch: Batch) -> Self:
         """Return a selector with the same candidates for another batch, with an empty cache."""
-        return Selector(
-            batch, dict(self.candidates), self.start, self.seed, self.on_progress, self.given, self.given_values
-        )
+        return replace(self, batch=batch, candidates=dict(self.candidates), tried=0)
 
-    def select(self) -> Selection:
-        """Add effects until none meets the criterion, then remove those without which the model predicts as well."""
-        base = current = self.base()
+    def select(self, begun: ScoredModel | None = None, group: Iterable[str] = ()) -> Selection:
+        """Add effects until none meets the criterion, then remove those without which the model predicts as well.
+
+        A model that was `begun` is continued; its effects with a cause in `group` are alike.
+        """
+        base = self.base()
+        current = base if begun is None else begun
         rejected: dict[str, float] = {}
         while True:  # ends when no effect meets the criterion: there are only so many candidates
-            larger = {name: self.with_effect(current, name) for name in self.candidates if name not in current.names}
+            causes = {cause_of(name) for name in current.names}
+            larger = {name: self.with_effect(current, name) for name in self.candidates if cause_of(name) not in causes}
             rejected = {name: model.gain_over(current) for name, model in larger.items()}
             accepted = {name: model for name, model in larger.items() if self.meets_criterion(current, model)}
             if not accepted:
                 break
-            current = min(accepted.values(), key=lambda model: model.deviance)
+            current = self.preferred(list(accepted.values()))
             self.on_progress(f"{' + '.join(current.names)}: gains {base.deviance - current.deviance:.0f}")
-        current, gains = self.backward_elimination(base, current)
+        current, gains = self.backward_elimination(base, current, group)
         alternatives = self.alternatives(base, current)
         rejected = {name: gain for name, gain in rejected.items() if name not in current.names}
         return Selection(base, current, alternatives, gains, rejected, self.tried)
+
+    def preferred(self, models: list[ScoredModel]) -> ScoredModel:
+        """Return the model of least deviance."""
+        return min(models, key=lambda model: model.deviance)
 
     def meets_criterion(self, without: ScoredModel, with_it: ScoredModel, *, of_group: bool = False) -> bool:
         """Return whether the effects in `with_it` but not in `without` meet the selection criterion.
@@ -91,12 +98,14 @@ class Selector(FittedModels):
         Nor need one that a prior states: the same prediction by other effects contradicts the prior.
         """
         gain, group = without.loss - with_it.loss, self.batch.readings.group
+        added = set(with_it.names) - set(without.names)
+        by_gain = of_group and self.criteria.group_by_gain
         by_priors = without.fit.prior.loss - with_it.fit.prior.loss
         return bool(
-            with_it.gain_over(without) > self.min_gain
+            with_it.gain_over(without) > (self.criteria.min_gain if by_gain else self.min_gain)
             and by_priors + trimmed_gain(gain, group, self.criteria.trimmed_share) > 0.0
             and (of_group or self._is_stated(without, with_it) or self._changes_prediction(without, with_it))
-            and all(differs_from_null(with_it.fit, name, group) for name in set(with_it.names) - set(without.names))
+            and (by_gain or all(differs_from_null(with_it.fit, name, group) for name in added))
         )
 
     def _is_stated(self, without: ScoredModel, with_it: ScoredModel) -> bool:
@@ -152,12 +161,16 @@ class Selector(FittedModels):
         among
             By effect, the others that are fitted in its place; by default every candidate.
         """
-        found = {}
+        found, causes = {}, {cause_of(name) for name in current.names}
         for name in self._added_effects(current):
             without = self.without_effect(base, current, name)
-            others = [n for n in (self.candidates if among is None else among.get(name, ())) if n not in current.names]
+            among_these = self.candidates if among is None else among.get(name, ())
+            others = [n for n in among_these if cause_of(n) not in causes]
             worse = {n: self.with_effect(without, n).deviance - current.deviance for n in others}
             found[name] = {
                 n: difference for n, difference in worse.items() if difference < SELECTION.alternative_margin
             }
         return found
+
+
+AnySelector = TypeVar("AnySelector", bound=Selector)

@@ -16,7 +16,7 @@ from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.candidates import Candidate, applies, bounds_of, candidate, candidates
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.initial_steering import STEERING_DYNAMICS, under_other_initial_steering
-from agvbench.diagnosis.selection.stepwise import Selection, Selector
+from agvbench.diagnosis.selection.stepwise import AnySelector, Selection, Selector
 from agvbench.diagnosis.terms import TERMS
 from agvbench.effects import Effect
 from agvbench.effects.variants import Variant, cause_of, effect_variants
@@ -46,7 +46,7 @@ def candidates_for(
     return candidates(geometry, exclude=known) | variants, EXTENDED_LIBRARY if variants else ()
 
 
-def with_extended_library(selector: Selector) -> Selector:
+def with_extended_library(selector: AnySelector) -> AnySelector:
     """Return a selector of the same runs whose simulation includes discrepancy terms and variants."""
     batch = selector.batch
     if selector.extended is None:

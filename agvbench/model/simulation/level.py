@@ -1,4 +1,4 @@
-"""The initial state of a simulation in motion: the measured speed, and the drive level that it indicates.
+"""The initial state of a simulation in motion: measured speed and yaw rate, and the drive level that they indicate.
 
 A part of the kernel; see `agvbench.model.simulation.compose`.
 """
@@ -15,6 +15,8 @@ from agvbench.types import Floats
 
 # Least ratio of longitudinal speed to drive speed; less occurs with invalid parameters only.
 _LEAST_PART = 0.05
+# Secants towards a yaw rate, and their width [rad]; least yaw rate per front angle [1/s]; largest correction [rad].
+_SECANTS, _SECANT_RAD, _LEAST_SLOPE, _MOST_RAD = 3, 1e-3, 0.1, 0.5
 # Below this speed [m/s] the drive level is not significant.
 _LEVEL_MPS = 0.05
 
@@ -36,6 +38,28 @@ def drive_speed(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: floa
         return 0.0
     part = _longitudinal_speed(s, p, vehicle, servos, now, longitudinal) / longitudinal
     return longitudinal / part if part > _LEAST_PART else longitudinal
+
+
+@compiled(inner=True)
+def front_angle(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, yaw_rate: float) -> float:
+    """Return the change of the front angle (of a differential vehicle: yaw rate) with which it turns at `yaw_rate`.
+
+    It is found by secants. Where the front angle hardly turns the vehicle, it is not changed.
+    """
+    before = servos[2]
+    change = 0.0
+    for _ in range(_SECANTS):
+        servos[2] = before + change
+        _longitudinal_speed(s, p, vehicle, servos, now, servos[4])
+        missing = yaw_rate - s[YAW_RATE]
+        servos[2] = before + change + _SECANT_RAD
+        _longitudinal_speed(s, p, vehicle, servos, now, servos[4])
+        slope = (s[YAW_RATE] - (yaw_rate - missing)) / _SECANT_RAD
+        if abs(slope) < _LEAST_SLOPE:
+            break
+        change = min(max(change + missing / slope, -_MOST_RAD), _MOST_RAD)
+    servos[2] = before
+    return change
 
 
 @compiled(inner=True)

@@ -60,7 +60,7 @@ from agvbench.model.compiled import compiled
 from agvbench.model.simulation.actuators import PLAN_SIZE, SERVOS_SIZE, leave_command, plan_command, step_length
 from agvbench.model.simulation.frames import follow_seen, report_step, see_step, start_run, wait
 from agvbench.model.simulation.layout import COUNT, LONGEST_STEP, START_SIZE, STARTED, TURN, WORK_SIZE
-from agvbench.model.simulation.level import drive_speed, level_lift, see_late
+from agvbench.model.simulation.level import drive_speed, front_angle, level_lift, see_late
 from agvbench.model.simulation.stages import aim, arrive, capture
 from agvbench.model.simulation.step import end_step, take_step
 from agvbench.types import Floats
@@ -159,6 +159,8 @@ def _drive_run(
     begin: float,
     speed: float,
     recent_speed: float,
+    yaw_rate: float,
+    weight: float,
     commands: Floats,
     settled: Floats,
     command_t_s: Floats,
@@ -203,6 +205,10 @@ def _drive_run(
                 if not math.isnan(speed):
                     lift = level_lift(s, p, vehicle, servos, now, recent_speed, speed)
                     servos[4] = drive_speed(s, p, vehicle, servos, now, speed)
+                    if weight > 0.0:
+                        turned = weight * front_angle(s, p, vehicle, servos, now, yaw_rate)
+                        servos[0] += turned
+                        servos[2] += turned
                     _obey(s, p, commands, settled, driven, front, rear, lift)
                 if s[SEEN_LAG] > 0.0:
                     see_late(s, p, vehicle, servos, now, start)
@@ -247,7 +253,8 @@ def simulate(
         Every effect's parameters.
     initial
         (runs, 4): the measured initial pose, and the longitudinal speed (NaN: that of the earlier commands); or
-        (runs, 5) with the recent longitudinal speed, which determines the drive level.
+        (runs, 5) with the recent longitudinal speed, which determines the drive level; or (runs, 7) with the yaw rate,
+        which determines the front angle, and its weight beside that of the earlier commands.
     begins_s
         (runs,): time stamp of the initial pose; NaN for runs that are at rest until their first command.
     started_h
@@ -287,8 +294,9 @@ def simulate(
         k = wait(s, p, start, begin, t_s, out, k, stop)
         speed = initial[run, 3]
         recent_speed = initial[run, 4] if initial.shape[1] > _STATE else speed
+        yaw_rate, weight = (initial[run, 5], initial[run, 6]) if initial.shape[1] > _STATE + 2 else (0.0, 0.0)
         if k < stop:
             _drive_run(
-                s, p, plan, work, vehicle, begin, speed, recent_speed, commands, settled, command_t_s, first, last,
-                start, servos, t_s, out, k, stop,
+                s, p, plan, work, vehicle, begin, speed, recent_speed, yaw_rate, weight, commands, settled,
+                command_t_s, first, last, start, servos, t_s, out, k, stop,
             )  # fmt: skip

@@ -208,7 +208,9 @@ class Simulation:
             (runs, 4): the pose that the camera reports at the start (x, y, heading), and the longitudinal speed of the
             centroid (0 for a run from rest; NaN in a window: the speed that the commands before it result in). Effects
             of the camera change the following poses, not the initial one. With a fifth column: the recent longitudinal
-            speed (averaged with weights that fall by e every 0.5 s), from which the drive's level is estimated.
+            speed (averaged with weights that fall by e every 0.5 s), from which the drive's level is estimated. With a
+            sixth and a seventh column: the yaw rate [rad/s] with which a window begins, to which the front axle is
+            turned, and the share of this turn that is made (0: the angle remains that of the commands before it).
         runs
             Indices of the runs to simulate; all by default. Other runs' frames are left as they are in `out`.
         out
