@@ -116,10 +116,110 @@ def reversed_steering(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataF
     return table.assign(steering=-table["steering"])
 
 
+def reversed_throttle(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """Have positive throttle drive backward: another vehicle, and no damage."""
+    return table.assign(throttle=-table["throttle"])
+
+
+def empty_commands(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """Leave both commands out in every fifth row."""
+    return table.mask(_every_fifth(table, rng, ("throttle", "steering")))
+
+
+def words(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """Write n/a for a hundredth of the positions."""
+    lost = rng.random(len(table)) < 0.01
+    return table.assign(x_m=np.where(lost, "n/a", table["x_m"].astype(str)))
+
+
+def infinite(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """Give infinite positions in a hundredth of the rows."""
+    return _set(table, np.flatnonzero(rng.random(len(table)) < 0.01), "y_m", np.inf)
+
+
+def repeated_rows(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """Write each row twice."""
+    return table.loc[table.index.repeat(2)]
+
+
+def shuffled(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """Write the rows in random order."""
+    return table.sample(frac=1.0, random_state=int(rng.integers(2**31)))
+
+
+def swapped_bodies(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """Follow another vehicle for a twentieth of the recording: poses of another part of it."""
+    own = _part(len(table), 0.05, rng)
+    other = (np.arange(len(table))[own] + len(table) // 2) % len(table)
+    for name in ("x_m", "y_m", "heading_rad"):
+        _set(table, own, name, table[name].to_numpy()[other])
+    return table
+
+
+def centimetres(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """Give positions in centimetres."""
+    return table.assign(x_m=1e2 * table["x_m"], y_m=1e2 * table["y_m"])
+
+
+def millimetres_later(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """Give positions in millimetres from the middle on."""
+    factor = np.where(np.arange(len(table)) < len(table) // 2, 1.0, 1e3)
+    return table.assign(x_m=factor * table["x_m"], y_m=factor * table["y_m"])
+
+
+def percent(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """Give the throttle in per cent."""
+    return table.assign(throttle=1e2 * table["throttle"])
+
+
+def steering_degrees(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """Give the steering in degrees."""
+    return table.assign(steering=25.0 * table["steering"])
+
+
+def swapped_commands(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """Exchange throttle and steering."""
+    return table.assign(throttle=table["steering"], steering=table["throttle"])
+
+
+def turned_round(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """Turn the body's axes round from the middle on, as when a tracker defines it anew."""
+    later = np.arange(len(table)) >= len(table) // 2
+    return table.assign(heading_rad=table["heading_rad"] + np.pi * later)
+
+
+def no_heading(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """Give a heading of zero throughout."""
+    return table.assign(heading_rad=0.0)
+
+
+def missing_column(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """Leave the headings out."""
+    return table.drop(columns="heading_rad")
+
+
+def coarse_times(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """Round times to a tenth of a second, so that several rows have the same."""
+    return table.assign(t_s=table["t_s"].round(1))
+
+
+def late_poses(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """Begin to track three seconds after the first command."""
+    return table.assign(x_m=table["x_m"].where(table["t_s"] > table["t_s"].iloc[0] + 3.0))
+
+
+def _every_fifth(table: pd.DataFrame, rng: np.random.Generator, columns: Sequence[str]) -> pd.DataFrame:
+    lost = rng.random(len(table)) < 0.2
+    return pd.DataFrame({name: lost & (name in columns) for name in table.columns}, index=table.index)
+
+
 DAMAGES: tuple[Damage, ...] = (
     missing_rows, gap, empty_poses, jump, clock_step, clock_back, latched, mirrored, clockwise, degrees, millimetres,
-    milliseconds, swapped_axes, reversed_steering,
+    milliseconds, swapped_axes, reversed_steering, reversed_throttle, empty_commands, words, infinite, repeated_rows,
+    shuffled, swapped_bodies, centimetres, millimetres_later, percent, steering_degrees, swapped_commands,
+    turned_round, no_heading, missing_column, coarse_times, late_poses,
 )  # fmt: skip
+"""New ones come last: the random numbers of each depend on its place."""
 
 
 def tables(source: Source, seed: int) -> dict[str, pd.DataFrame]:

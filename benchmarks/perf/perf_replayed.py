@@ -96,7 +96,7 @@ class Source:
         geometry = header.geometry
         windows = read_windows(runs, Horizon(), header.neutral, turns_on_the_spot=geometry.is_differential)
         fitted = static_maps(
-            windows.select(np.arange(0, len(windows), 1 + len(windows) // MAX_WINDOWS)), geometry, header.neutral
+            windows.select(np.arange(0, len(windows), 1 + len(windows) // MAX_WINDOWS)), runs, geometry, header.neutral
         )
         model = corrected_vehicle(header, geometry, fitted, fitted.predictor.maps, 0)
         names = {recording_of(run) for run in runs}
