@@ -41,7 +41,7 @@ def drive_speed(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: floa
 
 
 @compiled(inner=True)
-def front_angle(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, yaw_rate: float) -> float:
+def front_correction(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, yaw_rate: float) -> float:
     """Return the change of the front angle (of a differential vehicle: yaw rate) with which it turns at `yaw_rate`.
 
     It is found by secants. Where the front angle hardly turns the vehicle, it is not changed.

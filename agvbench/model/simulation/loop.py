@@ -60,7 +60,7 @@ from agvbench.model.compiled import compiled
 from agvbench.model.simulation.actuators import PLAN_SIZE, SERVOS_SIZE, leave_command, plan_command, step_length
 from agvbench.model.simulation.frames import follow_seen, report_step, see_step, start_run, wait
 from agvbench.model.simulation.layout import COUNT, LONGEST_STEP, START_SIZE, STARTED, TURN, WORK_SIZE
-from agvbench.model.simulation.level import drive_speed, front_angle, level_lift, see_late
+from agvbench.model.simulation.level import drive_speed, front_correction, level_lift, see_late
 from agvbench.model.simulation.stages import aim, arrive, capture
 from agvbench.model.simulation.step import end_step, take_step
 from agvbench.types import Floats
@@ -206,7 +206,7 @@ def _drive_run(
                     lift = level_lift(s, p, vehicle, servos, now, recent_speed, speed)
                     servos[4] = drive_speed(s, p, vehicle, servos, now, speed)
                     if weight > 0.0:
-                        turned = weight * front_angle(s, p, vehicle, servos, now, yaw_rate)
+                        turned = weight * front_correction(s, p, vehicle, servos, now, yaw_rate)
                         servos[0] += turned
                         servos[2] += turned
                     _obey(s, p, commands, settled, driven, front, rear, lift)
