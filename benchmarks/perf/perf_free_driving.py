@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from perf_diagnose import yardstick
+from perf_diagnose import Part, yardstick
 
 from agvbench.campaign import CampaignHeader
 from agvbench.diagnosis import diagnose
@@ -25,18 +25,6 @@ from agvbench.vehicle.channels import Channels
 
 SESSIONS, COMMAND_S, BOUND_S = 10, 0.1, 60.0
 NOISE_M, NOISE_RAD = 3e-4, 8e-4
-
-
-@dataclass(frozen=True)
-class Recorded:
-    """Runs of free driving, as `diagnose` takes them."""
-
-    header: CampaignHeader
-    runs: list[Run]
-
-    def __iter__(self) -> Iterator[Run]:
-        """Iterate over the runs."""
-        return iter(self.runs)
 
 
 @dataclass(frozen=True)
@@ -71,7 +59,7 @@ def steps(seconds: float, size: float, every_s: float, rng: np.random.Generator)
     return np.repeat(rng.uniform(-size, size, count // held + 1), held)[:count]
 
 
-def recorded(plant: Plant, kind: Kind, minutes: float, rate_hz: float, rng: np.random.Generator) -> Recorded:
+def recorded(plant: Plant, kind: Kind, minutes: float, rate_hz: float, rng: np.random.Generator) -> Part:
     """Drive `plant` in `SESSIONS` sessions; return what a camera sees of it."""
     seconds, runs = 60.0 * minutes / SESSIONS, []
     for session in range(SESSIONS):
@@ -90,7 +78,7 @@ def recorded(plant: Plant, kind: Kind, minutes: float, rate_hz: float, rng: np.r
             Run(f"{session}-0", "free", "", "", 0, NO_TARGET, 3600.0 * session, "ok", "", commands, frames,
                 session=f"day {session}")
         )  # fmt: skip
-    return Recorded(kind.header, runs)
+    return Part(kind.header, runs)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -11,11 +11,12 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from perf_diagnose import Part
 from perf_measured import SPLITS, recordings
 from rich.console import Console
 
@@ -68,17 +69,6 @@ SLOW = {"warthog": {"steering_lag": {"time_constant_s": 0.8}, "mocap_latency": {
 
 
 @dataclass(frozen=True)
-class Replayed:
-    """A campaign in memory."""
-
-    header: CampaignHeader
-    runs: list[Run]
-
-    def __iter__(self) -> Iterator[Run]:
-        return iter(self.runs)
-
-
-@dataclass(frozen=True)
 class Source:
     """The recordings of one vehicle, with static maps fitted to them and the noise of each recording's frames."""
 
@@ -103,7 +93,7 @@ class Source:
         noise = {n: RecordedMotion.of([r for r in runs if recording_of(r) == n]).filter.noise for n in names}
         return cls(header, runs, model, noise)
 
-    def replayed(self, planted: Planted, seed: int) -> Replayed:
+    def replayed(self, planted: Planted, seed: int) -> Part:
         """Return the recordings, driven again with what was planted."""
         rng = np.random.default_rng([0x4E91, seed])
         last = max(str(run.session) for run in self.runs)
@@ -120,7 +110,7 @@ class Source:
             position, heading = self.noise[recording_of(run)]
             x, y, angle = (poses + rng.normal(size=poses.shape) * [position, position, heading]).T
             runs.append(replace(run, frames=replace(frames, x_m=x, y_m=y, heading_rad=angle)))
-        return Replayed(self.header, runs)
+        return Part(self.header, runs)
 
 
 def slower(drive: MonotoneTable, factor: float) -> MonotoneTable:

@@ -30,7 +30,7 @@ from agvbench.diagnosis.selection.actuators import ACTUATORS, separate_channels
 from agvbench.diagnosis.selection.candidates import given_effects
 from agvbench.diagnosis.selection.initial_steering import reconsider_initial_steering
 from agvbench.diagnosis.selection.stepwise import Selection
-from agvbench.diagnosis.selection.variants import candidates_for, with_extended_library
+from agvbench.diagnosis.selection.variants import candidates_for
 from agvbench.errors import CampaignError
 from agvbench.types import Command, Run
 from agvbench.vehicle.geometry import Geometry
@@ -115,11 +115,8 @@ class FreeDriving(Method[SelectedFromWindows]):
     def _selected_effects(selector: WindowSelector) -> tuple[Selection, WindowSelector]:
         """Return the effects, with delays and lags of the channels where these predict better, and their selector."""
         selection, selector = reconsider_initial_steering(selector.select(), selector)
-        separate = separate_channels(selection, selector)
-        if separate is selection:
-            return selection, selector
-        extended = with_extended_library(selector)
-        return extended.select(separate.chosen, ACTUATORS), extended
+        separate, selector = separate_channels(selection, selector)
+        return separate if separate is selection else selector.select(separate.chosen, ACTUATORS), selector
 
     def conclude(self, readings: Readings, split: Split, selected: SelectedFromWindows) -> Diagnosis:
         """Open the test windows, and return the diagnosis."""

@@ -40,7 +40,7 @@ class WindowSelector(Selector):
         """Return a selector with the same candidates and test windows for another batch, with an empty cache."""
         test = self.test_batch
         if test is not None:
-            test = test.with_kinds(batch.kinds).with_preset(preset=batch.readings.preset)
+            test = test.repacked(kinds=batch.kinds, preset=batch.readings.preset)
         return replace(super().for_batch(batch), test_batch=test)
 
     def preferred(self, models: list[ScoredModel]) -> ScoredModel:

@@ -134,17 +134,14 @@ class Batch:
         turns = driven | (self.commands["front"] != self.maps.neutral.front)
         return {"drive": driven, "front": turns if self.geometry.is_differential else always, "rear": always}
 
-    def with_kinds(self, kinds: Sequence[type[Effect]]) -> Batch:
-        """Return this batch with other effects outside the library."""
-        level = self.nodal_deviation
-        return Batch(self.readings, self.maps, self.geometry, level, self.autocorrelation_time, kinds)
+    def repacked(self, *, kinds: Sequence[type[Effect]] | None = None, preset: bool | None = None) -> Batch:
+        """Return this batch with other effects outside the library, or another hypothesis on the initial steering.
 
-    def with_preset(self, *, preset: bool) -> Batch:
-        """Return this batch under a hypothesis on the initial steering; see `Readings`."""
-        readings = replace(self.readings, preset=preset)
-        return Batch(
-            readings, self.maps, self.geometry, self.nodal_deviation, self.autocorrelation_time, kinds=self.kinds
-        )
+        `preset` is that of `Readings`. What is not given stays as it is.
+        """
+        readings = self.readings if preset is None else replace(self.readings, preset=preset)
+        kinds, level = self.kinds if kinds is None else kinds, self.nodal_deviation
+        return Batch(readings, self.maps, self.geometry, level, self.autocorrelation_time, kinds)
 
     def with_priors(self, priors: tuple[Prior, ...]) -> Batch:
         """Return this batch with other priors of the effects' parameters; both share the packed runs."""

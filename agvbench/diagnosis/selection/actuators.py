@@ -16,7 +16,7 @@ import numpy as np
 from agvbench.diagnosis.criteria import DISCREPANCY, SELECTION
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.lack_of_fit import has_structure
-from agvbench.diagnosis.selection.stepwise import Selection, Selector
+from agvbench.diagnosis.selection.stepwise import AnySelector, Selection, Selector
 from agvbench.diagnosis.selection.variants import variant_candidates, with_extended_library
 from agvbench.effects.variants import cause_of
 
@@ -68,8 +68,8 @@ def separate_lag_from_delay(selection: Selection, selector: Selector) -> Selecti
     return replace(selection, alternatives=selection.alternatives | alternatives)
 
 
-def separate_channels(selection: Selection, selector: Selector) -> Selection:
-    """Return the selection with a delay of each channel and a lag of each, if they predict better.
+def separate_channels(selection: Selection, selector: AnySelector) -> tuple[Selection, AnySelector]:
+    """Return the selection with a delay of each channel and a lag of each, if they predict better, and its selector.
 
     While a vehicle drives, speed and steering answer at times of their own. One delay of all commands, or of the
     camera, resembles the slower of them, and the lag of the other leaves no gain beside it.
@@ -78,15 +78,15 @@ def separate_channels(selection: Selection, selector: Selector) -> Selection:
     slow = [name for name in chosen.names if cause_of(name) in (CAMERA, *MOTORS) and name not in selector.given]
     has_common_delay = {CAMERA, _DELAY} & {cause_of(name) for name in slow}
     if not has_common_delay or {*MOTORS} & {cause_of(name) for name in selector.given}:
-        return selection
+        return selection, selector
     extended = with_extended_library(selector)
     model = _with_channels(extended, chosen, slow)
     if model is None or model.gain_over(chosen) < SELECTION.min_gain:
-        return selection
-    separate = _replaced(selection, selector, extended, model, ACTUATORS)
+        return selection, selector
+    separate = _replaced(selection, extended, extended, model, ACTUATORS)
     more = len(separate.chosen.names) - len(chosen.names)
     gains = separate.chosen.gain_over(chosen) > SELECTION.min_gain * max(more, 1)
-    return separate if gains else selection
+    return (separate, extended) if gains else (selection, selector)
 
 
 def _with_channels(extended: Selector, chosen: ScoredModel, slow: list[str]) -> ScoredModel | None:

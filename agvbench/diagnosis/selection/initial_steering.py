@@ -51,7 +51,7 @@ def reconsider_initial_steering(selection: Selection, selector: AnySelector) -> 
 
 def under_other_initial_steering(selector: AnySelector) -> AnySelector:
     """Return a selector of the same runs under the other hypothesis."""
-    return selector.for_batch(selector.batch.with_preset(preset=not selector.batch.readings.preset))
+    return selector.for_batch(selector.batch.repacked(preset=not selector.batch.readings.preset))
 
 
 def _predicted_gain(selector: Selector, base: ScoredModel, name: str) -> float:

@@ -51,7 +51,7 @@ def with_extended_library(selector: AnySelector) -> AnySelector:
     batch = selector.batch
     if selector.extended is None:
         is_extended = {*EXTENDED_LIBRARY} <= {*batch.kinds}
-        selector.extended = batch if is_extended else batch.with_kinds(EXTENDED_LIBRARY)
+        selector.extended = batch if is_extended else batch.repacked(kinds=EXTENDED_LIBRARY)
     return selector.for_batch(selector.extended)
 
 
