@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from types import FunctionType
 from typing import Any, ClassVar, Self
 
 from agvbench.errors import VehicleError
@@ -77,6 +78,16 @@ HOOKS: Mapping[str, tuple[Stage, ...]] = {
 }
 #: Hooks that turn one time into another; all others change the state in place.
 TIME_HOOKS = frozenset({"arrive", "capture"})
+
+#: Entries of the state that differ between repeats of a run, beside those of the camera.
+_OF_THE_ROOM = frozenset({"X", "Y", "HEADING", "X_RATE", "Y_RATE", "SEEN_X", "SEEN_Y", "HOURS", "LOGGED"})
+
+
+def _reads(hook: Hook) -> set[str]:
+    """Return the names that a hook uses, and the functions of its file that it calls."""
+    names = set(hook.__code__.co_names)
+    used = [getattr(one, "py_func", one) for one in map(hook.__globals__.get, names)]
+    return names.union(*(_reads(one) for one in used if isinstance(one, FunctionType)))
 
 
 @dataclass(frozen=True)
@@ -182,6 +193,14 @@ class Effect:
     def hooks(cls) -> Mapping[str, Hook]:
         """Return the hooks of this effect, by name, in the order of the chain."""
         return {name: hook for name in HOOKS if (hook := getattr(cls, name)) is not None}
+
+    @classmethod
+    def acts_alike_on_repeats(cls) -> bool:
+        """Whether the effect moves repeats alike, in the frame of their start pose.
+
+        It does if no hook reads the place, the campaign time or a logged column.
+        """
+        return not any(_reads(hook) & _OF_THE_ROOM for hook in cls.hooks().values())
 
     @property
     def values(self) -> Mapping[str, float]:

@@ -55,7 +55,7 @@ def first_order_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floa
     existing parameters are those of `fitted`, so that a few simulations replace a fit.
     """
     parameters = initial_parameters(fitted, larger, start)
-    poses, slopes = larger.by_last(parameters, fitted.random_effects, len(start))
+    poses, slopes = larger.by_last(parameters, fitted.random_effects, len(start), fitted.linear.poses)
     residual = residual_of(larger, poses)
     prior = larger.prior(parameters)
     if larger.readings.initial_states is None:

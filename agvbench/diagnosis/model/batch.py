@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.model.nodal_maps import ROLES, NodalMaps
+from agvbench.diagnosis.model.repeats import Repeats
 from agvbench.diagnosis.model.smoothness import SmoothnessPrior
 from agvbench.effects import Effect
 from agvbench.model.priors import Prior
@@ -100,6 +101,8 @@ class Batch:
             tuple(kinds),
         )
         self.smoothness = SmoothnessPrior.of(maps, readings)
+        self.repeats = Repeats.of(readings)
+        self._alike: tuple[Floats, Repeats] = np.empty(0), self.repeats
         runs = readings.simulated()
         self.base = Simulation(geometry, maps.neutral, runs, kinds=kinds)
         self.commands: dict[str, Floats] = {role: getattr(self.base, role) for role in ROLES}
@@ -123,6 +126,18 @@ class Batch:
         self.perturbed = self._grouped(np.array(kind), np.array(row))
         self.rows = np.concatenate([rows_of_run[i] for i in run])
         self.row_change = np.concatenate(changed)
+
+    def alike(self, poses: Floats, heading: Floats) -> Repeats:
+        """Return the repeats whose `poses` (R, K, 3), predicted from a `heading` (R,), are alike; the last are kept."""
+        if self._alike[0] is not poses:
+            self._alike = poses, self.repeats.among_alike(poses, heading)
+        return self._alike[1]
+
+    def perturbations_of(self, repeats: Repeats) -> Integers:
+        """Return the perturbation (n,) of each run's representative; those of repeats are in the same order."""
+        begins = np.searchsorted(self.perturbed_run, np.arange(len(self.readings)))
+        behind = np.arange(len(self.perturbed_run)) - begins[self.perturbed_run]
+        return np.asarray(begins[repeats.representative[self.perturbed_run]] + behind)
 
     def _acting(self) -> dict[str, NDArray[np.bool_]]:
         """Return the rows (rows,) in which each channel acts: the drive unless it is at neutral, the steering always.

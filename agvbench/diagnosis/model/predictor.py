@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.nodal_maps import ROLES
 from agvbench.diagnosis.model.physical_priors import PhysicalPriors
+from agvbench.diagnosis.model.repeats import Repeats
 from agvbench.diagnosis.model.smoothness import PriorTerms
 from agvbench.types import Floats
 
@@ -79,6 +80,9 @@ class Predictor:
         self.nulls: Floats = batch.base.nulls[self._own]
         self.physical = PhysicalPriors.of(self.readings.priors, effects, self.parameter_names, self.nulls)
         self._steps = _STEP_SHARE * batch.base.scales[self._own]
+        repeatable = {kind.name for kind in batch.base.kinds if kind.acts_alike_on_repeats()}
+        kinds = [name.partition(".")[0] for name in self.parameter_names]
+        self._repeats = np.array([kind in repeatable for kind in kinds], dtype=np.bool_)
         self._last: tuple[tuple[bytes, ...], Floats] = (), np.empty(0)
 
     def prior(self, parameters: Floats) -> PriorTerms:
@@ -138,8 +142,10 @@ class Predictor:
             self._last = context, poses
         return self._last[1]
 
-    def _simulate(self, settled: Floats, own: Floats, initial: Floats) -> Floats:
-        poses = self.batch.base.predict(settled, self._all(own), initial, nodal_deviation=self.batch.nodal_deviation)
+    def _simulate(self, settled: Floats, own: Floats, initial: Floats, runs: NDArray[np.int64] | None = None) -> Floats:
+        poses = self.batch.base.predict(
+            settled, self._all(own), initial, runs=runs, nodal_deviation=self.batch.nodal_deviation
+        )
         return poses.reshape(len(self.readings), -1, 3)
 
     def linearise(self, parameters: Floats, random_effects: Floats, near: Linearised | None = None) -> Linearised:
@@ -153,24 +159,24 @@ class Predictor:
             by_maps, known = self._by_maps(parameters, random_effects, base, *inputs), {}
         else:
             by_maps, known = replace(near.by_first(self.maps.size), poses=base), near.by_effects()
-        return by_maps.with_last(
-            self._slopes(parameters, base, *inputs, len(self.parameter_names), known), self.parameter_names
-        )
+        repeats = self.batch.alike(base, inputs[1][:, 2])
+        slopes = self._slopes(parameters, base, *inputs, len(self.parameter_names), known, repeats)
+        return by_maps.with_last(slopes, self.parameter_names)
 
     def _by_maps(
         self, parameters: Floats, random_effects: Floats, base: Floats, settled: Floats, initial: Floats
     ) -> Linearised:
         """Return poses `base` with their derivatives by the nodal values and by the random effects."""
         batch = self.batch
-        perturbations = self._simulate_perturbed(settled, initial, parameters[self.maps.size :])
+        changes = self._changes_by_perturbations(base, settled, initial, parameters[self.maps.size :])
         by_own = np.zeros((*base.shape, batch.active.shape[1]))
         columns = by_own.transpose(0, 3, 1, 2)
         by_random_effects = np.zeros((*base.shape, len(RANDOM_EFFECTS)))
         by_random_effects[:, :, 0, 0] = by_random_effects[:, :, 1, 1] = 1.0
-        by_random_effects[..., 2] = (perturbations[batch.heading_perturbed] - base) / _STEP
+        by_random_effects[..., 2] = changes[batch.heading_perturbed]
         for k, role in enumerate(ROLES):
             perturbed = batch.perturbed[role]
-            change = (perturbations[perturbed.index] - base[perturbed.run]) / _STEP
+            change = changes[perturbed.index]
             by_offset, by_level = self._chain_factors(role, parameters, random_effects, settled)
             by_run = perturbed.by_run
             by_random_effects[by_run.key[:, 0], :, :, 3 + k] = by_run.sums(change * by_offset[:, None, None])
@@ -194,10 +200,22 @@ class Predictor:
             return factor * parameters[self.maps.slices()[role]][perturbed.row], factor
         return settled[perturbed.row, 2], factor
 
-    def by_last(self, parameters: Floats, random_effects: Floats, count: int) -> tuple[Floats, Floats]:
-        """Return poses (R, K, 3), and their derivatives by the last `count` parameters (R, K, 3, count)."""
-        base = self.predict(parameters, random_effects)
-        return base, self._slopes(parameters, base, *self._inputs(parameters, random_effects), count, {})
+    def by_last(
+        self, parameters: Floats, random_effects: Floats, count: int, near: Floats | None = None
+    ) -> tuple[Floats, Floats]:
+        """Return poses (R, K, 3), and their derivatives by the last `count` parameters (R, K, 3, count).
+
+        If `near` is given, it are the poses (R, K, 3) without the effect of these parameters. It moves repeats of a run
+        as it moves the run that represents them.
+        """
+        settled, initial = self._inputs(parameters, random_effects)
+        if near is None or not self._repeats[-count:].all():
+            base = self.predict(parameters, random_effects)
+            repeats = self.batch.alike(base, initial[:, 2])
+        else:
+            repeats = self.batch.alike(near, initial[:, 2])
+            base = near + self._change(near, settled, parameters[self.maps.size :], initial, repeats)
+        return base, self._slopes(parameters, base, settled, initial, count, {}, repeats)
 
     def _slopes(
         self,
@@ -207,12 +225,13 @@ class Predictor:
         initial: Floats,
         count: int,
         known: Mapping[str, Floats],
+        repeats: Repeats,
     ) -> Floats:
         """Return the derivatives (R, K, 3, count) of poses `base` by the last `count` of the effects' parameters.
 
         Those in `known` are taken from there.
         """
-        own = parameters[self.maps.size :]
+        own, every = parameters[self.maps.size :], Repeats(np.arange(len(base)))
         slopes = np.empty((*base.shape, count))
         for column, k in enumerate(range(len(own) - count, len(own))):
             name = self.parameter_names[k]
@@ -221,14 +240,26 @@ class Predictor:
                 continue
             moved = own.copy()
             moved[k] += self._steps[k]
-            slopes[..., column] = (self._simulate(settled, moved, initial) - base) / self._steps[k]
+            change = self._change(base, settled, moved, initial, repeats if self._repeats[k] else every)
+            slopes[..., column] = change / self._steps[k]
         return slopes
 
-    def _simulate_perturbed(self, settled: Floats, initial: Floats, own: Floats) -> Floats:
+    def _change(self, base: Floats, settled: Floats, own: Floats, initial: Floats, repeats: Repeats) -> Floats:
+        """Return by how much the poses differ from `base` (R, K, 3) with the effects' parameters `own`."""
+        poses = self._simulate(settled, own, initial, repeats.simulated)
+        changes = (poses - base)[repeats.representative]
+        return repeats.turned(changes, np.arange(len(base)), initial[:, 2])
+
+    def _changes_by_perturbations(self, base: Floats, settled: Floats, initial: Floats, own: Floats) -> Floats:
+        """Return the derivatives (n, K, 3) by each perturbed level (or nodal value), and by the initial heading."""
         batch = self.batch
         perturbed = settled[batch.rows] + _STEP * batch.row_change
         first = initial[batch.perturbed_run]
         first[:, 2] += _STEP * batch.heading_perturbed
-        return batch.perturbations.predict(
-            perturbed, self._all(own), first, nodal_deviation=batch.nodal_deviation
+        repeats = batch.alike(base, initial[:, 2])
+        representative = batch.perturbations_of(repeats)
+        poses = batch.perturbations.predict(
+            perturbed, self._all(own), first, runs=np.unique(representative), nodal_deviation=batch.nodal_deviation
         ).reshape(len(batch.perturbed_run), -1, 3)
+        changes = (poses - base[batch.perturbed_run])[representative] / _STEP
+        return repeats.turned(changes, batch.perturbed_run, initial[:, 2])
