@@ -143,6 +143,14 @@ def test_critical_damping_is_no_edge():
     np.testing.assert_allclose(near[0], near[2], atol=2e-6)
 
 
+def test_a_servo_has_a_damping_ratio_of_at_least_a_fifth():
+    ringing, damped, more = (
+        simulated([effect_variants()["steering_lag_inertia"](lag, 0.1)]) for lag in (0.0, 0.04, 0.05)
+    )
+    np.testing.assert_array_equal(ringing, damped)
+    assert np.max(np.abs(more - damped)) > 1e-4
+
+
 def test_a_drive_that_overshoots_many_times_comes_to_rest_and_reverses():
     """A damping of 0.1: the speed crosses zero several times after a stop, and before it after a start backward."""
     values = {"time_constant_s": 0.06, "inertia_s": 0.3}

@@ -24,7 +24,9 @@ class SteeringLagInertia(Variant):
     stage: ClassVar[Stage] = Stage.SERVO
     relaxes: ClassVar[str] = "axles rotate instantaneously (7.3)"
     reference: ClassVar[str] = "second-order actuator, as in textbooks of control (Ogata 2010, section 5.3)"
-    limits: ClassVar[str] = "a linear servo: steering_rate_limit does not act beside it"
+    limits: ClassVar[str] = (
+        "a linear servo with a damping ratio of at least 0.2; steering_rate_limit does not act beside it"
+    )
 
     time_constant_s: float = parameter(unit="s", low=0.0, high=5.0, scale=0.1)
     inertia_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.1)

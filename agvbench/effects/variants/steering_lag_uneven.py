@@ -21,7 +21,7 @@ class SteeringLagUneven(Variant):
     stage: ClassVar[Stage] = Stage.SERVO
     relaxes: ClassVar[str] = "axles rotate instantaneously (7.3)"
     reference: ClassVar[str] = "second-order actuator, as in textbooks of control (Ogata 2010, section 5.3)"
-    limits: ClassVar[str] = "servos of equal damping; steering_rate_limit does not act beside it"
+    limits: ClassVar[str] = "servos of equal damping, at least 0.2; steering_rate_limit does not act beside it"
     needs_steered_axles: ClassVar[bool] = True
 
     time_constant_s: float = parameter(unit="s", low=0.0, high=5.0, scale=0.1)

@@ -95,6 +95,8 @@ _TOGETHER = 1e-12
 _BACKLASH_STEP_S = 0.005
 # A smaller inertia oscillates faster than any camera resolves, and would need a step per oscillation.
 _LEAST_INERTIA_S = 1e-3
+# Time constant over inertia of a servo at a damping ratio of 0.2: position control that rings for longer is of no use.
+_LEAST_DAMPED = 0.4
 
 
 @compiled(inner=True)
@@ -117,7 +119,8 @@ def _plan_second_order(
     plan[servo + _AIM], plan[servo + _AXLE] = aim, axle
     plan[events] = plan[events + 2] = math.inf
     if plan[_ORDER] == INERT:
-        lag, inertia = ratio * state[STEERING_LAG], max(_LEAST_INERTIA_S, ratio * state[STEERING_INERTIA])
+        inertia = max(_LEAST_INERTIA_S, ratio * state[STEERING_INERTIA])
+        lag = max(ratio * state[STEERING_LAG], _LEAST_DAMPED * inertia)
         plan_inert(plan, servo, aim - position, -turning, lag, inertia)
     else:
         limit = state[STEERING_ACCELERATION]
