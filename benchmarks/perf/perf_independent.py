@@ -56,8 +56,18 @@ NAMES: Mapping[str, Mapping[str, str]] = {
     "differential_wheels": {"steering_rate_limit": "yaw_acceleration_limit", "motor_inertia": "wheel_lag"}
 }
 """Causes that the library knows by another name on such a vehicle."""
-ABSORBED: Mapping[str, frozenset[str]] = {"differential_wheels": frozenset({"drive_dead_band", "mocap_scale"})}
-"""Causes that free maps absorb: they need no name."""
+ABSORBED: Mapping[str, frozenset[str]] = {
+    "differential_wheels": frozenset({"drive_dead_band", "mocap_scale"}),
+    "state_space": frozenset({"wheel_diameter_mismatch"}),
+    "wheel_constraints": frozenset({"wheel_diameter_mismatch"}),
+}
+"""Causes that free maps absorb: they need no name.
+
+A curvature b that is added to every path is a shift of both steering maps: tan δ_f by b·l_f and tan δ_r by −b·l_r leave
+the lateral velocity as it is.
+"""
+LEAST_DELAY_S = 0.01
+"""A delay that is shorter is true where every actuator has a time constant of 5 ms."""
 
 
 @dataclass(frozen=True)
@@ -151,6 +161,8 @@ def judged(simulator: str, trial: Trial, known: Mapping[str, str], found: Diagno
     absorbed, names = ABSORBED.get(simulator, frozenset()), NAMES.get(simulator, {})
     inside = [names.get(cause, cause) for cause in trial.causes if known[cause] == "inside" and cause not in absorbed]
     true = WRONG_DISTANCES.union(trial.causes, inside, ALWAYS_TRUE.get(simulator, ()), *also)
+    if simulator in ALWAYS_TRUE and 0.0 < _delay_s(found) < LEAST_DELAY_S:
+        true |= {"actuation_delay"}
     errors = dict(found.held_out.errors["end_position_mm"]) if found.held_out is not None else {}
     return Answer(
         trial.name,
@@ -164,6 +176,12 @@ def judged(simulator: str, trial: Trial, known: Mapping[str, str], found: Diagno
         errors,
         seconds,
     )
+
+
+def _delay_s(found: Diagnosis) -> float:
+    """Return the longest delay of the actuators that a diagnosis states [s]; 0 if it states none."""
+    delays = [effect for effect in found.effects if effect.name == "actuation_delay"]
+    return max((value.value for effect in delays for value in effect.parameters.values()), default=0.0)
 
 
 def line(answer: Answer) -> str:
