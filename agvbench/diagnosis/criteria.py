@@ -117,6 +117,10 @@ class SelectionCriteria:
     ``likely_share``
         Share of an effect's gain in fit that another must be predicted to take, to first order, to be fitted in its
         place. Runs from rest have a criterion of their own.
+    ``superior_share``
+        An effect that is predicted to gain less than this share of what another one gains is not fitted in that step.
+        A gain that is predicted to first order is rarely more than twice too small. In free driving every effect is
+        fitted, because actuators are preferred to a latency of the camera whatever they gain.
     ``group_by_gain``
         Whether an effect of a group that was fitted together is judged by ``min_gain`` alone. It was not searched for
         among many, and a time constant of which only a lower bound is known has no finite standard error.
@@ -134,6 +138,7 @@ class SelectionCriteria:
     min_relative_change: float = 0.15
     trimmed_share: float = 0.05
     likely_share: float = 0.1
+    superior_share: float = 0.5
     group_by_gain: bool = False
     wald_alpha: float = 1e-4
     camera_share: float = 0.1
@@ -322,7 +327,7 @@ DATA = DataCriteria()
 MAPS = MapCriteria()
 FIT = FitCriteria()
 SELECTION = SelectionCriteria()
-FREE_DRIVING = SelectionCriteria(min_relative_change=0.3, trimmed_share=0.0, group_by_gain=True)
+FREE_DRIVING = SelectionCriteria(min_relative_change=0.3, trimmed_share=0.0, superior_share=0.0, group_by_gain=True)
 """Criteria for windows of free driving. Their residuals are mostly systematic, so that a small change of the prediction
 is no evidence; blocks of fast driving may be few, so that only one block is left out at each end."""
 

@@ -24,13 +24,14 @@ from agvbench.diagnosis.result import Diagnosis
 from agvbench.diagnosis.selection.actuators import prefer_actuators, separate_lag_from_delay
 from agvbench.diagnosis.selection.candidates import given_effects
 from agvbench.diagnosis.selection.driven_axle import UNDECLARED, better_driven_axle
+from agvbench.diagnosis.selection.equal_descriptions import with_equal_descriptions
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.initial_steering import choose_initial_steering, reconsider_initial_steering
 from agvbench.diagnosis.selection.sequential_replacement import excluded_by_priors, replace_sequentially
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.subsampling import refit_to_all, subsample_repeats
 from agvbench.diagnosis.selection.validation import validated
-from agvbench.diagnosis.selection.variants import candidates_for, select_variants_and_reconsider
+from agvbench.diagnosis.selection.variants import candidates_for, continued, select_variants_and_reconsider
 from agvbench.diagnosis.selection.with_term import TermSelection
 from agvbench.model import nominal_model
 from agvbench.types import Floats, Run
@@ -91,9 +92,10 @@ class RunsFromRest(Method[SelectedFromRest]):
         """Return the effects of the library with their variants, and the selector with their initial steering."""
         chosen, selector = reconsider_initial_steering(selector.select(), selector)
         library, selector = select_variants_and_reconsider(chosen, selector)
-        library = separate_lag_from_delay(prefer_actuators(library, selector), selector)
+        library = continued(separate_lag_from_delay(prefer_actuators(library, selector), selector), library, selector)
         if library.gains:
-            library = excluded_by_priors(replace_sequentially(library, selector), selector)
+            library = with_equal_descriptions(replace_sequentially(library, selector), chosen.chosen, selector)
+            library = excluded_by_priors(library, selector)
         return library, selector
 
     def _under(self, axle: Driven) -> RunsFromRest:

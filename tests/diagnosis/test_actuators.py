@@ -11,7 +11,7 @@ from tiny_vehicle import Tiny, campaign_runs
 from agvbench.diagnosis.selection.actuators import CAMERA, prefer_actuators, separate_lag_from_delay
 from agvbench.diagnosis.selection.sequential_replacement import replace_sequentially
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
-from agvbench.diagnosis.selection.variants import with_extended_library
+from agvbench.diagnosis.selection.variants import continued, with_extended_library
 from agvbench.effects.variants import cause_of
 
 SLOW = Tiny(delay_s=0.06, steering_lag_s=0.1, accelerate_s=0.15, brake_s=0.25)
@@ -57,6 +57,27 @@ def test_servos_of_which_one_is_slower_have_a_lag_each_and_a_common_delay():
     assert values["actuation_delay.delay_s"] == pytest.approx(0.06, abs=0.01)
     assert values["steering_lag_uneven.time_constant_s"] == pytest.approx(0.1, abs=0.02)
     assert values["steering_lag_uneven.rear_ratio"] == pytest.approx(1.8, rel=0.1)
+
+
+@pytest.mark.slow
+def test_equal_lags_of_servos_and_drive_are_no_delay_of_all():
+    tiny = Tiny(steering_lag_s=0.06, accelerate_s=0.06, brake_s=0.06)
+    selection, selector = selected(tiny, "actuation_delay_servos")
+    found = separate_lag_from_delay(selection, selector)
+    assert {*found.chosen.names} == {"steering_lag", "speed_lag"}
+    values = found.chosen.fit.effect_values()
+    assert values["steering_lag.time_constant_s"] == pytest.approx(0.06, abs=0.005)
+    assert values["speed_lag.accelerate_s"] == pytest.approx(0.06, abs=0.005)
+
+
+@pytest.mark.slow
+def test_beside_the_right_actuators_the_selection_goes_on():
+    """A delay of all actuators resembles lags of them, and leaves no gain to a small offset of the markers."""
+    tiny = Tiny(steering_lag_s=0.06, accelerate_s=0.06, brake_s=0.06, marker_forward_m=0.004)
+    before, selector = selected(tiny, "actuation_delay_servos")
+    found = continued(separate_lag_from_delay(before, selector), before, selector)
+    assert {cause_of(name) for name in found.chosen.names} == {"steering_lag", "speed_lag", "marker_offset"}
+    assert continued(found, found, selector) is found
 
 
 @pytest.mark.slow

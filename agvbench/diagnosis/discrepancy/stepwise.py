@@ -13,9 +13,11 @@ from agvbench.diagnosis.discrepancy.regression import steering_tangents
 from agvbench.diagnosis.discrepancy.screening import Start, screen
 from agvbench.diagnosis.estimation.cross_validation import by_group
 from agvbench.diagnosis.residuals.body_rates import residual_rates
+from agvbench.diagnosis.selection.actuators import prefer_actuators, separate_lag_from_delay
 from agvbench.diagnosis.selection.candidates import candidate
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.lack_of_fit import has_lack_of_fit
+from agvbench.diagnosis.selection.sequential_replacement import replace_sequentially
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.variants import (
     prefers_other_initial_steering,
@@ -142,7 +144,25 @@ def add_term(selection: Selection, selector: Selector) -> TermSelection | None:
     elif any(_depends_on_few_groups(selector, selection, name) for name in selection.gains):
         found.append(_term_in_place_of_effect(extended, selection))
     models = [reselect_effects(extended, selection, *pair) for pair in found if pair is not None]
+    models = [_with_right_actuators(extended, selection, model) for model in models]
     return _best_with_term(extended, selection, selector, models)
+
+
+def _with_right_actuators(extended: Selector, selection: Selection, model: ModelWithTerm) -> ModelWithTerm:
+    """Return the model with other actuators and the effects beside them, if they explain a slow response better.
+
+    While the term was missing, its cause decided which actuators fitted best.
+    """
+    chosen, term, gains, alternatives = model
+    beside = Selection(selection.base, chosen, alternatives, gains, {}, extended.models_fitted)
+    right = separate_lag_from_delay(prefer_actuators(beside, extended), extended).chosen
+    if {*right.names} == {*chosen.names} or term.name not in right.names:
+        return model
+    again, _, gains, alternatives = reselect_effects(extended, selection, right, term)
+    replaced = replace_sequentially(Selection(selection.base, again, alternatives, gains, {}, 0), extended)
+    gains = {name: gain for name, gain in replaced.gains.items() if name != term.name}
+    is_better = term.name in replaced.chosen.names and replaced.chosen.deviance < chosen.deviance
+    return (replaced.chosen, term, gains, replaced.alternatives) if is_better else model
 
 
 def _best_with_term(
@@ -157,7 +177,7 @@ def _best_with_term(
     if not extended.meets_criterion(without, chosen):
         return None
     gain = without.loss - chosen.loss
-    tried = selection.tried + extended.tried
+    tried = selector.models_fitted
     rejected = {n: g for n, g in selection.rejected.items() if n not in chosen.names}
     selector.on_progress(f"{' + '.join(chosen.names)}: a discrepancy term gains {gain.sum():.0f}")
     return TermSelection(

@@ -59,6 +59,12 @@ class Fit:
         return self.information.total + ridge(self.predictor) + self.prior.information
 
     @property
+    def decrement(self) -> float:
+        """The reduction of the loss that a further step is predicted to bring (Newton decrement, squared)."""
+        gradient = self.gradient.sum(axis=0) + self.prior.gradient
+        return float(gradient @ np.linalg.lstsq(self.total_information, gradient, rcond=1e-12)[0])
+
+    @property
     def covariance(self) -> Floats:
         """Covariance of the parameters (P, P)."""
         return np.asarray(np.linalg.pinv(self.total_information, hermitian=True))

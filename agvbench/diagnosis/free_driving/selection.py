@@ -68,9 +68,9 @@ class WindowSelector(Selector):
             if cause_of(other) not in causes and self.predicted_gain(without, other) >= least:
                 yield other
 
-    def meets_criterion(self, without: ScoredModel, with_it: ScoredModel, *, of_group: bool = False) -> bool:
-        """Return whether the added effects meet the criterion, are within their bounds and do not extrapolate."""
-        if not super().meets_criterion(without, with_it, of_group=of_group):
+    def improves(self, without: ScoredModel, with_it: ScoredModel, *, of_group: bool = False) -> bool:
+        """Return whether the added effects improve the prediction, are within their bounds and do not extrapolate."""
+        if not super().improves(without, with_it, of_group=of_group):
             return False
         added = set(with_it.names) - set(without.names)
         if any(self._is_at_bound(with_it, name) for name in added):

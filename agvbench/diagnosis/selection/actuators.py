@@ -20,12 +20,12 @@ from agvbench.diagnosis.selection.stepwise import AnySelector, Selection, Select
 from agvbench.diagnosis.selection.variants import variant_candidates, with_extended_library
 from agvbench.effects.variants import cause_of
 
-CAMERA = "mocap_latency"
+CAMERA, DELAY = "mocap_latency", "actuation_delay"
 ACTUATORS = ("actuation_delay", "steering_lag", "speed_lag", "wheel_lag")
 SERVOS = ("actuation_delay", "steering_lag", "steering_rate_limit")
 MOTORS = (*SERVOS, "yaw_acceleration_limit", "speed_lag", "wheel_lag")
 _SERVOS_DELAY = "actuation_delay_servos"
-_DELAY, _EVEN, _UNEVEN = "actuation_delay", "steering_lag_inertia", "steering_lag_uneven"
+_EVEN, _UNEVEN = "steering_lag_inertia", "steering_lag_uneven"
 _LAG, _SPEED, _WHEELS = "steering_lag", "speed_lag", "wheel_lag"
 _SPEED_INERT, _WHEELS_INERT = "speed_lag_inertia", "wheel_lag_inertia"
 # Of a response of second order with critical damping: its inertia over its lag.
@@ -38,9 +38,12 @@ def separate_lag_from_delay(selection: Selection, selector: Selector) -> Selecti
 
     A selection of one effect at a time takes what resembles the whole response, and neither a delay of each servo nor a
     rate limit leaves a gain to the other causes. If both descriptions predict equally, the lag becomes an alternative.
+    A delay also resembles lags of servos and drive that are about equal.
     """
     chosen, which = selection.chosen, MOTORS if selector.batch.geometry.is_differential else SERVOS
     slow = [name for name in chosen.names if cause_of(name) in which and name not in selector.given]
+    if _SPEED not in {cause_of(name) for name in (*chosen.names, *selector.given)}:
+        which = (*which, _SPEED)
     if not slow or {*which} & {cause_of(name) for name in selector.given}:
         return selection
     extended = with_extended_library(selector)
@@ -76,7 +79,7 @@ def separate_channels(selection: Selection, selector: AnySelector) -> tuple[Sele
     """
     chosen = selection.chosen
     slow = [name for name in chosen.names if cause_of(name) in (CAMERA, *MOTORS) and name not in selector.given]
-    has_common_delay = {CAMERA, _DELAY} & {cause_of(name) for name in slow}
+    has_common_delay = {CAMERA, DELAY} & {cause_of(name) for name in slow}
     if not has_common_delay or {*MOTORS} & {cause_of(name) for name in selector.given}:
         return selection, selector
     extended = with_extended_library(selector)
@@ -121,7 +124,12 @@ def _with_lag_and_delay(extended: Selector, chosen: ScoredModel, slow: list[str]
     kept = [value for key, value in own.items() if key.partition(".")[0] not in slow]
     others = tuple(name for name in chosen.names if name not in slow)
     maps = chosen.fit.parameters[: extended.batch.maps.size]
-    responses = _motors(own, slow) if extended.batch.geometry.is_differential else _servos(own, slow)
+    has_speed_lag = _SPEED in map(cause_of, others)
+    responses = (
+        _motors(own, slow)
+        if extended.batch.geometry.is_differential
+        else _servos(own, slow, has_speed_lag=has_speed_lag)
+    )
     best: ScoredModel | None = None
     for names, values in responses.items():
         start = np.r_[maps, kept, values]
@@ -132,15 +140,21 @@ def _with_lag_and_delay(extended: Selector, chosen: ScoredModel, slow: list[str]
     return best
 
 
-def _servos(own: Mapping[str, float], slow: list[str]) -> dict[tuple[str, ...], list[float]]:
-    """Return effects with initial values: one lag of both servos, or a lag each where one is slower than the other."""
+def _servos(own: Mapping[str, float], slow: list[str], *, has_speed_lag: bool) -> dict[tuple[str, ...], list[float]]:
+    """Return effects with initial values: one lag of both servos, or a lag each where one is slower than the other.
+
+    Where the drive responds late, too, its response is also taken for a lag, unless the model has one.
+    """
     front, rear, drive = _responses_s(own, slow)
     delay = min(drive, front, rear)
     lags = max(front - delay, _LEAST_LAG_S), max(rear - delay, _LEAST_LAG_S)
     mean = 0.5 * sum(lags)
-    return {
-        (_DELAY, _EVEN): [delay, mean, _CRITICAL * mean],
-        (_DELAY, _UNEVEN): [delay, lags[0], _CRITICAL * lags[0], lags[1] / lags[0]],
+    late: dict[tuple[str, ...], list[float]] = {}
+    if drive > 0.0 and not has_speed_lag:
+        late[_LAG, _SPEED] = [0.5 * (front + rear), drive, drive]
+    return late | {
+        (DELAY, _EVEN): [delay, mean, _CRITICAL * mean],
+        (DELAY, _UNEVEN): [delay, lags[0], _CRITICAL * lags[0], lags[1] / lags[0]],
     }
 
 
@@ -159,10 +173,10 @@ def _motors(own: Mapping[str, float], slow: list[str]) -> dict[tuple[str, ...], 
     mean = 0.5 * sum(lags)
     inert = [[lag, _CRITICAL * lag] for lag in (mean, *lags)]
     return {
-        (_DELAY, _WHEELS): [delay, mean],
-        (_DELAY, _WHEELS_INERT): [delay, *inert[0]],
-        (_DELAY, _LAG, _SPEED): [delay, lags[0], lags[1], lags[1]],
-        (_DELAY, _EVEN, _SPEED_INERT): [delay, *inert[1], *inert[2]],
+        (DELAY, _WHEELS): [delay, mean],
+        (DELAY, _WHEELS_INERT): [delay, *inert[0]],
+        (DELAY, _LAG, _SPEED): [delay, lags[0], lags[1], lags[1]],
+        (DELAY, _EVEN, _SPEED_INERT): [delay, *inert[1], *inert[2]],
     }
 
 
@@ -198,7 +212,7 @@ def _replaced(
         },
         gains=gains,
         rejected={name: gain for name, gain in selection.rejected.items() if name not in causes},
-        tried=selection.tried + extended.tried,
+        tried=selector.models_fitted,
     )
 
 
@@ -243,7 +257,7 @@ def prefer_actuators(selection: Selection, selector: Selector) -> Selection:
         alternatives=alternatives,
         gains=gains,
         rejected=rejected,
-        tried=selection.tried + extended.tried,
+        tried=selector.models_fitted,
     )
 
 

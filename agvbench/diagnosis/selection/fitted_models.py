@@ -93,6 +93,7 @@ class FittedModels:
     tried: int = 0
     _fold: NDArray[np.int64] = field(init=False)
     _known: dict[Request, ScoredModel] = field(init=False, default_factory=dict)
+    _gains: dict[tuple[Request, str, Starts], list[float]] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         self._fold = folds(fold_groups(self.batch.readings), FOLDS, self.seed)
@@ -153,9 +154,12 @@ class FittedModels:
         """Return the predicted gain of the effect `name` beside `current`, to first order, from its best start."""
         return max(self._predicted_gains(current, self._predictor((*current.names, name)), default_candidate(name)))
 
-    @staticmethod
-    def _predicted_gains(current: ScoredModel, predictor: Predictor, candidate: Candidate) -> list[float]:
-        return [first_order_gain(current.fit, predictor, start, candidate.bounds) for start in candidate.starts]
+    def _predicted_gains(self, current: ScoredModel, predictor: Predictor, candidate: Candidate) -> list[float]:
+        which = current.request, candidate.name, candidate.key
+        if which not in self._gains:
+            bounds = candidate.bounds
+            self._gains[which] = [first_order_gain(current.fit, predictor, start, bounds) for start in candidate.starts]
+        return self._gains[which]
 
     def _with_effect(
         self, current: ScoredModel, predictor: Predictor, candidate: Candidate, starts: Starts
@@ -176,12 +180,17 @@ class FittedModels:
             predicted_gain < FIT.large_predicted_gain
             and now.total_loss - preliminary.total_loss < FIT.min_predicted_gain
         ):
-            self.tried += 1
-            tried = ScoredModel(names, preliminary, cross_validated(preliminary, self._fold, bounds), starts)
-            return self._known.setdefault(tried.request, tried)
+            return self.unfinished(preliminary, starts)
         return self.score(
             names, preliminary.parameters, preliminary, starts=starts, patient=is_likely and candidate.patient
         )
+
+    def unfinished(self, fitted: Fit, starts: Starts = frozenset()) -> ScoredModel:
+        """Return the model of a preliminary fit that is not worth further steps, unless it is cached."""
+        self.tried += 1
+        names = fitted.predictor.effects
+        tried = ScoredModel(names, fitted, cross_validated(fitted, self._fold, bounds_of(names)), starts)
+        return self._known.setdefault(tried.request, tried)
 
     def _preliminary_fit(
         self, current: ScoredModel, predictor: Predictor, starts: list[Floats], bounds: Floats, least: float | None

@@ -44,7 +44,7 @@ def replace_sequentially(selection: Selection, selector: Selector) -> Selection:
         current, gains = extended.backward_elimination(selection.base, best, map(cause_of, best.names))
     selector.candidates |= {name: one for name, one in variant_candidates().items() if name in current.names}
     rejected = {name: gain for name, gain in selection.rejected.items() if name not in current.names}
-    tried = selection.tried + extended.tried
+    tried = selector.models_fitted
     return replace(selection, chosen=current, gains=gains, alternatives=alternatives, rejected=rejected, tried=tried)
 
 

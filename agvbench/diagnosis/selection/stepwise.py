@@ -50,11 +50,16 @@ class Selection:
 class Selector(FittedModels):
     """Fits effects to the training runs, and selects those that meet the criterion.
 
-    ``extended`` caches a batch with the extended library, once it was needed.
+    ``extended`` is the selector of the same runs with the extended library, once it was needed.
     """
 
     criteria: ClassVar[SelectionCriteria] = SELECTION
-    extended: Batch | None = field(init=False, default=None)
+    extended: Self | None = field(init=False, default=None)
+
+    @property
+    def models_fitted(self) -> int:
+        """The number of fitted models, with and without the extended library."""
+        return self.tried + (0 if self.extended is None else self.extended.tried)
 
     @property
     def min_gain(self) -> float:
@@ -74,18 +79,35 @@ class Selector(FittedModels):
         current = base if begun is None else begun
         rejected: dict[str, float] = {}
         while True:  # ends when no effect meets the criterion: there are only so many candidates
-            causes = {cause_of(name) for name in current.names}
-            larger = {name: self.with_effect(current, name) for name in self.candidates if cause_of(name) not in causes}
+            larger = self._with_one_more(current)
             rejected = {name: model.gain_over(current) for name, model in larger.items()}
-            accepted = {name: model for name, model in larger.items() if self.meets_criterion(current, model)}
+            accepted = [model for model in larger.values() if self.improves(current, model)]
             if not accepted:
                 break
-            current = self.preferred(list(accepted.values()))
+            current = self.preferred(accepted)
             self.on_progress(f"{' + '.join(current.names)}: gains {base.deviance - current.deviance:.0f}")
         current, gains = self.backward_elimination(base, current, group)
         alternatives = self.alternatives(base, current)
         rejected = {name: gain for name, gain in rejected.items() if name not in current.names}
-        return Selection(base, current, alternatives, gains, rejected, self.tried)
+        return Selection(base, current, alternatives, gains, rejected, self.models_fitted)
+
+    def _with_one_more(self, current: ScoredModel) -> dict[str, ScoredModel]:
+        """Return `current` with each further candidate, in the order of the predicted gains.
+
+        What is predicted to gain much less than another one does gain is left to the next step.
+        """
+        causes = {cause_of(name) for name in current.names}
+        names = [name for name in self.candidates if cause_of(name) not in causes]
+        predicted = {name: self.predicted_gain(current, name) for name in names}
+        larger: dict[str, ScoredModel] = {}
+        most = 0.0
+        for name in sorted(names, key=lambda name: -predicted[name]):
+            if predicted[name] < self.criteria.superior_share * most:
+                break
+            larger[name] = self.with_effect(current, name)
+            if self.improves(current, larger[name]):
+                most = max(most, larger[name].gain_over(current))
+        return larger
 
     def preferred(self, models: list[ScoredModel]) -> ScoredModel:
         """Return the model of least deviance."""
@@ -97,15 +119,25 @@ class Selector(FittedModels):
         An effect that is one `of_group` need not change the prediction noticeably: others of its group take its place.
         Nor need one that a prior states: the same prediction by other effects contradicts the prior.
         """
+        added, group = set(with_it.names) - set(without.names), self.batch.readings.group
+        by_gain = of_group and self.criteria.group_by_gain
+        return self.improves(without, with_it, of_group=of_group) and (
+            by_gain or all(differs_from_null(with_it.fit, name, group) for name in added)
+        )
+
+    def improves(self, without: ScoredModel, with_it: ScoredModel, *, of_group: bool = False) -> bool:
+        """Return whether `with_it` predicts enough better than `without`: the selection criterion but for Wald's test.
+
+        While causes are missing, their residuals widen the standard errors of the others: Wald's test decides about the
+        whole model, in the backward elimination.
+        """
         gain, group = without.loss - with_it.loss, self.batch.readings.group
-        added = set(with_it.names) - set(without.names)
         by_gain = of_group and self.criteria.group_by_gain
         by_priors = without.fit.prior.loss - with_it.fit.prior.loss
         return bool(
             with_it.gain_over(without) > (self.criteria.min_gain if by_gain else self.min_gain)
             and by_priors + trimmed_gain(gain, group, self.criteria.trimmed_share) > 0.0
             and (of_group or self._is_stated(without, with_it) or self._changes_prediction(without, with_it))
-            and (by_gain or all(differs_from_null(with_it.fit, name, group) for name in added))
         )
 
     def _is_stated(self, without: ScoredModel, with_it: ScoredModel) -> bool:

@@ -47,12 +47,16 @@ def candidates_for(
 
 
 def with_extended_library(selector: AnySelector) -> AnySelector:
-    """Return a selector of the same runs whose simulation includes discrepancy terms and variants."""
-    batch = selector.batch
+    """Return the selector of the same runs whose simulation includes discrepancy terms and variants.
+
+    Every step of the selection gets the same one, so that no model is fitted twice.
+    """
+    if {*EXTENDED_LIBRARY} <= {*selector.batch.kinds}:
+        return selector
     if selector.extended is None:
-        is_extended = {*EXTENDED_LIBRARY} <= {*batch.kinds}
-        selector.extended = batch if is_extended else batch.repacked(kinds=EXTENDED_LIBRARY)
-    return selector.for_batch(selector.extended)
+        selector.extended = selector.for_batch(selector.batch.repacked(kinds=EXTENDED_LIBRARY))
+    selector.extended.candidates = dict(selector.candidates)
+    return selector.extended
 
 
 @dataclass(frozen=True)
@@ -94,7 +98,23 @@ def select_variants(selection: Selection, selector: Selector) -> Selection:
     causes = {cause_of(n) for n in current.names}
     rejected = {n: g for n, g in (selection.rejected | selection.gains).items() if n not in causes}
     selector.candidates |= {n: c for n, c in variant_candidates().items() if n in current.names}
-    return Selection(selection.base, current, alternatives, gains, rejected, selection.tried + extended.tried)
+    return Selection(selection.base, current, alternatives, gains, rejected, selector.models_fitted)
+
+
+def continued(selection: Selection, before: Selection, selector: Selector) -> Selection:
+    """Return the selection with further effects and variants, if it has other effects than `before`.
+
+    An effect that compensated for the wrong actuators hides others, which gain beside the right ones.
+    """
+    if {*selection.chosen.names} == {*before.chosen.names}:
+        return selection
+    extended = with_extended_library(selector)
+    extended.candidates |= {n: c for n, c in variant_candidates().items() if n in selection.chosen.names}
+    again = extended.select(selection.chosen, map(cause_of, selection.chosen.names))
+    again = select_variants(replace(again, base=selection.base), extended)
+    selector.candidates |= {n: c for n, c in extended.candidates.items() if n in again.chosen.names}
+    kept = {name: selection.alternatives.get(name, {}) | again.alternatives.get(name, {}) for name in again.gains}
+    return replace(again, alternatives=kept, tried=selector.models_fitted)
 
 
 def select_variants_and_reconsider(selection: Selection, selector: Selector) -> tuple[Selection, Selector]:
@@ -239,6 +259,8 @@ def _swapped(extended: Selector, current: ScoredModel, out: set[str], variant: C
         for start in variant.starts
     ]  # fmt: skip
     best = min(fits, key=lambda one: one.total_loss)
+    if best.total_loss - best.decrement > near.total_loss + VARIANT.max_fit_loss:
+        return extended.unfinished(best, starts)  # further steps would not compensate for it
     return extended.score(names, best.parameters, best, starts=starts)
 
 
