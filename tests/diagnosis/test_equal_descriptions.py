@@ -29,6 +29,12 @@ def test_what_all_delays_of_actuators_have_in_common_may_be_the_cameras():
     assert abs(alternatives(Tiny(delay_s=0.06), "actuation_delay_servos")["mocap_latency"]) < 1.0
 
 
+def test_delays_with_nothing_in_common_are_not_the_cameras():
+    """The servos alone are late: a delay of the steering of 60 ms, and none of the drive."""
+    tiny = Tiny(steering_lag_s=0.06)
+    assert "mocap_latency" not in alternatives(tiny, "actuation_delay_servos")
+
+
 def test_a_wheelbase_beside_displaced_markers_may_be_a_scale_of_the_camera():
     tiny = Tiny(wheelbase_m=FRONT_M + REAR_M + 0.006, marker_forward_m=0.01)
     assert "mocap_scale" in alternatives(tiny, "marker_offset_wheelbase", "mocap_scale")

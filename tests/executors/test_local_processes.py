@@ -88,11 +88,13 @@ def test_ctrl_c_loses_only_what_is_in_flight(tmp_path):
 
     presser = threading.Thread(target=press)
     ended, began = [], time.monotonic()
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background it may be ignored
     with open_executor(ExecutorOptions(jobs=2)) as executor:
         presser.start()
         with pytest.raises(KeyboardInterrupt):
             ended += [outcome.key for outcome in executor.run(tasks, int) if ended.append(outcome.key) is None]
     presser.join()
+    signal.signal(signal.SIGINT, before)
     assert sorted(ended) == [0, 1]
     assert len(list(tmp_path.glob("begun-*"))) == 2
     assert time.monotonic() - began < 60.0

@@ -21,6 +21,8 @@ from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.variants import with_extended_library
 from agvbench.effects.variants import cause_of
 
+_STANDARD_ERRORS = 3.0
+
 
 def with_equal_descriptions(selection: Selection, before: ScoredModel, selector: Selector) -> Selection:
     """Return the selection with the effects that explain the runs as well as a variant, as its alternatives.
@@ -61,7 +63,10 @@ def _more_loss_of_camera(extended: Selector, chosen: ScoredModel, delays: str) -
     names, own = (*chosen.names, CAMERA), chosen.fit
     of_delays = np.array([key.partition(".")[0] == delays for key in own.predictor.parameter_names])
     at = extended.batch.maps.size + np.flatnonzero(of_delays)
-    common = own.parameters[at].min()
+    least = at[np.argmin(own.parameters[at])]
+    common = own.parameters[least]
+    if common < _STANDARD_ERRORS * np.sqrt(own.covariance[least, least]):
+        return np.inf  # the delays have nothing in common
     parameters = np.r_[own.parameters, common]
     parameters[at] -= common
     solver = LevenbergMarquardt(Predictor(extended.batch, names), bounds_of(names))

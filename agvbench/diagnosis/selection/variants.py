@@ -113,7 +113,16 @@ def continued(selection: Selection, before: Selection, selector: Selector) -> Se
     again = extended.select(selection.chosen, map(cause_of, selection.chosen.names))
     again = select_variants(replace(again, base=selection.base), extended)
     selector.candidates |= {n: c for n, c in extended.candidates.items() if n in again.chosen.names}
-    kept = {name: selection.alternatives.get(name, {}) | again.alternatives.get(name, {}) for name in again.gains}
+    gain, present = selection.chosen.deviance - again.chosen.deviance, {cause_of(name) for name in again.chosen.names}
+    kept = {
+        name: {
+            other: difference + gain
+            for other, difference in selection.alternatives.get(name, {}).items()
+            if difference + gain < SELECTION.alternative_margin and other not in present
+        }
+        | again.alternatives.get(name, {})
+        for name in again.gains
+    }
     return replace(again, alternatives=kept, tried=selector.models_fitted)
 
 
