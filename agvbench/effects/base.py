@@ -79,7 +79,7 @@ HOOKS: Mapping[str, tuple[Stage, ...]] = {
 #: Hooks that turn one time into another; all others change the state in place.
 TIME_HOOKS = frozenset({"arrive", "capture"})
 
-#: Entries of the state that differ between repeats of a run, beside those of the camera.
+#: Entries of the state in which repeats of a run differ in more than their start pose, or which that pose rotates.
 _OF_THE_ROOM = frozenset({"X", "Y", "HEADING", "X_RATE", "Y_RATE", "SEEN_X", "SEEN_Y", "HOURS", "LOGGED"})
 
 

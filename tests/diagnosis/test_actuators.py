@@ -71,7 +71,7 @@ def test_equal_lags_of_servos_and_drive_are_no_delay_of_all():
 
 
 @pytest.mark.slow
-def test_beside_the_right_actuators_the_selection_goes_on():
+def test_beside_the_right_actuators_the_selection_continues():
     """A delay of all actuators resembles lags of them, and leaves no gain to a small offset of the markers."""
     tiny = Tiny(steering_lag_s=0.06, accelerate_s=0.06, brake_s=0.06, marker_forward_m=0.004)
     before, selector = selected(tiny, "actuation_delay_servos")

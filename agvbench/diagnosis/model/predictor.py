@@ -80,9 +80,9 @@ class Predictor:
         self.nulls: Floats = batch.base.nulls[self._own]
         self.physical = PhysicalPriors.of(self.readings.priors, effects, self.parameter_names, self.nulls)
         self._steps = _STEP_SHARE * batch.base.scales[self._own]
-        repeatable = {kind.name for kind in batch.base.kinds if kind.acts_alike_on_repeats()}
+        alike = {kind.name for kind in batch.base.kinds if kind.name in effects and kind.acts_alike_on_repeats()}
         kinds = [name.partition(".")[0] for name in self.parameter_names]
-        self._repeats = np.array([kind in repeatable for kind in kinds], dtype=np.bool_)
+        self._acts_alike = np.array([kind in alike for kind in kinds], dtype=np.bool_)
         self._last: tuple[tuple[bytes, ...], Floats] = (), np.empty(0)
 
     def prior(self, parameters: Floats) -> PriorTerms:
@@ -205,16 +205,16 @@ class Predictor:
     ) -> tuple[Floats, Floats]:
         """Return poses (R, K, 3), and their derivatives by the last `count` parameters (R, K, 3, count).
 
-        If `near` is given, it are the poses (R, K, 3) without the effect of these parameters. It moves repeats of a run
-        as it moves the run that represents them.
+        The poses `near` (R, K, 3), if given, are those without the effect of these parameters. The effect moves repeats
+        of a run as it moves the run that represents them.
         """
         settled, initial = self._inputs(parameters, random_effects)
-        if near is None or not self._repeats[-count:].all():
-            base = self.predict(parameters, random_effects)
-            repeats = self.batch.alike(base, initial[:, 2])
-        else:
+        if near is not None and self.batch.repeats.are_any and self._acts_alike[-count:].all():
             repeats = self.batch.alike(near, initial[:, 2])
             base = near + self._change(near, settled, parameters[self.maps.size :], initial, repeats)
+        else:
+            base = self.predict(parameters, random_effects)
+            repeats = self.batch.alike(base, initial[:, 2])
         return base, self._slopes(parameters, base, settled, initial, count, {}, repeats)
 
     def _slopes(
@@ -231,7 +231,7 @@ class Predictor:
 
         Those in `known` are taken from there.
         """
-        own, every = parameters[self.maps.size :], Repeats(np.arange(len(base)))
+        own = parameters[self.maps.size :]
         slopes = np.empty((*base.shape, count))
         for column, k in enumerate(range(len(own) - count, len(own))):
             name = self.parameter_names[k]
@@ -240,12 +240,17 @@ class Predictor:
                 continue
             moved = own.copy()
             moved[k] += self._steps[k]
-            change = self._change(base, settled, moved, initial, repeats if self._repeats[k] else every)
+            change = self._change(base, settled, moved, initial, repeats if self._acts_alike[k] else None)
             slopes[..., column] = change / self._steps[k]
         return slopes
 
-    def _change(self, base: Floats, settled: Floats, own: Floats, initial: Floats, repeats: Repeats) -> Floats:
-        """Return by how much the poses differ from `base` (R, K, 3) with the effects' parameters `own`."""
+    def _change(self, base: Floats, settled: Floats, own: Floats, initial: Floats, repeats: Repeats | None) -> Floats:
+        """Return by how much the poses differ from `base` (R, K, 3) with the effects' parameters `own`.
+
+        If `repeats` are given, the runs that represent others are simulated.
+        """
+        if repeats is None or not repeats.are_any:
+            return self._simulate(settled, own, initial) - base
         poses = self._simulate(settled, own, initial, repeats.simulated)
         changes = (poses - base)[repeats.representative]
         return repeats.turned(changes, np.arange(len(base)), initial[:, 2])

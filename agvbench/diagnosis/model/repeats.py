@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +54,8 @@ class Repeats:
         `heading` (R,) is the initial heading. Random effects and campaign time may make repeats differ: such a run
         represents itself.
         """
+        if not self.are_any:
+            return self
         own = np.arange(len(heading))
         expected = self.turned(poses[self.representative] - poses[self.representative, :1], own, heading)
         apart = poses - poses[:, :1] - expected
@@ -61,7 +64,12 @@ class Repeats:
         turned = np.max(np.abs(apart[..., 2]), axis=1) <= _SAME_HEADING
         return Repeats(np.where(near & turned, self.representative, own))
 
-    @property
+    @cached_property
+    def are_any(self) -> bool:
+        """Whether a run represents another."""
+        return bool(np.any(self.representative != np.arange(len(self.representative))))
+
+    @cached_property
     def simulated(self) -> NDArray[np.int64]:
         """The indices of the runs that represent others or themselves, ascending."""
         return np.unique(self.representative)

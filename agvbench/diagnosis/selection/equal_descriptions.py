@@ -6,7 +6,6 @@ are the cause, or its parameters, the runs then do not tell.
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -70,7 +69,8 @@ def _more_loss_of_camera(extended: Selector, chosen: ScoredModel, delays: str) -
     parameters = np.r_[own.parameters, common]
     parameters[at] -= common
     solver = LevenbergMarquardt(Predictor(extended.batch, names), bounds_of(names))
-    with suppress(np.linalg.LinAlgError):
-        state = FitState(parameters, own.random_effects, own.variance_components)
-        return solver.evaluate(state).loss - own.total_loss
-    return np.inf
+    state = FitState(parameters, own.random_effects, own.variance_components)
+    try:
+        return solver.evaluate(state, own.linear).loss - own.total_loss
+    except np.linalg.LinAlgError:
+        return np.inf

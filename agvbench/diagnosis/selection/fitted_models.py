@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -152,7 +153,10 @@ class FittedModels:
 
     def predicted_gain(self, current: ScoredModel, name: str) -> float:
         """Return the predicted gain of the effect `name` beside `current`, to first order, from its best start."""
-        return max(self._predicted_gains(current, self._predictor((*current.names, name)), default_candidate(name)))
+        try:
+            return max(self._predicted_gains(current, self._predictor((*current.names, name)), default_candidate(name)))
+        except np.linalg.LinAlgError:
+            return -math.inf  # what cannot be evaluated gains nothing
 
     def _predicted_gains(self, current: ScoredModel, predictor: Predictor, candidate: Candidate) -> list[float]:
         which = current.request, candidate.name, candidate.key

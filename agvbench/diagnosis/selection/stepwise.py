@@ -79,9 +79,8 @@ class Selector(FittedModels):
         current = base if begun is None else begun
         rejected: dict[str, float] = {}
         while True:  # ends when no effect meets the criterion: there are only so many candidates
-            larger = self._with_one_more(current)
+            larger, accepted = self._with_one_more(current)
             rejected = {name: model.gain_over(current) for name, model in larger.items()}
-            accepted = [model for model in larger.values() if self.improves(current, model)]
             if not accepted:
                 break
             current = self.preferred(accepted)
@@ -91,8 +90,8 @@ class Selector(FittedModels):
         rejected = {name: gain for name, gain in rejected.items() if name not in current.names}
         return Selection(base, current, alternatives, gains, rejected, self.models_fitted)
 
-    def _with_one_more(self, current: ScoredModel) -> dict[str, ScoredModel]:
-        """Return `current` with each further candidate, in the order of the predicted gains.
+    def _with_one_more(self, current: ScoredModel) -> tuple[dict[str, ScoredModel], list[ScoredModel]]:
+        """Return `current` with each further candidate, in the order of predicted gains, and those that improve it.
 
         What is predicted to gain much less than another one does gain is left to the next step.
         """
@@ -100,14 +99,16 @@ class Selector(FittedModels):
         names = [name for name in self.candidates if cause_of(name) not in causes]
         predicted = {name: self.predicted_gain(current, name) for name in names}
         larger: dict[str, ScoredModel] = {}
+        accepted: list[ScoredModel] = []
         most = 0.0
         for name in sorted(names, key=lambda name: -predicted[name]):
-            if predicted[name] < self.criteria.superior_share * most:
+            if accepted and predicted[name] < self.criteria.superior_share * most:
                 break
-            larger[name] = self.with_effect(current, name)
-            if self.improves(current, larger[name]):
-                most = max(most, larger[name].gain_over(current))
-        return larger
+            larger[name] = model = self.with_effect(current, name)
+            if self.improves(current, model):
+                accepted.append(model)
+                most = max(most, model.gain_over(current))
+        return larger, accepted
 
     def preferred(self, models: list[ScoredModel]) -> ScoredModel:
         """Return the model of least deviance."""

@@ -93,7 +93,8 @@ def select_variants(selection: Selection, selector: Selector) -> Selection:
         return selection
     current, gains = extended.backward_elimination(selection.base, current)
     gain = selection.chosen.deviance - current.deviance
-    alternatives = {name: _alternatives(selection, name, gain) | _other_causes(current, name, tried) for name in gains}
+    known = {name: selection.alternatives.get(cause_of(name), {}) for name in gains}
+    alternatives = {name: _after_gain(known[name], gain) | _other_causes(current, name, tried) for name in gains}
     # An effect that a variant of another has replaced may be right beside a later discrepancy term.
     causes = {cause_of(n) for n in current.names}
     rejected = {n: g for n, g in (selection.rejected | selection.gains).items() if n not in causes}
@@ -114,16 +115,12 @@ def continued(selection: Selection, before: Selection, selector: Selector) -> Se
     again = select_variants(replace(again, base=selection.base), extended)
     selector.candidates |= {n: c for n, c in extended.candidates.items() if n in again.chosen.names}
     gain, present = selection.chosen.deviance - again.chosen.deviance, {cause_of(name) for name in again.chosen.names}
-    kept = {
-        name: {
-            other: difference + gain
-            for other, difference in selection.alternatives.get(name, {}).items()
-            if difference + gain < SELECTION.alternative_margin and other not in present
-        }
-        | again.alternatives.get(name, {})
-        for name in again.gains
+    kept = {name: _after_gain(selection.alternatives.get(name, {}), gain) for name in again.gains}
+    alternatives = {
+        name: {other: more for other, more in known.items() if other not in present} | again.alternatives.get(name, {})
+        for name, known in kept.items()
     }
-    return replace(again, alternatives=kept, tried=selector.models_fitted)
+    return replace(again, alternatives=alternatives, tried=selector.models_fitted)
 
 
 def select_variants_and_reconsider(selection: Selection, selector: Selector) -> tuple[Selection, Selector]:
@@ -273,9 +270,8 @@ def _swapped(extended: Selector, current: ScoredModel, out: set[str], variant: C
     return extended.score(names, best.parameters, best, starts=starts)
 
 
-def _alternatives(selection: Selection, name: str, gain: float) -> dict[str, float]:
-    """Return the alternatives of the effect `name` that remain after the `gain` of its variant."""
-    known = selection.alternatives.get(cause_of(name), {})
+def _after_gain(known: dict[str, float], gain: float) -> dict[str, float]:
+    """Return the `known` alternatives of an effect that remain after a further `gain` of the model."""
     return {
         other: difference + gain
         for other, difference in known.items()
