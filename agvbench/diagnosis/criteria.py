@@ -151,11 +151,17 @@ class VariantCriteria:
 
     ``max_fit_loss``
         No effect is removed beside a variant that fits worse by more: a model with fewer effects fits no better.
+    ``max_predicted_loss``, ``max_share_of_loss``
+        An effect is removed beside a variant if that is predicted to lose less than this, or less than this share of
+        what its removal is predicted to lose without the variant. Both predictions are quadratic. They are up to forty
+        times too large, because random effects and their standard deviations grow in a fit.
     ``min_gain_share``
         Another effect with a smaller share of the selected effect's gain is not tried in its variants.
     """
 
     max_fit_loss: float = 100.0
+    max_predicted_loss: float = 1000.0
+    max_share_of_loss: float = 0.25
     min_gain_share: float = 0.5
 
 

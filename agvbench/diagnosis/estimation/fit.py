@@ -88,6 +88,18 @@ class Fit:
             self.residual,
         )
 
+    def predicted_loss_without(self, name: str) -> float:
+        """Return the increase of the loss without the effect called `name`, by the quadratic approximation.
+
+        The parameter of a limit is replaced by its inverse, whose null value is 0: to first order both have the same
+        relative error.
+        """
+        own = np.array([key.partition(".")[0] == name for key in self.predictor.parameter_names])
+        nulls = self.predictor.nulls[own]
+        off = self.parameters[self.predictor.maps.size :][own] - np.where(np.isfinite(nulls), nulls, 0.0)
+        at = self.predictor.maps.size + np.flatnonzero(own)
+        return float(off @ np.linalg.pinv(self.covariance[np.ix_(at, at)], hermitian=True) @ off)
+
     def effect_values(self) -> dict[str, float]:
         """Return the effects' parameters by name."""
         own = self.parameters[self.predictor.maps.size :]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Self
 
@@ -16,7 +15,6 @@ from agvbench.diagnosis.selection.candidates import default_candidate
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selector
 from agvbench.effects import effect_kinds
-from agvbench.effects.variants import cause_of
 from agvbench.types import Floats
 
 _EXTRAPOLATION_QUANTILE = 0.98
@@ -48,25 +46,6 @@ class WindowSelector(Selector):
         best = super().preferred(models)
         others = [model for model in models if CAMERA not in model.names and best.is_matched_by(model)]
         return super().preferred(others) if others and CAMERA in best.names else best
-
-    def alternatives(
-        self, base: ScoredModel, current: ScoredModel, among: Mapping[str, Iterable[str]] | None = None
-    ) -> dict[str, dict[str, float]]:
-        """Return the alternatives of each effect; by default among those that are predicted to take a part of its gain.
-
-        A fit of windows takes seconds. To first order, a latency is predicted to take a fifth of what a delay gains.
-        """
-        if among is None:
-            among = {name: list(self._likely(base, current, name)) for name in self._added_effects(current)}
-        return super().alternatives(base, current, among)
-
-    def _likely(self, base: ScoredModel, current: ScoredModel, name: str) -> Iterator[str]:
-        """Yield the candidates that may take the place of the effect called `name`."""
-        without, causes = self.without_effect(base, current, name), {cause_of(n) for n in current.names}
-        least = self.criteria.likely_share * (without.fit.total_loss - current.fit.total_loss)
-        for other in self.candidates:
-            if cause_of(other) not in causes and self.predicted_gain(without, other) >= least:
-                yield other
 
     def improves(self, without: ScoredModel, with_it: ScoredModel, *, of_group: bool = False) -> bool:
         """Return whether the added effects improve the prediction, are within their bounds and do not extrapolate."""

@@ -99,16 +99,19 @@ def _kept(known: dict[str, float], others: dict[str, ScoredModel]) -> dict[str, 
 
 
 def _in_place_of(extended: Selector, base: ScoredModel, current: ScoredModel, name: str) -> dict[str, ScoredModel]:
-    """Return the models with another effect in the place of `name`, by that effect; unlikely ones are not fitted."""
+    """Return the models with another effect in the place of `name`, by that effect; unlikely ones are not fitted.
+
+    A variant is not considered if the library's equation is predicted to gain too little to be near it.
+    """
     without = extended.without_effect(base, current, name)
     causes = {cause_of(present) for present in current.names}
-    likely = VARIANT.min_gain_share * (without.fit.total_loss - current.fit.total_loss)
+    gain = without.fit.total_loss - current.fit.total_loss
     geometry = extended.batch.geometry
-    variants = {other for other, kind in effect_variants().items() if applies(kind, geometry)}
-    others = [other for other in {*extended.candidates, *variants} if cause_of(other) not in causes]
-    models = {
-        other: extended.with_effect(without, other)
-        for other in sorted(others)
-        if extended.predicted_gain(without, other) >= likely
-    }
+    library = [other for other in extended.candidates if cause_of(other) not in causes]
+    predicted = {other: extended.predicted_gain(without, other) for other in library}
+    near = {cause_of(other) for other, own in predicted.items() if own >= SELECTION.likely_share * gain}
+    variants = [v for v in effect_variants().values() if v.variant_of in near and applies(v, geometry)]
+    predicted |= {v.name: extended.predicted_gain(without, v.name) for v in variants}
+    likely = VARIANT.min_gain_share * gain
+    models = {other: extended.with_effect(without, other) for other in sorted(predicted) if predicted[other] >= likely}
     return {other: model for other, model in models.items() if model.is_fitted}

@@ -199,11 +199,19 @@ class Selector(FittedModels):
             without = self.without_effect(base, current, name)
             among_these = self.candidates if among is None else among.get(name, ())
             others = [n for n in among_these if cause_of(n) not in causes]
-            worse = {n: self.with_effect(without, n).deviance - current.deviance for n in others}
+            worse = {n: m.deviance - current.deviance for n, m in self.likely(without, current, others).items()}
             found[name] = {
                 n: difference for n, difference in worse.items() if difference < SELECTION.alternative_margin
             }
         return found
+
+    def likely(self, without: ScoredModel, current: ScoredModel, others: Iterable[str]) -> dict[str, ScoredModel]:
+        """Return `without` with each of the `others`, but for those that cannot take the place of what `current` has.
+
+        They are predicted to gain less than `likely_share` of what `current` gains over `without`.
+        """
+        least = self.criteria.likely_share * (without.fit.total_loss - current.fit.total_loss)
+        return {n: self.with_effect(without, n) for n in others if self.predicted_gain(without, n) >= least}
 
 
 AnySelector = TypeVar("AnySelector", bound=Selector)

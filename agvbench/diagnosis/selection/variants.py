@@ -158,20 +158,18 @@ def _replacements(selection: Selection, selector: Selector, extended: Selector, 
     chosen = selection.chosen
     without = selector.without_effect(selection.base, chosen, name)
     chosen_gains = without.deviance - chosen.deviance, _fit_gain(without, chosen)
-    models = {name: chosen} | {
-        other: selector.with_effect(without, other) for other in selector.candidates if other not in chosen.names
-    }
+    others = [other for other in selector.candidates if other not in chosen.names]
+    models = {name: chosen} | selector.likely(without, chosen, others)
     for variant in effect_variants().values():
-        if not applies(variant, selector.batch.geometry):
-            continue
-        if (model := models.get(variant.variant_of)) is None:
+        if not applies(variant, selector.batch.geometry) or variant.variant_of not in {name, *others}:
             continue
         kind = candidate(variant)
-        # A strong effect with the wrong equation fits well and predicts badly.
-        gains = without.deviance - model.deviance, _fit_gain(without, model)
-        if any(own >= VARIANT.min_gain_share * gain for own, gain in zip(gains, chosen_gains, strict=True)):
-            yield _Replacement(name, variant, _starts_of(variant, model))
-            continue
+        if (model := models.get(variant.variant_of)) is not None:
+            # A strong effect with the wrong equation fits well and predicts badly.
+            gains = without.deviance - model.deviance, _fit_gain(without, model)
+            if any(own >= VARIANT.min_gain_share * gain for own, gain in zip(gains, chosen_gains, strict=True)):
+                yield _Replacement(name, variant, _starts_of(variant, model))
+                continue
         # The library's equation may fail where a variant does not.
         larger = Predictor(extended.batch, (*without.names, variant.name))
         predicted_gains = [first_order_gain(without.fit, larger, start, kind.bounds) for start in kind.starts]
@@ -220,11 +218,18 @@ def _swapped_models(
         if _fit_gain(current, model) < -VARIANT.max_fit_loss or model.deviance > least + extended.min_gain:
             continue
         others = [name for name in current.names if name != one.replaced and name not in extended.given]
+        others = [name for name in others if _may_be_unnecessary(name, current, model)]
         with suppress(np.linalg.LinAlgError):
             smaller += [
                 (one, _swapped(extended, current, {one.replaced, other}, _variant_candidate(one))) for other in others
             ]
     return swapped + smaller
+
+
+def _may_be_unnecessary(name: str, current: ScoredModel, model: ScoredModel) -> bool:
+    """Return whether the effect called `name` explains little beside a variant, or much less than in `current`."""
+    predicted, before = (one.fit.predicted_loss_without(name) for one in (model, current))
+    return predicted < max(VARIANT.max_predicted_loss, VARIANT.max_share_of_loss * before)
 
 
 def _variant_candidate(replacement: _Replacement) -> Candidate:
