@@ -114,7 +114,7 @@ def test_steering_that_never_changes_while_driving_leaves_its_lag_open_and_a_run
 def test_where_everything_was_excited_nothing_is_proposed(diagnosed):
     found, _ = diagnosed(Tiny(), steps=True)
     assert found.next_experiment is None
-    assert "not_identifiable" not in found.provenance
+    assert "not_identifiable" not in found.provenance, found.provenance["not_identifiable"]
 
 
 def test_designs_stay_within_known_levels_and_time(diagnosed):

@@ -59,7 +59,9 @@ def unidentified(chosen: Fit, candidates: Mapping[str, Candidate]) -> list[Unide
         parameters = kinds[name].parameters()
         if name in chosen.predictor.effects or not np.isfinite([p.null for p in parameters]).all():
             continue
-        start = candidate.starts[0]
+        # A direction has no effect near the null value of the drift.
+        at_size = [0.0 if p.is_direction else p.scale for p in parameters]
+        start = np.array(at_size) if any(p.is_direction for p in parameters) else candidate.starts[0]
         predictor = Predictor(chosen.predictor.batch, (*chosen.predictor.effects, name))
         _, slopes = predictor.by_last(np.r_[chosen.parameters, start], chosen.random_effects, len(start))
         weighted_slopes = weighted.columns(slopes)

@@ -12,6 +12,7 @@ import numpy as np
 
 from agvbench.diagnosis.terms import TERMS
 from agvbench.effects import Effect, effect_kinds
+from agvbench.effects.base import Parameter
 from agvbench.effects.variants import cause_of, effect_variants
 from agvbench.model import VehicleModel
 from agvbench.model.priors import is_limit
@@ -23,6 +24,7 @@ ABSORBED_BY_MAPS = frozenset({"steering_saturation", "drive_dead_band"})
 
 _UNBOUNDED = 1e3
 _STARTS = (0.1, 1.0)
+_NEAR_NULL = 1e-3
 _LIMIT_STARTS = (0.3, 1.0, 3.0)
 DIRECTIONS = (0.0, 0.5 * math.pi, math.pi, -0.5 * math.pi)
 """Initial values of a direction [rad]: a fit does not turn by more than a quarter of a turn."""
@@ -79,21 +81,18 @@ def applies(kind: type[Effect], geometry: Geometry) -> bool:
 
 
 def candidate(kind: type[Effect]) -> Candidate:
-    """Return the candidate of an effect: initial values are 0.1 and 1 times its scale, with each possible sign.
+    """Return the candidate of an effect: initial values are near its null values and at its scale, with each sign.
 
+    Maps absorb much of most effects. What they leave shows only where the derivatives by the effect and by the maps are
+    taken at the same point, that is near the null values; a strong effect may need a start at its scale. Variants and
+    discrepancy terms, whose parameters also shape them, start at 0.1 and 1 times their scale.
     A direction has four initial values: a fit does not turn by more than a quarter of a turn.
     """
     parameters = kind.parameters()
     bounds = np.array([[max(p.low, -_UNBOUNDED), min(p.high, _UNBOUNDED)] for p in parameters])
     scale = np.array([p.scale for p in parameters])
-    choices = []
-    for p, s in zip(parameters, scale, strict=True):
-        if p.is_direction:
-            choices.append([0.0])
-            continue
-        shares = _LIMIT_STARTS if math.isinf(p.null) else _STARTS
-        signs = (1.0, -1.0) if p.low < p.null else (1.0,)
-        choices.append([sign * share * s for share in shares for sign in signs])
+    near_null = kind.name in effect_kinds()
+    choices = [_choices(p, near_null=near_null) for p in parameters]
     if len(parameters) == 1:
         starts = np.array(choices[0])[:, None]
     else:
@@ -104,6 +103,18 @@ def candidate(kind: type[Effect]) -> Candidate:
             starts = np.repeat(starts, len(DIRECTIONS), axis=0)
             starts[:, k] = np.tile(DIRECTIONS, len(starts) // len(DIRECTIONS))
     return Candidate(kind.name, bounds, scale, np.clip(starts, bounds[:, 0], bounds[:, 1]))
+
+
+def _choices(p: Parameter, *, near_null: bool) -> list[float]:
+    """Return the initial values of one parameter, ascending in size."""
+    if p.is_direction:
+        return [0.0]
+    if math.isinf(p.null):
+        return [share * p.scale for share in _LIMIT_STARTS]
+    signs = (1.0, -1.0) if p.low < p.null else (1.0,)
+    if near_null:
+        return [_NEAR_NULL * p.scale, *(sign * p.scale for sign in signs)]
+    return [sign * share * p.scale for share in _STARTS for sign in signs]
 
 
 def _by_share(choices: list[list[float]]) -> list[list[list[float]]]:
