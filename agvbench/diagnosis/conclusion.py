@@ -32,6 +32,7 @@ from agvbench.diagnosis.selection.stepwise import Selection
 from agvbench.diagnosis.selection.validation import Assessment, assess, predictor_for
 from agvbench.diagnosis.selection.variants import candidates_for
 from agvbench.diagnosis.selection.with_term import TermSelection, term_entry, with_term_first
+from agvbench.diagnosis.terms import TERMS
 from agvbench.effects.variants import effect_variants
 from agvbench.model import VehicleModel
 from agvbench.types import Floats
@@ -194,8 +195,14 @@ def _verdict(
     if not effects:
         return Verdict.ADEQUATE, "with refitted maps the residual is within repeatability"
     if any(effect.confounded_with for effect in effects):
-        return Verdict.AMBIGUOUS, "several effects explain the residual equally well"
+        return Verdict.AMBIGUOUS, "several effects explain the residual equally well" + _other_forms(effects)
     return Verdict.NAMED, "with the named effects the residual is within repeatability"
+
+
+def _other_forms(effects: tuple[NamedEffect, ...]) -> str:
+    """Return which effects may have another form, a discrepancy term, and the runs that would tell."""
+    pairs = [(effect.name, term) for effect in effects for term in TERMS if term.name in effect.confounded_with]
+    return "".join(f"; {name} or {term.name}: drive {term.distinguished_by}" for name, term in pairs)
 
 
 def _held_out(kept: Readings, assessment: Assessment) -> HeldOut:

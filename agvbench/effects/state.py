@@ -55,6 +55,8 @@ REAR_LAG_RATIO = 50
 REAR_BACKLASH = 51
 # A drive of second order: τ of τ² v̈ + lag v̇ = aim − v, without limits of v̇.
 DRIVE_INERTIA = 52
+# Hysteresis of each axle: how far it lags behind, as a share of the most (−1…1), and the angle at which that holds.
+FRONT_LAGS, REAR_LAGS, FRONT_LAGS_AT, REAR_LAGS_AT = range(53, 57)
 # What the lab logged about the run, each column standardised; 0 where nothing was logged.
-LOGGED, LOGGED_COUNT = 53, 16
+LOGGED, LOGGED_COUNT = 57, 16
 SIZE = LOGGED + LOGGED_COUNT

@@ -40,8 +40,9 @@ ALSO_TRUE: Mapping[str, frozenset[str]] = {
     "battery_change": frozenset({"battery_droop"}),
     "slow_evening": frozenset({"battery_droop"}),
     "warm_up": frozenset({"steering_lag", "speed_lag"}),  # a lag that decays
+    "steering_hysteresis": frozenset({"steering_by_travel"}),  # the same equation: a true alternative of a backlash
 }
-"""Effects of the library that describe a cause of another name in part, and are no wrong name."""
+"""Effects and terms that describe a cause of another name, at least in part, and are no wrong name."""
 WRONG_DISTANCES = frozenset({"wheelbase_error", "marker_offset"})
 """The axle distances in campaign.toml are wrong by a millimetre or two each, as those that a lab measures."""
 ALWAYS_TRUE: Mapping[str, frozenset[str]] = {

@@ -15,6 +15,12 @@ OUTSIDE = {
     "seam": (Tiny(seam_rad=0.06), "turn_at_line", {"same_rad": 0.06, "turn_rad": 0.0}, "x_m y_m"),
     "downhill": (Tiny(downhill=0.06), "speed_by_course", {"cosine": 0.0324, "sine": 0.0505}, "course_rad"),
     "slide": (Tiny(creep_s=0.12), "slip_by_yaw_rate", {"side_s": -0.12, "turn_s": 0.0}, "curvature_per_m speed_mps"),
+    "friction": (
+        Tiny(friction_rad=0.03, friction_share=0.25),
+        "steering_by_travel",
+        {"half_width_rad": 0.03, "share": 0.25},
+        "history",
+    ),
     "run-out": (Tiny(run_out_rad=0.04), "wave_by_distance", {"turn_sine": 0.1325}, "distance_modulo_period_m"),
 }
 

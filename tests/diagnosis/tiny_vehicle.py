@@ -52,6 +52,8 @@ class Tiny:
     rear_lag_ratio: float = 1.0
     play_rad: float = 0.0
     rear_play_ratio: float = 1.0
+    friction_rad: float = 0.0
+    friction_share: float = 0.3
     accelerate_s: float = 0.0
     brake_s: float = 0.0
     coast_s: float = 0.0
@@ -114,6 +116,7 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
     x, y, heading = start
     front, rear, speed = front_of(NEUTRAL) + f_off, rear_of(NEUTRAL) + r_off, 0.0
     turning, loose, driven, windup = [0.0, 0.0], [front, rear], 0.0, 0.0
+    strained = [(front, 0.0), (rear, 0.0)]
     poses, times = [], []
     steps = round((commands.t_s[-1] + _AFTER_S + _BEFORE_S) / _STEP_S)
     for k in range(steps):
@@ -149,6 +152,11 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
                 follow(loose[0], f, tiny.play_rad / 2.0),
                 follow(loose[1], r, tiny.rear_play_ratio * tiny.play_rad / 2.0),
             ]
+        if tiny.friction_rad:
+            strained = [
+                (servo, strain(tiny, before, servo - at)) for servo, (at, before) in zip((f, r), strained, strict=True)
+            ]
+            f, r = f - strained[0][1], r - strained[1][1]
         f += tiny.run_out_rad * math.sin(math.tau * driven / 0.8)
         df = (f + tiny.front_from_rear * r) * relief * warm * tiny.steering_factor + tiny.front_trim_rad
         dr = (r + tiny.rear_from_front * f) * relief * warm * tiny.steering_factor
@@ -217,6 +225,18 @@ def balanced(front: float, rear: float, drag: float, overrun: float) -> float:
 def follow(axle: float, servo: float, half: float) -> float:
     """Return where an axle with play of twice `half` comes to stand that its servo pulls along."""
     return min(max(axle, servo - half), servo + half)
+
+
+def strain(tiny: Tiny, before: float, travel: float) -> float:
+    """Return by how much a linkage with friction is strained after a `travel` of its servo, in steps of 0.1 mrad.
+
+    The first step after a reversal is strained by a share of it, and the strain ends at its limit.
+    """
+    steps = max(1, math.ceil(abs(travel) / 1e-4))
+    for _ in range(steps):
+        stiffness = 0.5 * tiny.friction_share * (1.0 - math.copysign(before, before * travel) / tiny.friction_rad)
+        before += stiffness * travel / steps
+    return before
 
 
 def held(drive_us: float, front: float, rear: float, seconds: float) -> Commands:

@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.residuals.body_rates import Rates
+from agvbench.diagnosis.terms.steering import lags_after
 from agvbench.types import Floats
 
 FOLDS = 5
+REACHES_RAD = (0.05, 0.1, 0.2, 0.4)
 
 _MIN_SCALE = 1e-9
 _WINSOR_LIMIT, _WINSOR_QUANTILE = 3.0, 0.99
@@ -30,13 +32,15 @@ class SteeringTangents:
 
     They mean nothing for a differential vehicle. ``previous`` (n, 2): those under the previous
     steering command; ``reversal`` (n, 2): those at which each axle last reversed; ``levels`` (n, 3): index of the level
-    of drive, front and rear in force.
+    of drive, front and rear in force; ``lags`` (n, 2, reaches): how far an axle lags behind by a hysteresis of each of
+    `REACHES_RAD`.
     """
 
     tangent: Floats
     previous: Floats
     reversal: Floats
     levels: NDArray[np.int64]
+    lags: Floats
 
 
 def steering_tangents(batch: Batch, parameters: Floats, rates: Rates) -> SteeringTangents:
@@ -44,7 +48,7 @@ def steering_tangents(batch: Batch, parameters: Floats, rates: Rates) -> Steerin
     where = batch.maps.slices()
     settled = np.column_stack([batch.weights[role] @ parameters[where[role]] for role in ("front", "rear")])
     tangent = np.tan(np.clip(settled, -1.4, 1.4))
-    previous, reversal = tangent.copy(), tangent.copy()
+    previous, reversal, lags = tangent.copy(), tangent.copy(), np.zeros((*tangent.shape, len(REACHES_RAD)))
     for k, role in enumerate(("front", "rear")):
         command = batch.commands[role]
         for row in range(1, len(command)):
@@ -54,6 +58,11 @@ def steering_tangents(batch: Batch, parameters: Floats, rates: Rates) -> Steerin
                 last = reversal[row - 1, k]
                 reverses = (tangent[row, k] - tangent[row - 1, k]) * (tangent[row - 1, k] - last) < 0.0
                 reversal[row, k] = tangent[row - 1, k] if reverses else last
+                travel = float(settled[row, k] - settled[row - 1, k])
+                lags[row, k] = [
+                    lags_after(before, travel, reach) if travel else before
+                    for before, reach in zip(lags[row - 1, k], REACHES_RAD, strict=True)
+                ]
     rows = np.empty(len(rates.run), dtype=np.int64)
     for r in np.unique(rates.run):
         own = rates.run == r
@@ -62,7 +71,7 @@ def steering_tangents(batch: Batch, parameters: Floats, rates: Rates) -> Steerin
     levels = np.column_stack(
         [np.unique(batch.commands[role], return_inverse=True)[1][rows] for role in ("drive", "front", "rear")]
     )
-    return SteeringTangents(tangent[rows], previous[rows], reversal[rows], levels)
+    return SteeringTangents(tangent[rows], previous[rows], reversal[rows], levels, lags[rows])
 
 
 class GroupedRegression:

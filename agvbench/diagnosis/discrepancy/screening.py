@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from agvbench.diagnosis import terms
 from agvbench.diagnosis.data.splits import folds
 from agvbench.diagnosis.discrepancy.campaign_time import by_axle_angles, changes, columns_by_campaign_time
-from agvbench.diagnosis.discrepancy.regression import FOLDS, Columns, GroupedRegression, SteeringTangents
+from agvbench.diagnosis.discrepancy.regression import FOLDS, REACHES_RAD, Columns, GroupedRegression, SteeringTangents
 from agvbench.diagnosis.residuals.body_rates import Rates
 from agvbench.diagnosis.terms import DiscrepancyTerm
 from agvbench.types import Floats
@@ -52,6 +52,12 @@ class _Picture(Values):
         limit = 3.0
         centre = [float(np.clip(s / bend, -limit, limit)) if bend else 0.0 for s in coefficients[1:]]
         return [bend, *centre, 0.0, 0.0][:3]
+
+
+class _Travel(Values):
+    def __call__(self, coefficients: Floats) -> list[float]:
+        half_width, (reach,) = max(float(coefficients[0]), 0.0), self.fixed
+        return [half_width, 2.0 * half_width / reach]
 
 
 class _Wave(Values):
@@ -97,6 +103,14 @@ def _steering(
         both = [by_axle_angles(angle[:, 0], angle[:, 1], tangents, geometry) for angle in angles]
         columns = {k: np.column_stack([shares[k].sum(axis=1) for shares in both]) for k in both[0]}
         yield terms.SteeringByHistory, iter([(columns, Values())])
+        yield terms.SteeringByTravel, _travels(tangents, geometry)
+
+
+def _travels(tangents: SteeringTangents, geometry: Geometry) -> Iterator[Option]:
+    for number, reach in enumerate(REACHES_RAD):
+        front, rear = -tangents.lags[:, :, number].T
+        shares = by_axle_angles(front, rear, tangents, geometry)
+        yield {k: column.sum(axis=1, keepdims=True) for k, column in shares.items()}, _Travel(reach)
 
 
 _BY_LOGGED_COLUMN: dict[type[DiscrepancyTerm], type[terms.ByLoggedColumn]] = {

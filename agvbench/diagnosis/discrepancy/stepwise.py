@@ -9,6 +9,7 @@ import numpy as np
 
 from agvbench.diagnosis.criteria import DISCREPANCY, FIT
 from agvbench.diagnosis.discrepancy.campaign_time import complement, is_constant
+from agvbench.diagnosis.discrepancy.other_forms import models_of_other_forms, with_other_forms
 from agvbench.diagnosis.discrepancy.regression import steering_tangents
 from agvbench.diagnosis.discrepancy.screening import Start, screen
 from agvbench.diagnosis.estimation.cross_validation import by_group
@@ -113,7 +114,8 @@ def add_term(selection: Selection, selector: Selector) -> TermSelection | None:
 
     Terms are fitted beside the selected effects. If none helps there, they are fitted without any effect: an effect
     that only mimics the unknown cause is removed once the term is in the model. If the predicted gain is larger without
-    the effects, that is done first, and the effects are then fitted again beside the term.
+    the effects, that is done first, and the effects are then fitted again beside the term. A term that is another form
+    of a selected effect is fitted in its place in any case.
 
     Parameters
     ----------
@@ -143,6 +145,8 @@ def add_term(selection: Selection, selector: Selector) -> TermSelection | None:
                 ]
     elif any(_depends_on_few_groups(selector, selection, name) for name in selection.gains):
         found.append(_term_in_place_of_effect(extended, selection))
+    others = models_of_other_forms(extended, selection)
+    found += [(model, term) for _, term, model in others if model.deviance < selection.chosen.deviance]
     models = [reselect_effects(extended, selection, *pair) for pair in found if pair is not None]
     models = [_with_right_actuators(extended, selection, model) for model in models]
     return _best_with_term(extended, selection, selector, models)
@@ -194,8 +198,10 @@ def add_term_and_reconsider(
 ) -> tuple[Selection, TermSelection | None, Selector]:
     """Do as `add_term`, and repeat everything under the other initial steering if that is better now.
 
-    While a cause is missing from the model, the runs do not determine the initial steering.
+    While a cause is missing from the model, the runs do not determine the initial steering. Terms that predict as well
+    as an effect of which they are another form are among its alternatives.
     """
+    selection = with_other_forms(selection, selector)
     term_selection = add_term(selection, selector)
     if term_selection is None:
         return selection, None, selector
@@ -203,7 +209,7 @@ def add_term_and_reconsider(
         selected, other = select_under_other_initial_steering(selector)
         again = add_term(selected, other)
         if again is not None and again.selection.chosen.deviance < term_selection.selection.chosen.deviance:
-            selection, term_selection, selector = selected, again, other
+            selection, term_selection, selector = with_other_forms(selected, other), again, other
     return selection, term_selection, selector
 
 

@@ -23,7 +23,7 @@ from agvbench.diagnosis.terms.logged import (
     TrimByLoggedColumn,
 )
 from agvbench.diagnosis.terms.speed import SpeedByCourse, SpeedByHeading, SpeedByRunTime, SpeedInDisc, SpeedInStrip
-from agvbench.diagnosis.terms.steering import SteeringByDirection, SteeringByHistory
+from agvbench.diagnosis.terms.steering import SteeringByDirection, SteeringByHistory, SteeringByTravel
 from agvbench.diagnosis.terms.turning import SlipByYawRate, TurnAtLine, TurnByHeading, TwistAtStart, WaveByDistance
 
 TERMS: tuple[type[DiscrepancyTerm], ...] = (
@@ -50,6 +50,7 @@ TERMS: tuple[type[DiscrepancyTerm], ...] = (
     TrimByLoggedColumn,
     SteeringByDirection,
     SteeringByHistory,
+    SteeringByTravel,
     WaveByDistance,
 )
 """All discrepancy terms."""
@@ -76,6 +77,7 @@ __all__ = [
     "SteeringByDirection",
     "SteeringByHistory",
     "SteeringByLoggedColumn",
+    "SteeringByTravel",
     "TrimByCampaignTime",
     "TrimByLoggedColumn",
     "TurnAtLine",

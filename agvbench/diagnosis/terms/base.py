@@ -10,10 +10,16 @@ from agvbench.effects.base import Effect
 
 @dataclass(frozen=True)
 class DiscrepancyTerm(Effect):
-    """A shape without a cause: the residual depends on ``covariates``, and the shape acts ``through`` a channel."""
+    """A shape without a cause: the residual depends on ``covariates``, and the shape acts ``through`` a channel.
+
+    ``form_of`` are effects of the library of which the term is another form: where one was selected, the term is tried
+    in its place, even if no residual is left. ``distinguished_by`` are the runs that tell them apart.
+    """
 
     relaxes: ClassVar[str] = "none: it stands for an unknown cause"
     reference: ClassVar[str] = "empirical"
     limits: ClassVar[str] = "describes, and explains nothing"
     covariates: ClassVar[tuple[str, ...]]
     through: ClassVar[str]
+    form_of: ClassVar[frozenset[str]] = frozenset()
+    distinguished_by: ClassVar[str] = ""

@@ -12,13 +12,18 @@ from agvbench.effects.state import (
     FRONT,
     FRONT_AIM,
     FRONT_BEFORE,
+    FRONT_LAGS,
+    FRONT_LAGS_AT,
     FRONT_REVERSAL,
     REAR,
     REAR_AIM,
     REAR_BEFORE,
+    REAR_LAGS,
+    REAR_LAGS_AT,
     REAR_REVERSAL,
     SPEED,
 )
+from agvbench.model.compiled import compiled
 from agvbench.types import Floats
 
 
@@ -65,3 +70,42 @@ class SteeringByHistory(DiscrepancyTerm):
         front, rear = state[FRONT_AIM], state[REAR_AIM]
         state[FRONT_AIM] -= share * (front - state[FRONT_BEFORE]) + since_reversal * (front - state[FRONT_REVERSAL])
         state[REAR_AIM] -= share * (rear - state[REAR_BEFORE]) + since_reversal * (rear - state[REAR_REVERSAL])
+
+
+@compiled(inline=True)
+def lags_after(lags: float, travel: float, reach_rad: float) -> float:
+    """Return the share of the most by which an axle lags behind after a `travel` [rad] one way, of `lags` before it."""
+    most = math.copysign(1.0, travel)
+    return most + (lags - most) * math.exp(-abs(travel) / reach_rad)
+
+
+@dataclass(frozen=True)
+class SteeringByTravel(DiscrepancyTerm):
+    """Axles lag behind their target by an amount that saturates with the travel: ``δ ← δ − h z``, |z| ≤ 1.
+
+    ``dz = share (dδ − z |dδ|) / 2h`` is the equation of Dahl for friction beside an elastic linkage. Of a motion right
+    after a reversal ``share`` is lost, and less and less of it later. Backlash loses all of it within the gap and none
+    beyond: a share above a half would be a backlash in all but name. Both axles have the same parameters.
+    """
+
+    name: ClassVar[str] = "steering_by_travel"
+    stage: ClassVar[Stage] = Stage.SERVO
+    covariates: ClassVar[tuple[str, ...]] = ("history", "curvature_per_m")
+    through: ClassVar[str] = "steering"
+    form_of: ClassVar[frozenset[str]] = frozenset({"steering_backlash"})
+    distinguished_by: ClassVar[str] = "runs whose steering turns back by less than the backlash while they drive"
+
+    half_width_rad: float = parameter(unit="rad", low=0.0, high=0.3, scale=0.02)
+    share: float = parameter(unit="–", low=0.0, high=0.5, scale=0.2)
+
+    @staticmethod
+    def aim(state: Floats, half_width_rad: float, share: float) -> None:
+        """Reduce both targets by what the axles lag behind after their travel since the previous command."""
+        if half_width_rad > 0.0 and share > 0.0:
+            reach_rad = 2.0 * half_width_rad / share
+            front, rear = state[FRONT_AIM], state[REAR_AIM]
+            state[FRONT_LAGS] = lags_after(state[FRONT_LAGS], front - state[FRONT_LAGS_AT], reach_rad)
+            state[REAR_LAGS] = lags_after(state[REAR_LAGS], rear - state[REAR_LAGS_AT], reach_rad)
+            state[FRONT_LAGS_AT], state[REAR_LAGS_AT] = front, rear
+            state[FRONT_AIM] -= half_width_rad * state[FRONT_LAGS]
+            state[REAR_AIM] -= half_width_rad * state[REAR_LAGS]

@@ -29,6 +29,8 @@ from agvbench.effects.state import (
     FRONT_BACKLASH,
     FRONT_BEFORE,
     FRONT_COMMAND,
+    FRONT_LAGS,
+    FRONT_LAGS_AT,
     FRONT_REVERSAL,
     HEADING,
     HOURS,
@@ -39,6 +41,8 @@ from agvbench.effects.state import (
     REAR_BEFORE,
     REAR_COMMAND,
     REAR_LAG_RATIO,
+    REAR_LAGS,
+    REAR_LAGS_AT,
     REAR_REVERSAL,
     REAR_WAIT,
     SEEN_LAG,
@@ -179,6 +183,8 @@ def _drive_run(
     s[FRONT_COMMAND], s[REAR_COMMAND] = commands[first, 1], commands[first, 2]
     s[FRONT_BEFORE], s[REAR_BEFORE] = settled[first, 0], settled[first, 1]
     s[FRONT_REVERSAL], s[REAR_REVERSAL] = settled[first, 0], settled[first, 1]
+    s[FRONT_LAGS] = s[REAR_LAGS] = 0.0
+    s[FRONT_LAGS_AT], s[REAR_LAGS_AT] = settled[first, 0], settled[first, 1]
     driven = front = rear = first
     while now < math.inf:
         to_front = arrive(s, command_t_s[front + 1], p) if front < last else math.inf
