@@ -14,7 +14,7 @@ from agvbench.diagnosis.conclusion import conclude
 from agvbench.diagnosis.context import DiagnosisContext
 from agvbench.diagnosis.criteria import DATA
 from agvbench.diagnosis.data.readings import Readings, read_runs
-from agvbench.diagnosis.data.splits import Split, split_runs
+from agvbench.diagnosis.data.splits import Split, split_runs, with_other_validation
 from agvbench.diagnosis.discrepancy.stepwise import add_term_and_reconsider
 from agvbench.diagnosis.method import Method
 from agvbench.diagnosis.model.batch import Batch
@@ -42,13 +42,16 @@ from agvbench.vehicle.geometry import Driven
 class SelectedFromRest:
     """The selection from the library, that with a discrepancy term if there is one, and its selector.
 
-    ``static`` are the maps without effects and with both axles driven, if the selection has one driven axle.
+    ``static`` are the maps without effects and with both axles driven, if the selection has one driven axle. ``split``
+    are the runs that were used. ``is_rejected`` says whether the validation runs rejected all that was selected.
     """
 
     library: Selection
     with_term: TermSelection | None
     selector: Selector
+    split: Split
     static: ScoredModel | None = None
+    is_rejected: bool = False
 
 
 class RunsFromRest(Method[SelectedFromRest]):
@@ -72,7 +75,24 @@ class RunsFromRest(Method[SelectedFromRest]):
         return split_runs(readings.runs, readings.group, self.context.seed)
 
     def select(self, readings: Readings, split: Split) -> SelectedFromRest:
-        """Select effects, variants and a discrepancy term in the training runs; validation runs may reject them."""
+        """Select effects, variants and a discrepancy term in the training runs; validation runs may reject them.
+
+        Validation runs that reject everything show what the training runs lack. They are then added to the training
+        runs, and the selection is repeated with other validation runs. What it finds is fitted to both parts.
+        """
+        selected = self._selected(readings, split)
+        again = with_other_validation(split, readings.runs, readings.group, self.context.seed)
+        if not selected.is_rejected or again is None:
+            return selected
+        self.on_progress("the selection is repeated with these runs among the training runs")
+        other = self._selected(readings, again)
+        if other.is_rejected or not (other.library.gains or other.with_term):
+            return selected
+        library, with_term = refit_to_all(other.library, other.with_term, other.selector, readings.select(~again.test))
+        return replace(other, library=library, with_term=with_term)
+
+    def _selected(self, readings: Readings, split: Split) -> SelectedFromRest:
+        """Return what the runs of this split select."""
         fitted, validation = readings.select(split.training), int(split.validation.sum())
         self.on_progress(f"{len(fitted)} training runs, {validation} validation runs, {split.test.sum()} test runs")
         searched = fitted.select(subsample_repeats(fitted.group, DATA.max_selection_runs))
@@ -85,7 +105,7 @@ class RunsFromRest(Method[SelectedFromRest]):
         library, with_term, selector = add_term_and_reconsider(library, selector)
         if len(searched) < len(fitted):
             self.on_progress(f"effects were selected in {len(searched)} runs; they are refitted to all {len(fitted)}")
-        return self._refitted_and_validated(SelectedFromRest(library, with_term, selector, static), readings, split)
+        return self._refitted_and_validated(SelectedFromRest(library, with_term, selector, split, static), readings)
 
     @staticmethod
     def _selected_effects(selector: Selector) -> tuple[Selection, Selector]:
@@ -111,6 +131,7 @@ class RunsFromRest(Method[SelectedFromRest]):
 
     def conclude(self, readings: Readings, split: Split, selected: SelectedFromRest) -> Diagnosis:
         """Open the test runs, and return the diagnosis."""
+        split = selected.split
         batch = selected.selector.batch
         readings = replace(readings, preset=batch.readings.preset)
         context = replace(self.context, geometry=batch.geometry)
@@ -118,14 +139,16 @@ class RunsFromRest(Method[SelectedFromRest]):
             context, readings, split, selected.library, selected.with_term, selected.static, len(batch.readings)
         )
 
-    def _refitted_and_validated(self, selected: SelectedFromRest, readings: Readings, split: Split) -> SelectedFromRest:
+    def _refitted_and_validated(self, selected: SelectedFromRest, readings: Readings) -> SelectedFromRest:
         """Return the selection refitted to all training runs, or the maps alone if validation rejects it."""
         library, with_term, selector = selected.library, selected.with_term, selected.selector
+        split, has_any = selected.split, bool(library.gains) or with_term is not None
         fitted = readings.select(split.training)
         if len(selector.batch.readings) < len(fitted):
             library, with_term = refit_to_all(library, with_term, selector, fitted)
         library, with_term = validated(library, with_term, readings.select(split.validation), self.on_progress)
-        return replace(selected, library=library, with_term=with_term)
+        is_rejected = has_any and not library.gains and with_term is None
+        return replace(selected, library=library, with_term=with_term, is_rejected=is_rejected)
 
     def selector(self, readings: Readings) -> Selector:
         """Return the selector for these runs, with the better of both initial states of the steering."""

@@ -85,6 +85,19 @@ class Split:
         ]
 
 
+def with_other_validation(split: Split, runs: Sequence[Run], group: NDArray[np.int64], seed: int) -> Split | None:
+    """Return the split with other runs for validation, and the present ones among the training runs; None if none can.
+
+    The test runs stay. Validation runs that a campaign names itself stay, too.
+    """
+    if not split.validation.any() or any(run.split for run in runs):
+        return None
+    rest, rng = np.flatnonzero(split.training), np.random.default_rng([0x0A6A, seed])
+    validation = np.zeros_like(split.training)
+    validation[rest[_drawn([runs[int(i)] for i in rest], group[rest], rng, DATA.test_share / 2.0)]] = True
+    return Split(~(split.test | validation), validation, split.test)
+
+
 def split_runs(runs: Sequence[Run], group: NDArray[np.int64], seed: int) -> Split:
     """Split runs into training, validation and test runs.
 
