@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 CommandUnit = Literal["us", "normalised", "si"]
+Kinematics = Literal["two_axle", "differential"]
+"""How a vehicle turns: by the angles of its axles, or by the difference of the speeds of its left and right wheels."""
 """Pulse widths in µs; −1…1; or m/s, and rad of an axle or rad/s of a vehicle that turns by its wheels' speeds."""
 
 RUN_OK = "ok"

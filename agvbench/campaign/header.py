@@ -16,11 +16,11 @@ from agvbench.campaign.uncertainty_statement import read_statement
 from agvbench.errors import CampaignError, FileError, VehicleError
 from agvbench.labels import checked_labels
 from agvbench.text_files import read_toml
-from agvbench.types import Command, CommandUnit
+from agvbench.types import Command, CommandUnit, Kinematics
 from agvbench.validation import convert
 from agvbench.vehicle.channel_tables import channel_names, channels_from_keys, channels_to_keys
 from agvbench.vehicle.channels import Channels
-from agvbench.vehicle.geometry import Driven, Geometry, Kinematics
+from agvbench.vehicle.geometry import Driven, Geometry
 
 SCHEMA = 1
 SCHEMA_OF_DRIVEN_AXLE = 2

@@ -8,8 +8,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,11 +17,13 @@ from agvbench.challenge.scores import Scores, plain, score
 from agvbench.challenge.trial import Trial
 from agvbench.errors import FileError, FlagError, PlantError
 from agvbench.executors import Executor, ExecutorOptions, Failed, Outcome, Task, cause_of, open_executor
+from agvbench.model.examples import example_path
 from agvbench.running.configuration.benchmark_files import EXCITATION_RUNS
 from agvbench.simulator.hidden import SealedTruth, indistinguishable_effects, sealed_truth
-from agvbench.simulator.hidden.catalogue import CATALOGUE, NOTHING, recipes
+from agvbench.simulator.hidden.catalogue import AND, NOTHING, catalogue, recipes
 from agvbench.simulator.hidden.sampling import vehicle_of
 from agvbench.text_files import read_json
+from agvbench.types import Kinematics
 from agvbench.workflows.output_files import write_file
 
 if TYPE_CHECKING:
@@ -35,8 +37,23 @@ PAIRS = (
     "steering_lag_and_lateral_slip", "speed_lag_and_cornering_speed_loss", "axle_coupling_and_battery_droop",
     "actuation_delay_and_reverse_steering_gain", "steering_lag_and_slow_patch", "speed_lag_and_floor_seam",
     "cornering_speed_loss_and_servo_warm_up",
+    "wheel_lag_and_wheel_diameter_mismatch", "yaw_acceleration_limit_and_marker_offset", "wheel_lag_and_tyre_warm_up",
 )  # fmt: skip
-"""Two effects of the library, and one beside one from outside."""
+"""Two effects of the library, and one beside one from outside; each for the vehicles that can have both."""
+
+
+@dataclass(frozen=True)
+class TrialKind:
+    """What the trials of one file share: how often each trajectory is driven, and by what kind of vehicle."""
+
+    repeats: int
+    kinematics: Kinematics = "two_axle"
+
+
+def everything(kinematics: Kinematics) -> tuple[str, ...]:
+    """Return all that is hidden by default in vehicles of a kind: nothing, each effect, and some pairs."""
+    known = catalogue(kinematics)
+    return (NOTHING, *known, *(pair for pair in PAIRS if known.keys() >= set(pair.split(AND))))
 
 
 def run_challenge(
@@ -49,6 +66,7 @@ def run_challenge(
     json_file: str | None,
     resume: bool = False,
     cluster: ExecutorOptions | None = None,
+    kinematics: Kinematics = "two_axle",
 ) -> Scores:
     """Hold the trials with a progress bar, and write the scores if asked for.
 
@@ -80,24 +98,25 @@ def run_challenge(
             raise FlagError("is too large", where=where, value=value, limit=f"at most {most}")
     for spec in specs:
         try:
-            recipes(spec)
+            recipes(spec, kinematics)
         except PlantError as error:
             raise FlagError(error.what, where="--only", value=error.value, limit=error.limit) from None
     file = None if json_file is None else Path(json_file)
-    known = known_trials(file, repeats) if resume and file is not None and file.exists() else {}
+    kind = TrialKind(repeats, kinematics)
+    known = known_trials(file, kind) if resume and file is not None and file.exists() else {}
     # What ended with an error may have met a full disk: it is tried again.
     done = {one: trial for one, trial in known.items() if trial.verdict != _ERROR}
-    wanted = [(s, n) for n in range(first_seed, first_seed + seeds) for s in specs or (NOTHING, *CATALOGUE, *PAIRS)]
+    wanted = [(s, n) for n in range(first_seed, first_seed + seeds) for s in specs or everything(kinematics)]
     missing = [one for one in wanted if one not in done]
     with open_executor(options) as executor:
-        for trial in _held(missing, repeats, executor):
+        for trial in _held(missing, kind, executor):
             done[trial.spec, trial.seed] = trial
             if file is not None:
-                write_trials(file, repeats, list(done.values()))
+                write_trials(file, kind, list(done.values()))
     return score([done[one] for one in sorted(wanted)])
 
 
-def hold_trial(spec: str, seed: int, repeats: int) -> Trial:
+def hold_trial(spec: str, seed: int, kind: TrialKind) -> Trial:
     """Drive a campaign with one hidden plant, diagnose it, and only then unseal the truth.
 
     A bench or a diagnosis that ends with an error is the answer ``"ERROR"``, with the cause.
@@ -108,18 +127,20 @@ def hold_trial(spec: str, seed: int, repeats: int) -> Trial:
     with tempfile.TemporaryDirectory(prefix="agvbench-challenge-") as folder:
         directory, began = Path(folder) / "campaign", time.process_time()
         try:
-            _drive(spec, seed, repeats, directory)
+            _drive(spec, seed, kind, directory)
             began = time.process_time()
             found, error = diagnose(Campaign.open(directory)), ""
         # Hours of other trials must not be lost for one that has no answer, be it for an internal error.
         except Exception as failure:  # noqa: BLE001
             found, error = Diagnosis(Verdict.NOT_IDENTIFIABLE, str(failure)), cause_of(failure)
         seconds = time.process_time() - began
-    trial = unsealed(spec, seed, sealed_truth(spec, seed), found, seconds)
+    trial = unsealed(spec, seed, sealed_truth(spec, seed, kind.kinematics), found, seconds, kind.kinematics)
     return replace(trial, verdict=_ERROR, error=error) if error else trial
 
 
-def unsealed(spec: str, seed: int, truth: SealedTruth, found: Diagnosis, seconds: float) -> Trial:
+def unsealed(
+    spec: str, seed: int, truth: SealedTruth, found: Diagnosis, seconds: float, kinematics: Kinematics = "two_axle"
+) -> Trial:
     """Return the trial: the answer beside the truth."""
     held = found.held_out.errors.get(_POSITION, {}) if found.held_out else {}
     named = tuple(effect.name for effect in found.effects)
@@ -143,26 +164,36 @@ def unsealed(spec: str, seed: int, truth: SealedTruth, found: Diagnosis, seconds
         {e.name: {k: (p.value, p.stderr) for k, p in e.parameters.items()} for e in found.effects},
         {name: value**2 for name, value in held.items()},
         found.held_out.worse_on if found.held_out else (),
-        _indistinguishable(seed, truth) if ask else (),
+        _indistinguishable(seed, truth, kinematics) if ask else (),
         seconds,
     )
 
 
-def _indistinguishable(seed: int, truth: SealedTruth) -> tuple[str, ...]:
+def _indistinguishable(seed: int, truth: SealedTruth, kinematics: Kinematics) -> tuple[str, ...]:
     """Return the indistinguishable alternatives of every hidden effect of the library, each as if hidden alone."""
     alone = [effect.name for effect in truth.effects if effect.library_name]
+    base = vehicle_of(seed, kinematics)
     return tuple(
         dict.fromkeys(
-            r for name in alone for r in indistinguishable_effects(vehicle_of(seed), sealed_truth(name, seed))
+            r for name in alone for r in indistinguishable_effects(base, sealed_truth(name, seed, kinematics))
         )
     )
 
 
-def _drive(spec: str, seed: int, repeats: int, directory: Path) -> None:
+_PLANTS: Mapping[Kinematics, tuple[str, str | None]] = {
+    "two_axle": ("agvbench.simulator.hidden", None),
+    "differential": ("agvbench.simulator.hidden.differential", "differential"),
+}
+"""Where the hidden plants of a kind are, and the example of a vehicle file with which they are driven."""
+
+
+def _drive(spec: str, seed: int, kind: TrialKind, directory: Path) -> None:
+    module, vehicle = _PLANTS[kind.kinematics]
     options = [
-        f"--plant=agvbench.simulator.hidden:{spec}",
+        f"--plant={module}:{spec}",
+        *([] if vehicle is None else [f"--vehicle={example_path(vehicle)}"]),
         f"--seed={seed}",
-        f"--repeats={repeats}",
+        f"--repeats={kind.repeats}",
         "--no-report",
         "--exchange=2",
     ]
@@ -173,18 +204,18 @@ def _drive(spec: str, seed: int, repeats: int, directory: Path) -> None:
         raise PlantError("the bench could not drive this plant", where=f"{spec}, seed {seed}", value=said[-300:])
 
 
-def _held(wanted: Sequence[tuple[str, int]], repeats: int, executor: Executor) -> Iterator[Trial]:
+def _held(wanted: Sequence[tuple[str, int]], kind: TrialKind, executor: Executor) -> Iterator[Trial]:
     from rich.console import Console
     from rich.progress import track
 
     console = Console(stderr=True)
-    tasks = (Task(one, hold_trial, (*one, repeats)) for one in wanted)
+    tasks = (Task(one, hold_trial, (*one, kind)) for one in wanted)
     outcomes = executor.run(tasks, Trial)
     for outcome in track(outcomes, "blind trials", len(wanted), console=console, disable=not console.is_terminal):
-        yield _trial_of(outcome)
+        yield _trial_of(outcome, kind.kinematics)
 
 
-def _trial_of(outcome: Outcome[tuple[str, int], Trial]) -> Trial:
+def _trial_of(outcome: Outcome[tuple[str, int], Trial], kinematics: Kinematics) -> Trial:
     """Return a trial; one whose worker died, again and again, has the answer ``"ERROR"``.
 
     Raises
@@ -200,14 +231,15 @@ def _trial_of(outcome: Outcome[tuple[str, int], Trial]) -> Trial:
         raise RuntimeError(outcome.cause)
     spec, seed = outcome.key
     unanswered = Diagnosis(Verdict.NOT_IDENTIFIABLE, outcome.cause)
-    trial = unsealed(spec, seed, sealed_truth(spec, seed), unanswered, math.nan)
+    truth = sealed_truth(spec, seed, kinematics)
+    trial = unsealed(spec, seed, truth, unanswered, math.nan, kinematics)
     return replace(trial, verdict=_ERROR, error=outcome.cause)
 
 
 SCHEMA = 1
 
 
-def write_trials(path: Path, repeats: int, trials: Sequence[Trial]) -> None:
+def write_trials(path: Path, kind: TrialKind, trials: Sequence[Trial]) -> None:
     """Write scores and trials, in the order of what was hidden; the file is replaced at once or not at all.
 
     Raises
@@ -217,33 +249,41 @@ def write_trials(path: Path, repeats: int, trials: Sequence[Trial]) -> None:
     """
     ordered = sorted(trials, key=lambda trial: (trial.spec, trial.seed))
     scores = _without_empty(score(ordered).to_json(), "errors")
-    content: dict[str, Any] = {"schema": SCHEMA, "repeats": repeats, **scores}
+    # Files of two axles are older than those of others, and stay as they are.
+    kinematics = {} if kind.kinematics == "two_axle" else {"kinematics": kind.kinematics}
+    content: dict[str, Any] = {"schema": SCHEMA, **kinematics, "repeats": kind.repeats, **scores}
     content["each"] = [_without_empty(plain(asdict(trial)), "error") for trial in ordered]
     text = json.dumps(content, indent=1) + "\n"
     write_file("--json", path, lambda file: file.write_text(text, encoding="utf-8"))
 
 
-def known_trials(path: Path, repeats: int) -> dict[tuple[str, int], Trial]:
+def known_trials(path: Path, kind: TrialKind) -> dict[tuple[str, int], Trial]:
     """Return the trials that a file holds, by what was hidden and seed.
+
+    A file that states no kinematics is one of two axles.
 
     Raises
     ------
     FileError
-        If it cannot be read, is no such file, or was made with other `repeats`.
+        If it cannot be read, is no such file, or was made with other repeats or other kinematics.
     """
     import msgspec
 
     try:
         content = read_json(path)
         found = msgspec.convert(_with_nan(content["each"]), list[Trial])
-        was = content["repeats"]
+        was, driven = content["repeats"], content.get("kinematics", "two_axle")
     except (OSError, ValueError, KeyError, TypeError, msgspec.ValidationError) as error:
         raise FileError(
             "holds no challenge to go on with", where=path, value=str(error).splitlines()[0],
             remedy="leave out --resume to begin anew",
         ) from None  # fmt: skip
-    if was != repeats:
-        raise FileError("has trials with other repeats", where=path, value=was, limit=f"--repeats {repeats}")
+    if driven != kind.kinematics:
+        raise FileError(
+            "has trials with other kinematics", where=path, value=driven, limit=f"--kinematics {kind.kinematics}"
+        )
+    if was != kind.repeats:
+        raise FileError("has trials with other repeats", where=path, value=was, limit=f"--repeats {kind.repeats}")
     return {(trial.spec, trial.seed): trial for trial in found}
 
 

@@ -17,7 +17,12 @@ from agvbench.simulator.checked_plant import CheckedPlant, as_plant_error, raise
 from agvbench.simulator.plant_options import plant_keywords
 from agvbench.types import PlantFactory
 
-_SAMPLED = ("agvbench.simulator.hidden:", "agvbench.simulator:random_", "agvbench.simulator.plants:random_")
+_SAMPLED = (
+    "agvbench.simulator.hidden:",
+    "agvbench.simulator.hidden.differential:",
+    "agvbench.simulator:random_",
+    "agvbench.simulator.plants:random_",
+)
 _FORM = "write MODULE:FACTORY or path/to/FILE.py:FACTORY"
 _NO_OPTIONS: Mapping[str, str | float] = MappingProxyType({})
 

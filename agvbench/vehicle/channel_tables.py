@@ -11,10 +11,9 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from agvbench.errors import OneOf, VehicleError
-from agvbench.types import CommandUnit
+from agvbench.types import CommandUnit, Kinematics
 from agvbench.vehicle.channels import Channel, Channels
 from agvbench.vehicle.fields import check_keys, located, number
-from agvbench.vehicle.geometry import Kinematics
 from agvbench.vehicle.wheels import WheelCommand, Wheels
 
 _NAMES: Final[dict[Kinematics, dict[str, str]]] = {

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from typing import Final, Literal, get_args
 
 from agvbench.errors import OneOf, VehicleError
+from agvbench.types import Kinematics
 from agvbench.vehicle.fields import coerce_float, require_positive
 
 LONGEST_M = 20.0
 Driven = Literal["both", "front", "rear"]
 """Which axle the motor drives."""
-
-Kinematics = Literal["two_axle", "differential"]
-"""How a vehicle turns: by the angles of its axles, or by the difference of the speeds of its left and right wheels."""
 
 _FRONT_DRIVE_SHARES: Final[dict[str, float]] = {"both": 0.5, "front": 1.0, "rear": 0.0}
 

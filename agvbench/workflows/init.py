@@ -10,7 +10,7 @@ from agvbench.errors import FileError
 from agvbench.model.examples import example_path
 from agvbench.resources import resource_directory
 from agvbench.running.configuration.vehicles import uncalibrated_vehicle
-from agvbench.vehicle.geometry import Kinematics
+from agvbench.types import Kinematics
 
 _TEMPLATES = Path(__file__).parent / "lab"
 

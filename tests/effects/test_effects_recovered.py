@@ -74,7 +74,7 @@ class Data:
         if hides != "nothing":
             self.parameters = dict(truth.effects[0].parameters)
         plant = HiddenPlant(constants, (0.0, 0.0, 0.0), 0, truth)
-        drives = reference_drives(vehicle_of(SEED).constants)
+        drives = reference_drives(vehicle_of(SEED))
         runs, poses, clock_s = [], [], 0.0
         for drive in drives:
             times = np.concatenate([[0.0], np.cumsum([row[0] for row in drive.rows])])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from agvbench.challenge.challenge import known_trials, write_trials
+from agvbench.challenge.challenge import TrialKind, known_trials, write_trials
 from agvbench.challenge.scores import score
 from agvbench.reporting.console.challenge import scores_markdown
 
@@ -24,14 +24,14 @@ def test_there_are_files():
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_the_page_says_what_the_file_scores(file):
-    trials = known_trials(file, 5)
+    trials = known_trials(file, TrialKind(5))
     assert f"blind-trials/{file.name}" in PAGE
     assert scores_markdown(score(list(trials.values()))) in PAGE
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_the_file_is_as_it_would_be_written_now(file, tmp_path):
-    write_trials(tmp_path / "again.json", 5, list(known_trials(file, 5).values()))
+    write_trials(tmp_path / "again.json", TrialKind(5), list(known_trials(file, TrialKind(5)).values()))
     (text, numbers), (published, before) = map(apart, (tmp_path / "again.json", file))
     assert text == published
     # SciPy's quantiles differ between versions in the last digits.

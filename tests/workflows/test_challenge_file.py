@@ -14,11 +14,21 @@ import pytest
 import stand_ins
 
 from agvbench.challenge import challenge
-from agvbench.challenge.challenge import hold_trial, known_trials, run_challenge, write_trials
+from agvbench.challenge.challenge import (
+    PAIRS,
+    TrialKind,
+    everything,
+    hold_trial,
+    known_trials,
+    run_challenge,
+    write_trials,
+)
 from agvbench.challenge.trial import Trial
 from agvbench.cli import main
 from agvbench.errors import FileError, FitError, FlagError, PlantError
 from agvbench.executors import ExecutorOptions
+from agvbench.model import VehicleModel
+from agvbench.simulator.hidden.catalogue import CATALOGUE, catalogue
 
 LAG = Trial(
     "steering_lag", 3, "library", ("steering_lag",), ("steering_lag",), (), False, False,
@@ -33,8 +43,8 @@ def same(a, b):
 
 def test_what_was_written_is_known_again(tmp_path):
     file = tmp_path / "deep" / "challenge.json"
-    write_trials(file, 5, [LAG])
-    found = known_trials(file, 5)
+    write_trials(file, TrialKind(5), [LAG])
+    found = known_trials(file, TrialKind(5))
     assert list(found) == [("steering_lag", 3)]
     assert same(found["steering_lag", 3], LAG)
     assert not list(file.parent.glob("*.part"))
@@ -42,7 +52,7 @@ def test_what_was_written_is_known_again(tmp_path):
 
 def test_trials_that_the_file_holds_are_not_held_again(tmp_path, capsys):
     file = tmp_path / "challenge.json"
-    write_trials(file, 5, [LAG])
+    write_trials(file, TrialKind(5), [LAG])
     before = file.read_bytes()
     flags = ["--first-seed=3", "--only", "steering_lag", "--jobs=1", f"--json={file}", "--resume"]
     assert main(["challenge", *flags]) == 0
@@ -57,16 +67,65 @@ def test_another_file_is_told_in_one_line(tmp_path, content):
     file = tmp_path / "challenge.json"
     file.write_text(content)
     with pytest.raises(FileError, match="holds no challenge") as caught:
-        known_trials(file, 5)
+        known_trials(file, TrialKind(5))
     assert "\n" not in str(caught.value)
 
 
 def test_other_repeats_are_told(tmp_path):
     file = tmp_path / "challenge.json"
-    write_trials(file, 5, [LAG])
+    write_trials(file, TrialKind(5), [LAG])
     assert json.loads(file.read_text())["repeats"] == 5
     with pytest.raises(FileError, match="other repeats"):
-        known_trials(file, 4)
+        known_trials(file, TrialKind(4))
+
+
+@pytest.mark.parametrize(("was", "asked"), [("two_axle", "differential"), ("differential", "two_axle")])
+def test_other_kinematics_are_told_in_one_line_and_nothing_is_driven(tmp_path, capsys, was, asked):
+    file = tmp_path / "challenge.json"
+    write_trials(file, TrialKind(5, was), [LAG])
+    before = file.read_bytes()
+    flags = ["--first-seed=3", "--only", "steering_lag", "--jobs=1", f"--json={file}", "--resume"]
+    assert main(["challenge", *flags, f"--kinematics={asked}"]) == 2
+    said = capsys.readouterr().err.strip()
+    assert f"has trials with other kinematics: {was} (limit: --kinematics {asked})" in said
+    assert "\n" not in said
+    assert file.read_bytes() == before
+
+
+def test_a_file_of_differential_vehicles_states_so_and_is_known_again(tmp_path):
+    file = tmp_path / "challenge.json"
+    write_trials(file, TrialKind(5, "differential"), [LAG])
+    assert json.loads(file.read_text())["kinematics"] == "differential"
+    assert same(known_trials(file, TrialKind(5, "differential"))["steering_lag", 3], LAG)
+    write_trials(file, TrialKind(5), [LAG])
+    assert "kinematics" not in json.loads(file.read_text())
+
+
+def test_what_such_a_vehicle_cannot_hide_is_told(capsys):
+    assert main(["challenge", "--kinematics=differential", "--only", "axle_coupling"]) == 2
+    assert "--only: no such hidden effect: axle_coupling" in capsys.readouterr().err
+    assert main(["challenge", "--only", "wheel_lag"]) == 2
+
+
+def test_by_default_everything_is_hidden_that_a_vehicle_of_its_kind_can_have():
+    two_axle, differential = everything("two_axle"), everything("differential")
+    assert two_axle[: len(CATALOGUE) + 1] == ("nothing", *CATALOGUE)
+    assert two_axle[len(CATALOGUE) + 1 :] == PAIRS[:7]
+    assert "steering_lag_and_lateral_slip" in differential
+    assert "wheel_lag_and_wheel_diameter_mismatch" in differential
+    assert not any("axle_coupling" in spec or "servo" in spec for spec in differential)
+    assert {name for spec in differential[1:] for name in spec.split("_and_")} == set(catalogue("differential"))
+
+
+def test_a_differential_vehicle_is_driven_with_a_vehicle_file_of_its_kind(tmp_path, monkeypatch):
+    began = benches(monkeypatch, (0, ""), (0, ""))
+    challenge._drive("wheel_lag", 3, TrialKind(5, "differential"), tmp_path)
+    challenge._drive("steering_lag", 3, TrialKind(5), tmp_path)
+    vehicle = next(o for o in began[0] if o.startswith("--vehicle=")).partition("=")[2]
+    assert VehicleModel.load(vehicle).geometry.is_differential
+    assert "--plant=agvbench.simulator.hidden.differential:wheel_lag" in began[0]
+    assert not any(o.startswith("--vehicle") for o in began[1])
+    assert "--plant=agvbench.simulator.hidden:steering_lag" in began[1]
 
 
 def test_to_resume_without_a_file_is_told():
@@ -89,7 +148,7 @@ def test_what_was_held_before_a_trial_that_fails_is_kept_and_no_other_is_begun(t
     file = tmp_path / "challenge.json"
     with pytest.raises(RuntimeError, match="steering_lag"):
         run_challenge(40, first_seed=0, specs=["steering_lag"], repeats=5, jobs=1, json_file=str(file))
-    assert sorted(known_trials(file, 5)) == [("steering_lag", 0), ("steering_lag", 1)]
+    assert sorted(known_trials(file, TrialKind(5))) == [("steering_lag", 0), ("steering_lag", 1)]
     assert len(list((tmp_path / "held").iterdir())) <= 4
 
 
@@ -98,10 +157,10 @@ def test_a_trial_that_ended_with_an_error_is_held_again(tmp_path, monkeypatch):
     monkeypatch.setenv("HELD", str(tmp_path / "held"))
     monkeypatch.setattr(challenge, "hold_trial", one_that_fails)
     file = tmp_path / "challenge.json"
-    write_trials(file, 5, [dataclasses.replace(LAG, verdict="ERROR", named=())])
+    write_trials(file, TrialKind(5), [dataclasses.replace(LAG, verdict="ERROR", named=())])
     run_challenge(1, first_seed=3, specs=["steering_lag"], repeats=5, jobs=1, json_file=str(file), resume=True)
     assert (tmp_path / "held" / "3").exists()
-    assert same(known_trials(file, 5)["steering_lag", 3], LAG)
+    assert same(known_trials(file, TrialKind(5))["steering_lag", 3], LAG)
 
 
 def benches(monkeypatch, *ends):
@@ -119,11 +178,11 @@ def benches(monkeypatch, *ends):
 
 def test_a_bench_that_fails_is_a_trial_that_cannot_be_driven_and_rejected_runs_are_none(tmp_path, monkeypatch):
     began = benches(monkeypatch, (1, ""))
-    challenge._drive("nothing", 3, 5, tmp_path)
+    challenge._drive("nothing", 3, TrialKind(5), tmp_path)
     assert "--resume" not in began[0]
     began = benches(monkeypatch, (2, "ERROR: the disk is full"), (0, ""))
     with pytest.raises(PlantError, match=r"could not drive.*disk is full"):
-        challenge._drive("nothing", 3, 5, tmp_path)
+        challenge._drive("nothing", 3, TrialKind(5), tmp_path)
     assert len(began) == 1
 
 
@@ -141,7 +200,7 @@ def test_a_diagnosis_that_fails_is_an_answer_that_counts_as_wrong(monkeypatch, e
     monkeypatch.setattr(challenge, "_drive", lambda *_: None)
     monkeypatch.setattr("agvbench.campaign.Campaign.open", lambda _: None)
     monkeypatch.setattr("agvbench.diagnosis.diagnose", fails)
-    trial = hold_trial("nothing", 3, 5)
+    trial = hold_trial("nothing", 3, TrialKind(5))
     assert trial.verdict == "ERROR"
     assert re.fullmatch(cause, trial.error)
 
@@ -161,7 +220,7 @@ def test_a_trial_without_an_answer_is_told_with_its_cause_and_by_the_exit_code(t
     content = json.loads(file.read_text())
     assert content["errors"] == ["steering_lag, seed 3: the disk is full"]
     assert content["each"][0]["error"] == "the disk is full"
-    assert known_trials(file, 5)["steering_lag", 3].error == "the disk is full"
+    assert known_trials(file, TrialKind(5))["steering_lag", 3].error == "the disk is full"
 
 
 def test_a_plant_that_cannot_be_driven_is_an_answer_that_counts_as_wrong(monkeypatch):
@@ -169,7 +228,7 @@ def test_a_plant_that_cannot_be_driven_is_an_answer_that_counts_as_wrong(monkeyp
         raise PlantError("the bench could not drive this plant")
 
     monkeypatch.setattr(challenge, "_drive", fails)
-    assert hold_trial("steering_lag", 3, 5).verdict == "ERROR"
+    assert hold_trial("steering_lag", 3, TrialKind(5)).verdict == "ERROR"
 
 
 def one_that_kills_its_worker(spec, seed, _):
@@ -185,7 +244,7 @@ def test_a_trial_whose_worker_dies_again_and_again_is_an_answer_that_counts_as_w
     file = tmp_path / "challenge.json"
     scores = run_challenge(2, first_seed=4, specs=["steering_lag"], repeats=5, jobs=2, json_file=str(file))
     assert scores.errors == ("steering_lag, seed 4: process was killed by SIGKILL, 4 times",)
-    assert same(known_trials(file, 5)["steering_lag", 5], dataclasses.replace(LAG, seed=5))
+    assert same(known_trials(file, TrialKind(5))["steering_lag", 5], dataclasses.replace(LAG, seed=5))
 
 
 @pytest.mark.real_time

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from agvbench.challenge import challenge
-from agvbench.challenge.challenge import hold_trial, unsealed
+from agvbench.challenge.challenge import TrialKind, hold_trial, unsealed
 from agvbench.diagnosis import Dependence, Diagnosis, Estimate, HeldOut, NamedEffect, Verdict
 from agvbench.simulator.hidden import make_hidden_plant
 
@@ -43,10 +43,20 @@ def test_parameters_of_another_form_are_not_compared():
 
 @pytest.mark.slow
 def test_a_blind_trial_from_drive_to_score():
-    trial = hold_trial("speed_lag", 11, 2)
+    trial = hold_trial("speed_lag", 11, TrialKind(2))
     assert trial.verdict != "ERROR"
     assert "speed_lag" in trial.named
     assert trial.squares_mm2["after"] < 0.2 * trial.squares_mm2["before"]
+
+
+@pytest.mark.slow
+def test_a_blind_trial_of_a_differential_vehicle() -> None:
+    trial = hold_trial("wheel_diameter_mismatch", 301, TrialKind(2, "differential"))
+    assert trial.named == ("wheel_diameter_mismatch",)
+    assert trial.is_right
+    true = trial.true_parameters["wheel_diameter_mismatch"]["curvature_per_m"]
+    value, stderr = trial.estimates["wheel_diameter_mismatch"]["curvature_per_m"]
+    assert abs(value - true) < 4.0 * stderr + 1e-3
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ examples:
   agvbench challenge --seeds 300 --only nothing               how often a name is given where nothing is hidden
   agvbench challenge --seeds 10 --json challenge.json --resume --markdown   what a whole file says, as tables
   agvbench challenge --first-seed 5000                        unseen vehicles
+  agvbench challenge --kinematics differential --only wheel_lag   a vehicle with two driven wheels
   agvbench challenge --seeds 10 --json challenge.json --cluster tcp://127.0.0.1:8786
                                                               on the workers of a Dask cluster
 """
@@ -18,9 +19,11 @@ examples:
 from __future__ import annotations
 
 import argparse
+from typing import get_args
 
 from agvbench.cli._cluster_arguments import add_cluster_arguments, executor_options
 from agvbench.running.configuration.option_types import whole_number
+from agvbench.types import Kinematics
 
 HELP = "blind trials of the diagnosis on plants with a hidden effect"
 PACKAGES = ("numba", "zenoh")
@@ -34,6 +37,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--only", nargs="+", default=[], metavar="NAME", help="what to hide (default: everything, and some pairs)"
+    )
+    parser.add_argument(
+        "--kinematics", choices=get_args(Kinematics), default="two_axle", help="kind of vehicle (default two_axle)"
     )
     parser.add_argument("--repeats", type=whole_number, default=5, metavar="N", help="of each trajectory (default 5)")
     parser.add_argument("--jobs", type=whole_number, metavar="N", help="trials at a time (default: one per processor)")
@@ -59,6 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
         json_file=arguments.json_file,
         resume=arguments.resume,
         cluster=executor_options(arguments),
+        kinematics=arguments.kinematics,
     )
     if arguments.markdown:
         print(scores_markdown(scores), end="")

@@ -2,7 +2,7 @@
 
 Every name of the catalogue is a factory for the command line, and so is every pair:
 ``--plant agvbench.simulator.hidden:steering_lag``, ``…:steering_lag_and_lateral_slip``, ``…:nothing``.
-``…:make_plant`` draws one by its seed.
+``…:make_plant`` draws one by its seed. Differential vehicles are those of `agvbench.simulator.hidden.differential`.
 
 Examples
 --------
@@ -25,6 +25,7 @@ from agvbench.simulator.hidden.plant import HiddenPlant
 from agvbench.simulator.hidden.sampling import factory, make_hidden_plant, sampled_spec, vehicle_of
 from agvbench.simulator.hidden.separation import Separation, SeparationStudy, indistinguishable_effects, separation
 from agvbench.simulator.hidden.truth import HiddenEffect, SealedTruth
+from agvbench.types import Kinematics
 
 __all__ = [
     "CATALOGUE",
@@ -49,9 +50,9 @@ def make_plant(seed: int) -> HiddenPlant:
     return make_hidden_plant(sampled_spec(seed), seed)
 
 
-def sealed_truth(spec: str, seed: int) -> SealedTruth:
+def sealed_truth(spec: str, seed: int, kinematics: Kinematics = "two_axle") -> SealedTruth:
     """Return what the plant of a specification and seed hides; for scoring."""
-    return make_hidden_plant(spec, seed).sealed_truth()
+    return make_hidden_plant(spec, seed, kinematics=kinematics).sealed_truth()
 
 
 def __getattr__(name: str) -> Callable[[int], HiddenPlant]:

@@ -11,7 +11,10 @@ from agvbench.simulator.hidden.constants import (
     BACKLASH,
     BRAKE_S,
     DEAD_WIDTH,
+    DRIVE_DAMPING,
     DRIVE_DEAD,
+    DRIVE_FREQUENCY,
+    DRIVE_SIGN,
     DROOP,
     FADE,
     FADE_HOURS,
@@ -36,6 +39,7 @@ from agvbench.simulator.hidden.constants import (
     SERVO_FREQUENCY,
     SLEW,
     SLEW_ACCELERATION,
+    TURN_DROOP,
 )  # fmt: skip
 from agvbench.types import Floats
 
@@ -64,8 +68,8 @@ def rear_aim(p: Floats, command: float) -> float:
 
 @cached_njit()
 def wheel_aim(p: Floats, command: float) -> float:
-    """Return the wheel speed [m/s] of a fresh battery; a falling pulse drives forward."""
-    longitudinal = p[NEUTRAL] - command
+    """Return the wheel speed [m/s] of a fresh battery; with a negative sign a falling pulse drives forward."""
+    longitudinal = p[DRIVE_SIGN] * (command - p[NEUTRAL])
     beyond = abs(longitudinal) - p[DRIVE_DEAD]
     if beyond <= 0.0 or abs(longitudinal) <= p[DEAD_WIDTH]:
         return 0.0
@@ -77,6 +81,14 @@ def supply(p: Floats, session_s: float, driven_s: float) -> float:
     """Return what battery and controller leave of the speed, after hours in the session and seconds of driving."""
     hours = session_s / _HOUR_S
     left = 1.0 - p[DROOP] * hours - p[FADE] * (1.0 - math.exp(-hours / p[FADE_HOURS]))
+    return max(0.0, left * (1.0 - p[SAG] * (1.0 - math.exp(-driven_s / p[SAG_S]))))
+
+
+@cached_njit()
+def turn_supply(p: Floats, session_s: float, driven_s: float) -> float:
+    """Return what battery and controller leave of a differential vehicle's yaw rate."""
+    hours = session_s / _HOUR_S
+    left = 1.0 - p[TURN_DROOP] * hours - p[FADE] * (1.0 - math.exp(-hours / p[FADE_HOURS]))
     return max(0.0, left * (1.0 - p[SAG] * (1.0 - math.exp(-driven_s / p[SAG_S]))))
 
 
@@ -144,3 +156,18 @@ def wheel(p: Floats, aim: float, speed: float, dt: float) -> float:
     k3 = _gaining(p, aim, speed + 0.5 * dt * k2)
     k4 = _gaining(p, aim, speed + dt * k3)
     return speed + dt / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+
+
+@cached_njit()
+def motor(p: Floats, aim: float, speed: float, rate: float, dt: float) -> tuple[float, float]:
+    """Return the wheel speed and its rate `dt` later: of second order if the drive has a frequency."""
+    omega, damping = p[DRIVE_FREQUENCY], p[DRIVE_DAMPING]
+    if omega == 0.0:
+        return wheel(p, aim, speed, dt), 0.0
+    h = 0.5 * dt
+    a1 = omega * (omega * (aim - speed) - 2.0 * damping * rate)
+    r2, a2 = rate + h * a1, omega * (omega * (aim - speed - h * rate) - 2.0 * damping * (rate + h * a1))
+    r3, a3 = rate + h * a2, omega * (omega * (aim - speed - h * r2) - 2.0 * damping * (rate + h * a2))
+    r4, a4 = rate + dt * a3, omega * (omega * (aim - speed - dt * r3) - 2.0 * damping * (rate + dt * a3))
+    sixth = dt / 6.0
+    return speed + sixth * (rate + 2.0 * (r2 + r3) + r4), rate + sixth * (a1 + 2.0 * (a2 + a3) + a4)

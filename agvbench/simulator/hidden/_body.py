@@ -57,7 +57,7 @@ def wheels(p: Floats, front: float, rear: float, speed: float, session_s: float)
 
 
 @cached_njit()
-def _grip(p: Floats, x: float, y: float, heading: float, front: float, rear: float) -> float:
+def grip(p: Floats, x: float, y: float, heading: float, front: float, rear: float) -> float:
     """Return the share of the wheel speed that place, heading and steering leave."""
     left = 1.0 - p[LOSS_TANGENT] * (abs(math.tan(front)) + abs(math.tan(rear)))
     left -= p[LOSS_SQUARE] * (front * front + rear * rear)
@@ -87,7 +87,7 @@ def motion(
     longer = 0.5 * p[LONGER] * (p[FRONT_AXLE] + p[REAR_AXLE])
     lf, lr = p[FRONT_AXLE] + longer, p[REAR_AXLE] + longer
     tan_front, tan_rear = math.tan(front), math.tan(rear)
-    left_of_speed = _grip(p, x, y, heading, front, rear)
+    left_of_speed = grip(p, x, y, heading, front, rear)
     longitudinal = speed * left_of_speed * _shared(p, math.cos(front), (1.0 + p[AXLE_RATIO]) * math.cos(rear))
     lateral = longitudinal * (lr * tan_front + lf * tan_rear) / (lf + lr)
     path_speed = math.copysign(math.hypot(longitudinal, lateral), longitudinal)

@@ -14,10 +14,13 @@ import numpy as np
 from agvbench.compiled import cached_njit
 from agvbench.simulator.hidden import _actuators as actuators
 from agvbench.simulator.hidden import _body as body
+from agvbench.simulator.hidden import _differential as differential
 from agvbench.simulator.hidden.constants import (
+    CASTER_KICK,
     COMMAND_HIGH,
     COMMAND_LOW,
     DELAY_S,
+    DIFFERENTIAL,
     DRIVE_DELAY_SHARE,
     LATENCY_S,
     LENS,
@@ -73,8 +76,9 @@ _ROUNDING_S = 1e-10
     DRIVE, FRONT, REAR, AIM_WHEEL, AIM_FRONT, AIM_REAR,
     SERVO_FRONT, RATE_FRONT, SERVO_REAR, RATE_REAR, AXLE_FRONT, AXLE_REAR, WHEEL,
     STARTED, MOVING, SMOOTH_X, SMOOTH_Y, SMOOTH_HEADING, COMMANDED_DRIVE, COMMANDED_FRONT, COMMANDED_REAR,
-) = range(28)  # fmt: skip
-STATE_SIZE = 28
+    RATE_WHEEL, CASTER,
+) = range(30)  # fmt: skip
+STATE_SIZE = 30
 VARIATION_FRONT, VARIATION_REAR, VARIATION_SPEED = range(3)
 
 # Commands on their way: a ring of (when, which, value), which = 0 drive, 1 front, 2 rear.
@@ -96,6 +100,7 @@ def begin(p: Floats, state: Floats, past: Floats, marks: np.ndarray, pose: tuple
     state[AIM_FRONT] = state[SERVO_FRONT] = state[AXLE_FRONT] = actuators.front_aim(p, p[NEUTRAL])
     state[AIM_REAR] = state[SERVO_REAR] = state[AXLE_REAR] = actuators.rear_aim(p, p[NEUTRAL])
     state[GRID] = STEP_S
+    state[CASTER] = differential.CASTER_BEGINS_RAD
     marks[:] = 0
     past[0, 0], past[0, 1], past[0, 2], past[0, 3] = 0.0, state[X], state[Y], state[HEADING]
     marks[2] = 1
@@ -146,6 +151,9 @@ def _rates(
     since = state[CLOCK] + t - state[STARTED]
     if since < p[STICK_S] and abs(speed) > body.MOVES_MPS:
         return 0.0, 0.0, math.copysign(p[STICK_TWIST] / p[STICK_S], speed), abs(speed)
+    if p[DIFFERENTIAL] != 0.0:
+        uneven = (run_variation[VARIATION_FRONT], run_variation[VARIATION_REAR])
+        return differential.motion(p, at, front, speed, uneven, state[CASTER], state[SESSION])
     front, rear = body.wheels(
         p, front + run_variation[VARIATION_FRONT], rear + run_variation[VARIATION_REAR], speed, state[SESSION]
     )
@@ -159,12 +167,15 @@ def _step(p: Floats, state: Floats, run_variation: Floats, dt: float, out: Float
     h = 0.5 * dt
     driven = state[CLOCK] - state[STARTED] if state[MOVING] > 0.0 else 0.0
     aim = state[AIM_WHEEL] * actuators.supply(p, state[SESSION], driven) * (1.0 + run_variation[VARIATION_SPEED])
-    w0 = actuators.wheel(p, aim, state[WHEEL], 0.0)
-    w1 = actuators.wheel(p, aim, state[WHEEL], h)
-    w2 = actuators.wheel(p, aim, w1, h)
-    f0, _ = actuators.servo(p, state[AIM_FRONT], state[SERVO_FRONT], state[RATE_FRONT], 0.0)
-    f1, rf1 = actuators.servo(p, state[AIM_FRONT], state[SERVO_FRONT], state[RATE_FRONT], h)
-    f2, rf2 = actuators.servo(p, state[AIM_FRONT], f1, rf1, h)
+    w0, _ = actuators.motor(p, aim, state[WHEEL], state[RATE_WHEEL], 0.0)
+    w1, rw1 = actuators.motor(p, aim, state[WHEEL], state[RATE_WHEEL], h)
+    w2, rw2 = actuators.motor(p, aim, w1, rw1, h)
+    front = state[AIM_FRONT]
+    if p[DIFFERENTIAL] != 0.0:
+        front *= actuators.turn_supply(p, state[SESSION], driven)
+    f0, _ = actuators.servo(p, front, state[SERVO_FRONT], state[RATE_FRONT], 0.0)
+    f1, rf1 = actuators.servo(p, front, state[SERVO_FRONT], state[RATE_FRONT], h)
+    f2, rf2 = actuators.servo(p, front, f1, rf1, h)
     r0, _ = actuators.servo(p, state[AIM_REAR], state[SERVO_REAR], state[RATE_REAR], 0.0)
     r1, rr1 = actuators.servo(p, state[AIM_REAR], state[SERVO_REAR], state[RATE_REAR], h)
     r2, rr2 = actuators.servo(p, state[AIM_REAR], r1, rr1, h)
@@ -185,6 +196,9 @@ def _step(p: Floats, state: Floats, run_variation: Floats, dt: float, out: Float
         out[X + i] = state[X + i] + dt / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
     out[SERVO_FRONT], out[RATE_FRONT], out[SERVO_REAR], out[RATE_REAR] = f2, rf2, r2, rr2
     out[AXLE_FRONT], out[AXLE_REAR], out[WHEEL] = a2, b2, w2
+    out[RATE_WHEEL] = rw2
+    if p[CASTER_KICK] != 0.0:
+        out[CASTER] = state[CASTER] + dt * differential.caster_rate(p, state[CASTER], w1, a1)
     out[CLOCK], out[SESSION] = state[CLOCK] + dt, state[SESSION] + dt
     _cross_seam(p, state, out)
 
@@ -204,9 +218,9 @@ def _cross_seam(p: Floats, state: Floats, out: Floats) -> None:
 
 
 @cached_njit()
-def _notice_start(state: Floats) -> None:
+def _notice_start(p: Floats, state: Floats) -> None:
     """Note when the vehicle was last commanded to move from rest."""
-    moving = abs(state[AIM_WHEEL]) > 0.0
+    moving = abs(state[AIM_WHEEL]) > 0.0 or (p[DIFFERENTIAL] != 0.0 and abs(state[AIM_FRONT]) > 0.0)
     if moving and state[MOVING] == 0.0:
         state[STARTED] = state[CLOCK]
     state[MOVING] = 1.0 if moving else 0.0
@@ -282,7 +296,7 @@ def advance(
         if arrival >= 0 and ring[arrival, 0] <= state[CLOCK] + _ROUNDING_S:
             _latch(p, state, int(ring[arrival, 1]), ring[arrival, 2])
             ring[arrival, 1] = -1.0
-            _notice_start(state)
+            _notice_start(p, state)
             continue
         end = state[GRID] - state[CLOCK]
         if arrival >= 0:

@@ -43,6 +43,9 @@ NULL: dict[str, float] = {
     "lens": 0.0,
     # wheels, again: what is added comes last, because compiled code keeps the places that it was compiled with
     "overrun": 0.0, "front_trim": 0.0, "longer": 0.0,
+    # differential vehicles: the front servo is the yaw rate's controller, and the rear one does nothing
+    "differential": 0.0, "drive_sign": -1.0, "track": 0.3, "turn_droop": 0.0, "drive_frequency": 0.0,
+    "drive_damping": 1.0, "course_curvature": 0.0, "caster_kick": 0.0, "caster_trail": 0.02,
 }  # fmt: skip
 """Every mechanism's constants at their null."""
 
@@ -63,6 +66,8 @@ NAMES = (*BASE, *NULL)
     SEAM_KICK, SEAM_PLACE, SEAM_DIRECTION, NAP, NAP_DIRECTION,
     LATENCY_S, SMOOTHING_S, MARKER_FORWARD, MARKER_LEFT, TURNED, SCALE, LENS,
     OVERRUN, FRONT_TRIM, LONGER,
+    DIFFERENTIAL, DRIVE_SIGN, TRACK, TURN_DROOP, DRIVE_FREQUENCY, DRIVE_DAMPING, COURSE_CURVATURE,
+    CASTER_KICK, CASTER_TRAIL,
 ) = range(len(NAMES))  # fmt: skip
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from agvbench.simulator.hidden.truth import Change, HiddenEffect, Kind
+from agvbench.types import Kinematics
 
 Values = dict[str, float]
 Constants = Callable[[Values], Values]
@@ -66,6 +67,8 @@ class Recipe:
     changes
         The constants of an effect that holds in a part of the campaign only, or grows during it. The parameters that
         say when are those of `Change`.
+    kinematics
+        The vehicles that can have it.
     """
 
     name: str
@@ -78,6 +81,7 @@ class Recipe:
     absorbed: bool = False
     random_phase: bool = False
     changes: tuple[str, ...] = ()
+    kinematics: tuple[Kinematics, ...] = ("two_axle",)
 
     def draw(self, rng: np.random.Generator) -> Values:
         """Return parameters."""
@@ -98,3 +102,62 @@ class Recipe:
         return HiddenEffect(
             self.name, self.library_name, self.kind, dict(values), self.covariates, self.random_phase
         )  # fmt: skip
+
+
+TURN = Size(-math.pi, math.pi, grows=0)
+"""A direction."""
+STEP = {"begins_h": Size(0.3, 0.8, grows=0)}
+"""When a change begins."""
+AT_ONCE_H = 1e-9
+BY_CAMPAIGN_TIME = ("campaign_time_h",)
+
+
+def renamed(**names: str) -> Constants:
+    """Return a map of parameters to constants: ``renamed(lag_s="time_constant_s")``."""
+
+    def constants(values: Values) -> Values:
+        return {constant: values[parameter] for constant, parameter in names.items()}
+
+    return constants
+
+
+def library_effect(
+    name: str, sizes: dict[str, Size], absorbed: bool = False, base: Values | None = None, /, **names: str
+) -> Recipe:  # fmt: skip
+    """Return an effect with the equation of the library."""
+    return Recipe(name, name, "library", sizes, renamed(**names), base or {}, absorbed=absorbed)
+
+
+def other_form(name: str, library_name: str, sizes: dict[str, Size], /, **names: str) -> Recipe:
+    """Return an effect of the library with another equation."""
+    return Recipe(name, library_name, "other form", sizes, renamed(**names))
+
+
+def outside_cause(
+    name: str, covariates: tuple[str, ...], sizes: dict[str, Size], random_phase: bool = False, /, **names: str
+) -> Recipe:
+    """Return a cause that the library does not have."""
+    return Recipe(
+        name, None, "outside", sizes, renamed(**names), covariates=covariates, random_phase=random_phase
+    )  # fmt: skip
+
+
+def changing_cause(
+    name: str, changes: tuple[str, ...], sizes: dict[str, Size], fixed: Values | None = None, /, **names: str
+) -> Recipe:
+    """Return a cause outside the library that changes constants with the time of the session."""
+    constants = renamed(**names)
+    return Recipe(
+        name, None, "outside", sizes, lambda values: constants(values) | (fixed or {}),
+        covariates=BY_CAMPAIGN_TIME, changes=changes,
+    )  # fmt: skip
+
+
+def of_either(recipe: Recipe) -> Recipe:
+    """Return the recipe of an effect that vehicles of either kind may have, with the same equation."""
+    return replace(recipe, kinematics=("two_axle", "differential"))
+
+
+def of_differential(*recipes: Recipe) -> tuple[Recipe, ...]:
+    """Return recipes of effects that only a differential vehicle may have."""
+    return tuple(replace(recipe, kinematics=("differential",)) for recipe in recipes)

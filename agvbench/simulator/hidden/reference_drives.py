@@ -1,6 +1,7 @@
 """The reference drives: what a session with the eight trajectories, calibration and steps asks of a vehicle.
 
-They are made for the base vehicle, from its own maps, as a calibrated bench would command it.
+They are made for the base vehicle, as a calibrated bench would command it: from its own maps, or, of a differential
+vehicle, whose levels are shares of its full commands, from those.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from agvbench.simulator.hidden.base_vehicle import FULL_SPEED, FULL_YAW_RATE, BaseVehicle
 from agvbench.simulator.hidden.constants import BASE
 from agvbench.types import Floats, Plant
 
@@ -55,8 +57,13 @@ class _Commands:
         )
 
 
-def reference_drives(constants: dict[str, float]) -> list[ReferenceDrive]:
-    """Return the drives for a base vehicle: the eight, holds of the servos and the drive, steps, a slalom."""
+def reference_drives(base: BaseVehicle) -> list[ReferenceDrive]:
+    """Return the drives for a base vehicle of either kind."""
+    return _of_wheels(base.constants) if base.kinematics == "differential" else _of_axles(base.constants)
+
+
+def _of_axles(constants: dict[str, float]) -> list[ReferenceDrive]:
+    """Return the eight, holds of the servos and the drive, steps, a slalom."""
     c = _Commands(constants)
     front = math.atan((BASE | constants)["front_axle"])  # centre of rotation 1 m abeam of the centroid
     rear = -math.atan((BASE | constants)["rear_axle"])
@@ -75,6 +82,29 @@ def reference_drives(constants: dict[str, float]) -> list[ReferenceDrive]:
         drives.append(c.drive(f"rear steps {v:+g}", *((1.5, v, 0.0, s * a) for s in (0.0, 1.0, 0.0, -1.0, 0.0))))
     for v in (1.0, 0.5):
         drives.append(c.drive(f"slalom {v:+g}", *((1.0, v, s * a, -s * a) for s in (1.0, -1.0, 1.0, -1.0, 1.0, -1.0))))
+    return drives
+
+
+def _of_wheels(constants: dict[str, float]) -> list[ReferenceDrive]:
+    """Return straights, turns on the spot, arcs, steps and a slalom; yaw rates are shares of the full one."""
+    gain, dead = constants["gain_forward"], constants["drive_dead"]
+    full = gain * (FULL * FULL_SPEED - dead)
+
+    def drive(name: str, *parts: tuple[float, float, float]) -> ReferenceDrive:
+        rows = ((PRESTEER_S, 0.0, 0.0), *parts, (SETTLE_S, 0.0, 0.0))
+        return ReferenceDrive(
+            name, tuple((s, FULL * FULL_SPEED * v, FULL * FULL_YAW_RATE * w, 0.0) for s, v, w in rows)
+        )
+
+    drives = [drive(f"straight {v:+g}", (2.0 / full / abs(v), v, 0.0)) for v in (1.0, -1.0, 0.5, -0.5)]
+    drives += [drive(f"drive {v:+g}", (4.0, v, 0.0)) for v in (0.75, 0.2, -0.2, -0.75)]
+    drives += [drive(f"turn on the spot {w:+g}", (4.0, 0.0, w)) for w in (1.0, 2 / 3, 1 / 3, -1 / 3, -2 / 3, -1.0)]
+    for v in (1.0, 0.5, -0.5, -1.0):
+        drives += [drive(f"arc {v:+g} {w:+.2g}", (4.0, v, w)) for w in (2 / 3, 1 / 3, -1 / 3, -2 / 3)]
+    for v in (1.0, -1.0):
+        drives.append(drive(f"steps {v:+g}", *((1.5, v, w) for w in (0.0, 0.5, 0.0, -0.5, 0.0))))
+    for v in (1.0, 0.5):
+        drives.append(drive(f"slalom {v:+g}", *((1.0, v, w) for w in (0.5, -0.5, 0.5, -0.5, 0.5, -0.5))))
     return drives
 
 

@@ -9,13 +9,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from agvbench.simulator.hidden.base_vehicle import BaseVehicle, sample_vehicle
+from agvbench.simulator.hidden.base_vehicle import BaseVehicle, sample_differential, sample_vehicle
 from agvbench.simulator.hidden.catalogue import AND, CATALOGUE, LATER, NOTHING, recipes
 from agvbench.simulator.hidden.plant import HiddenPlant
 from agvbench.simulator.hidden.recipe import Recipe, Values
 from agvbench.simulator.hidden.separation import Separation, SeparationStudy, separation
 from agvbench.simulator.hidden.truth import HiddenEffect, Kind, SealedTruth
 from agvbench.simulator.random_streams import random_stream
+from agvbench.types import Kinematics
 
 FLOORS = 3.0
 """What a hidden effect leaves at least on the reference drives."""
@@ -23,7 +24,9 @@ _GROWTH, _MOST_GROWTHS = 1.3, 6
 _SEEDS = 2**64
 
 
-def make_hidden_plant(spec: str, seed: int, *, floors: float = FLOORS) -> HiddenPlant:
+def make_hidden_plant(
+    spec: str, seed: int, *, floors: float = FLOORS, kinematics: Kinematics = "two_axle"
+) -> HiddenPlant:
     """Return a plant that hides what `spec` says.
 
     Parameters
@@ -35,11 +38,13 @@ def make_hidden_plant(spec: str, seed: int, *, floors: float = FLOORS) -> Hidden
     floors
         What each effect leaves at least on the reference drives [floors]; 0 takes the sizes as they are drawn and
         measures nothing, which saves seconds.
+    kinematics
+        What kind of vehicle it is.
 
     Raises
     ------
     PlantError
-        If a name is unknown.
+        If a name is unknown, or such a vehicle cannot have the effect.
 
     Examples
     --------
@@ -47,12 +52,14 @@ def make_hidden_plant(spec: str, seed: int, *, floors: float = FLOORS) -> Hidden
     >>> plant.sealed_truth().effects
     ()
     """
-    base, truth = _sampled(spec, seed % _SEEDS, floors)
+    base, truth = _sampled(spec, seed % _SEEDS, floors, kinematics)
     return HiddenPlant(dict(truth.constants), base.run_variation, seed, truth)
 
 
-def vehicle_of(seed: int) -> BaseVehicle:
+def vehicle_of(seed: int, kinematics: Kinematics = "two_axle") -> BaseVehicle:
     """Return the vehicle that all plants of a seed share, whatever they hide."""
+    if kinematics == "differential":
+        return sample_differential(random_stream(0xD1FFBA5E, seed))
     return sample_vehicle(random_stream(0xBA5E, seed))
 
 
@@ -70,26 +77,26 @@ def sampled_spec(seed: int) -> str:
     return first if share < 0.8 or related else f"{first}{AND}{second}"
 
 
-def factory(spec: str) -> Callable[[int], HiddenPlant]:
+def factory(spec: str, kinematics: Kinematics = "two_axle") -> Callable[[int], HiddenPlant]:
     """Return a plant factory for a specification, as ``--plant`` wants it."""
-    recipes(spec)
+    recipes(spec, kinematics)
 
     def make(seed: int) -> HiddenPlant:
         """Return a plant."""
-        return make_hidden_plant(spec, seed)
+        return make_hidden_plant(spec, seed, kinematics=kinematics)
 
     make.__name__ = make.__qualname__ = spec
     return make
 
 
 @functools.lru_cache(maxsize=256)
-def _sampled(spec: str, seed: int, floors: float) -> tuple[BaseVehicle, SealedTruth]:
-    base = vehicle_of(seed)
-    hidden = recipes(spec)
+def _sampled(spec: str, seed: int, floors: float, kinematics: Kinematics) -> tuple[BaseVehicle, SealedTruth]:
+    base = vehicle_of(seed, kinematics)
+    hidden = recipes(spec, kinematics)
     override = {name: value for recipe in hidden for name, value in recipe.base.items()}
     if not hidden:
         return base, SealedTruth("nothing", constants=base.constants)
-    bench = _bench(seed, tuple(override.items())) if floors > 0.0 else None
+    bench = _bench(seed, tuple(override.items()), kinematics) if floors > 0.0 else None
     sizes = {recipe.name: _large_enough(bench, recipe, seed, floors) for recipe in hidden}
     mechanism = {k: v for recipe in hidden for k, v in recipe.constants(sizes[recipe.name]).items()}
     found = Separation(math.nan, math.nan, math.nan) if bench is None else separation(bench, mechanism)
@@ -102,8 +109,8 @@ def _sampled(spec: str, seed: int, floors: float) -> tuple[BaseVehicle, SealedTr
 
 
 @functools.lru_cache(maxsize=4)
-def _bench(seed: int, override: tuple[tuple[str, float], ...]) -> SeparationStudy:
-    return SeparationStudy(vehicle_of(seed), dict(override))
+def _bench(seed: int, override: tuple[tuple[str, float], ...], kinematics: Kinematics) -> SeparationStudy:
+    return SeparationStudy(vehicle_of(seed, kinematics), dict(override))
 
 
 def _kind(effects: tuple[HiddenEffect, ...]) -> Kind:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from agvbench.simulator.hidden.base_vehicle import BaseVehicle
-from agvbench.simulator.hidden.catalogue import LIBRARY
+from agvbench.simulator.hidden.catalogue import library
 from agvbench.simulator.hidden.plant import TURNAROUND_S, HiddenPlant
 from agvbench.simulator.hidden.recipe import Recipe
 from agvbench.simulator.hidden.reference_drives import ReferenceDrive, centred, path, reference_drives
@@ -28,8 +28,10 @@ CAMERA_NOISE_M = 0.0005 / math.sqrt(5.0)
 REPEATS = 6
 _STRETCH = 8.0
 """A session has about so many times the runs of the reference drives: each waits so many turnarounds."""
-_STEP = 2.0
-"""Command units by which a level is moved for its derivative: 0.2° or 1 mm/s."""
+_STEPS = {"two_axle": 2.0, "differential": 0.002}
+"""Command units by which a level is moved for its derivative: 0.2° or 1 mm/s, and 2 mm/s or 0.1°/s."""
+_STOPS = {"two_axle": (0,), "differential": (0, 1, 2)}
+"""Commands (drive, front, rear) whose neutral level is no free one: there the vehicle stops, or does not turn."""
 _ROUNDS = 3
 _UNBOUNDED = {
     "command_low": -1e6,
@@ -77,7 +79,8 @@ class SeparationStudy:
 
     def __init__(self, base: BaseVehicle, override: dict[str, float] | None = None) -> None:
         self._constants, self._run_variation = base.constants | (override or {}) | _UNBOUNDED, base.run_variation
-        self.drives = [centred(self.plant({}), drive) for drive in reference_drives(base.constants)]
+        self._kinematics = base.kinematics
+        self.drives = [centred(self.plant({}), drive) for drive in reference_drives(base)]
         self.base_path = self.paths({})
         self.floor_m = self._floor_m()
         self.levels = self._free_levels()
@@ -118,19 +121,19 @@ class SeparationStudy:
         return best
 
     def _column(self, level: tuple[int, float]) -> Floats:
-        plant = self.plant({})
+        plant, step = self.plant({}), _STEPS[self._kinematics]
         parts = []
         for drive, before in zip(self.drives, self.base_path, strict=True):
-            moved = _moved(drive, {level: _STEP})
+            moved = _moved(drive, {level: step})
             same = moved == drive
-            parts.append(np.zeros_like(before) if same else (_scaled(path(plant, moved)) - before) / _STEP)
+            parts.append(np.zeros_like(before) if same else (_scaled(path(plant, moved)) - before) / step)
         return np.concatenate(parts).ravel()
 
     def _free_levels(self) -> list[tuple[int, float]]:
-        """Return (column, command) of every level, save for the drive's neutral, which stops by definition."""
-        neutral = self.drives[0].rows[0][1]
+        """Return (column, command) of every level, save for neutral where it stops by definition."""
+        neutral, stops = self.drives[0].rows[0][1], _STOPS[self._kinematics]
         found = {(i, row[1 + i]) for drive in self.drives for row in drive.rows for i in range(3)}
-        return sorted(level for level in found if level != (0, neutral))
+        return sorted((i, u) for i, u in found if i not in stops or u != neutral)
 
     def _floor_m(self) -> float:
         """Return the rms variation of the drives between runs, with the camera's noise."""
@@ -237,8 +240,9 @@ def indistinguishable_effects(
     bench = SeparationStudy(base, {k: v for k, v in truth.constants.items() if k in base.constants})
     mechanism = {k: v for k, v in truth.constants.items() if k not in base.constants}
     wanted = np.concatenate(bench.paths(mechanism))
+    known = library(base.kinematics)
     left = {
-        recipe.name: fit_recipe(bench, wanted, recipe) / bench.floor_m for recipe in LIBRARY if recipe.name not in names
+        recipe.name: fit_recipe(bench, wanted, recipe) / bench.floor_m for recipe in known if recipe.name not in names
     }
     return {name: rest for name, rest in sorted(left.items(), key=lambda item: item[1]) if rest < limit}
 
@@ -260,7 +264,7 @@ def _typical(recipe: Recipe, name: str) -> float:
     return middle if middle else 0.5 * size.high
 
 
-_POSITIVE = ("_s", "rate_rad_per_s", "width", "width_rad", "front_rad", "rear_rad")
+_POSITIVE = ("_s", "rate_rad_per_s", "_radps2", "width", "width_rad", "front_rad", "rear_rad")
 
 
 def _within(
