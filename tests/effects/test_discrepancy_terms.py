@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agvbench.diagnosis.criteria import LOGGED
-from agvbench.diagnosis.terms import TERMS, ByLoggedColumn, DiscrepancyTerm
+from agvbench.diagnosis.terms import TERMS, ByLoggedColumn, DiscrepancyTerm, TurnByDirection
 from agvbench.diagnosis.terms.campaign_time import ByCampaignTime, course
 from agvbench.effects import TIME_HOOKS, effect_kinds
 from agvbench.effects import state as s
@@ -70,6 +70,19 @@ def test_a_change_is_in_proportion_to_its_column_only(term: type[DiscrepancyTerm
     assert np.all(moved[[0, 3]] == 0.0)
     assert np.abs(moved[1]).max() > 1e-5
     np.testing.assert_allclose(moved[2], 2.0 * moved[1], rtol=0.02, atol=1e-8)
+
+
+def test_a_weak_motor_bends_the_path_to_the_same_side_forward_and_backward() -> None:
+    run = SimulatedRun(COMMANDS, np.linspace(0.2, 5.0, 49))
+    geometry = Geometry(0.0, 0.05, kinematics="differential")
+    simulation = Simulation(geometry, Command(0.0, 0.0, 0.0), [run], kinds=(TurnByDirection,))
+    values = simulation.parameters()
+    values[simulation.indices("turn_by_direction")] = 0.2
+    speeds = np.array([0.0, 0.3, -0.2, 0.2, 0.0])
+    rows = np.column_stack([np.zeros((5, 2)), speeds])
+    heading = simulation.predict(rows, values, np.array([[0.5, 0.2, 0.3, 0.0]])).reshape(-1, 3)[:, 2]
+    at = np.interp(np.linspace(0.2, 5.0, 49), [0.0, 1.0, 2.0, 3.0, 5.0], [0.0, 0.3, 0.5, 0.7, 0.7])
+    np.testing.assert_allclose(heading, 0.3 + 0.2 * at, rtol=0.0, atol=1e-6)
 
 
 def test_more_columns_than_the_simulation_holds_are_refused() -> None:

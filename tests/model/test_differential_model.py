@@ -11,7 +11,16 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from agvbench.campaign import CampaignHeader
-from agvbench.effects import CorneringSpeedLoss, SpeedLag, SteeringLag, WheelDiameterMismatch
+from agvbench.effects import (
+    ActuationDelay,
+    BatteryDroop,
+    CorneringSpeedLoss,
+    Effect,
+    MocapLatency,
+    SpeedLag,
+    SteeringLag,
+    WheelDiameterMismatch,
+)
 from agvbench.effects.variants import effect_variants
 from agvbench.errors import CampaignError, VehicleError
 from agvbench.model import VehicleModel
@@ -97,6 +106,34 @@ def test_wheels_of_second_order_agree_with_dop853(lag_s: float, inertia_s: float
     zeros = np.zeros(len(times))
     ours = robot.rollout([Commands(times, *commanded.T, zeros)], [(0.0, 0.0, 0.0)], [t])[0]
     np.testing.assert_allclose(ours, expected, rtol=0.0, atol=5e-6)
+
+
+def test_a_battery_of_both_wheels_slows_turns_as_the_library_s_does_not() -> None:
+    times, commanded = np.array([0.0, 3.0]), np.array([[0.0, 0.8], [0.3, 0.0]])
+    t, aims = np.linspace(0.0, 6.0, 61)[:-1], Commands(times, *commanded.T, np.zeros(2))
+    wheels, controller = effect_variants()["battery_droop_wheels"](0.2), BatteryDroop(0.2)
+    found = {
+        e.name: turtle().with_effects(e).rollout([aims], [(0.0, 0.0, 0.0)], [t], [1.5])[0] for e in (wheels, controller)
+    }
+    # The battery falls by 0.03 % within these seconds.
+    for name, turns in (("battery_droop_wheels", 0.7), ("battery_droop", 1.0)):
+        expected = truth(t, times, commanded * [0.7, turns], 0.0, 0.0, 0.0)
+        np.testing.assert_allclose(found[name], expected, rtol=0.0, atol=1e-3)
+
+
+@settings(max_examples=20, deadline=None)
+@given(delay_s=st.floats(0.0, 0.3), late_s=st.floats(0.0, 0.3))
+def test_a_delay_and_a_latency_of_the_camera_shift_every_run_from_rest_alike(delay_s: float, late_s: float) -> None:
+    """No campaign of such runs tells them apart: only their sum is in it."""
+    times, commanded = np.array([0.0, 1.0, 2.2]), np.array([[0.3, 0.4], [-0.2, 0.9], [0.0, 0.0]])
+    t, aims = np.linspace(0.0, 4.0, 81), Commands(times, *commanded.T, np.zeros(3))
+    robot = turtle(0.1, 0.2, 0.05)
+
+    def seen(*effects: Effect) -> Floats:
+        return robot.with_effects(*effects).rollout([aims], [(0.0, 0.0, 0.0)], [t])[0]
+
+    both = seen(ActuationDelay(delay_s), MocapLatency(late_s))
+    np.testing.assert_allclose(both, seen(ActuationDelay(delay_s + late_s)), rtol=0.0, atol=1e-7)
 
 
 @given(forward=st.floats(-2.0, 2.0), yaw=st.floats(-5.0, 5.0))

@@ -87,7 +87,11 @@ def options(
     for term, shapes in changes(rates, tangents, geometry, regression):
         yield term, ((columns, course.values) for columns, course in shapes)
     yield from _logged(rates, tangents, geometry)
-    if not geometry.is_differential:
+    if geometry.is_differential:
+        direction = c["direction"][:, None]
+        columns = {1: geometry.rear_axle_m * direction, 2: direction}
+        yield terms.TurnByDirection, iter([(columns, Values())])
+    else:
         yield from _steering(rates, tangents, geometry)
     yield terms.WaveByDistance, _waves(rates)
 

@@ -24,7 +24,14 @@ from agvbench.diagnosis.terms.logged import (
 )
 from agvbench.diagnosis.terms.speed import SpeedByCourse, SpeedByHeading, SpeedByRunTime, SpeedInDisc, SpeedInStrip
 from agvbench.diagnosis.terms.steering import SteeringByDirection, SteeringByHistory, SteeringByTravel
-from agvbench.diagnosis.terms.turning import SlipByYawRate, TurnAtLine, TurnByHeading, TwistAtStart, WaveByDistance
+from agvbench.diagnosis.terms.turning import (
+    SlipByYawRate,
+    TurnAtLine,
+    TurnByDirection,
+    TurnByHeading,
+    TwistAtStart,
+    WaveByDistance,
+)
 
 TERMS: tuple[type[DiscrepancyTerm], ...] = (
     SpeedInDisc,
@@ -52,6 +59,7 @@ TERMS: tuple[type[DiscrepancyTerm], ...] = (
     SteeringByHistory,
     SteeringByTravel,
     WaveByDistance,
+    TurnByDirection,
 )
 """All discrepancy terms."""
 
@@ -81,6 +89,7 @@ __all__ = [
     "TrimByCampaignTime",
     "TrimByLoggedColumn",
     "TurnAtLine",
+    "TurnByDirection",
     "TurnByHeading",
     "TwistAtStart",
     "WaveByDistance",

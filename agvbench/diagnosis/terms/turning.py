@@ -69,6 +69,27 @@ class TurnByHeading(DiscrepancyTerm):
 
 
 @dataclass(frozen=True)
+class TurnByDirection(DiscrepancyTerm):
+    """The path of a differential vehicle bends to the same side forward and backward: ``ω ← ω + curvature |v|``.
+
+    One of its motors is weaker in one direction.
+    """
+
+    name: ClassVar[str] = "turn_by_direction"
+    stage: ClassVar[Stage] = Stage.BODY
+    covariates: ClassVar[tuple[str, ...]] = ("direction",)
+    through: ClassVar[str] = "turning"
+
+    curvature_per_m: float = parameter(unit="1/m", low=-2.0, high=2.0, scale=0.02)
+
+    @staticmethod
+    def move(state: Floats, curvature_per_m: float) -> None:
+        """Add to the yaw rate."""
+        if curvature_per_m != 0.0:
+            state[YAW_RATE] += curvature_per_m * abs(state[FORWARD])
+
+
+@dataclass(frozen=True)
 class SlipByYawRate(DiscrepancyTerm):
     """The vehicle slides out of a turn, and turns less, the faster it turns.
 
