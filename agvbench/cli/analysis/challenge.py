@@ -19,11 +19,9 @@ examples:
 from __future__ import annotations
 
 import argparse
-from typing import get_args
 
 from agvbench.cli._cluster_arguments import add_cluster_arguments, executor_options
 from agvbench.running.configuration.option_types import whole_number
-from agvbench.types import Kinematics
 
 HELP = "blind trials of the diagnosis on plants with a hidden effect"
 PACKAGES = ("numba", "zenoh")
@@ -39,7 +37,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--only", nargs="+", default=[], metavar="NAME", help="what to hide (default: everything, and some pairs)"
     )
     parser.add_argument(
-        "--kinematics", choices=get_args(Kinematics), default="two_axle", help="kind of vehicle (default two_axle)"
+        "--kinematics",
+        choices=("two_axle", "differential"),
+        default="two_axle",
+        help="kind of vehicle (default two_axle)",
     )
     parser.add_argument("--repeats", type=whole_number, default=5, metavar="N", help="of each trajectory (default 5)")
     parser.add_argument("--jobs", type=whole_number, metavar="N", help="trials at a time (default: one per processor)")
