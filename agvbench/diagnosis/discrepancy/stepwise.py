@@ -15,7 +15,7 @@ from agvbench.diagnosis.discrepancy.screening import Start, screen
 from agvbench.diagnosis.estimation.cross_validation import by_group
 from agvbench.diagnosis.residuals.body_rates import residual_rates
 from agvbench.diagnosis.selection.actuators import prefer_actuators, separate_lag_from_delay
-from agvbench.diagnosis.selection.candidates import candidate
+from agvbench.diagnosis.selection.candidates import applies, candidate
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.lack_of_fit import has_lack_of_fit
 from agvbench.diagnosis.selection.sequential_replacement import replace_sequentially
@@ -283,7 +283,8 @@ def _term_in_place_of_effect(
     for name, gain in selection.gains.items():
         without = extended.without_effect(selection.base, selection.chosen, name)
         for term in TERMS:
-            if term.longest_step_s < math.inf or issubclass(term, ByLoggedColumn):
+            is_slow = term.longest_step_s < math.inf
+            if is_slow or issubclass(term, ByLoggedColumn) or not applies(term, extended.batch.geometry):
                 continue
             if extended.predicted_gain(without, term.name) < DISCREPANCY.min_share_of_effects * gain:
                 continue

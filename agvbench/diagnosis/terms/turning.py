@@ -79,6 +79,7 @@ class TurnByDirection(DiscrepancyTerm):
     stage: ClassVar[Stage] = Stage.BODY
     covariates: ClassVar[tuple[str, ...]] = ("direction",)
     through: ClassVar[str] = "turning"
+    needs_differential: ClassVar[bool] = True
 
     curvature_per_m: float = parameter(unit="1/m", low=-2.0, high=2.0, scale=0.02)
 
