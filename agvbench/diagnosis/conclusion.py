@@ -178,6 +178,7 @@ def _split_provenance(split: Split, searched: int, tested: Assessment) -> dict[s
         "searched_runs": searched,
         "validation_runs": int(split.validation.sum()),
         "lack_of_fit_p_value": tested.lack_of_fit,
+        "bias_p_value": tested.bias,
         "lack_of_fit_runs": {"tested": int(split.test.sum()), "repeats": int(np.sum(~split.training))},
     }
 

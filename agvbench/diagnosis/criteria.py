@@ -196,8 +196,11 @@ class ResidualCriteria:
     ``within_repeatability``
         A residual below this multiple of the repeatability is within it. The ratio of two standard deviations with
         twenty degrees of freedom each exceeds it in one of six comparisons by chance, so that a test decides beyond it.
+    ``far_beyond_repeatability``
+        Multiple of the repeatability beyond which a bias of repeats is a lack of fit by itself. Errors of the fitted
+        parameters bias repeats, too, but by less than the repeatability.
     ``lack_of_fit_alpha``
-        Level of the lack-of-fit test.
+        Level of the lack-of-fit test and of the test for a bias.
     ``dependence_alpha``, ``likely_alpha``
         Levels of a dependence after the correction for the number of tests: for a residual of which nothing is known,
         and for one that is known to have structure.
@@ -214,6 +217,7 @@ class ResidualCriteria:
     """
 
     within_repeatability: float = 1.25
+    far_beyond_repeatability: float = 2.0
     lack_of_fit_alpha: float = 0.01
     dependence_alpha: float = 1e-3
     likely_alpha: float = 0.05

@@ -13,6 +13,7 @@ from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.estimation.levenberg_marquardt import FitState, LevenbergMarquardt
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
+from agvbench.diagnosis.residuals.bias_test import bias_p_value
 from agvbench.diagnosis.residuals.repeatability import repeatability, reproducibility
 from agvbench.diagnosis.residuals.residuals import EndCovariance, PoseResiduals, lack_of_fit, pose_residuals
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
@@ -27,9 +28,10 @@ _REJECTED = "{}: rejected in validation: the validation runs are predicted bette
 
 @dataclass(frozen=True)
 class Assessment:
-    """Residuals ``before`` and ``after``, the spread of repeats by quantity, and the p-value of ``lack_of_fit``.
+    """Residuals ``before`` and ``after``, the spread of repeats by quantity, and p-values.
 
     ``repeatability`` is that of repeats in succession, ``reproducibility`` that of all repeats of the campaign.
+    ``lack_of_fit`` is the p-value of the lack-of-fit test, and ``bias`` that of repeats that miss to the same side.
     """
 
     before: PoseResiduals
@@ -37,16 +39,23 @@ class Assessment:
     repeatability: dict[str, float]
     reproducibility: dict[str, float]
     lack_of_fit: float | None
+    bias: float | None = None
 
     @property
     def has_lack_of_fit(self) -> bool:
         """Whether the residuals exceed the repeatability, and the lack of fit is significant."""
-        after = self.after.rms()
-        above = any(
-            after[name] > RESIDUAL.within_repeatability * self.repeatability[name]
-            for name in ("position_rms_mm", "heading_rms_deg")
-        )
-        return above and self.lack_of_fit is not None and self.lack_of_fit < RESIDUAL.lack_of_fit_alpha
+        significant = self.lack_of_fit is not None and self.lack_of_fit < RESIDUAL.lack_of_fit_alpha
+        return self._exceeds(RESIDUAL.within_repeatability) and (significant or self._is_far_beyond)
+
+    @property
+    def _is_far_beyond(self) -> bool:
+        """Whether the residuals are far beyond the repeatability, and to the same side in repeats."""
+        is_biased = self.bias is not None and self.bias < RESIDUAL.lack_of_fit_alpha
+        return is_biased and self._exceeds(RESIDUAL.far_beyond_repeatability)
+
+    def _exceeds(self, multiple: float) -> bool:
+        after, least = self.after.rms(), self.repeatability
+        return any(after[name] > multiple * least[name] for name in ("position_rms_mm", "heading_rms_deg"))
 
 
 def assess(
@@ -70,7 +79,8 @@ def assess(
     among = held if repeats is None else repeats
     repeated = readings.select(among)
     p_value = lack_of_fit(pose_residuals(repeated, after[among]), repeated.group, covariance.select(among), held[among])
-    return Assessment(pose_residuals(kept, before[held]), residuals, *spread, p_value)
+    bias = bias_p_value(residuals.ends[:, :2], kept.group)
+    return Assessment(pose_residuals(kept, before[held]), residuals, *spread, p_value, bias)
 
 
 def _spread_of_repeats(
