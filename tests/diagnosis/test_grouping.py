@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tiny_vehicle import NEUTRAL, experiments
 
 from agvbench.diagnosis.criteria import DATA
-from agvbench.diagnosis.data.splits import folds, group_runs, split_runs
+from agvbench.diagnosis.data.splits import folds, group_runs, split_runs, with_other_validation
 from agvbench.errors import FitError
 from agvbench.types import NO_TARGET, Commands, Frames, Run
 
@@ -54,6 +54,31 @@ def test_what_is_set_aside_is_whole_groups_whose_levels_were_driven_elsewhere_to
         kept = {float(v) for run, out in zip(runs, held, strict=True) if not out for v in getattr(run.commands, role)}
         aside = {float(v) for run, out in zip(runs, held, strict=True) if out for v in getattr(run.commands, role)}
         assert aside <= kept | {NEUTRAL}
+
+
+@given(seed=st.integers(0, 50))
+def test_other_validation_runs_leave_the_test_and_every_level_in_the_training(seed):
+    runs = bare_runs()
+    group = group_runs(runs)
+    split = split_runs(runs, group, seed)
+    other = with_other_validation(split, runs, group, seed)
+    assert np.array_equal(other.test, split.test)
+    assert np.array_equal(other.training, ~(other.validation | other.test))
+    assert other.validation.any()
+    assert other.training[split.validation].all()
+    assert not set(group[other.validation]) & set(group[other.training])
+    for role in ("drive", "front", "rear"):
+        at = [{float(v) for v in getattr(run.commands, role)} for run in runs]
+        fitted = set().union(*(at[i] for i in np.flatnonzero(other.training)))
+        assert set().union(*at) <= fitted | {NEUTRAL}
+
+
+def test_validation_runs_that_a_campaign_names_stay():
+    runs = [dataclasses.replace(run, split="fit") for run in bare_runs()]
+    runs[0] = dataclasses.replace(runs[0], split="held_out")
+    runs[1] = dataclasses.replace(runs[1], split="validation")
+    group = group_runs(runs)
+    assert with_other_validation(split_runs(runs, group, 0), runs, group, 0) is None
 
 
 @given(seed=st.integers(0, 200))

@@ -10,7 +10,7 @@ from tiny_vehicle import FRONT_M, HEADER, NEUTRAL_COMMAND, REAR_M, InMemory, Tin
 
 from agvbench.diagnosis import Verdict, diagnose
 from agvbench.diagnosis.data.readings import read_runs
-from agvbench.diagnosis.data.splits import split_runs
+from agvbench.diagnosis.data.splits import split_runs, with_other_validation
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.nodal_maps import ROLES, nodal_maps
 from agvbench.diagnosis.model.steady_drives import start_values, steady_drives
@@ -107,3 +107,17 @@ def test_test_runs_change_no_name_and_no_parameter(tiny_campaign):
     runs = {"tested": names.count("held_out"), "repeats": len(names) - names.count("fit")}
     assert found.provenance["lack_of_fit_runs"] == runs
     assert found.held_out.errors["position_rms_mm"]["after"] > found.held_out.errors["position_rms_mm"]["before"]
+
+
+def test_validation_runs_that_reject_everything_join_the_training_runs(tiny_campaign):
+    late, prompt = (list(tiny_campaign(Tiny(delay_s=delay))) for delay in (0.1, 0.0))
+    readings = read_runs(late, HEADER.neutral)
+    split = split_runs(readings.runs, readings.group, 0)
+    runs = [other if v else own for own, other, v in zip(late, prompt, split.validation, strict=True)]
+    said = []
+    found = diagnose(InMemory(runs), on_progress=said.append)
+    again = with_other_validation(split, readings.runs, readings.group, 0)
+    repeated = said.index("the selection is repeated with these runs among the training runs")
+    assert "rejected in validation" in said[repeated - 1]
+    assert said[repeated + 1].startswith(f"{again.training.sum()} training runs, {again.validation.sum()} validation")
+    assert found.held_out.runs == split.test.sum()
