@@ -9,6 +9,7 @@ import pytest
 from tiny_selector import selector_of
 from tiny_vehicle import HEADER, Tiny
 
+from agvbench.diagnosis.model.repeats import Repeats
 from agvbench.diagnosis.selection.candidates import candidates, default_candidate
 from agvbench.effects import effect_kinds
 from agvbench.effects.variants import effect_variants
@@ -51,3 +52,11 @@ def test_what_is_predicted_to_gain_too_little_is_not_fitted_in_the_place_of_an_e
     least = 0.1 * (base.fit.total_loss - chosen.fit.total_loss)
     assert set(likely) == {name for name in others if selector.predicted_gain(base, name) >= least}
     assert 0 < len(likely) < len(others)
+
+
+def test_repeats_that_a_droop_makes_differ_do_not_hide_it(tiny_campaign):
+    shared, alone = (selector_of(tiny_campaign(Tiny(droop_per_hour=0.1))) for _ in range(2))
+    alone.batch.repeats = Repeats(np.arange(len(alone.batch.readings)))
+    gains = [one.predicted_gain(one.base(), "battery_droop") for one in (shared, alone)]
+    assert gains[1] > 20.0
+    assert gains[0] == pytest.approx(gains[1], rel=0.3)

@@ -13,7 +13,7 @@ from agvbench.types import Floats
 
 _SAME_TIME_S = 0.02
 # Runs are predicted alike if their poses differ by less, relative to the distance from the start, and in heading [rad].
-_SAME_SHARE, _SAME_HEADING = 0.1, 0.1
+_SAME_SHARE, _SAME_HEADING = 0.02, 0.02
 
 
 @dataclass(frozen=True)
