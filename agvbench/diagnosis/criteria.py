@@ -116,7 +116,7 @@ class SelectionCriteria:
         still gain.
     ``likely_share``
         Share of an effect's gain in fit that another must be predicted to take, to first order, to be fitted in its
-        place. Runs from rest have a criterion of their own.
+        place. It is low, because such predictions may be several times too small.
     ``superior_share``
         An effect that is predicted to gain less than this share of what another one gains is not fitted in that step.
         A gain that is predicted to first order is rarely more than twice too small. In free driving every effect is
