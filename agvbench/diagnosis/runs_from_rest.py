@@ -81,12 +81,14 @@ class RunsFromRest(Method[SelectedFromRest]):
         runs, and the selection is repeated with other validation runs. What it finds is fitted to both parts.
         """
         selected = self._selected(readings, split)
+        if not selected.is_rejected:
+            return selected
         again = with_other_validation(split, readings.runs, readings.group, self.context.seed)
-        if not selected.is_rejected or again is None:
+        if again is None:
             return selected
         self.on_progress("the selection is repeated with these runs among the training runs")
         other = self._selected(readings, again)
-        if other.is_rejected or not (other.library.gains or other.with_term):
+        if not (other.library.gains or other.with_term):
             return selected
         library, with_term = refit_to_all(other.library, other.with_term, other.selector, readings.select(~again.test))
         return replace(other, library=library, with_term=with_term)
@@ -131,8 +133,7 @@ class RunsFromRest(Method[SelectedFromRest]):
 
     def conclude(self, readings: Readings, split: Split, selected: SelectedFromRest) -> Diagnosis:
         """Open the test runs, and return the diagnosis."""
-        split = selected.split
-        batch = selected.selector.batch
+        batch, split = selected.selector.batch, selected.split
         readings = replace(readings, preset=batch.readings.preset)
         context = replace(self.context, geometry=batch.geometry)
         return conclude(

@@ -187,7 +187,7 @@ def test_repeats_that_each_differ_by_another_amount_are_evidence_and_no_second_v
     runs = _spread_over_an_evening()
     random = np.random.default_rng(1)
     disturbed = np.where(random.random(len(runs)) < 0.5, random.uniform(0.1, 0.6, len(runs)), 0.0)
-    require_consistent_repeats(read_runs(_turned(runs, disturbed)), where="campaign tiny")
+    assert require_consistent_repeats(read_runs(_turned(runs, disturbed)), where="campaign tiny") is None
 
 
 @pytest.mark.slow

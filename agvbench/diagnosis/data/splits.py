@@ -92,9 +92,7 @@ def with_other_validation(split: Split, runs: Sequence[Run], group: NDArray[np.i
     """
     if not split.validation.any() or any(run.split for run in runs):
         return None
-    rest, rng = np.flatnonzero(split.training), np.random.default_rng([0x0A6A, seed])
-    validation = np.zeros_like(split.training)
-    validation[rest[_drawn([runs[int(i)] for i in rest], group[rest], rng, DATA.test_share / 2.0)]] = True
+    validation = _for_validation(runs, group, split.training, np.random.default_rng([0x0A6A, seed]))
     return Split(~(split.test | validation), validation, split.test)
 
 
@@ -126,9 +124,17 @@ def split_runs(runs: Sequence[Run], group: NDArray[np.int64], seed: int) -> Spli
         named = {run.split for run in runs}
         raise FitError("the column split must name training runs and test runs", where="runs", value=named)
     if not validation.any():
-        rest = np.flatnonzero(training)
-        validation[rest[_drawn([runs[int(i)] for i in rest], group[rest], rng, DATA.test_share / 2.0)]] = True
+        validation = _for_validation(runs, group, training, rng)
     return Split(training & ~validation, validation, test)
+
+
+def _for_validation(
+    runs: Sequence[Run], group: NDArray[np.int64], training: NDArray[np.bool_], rng: np.random.Generator
+) -> NDArray[np.bool_]:
+    """Return which runs (R,) are drawn for validation from the `training` runs (R,): an eighth of them."""
+    rest, validation = np.flatnonzero(training), np.zeros_like(training)
+    validation[rest[_drawn([runs[int(i)] for i in rest], group[rest], rng, DATA.test_share / 2.0)]] = True
+    return validation
 
 
 def _for_test(runs: Sequence[Run], group: NDArray[np.int64], held: NDArray[np.bool_]) -> NDArray[np.bool_]:

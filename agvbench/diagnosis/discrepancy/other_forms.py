@@ -37,8 +37,6 @@ def models_of_other_forms(extended: Selector, selection: Selection) -> list[Mode
 
 def with_other_forms(selection: Selection, selector: Selector) -> Selection:
     """Return the selection with the terms that predict as well in the place of an effect, as its alternatives."""
-    if not any(cause_of(name) in term.form_of for name in selection.gains for term in TERMS):
-        return selection
     alternatives = dict(selection.alternatives)
     for name, term, model in models_of_other_forms(with_extended_library(selector), selection):
         worse = model.deviance - selection.chosen.deviance

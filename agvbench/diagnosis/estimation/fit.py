@@ -64,7 +64,7 @@ class Fit:
         gradient = self.gradient.sum(axis=0) + self.prior.gradient
         return float(gradient @ np.linalg.lstsq(self.total_information, gradient, rcond=1e-12)[0])
 
-    @property
+    @cached_property
     def covariance(self) -> Floats:
         """Covariance of the parameters (P, P)."""
         return np.asarray(np.linalg.pinv(self.total_information, hermitian=True))

@@ -10,12 +10,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.diagnosis.residuals.repeatability import groups_of_repeats
 from agvbench.types import Floats
 
 _FLIPS = 9999
 
 
-def bias_p_value(ends: Floats, group: NDArray[np.int64], seed: int = 0) -> float | None:
+def bias_p_value(ends: Floats, group: NDArray[np.int64]) -> float | None:
     """Return the p-value of the test that no group of repeats has a bias; None if no run has a repeat.
 
     The statistic is the sum over groups of the share of the squared residuals that the mean residual explains. Each
@@ -29,14 +30,11 @@ def bias_p_value(ends: Floats, group: NDArray[np.int64], seed: int = 0) -> float
         (R, 2): residuals of the end positions, along and across the initial heading [m].
     group
         (R,): the group of each run.
-    seed
-        Of the random signs.
     """
-    parts = [ends[group == g] for g in np.unique(group)]
-    parts = [own for own in parts if len(own) > 1 and np.any(own)]
+    parts = [own for runs in groups_of_repeats(group) if np.any(own := ends[runs])]
     if not parts:
         return None
-    rng, observed, flipped = np.random.default_rng([0xB1A5, seed]), 0.0, np.zeros(_FLIPS)
+    rng, observed, flipped = np.random.default_rng([0xB1A5, 0]), 0.0, np.zeros(_FLIPS)
     for own in parts:
         squares = len(own) * float(np.sum(own**2))
         signs = rng.integers(0, 2, (_FLIPS, len(own))) * 2.0 - 1.0

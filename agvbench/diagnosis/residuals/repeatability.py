@@ -35,7 +35,7 @@ def repeatability(residuals: PoseResiduals, group: NDArray[np.int64], started_h:
     started_h
         (R,): when each run began [h].
     """
-    ordered = [own[np.argsort(started_h[own], kind="stable")] for own in _groups(group)]
+    ordered = [own[np.argsort(started_h[own], kind="stable")] for own in groups_of_repeats(group)]
     return _root_mean_squares(residuals, ordered, _successive)
 
 
@@ -45,10 +45,10 @@ def reproducibility(residuals: PoseResiduals, group: NDArray[np.int64]) -> dict[
     It contains what changes during an evening and between sessions. ISO 5725-3 calls it intermediate precision, since
     laboratory and vehicle are the same.
     """
-    return _root_mean_squares(residuals, _groups(group), _from_mean)
+    return _root_mean_squares(residuals, groups_of_repeats(group), _from_mean)
 
 
-def _groups(group: NDArray[np.int64]) -> Groups:
+def groups_of_repeats(group: NDArray[np.int64]) -> Groups:
     """Return the runs of each group with at least two."""
     return [own for g in np.unique(group) if len(own := np.flatnonzero(group == g)) > 1]
 

@@ -99,6 +99,11 @@ class PoseResiduals:
         squares = self.squares()
         return {name: UNITS[name] * float(np.sqrt(np.mean(squares[name]))) for name in QUANTITIES}
 
+    def exceed(self, spread: Mapping[str, float], multiple: float) -> bool:
+        """Return whether position or heading along the path exceeds a multiple of the spread of repeats."""
+        own = self.rms()
+        return any(own[name] > multiple * spread[name] for name in ("position_rms_mm", "heading_rms_deg"))
+
     def squares(self) -> Mapping[str, Floats]:
         """Return each quantity's mean square of each run (R,): runs have equal weights, whatever their length."""
         count, ends = np.maximum(self.seen.sum(axis=1), 1), self.ends**2

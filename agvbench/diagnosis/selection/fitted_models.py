@@ -69,7 +69,11 @@ class ScoredModel:
         If few runs determine a nodal value, predictions without them are unreliable, and the cross-validated deviance
         may differ by a hundred. A gain that does not show in the fit itself does not count.
         """
-        return min(other.deviance - self.deviance, other.fit.total_loss - self.fit.total_loss)
+        return min(other.deviance - self.deviance, self.fit_gain_over(other))
+
+    def fit_gain_over(self, other: ScoredModel) -> float:
+        """Return the gain in deviance of the fit, whatever the cross-validated gain."""
+        return other.fit.total_loss - self.fit.total_loss
 
     def is_matched_by(self, other: ScoredModel) -> bool:
         """Return whether `other` predicts as well: by the margin of alternatives this model gains nothing over it."""
@@ -127,7 +131,7 @@ class FittedModels:
         starts = frozenset(start for start in current.starts if start[0] != name)
         maps, base_maps = (model.fit.parameters[: self.batch.maps.size] for model in (current, base))
         without = self.score(names, np.r_[maps, kept], current.fit, starts=starts)
-        if without.fit.total_loss - current.fit.total_loss < FIT.large_loss_of_removal:
+        if current.fit_gain_over(without) < FIT.large_loss_of_removal:
             return without
         again = starts | {(f"maps without {name}", base_maps.tobytes())}
         try:

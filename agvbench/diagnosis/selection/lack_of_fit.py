@@ -18,10 +18,7 @@ def has_lack_of_fit(model: ScoredModel) -> bool:
     p_value = lack_of_fit(residuals, readings.group)
     if least is None or p_value is None or p_value >= RESIDUAL.lack_of_fit_alpha:
         return False
-    return any(
-        residuals.rms()[name] > RESIDUAL.within_repeatability * least[name]
-        for name in ("position_rms_mm", "heading_rms_deg")
-    )
+    return residuals.exceed(least, RESIDUAL.within_repeatability)
 
 
 def has_structure(model: ScoredModel, seed: int) -> bool:

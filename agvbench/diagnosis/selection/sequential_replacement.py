@@ -105,7 +105,7 @@ def _in_place_of(extended: Selector, base: ScoredModel, current: ScoredModel, na
     """
     without = extended.without_effect(base, current, name)
     causes = {cause_of(present) for present in current.names}
-    gain = without.fit.total_loss - current.fit.total_loss
+    gain = current.fit_gain_over(without)
     geometry = extended.batch.geometry
     library = [other for other in extended.candidates if cause_of(other) not in causes]
     predicted = {other: extended.predicted_gain(without, other) for other in library}

@@ -210,7 +210,7 @@ class Selector(FittedModels):
 
         They are predicted to gain less than `likely_share` of what `current` gains over `without`.
         """
-        least = self.criteria.likely_share * (without.fit.total_loss - current.fit.total_loss)
+        least = self.criteria.likely_share * current.fit_gain_over(without)
         return {n: self.with_effect(without, n) for n in others if self.predicted_gain(without, n) >= least}
 
 

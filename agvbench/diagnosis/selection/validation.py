@@ -43,19 +43,14 @@ class Assessment:
 
     @property
     def has_lack_of_fit(self) -> bool:
-        """Whether the residuals exceed the repeatability, and the lack of fit is significant."""
-        significant = self.lack_of_fit is not None and self.lack_of_fit < RESIDUAL.lack_of_fit_alpha
-        return self._exceeds(RESIDUAL.within_repeatability) and (significant or self._is_far_beyond)
-
-    @property
-    def _is_far_beyond(self) -> bool:
-        """Whether the residuals are far beyond the repeatability, and to the same side in repeats."""
-        is_biased = self.bias is not None and self.bias < RESIDUAL.lack_of_fit_alpha
-        return is_biased and self._exceeds(RESIDUAL.far_beyond_repeatability)
-
-    def _exceeds(self, multiple: float) -> bool:
-        after, least = self.after.rms(), self.repeatability
-        return any(after[name] > multiple * least[name] for name in ("position_rms_mm", "heading_rms_deg"))
+        """Whether the residuals exceed the repeatability significantly, or far and to the same side in repeats."""
+        tests = (self.lack_of_fit, RESIDUAL.within_repeatability), (self.bias, RESIDUAL.far_beyond_repeatability)
+        return any(
+            p_value is not None
+            and p_value < RESIDUAL.lack_of_fit_alpha
+            and self.after.exceed(self.repeatability, multiple)
+            for p_value, multiple in tests
+        )
 
 
 def assess(

@@ -157,7 +157,7 @@ def _replacements(selection: Selection, selector: Selector, extended: Selector, 
     """
     chosen = selection.chosen
     without = selector.without_effect(selection.base, chosen, name)
-    chosen_gains = without.deviance - chosen.deviance, _fit_gain(without, chosen)
+    chosen_gains = without.deviance - chosen.deviance, chosen.fit_gain_over(without)
     others = [other for other in selector.candidates if other not in chosen.names]
     models = {name: chosen} | selector.likely(without, chosen, others)
     for variant in effect_variants().values():
@@ -166,7 +166,7 @@ def _replacements(selection: Selection, selector: Selector, extended: Selector, 
         kind = candidate(variant)
         if (model := models.get(variant.variant_of)) is not None:
             # A strong effect with the wrong equation fits well and predicts badly.
-            gains = without.deviance - model.deviance, _fit_gain(without, model)
+            gains = without.deviance - model.deviance, model.fit_gain_over(without)
             if any(own >= VARIANT.min_gain_share * gain for own, gain in zip(gains, chosen_gains, strict=True)):
                 yield _Replacement(name, variant, _starts_of(variant, model))
                 continue
@@ -181,11 +181,6 @@ def _is_new(replacement: _Replacement, current: ScoredModel) -> bool:
     """Return whether no other effect of the model has the cause of the variant: a model has one equation per cause."""
     others = {cause_of(name) for name in current.names if name != replacement.replaced}
     return replacement.variant.variant_of not in others
-
-
-def _fit_gain(without: ScoredModel, model: ScoredModel) -> float:
-    """Return the gain of `model` in deviance of the fit, whatever its cross-validated gain."""
-    return without.fit.total_loss - model.fit.total_loss
 
 
 def _starts_of(variant: type[Variant], model: ScoredModel) -> Floats:
@@ -215,10 +210,10 @@ def _swapped_models(
     smaller = []
     for one, model in swapped:
         # A model with fewer effects fits no better: nothing is removed from one that fits much worse already.
-        if _fit_gain(current, model) < -VARIANT.max_fit_loss or model.deviance > least + extended.min_gain:
+        if model.fit_gain_over(current) < -VARIANT.max_fit_loss or model.deviance > least + extended.min_gain:
             continue
-        others = [name for name in current.names if name != one.replaced and name not in extended.given]
-        others = [name for name in others if _may_be_unnecessary(name, current, model)]
+        present = {*current.names} - {one.replaced, *extended.given}
+        others = [name for name in current.names if name in present and _may_be_unnecessary(name, current, model)]
         with suppress(np.linalg.LinAlgError):
             smaller += [
                 (one, _swapped(extended, current, {one.replaced, other}, _variant_candidate(one))) for other in others

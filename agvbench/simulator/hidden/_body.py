@@ -46,9 +46,32 @@ _HOUR_S = 3600.0
 
 
 @cached_njit()
+def warmth(p: Floats, session_s: float) -> float:
+    """Return by what factor the steering, or the tyres' grip in turns, has changed since the session began."""
+    return 1.0 + p[WARM_GAIN] * (1.0 - math.exp(-session_s / (_HOUR_S * p[WARM_HOURS])))
+
+
+@cached_njit()
+def slipping(p: Floats, yaw_rate: float, speed: float) -> float:
+    """Return the yaw rate that slip leaves at a `speed` (its magnitude)."""
+    return yaw_rate / (1.0 + p[SLIP_SQUARE] * speed * speed + p[SLIP_LINEAR] * speed)
+
+
+@cached_njit()
+def over_floor(p: Floats, heading: float, forward: float, lateral: float, speed: float) -> tuple[float, float]:
+    """Return the time derivatives of x and y of a body that the floor lets drift; `speed` is its magnitude."""
+    drift = p[DRIFT_SHARE] * speed + (p[DRIFT] if speed > MOVES_MPS else 0.0)
+    c, s = math.cos(heading), math.sin(heading)
+    return (
+        c * forward - s * lateral + drift * math.cos(p[DRIFT_DIRECTION]),
+        s * forward + c * lateral + drift * math.sin(p[DRIFT_DIRECTION]),
+    )
+
+
+@cached_njit()
 def wheels(p: Floats, front: float, rear: float, speed: float, session_s: float) -> tuple[float, float]:
     """Return the wheels' angles [rad] for the axles' angles: what the linkage makes of them."""
-    warm = 1.0 + p[WARM_GAIN] * (1.0 - math.exp(-session_s / (_HOUR_S * p[WARM_HOURS])))
+    warm = warmth(p, session_s)
     front, rear = warm * front + p[FRONT_TRIM], warm * rear
     front, rear = front + p[FRONT_FROM_REAR] * rear, rear + p[REAR_FROM_FRONT] * front
     if speed < 0.0:
@@ -93,15 +116,9 @@ def motion(
     path_speed = math.copysign(math.hypot(longitudinal, lateral), longitudinal)
     fast = abs(path_speed)
     turn = longitudinal * (tan_front - tan_rear) / (lf + lr)
-    turn = turn / (1.0 + p[SLIP_SQUARE] * fast * fast + p[SLIP_LINEAR] * fast) + p[WHEEL_CURVATURE] * path_speed
+    turn = slipping(p, turn, fast) + p[WHEEL_CURVATURE] * path_speed
     uneven = p[RUNOUT] * math.sin(2.0 * math.pi * rolled / p[RUNOUT_PERIOD] + p[RUNOUT_PHASE])
     turn -= uneven / p[RUNOUT_TRACK] * longitudinal
     longitudinal += 0.5 * uneven * longitudinal
-    drift = p[DRIFT_SHARE] * fast + (p[DRIFT] if fast > MOVES_MPS else 0.0)
-    c, s = math.cos(heading), math.sin(heading)
-    return (
-        c * longitudinal - s * lateral + drift * math.cos(p[DRIFT_DIRECTION]),
-        s * longitudinal + c * lateral + drift * math.sin(p[DRIFT_DIRECTION]),
-        turn,
-        abs(speed),
-    )
+    x_rate, y_rate = over_floor(p, heading, longitudinal, lateral, fast)
+    return x_rate, y_rate, turn, abs(speed)

@@ -10,23 +10,16 @@ from __future__ import annotations
 import math
 
 from agvbench.compiled import cached_njit
-from agvbench.simulator.hidden._body import MOVES_MPS, grip
+from agvbench.simulator.hidden._body import grip, over_floor, slipping, warmth
 from agvbench.simulator.hidden.constants import (
     CASTER_KICK,
     CASTER_TRAIL,
     COURSE_CURVATURE,
-    DRIFT,
-    DRIFT_DIRECTION,
-    DRIFT_SHARE,
     REAR_AXLE,
     RUNOUT,
     RUNOUT_PERIOD,
     RUNOUT_PHASE,
-    SLIP_LINEAR,
-    SLIP_SQUARE,
     TRACK,
-    WARM_GAIN,
-    WARM_HOURS,
     WHEEL_CURVATURE,
 )
 from agvbench.types import Floats
@@ -35,7 +28,6 @@ CASTER_AHEAD_M = 0.12
 """From the axle to the caster."""
 CASTER_BEGINS_RAD = 0.3
 """The angle at which a vehicle that was set down has its caster: nearly as if it had come forward."""
-_HOUR_S = 3600.0
 
 
 @cached_njit()
@@ -55,24 +47,16 @@ def motion(
     `uneven` holds by what share each wheel, left and right, is faster in this run.
     """
     x, y, heading, rolled = at
-    warm = 1.0 + p[WARM_GAIN] * (1.0 - math.exp(-session_s / (_HOUR_S * p[WARM_HOURS])))
-    half = 0.5 * p[TRACK] * warm * yaw_rate
+    half = 0.5 * p[TRACK] * warmth(p, session_s) * yaw_rate
     left_of_speed = grip(p, x, y, heading, 0.0, 0.0)
     eccentric = p[RUNOUT] * math.sin(2.0 * math.pi * rolled / p[RUNOUT_PERIOD] + p[RUNOUT_PHASE])
     left = (speed - half) * left_of_speed * (1.0 + uneven[0]) * (1.0 + eccentric)
     right = (speed + half) * left_of_speed * (1.0 + uneven[1])
     forward, turn = 0.5 * (left + right), (right - left) / p[TRACK]
     fast = abs(forward)
-    turn = turn / (1.0 + p[SLIP_SQUARE] * fast * fast + p[SLIP_LINEAR] * fast)
+    turn = slipping(p, turn, fast)
     turn += p[WHEEL_CURVATURE] * forward + p[COURSE_CURVATURE] * fast
     turn += p[CASTER_KICK] / math.pi * caster_rate(p, caster, forward, turn) if p[CASTER_KICK] != 0.0 else 0.0
     lateral = p[REAR_AXLE] * turn
-    moves = math.hypot(forward, lateral)
-    drift = p[DRIFT_SHARE] * moves + (p[DRIFT] if moves > MOVES_MPS else 0.0)
-    c, s = math.cos(heading), math.sin(heading)
-    return (
-        c * forward - s * lateral + drift * math.cos(p[DRIFT_DIRECTION]),
-        s * forward + c * lateral + drift * math.sin(p[DRIFT_DIRECTION]),
-        turn,
-        abs(left),
-    )
+    x_rate, y_rate = over_floor(p, heading, forward, lateral, math.hypot(forward, lateral))
+    return x_rate, y_rate, turn, abs(left)
