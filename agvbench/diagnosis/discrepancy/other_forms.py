@@ -37,8 +37,11 @@ def models_of_other_forms(extended: Selector, selection: Selection) -> list[Mode
 
 def with_other_forms(selection: Selection, selector: Selector) -> Selection:
     """Return the selection with the terms that predict as well in the place of an effect, as its alternatives."""
+    models = models_of_other_forms(with_extended_library(selector), selection)
+    if not models:
+        return selection
     alternatives = dict(selection.alternatives)
-    for name, term, model in models_of_other_forms(with_extended_library(selector), selection):
+    for name, term, model in models:
         worse = model.deviance - selection.chosen.deviance
         if worse < SELECTION.alternative_margin:
             alternatives[name] = alternatives.get(name, {}) | {term.name: worse}

@@ -35,13 +35,13 @@ class Request:
     starts: Starts = frozenset()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ScoredModel:
     """A fitted model: its effects, the cross-validated loss of each run (R,), and non-default initial values."""
 
     names: tuple[str, ...]
-    fit: Fit
-    loss: Floats
+    fit: Fit = field(repr=False)
+    loss: Floats = field(repr=False)
     starts: Starts = frozenset()
 
     @property
