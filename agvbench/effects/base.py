@@ -130,7 +130,8 @@ class Effect:
         ``REAR_WAIT`` and ``DRIVE_WAIT``.
     aim
         Called when a command takes effect, which is in ``DRIVE_COMMAND`` …; may change the aims and the dynamics of the
-        actuators: ``FRONT_AIM`` … ``BRAKE_LAG``, ``STEERING_INERTIA`` … ``BRAKING_LIMIT``, ``DRIVE_INERTIA``.
+        actuators: ``FRONT_AIM`` … ``BRAKE_LAG``, ``STEERING_INERTIA`` … ``BRAKING_LIMIT``, ``DRIVE_INERTIA``,
+        ``DRIVE_BACKLASH``.
     steer
         Called at every time of evaluation, as all hooks below; may change ``FRONT`` and ``REAR``.
     drive

@@ -57,6 +57,8 @@ REAR_BACKLASH = 51
 DRIVE_INERTIA = 52
 # Hysteresis of each axle: how far it lags behind, as a share of the most (−1…1), and the angle at which that holds.
 FRONT_LAGS, REAR_LAGS, FRONT_LAGS_AT, REAR_LAGS_AT = range(53, 57)
+# Backlash of the drive train: the distance that the wheels would go while the motor turns through it at a start.
+DRIVE_BACKLASH = 57
 # What the lab logged about the run, each column standardised; 0 where nothing was logged.
-LOGGED, LOGGED_COUNT = 57, 16
+LOGGED, LOGGED_COUNT = 58, 16
 SIZE = LOGGED + LOGGED_COUNT

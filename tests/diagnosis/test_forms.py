@@ -53,6 +53,18 @@ def test_an_elastic_drive_train_is_a_speed_lag_with_its_force_in_each_direction(
 
 
 @pytest.mark.slow
+def test_a_drive_with_a_lag_and_a_backlash_is_no_filter_of_the_camera(tiny_campaign):
+    """Both round the speed off, which no limit of the force does, and a filter of the camera seems to."""
+    train = {"ramp_forward_mps2": 1.1, "ramp_backward_mps2": 0.9, "coast_s": 0.3, "spring_per_s2": 2.5}
+    found = diagnose(tiny_campaign(Tiny(**train, ramp_lag_s=0.08, drive_gap_m=0.012, steering_lag_s=0.1)))
+    effects = {effect.name: effect for effect in found.effects}
+    assert "mocap_latency" not in effects
+    parameters = effects["speed_lag"].parameters
+    assert parameters["lag_s"].value == pytest.approx(0.08, rel=0.25)
+    assert parameters["backlash_m"].value == pytest.approx(0.012, rel=0.25)
+
+
+@pytest.mark.slow
 def test_an_axle_that_brakes_and_the_drag_of_turned_wheels_are_both_measured(tiny_campaign):
     """Drag acts against both axles at once: where it is large, none of them brakes."""
     found = diagnose(tiny_campaign(Tiny(overrun=2.0, cornering_loss=0.08)))

@@ -59,6 +59,8 @@ class Tiny:
     coast_s: float = 0.0
     ramp_forward_mps2: float = 0.0
     ramp_backward_mps2: float = 0.0
+    ramp_lag_s: float = 0.0
+    drive_gap_m: float = 0.0
     spring_per_s2: float = 0.0
     relaxation_s: float = 0.5
     slip: float = 0.0
@@ -115,7 +117,7 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
     warm = 1.0 + tiny.warm_gain * -math.expm1(-started_s / 3600.0 / tiny.warm_h)
     x, y, heading = start
     front, rear, speed = front_of(NEUTRAL) + f_off, rear_of(NEUTRAL) + r_off, 0.0
-    turning, loose, driven, windup = [0.0, 0.0], [front, rear], 0.0, 0.0
+    turning, loose, driven, windup, gap_m = [0.0, 0.0], [front, rear], 0.0, 0.0, 0.0
     strained = [(front, 0.0), (rear, 0.0)]
     poses, times = [], []
     steps = round((commands.t_s[-1] + _AFTER_S + _BEFORE_S) / _STEP_S)
@@ -127,6 +129,8 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
         row = int(np.searchsorted(commands.t_s, t - tiny.delay_s + 1e-12, side="right")) - 1
         c = commands.at(row) if row >= 0 else Command(NEUTRAL, NEUTRAL, NEUTRAL)
         told = speed_of(c.drive) * gain
+        gap_m = tiny.drive_gap_m if told == 0.0 else gap_m - abs(told) * _STEP_S
+        told = 0.0 if gap_m > 0.0 else told
         lags = tiny.steering_lag_s, tiny.rear_lag_ratio * tiny.steering_lag_s
         away = [1.0 - math.exp(-_STEP_S / lag) if lag else 1.0 for lag in lags]
         was = front, rear, speed
@@ -208,7 +212,8 @@ def driven_speed(tiny: Tiny, told: float, lag: float, speed: float, windup: floa
         return speed, windup + (speed - windup / tiny.relaxation_s) * _STEP_S
     if told != 0.0 and tiny.ramp_forward_mps2:
         ramp = (tiny.ramp_forward_mps2 if told > 0.0 else tiny.ramp_backward_mps2) * _STEP_S
-        return min(max(told, speed - ramp), speed + ramp), windup * (1.0 - _STEP_S / tiny.relaxation_s)
+        closer = (told - speed) * (1.0 - math.exp(-_STEP_S / tiny.ramp_lag_s) if tiny.ramp_lag_s else 1.0)
+        return speed + min(max(closer, -ramp), ramp), windup * (1.0 - _STEP_S / tiny.relaxation_s)
     return speed + (told - speed) * (1.0 - math.exp(-_STEP_S / lag) if lag else 1.0), windup
 
 

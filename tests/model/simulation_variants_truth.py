@@ -141,13 +141,13 @@ def coasted(aim: Path, moments: Floats, acceleration: float, coast_s: float, end
 
 
 def sprung(aim: Path, moments: Floats, values: dict[str, float], end: float) -> Path:
-    """Return the path of a speed that ramps under power, and that friction and a relaxing spring brake without."""
+    """Return the path of a speed that obeys a limited motor, and without power friction and a relaxing spring."""
 
     def equation(aimed: float) -> Callable[[float, Floats], list[float]]:
         def slopes(_: float, y: Floats) -> list[float]:
             v, w = y
             if aimed != 0.0:
-                return [0.0, -w / values["relaxation_s"]]
+                return [0.0, -w / values["relaxation_s"]]  # the speed under power has a closed form
             return [-v / values["coast_s"] - values["spring_per_s2"] * w, v - w / values["relaxation_s"]]
 
         return slopes
@@ -157,17 +157,43 @@ def sprung(aim: Path, moments: Floats, values: dict[str, float], end: float) -> 
         aimed = float(aim(begin + 1e-9))
         found = solve_ivp(equation(aimed), (begin, until), state, dense_output=True, **_TIGHT)
         limit = values["forward_mps2" if aimed > 0.0 else "backward_mps2"]
-        piece = partial(_sprung_speed, found.sol, aimed, begin, state[0], limit)
+        piece = partial(_sprung_speed, found.sol, aimed, begin, state[0], limit, values.get("lag_s", 0.0))
         pieces.append(piece)
         state = np.array([piece(until), found.y[1, -1]])
     begins = moments.tolist()
     return lambda t: pieces[max(0, bisect.bisect_right(begins, t) - 1)](max(t, begins[0]))
 
 
-def _sprung_speed(sol: Any, aimed: float, begin: float, was: float, acceleration: float, t: float) -> float:
+def _sprung_speed(
+    sol: Any, aimed: float, begin: float, was: float, acceleration: float, lag_s: float, t: float
+) -> float:
     if aimed == 0.0:
         return float(sol(t)[0])
-    return was + math.copysign(min(abs(aimed - was), acceleration * (t - begin)), aimed - was)
+    short, since = abs(aimed - was), t - begin
+    ramp_s = max(0.0, short / acceleration - lag_s)
+    left = short - acceleration * min(since, ramp_s)
+    if since > ramp_s:
+        left *= math.exp((ramp_s - since) / lag_s) if lag_s > 0.0 else 0.0
+    return aimed - math.copysign(left, aimed - was)
+
+
+def backlash_closes(moments: Floats, speeds: Floats, backlash_m: float) -> tuple[Floats, list[int]]:
+    """Return when commands move the wheels, and which do, by turning the motor through the backlash in small steps.
+
+    ``moments`` (n,) of commands, ``speeds`` (n,) of the wheels; the vehicle is at rest before the first. A command that
+    another replaces before the backlash is closed moves nothing.
+    """
+    times, moving, left = [], [], backlash_m
+    for row, (begin, until, speed) in enumerate(zip(moments, [*moments[1:], math.inf], speeds, strict=True)):
+        now, left = begin, left if speed != 0.0 else 0.0
+        while left > 1e-12 and now < until:
+            step = min(1e-5, left / abs(speed), until - now)
+            now, left = now + step, left - abs(speed) * step
+        if left <= 1e-12:
+            times.append(now)
+            moving.append(row)
+        left = backlash_m if speed == 0.0 else left
+    return np.array(times), moving
 
 
 def _pieces(equation: Any, aim: Path, state: Floats, moments: Floats, end: float) -> Path:
@@ -262,7 +288,8 @@ def true_form(name: str, values: dict[str, float], start: tuple[float, float, fl
     if name == "speed_lag_inertia":
         speed = second_order(speed, 0.0, drives, values["time_constant_s"], values["inertia_s"], end)
     if name == "speed_lag_spring_back":
-        speed = sprung(speed, drives, values, end)
+        drives, _ = backlash_closes(drives, SETTLED[:, 2], values.get("backlash_m", 0.0))
+        speed = sprung(aims(2, drives), drives, values, end)
     smoothing = values.get("time_constant_s", 0.0) if name == "mocap_latency_smoothing" else 0.0
     seen = times - values.get("latency_s", 0.0)
     return drive(front, rear, speed, np.array(start), seen, np.r_[fronts, rears, drives], smoothing)

@@ -7,7 +7,16 @@ import math
 import numpy as np
 import pytest
 from simulation_truth import COMMANDS, FRAMES, LF, LR, REST, RUN_TIMES, SETTLED
-from simulation_variants_truth import aims, at_once, drive, servo_path, sprung, true_form, with_play
+from simulation_variants_truth import (
+    aims,
+    at_once,
+    backlash_closes,
+    drive,
+    servo_path,
+    sprung,
+    true_form,
+    with_play,
+)
 
 from agvbench.effects import effect_kinds
 from agvbench.effects.variants import effect_variants
@@ -45,6 +54,18 @@ SIZES = [
     (
         "speed_lag_spring_back",
         {"forward_mps2": 0.5, "backward_mps2": 0.9, "coast_s": 0.1, "spring_per_s2": 1.0, "relaxation_s": 0.5},
+    ),
+    (
+        "speed_lag_spring_back",
+        {
+            "forward_mps2": 0.5,
+            "backward_mps2": 0.9,
+            "coast_s": 0.4,
+            "spring_per_s2": 2.5,
+            "relaxation_s": 0.5,
+            "lag_s": 0.2,
+            "backlash_m": 0.02,
+        },
     ),
     ("mocap_latency_smoothing", {"latency_s": 0.03, "time_constant_s": 0.12}),
     ("mocap_latency_smoothing", {"latency_s": 0.0, "time_constant_s": 0.004}),
@@ -135,6 +156,31 @@ def test_the_windup_lasts_over_commands_without_power_and_relaxes_under_power():
     speed = sprung(at_once(np.r_[0.0, settled[:, 2]], moments), moments, values, 6.0)
     truth = drive(front, rear, speed, np.array(START), frames, moments, 0.0)
     np.testing.assert_allclose(predicted, truth, atol=3e-6)
+
+
+def test_a_backlash_is_closed_by_several_commands_and_opens_at_every_stop():
+    """A slow command does not close it, a faster one does; a stop before it is closed leaves the vehicle at rest."""
+    values = {
+        "forward_mps2": 2.0, "backward_mps2": 2.0, "coast_s": 0.1, "spring_per_s2": 0.0, "lag_s": 0.05,
+        "relaxation_s": 0.5, "backlash_m": 0.03,
+    }  # fmt: skip
+    moments = np.array([0.1, 0.4, 0.5, 1.5, 2.5, 2.6, 3.6])
+    speeds = np.array([0.05, 0.1, 0.3, 0.0, -0.2, 0.0, 0.25])
+    frames = np.arange(0.0, 4.5, 0.04)
+    ids = np.arange(1.0, 8.0)
+    run = SimulatedRun(Commands(moments, 1500.0 + ids, 1500.0 + ids, 1500.0 + ids), frames)
+    simulation = Simulation(Geometry(LF, LR), NEUTRAL, [run], kinds=tuple(effect_variants().values()))
+    parameters = simulation.parameters([effect_variants()["speed_lag_spring_back"](**values)])
+    angles = np.tile([0.2, -0.1], (8, 1))
+    predicted = simulation.predict(np.column_stack([angles, np.r_[0.0, speeds]]), parameters, INITIAL)
+    moved, rows = backlash_closes(moments, speeds, values["backlash_m"])
+    assert rows == [2, 3, 5, 6]
+    assert moved[0] == pytest.approx(moments[2] + 0.005 / 0.3, abs=1e-6)
+    speed = sprung(at_once(np.r_[0.0, speeds[rows]], moved), moved, values, 6.0)
+    truth = drive(lambda _: 0.2, lambda _: -0.1, speed, np.array(START), frames, moved, 0.0)
+    np.testing.assert_allclose(predicted, truth, atol=3e-6)
+    at_rest = (frames > 2.5 + 0.3) & (frames < 3.6)
+    assert np.ptp(predicted[at_rest], axis=0).max() < 1e-6
 
 
 def test_critical_damping_is_no_edge():

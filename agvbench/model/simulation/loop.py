@@ -22,6 +22,7 @@ from agvbench.effects.state import (
     COAST_RELAXATION,
     COAST_SPRING,
     DISTANCE,
+    DRIVE_BACKLASH,
     DRIVE_COMMAND,
     DRIVE_INERTIA,
     DRIVE_WAIT,
@@ -109,7 +110,7 @@ def _obey(
     s[FRONT_BACKLASH] = s[REAR_BACKLASH] = 0.0
     s[STEERING_INERTIA], s[STEERING_ACCELERATION], s[REAR_LAG_RATIO] = 0.0, math.inf, 1.0
     s[ACCELERATION_LIMIT] = s[BRAKING_LIMIT] = math.inf
-    s[COAST_SPRING], s[COAST_RELAXATION], s[DRIVE_INERTIA] = 0.0, math.inf, 0.0
+    s[COAST_SPRING], s[COAST_RELAXATION], s[DRIVE_INERTIA], s[DRIVE_BACKLASH] = 0.0, math.inf, 0.0, 0.0
     aim(s, p)
 
 
@@ -154,6 +155,24 @@ def _hold(
 
 
 @compiled(inner=True)
+def _next_drive(
+    s: Floats, p: Floats, settled: Floats, command_t_s: Floats, driven: int, last: int
+) -> tuple[float, int]:
+    """Return when the drive obeys another row, and which: at a start, the one that closes the backlash."""
+    if driven == last:
+        return math.inf, driven
+    row, at_s = driven + 1, arrive(s, command_t_s[driven + 1], p) + s[DRIVE_WAIT]
+    left = s[DRIVE_BACKLASH] if settled[driven, 2] == 0.0 else 0.0
+    while left > 0.0 and settled[row, 2] != 0.0:
+        until_s = arrive(s, command_t_s[row + 1], p) + s[DRIVE_WAIT] if row < last else math.inf
+        closed_s = at_s + left / abs(settled[row, 2])
+        if closed_s <= until_s:
+            return closed_s, row
+        left, at_s, row = left - abs(settled[row, 2]) * (until_s - at_s), until_s, row + 1
+    return at_s, row
+
+
+@compiled(inner=True)
 def _drive_run(
     s: Floats,
     p: Floats,
@@ -187,11 +206,11 @@ def _drive_run(
     s[FRONT_LAGS_AT], s[REAR_LAGS_AT] = settled[first, 0], settled[first, 1]
     driven = front = rear = first
     while now < math.inf:
+        _obey(s, p, commands, settled, driven, front, rear, lift)
         to_front = arrive(s, command_t_s[front + 1], p) if front < last else math.inf
         to_rear = arrive(s, command_t_s[rear + 1], p) + s[REAR_WAIT] if rear < last else math.inf
-        to_drive = arrive(s, command_t_s[driven + 1], p) + s[DRIVE_WAIT] if driven < last else math.inf
+        to_drive, next_driven = _next_drive(s, p, settled, command_t_s, driven, last)
         end = min(to_front, to_rear, to_drive)
-        _obey(s, p, commands, settled, driven, front, rear, lift)
         if now == -math.inf:
             # At rest with settled axles before the first command.
             servos[0] = servos[2] = s[FRONT_AIM]
@@ -226,7 +245,7 @@ def _drive_run(
         now = end
         front += to_front <= end
         rear += to_rear <= end
-        driven += to_drive <= end
+        driven = next_driven if to_drive <= end else driven
 
 
 @compiled()
