@@ -72,7 +72,7 @@ class RunsFromRest(Method[SelectedFromRest]):
 
     def split(self, readings: Readings) -> Split:
         """Return the training, validation and test runs; whole groups of runs with equal commands."""
-        return split_runs(readings.runs, readings.group, self.context.seed)
+        return split_runs(readings.runs, readings.group, self.context.header.neutral, self.context.seed)
 
     def select(self, readings: Readings, split: Split) -> SelectedFromRest:
         """Select effects, variants and a discrepancy term in the training runs; validation runs may reject them.
@@ -83,7 +83,9 @@ class RunsFromRest(Method[SelectedFromRest]):
         selected = self._selected(readings, split)
         if not selected.is_rejected:
             return selected
-        again = with_other_validation(split, readings.runs, readings.group, self.context.seed)
+        again = with_other_validation(
+            split, readings.runs, readings.group, self.context.header.neutral, self.context.seed
+        )
         if again is None:
             return selected
         self.on_progress("the selection is repeated with these runs among the training runs")

@@ -166,7 +166,7 @@ def _kept(campaign: Campaign, seed: int) -> Iterator[Run]:
         yield from runs
         return
     readings = read_runs(runs, campaign.header.neutral)
-    split = split_runs(readings.runs, readings.group, seed)
+    split = split_runs(readings.runs, readings.group, campaign.header.neutral, seed)
     names = dict(zip((run.run_id for run in readings.runs), split.names, strict=True))
     for run in runs:
         yield dataclasses.replace(run, split=names.get(run.run_id, "fit"))

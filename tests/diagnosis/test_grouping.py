@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tiny_vehicle import NEUTRAL, experiments
+from tiny_vehicle import NEUTRAL, NEUTRAL_COMMAND, experiments
 
 from agvbench.diagnosis.criteria import DATA
 from agvbench.diagnosis.data.splits import folds, group_runs, split_runs, with_other_validation
@@ -43,7 +43,7 @@ def test_times_that_jitter_by_milliseconds_are_the_same_commands():
 def test_what_is_set_aside_is_whole_groups_whose_levels_were_driven_elsewhere_too(seed):
     runs = bare_runs()
     group = group_runs(runs)
-    split = split_runs(runs, group, seed)
+    split = split_runs(runs, group, NEUTRAL_COMMAND, seed)
     held = ~split.training
     assert np.array_equal(held, split.validation | split.test)
     assert not set(group[split.validation]) & set(group[split.test])
@@ -60,8 +60,8 @@ def test_what_is_set_aside_is_whole_groups_whose_levels_were_driven_elsewhere_to
 def test_other_validation_runs_leave_the_test_and_every_level_in_the_training(seed):
     runs = bare_runs()
     group = group_runs(runs)
-    split = split_runs(runs, group, seed)
-    other = with_other_validation(split, runs, group, seed)
+    split = split_runs(runs, group, NEUTRAL_COMMAND, seed)
+    other = with_other_validation(split, runs, group, NEUTRAL_COMMAND, seed)
     assert np.array_equal(other.test, split.test)
     assert np.array_equal(other.training, ~(other.validation | other.test))
     assert other.validation.any()
@@ -78,42 +78,66 @@ def test_validation_runs_that_a_campaign_names_stay():
     runs[0] = dataclasses.replace(runs[0], split="held_out")
     runs[1] = dataclasses.replace(runs[1], split="validation")
     group = group_runs(runs)
-    assert with_other_validation(split_runs(runs, group, 0), runs, group, 0) is None
+    assert with_other_validation(split_runs(runs, group, NEUTRAL_COMMAND, 0), runs, group, NEUTRAL_COMMAND, 0) is None
 
 
 @given(seed=st.integers(0, 200))
 def test_most_of_what_steers_while_it_drives_stays_to_be_fitted(seed):
     runs = bare_runs()
-    split = split_runs(runs, group_runs(runs), seed)
+    split = split_runs(runs, group_runs(runs), NEUTRAL_COMMAND, seed)
     steps = np.array([run.experiment == "step" for run in runs])
     assert steps.sum() > 0
     assert (~split.training & steps).sum() <= steps.sum() / 3.0
     assert abs((split.validation & steps).sum() - (split.test & steps).sum()) <= 3
 
 
+def changing(name: str, fronts: list[float], repeats: int = 4) -> list[Run]:
+    """Return runs whose front command changes while they drive, and that steer back at rest."""
+    count = len(fronts)
+    t_s, neutral = np.arange(count + 2.0), np.full(count + 2, NEUTRAL)
+    drive = np.r_[np.full(count, 1800.0), NEUTRAL, NEUTRAL]
+    commands = Commands(t_s, drive, np.r_[fronts, fronts[-1], NEUTRAL], neutral)
+    return [
+        Run(f"{name}-{r}", name, "", "calibrated", r, NO_TARGET, 0.0, "ok", "", commands, Frames.empty())
+        for r in range(repeats)
+    ]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_returns_to_neutral_while_driving_are_never_in_the_test_alone(seed):
+    """Only they show a backlash: in every other run the side from which an angle is reached has the command's sign."""
+    runs = [run for k in range(12) for run in changing(f"slalom-{k}", [1300.0, 1700.0, 1300.0, 1700.0][: 2 + k % 3])]
+    runs += [run for level in (1300.0, 1700.0) for run in changing(f"arc-{level}", [level])]
+    runs += changing("lane change", [NEUTRAL, 1300.0, 1700.0, NEUTRAL]) + changing("jog", [NEUTRAL, 1700.0, NEUTRAL])
+    split = split_runs(runs, group_runs(runs), NEUTRAL_COMMAND, seed)
+    fitted = {run.experiment for run, fits in zip(runs, split.training, strict=True) if fits}
+    assert fitted & {"lane change", "jog"}
+    assert not split.training.all()
+
+
 def test_the_campaigns_own_split_is_kept():
     runs = [dataclasses.replace(r, split="held_out" if i % 3 == 0 else "fit") for i, r in enumerate(bare_runs())]
-    split = split_runs(runs, group_runs(runs), 0)
+    split = split_runs(runs, group_runs(runs), NEUTRAL_COMMAND, 0)
     assert split.test.tolist() == [i % 3 == 0 for i in range(len(runs))]
     assert 0 < split.validation.sum() < 0.15 * len(runs)
     assert not (split.validation & split.test).any()
     named = [dataclasses.replace(r, split=name) for r, name in zip(runs, split.names, strict=True)]
-    assert split_runs(named, group_runs(named), 5).names == split.names
+    assert split_runs(named, group_runs(named), NEUTRAL_COMMAND, 5).names == split.names
 
 
 def test_of_few_runs_the_test_is_made_first():
     few = [dataclasses.replace(r, run_id=str(i)) for i, r in enumerate(bare_runs()[:1] * 4)]
-    split = split_runs(few, group_runs(few), 0)
+    split = split_runs(few, group_runs(few), NEUTRAL_COMMAND, 0)
     assert (split.training.sum(), split.validation.sum(), split.test.sum()) == (3, 0, 1)
     more = [dataclasses.replace(few[0], run_id=str(i)) for i in range(8)]
-    split = split_runs(more, group_runs(more), 0)
+    split = split_runs(more, group_runs(more), NEUTRAL_COMMAND, 0)
     assert (split.training.sum(), split.validation.sum(), split.test.sum()) == (6, 1, 1)
 
 
 def test_a_split_that_leaves_nothing_to_fit_is_one_line():
     runs = [dataclasses.replace(r, split="held_out") for r in bare_runs()]
     with pytest.raises(FitError, match="must name training runs and test runs"):
-        split_runs(runs, group_runs(runs), 0)
+        split_runs(runs, group_runs(runs), NEUTRAL_COMMAND, 0)
 
 
 @given(group=st.lists(st.integers(0, 12), min_size=5, max_size=60), seed=st.integers(0, 9))

@@ -47,7 +47,7 @@ def test_the_next_run_is_driven_and_added_to_a_copy(unexcited, tmp_path, capsys)
     assert {run.session for run in added} == {"next1"}
     assert {run.split for run in added} == {"fit"}
     readings = read_runs(list(old), HEADER.neutral)
-    split = split_runs(readings.runs, readings.group, 0)
+    split = split_runs(readings.runs, readings.group, HEADER.neutral, 0)
     names = dict(zip((run.run_id for run in readings.runs), split.names, strict=True))
     assert {run.run_id: run.split for run in new} == names | {run.run_id: "fit" for run in added}
     assert set(names.values()) == {"fit", "validation", "held_out"}

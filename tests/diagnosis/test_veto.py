@@ -26,7 +26,7 @@ def chooser(campaign):
     """Return who chooses among causes of what a campaign shows, all its runs, and which are set aside."""
     runs = list(campaign)
     readings, geometry = read_runs(runs, HEADER.neutral), Geometry(FRONT_M, REAR_M)
-    held = ~split_runs(readings.runs, readings.group, 0).training
+    held = ~split_runs(readings.runs, readings.group, HEADER.neutral, 0).training
     maps = nodal_maps(readings.runs, NEUTRAL_COMMAND)
     prior_model = {role: np.zeros(len(maps.nodes[role])) for role in ROLES}
     start = start_values(maps, steady_drives(runs, geometry, NEUTRAL_COMMAND), prior_model)
@@ -92,7 +92,7 @@ def test_a_cause_that_makes_it_worse_is_withdrawn(found, spoilt):
 def test_test_runs_change_no_name_and_no_parameter(tiny_campaign):
     tiring, opposite = (list(tiny_campaign(Tiny(droop_per_hour=droop))) for droop in (0.1, -0.1))
     readings = read_runs(tiring, HEADER.neutral)
-    names = split_runs(readings.runs, readings.group, 0).names
+    names = split_runs(readings.runs, readings.group, HEADER.neutral, 0).names
     runs = [
         replace(other if name == "held_out" else own, split=name)
         for own, other, name in zip(tiring, opposite, names, strict=True)
@@ -112,11 +112,11 @@ def test_test_runs_change_no_name_and_no_parameter(tiny_campaign):
 def test_validation_runs_that_reject_everything_join_the_training_runs(tiny_campaign):
     late, prompt = (list(tiny_campaign(Tiny(delay_s=delay))) for delay in (0.1, 0.0))
     readings = read_runs(late, HEADER.neutral)
-    split = split_runs(readings.runs, readings.group, 0)
+    split = split_runs(readings.runs, readings.group, HEADER.neutral, 0)
     runs = [other if v else own for own, other, v in zip(late, prompt, split.validation, strict=True)]
     said = []
     found = diagnose(InMemory(runs), on_progress=said.append)
-    again = with_other_validation(split, readings.runs, readings.group, 0)
+    again = with_other_validation(split, readings.runs, readings.group, HEADER.neutral, 0)
     repeated = said.index("the selection is repeated with these runs among the training runs")
     assert "rejected in validation" in said[repeated - 1]
     assert said[repeated + 1].startswith(f"{again.training.sum()} training runs, {again.validation.sum()} validation")

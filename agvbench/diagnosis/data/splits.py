@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis.criteria import DATA
 from agvbench.errors import FitError
-from agvbench.types import Commands, Floats, Run
+from agvbench.types import Command, Commands, Floats, Run
 
 _SAME_TIME_S = 0.05
 _SAME_LEVEL = 1e-5
@@ -85,18 +86,20 @@ class Split:
         ]
 
 
-def with_other_validation(split: Split, runs: Sequence[Run], group: NDArray[np.int64], seed: int) -> Split | None:
+def with_other_validation(
+    split: Split, runs: Sequence[Run], group: NDArray[np.int64], neutral: Command, seed: int
+) -> Split | None:
     """Return the split with other runs for validation, and the present ones among the training runs; None if none can.
 
     The test runs stay. Validation runs that a campaign names itself stay, too.
     """
     if not split.validation.any() or any(run.split for run in runs):
         return None
-    validation = _for_validation(runs, group, split.training, np.random.default_rng([0x0A6A, seed]))
+    validation = _for_validation(runs, group, neutral, split.training, np.random.default_rng([0x0A6A, seed]))
     return Split(~(split.test | validation), validation, split.test)
 
 
-def split_runs(runs: Sequence[Run], group: NDArray[np.int64], seed: int) -> Split:
+def split_runs(runs: Sequence[Run], group: NDArray[np.int64], neutral: Command, seed: int) -> Split:
     """Split runs into training, validation and test runs.
 
     A campaign's own ``split`` column takes precedence. If it names no validation runs, an eighth of its training runs
@@ -104,9 +107,11 @@ def split_runs(runs: Sequence[Run], group: NDArray[np.int64], seed: int) -> Spli
 
     Otherwise whole groups are drawn at random, about a quarter of all runs: half of them for validation and half for
     test. A group is drawn only if every level of every command in it also occurs in a remaining group. The test then
-    evaluates new combinations of known commands and not the interpolation of a map. At most a third of the runs that
-    steer while they drive is drawn: they are few, and no other run shows a dependence on the steering history. If only
-    a single run can be spared, it is the test run, and there is no validation.
+    evaluates new combinations of known commands and not the interpolation of a map. The same holds for every kind of
+    change while the vehicle drives, such as a return to neutral: a backlash, which only returns show, would otherwise
+    be found by the test alone. At most a third of the runs that steer while they drive is drawn: they are few, and no
+    other run shows a dependence on the steering history. If only a single run can be spared, it is the test run, and
+    there is no validation.
 
     Raises
     ------
@@ -115,8 +120,8 @@ def split_runs(runs: Sequence[Run], group: NDArray[np.int64], seed: int) -> Spli
     """
     split, rng = np.array([run.split or "" for run in runs]), np.random.default_rng([0xD1A6, seed])
     if not np.any(split != ""):
-        held = _drawn(runs, group, rng, DATA.test_share)
-        test = _for_test(runs, group, held)
+        held = _drawn(runs, group, neutral, rng, DATA.test_share)
+        test = _for_test(runs, group, neutral, held)
         return Split(~held, held & ~test, test)
     test, validation = split == "held_out", split == "validation"
     training = ~(test | validation)
@@ -124,49 +129,55 @@ def split_runs(runs: Sequence[Run], group: NDArray[np.int64], seed: int) -> Spli
         named = {run.split for run in runs}
         raise FitError("the column split must name training runs and test runs", where="runs", value=named)
     if not validation.any():
-        validation = _for_validation(runs, group, training, rng)
+        validation = _for_validation(runs, group, neutral, training, rng)
     return Split(training & ~validation, validation, test)
 
 
 def _for_validation(
-    runs: Sequence[Run], group: NDArray[np.int64], training: NDArray[np.bool_], rng: np.random.Generator
+    runs: Sequence[Run],
+    group: NDArray[np.int64],
+    neutral: Command,
+    training: NDArray[np.bool_],
+    rng: np.random.Generator,
 ) -> NDArray[np.bool_]:
     """Return which runs (R,) are drawn for validation from the `training` runs (R,): an eighth of them."""
     rest, validation = np.flatnonzero(training), np.zeros_like(training)
-    validation[rest[_drawn([runs[int(i)] for i in rest], group[rest], rng, DATA.test_share / 2.0)]] = True
+    drawn = _drawn([runs[int(i)] for i in rest], group[rest], neutral, rng, DATA.test_share / 2.0)
+    validation[rest[drawn]] = True
     return validation
 
 
-def _for_test(runs: Sequence[Run], group: NDArray[np.int64], held: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _for_test(
+    runs: Sequence[Run], group: NDArray[np.int64], neutral: Command, held: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
     """Return which of the drawn runs `held` (R,) are test runs: every other group, or every other run of one group."""
     test, validation = np.zeros_like(held), np.zeros_like(held)
     parts = [np.flatnonzero(held & (group == g)) for g in np.unique(group[held])]
     if len(parts) == 1:
         parts = list(parts[0][:, None])
     # Runs that steer while they drive come first, so that both halves contain some.
-    for own in sorted(parts, key=lambda own: not _steers_while_driving(runs[own[0]].commands)):
+    for own in sorted(parts, key=lambda own: not _steers_while_driving(runs[own[0]].commands, neutral)):
         (test if np.count_nonzero(test) <= np.count_nonzero(validation) else validation)[own] = True
     return test
 
 
-def _drawn(runs: Sequence[Run], group: NDArray[np.int64], rng: np.random.Generator, share: float) -> NDArray[np.bool_]:
-    levels = {int(g): _levels(runs[int(np.argmax(group == g))].commands) for g in np.unique(group)}
-    uses: dict[tuple[str, float], int] = {}
-    for own in levels.values():
-        for level in own:
-            uses[level] = uses.get(level, 0) + 1
+def _drawn(
+    runs: Sequence[Run], group: NDArray[np.int64], neutral: Command, rng: np.random.Generator, share: float
+) -> NDArray[np.bool_]:
+    commands = {int(g): runs[int(np.argmax(group == g))].commands for g in np.unique(group)}
+    shown = {g: _levels(own) | _changes_while_driving(own, neutral) for g, own in commands.items()}
+    uses = Counter(one for own in shown.values() for one in own)
     held = np.zeros(len(runs), dtype=np.bool_)
-    steering = np.array([_steers_while_driving(run.commands) for run in runs])
+    steering = np.array([_steers_while_driving(run.commands, neutral) for run in runs])
     for g in rng.permutation(np.unique(group)).tolist():
         own = group == g
         if np.count_nonzero(held) + np.count_nonzero(own) > 1.1 * share * len(runs):
             continue
         if steering[own].any() and np.count_nonzero(held & steering) + np.count_nonzero(own) > np.sum(steering) / 3.0:
             continue
-        if all(uses[level] > 1 for level in levels[g]):
+        if all(uses[one] > 1 for one in shown[g]):
             held |= own
-            for level in levels[g]:
-                uses[level] -= 1
+            uses.subtract(shown[g])
     return held if held.any() else _some_repeats(group, rng)
 
 
@@ -180,14 +191,26 @@ def _some_repeats(group: NDArray[np.int64], rng: np.random.Generator) -> NDArray
     return held
 
 
-def _steers_while_driving(commands: Commands) -> bool:
-    """Whether a steering command changes while the drive command does not."""
-    driven = np.flatnonzero(np.diff(commands.drive) == 0.0)
-    return bool(np.any(np.diff(commands.front)[driven] != 0.0) or np.any(np.diff(commands.rear)[driven] != 0.0))
+def _steers_while_driving(commands: Commands, neutral: Command) -> bool:
+    return any(role != "drive" for role, _ in _changes_while_driving(commands, neutral))
 
 
-def _levels(commands: Commands) -> set[tuple[str, float]]:
-    return {(role, float(v)) for role in ("drive", "front", "rear") for v in np.unique(getattr(commands, role))}
+def _changes_while_driving(commands: Commands, neutral: Command) -> set[tuple[str, float | str]]:
+    """Return how each channel changes between commands that drive: from neutral, to it, through it, or beside it."""
+    drives = commands.drive != neutral.drive
+    found: set[tuple[str, float | str]] = set()
+    for role in _ROLES:
+        values = getattr(commands, role)
+        changes = np.flatnonzero(drives[1:] & drives[:-1] & (np.diff(values) != 0.0))
+        side = np.sign(values - getattr(neutral, role))
+        for before, after in zip(side[changes], side[changes + 1], strict=True):
+            beside = "through neutral" if before * after < 0.0 else "beside neutral"
+            found.add((role, "from neutral" if before == 0.0 else "to neutral" if after == 0.0 else beside))
+    return found
+
+
+def _levels(commands: Commands) -> set[tuple[str, float | str]]:
+    return {(role, float(v)) for role in _ROLES for v in np.unique(getattr(commands, role))}
 
 
 def folds(group: NDArray[np.int64], count: int, seed: int) -> NDArray[np.int64]:
