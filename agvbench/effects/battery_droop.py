@@ -19,14 +19,15 @@ class BatteryDroop(Effect):
     relaxes: ClassVar[str] = "the battery is negligible (9.2)"
     reference: ClassVar[str] = "Bentvelsen 2015, section 8.2 (endurance)"
     limits: ClassVar[str] = (
-        "linear in time: neither the steep end of a discharge nor a battery that recovers in a pause"
+        "linear in time: neither the steep end of a discharge nor a battery that recovers in a pause; a speed that "
+        "grows with use is no battery (speed_by_campaign_time)"
     )
     remedy: ClassVar[str] = (
         "control the speed of the wheels instead of the voltage, or charge between runs; record the battery "
         "voltage of each run"
     )
 
-    per_hour: float = parameter(unit="1/h", low=-1.0, high=2.0, scale=0.1)
+    per_hour: float = parameter(unit="1/h", low=0.0, high=2.0, scale=0.1)
 
     @staticmethod
     def drive(state: Floats, per_hour: float) -> None:

@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from agvbench.diagnosis.criteria import DISCREPANCY, FIT
+from agvbench.diagnosis.criteria import DISCREPANCY, FIT, SELECTION
 from agvbench.diagnosis.discrepancy.campaign_time import complement, is_constant
 from agvbench.diagnosis.discrepancy.other_forms import models_of_other_forms, with_other_forms
 from agvbench.diagnosis.discrepancy.regression import steering_tangents
 from agvbench.diagnosis.discrepancy.screening import Start, screen
 from agvbench.diagnosis.estimation.cross_validation import by_group
 from agvbench.diagnosis.residuals.body_rates import residual_rates
-from agvbench.diagnosis.selection.actuators import prefer_actuators, separate_lag_from_delay
+from agvbench.diagnosis.selection.actuators import CAMERA, prefer_actuators, separate_lag_from_delay
 from agvbench.diagnosis.selection.candidates import applies, candidate
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.lack_of_fit import has_lack_of_fit
@@ -28,6 +28,7 @@ from agvbench.diagnosis.selection.variants import (
 from agvbench.diagnosis.selection.with_term import TermSelection, gain_p_value
 from agvbench.diagnosis.terms import TERMS, ByLoggedColumn, DiscrepancyTerm
 from agvbench.diagnosis.terms.campaign_time import ByCampaignTime
+from agvbench.effects.variants import cause_of
 from agvbench.types import Floats
 
 ModelWithTerm = tuple[ScoredModel, type[DiscrepancyTerm], dict[str, float], dict[str, dict[str, float]]]
@@ -155,7 +156,8 @@ def add_term(selection: Selection, selector: Selector) -> TermSelection | None:
 def _with_right_actuators(extended: Selector, selection: Selection, model: ModelWithTerm) -> ModelWithTerm:
     """Return the model with other actuators and the effects beside them, if they explain a slow response better.
 
-    While the term was missing, its cause decided which actuators fitted best.
+    While the term was missing, its cause decided which actuators fitted best. Actuators that explain the runs as well
+    replace a latency of the camera, as they do without a term.
     """
     chosen, term, gains, alternatives = model
     beside = Selection(selection.base, chosen, alternatives, gains, {}, extended.models_fitted)
@@ -165,7 +167,9 @@ def _with_right_actuators(extended: Selector, selection: Selection, model: Model
     again, _, gains, alternatives = reselect_effects(extended, selection, right, term)
     replaced = replace_sequentially(Selection(selection.base, again, alternatives, gains, {}, 0), extended)
     gains = {name: gain for name, gain in replaced.gains.items() if name != term.name}
-    is_better = term.name in replaced.chosen.names and replaced.chosen.deviance < chosen.deviance
+    causes = [{cause_of(name) for name in names} for names in (chosen.names, replaced.chosen.names)]
+    margin = SELECTION.alternative_margin if CAMERA in causes[0] - causes[1] else 0.0
+    is_better = term.name in replaced.chosen.names and replaced.chosen.deviance < chosen.deviance + margin
     return (replaced.chosen, term, gains, replaced.alternatives) if is_better else model
 
 

@@ -192,12 +192,12 @@ class Selector(FittedModels):
         base, current
             The model with the given effects only, and the selected model.
         among
-            By effect, the others that are fitted in its place; by default every candidate.
+            By effect, the others that are fitted in its place; every candidate for effects that it does not contain.
         """
         found, causes = {}, {cause_of(name) for name in current.names}
         for name in self._added_effects(current):
             without = self.without_effect(base, current, name)
-            among_these = self.candidates if among is None else among.get(name, ())
+            among_these = (among or {}).get(name, self.candidates)
             others = [n for n in among_these if cause_of(n) not in causes]
             worse = {n: m.deviance - current.deviance for n, m in self.likely(without, current, others).items()}
             found[name] = {

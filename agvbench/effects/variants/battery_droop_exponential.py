@@ -24,7 +24,7 @@ class BatteryDroopExponential(Variant):
     reference: ClassVar[str] = "Bentvelsen 2015, section 8.2 (the steep end of a full battery)"
     limits: ClassVar[str] = "in a session much shorter than the time constant it cannot be distinguished from a line"
 
-    share: float = parameter(unit="–", low=-0.5, high=0.9, scale=0.05)
+    share: float = parameter(unit="–", low=0.0, high=0.9, scale=0.05)
     time_constant_h: float = parameter(unit="h", low=0.05, high=20.0, scale=0.5, null=0.5)
 
     @classmethod

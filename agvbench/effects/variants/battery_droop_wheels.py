@@ -27,7 +27,7 @@ class BatteryDroopWheels(Variant):
     limits: ClassVar[str] = "linear in time, as battery_droop; both motors lose the same share"
     needs_differential: ClassVar[bool] = True
 
-    per_hour: float = parameter(unit="1/h", low=-1.0, high=2.0, scale=0.1)
+    per_hour: float = parameter(unit="1/h", low=0.0, high=2.0, scale=0.1)
 
     @classmethod
     def starts(cls, fitted: Mapping[str, float]) -> list[tuple[float, ...]]:
