@@ -65,8 +65,8 @@ def causes(vehicle: SimulatedVehicle) -> dict[str, Cause]:
         "delay": (replace(vehicle, delay_frames=0.0), {"actuation_delay", "mocap_latency"}),
         "servos": (replace(vehicle, front=axle("front"), rear=axle("rear")), {"steering_lag", "steering_rate_limit"}),
         "speed": (replace(vehicle, drive=stiff, **fast), {"speed_lag"}),
-        "backlash of the drive train": (replace(vehicle, drive=replace(drive_train, backlash_m=0.0)), set()),
-        "spring-back": (replace(vehicle, drive=replace(drive_train, windup_per_s2=0.0)), set()),
+        "backlash of the drive train": (replace(vehicle, drive=replace(drive_train, backlash_m=0.0)), {"speed_lag"}),
+        "spring-back": (replace(vehicle, drive=replace(drive_train, windup_per_s2=0.0)), {"speed_lag"}),
         "speed in turns": (
             replace(vehicle, drive=replace(drive_train, overrun=1.0, scrub=0.0, scrub_dry_mps=0.0)),
             {"cornering_speed_loss", "axle_overrun"},

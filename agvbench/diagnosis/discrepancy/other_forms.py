@@ -23,14 +23,14 @@ ModelInPlace = tuple[str, type[DiscrepancyTerm], ScoredModel]
 def models_of_other_forms(extended: Selector, selection: Selection) -> list[ModelInPlace]:
     """Return the selected model with each term that is another form of one of its effects in the place of that effect.
 
-    A term must meet the selection criterion there.
+    A term must predict enough better there. While causes beside it are missing, Wald's test does not judge it.
     """
     found = []
     for name in selection.gains:
         for term in (term for term in TERMS if cause_of(name) in term.form_of):
             without = extended.without_effect(selection.base, selection.chosen, name)
             model = extended.with_effect(without, term.name)
-            if model.is_fitted and extended.meets_criterion(without, model):
+            if model.is_fitted and extended.improves(without, model):
                 found.append((name, term, model))
     return found
 
