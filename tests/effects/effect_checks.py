@@ -35,7 +35,7 @@ def check_null_hooks(cls: type[Effect]) -> None:
     null = cls().values.values()
     state = np.random.default_rng(7).uniform(-1.0, 1.0, s.SIZE)
     state[[s.STEERING_LAG, s.FRONT_BACKLASH, s.REAR_BACKLASH, s.ACCELERATE_LAG, s.BRAKE_LAG]] = 0.0
-    state[[s.STEERING_INERTIA, s.DRIVE_INERTIA, s.REAR_WAIT, s.DRIVE_WAIT, s.SEEN_LAG]] = 0.0
+    state[[s.STEERING_INERTIA, s.DRIVE_INERTIA, s.REAR_WAIT, s.DRIVE_WAIT, s.DRIVE_BACKLASH, s.SEEN_LAG]] = 0.0
     state[[s.STEERING_RATE, s.STEERING_ACCELERATION, s.ACCELERATION_LIMIT, s.BRAKING_LIMIT]] = math.inf
     for name, hook in cls.hooks().items():
         before = state.copy()
