@@ -123,7 +123,8 @@ def by_group(values: Floats, group: NDArray[np.int64]) -> Floats:
 def differs_from_null(fitted: Fit, name: str, group: NDArray[np.int64]) -> bool:
     """Return whether the parameters of the effect called `name` differ significantly from null (Wald's test).
 
-    An effect with an infinite null value (a limit) always passes: its gain alone decides.
+    The null value of a limit is infinity: its inverse is tested against zero, with the standard error that the delta
+    method propagates.
     """
     from scipy import special
 
@@ -131,9 +132,9 @@ def differs_from_null(fitted: Fit, name: str, group: NDArray[np.int64]) -> bool:
     own = np.array([key.partition(".")[0] == name for key in predictor.parameter_names])
     at = predictor.maps.size + np.flatnonzero(own)
     nulls = predictor.nulls[own]
-    if not np.isfinite(nulls).all():
-        return True
-    off = fitted.parameters[at] - nulls
-    covariance = clustered_covariance(fitted, group)[np.ix_(at, at)]
+    off, slope, limits = fitted.parameters[at] - nulls, np.ones(len(at)), np.isinf(nulls)
+    off[limits] = 1.0 / fitted.parameters[at][limits]
+    slope[limits] = -(off[limits] ** 2)
+    covariance = clustered_covariance(fitted, group)[np.ix_(at, at)] * slope[:, None] * slope
     statistic = float(off @ np.linalg.pinv(covariance, hermitian=True) @ off)
     return bool(special.chdtrc(len(at), statistic) < SELECTION.wald_alpha)

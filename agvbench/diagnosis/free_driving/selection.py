@@ -11,14 +11,11 @@ from agvbench.diagnosis.criteria import FREE_DRIVING, SelectionCriteria
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.actuators import CAMERA
-from agvbench.diagnosis.selection.candidates import default_candidate
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selector
-from agvbench.effects import effect_kinds
 from agvbench.types import Floats
 
 _EXTRAPOLATION_QUANTILE = 0.98
-_AT_BOUND = 1e-3
 
 
 @dataclass
@@ -52,25 +49,13 @@ class WindowSelector(Selector):
         if not super().improves(without, with_it, of_group=of_group):
             return False
         added = set(with_it.names) - set(without.names)
-        if any(self._is_at_bound(with_it, name) for name in added):
+        if any(with_it.is_at_bound(name) for name in added):
             return False
         if self._extrapolates(without, with_it):
             self.extrapolating |= added
             return False
         self.extrapolating -= added
         return True
-
-    @staticmethod
-    def _is_at_bound(model: ScoredModel, name: str) -> bool:
-        """Return whether a parameter lies at a bound other than null: then the windows do not determine it."""
-        kind, values = default_candidate(name), model.fit.effect_values()
-        own = [value for key, value in values.items() if key.partition(".")[0] == name]
-        nulls = [p.null for p in effect_kinds()[name].parameters()] if name in effect_kinds() else own
-        near = _AT_BOUND * (kind.bounds[:, 1] - kind.bounds[:, 0])
-        for value, null, (low, high), width in zip(own, nulls, kind.bounds, near, strict=True):
-            if any(abs(value - bound) <= width and bound != null for bound in (low, high)):
-                return True
-        return False
 
     def _extrapolates(self, without: ScoredModel, with_it: ScoredModel) -> bool:
         if self.test_batch is None:

@@ -18,8 +18,10 @@ from agvbench.diagnosis.method import OnProgress
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.candidates import Candidate, bounds_of, default_candidate
+from agvbench.effects import effect_kinds
 from agvbench.types import Floats
 
+_AT_BOUND = 1e-3
 Starts = frozenset[tuple[str, bytes]]
 """Effects that were fitted from other than the default initial values, with these values."""
 
@@ -62,6 +64,21 @@ class ScoredModel:
         of effects are observations of their own, whether the model has the effect or lacks it.
         """
         return float(self.loss.sum()) + self.fit.prior.loss
+
+    def is_at_bound(self, name: str) -> bool:
+        """Return whether a parameter of an effect of the library lies at a bound other than null.
+
+        The runs then do not determine it, or ask for what the effect cannot be.
+        """
+        kind = effect_kinds().get(name)
+        if kind is None:
+            return False
+        values = self.fit.effect_values()
+        return any(
+            abs(values[f"{name}.{p.name}"] - bound) <= _AT_BOUND * (p.high - p.low) and bound != p.null
+            for p in kind.parameters()
+            for bound in (p.low, p.high)
+        )
 
     def gain_over(self, other: ScoredModel) -> float:
         """Return the gain in cross-validated deviance or in deviance of the fit, whichever is smaller.

@@ -123,7 +123,8 @@ class Selector(FittedModels):
         added, group = set(with_it.names) - set(without.names), self.batch.readings.group
         by_gain = of_group and self.criteria.group_by_gain
         return self.improves(without, with_it, of_group=of_group) and (
-            by_gain or all(differs_from_null(with_it.fit, name, group) for name in added)
+            by_gain
+            or all(differs_from_null(with_it.fit, name, group) and not with_it.is_at_bound(name) for name in added)
         )
 
     def improves(self, without: ScoredModel, with_it: ScoredModel, *, of_group: bool = False) -> bool:
