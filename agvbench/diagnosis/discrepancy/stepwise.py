@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -142,10 +143,11 @@ def add_term(selection: Selection, selector: Selector) -> TermSelection | None:
                 alone = first or _best_term(extended, selection.base, starts_alone)
                 found += [
                     alone if alone is not None and _may_be_mimicked(selection, alone[0]) else None,
-                    _term_in_place_of_effect(extended, selection),
+                    _term_in_place_of_effect(extended, selection, selection.gains),
                 ]
-    elif any(_depends_on_few_groups(selector, selection, name) for name in selection.gains):
-        found.append(_term_in_place_of_effect(extended, selection))
+    else:
+        of_few_groups = [name for name in selection.gains if _depends_on_few_groups(selector, selection, name)]
+        found.append(_term_in_place_of_effect(extended, selection, of_few_groups))
     others = models_of_other_forms(extended, selection)
     found += [(model, term) for _, term, model in others if model.deviance < selection.chosen.deviance]
     models = [reselect_effects(extended, selection, *pair) for pair in found if pair is not None]
@@ -275,22 +277,22 @@ def _depends_on_few_groups(selector: Selector, selection: Selection, name: str) 
 
 
 def _term_in_place_of_effect(
-    extended: Selector, selection: Selection
+    extended: Selector, selection: Selection, names: Iterable[str]
 ) -> tuple[ScoredModel, type[DiscrepancyTerm]] | None:
-    """Return the term that predicts better in the place of a selected effect, or None.
+    """Return the term that predicts better in the place of one of the selected effects `names`, or None.
 
     An effect that few runs determine is fitted to them, so that no residual is left for a regression. Only terms that
     do not depend on the position are fitted, because their simulation is as fast as that of effects. The column of a
     term of a logged column comes from the regression only.
     """
     best: tuple[ScoredModel, type[DiscrepancyTerm]] | None = None
-    for name, gain in selection.gains.items():
+    for name in names:
         without = extended.without_effect(selection.base, selection.chosen, name)
         for term in TERMS:
             is_slow = term.longest_step_s < math.inf
             if is_slow or issubclass(term, ByLoggedColumn) or not applies(term, extended.batch.geometry):
                 continue
-            if extended.predicted_gain(without, term.name) < DISCREPANCY.min_share_of_effects * gain:
+            if extended.predicted_gain(without, term.name) < DISCREPANCY.min_share_of_effects * selection.gains[name]:
                 continue
             model = extended.with_effect(without, term.name)
             if model.deviance < (best[0] if best else selection.chosen).deviance and extended.meets_criterion(
