@@ -109,6 +109,7 @@ def test_test_runs_change_no_name_and_no_parameter(tiny_campaign):
     assert found.held_out.errors["position_rms_mm"]["after"] > found.held_out.errors["position_rms_mm"]["before"]
 
 
+@pytest.mark.slow
 def test_validation_runs_that_reject_everything_join_the_training_runs(tiny_campaign):
     late, prompt = (list(tiny_campaign(Tiny(delay_s=delay))) for delay in (0.1, 0.0))
     readings = read_runs(late, HEADER.neutral)
