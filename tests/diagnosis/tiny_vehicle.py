@@ -128,9 +128,9 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
             poses.append((x, y, heading))
         row = int(np.searchsorted(commands.t_s, t - tiny.delay_s + 1e-12, side="right")) - 1
         c = commands.at(row) if row >= 0 else Command(NEUTRAL, NEUTRAL, NEUTRAL)
-        told = speed_of(c.drive) * gain
-        gap_m = tiny.drive_gap_m if told == 0.0 else gap_m - abs(told) * _STEP_S
-        told = 0.0 if gap_m > 0.0 else told
+        commanded = speed_of(c.drive) * gain
+        gap_m = tiny.drive_gap_m if commanded == 0.0 else gap_m - abs(commanded) * _STEP_S
+        commanded = 0.0 if gap_m > 0.0 else commanded
         lags = tiny.steering_lag_s, tiny.rear_lag_ratio * tiny.steering_lag_s
         away = [1.0 - math.exp(-_STEP_S / lag) if lag else 1.0 for lag in lags]
         was = front, rear, speed
@@ -142,8 +142,12 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
         else:
             front += (front_of(c.front) + f_off - front) * away[0]
             rear += (rear_of(c.rear) + r_off - rear) * away[1]
-        lag = tiny.accelerate_s if abs(told) > abs(speed) else (tiny.coast_s if told == 0.0 else 0.0) or tiny.brake_s
-        speed, windup = driven_speed(tiny, told, lag, speed, windup)
+        lag = (
+            tiny.accelerate_s
+            if abs(commanded) > abs(speed)
+            else (tiny.coast_s if commanded == 0.0 else 0.0) or tiny.brake_s
+        )
+        speed, windup = driven_speed(tiny, commanded, lag, speed, windup)
         relief = 1.0 + tiny.reverse_gain if speed < 0.0 else 1.0
         f, r, s = (
             (old + new) / 2.0 if lagged else new
@@ -205,16 +209,16 @@ def seen(tiny: Tiny, t_s: np.ndarray, p: np.ndarray, rng: np.random.Generator) -
     return Frames(t_s, p[:, 0], p[:, 1], p[:, 2], np.ones(n, dtype=bool), np.full(n, -1), nan, nan)
 
 
-def driven_speed(tiny: Tiny, told: float, lag: float, speed: float, windup: float) -> tuple[float, float]:
+def driven_speed(tiny: Tiny, commanded: float, lag: float, speed: float, windup: float) -> tuple[float, float]:
     """Return speed and windup of the drive train one step later."""
-    if told == 0.0 and tiny.spring_per_s2:
+    if commanded == 0.0 and tiny.spring_per_s2:
         speed -= (speed / tiny.coast_s + tiny.spring_per_s2 * windup) * _STEP_S
         return speed, windup + (speed - windup / tiny.relaxation_s) * _STEP_S
-    if told != 0.0 and tiny.ramp_forward_mps2:
-        ramp = (tiny.ramp_forward_mps2 if told > 0.0 else tiny.ramp_backward_mps2) * _STEP_S
-        closer = (told - speed) * (1.0 - math.exp(-_STEP_S / tiny.ramp_lag_s) if tiny.ramp_lag_s else 1.0)
+    if commanded != 0.0 and tiny.ramp_forward_mps2:
+        ramp = (tiny.ramp_forward_mps2 if commanded > 0.0 else tiny.ramp_backward_mps2) * _STEP_S
+        closer = (commanded - speed) * (1.0 - math.exp(-_STEP_S / tiny.ramp_lag_s) if tiny.ramp_lag_s else 1.0)
         return speed + min(max(closer, -ramp), ramp), windup * (1.0 - _STEP_S / tiny.relaxation_s)
-    return speed + (told - speed) * (1.0 - math.exp(-_STEP_S / lag) if lag else 1.0), windup
+    return speed + (commanded - speed) * (1.0 - math.exp(-_STEP_S / lag) if lag else 1.0), windup
 
 
 def balanced(front: float, rear: float, drag: float, overrun: float) -> float:

@@ -168,7 +168,7 @@ def _drawn(
     shown = {g: _levels(own) | _changes_while_driving(own, neutral) for g, own in commands.items()}
     uses = Counter(one for own in shown.values() for one in own)
     held = np.zeros(len(runs), dtype=np.bool_)
-    steering = np.array([_steers_while_driving(run.commands, neutral) for run in runs])
+    steering = np.isin(group, [g for g, own in commands.items() if _steers_while_driving(own, neutral)])
     for g in rng.permutation(np.unique(group)).tolist():
         own = group == g
         if np.count_nonzero(held) + np.count_nonzero(own) > 1.1 * share * len(runs):

@@ -169,8 +169,8 @@ def _with_right_actuators(extended: Selector, selection: Selection, model: Model
     again, _, gains, alternatives = reselect_effects(extended, selection, right, term)
     replaced = replace_sequentially(Selection(selection.base, again, alternatives, gains, {}, 0), extended)
     gains = {name: gain for name, gain in replaced.gains.items() if name != term.name}
-    causes = [{cause_of(name) for name in names} for names in (chosen.names, replaced.chosen.names)]
-    margin = SELECTION.alternative_margin if CAMERA in causes[0] - causes[1] else 0.0
+    before, after = ({cause_of(name) for name in one.names} for one in (chosen, replaced.chosen))
+    margin = SELECTION.alternative_margin if CAMERA in before - after else 0.0
     is_better = term.name in replaced.chosen.names and replaced.chosen.deviance < chosen.deviance + margin
     return (replaced.chosen, term, gains, replaced.alternatives) if is_better else model
 

@@ -75,9 +75,9 @@ class ScoredModel:
             return False
         values = self.fit.effect_values()
         return any(
-            abs(values[f"{name}.{p.name}"] - bound) <= _AT_BOUND * (p.high - p.low) and bound != p.null
-            for p in kind.parameters()
-            for bound in (p.low, p.high)
+            abs(values[f"{name}.{p.name}"] - bound) <= _AT_BOUND * (bounds[1] - bounds[0]) and bound != p.null
+            for p, bounds in zip(kind.parameters(), default_candidate(name).bounds, strict=True)
+            for bound in bounds
         )
 
     def gain_over(self, other: ScoredModel) -> float:
