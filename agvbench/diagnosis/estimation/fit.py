@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agvbench.diagnosis.estimation.levenberg_marquardt import Convergence, FitState, LevenbergMarquardt
 from agvbench.diagnosis.estimation.likelihood import Information, residual_of, ridge, terms_of
@@ -34,7 +35,8 @@ class Fit:
     ``parameters`` (P,), the nodal values first; ``random_effects`` (R, 6) of each run; ``variance_components``;
     ``loss`` (R,): minus two log likelihood of each run; ``information`` and ``gradient`` (R, P): the quadratic
     approximation of the loss at the parameters; ``prior``: that of maps and effects; ``residual`` (R, K, 3): measured
-    minus predicted poses, with the random effects; ``linear``: the derivatives at the parameters.
+    minus predicted poses, with the random effects; ``linear``: the derivatives at the parameters; ``bounds`` (effects'
+    parameters, 2).
     """
 
     predictor: Predictor
@@ -47,6 +49,7 @@ class Fit:
     prior: PriorTerms
     residual: Floats
     linear: Linearised
+    bounds: Floats
 
     @property
     def total_loss(self) -> float:
@@ -59,10 +62,24 @@ class Fit:
         return self.information.total + ridge(self.predictor) + self.prior.information
 
     @property
+    def total_gradient(self) -> Floats:
+        """Minus half the derivative of the total loss (P,)."""
+        return np.asarray(self.gradient.sum(axis=0) + self.prior.gradient)
+
+    @cached_property
+    def free(self) -> NDArray[np.bool_]:
+        """Which parameters (P,) may move: all but those at a bound that the loss presses against it."""
+        own, gradient = (values[self.predictor.maps.size :] for values in (self.parameters, self.total_gradient))
+        low, high = self.bounds.T
+        pressed = ((own <= low) & (gradient < 0.0)) | ((own >= high) & (gradient > 0.0))
+        return np.asarray(np.r_[np.ones(self.predictor.maps.size, dtype=np.bool_), ~pressed])
+
+    @property
     def decrement(self) -> float:
         """The reduction of the loss that a further step is predicted to bring (Newton decrement, squared)."""
-        gradient = self.gradient.sum(axis=0) + self.prior.gradient
-        return float(gradient @ np.linalg.lstsq(self.total_information, gradient, rcond=1e-12)[0])
+        gradient = self.total_gradient[self.free]
+        matrix = self.total_information[np.ix_(self.free, self.free)]
+        return float(gradient @ np.linalg.lstsq(matrix, gradient, rcond=1e-12)[0])
 
     @cached_property
     def covariance(self) -> Floats:
@@ -83,6 +100,7 @@ class Fit:
             self.predictor,
             self.linear,
             self.total_information,
+            self.free,
             self.variance_components,
             self.random_effects,
             self.residual,
@@ -156,7 +174,7 @@ def fit(
     terms = evaluation.terms
     return Fit(
         predictor, state.parameters, state.random_effects, state.variance_components,
-        terms.loss, terms.information, terms.gradient, evaluation.prior, evaluation.residual, evaluation.linear,
+        terms.loss, terms.information, terms.gradient, evaluation.prior, evaluation.residual, evaluation.linear, bounds,
     )  # fmt: skip
 
 

@@ -62,7 +62,7 @@ class StepSolver:
         for damping in _DAMPINGS:
             damped = matrix + damping * np.diag(np.diagonal(matrix))
             move, move_random_effects = self._move(point, terms, damped, gradient)
-            decrement = float(gradient @ move)
+            decrement = float(2.0 * gradient @ move - move @ damped @ move)
             for length in _STEP_LENGTHS:
                 tried = self._at(point, length * move, length * move_random_effects)
                 if self._objective(tried) <= now:
@@ -95,21 +95,24 @@ class StepSolver:
         return move, np.einsum("rij,rj->ri", terms.inner_inverse, terms.pull - terms.mixed @ move)
 
     def _bounded(self, matrix: Floats, gradient: Floats, parameters: Floats) -> Floats:
-        """Return the step of the normal equations; effects' parameters at an active bound are fixed."""
-        maps = self.predictor.maps.size
-        free = np.ones(len(parameters), dtype=np.bool_)
-        for _ in range(3):
-            move = np.zeros(len(parameters))
-            move[free] = np.linalg.lstsq(matrix[np.ix_(free, free)], gradient[free], rcond=1e-12)[0]
+        """Return the step of the normal equations within the bounds of the effects' parameters.
+
+        A parameter that would leave its bounds moves to the bound, and the others are solved for beside it. If it were
+        only clipped, the others would compensate for a move that is not made, and no fraction of the step might reduce
+        the objective.
+        """
+        maps, (low, high) = self.predictor.maps.size, self.bounds.T
+        move, free = np.zeros(len(parameters)), np.ones(len(parameters), dtype=np.bool_)
+        while True:  # ends when no parameter leaves its bounds: there are only so many
+            rest = gradient - matrix @ np.where(free, 0.0, move)
+            move[free] = np.linalg.lstsq(matrix[np.ix_(free, free)], rest[free], rcond=1e-12)[0]
             unbounded = parameters[maps:] + move[maps:]
-            clipped = np.clip(unbounded, self.bounds[:, 0], self.bounds[:, 1])
-            outside = np.flatnonzero(clipped != unbounded)
-            # Parameters already at their bound are fixed, and the others are solved for again.
-            fixed = outside[parameters[maps + outside] == clipped[outside]]
-            if not len(fixed):
-                break
-            free[maps + fixed] = False
-        return move
+            clipped = np.clip(unbounded, low, high)
+            leaves = free[maps:] & (clipped != unbounded)
+            if not leaves.any():
+                return move
+            move[maps:][leaves] = (clipped - parameters[maps:])[leaves]
+            free[maps:][leaves] = False
 
 
 @dataclass(frozen=True)

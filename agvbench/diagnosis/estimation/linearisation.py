@@ -22,8 +22,8 @@ class LinearisationPoint:
     ``weight`` (R, K, 3): weights of the residuals; ``a`` (R, 3K, 6): derivatives by the random effects; ``inverse``
     (R, 6, 6): the inverse of their information; ``prior_gradient`` (R, 6): gradient of their prior; ``own`` (R, m):
     indices of each run's active parameters; ``j`` (R, 3K, m): projected derivatives by these; ``covariance`` (P, P) of
-    the parameters; ``pull`` (P,): gradient of the prior of the random effects by the parameters; ``residual`` (R, 3K),
-    weighted.
+    the parameters that are free, zero for those that are held at a bound; ``pull`` (P,): gradient of the prior of the
+    random effects by the parameters; ``residual`` (R, 3K), weighted.
     """
 
     weight: Floats
@@ -42,11 +42,15 @@ class LinearisationPoint:
         predictor: Predictor,
         linear: Linearised,
         information: Floats,
+        free: NDArray[np.bool_],
         variance_components: VarianceComponents,
         random_effects: Floats,
         residual: Floats,
     ) -> LinearisationPoint:
-        """Return the linearisation point of a fit: derivatives, total information, random effects and residuals."""
+        """Return the linearisation point of a fit: derivatives, total information, random effects and residuals.
+
+        ``free`` (P,): which of its parameters larger models may move.
+        """
         weight = weights(predictor, variance_components)
         residual = (residual * weight).reshape(len(weight), -1)
         a = (linear.by_random_effects * weight[..., None]).reshape(*residual.shape, -1)
@@ -57,7 +61,8 @@ class LinearisationPoint:
         prior_gradient = random_effects / prior**2
         pull = np.zeros(len(information))
         np.add.at(pull, linear.own, np.einsum("rij,ri->rj", mixed, prior_gradient))
-        covariance = np.asarray(np.linalg.inv(information))
+        covariance = np.zeros_like(information)
+        covariance[np.ix_(free, free)] = np.linalg.inv(information[np.ix_(free, free)])
         return cls(weight, a, inverse, prior_gradient, linear.own, j - a @ mixed, covariance, pull, residual)
 
     @cached_property

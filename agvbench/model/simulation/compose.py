@@ -38,7 +38,8 @@ _SECOND_ORDER = {"STEERING_INERTIA", "STEERING_ACCELERATION", "COAST_SPRING", "D
 def kernel(kinds: tuple[type[Effect], ...]) -> Callable[..., None]:
     """Return the compiled ``simulate`` of `agvbench.model.simulation.loop` with the hooks of `kinds`.
 
-    Parameters are laid out in the order of `kinds`. Compiling takes some seconds, once per set of effects and version.
+    Parameters are laid out in the order of `kinds`; after them, a number for each kind is 0 if it is at null, whose
+    hooks are then not called. Compiling takes some seconds, once per set of effects and version.
 
     Raises
     ------
@@ -89,9 +90,10 @@ def _chosen(node: ast.Import | ast.ImportFrom, second_order: bool) -> ast.Import
 def _stages(kinds: Sequence[type[Effect]]) -> tuple[list[str], list[str]]:
     """Return the imports of effects, and one function for each stage that calls their hooks."""
     imports, stages = [], []
+    parameters = sum(len(kind.parameters()) for kind in kinds)
     for stage in HOOKS:
         calls, first = [], 0
-        for kind in kinds:
+        for index, kind in enumerate(kinds):
             count = len(kind.parameters())
             if stage in kind.hooks():
                 imports.append(f"from {kind.__module__} import {kind.__qualname__}")
@@ -99,7 +101,8 @@ def _stages(kinds: Sequence[type[Effect]]) -> tuple[list[str], list[str]]:
                 stages.append(f"{alias} = compiled(inner=True)({kind.__qualname__}.{stage})\n")
                 values = "".join(f", p[{i}]" for i in range(first, first + count))
                 time = ", time_s" if stage in TIME_HOOKS else ""
-                calls.append(f"    {'time_s = ' if time else ''}{alias}(s{time}{values})\n")
+                call = f"{'time_s = ' if time else ''}{alias}(s{time}{values})"
+                calls.append(f"    if p[{parameters + index}] != 0.0:\n        {call}\n")
             first += count
         stages.append(_stage(stage, calls))
     return imports, stages

@@ -275,7 +275,7 @@ def simulate(
         that earlier commands result in (a larger deviation indicates another drive level; ∞: never), and 1 for a
         differential vehicle.
     p
-        Every effect's parameters.
+        Every effect's parameters, then a number for each effect: 0 if all its parameters are at null.
     initial
         (runs, 4): the measured initial pose, and the longitudinal speed (NaN: that of the earlier commands); or
         (runs, 5) with the recent longitudinal speed, which determines the drive level; or (runs, 7) with the yaw rate,

@@ -125,6 +125,7 @@ class Simulation:
         self.nulls, self.lower, self.upper, self.scales = (
             np.array([getattr(p, what) for _, p in declared]) for what in ("null", "low", "high", "scale")
         )
+        self._first_parameters = _starts([len(kind.parameters()) for kind in self.kinds])[:-1]
         starts = _starts([len(run.commands) for run in runs])
         self.row_starts = starts + np.arange(len(starts))
         self.frame_starts = _starts([len(run.t_s) for run in runs])
@@ -248,7 +249,7 @@ class Simulation:
                     float(self.geometry.is_differential),
                 ]
             ),
-            np.ascontiguousarray(parameters, dtype=np.float64),
+            np.append(parameters, np.logical_or.reduceat(parameters != self.nulls, self._first_parameters)),
             np.ascontiguousarray(initial, dtype=np.float64),
             self._begins_s,
             self._started_h,
