@@ -174,9 +174,6 @@ class DiscrepancyCriteria:
         gain, and at most this many, because each is a fit of several seconds.
     ``max_refitted``
         Effects that are reconsidered beside a term in one step.
-    ``few_groups_share``
-        An effect of which this share of the groups makes up more than half of the gain rests on few of them. A term may
-        take its place.
     ``min_share_of_effects``
         A term takes the place of effects, or of one of them, only if it gains this share of what they gain without it.
     """
@@ -185,7 +182,6 @@ class DiscrepancyCriteria:
     min_share_of_best_start: float = 0.3
     max_starts: int = 3
     max_refitted: int = 3
-    few_groups_share: float = 0.1
     min_share_of_effects: float = 0.2
 
 

@@ -59,6 +59,10 @@ DRIVE_INERTIA = 52
 FRONT_LAGS, REAR_LAGS, FRONT_LAGS_AT, REAR_LAGS_AT = range(53, 57)
 # Backlash of the drive train: the distance that the wheels would go while the motor turns through it at a start.
 DRIVE_BACKLASH = 57
+# Distance driven forward less that driven backward in the run: the angle that a wheel has turned, times its radius.
+ROLLED = 58
+# When the drive was last commanded to start from rest [s], and 1 while it is commanded to drive.
+DRIVE_START, DRIVES = range(59, 61)
 # What the lab logged about the run, each column standardised; 0 where nothing was logged.
-LOGGED, LOGGED_COUNT = 58, 16
+LOGGED, LOGGED_COUNT = 61, 16
 SIZE = LOGGED + LOGGED_COUNT

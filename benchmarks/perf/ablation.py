@@ -146,9 +146,7 @@ PARTS: dict[str, Part] = {
         lambda wide, current: current,
         lambda found, wide, current: found is not current,
     ),
-    "a term in place of an effect that rests on few groups": Part(
-        _DISCREPANCY, "_depends_on_few_groups", lambda *_: False, _is_true
-    ),
+    "a term in place of an effect": Part(_DISCREPANCY, "_term_in_place_of_effect", lambda *_: None, _is_something),
     "the validation gate": Part(f"{_SELECTION}validation", "validated", _first_two, _is_not_first),
     "a way off the likelihood's plateaus": Part(
         _OPTIMISER,

@@ -29,7 +29,7 @@ _LINE_DIRECTIONS = 16
 _STRIP_DIRECTIONS, _STRIP_STEP, _WIDTHS_M = 8, 16, (0.3, 0.6, 1.0, 1.6)
 _BLUR_M, _SHARP_M, _BEST_LINES, _FINE_STEPS, _MIN_CROSSINGS = 0.1, 0.01, 4, 9, 5
 _POINT_STEP, _CORES_M = 12, (0.1, 0.5, 2.0)
-_RUN_TIMES_S = (0.4, 0.8, 1.6, 3.2, 6.4)
+_RUN_TIMES_S = (0.2, 0.4, 0.8, 1.6, 3.2, 6.4)
 _WAVES_M = np.geomspace(0.12, 1.5, 50)
 
 Option = tuple[Columns, Callable[[Floats], list[float]]]
@@ -83,6 +83,7 @@ def options(
     yield terms.DriftToPoint, _points(rates)
     yield terms.DriftByPlace, iter([(_drifts(rates, _quadratic(rates.middle)), Values())])
     yield terms.SpeedByRunTime, _run_times(rates)
+    yield terms.SteeringAtStart, _starts_of_steering(rates, tangents, geometry)
     yield terms.TwistAtStart, _starts(rates)
     for term, shapes in changes(rates, tangents, geometry, regression):
         yield term, ((columns, course.values) for columns, course in shapes)
@@ -146,6 +147,13 @@ def _run_times(rates: Rates) -> Iterator[Option]:
         yield {0: column[:, None]}, Values(constant)
 
 
+def _starts_of_steering(rates: Rates, tangents: SteeringTangents, geometry: Geometry) -> Iterator[Option]:
+    gain = dict(columns_by_campaign_time(rates, tangents, geometry))[terms.SteeringByCampaignTime]
+    for constant in _RUN_TIMES_S:
+        loss = rates.covariates["speed_mps"] * np.exp(-rates.covariates["time_in_run_s"] / constant)
+        yield {k: -loss[:, None] * column for k, column in gain.items()}, Values(constant)
+
+
 def _starts(rates: Rates) -> Iterator[Option]:
     first = np.r_[True, np.diff(rates.run) != 0] / rates.weight
     zero = np.zeros_like(first)
@@ -165,7 +173,7 @@ def _slips(rates: Rates) -> Columns:
 def _waves(rates: Rates) -> Iterator[Option]:
     zero = np.zeros((len(rates.run), 2))
     for period in _WAVES_M:
-        angle = math.tau * rates.covariates["distance_m"] * rates.covariates["direction"] / period
+        angle = math.tau * rates.covariates["distance_m"] / period
         wave = np.column_stack([np.cos(angle), np.sin(angle)])
         columns = {0: [wave, zero, zero], 2: [zero, wave, zero], 1: [zero, zero, wave]}
         yield {feature: np.hstack(parts) for feature, parts in columns.items()}, _Wave(float(period))

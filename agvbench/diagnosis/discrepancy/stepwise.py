@@ -13,7 +13,6 @@ from agvbench.diagnosis.discrepancy.campaign_time import complement, is_constant
 from agvbench.diagnosis.discrepancy.other_forms import models_of_other_forms, with_other_forms
 from agvbench.diagnosis.discrepancy.regression import steering_tangents
 from agvbench.diagnosis.discrepancy.screening import Start, screen
-from agvbench.diagnosis.estimation.cross_validation import by_group
 from agvbench.diagnosis.residuals.body_rates import residual_rates
 from agvbench.diagnosis.selection.actuators import CAMERA, prefer_actuators, separate_lag_from_delay
 from agvbench.diagnosis.selection.candidates import applies, candidate
@@ -146,8 +145,7 @@ def add_term(selection: Selection, selector: Selector) -> TermSelection | None:
                     _term_in_place_of_effect(extended, selection, selection.gains),
                 ]
     else:
-        of_few_groups = [name for name in selection.gains if _depends_on_few_groups(selector, selection, name)]
-        found.append(_term_in_place_of_effect(extended, selection, of_few_groups))
+        found.append(_term_in_place_of_effect(extended, selection, selection.gains))
     others = models_of_other_forms(extended, selection)
     found += [(model, term) for _, term, model in others if model.deviance < selection.chosen.deviance]
     models = [reselect_effects(extended, selection, *pair) for pair in found if pair is not None]
@@ -262,18 +260,6 @@ def _may_be_mimicked(selection: Selection, with_term: ScoredModel) -> bool:
 def _term_values(model: ScoredModel, term: type[DiscrepancyTerm]) -> Floats:
     own = model.fit.effect_values()
     return np.array([own[f"{term.name}.{p.name}"] for p in term.parameters()])
-
-
-def _depends_on_few_groups(selector: Selector, selection: Selection, name: str) -> bool:
-    """Return whether a tenth of the groups of runs contributes more than half of the gain of an effect."""
-    chosen = selection.chosen
-    names = tuple(n for n in chosen.names if n != name)
-    without = selection.base if names == selection.base.names else selector.known(names)
-    if without is None:
-        return False
-    gains = np.sort(by_group(without.loss - chosen.loss, selector.batch.readings.group))
-    few = max(1, round(DISCREPANCY.few_groups_share * len(gains)))
-    return float(gains[-few:].sum()) > 0.5 * float(gains.sum())
 
 
 def _term_in_place_of_effect(

@@ -80,7 +80,8 @@ def residual_rates(readings: Readings, poses: Floats) -> Rates:
     value = (steps_m - steps_p)[use] * (direction / size)[:, None]
     middle = 0.5 * (measured[:, 1:] + begin)[use]
     duration = (t_s[:, 1:] - begin_s)[use]
-    driven = (np.cumsum(np.where(use, length, 0.0), axis=1) - 0.5 * length)[use]
+    signed = np.where(use, np.copysign(length, steps_p[..., 0]), 0.0)
+    rolled = (np.cumsum(signed, axis=1) - 0.5 * signed)[use]
     covariates = {
         "x_m": middle[:, 0],
         "y_m": middle[:, 1],
@@ -92,7 +93,7 @@ def residual_rates(readings: Readings, poses: Floats) -> Rates:
         "direction": direction,
         "curvature_per_m": direction * steps_p[..., 2][use] / size,
         "sideslip": direction * steps_p[..., 1][use] / size,
-        "distance_m": driven,
+        "distance_m": rolled,
     }
     logged = {
         # Without a sample at the beginning of the step, `last` is the one before.

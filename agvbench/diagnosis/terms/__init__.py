@@ -23,7 +23,7 @@ from agvbench.diagnosis.terms.logged import (
     TrimByLoggedColumn,
 )
 from agvbench.diagnosis.terms.speed import SpeedByCourse, SpeedByHeading, SpeedByRunTime, SpeedInDisc, SpeedInStrip
-from agvbench.diagnosis.terms.steering import SteeringByDirection, SteeringByHistory, SteeringByTravel
+from agvbench.diagnosis.terms.steering import SteeringAtStart, SteeringByDirection, SteeringByHistory, SteeringByTravel
 from agvbench.diagnosis.terms.turning import (
     SlipByYawRate,
     TurnAtLine,
@@ -45,6 +45,7 @@ TERMS: tuple[type[DiscrepancyTerm], ...] = (
     DriftToPoint,
     DriftByPlace,
     SpeedByRunTime,
+    SteeringAtStart,
     TwistAtStart,
     SpeedByCampaignTime,
     SteeringByCampaignTime,
@@ -81,6 +82,7 @@ __all__ = [
     "SpeedByRunTime",
     "SpeedInDisc",
     "SpeedInStrip",
+    "SteeringAtStart",
     "SteeringByCampaignTime",
     "SteeringByDirection",
     "SteeringByHistory",

@@ -9,6 +9,7 @@ from typing import ClassVar
 from agvbench.diagnosis.terms.base import DiscrepancyTerm
 from agvbench.effects.base import Stage, parameter
 from agvbench.effects.state import (
+    DRIVE_START,
     FRONT,
     FRONT_AIM,
     FRONT_BEFORE,
@@ -22,6 +23,8 @@ from agvbench.effects.state import (
     REAR_LAGS_AT,
     REAR_REVERSAL,
     SPEED,
+    SPEED_AIM,
+    TIME,
 )
 from agvbench.model.compiled import compiled
 from agvbench.types import Floats
@@ -45,6 +48,34 @@ class SteeringByDirection(DiscrepancyTerm):
         if state[SPEED] != 0.0:
             state[FRONT] += math.copysign(front_rad, front_rad * state[SPEED])
             state[REAR] += math.copysign(rear_rad, rear_rad * state[SPEED])
+
+
+@dataclass(frozen=True)
+class SteeringAtStart(DiscrepancyTerm):
+    """The axles turn less while the drive starts: ``δ ← δ (1 − loss |v_map| e^(−(t − t₀)/T))``.
+
+    The drive starts from rest at t₀. A motor that starts draws a current in proportion to
+    the speed that is commanded; servos with the same supply are then weak.
+    """
+
+    name: ClassVar[str] = "steering_at_start"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    covariates: ClassVar[tuple[str, ...]] = ("time_in_run_s", "history")
+    through: ClassVar[str] = "steering"
+    longest_step_s: ClassVar[float] = 0.1
+
+    loss_s_per_m: float = parameter(unit="s/m", low=-3.0, high=3.0, scale=0.1)
+    # A shorter one would be the lag of a servo, a longer one a gain that the maps absorb.
+    time_constant_s: float = parameter(unit="s", low=0.15, high=60.0, scale=1.0, null=1.0)
+
+    @staticmethod
+    def steer(state: Floats, loss_s_per_m: float, time_constant_s: float) -> None:
+        """Scale both angles by the time since the drive started."""
+        if loss_s_per_m != 0.0:
+            since_s = max(state[TIME] - state[DRIVE_START], 0.0)
+            loss = loss_s_per_m * abs(state[SPEED_AIM]) * math.exp(-since_s / time_constant_s)
+            state[FRONT] *= 1.0 - loss
+            state[REAR] *= 1.0 - loss
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from agvbench.diagnosis.terms.base import DiscrepancyTerm
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.state import DISTANCE, FORWARD, HEADING, LEFT, SPEED, X_RATE, Y_RATE, YAW_RATE, X, Y
+from agvbench.effects.state import DISTANCE, FORWARD, HEADING, LEFT, ROLLED, SPEED, X_RATE, Y_RATE, YAW_RATE, X, Y
 from agvbench.types import Floats
 
 _EDGE_M = 0.015
@@ -150,7 +150,7 @@ class TwistAtStart(DiscrepancyTerm):
 class WaveByDistance(DiscrepancyTerm):
     """Speed, direction of motion and curvature vary periodically with the distance driven in the run.
 
-    The distance is negative backward: a wheel that turns back passes the same angles in reverse order.
+    The distance decreases backward: a wheel that turns back passes the same angles in reverse order.
     """
 
     name: ClassVar[str] = "wave_by_distance"
@@ -180,7 +180,7 @@ class WaveByDistance(DiscrepancyTerm):
     ) -> None:
         """Modulate speed, lateral velocity and yaw rate."""
         if period_m > 0.0:
-            angle = math.tau * math.copysign(state[DISTANCE], state[SPEED]) / period_m
+            angle = math.tau * state[ROLLED] / period_m
             c, s = math.cos(angle), math.sin(angle)
             side = (side_cosine * c + side_sine * s) * state[FORWARD]
             state[YAW_RATE] += (turn_cosine * c + turn_sine * s) * state[FORWARD]

@@ -18,8 +18,8 @@ WEIGHTS = BASIS.sum(axis=1)
 LONGITUDINAL, LATERAL, TURN, ALONG_X, ALONG_Y, TURNED = range(0, 6 * COUNT, COUNT)
 SMOOTH = 6 * COUNT
 WORK_SIZE = SMOOTH + SMOOTH_SIZE
-# Where a step starts: pose, distance driven, and the pose that a smoothing camera reports.
-START_SIZE = 7
+# Where a step starts: pose, distance driven, the pose that a smoothing camera reports, and the distance with its sign.
+START_ROLLED, START_SIZE = 7, 8
 
 # Numbers of the vehicle: axles, the front axle's share of the drive, longest step, when the run began in hours, the
 # deviation of the drive's level, and whether it is differential.

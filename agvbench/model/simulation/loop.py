@@ -25,7 +25,9 @@ from agvbench.effects.state import (
     DRIVE_BACKLASH,
     DRIVE_COMMAND,
     DRIVE_INERTIA,
+    DRIVE_START,
     DRIVE_WAIT,
+    DRIVES,
     FRONT_AIM,
     FRONT_BACKLASH,
     FRONT_BEFORE,
@@ -46,6 +48,7 @@ from agvbench.effects.state import (
     REAR_LAGS_AT,
     REAR_REVERSAL,
     REAR_WAIT,
+    ROLLED,
     SEEN_LAG,
     SIZE,
     SPEED,
@@ -64,7 +67,7 @@ from agvbench.effects.state import (
 from agvbench.model.compiled import compiled
 from agvbench.model.simulation.actuators import PLAN_SIZE, SERVOS_SIZE, leave_command, plan_command, step_length
 from agvbench.model.simulation.frames import follow_seen, report_step, see_step, start_run, wait
-from agvbench.model.simulation.layout import COUNT, LONGEST_STEP, START_SIZE, STARTED, TURN, WORK_SIZE
+from agvbench.model.simulation.layout import COUNT, LONGEST_STEP, START_ROLLED, START_SIZE, STARTED, TURN, WORK_SIZE
 from agvbench.model.simulation.level import drive_speed, front_correction, level_lift, see_late
 from agvbench.model.simulation.stages import aim, arrive, capture
 from agvbench.model.simulation.step import end_step, take_step
@@ -90,7 +93,7 @@ def _last_reversal(reversal: float, before: float, now: float) -> float:
 
 @compiled(inner=True)
 def _obey(
-    s: Floats, p: Floats, commands: Floats, settled: Floats, driven: int, front: int, rear: int, lift: float
+    s: Floats, p: Floats, commands: Floats, settled: Floats, driven: int, front: int, rear: int, lift: float, now: float
 ) -> None:
     """Put commands and aims into `s`; the `lift` of the drive level makes a driving command faster, either way.
 
@@ -104,6 +107,10 @@ def _obey(
         s[REAR_REVERSAL] = _last_reversal(s[REAR_REVERSAL], settled[rear - 1, 1], settled[rear, 1])
     s[DRIVE_COMMAND], s[FRONT_COMMAND], s[REAR_COMMAND] = commands[driven, 0], commands[front, 1], commands[rear, 2]
     s[FRONT_AIM], s[REAR_AIM], s[SPEED_AIM] = settled[front, 0], settled[rear, 1], settled[driven, 2]
+    drives = 1.0 if settled[driven, 2] != 0.0 else 0.0
+    if drives > s[DRIVES]:
+        s[DRIVE_START] = now
+    s[DRIVES] = drives
     if lift != 0.0 and settled[driven, 2] != 0.0:
         s[SPEED_AIM] = math.copysign(max(abs(settled[driven, 2]) + lift, 0.0), settled[driven, 2])
     s[STEERING_LAG], s[STEERING_RATE], s[ACCELERATE_LAG], s[BRAKE_LAG] = 0.0, math.inf, 0.0, 0.0
@@ -202,11 +209,11 @@ def _drive_run(
     s[FRONT_COMMAND], s[REAR_COMMAND] = commands[first, 1], commands[first, 2]
     s[FRONT_BEFORE], s[REAR_BEFORE] = settled[first, 0], settled[first, 1]
     s[FRONT_REVERSAL], s[REAR_REVERSAL] = settled[first, 0], settled[first, 1]
-    s[FRONT_LAGS] = s[REAR_LAGS] = 0.0
+    s[FRONT_LAGS] = s[REAR_LAGS] = s[DRIVES] = 0.0
     s[FRONT_LAGS_AT], s[REAR_LAGS_AT] = settled[first, 0], settled[first, 1]
     driven = front = rear = first
     while now < math.inf:
-        _obey(s, p, commands, settled, driven, front, rear, lift)
+        _obey(s, p, commands, settled, driven, front, rear, lift, now)
         to_front = arrive(s, command_t_s[front + 1], p) if front < last else math.inf
         to_rear = arrive(s, command_t_s[rear + 1], p) + s[REAR_WAIT] if rear < last else math.inf
         to_drive, next_driven = _next_drive(s, p, settled, command_t_s, driven, last)
@@ -234,7 +241,7 @@ def _drive_run(
                         turned = weight * front_correction(s, p, vehicle, servos, now, yaw_rate)
                         servos[0] += turned
                         servos[2] += turned
-                    _obey(s, p, commands, settled, driven, front, rear, lift)
+                    _obey(s, p, commands, settled, driven, front, rear, lift, now)
                 if s[SEEN_LAG] > 0.0:
                     see_late(s, p, vehicle, servos, now, start)
             plan_command(plan, s, servos)
@@ -306,13 +313,13 @@ def simulate(
             continue
         first, last = command_starts[run], command_starts[run + 1] - 1
         vehicle[STARTED] = started_h[run]
-        s[X_RATE] = s[Y_RATE] = s[YAW_RATE] = s[TIME] = s[DISTANCE] = 0.0
+        s[X_RATE] = s[Y_RATE] = s[YAW_RATE] = s[TIME] = s[DISTANCE] = s[ROLLED] = 0.0
         s[HOURS] = started_h[run]
         for i in range(logged.shape[1]):
             s[LOGGED + i] = logged[run, i]
         start_run(s, p, initial, run)
         start[0], start[1], start[2], start[3] = s[X], s[Y], s[HEADING], 0.0
-        start[4], start[5], start[6] = initial[run, 0], initial[run, 1], initial[run, 2]
+        start[4], start[5], start[6], start[START_ROLLED] = initial[run, 0], initial[run, 1], initial[run, 2], 0.0
         begin = arrive(s, command_t_s[first + 1], p) + min(0.0, s[REAR_WAIT], s[DRIVE_WAIT])
         if not math.isnan(begins_s[run]):
             begin = capture(s, begins_s[run], p)

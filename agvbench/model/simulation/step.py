@@ -23,6 +23,7 @@ from agvbench.effects.state import (
     LEFT,
     REAR,
     REAR_SPEED,
+    ROLLED,
     SPEED,
     TAN_FRONT,
     TAN_REAR,
@@ -47,6 +48,7 @@ from agvbench.model.simulation.layout import (
     NODES,
     REAR_AXLE,
     SECONDS_PER_HOUR,
+    START_ROLLED,
     STARTED,
     TO_NODES,
     TURN,
@@ -106,6 +108,7 @@ def take_step(
         # Pose for effects that depend on it, extrapolated with the velocity at the last node.
         s[X], s[Y], s[HEADING] = start[0] + elapsed * x_rate, start[1] + elapsed * y_rate, start[2] + elapsed * yaw_rate
         s[DISTANCE] = start[3] + elapsed * abs(s[SPEED])
+        s[ROLLED] = start[START_ROLLED] + elapsed * s[SPEED]
         set_motion(s, p, vehicle)
         work[LONGITUDINAL + i], work[LATERAL + i], work[TURN + i] = s[FORWARD], s[LEFT], s[YAW_RATE]
     for i in range(COUNT):
@@ -124,12 +127,14 @@ def take_step(
 
 @compiled(inner=True, fast=True)
 def end_step(work: Floats, start: Floats, length: float) -> None:
-    """Move `start`, pose and distance, to the end of the step."""
-    longitudinal = 0.0
+    """Move `start`, pose and distances, to the end of the step."""
+    driven = rolled = 0.0
     for j in range(COUNT):
         weight = WEIGHTS[j] * length
         start[0] += weight * work[ALONG_X + j]
         start[1] += weight * work[ALONG_Y + j]
         start[2] += weight * work[TURNED + j]
-        longitudinal += weight * abs(work[LONGITUDINAL + j])
-    start[3] += longitudinal
+        driven += weight * abs(work[LONGITUDINAL + j])
+        rolled += weight * work[LONGITUDINAL + j]
+    start[3] += driven
+    start[START_ROLLED] += rolled
