@@ -11,7 +11,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agvbench.diagnosis.criteria import LOGGED
-from agvbench.diagnosis.terms import TERMS, ByLoggedColumn, DiscrepancyTerm, TurnByDirection
+from agvbench.diagnosis.selection.variants import EXTENDED_LIBRARY
+from agvbench.diagnosis.terms import (
+    TERMS,
+    ByLoggedColumn,
+    DiscrepancyTerm,
+    SteeringAtStart,
+    TurnByDirection,
+    WaveByDistance,
+)
 from agvbench.diagnosis.terms.campaign_time import ByCampaignTime, course
 from agvbench.effects import TIME_HOOKS, effect_kinds
 from agvbench.effects import state as s
@@ -83,6 +91,38 @@ def test_a_weak_motor_bends_the_path_to_the_same_side_forward_and_backward() -> 
     heading = simulation.predict(rows, values, np.array([[0.5, 0.2, 0.3, 0.0]])).reshape(-1, 3)[:, 2]
     at = np.interp(np.linspace(0.2, 5.0, 49), [0.0, 1.0, 2.0, 3.0, 5.0], [0.0, 0.3, 0.5, 0.7, 0.7])
     np.testing.assert_allclose(heading, 0.3 + 0.2 * at, rtol=0.0, atol=1e-6)
+
+
+def driven(effect: DiscrepancyTerm, rows: np.ndarray, t_s: np.ndarray) -> np.ndarray:
+    """Return the headings (K,) of a vehicle with one term under a command per second; `rows` as of the simulation."""
+    times = np.arange(len(rows) - 1.0)
+    commands = Commands(times, *np.full((3, len(times)), 1600.0))
+    # The diagnosis compiles this kernel in any case.
+    simulation = Simulation(Geometry(0.2, 0.2), NEUTRAL, [SimulatedRun(commands, t_s)], kinds=EXTENDED_LIBRARY)
+    return simulation.predict(rows, simulation.parameters([effect]), np.zeros((1, 4))).reshape(-1, 3)[:, 2]
+
+
+def test_a_wheel_that_turns_back_passes_the_same_angles_in_reverse_order() -> None:
+    wave = WaveByDistance(period_m=0.41, turn_cosine=0.3, turn_sine=0.8)
+    speeds = np.array([0.0, 0.5, -0.5, 0.3, -0.3, 0.0])
+    heading = driven(wave, np.column_stack([np.zeros((6, 2)), speeds]), np.array([0.5, 1.0, 1.5, 2.0, 3.0, 4.0]))
+    angle = math.tau * 0.25 / 0.41
+    there = 0.41 / math.tau * (0.3 * math.sin(angle) + 0.8 * (1.0 - math.cos(angle)))
+    np.testing.assert_allclose(heading[[0, 2]], there, atol=1e-6)
+    np.testing.assert_allclose(heading[3:], [0.0, heading[4], 0.0], atol=1e-6)
+    assert abs(heading[4]) > 0.01
+
+
+def test_the_axles_turn_less_at_each_start_of_the_drive() -> None:
+    weak = SteeringAtStart(loss_s_per_m=0.4, time_constant_s=0.3)
+    speeds = np.array([0.0, 0.5, 0.0, 0.5, -0.5, 0.0])
+    rows = np.column_stack([np.full((6, 2), [0.02, -0.02]), speeds])
+    t_s = np.linspace(0.0, 5.0, 501)[1:]
+    lost = (driven(SteeringAtStart(), rows, t_s) - driven(weak, rows, t_s))[[99, 199, 299, 399, 499]]
+    # The yaw rate of small angles, times the loss integrated over a second; a reversal is no start from rest.
+    whole = 0.5 * 0.04 / 0.4 * 0.4 * 0.5 * 0.3 * -math.expm1(-1.0 / 0.3)
+    after = 0.5 * 0.04 / 0.4 * 0.4 * 0.5 * 0.3 * math.exp(-1.0 / 0.3) * -math.expm1(-1.0 / 0.3)
+    np.testing.assert_allclose(lost, [whole, whole, 2.0 * whole, 2.0 * whole - after, 2.0 * whole - after], rtol=2e-3)
 
 
 def test_more_columns_than_the_simulation_holds_are_refused() -> None:

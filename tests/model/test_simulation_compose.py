@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 
@@ -67,9 +68,13 @@ def test_an_effect_from_another_module(tmp_path, monkeypatch):
 def test_the_kernel_calls_every_hook_once_in_the_order_of_the_chain():
     kinds = tuple(effect_kinds().values())
     text = simulation_compose.kernel_text(kinds)
-    for kind in kinds:
+    first_number = sum(len(kind.parameters()) for kind in kinds)
+    for index, kind in enumerate(kinds):
         for hook in kind.hooks():
             assert text.count(f"    _{hook}_{kind.name}(s") + text.count(f"time_s = _{hook}_{kind.name}(s") == 1
+            # The number after the parameters is 0 where the effect is at null.
+            guarded = rf"    if p\[{first_number + index}\] != 0.0:\n        (time_s = )?_{hook}_{kind.name}\(s"
+            assert re.search(guarded, text)
     compile(text, "kernel", "exec")
 
 

@@ -42,6 +42,31 @@ class Step:
     decrement: float
 
 
+def bounded_step(matrix: Floats, gradient: Floats, parameters: Floats, bounds: Floats) -> Floats:
+    """Return the step (P,) of the normal equations from `parameters` (P,), the last q of which have `bounds` (q, 2).
+
+    A parameter that would leave its bounds moves to the bound, and the others are solved for beside it. If it were only
+    clipped, the others would compensate for a move that is not made, and no fraction of the step might reduce the
+    objective. Which parameters are held follows from the step and its multipliers (primal-dual active set strategy:
+    Hintermüller, Ito and Kunisch, SIAM Journal on Optimization 13, 2003).
+    """
+    first = len(parameters) - len(bounds)
+    low, high = bounds.T - parameters[first:]
+    move, held = np.zeros(len(parameters)), np.zeros(len(parameters), dtype=np.bool_)
+    for _ in range(2 * len(bounds) + 2):
+        rest = gradient - matrix @ np.where(held, move, 0.0)
+        move[~held] = np.linalg.lstsq(matrix[np.ix_(~held, ~held)], rest[~held], rcond=1e-12)[0]
+        pressing = (gradient - matrix @ move)[first:]
+        own, was = move[first:], held[first:]
+        below = np.where(was, (own <= low) & (pressing < 0.0), own < low)
+        above = np.where(was, (own >= high) & (pressing > 0.0), own > high)
+        if np.array_equal(below | above, was):
+            break
+        held[first:] = below | above
+        own[below], own[above] = low[below], high[above]
+    return move
+
+
 @dataclass(frozen=True)
 class StepSolver:
     """Solves for one step at fixed derivatives, variance components and ``bounds`` (effects' parameters, 2)."""
@@ -91,28 +116,8 @@ class StepSolver:
         return matrix, terms.gradient.sum(axis=0) + prior.gradient
 
     def _move(self, point: Point, terms: Terms, matrix: Floats, gradient: Floats) -> tuple[Floats, Floats]:
-        move = self._bounded(matrix, gradient, point.parameters)
+        move = bounded_step(matrix, gradient, point.parameters, self.bounds)
         return move, np.einsum("rij,rj->ri", terms.inner_inverse, terms.pull - terms.mixed @ move)
-
-    def _bounded(self, matrix: Floats, gradient: Floats, parameters: Floats) -> Floats:
-        """Return the step of the normal equations within the bounds of the effects' parameters.
-
-        A parameter that would leave its bounds moves to the bound, and the others are solved for beside it. If it were
-        only clipped, the others would compensate for a move that is not made, and no fraction of the step might reduce
-        the objective.
-        """
-        maps, (low, high) = self.predictor.maps.size, self.bounds.T
-        move, free = np.zeros(len(parameters)), np.ones(len(parameters), dtype=np.bool_)
-        while True:  # ends when no parameter leaves its bounds: there are only so many
-            rest = gradient - matrix @ np.where(free, 0.0, move)
-            move[free] = np.linalg.lstsq(matrix[np.ix_(free, free)], rest[free], rcond=1e-12)[0]
-            unbounded = parameters[maps:] + move[maps:]
-            clipped = np.clip(unbounded, low, high)
-            leaves = free[maps:] & (clipped != unbounded)
-            if not leaves.any():
-                return move
-            move[maps:][leaves] = (clipped - parameters[maps:])[leaves]
-            free[maps:][leaves] = False
 
 
 @dataclass(frozen=True)
