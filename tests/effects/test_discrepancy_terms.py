@@ -19,6 +19,7 @@ from agvbench.diagnosis.terms import (
     SteeringAtStart,
     TurnByDirection,
     WaveByDistance,
+    WheelsByCampaignTime,
 )
 from agvbench.diagnosis.terms.campaign_time import ByCampaignTime, course
 from agvbench.effects import TIME_HOOKS, effect_kinds
@@ -123,6 +124,19 @@ def test_the_axles_turn_less_at_each_start_of_the_drive() -> None:
     whole = 0.5 * 0.04 / 0.4 * 0.4 * 0.5 * 0.3 * -math.expm1(-1.0 / 0.3)
     after = 0.5 * 0.04 / 0.4 * 0.4 * 0.5 * 0.3 * math.exp(-1.0 / 0.3) * -math.expm1(-1.0 / 0.3)
     np.testing.assert_allclose(lost, [whole, whole, 2.0 * whole, 2.0 * whole - after, 2.0 * whole - after], rtol=2e-3)
+
+
+def test_another_battery_changes_speed_and_yaw_rate_of_both_wheels_alike() -> None:
+    run = SimulatedRun(Commands(*np.array([[0.0], [1600.0], [1600.0], [1600.0]])), np.array([1.0, 2.0]), started_h=0.5)
+    geometry = Geometry(0.0, 0.0, kinematics="differential")
+    simulation = Simulation(geometry, NEUTRAL, [run], kinds=EXTENDED_LIBRARY)
+    rows = np.array([[0.0, 0.0, 0.0], [0.4, 0.0, 0.3]])
+    for begins_h, factor in ((0.2, 1.25), (0.8, 1.0)):
+        change = WheelsByCampaignTime(change=0.25, begins_h=begins_h, ends_h=2.0)
+        x, y, heading = simulation.predict(rows, simulation.parameters([change]), np.zeros((1, 4)))[-1]
+        turned = 2.0 * 0.4 * factor
+        np.testing.assert_allclose(heading, turned, rtol=1e-6)
+        np.testing.assert_allclose(math.hypot(x, y), 2.0 * 0.3 / 0.4 * math.sin(0.5 * turned), rtol=1e-6)
 
 
 def test_more_columns_than_the_simulation_holds_are_refused() -> None:

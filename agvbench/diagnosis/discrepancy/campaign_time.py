@@ -120,7 +120,9 @@ def columns_by_campaign_time(
     one, zero, curvature = np.ones(len(rates.run)), np.zeros(len(rates.run)), c["curvature_per_m"]
     yield terms.SpeedByCampaignTime, {0: one[:, None]}
     if geometry.is_differential:
-        yield terms.SteeringByCampaignTime, {1: geometry.rear_axle_m * curvature[:, None], 2: curvature[:, None]}
+        turning = {1: geometry.rear_axle_m * curvature[:, None], 2: curvature[:, None]}
+        yield terms.SteeringByCampaignTime, turning
+        yield terms.WheelsByCampaignTime, {0: one[:, None]} | turning
     else:
         angle = np.arctan(tangents.tangent)
         gain = by_axle_angles(angle[:, 0], angle[:, 1], tangents, geometry)

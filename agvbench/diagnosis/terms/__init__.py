@@ -14,6 +14,7 @@ from agvbench.diagnosis.terms.campaign_time import (
     SpeedByCampaignTime,
     SteeringByCampaignTime,
     TrimByCampaignTime,
+    WheelsByCampaignTime,
 )
 from agvbench.diagnosis.terms.floor import DriftByPlace, DriftToPoint
 from agvbench.diagnosis.terms.logged import (
@@ -50,6 +51,7 @@ TERMS: tuple[type[DiscrepancyTerm], ...] = (
     SpeedByCampaignTime,
     SteeringByCampaignTime,
     TrimByCampaignTime,
+    WheelsByCampaignTime,
     DriftByCampaignTime,
     MarkersByCampaignTime,
     ClockByCampaignTime,
@@ -95,4 +97,5 @@ __all__ = [
     "TurnByHeading",
     "TwistAtStart",
     "WaveByDistance",
+    "WheelsByCampaignTime",
 ]

@@ -112,6 +112,36 @@ class SteeringByCampaignTime(ByCampaignTime):
 
 
 @dataclass(frozen=True)
+class WheelsByCampaignTime(ByCampaignTime):
+    """Both wheels of a differential vehicle change alike: ``v ← v (1 + change · course)``, and so ω.
+
+    One example is a battery that is changed, without a controller of the yaw rate.
+    """
+
+    name: ClassVar[str] = "wheels_by_campaign_time"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    through: ClassVar[str] = "speed and turning"
+    needs_differential: ClassVar[bool] = True
+
+    change: float = parameter(unit="–", low=-0.9, high=2.0, scale=0.05)
+    begins_h: float = _begin()
+    ends_h: float = _end()
+    time_constant_h: float = _time_constant()
+
+    @staticmethod
+    def steer(state: Floats, change: float, begins_h: float, ends_h: float, time_constant_h: float) -> None:
+        """Scale the yaw rate."""
+        state[FRONT] *= 1.0 + change * course(state[HOURS], begins_h, ends_h, time_constant_h)
+
+    @staticmethod
+    def drive(state: Floats, change: float, begins_h: float, ends_h: float, time_constant_h: float) -> None:
+        """Scale the speed."""
+        factor = 1.0 + change * course(state[HOURS], begins_h, ends_h, time_constant_h)
+        state[FRONT_SPEED] *= factor
+        state[REAR_SPEED] *= factor
+
+
+@dataclass(frozen=True)
 class TrimByCampaignTime(ByCampaignTime):
     """The offset of the axle angles changes: ``δ ← δ + angle · course``."""
 
