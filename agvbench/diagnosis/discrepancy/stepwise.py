@@ -274,11 +274,13 @@ def _term_in_place_of_effect(
     best: tuple[ScoredModel, type[DiscrepancyTerm]] | None = None
     for name in names:
         without = extended.without_effect(selection.base, selection.chosen, name)
+        # What is predicted is a gain of the fit, and not a cross-validated one.
+        least = DISCREPANCY.min_share_of_effects * selection.chosen.fit_gain_over(without)
         for term in TERMS:
             is_slow = term.longest_step_s < math.inf
             if is_slow or issubclass(term, ByLoggedColumn) or not applies(term, extended.batch.geometry):
                 continue
-            if extended.predicted_gain(without, term.name) < DISCREPANCY.min_share_of_effects * selection.gains[name]:
+            if extended.predicted_gain(without, term.name) < least:
                 continue
             model = extended.with_effect(without, term.name)
             if model.deviance < (best[0] if best else selection.chosen).deviance and extended.meets_criterion(

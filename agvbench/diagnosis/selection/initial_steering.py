@@ -10,6 +10,8 @@ them result in. The measured one is noisy and late, the commanded one as wrong a
 
 from __future__ import annotations
 
+import numpy as np
+
 from agvbench.diagnosis.criteria import SELECTION
 from agvbench.diagnosis.estimation.score_test import first_order_gain
 from agvbench.diagnosis.model.predictor import Predictor
@@ -26,27 +28,43 @@ def choose_initial_steering(selector: Selector) -> Selector:
 
     The comparison is between the best models with a single effect that delays the axles.
     """
-    names = [name for name in STEERING_DYNAMICS if name in selector.candidates]
     base, other = selector.base(), under_other_initial_steering(selector)
     if set(STEERING_DYNAMICS) & {cause_of(name) for name in selector.given}:
         return other if other.base().deviance < base.deviance - SELECTION.min_gain else selector
-    adopted = other.adopt(base)
-    if max(_predicted_gain(other, adopted, name) for name in names) < SELECTION.min_gain_of_initial_steering:
-        return selector
-    at_neutral = min(selector.with_effect(base, name).deviance for name in names)
-    at_first = min(other.with_effect(adopted, name).deviance for name in names)
-    return other if at_first < at_neutral - SELECTION.min_gain else selector
+    return other if _is_better_beside(other, other.adopt(base), selector, base) else selector
 
 
 def reconsider_initial_steering(selection: Selection, selector: AnySelector) -> tuple[Selection, AnySelector]:
-    """Repeat the selection under the other hypothesis if the selected model predicts clearly better under it."""
-    chosen = selection.chosen
-    if not set(STEERING_DYNAMICS) & {cause_of(name) for name in chosen.names}:
+    """Repeat the selection under the other hypothesis if the selected model predicts clearly better under it.
+
+    If the model has no effect that delays the axles, the best one of them is added under both hypotheses. Beside a
+    cause that was missing when the hypothesis was chosen, the other one may be right.
+    """
+    chosen, other = selection.chosen, under_other_initial_steering(selector)
+    has_delay = bool(set(STEERING_DYNAMICS) & {cause_of(name) for name in chosen.names})
+    if not has_delay and chosen.names == selector.given:
         return selection, selector
-    other = under_other_initial_steering(selector)
-    if other.score(chosen.names, chosen.fit.parameters, None).deviance >= chosen.deviance - SELECTION.min_gain:
-        return selection, selector
-    return other.select(), other
+    try:
+        there = other.score(chosen.names, chosen.fit.parameters, None)
+    except np.linalg.LinAlgError:
+        return selection, selector  # the fit diverged
+    is_better = there.deviance < chosen.deviance - SELECTION.min_gain
+    if is_better if has_delay else _is_better_beside(other, there, selector, chosen):
+        return other.select(), other
+    return selection, selector
+
+
+def _is_better_beside(other: Selector, there: ScoredModel, selector: Selector, here: ScoredModel) -> bool:
+    """Return whether an effect that delays the axles predicts clearly better beside `there` than any beside `here`."""
+    names = [name for name in STEERING_DYNAMICS if name in selector.candidates]
+    gains = [_predicted_gain(other, there, name) for name in names]
+    if max(gains, default=0.0) < SELECTION.min_gain_of_initial_steering:
+        return False
+    best, other_best = (
+        min(one.with_effect(model, name).deviance for name in names)
+        for one, model in ((selector, here), (other, there))
+    )
+    return other_best < min(best, here.deviance) - SELECTION.min_gain
 
 
 def under_other_initial_steering(selector: AnySelector) -> AnySelector:

@@ -1,0 +1,28 @@
+"""Where the axles were before the first command is decided by the runs, and again beside other causes."""
+
+from __future__ import annotations
+
+from tiny_selector import selector_of
+from tiny_vehicle import Tiny
+
+from agvbench.diagnosis.selection.initial_steering import reconsider_initial_steering, under_other_initial_steering
+from agvbench.diagnosis.selection.stepwise import Selection
+
+
+def test_another_cause_decides_on_the_initial_steering_again(tiny_campaign):
+    """Beside the slip that was missing at first, a backlash tells where the axles were."""
+    right = selector_of(tiny_campaign(Tiny(slip=0.3, play_rad=0.06)))
+    assert not right.batch.readings.preset
+    wrong = under_other_initial_steering(right)
+    base = wrong.base()
+    slipping = Selection(base, wrong.with_effect(base, "lateral_slip"), {}, {}, {}, wrong.models_fitted)
+    selection, selector = reconsider_initial_steering(slipping, wrong)
+    assert not selector.batch.readings.preset
+    assert {"lateral_slip", "steering_backlash"} <= {*selection.chosen.names}
+
+
+def test_without_a_gain_the_initial_steering_stays(tiny_campaign):
+    selector = selector_of(tiny_campaign(Tiny(slip=0.3)))
+    base = selector.base()
+    slipping = Selection(base, selector.with_effect(base, "lateral_slip"), {}, {}, {}, selector.models_fitted)
+    assert reconsider_initial_steering(slipping, selector) == (slipping, selector)
