@@ -119,14 +119,11 @@ def columns_by_campaign_time(
     c = rates.covariates
     one, zero, curvature = np.ones(len(rates.run)), np.zeros(len(rates.run)), c["curvature_per_m"]
     yield terms.SpeedByCampaignTime, {0: one[:, None]}
+    steering = by_steering_gain(rates, tangents, geometry)
+    yield terms.SteeringByCampaignTime, steering
     if geometry.is_differential:
-        turning = {1: geometry.rear_axle_m * curvature[:, None], 2: curvature[:, None]}
-        yield terms.SteeringByCampaignTime, turning
-        yield terms.WheelsByCampaignTime, {0: one[:, None]} | turning
+        yield terms.WheelsByCampaignTime, {0: one[:, None]} | steering
     else:
-        angle = np.arctan(tangents.tangent)
-        gain = by_axle_angles(angle[:, 0], angle[:, 1], tangents, geometry)
-        yield terms.SteeringByCampaignTime, {k: v.sum(axis=1, keepdims=True) for k, v in gain.items()}
         yield terms.TrimByCampaignTime, by_axle_angles(one, one, tangents, geometry)
     heading = 0.5 * (rates.begin + rates.end)[:, 2]
     cos, sin = (c["direction"] / c["speed_mps"] * of(heading) for of in (np.cos, np.sin))
@@ -138,6 +135,16 @@ def columns_by_campaign_time(
     first = np.r_[True, np.diff(rates.run) != 0]
     before = np.where(first, 0.0, np.r_[0.0, c["speed_mps"][:-1]])
     yield terms.ClockByCampaignTime, {0: ((before - c["speed_mps"]) / rates.weight)[:, None]}
+
+
+def by_steering_gain(rates: Rates, tangents: SteeringTangents, geometry: Geometry) -> Columns:
+    """Return the lateral and curvature residuals by a share of both axle angles, or of a differential's yaw rate."""
+    if geometry.is_differential:
+        curvature = rates.covariates["curvature_per_m"][:, None]
+        return {1: geometry.rear_axle_m * curvature, 2: curvature}
+    angle = np.arctan(tangents.tangent)
+    by_axle = by_axle_angles(angle[:, 0], angle[:, 1], tangents, geometry)
+    return {k: columns.sum(axis=1, keepdims=True) for k, columns in by_axle.items()}
 
 
 def by_axle_angles(front: Floats, rear: Floats, tangents: SteeringTangents, geometry: Geometry) -> Columns:

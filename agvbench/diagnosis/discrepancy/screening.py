@@ -15,7 +15,12 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis import terms
 from agvbench.diagnosis.data.splits import folds
-from agvbench.diagnosis.discrepancy.campaign_time import by_axle_angles, changes, columns_by_campaign_time
+from agvbench.diagnosis.discrepancy.campaign_time import (
+    by_axle_angles,
+    by_steering_gain,
+    changes,
+    columns_by_campaign_time,
+)
 from agvbench.diagnosis.discrepancy.regression import FOLDS, REACHES_RAD, Columns, GroupedRegression, SteeringTangents
 from agvbench.diagnosis.residuals.body_rates import Rates
 from agvbench.diagnosis.terms import DiscrepancyTerm
@@ -148,7 +153,7 @@ def _run_times(rates: Rates) -> Iterator[Option]:
 
 
 def _starts_of_steering(rates: Rates, tangents: SteeringTangents, geometry: Geometry) -> Iterator[Option]:
-    gain = dict(columns_by_campaign_time(rates, tangents, geometry))[terms.SteeringByCampaignTime]
+    gain = by_steering_gain(rates, tangents, geometry)
     for constant in _RUN_TIMES_S:
         loss = rates.covariates["speed_mps"] * np.exp(-rates.covariates["time_in_run_s"] / constant)
         yield {k: -loss[:, None] * column for k, column in gain.items()}, Values(constant)

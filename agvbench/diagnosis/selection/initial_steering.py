@@ -40,10 +40,11 @@ def reconsider_initial_steering(selection: Selection, selector: AnySelector) -> 
     If the model has no effect that delays the axles, the best one of them is added under both hypotheses. Beside a
     cause that was missing when the hypothesis was chosen, the other one may be right.
     """
-    chosen, other = selection.chosen, under_other_initial_steering(selector)
+    chosen = selection.chosen
     has_delay = bool(set(STEERING_DYNAMICS) & {cause_of(name) for name in chosen.names})
     if not has_delay and chosen.names == selector.given:
         return selection, selector
+    other = under_other_initial_steering(selector)
     try:
         there = other.score(chosen.names, chosen.fit.parameters, None)
     except np.linalg.LinAlgError:

@@ -54,8 +54,8 @@ class SteeringByDirection(DiscrepancyTerm):
 class SteeringAtStart(DiscrepancyTerm):
     """The axles turn less while the drive starts: ``δ ← δ (1 − loss |v_map| e^(−(t − t₀)/T))``.
 
-    The drive starts from rest at t₀. A motor that starts draws a current in proportion to
-    the speed that is commanded; servos with the same supply are then weak.
+    The drive starts from rest at t₀. A motor that starts draws a current in proportion to the speed that is commanded;
+    servos with the same supply are then weak.
     """
 
     name: ClassVar[str] = "steering_at_start"
