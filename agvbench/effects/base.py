@@ -42,6 +42,8 @@ class Parameter:
         Bounds of the value, in files and in fits.
     scale
         Typical size of the value: unit of the initial values and steps of a fit.
+    is_discrete
+        Whether predictions change in steps with it, as runs change sides: a fit leaves it at its start.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Parameter:
     low: float
     high: float
     scale: float
+    is_discrete: bool = False
 
     @property
     def is_direction(self) -> bool:
@@ -57,9 +60,9 @@ class Parameter:
         return self.unit == "rad" and self.high - self.low >= math.tau
 
 
-def parameter(*, unit: str, low: float, high: float, scale: float, null: float = 0.0) -> Any:
+def parameter(*, unit: str, low: float, high: float, scale: float, null: float = 0.0, is_discrete: bool = False) -> Any:
     """Declare a field of an effect; its default is its null value. See `Parameter`."""
-    metadata = {"unit": unit, "null": null, "low": low, "high": high, "scale": scale}
+    metadata = {"unit": unit, "null": null, "low": low, "high": high, "scale": scale, "is_discrete": is_discrete}
     return dataclasses.field(default=null, metadata=metadata)
 
 

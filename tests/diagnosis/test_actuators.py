@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 from tiny_selector import selector_of
-from tiny_vehicle import Tiny, campaign_runs
+from tiny_vehicle import FRONT_M, REAR_M, Tiny, campaign_runs
 
 from agvbench.diagnosis.selection.actuators import CAMERA, prefer_actuators, separate_lag_from_delay
 from agvbench.diagnosis.selection.sequential_replacement import replace_sequentially
@@ -101,6 +101,36 @@ def test_an_effect_that_another_explains_better_is_replaced():
     found = replace_sequentially(selection, selector)
     assert found.chosen.names == ("cornering_speed_loss",)
     assert found.chosen.deviance < selection.chosen.deviance
+
+
+@pytest.mark.slow
+def test_a_variant_replaces_an_effect_that_resembles_only_one_of_the_two_that_it_combines():
+    """The offset of the markers is small: the library's equation for it alone gains nothing."""
+    tiny = Tiny(wheelbase_m=FRONT_M + REAR_M + 0.006, marker_forward_m=-0.0015, noise_m=1e-4, noise_rad=3e-4)
+    selection, selector = selected(tiny, "mocap_scale")
+    found = replace_sequentially(selection, selector)
+    assert found.chosen.names == ("marker_offset_wheelbase",)
+    values = found.chosen.fit.effect_values()
+    assert values["marker_offset_wheelbase.forward_m"] == pytest.approx(-0.0015, abs=0.0003)
+
+
+@pytest.mark.slow
+def test_a_variant_that_gains_nothing_gives_way_to_the_librarys_equation():
+    selection, selector = selected(Tiny(steering_lag_s=0.1), "steering_lag_inertia")
+    selection = replace(selection, alternatives={"steering_lag_inertia": {"actuation_delay": 3.0}})
+    found = replace_sequentially(selection, selector)
+    assert found.chosen.names == ("steering_lag",)
+    assert found.gains.keys() == found.alternatives.keys() == {"steering_lag"}
+
+
+@pytest.mark.slow
+def test_beside_a_variant_the_selection_continues():
+    tiny = Tiny(steering_lag_s=0.1, steering_inertia_s=0.06, marker_forward_m=0.01)
+    selection, selector = selected(tiny, "steering_lag_inertia")
+    found = continued(selection, selection, selector)
+    assert {*found.chosen.names} == {"steering_lag_inertia", "marker_offset"}
+    plain, selector = selected(Tiny(steering_lag_s=0.1, marker_forward_m=0.01), "steering_lag")
+    assert continued(plain, plain, selector) is plain
 
 
 @pytest.mark.slow

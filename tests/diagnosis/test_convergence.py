@@ -12,8 +12,8 @@ from scipy import optimize
 from tiny_selector import selector_of
 from tiny_vehicle import Tiny
 
+from agvbench.diagnosis.estimation.bounded_step import bounded_step
 from agvbench.diagnosis.estimation.fit import Fit, fit
-from agvbench.diagnosis.estimation.levenberg_marquardt import bounded_step
 from agvbench.diagnosis.estimation.score_test import first_order_gain
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.candidates import bounds_of, default_candidate

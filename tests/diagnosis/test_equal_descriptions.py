@@ -13,15 +13,19 @@ from agvbench.diagnosis.selection.variants import with_extended_library
 pytestmark = pytest.mark.slow
 
 
-def alternatives(tiny: Tiny, variant: str, *before: str) -> dict[str, float]:
-    """Return the alternatives of a variant that took the place of the effects `before`."""
+WRONG_DISTANCES = Tiny(wheelbase_m=FRONT_M + REAR_M + 0.006, marker_forward_m=0.01)
+
+
+def alternatives(tiny: Tiny, variant: str, *before: str, known: tuple[str, ...] = ()) -> dict[str, float]:
+    """Return the alternatives of an effect that took the place of the effects `before`, beside the `known` ones."""
     selector = selector_of(campaign_runs(tiny))
     extended = with_extended_library(selector)
     base = larger = extended.base()
     for name in before:
         larger = extended.with_effect(larger, name)
     chosen = extended.with_effect(base, variant)
-    selection = Selection(base, chosen, {}, {variant: base.deviance - chosen.deviance}, {}, 0)
+    gains = {variant: base.deviance - chosen.deviance}
+    selection = Selection(base, chosen, {variant: dict.fromkeys(known, 0.0)}, gains, {}, 0)
     return with_equal_descriptions(selection, larger, selector).alternatives.get(variant, {})
 
 
@@ -36,10 +40,21 @@ def test_delays_with_nothing_in_common_are_not_the_cameras():
 
 
 def test_a_wheelbase_beside_displaced_markers_may_be_a_scale_of_the_camera():
-    tiny = Tiny(wheelbase_m=FRONT_M + REAR_M + 0.006, marker_forward_m=0.01)
-    assert "mocap_scale" in alternatives(tiny, "marker_offset_wheelbase", "mocap_scale")
+    found = alternatives(WRONG_DISTANCES, "marker_offset_wheelbase", "mocap_scale")
+    assert {"mocap_scale", "wheelbase_error"} <= found.keys()
 
 
-def test_an_effect_that_explains_the_runs_worse_is_no_alternative():
-    tiny = Tiny(wheelbase_m=FRONT_M + REAR_M + 0.006, marker_forward_m=0.01)
-    assert alternatives(tiny, "marker_offset_wheelbase", "lateral_slip") == {}
+def test_a_scale_is_an_alternative_also_where_it_was_not_selected_before():
+    found = alternatives(WRONG_DISTANCES, "marker_offset_wheelbase", "lateral_slip")
+    assert "mocap_scale" in found
+    assert "lateral_slip" not in found
+
+
+def test_two_wrong_distances_may_stand_for_a_coupling_of_the_axles():
+    """Both describe that each axle turns the vehicle as if it were somewhere else."""
+    found = alternatives(WRONG_DISTANCES, "axle_coupling", known=("marker_offset",))
+    assert {"marker_offset", "mocap_scale", "wheelbase_error"} <= found.keys()
+
+
+def test_without_displaced_markers_among_its_alternatives_a_coupling_is_not_divided():
+    assert alternatives(WRONG_DISTANCES, "axle_coupling") == {}

@@ -344,7 +344,7 @@ def test_what_explains_the_change_of_repeats_best_is_named_first():
     swapped = np.where(hours > 0.6, volt + 0.6, volt)  # a fresh pack half way
     logged["battery_V"] = swapped.tolist()
     by_battery_ = changes_of(*chance(0, logged, 0.05 * (swapped - swapped.mean())))
-    assert [d.covariate for d in by_battery_] == ["battery_V"]
+    assert [d.covariate for d in by_battery_] == ["battery_V", "campaign_time_h"]  # a drift that starts over
     by_time_ = changes_of(*chance(0, logged, 0.05 * (hours > 0.3)))
     assert by_time_[0].covariate == "campaign_time_h"
     assert by_time_[0].p_value < 0.001

@@ -239,3 +239,30 @@ def test_steering_that_warms_up_within_the_session_is_described_by_campaign_time
     assert found.provenance["empirical_term"]["parameters"]["gain"] == pytest.approx(0.2, rel=0.1)
     position = found.held_out.errors["position_rms_mm"]
     assert position["after"] < 0.3 * position["before"]
+
+
+@pytest.mark.slow
+def test_a_battery_that_is_changed_half_way_is_a_drift_that_starts_over(tiny_campaign):
+    found = diagnose(tiny_campaign(Tiny(droop_per_hour=0.1, battery_changed_h=0.5)))
+    assert found.verdict is Verdict.UNKNOWN
+    assert found.depends_on[0].covariate == "campaign_time_h"
+    term = found.provenance["empirical_term"]
+    assert term["name"] == "speed_by_campaign_time"
+    assert term["parameters"]["begins_h"] == pytest.approx(0.5, abs=0.01)
+    per_hour = term["parameters"]["change"] / term["parameters"]["time_constant_h"]
+    assert per_hour == pytest.approx(-0.1, rel=0.15)
+    position = found.held_out.errors["position_rms_mm"]
+    assert position["after"] < 0.5 * position["before"]
+
+
+@pytest.mark.slow
+def test_servos_that_are_slow_while_they_are_cold_are_named_with_their_change(tiny_campaign):
+    found = diagnose(tiny_campaign(Tiny(cold_steering_lag_s=0.4)))
+    assert found.verdict is Verdict.UNKNOWN
+    assert [effect.name for effect in found.effects] == ["steering_lag"]
+    term = found.provenance["empirical_term"]
+    assert term["name"] == "steering_lag_by_campaign_time"
+    assert term["parameters"]["change_s"] == pytest.approx(-0.4, rel=0.1)
+    assert term["parameters"]["time_constant_h"] == pytest.approx(0.4, rel=0.2)
+    position = found.held_out.errors["position_rms_mm"]
+    assert position["after"] < 0.3 * position["before"]

@@ -65,6 +65,8 @@ class Tiny:
     relaxation_s: float = 0.5
     slip: float = 0.0
     droop_per_hour: float = 0.0
+    battery_changed_h: float = math.inf
+    cold_steering_lag_s: float = 0.0
     tilt_mps: float = 0.0
     tilt_rad: float = 0.0
     front_from_rear: float = 0.0
@@ -113,8 +115,11 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
     """Return 60 Hz frames of one run, from rest to rest."""
     f_off, r_off = rng.normal(0.0, tiny.axle_scatter_rad, 2)
     gain = 1.0 + rng.normal(0.0, tiny.speed_scatter)
-    gain *= tiny.speed_factor * (1.0 - tiny.droop_per_hour * started_s / 3600.0)
-    warm = 1.0 + tiny.warm_gain * -math.expm1(-started_s / 3600.0 / tiny.warm_h)
+    hours = started_s / 3600.0
+    of_battery_h = hours if hours < tiny.battery_changed_h else hours - tiny.battery_changed_h
+    gain *= tiny.speed_factor * (1.0 - tiny.droop_per_hour * of_battery_h)
+    steering_lag_s = tiny.steering_lag_s + tiny.cold_steering_lag_s * math.exp(-hours / tiny.warm_h)
+    warm = 1.0 + tiny.warm_gain * -math.expm1(-hours / tiny.warm_h)
     x, y, heading = start
     front, rear, speed = front_of(NEUTRAL) + f_off, rear_of(NEUTRAL) + r_off, 0.0
     turning, loose, driven, windup, gap_m = [0.0, 0.0], [front, rear], 0.0, 0.0, 0.0
@@ -131,7 +136,7 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
         commanded = speed_of(c.drive) * gain
         gap_m = tiny.drive_gap_m if commanded == 0.0 else gap_m - abs(commanded) * _STEP_S
         commanded = 0.0 if gap_m > 0.0 else commanded
-        lags = tiny.steering_lag_s, tiny.rear_lag_ratio * tiny.steering_lag_s
+        lags = steering_lag_s, tiny.rear_lag_ratio * steering_lag_s
         away = [1.0 - math.exp(-_STEP_S / lag) if lag else 1.0 for lag in lags]
         was = front, rear, speed
         if tiny.steering_inertia_s:
@@ -151,9 +156,7 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
         relief = 1.0 + tiny.reverse_gain if speed < 0.0 else 1.0
         f, r, s = (
             (old + new) / 2.0 if lagged else new
-            for old, new, lagged in zip(
-                was, (front, rear, speed), (tiny.steering_lag_s, tiny.steering_lag_s, lag), strict=True
-            )
+            for old, new, lagged in zip(was, (front, rear, speed), (steering_lag_s, steering_lag_s, lag), strict=True)
         )
         if tiny.play_rad:
             f, r = loose = [

@@ -150,10 +150,13 @@ def test_more_columns_than_the_simulation_holds_are_refused() -> None:
 def test_the_share_of_a_change_is_between_none_and_all(hours, begin, end, constant) -> None:
     share = course(hours, begin, end, constant)
     assert 0.0 <= share <= 1.0
-    if begin <= hours < end:
-        assert share == (pytest.approx(-math.expm1(-hours / constant)) if constant else 1.0)
-    else:
+    since = hours if hours < begin else hours - begin
+    if hours >= end:
         assert share == 0.0
+    elif constant:
+        assert share == pytest.approx(-math.expm1(-since / constant))
+    else:
+        assert share == float(hours >= begin)
 
 
 @pytest.mark.parametrize("term", OF_TIME, ids=[term.name for term in OF_TIME])
@@ -166,7 +169,7 @@ def test_hooks_called_as_python_change_the_state_by_the_share(term: type[Discrep
             state[s.HOURS] = hours
             before = state.copy()
             time_s = (
-                hook(state, 1.0, *sizes, 0.3, 2.0, 0.4) if name in TIME_HOOKS else hook(state, *sizes, 0.3, 2.0, 0.4)
+                hook(state, 1.0, *sizes, 0.3, 2.0, 0.0) if name in TIME_HOOKS else hook(state, *sizes, 0.3, 2.0, 0.0)
             )
             changed.append(np.abs(state - before).max() if time_s is None else abs(time_s - 1.0))
         assert changed[0] == changed[2] == 0.0

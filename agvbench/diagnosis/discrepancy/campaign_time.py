@@ -18,6 +18,7 @@ from agvbench.types import Floats
 from agvbench.vehicle.geometry import Geometry
 
 _TIME_CONSTANTS_H = (0.1, 0.2, 0.4, 0.8, 2.0, LONGEST_H)
+_RESTARTED_H = (0.4, LONGEST_H)
 _PARTS = 12
 _AT_ONCE_H, _FEW, _CHANGED_SHARE = 1e-3, 0.03, 0.05
 
@@ -47,19 +48,40 @@ def exponentials(hours: Floats) -> Iterator[Course]:
         yield Course(-np.expm1(-hours / constant), 0.0, LATEST_H, constant)
 
 
+def restarts(hours: Floats) -> Iterator[Course]:
+    """Yield exponential courses that start over at a time of a coarse grid; none if the runs began at a few times."""
+    for begin in _coarse_grid(hours)[:-1]:
+        for constant in _RESTARTED_H:
+            yield _restarted(hours, begin, constant)
+
+
+def _restarted(hours: Floats, begins_h: float, time_constant_h: float) -> Course:
+    since = np.where(hours >= begins_h, hours - begins_h, hours)
+    return Course(-np.expm1(-since / time_constant_h), begins_h, LATEST_H, time_constant_h)
+
+
 def coarse_parts(hours: Floats) -> Iterator[Course]:
     """Yield parts of the campaign with ends on a coarse grid; none if the runs began at a few times only."""
+    for begin, end in combinations(_coarse_grid(hours), 2):
+        yield Course.part(hours, begin, end)
+
+
+def _coarse_grid(hours: Floats) -> list[float]:
     between = _between_runs(hours)
-    if len(between) >= _PARTS:
-        grid = between[np.unique(np.linspace(0, len(between) - 1, _PARTS + 1).round().astype(int)[1:])]
-        for begin, end in combinations(grid.tolist(), 2):
-            yield Course.part(hours, begin, end)
+    if len(between) < _PARTS:
+        return []
+    at = np.unique(np.linspace(0, len(between) - 1, _PARTS + 1).round().astype(int)[1:])
+    return [float(time) for time in between[at]]
 
 
 def _between_runs(hours: Floats) -> Floats:
     """Return times between any two runs, and one after all of them [h]."""
     starts = np.unique(hours)
     return np.concatenate([0.5 * (starts[1:] + starts[:-1]), [LATEST_H]])
+
+
+def _best_exponential(hours: Floats, gain_of: Callable[[Course], float]) -> Course | None:
+    return max(exponentials(hours), key=gain_of)
 
 
 def _best_part(hours: Floats, gain_of: Callable[[Course], float]) -> Course | None:
@@ -82,6 +104,20 @@ def _best_part(hours: Floats, gain_of: Callable[[Course], float]) -> Course | No
         choices = [(one, best[1]) if end == 0 else (best[0], one) for one in moved]
         best = max([best, *(c for c in choices if c[0] < c[1])], key=gain)
     return Course.part(hours, *best)
+
+
+def _best_restart(hours: Floats, gain_of: Callable[[Course], float]) -> Course | None:
+    """Return the course that starts over with the largest gain: the best of a coarse grid, then between any two runs.
+
+    A restart before the first or after the last runs is none.
+    """
+    best = max(restarts(hours), key=gain_of, default=None)
+    if best is None:
+        return None
+    between = _between_runs(hours)
+    near, at = len(between) // _PARTS + 1, int(np.searchsorted(between, best.begins_h))
+    moved = between[max(at - near, 0) : min(at + near, len(between) - 1)].tolist()
+    return max([best, *(_restarted(hours, begin, best.time_constant_h) for begin in moved)], key=gain_of)
 
 
 def complement(values: Floats, hours: Floats) -> Floats | None:
@@ -121,10 +157,13 @@ def columns_by_campaign_time(
     yield terms.SpeedByCampaignTime, {0: one[:, None]}
     steering = by_steering_gain(rates, tangents, geometry)
     yield terms.SteeringByCampaignTime, steering
+    late_steering: Columns = {}
     if geometry.is_differential:
         yield terms.WheelsByCampaignTime, {0: one[:, None]} | steering
     else:
         yield terms.TrimByCampaignTime, by_axle_angles(one, one, tangents, geometry)
+        late_steering = _by_steering_lag(rates, tangents, geometry)
+        yield terms.SteeringLagByCampaignTime, late_steering
     heading = 0.5 * (rates.begin + rates.end)[:, 2]
     cos, sin = (c["direction"] / c["speed_mps"] * of(heading) for of in (np.cos, np.sin))
     yield terms.DriftByCampaignTime, {0: np.column_stack([cos, sin]), 1: np.column_stack([-sin, cos])}
@@ -134,7 +173,9 @@ def columns_by_campaign_time(
     )
     first = np.r_[True, np.diff(rates.run) != 0]
     before = np.where(first, 0.0, np.r_[0.0, c["speed_mps"][:-1]])
-    yield terms.ClockByCampaignTime, {0: ((before - c["speed_mps"]) / rates.weight)[:, None]}
+    gained = ((before - c["speed_mps"]) / rates.weight)[:, None]
+    yield terms.ClockByCampaignTime, {0: gained} | late_steering
+    yield terms.SpeedLagByCampaignTime, {0: gained}
 
 
 def by_steering_gain(rates: Rates, tangents: SteeringTangents, geometry: Geometry) -> Columns:
@@ -144,6 +185,15 @@ def by_steering_gain(rates: Rates, tangents: SteeringTangents, geometry: Geometr
         return {1: geometry.rear_axle_m * curvature, 2: curvature}
     angle = np.arctan(tangents.tangent)
     by_axle = by_axle_angles(angle[:, 0], angle[:, 1], tangents, geometry)
+    return {k: columns.sum(axis=1, keepdims=True) for k, columns in by_axle.items()}
+
+
+def _by_steering_lag(rates: Rates, tangents: SteeringTangents, geometry: Geometry) -> Columns:
+    """Return the lateral and curvature residuals by a lag of the servos [s], which acts after their commands."""
+    changed = np.any(np.diff(tangents.levels[:, 1:], axis=0) != 0, axis=1) | (np.diff(rates.run) != 0)
+    lost = np.r_[True, changed] * rates.covariates["speed_mps"] / rates.weight
+    missing = (np.arctan(tangents.previous) - np.arctan(tangents.tangent)) * lost[:, None]
+    by_axle = by_axle_angles(missing[:, 0], missing[:, 1], tangents, geometry)
     return {k: columns.sum(axis=1, keepdims=True) for k, columns in by_axle.items()}
 
 
@@ -157,19 +207,15 @@ def by_axle_angles(front: Floats, rear: Floats, tangents: SteeringTangents, geom
 
 def changes(
     rates: Rates, tangents: SteeringTangents, geometry: Geometry, regression: GroupedRegression
-) -> Iterator[tuple[type[DiscrepancyTerm], Iterator[tuple[Columns, Course]]]]:
-    """Yield each term that depends on campaign time with its shapes: regressors, and the course of time."""
+) -> Iterator[tuple[type[DiscrepancyTerm], Columns, Course]]:
+    """Yield each term that depends on campaign time with the best course of each kind, and its regressors."""
     hours = rates.covariates["campaign_time_h"]
     for term, columns in columns_by_campaign_time(rates, tangents, geometry):
-        yield term, _shapes(hours, columns, regression)
 
+        def over_time(course: Course, columns: Columns = columns) -> Columns:
+            return {k: course.share[:, None] * c for k, c in columns.items()}
 
-def _shapes(hours: Floats, columns: Columns, regression: GroupedRegression) -> Iterator[tuple[Columns, Course]]:
-    def over_time(course: Course) -> Columns:
-        return {k: course.share[:, None] * c for k, c in columns.items()}
-
-    for course in exponentials(hours):
-        yield over_time(course), course
-    part = _best_part(hours, lambda course: regression.gain(over_time(course))[0])
-    if part is not None:
-        yield over_time(part), part
+        for search in (_best_exponential, _best_part, _best_restart):
+            best = search(hours, lambda course: regression.gain(over_time(course))[0])
+            if best is not None:
+                yield term, over_time(best), best

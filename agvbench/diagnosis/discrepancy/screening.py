@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.diagnosis import terms
+from agvbench.diagnosis.criteria import DISCREPANCY
 from agvbench.diagnosis.data.splits import folds
 from agvbench.diagnosis.discrepancy.campaign_time import (
     by_axle_angles,
@@ -90,8 +91,8 @@ def options(
     yield terms.SpeedByRunTime, _run_times(rates)
     yield terms.SteeringAtStart, _starts_of_steering(rates, tangents, geometry)
     yield terms.TwistAtStart, _starts(rates)
-    for term, shapes in changes(rates, tangents, geometry, regression):
-        yield term, ((columns, course.values) for columns, course in shapes)
+    for term, columns, change in changes(rates, tangents, geometry, regression):
+        yield term, iter([(columns, change.values)])
     yield from _logged(rates, tangents, geometry)
     if geometry.is_differential:
         direction = c["direction"][:, None]
@@ -304,9 +305,9 @@ _REDUCED_SIZE = 0.1
 
 @dataclass(frozen=True)
 class Start:
-    """A term with initial values (2, p) of a fit, and its ``gain``: the log likelihood ratio in runs left out.
+    """A term with initial values (n, p) of a fit, and its ``gain``: the log likelihood ratio in runs left out.
 
-    The second row is the same shape at a tenth of its size. It is for cases in which the random effects of runs have
+    Every second row is the same shape at a tenth of its size. It is for cases in which the random effects of runs have
     absorbed the cause and release it in small steps only.
     """
 
@@ -314,13 +315,19 @@ class Start:
     values: Floats
     gain: float
 
+    def beside(self, other: Start) -> Start:
+        """Return the start with those initial values that gain at least about as much, this or another shape's."""
+        best, worse = sorted((self, other), key=lambda start: -start.gain)
+        near = worse.gain > DISCREPANCY.min_share_of_best_start * best.gain
+        return replace(best, values=np.vstack([best.values, worse.values])) if near else best
+
 
 def screen(
     rates: Rates, tangents: SteeringTangents, geometry: Geometry, group: NDArray[np.int64], seed: int
 ) -> list[Start]:
     """Return the best start of each term with a predicted gain, the largest gain first."""
     regression = GroupedRegression(rates, tangents, folds(group, FOLDS, seed)[rates.run])
-    found = []
+    found: dict[type[DiscrepancyTerm], Start] = {}
     for term, shapes in options(rates, tangents, geometry, regression):
         best: Start | None = None
         for columns, values in shapes:
@@ -330,5 +337,5 @@ def screen(
                     term, np.array([values(coefficients), values(_REDUCED_SIZE * coefficients)], dtype=np.float64), gain
                 )
         if best is not None:
-            found.append(best)
-    return sorted(found, key=lambda start: -start.gain)
+            found[term] = best if term not in found else found[term].beside(best)
+    return sorted(found.values(), key=lambda start: -start.gain)

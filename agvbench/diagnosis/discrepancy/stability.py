@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from agvbench.diagnosis.criteria import RESIDUAL
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.data.splits import folds
-from agvbench.diagnosis.discrepancy.campaign_time import coarse_parts, exponentials
+from agvbench.diagnosis.discrepancy.campaign_time import coarse_parts, exponentials, restarts
 from agvbench.diagnosis.discrepancy.regression import FOLDS, Columns, winsorised
 from agvbench.diagnosis.residuals.body_rates import Rates
 from agvbench.diagnosis.residuals.covariate_test import Dependence
@@ -32,8 +32,9 @@ def stability_test(
 
     Each run has a score for each physical quantity that may change (speed, steering gain, offset of an axle, drift,
     position of the markers, delay). Scores and courses of time are centred within groups of repeats. The statistic is
-    the largest standardised product of any score with any course. Courses are exponentials, parts of the campaign and
-    sessions (tests of parameter instability: Nyblom 1989; Zeileis and Hornik 2007), and the logged columns.
+    the largest standardised product of any score with any course. Courses are exponentials, with and without a restart,
+    parts of the campaign and sessions (tests of parameter instability: Nyblom 1989; Zeileis and Hornik 2007), and the
+    logged columns.
 
     Logged columns are often correlated with time: a battery falls over the evening. If there are any, the share of the
     variance that each covariate predicts in groups left out decides which comes first. Those that are not predicted
@@ -124,7 +125,7 @@ def _scores(
 def _courses(readings: Readings) -> tuple[list[str], Floats]:
     """Return what each course is of, and each run's share of the change (runs, k)."""
     hours = readings.started_h
-    courses = [course.share for course in (*exponentials(hours), *coarse_parts(hours))]
+    courses = [course.share for course in (*exponentials(hours), *restarts(hours), *coarse_parts(hours))]
     sessions = np.array([run.session or "" for run in readings.runs])
     several = [(sessions == name).astype(np.float64) for name in np.unique(sessions)[1:]]
     logged = list(readings.logged.standardised(len(readings)).T)

@@ -16,6 +16,7 @@ from agvbench.diagnosis.discrepancy.screening import Start, screen
 from agvbench.diagnosis.residuals.body_rates import residual_rates
 from agvbench.diagnosis.selection.actuators import CAMERA, prefer_actuators, separate_lag_from_delay
 from agvbench.diagnosis.selection.candidates import applies, candidate
+from agvbench.diagnosis.selection.equal_descriptions import with_equal_descriptions
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.lack_of_fit import has_lack_of_fit
 from agvbench.diagnosis.selection.sequential_replacement import replace_sequentially
@@ -31,8 +32,8 @@ from agvbench.diagnosis.terms.campaign_time import ByCampaignTime
 from agvbench.effects.variants import cause_of
 from agvbench.types import Floats
 
-ModelWithTerm = tuple[ScoredModel, type[DiscrepancyTerm], dict[str, float], dict[str, dict[str, float]]]
-"""A model with a term, the term, the gains of the effects beside it, and the alternatives of these effects."""
+ModelWithTerm = tuple[ScoredModel, type[DiscrepancyTerm], dict[str, float]]
+"""A model with a term, the term, and the gains of the effects beside it."""
 
 _TERM_NAMES = frozenset(term.name for term in TERMS)
 
@@ -40,7 +41,7 @@ _TERM_NAMES = frozenset(term.name for term in TERMS)
 def reselect_effects(
     extended: Selector, selection: Selection, current: ScoredModel, term: type[DiscrepancyTerm]
 ) -> ModelWithTerm:
-    """Return the model with the term and the effects that meet the criterion beside it, their gains and alternatives.
+    """Return the model with the term and the effects that meet the criterion beside it, and their gains.
 
     An effect that was selected without the term may only mimic one that is right beside it.
     """
@@ -52,7 +53,6 @@ def reselect_effects(
         larger = extended.with_effect(current, name)
         if name not in current.names and extended.meets_criterion(current, larger):
             current = larger
-    alternatives = extended.alternatives(base, current, selection.alternatives)
     while True:
         found = [n for n in current.names if n not in {*base.names, term.name}]
         smaller = {name: extended.refitted_without(base, current, name) for name in found}
@@ -61,7 +61,7 @@ def reselect_effects(
         if not unnecessary:
             simpler = _with_complement(extended, base, current, term)
             if simpler is None:
-                return current, term, gains, {name: alternatives.get(name, {}) for name in gains}
+                return current, term, gains
             current = simpler
             continue
         current = smaller[min(unnecessary, key=lambda name: gains[name])]
@@ -136,6 +136,8 @@ def add_term(selection: Selection, selector: Selector) -> TermSelection | None:
         first = _best_term(extended, selection.base, starts_alone) if is_better_alone else None
         if first is not None and first[0].deviance < selection.chosen.deviance:
             found.append(first)
+            if starts and starts[0].gain > DISCREPANCY.min_share_of_best_start * starts_alone[0].gain:
+                found.append(_best_term(extended, selection.chosen, starts))
         else:
             found.append(_best_term(extended, selection.chosen, starts))
             if found[0] is None and selection.gains:
@@ -149,8 +151,31 @@ def add_term(selection: Selection, selector: Selector) -> TermSelection | None:
     others = models_of_other_forms(extended, selection)
     found += [(model, term) for _, term, model in others if model.deviance < selection.chosen.deviance]
     models = [reselect_effects(extended, selection, *pair) for pair in found if pair is not None]
-    models = [_with_right_actuators(extended, selection, model) for model in models]
+    models = [_with_other_change(extended, selection, model) for model in models]
     return _best_with_term(extended, selection, selector, models)
+
+
+def _with_other_change(extended: Selector, selection: Selection, model: ModelWithTerm) -> ModelWithTerm:
+    """Return the model with another change with time in the place of its own, if that predicts better.
+
+    While effects were missing, another quantity or course had the least error; its fit may end in another minimum.
+    """
+    chosen, own, _ = model
+    if not issubclass(own, ByCampaignTime):
+        return model
+    without = extended.without_effect(selection.base, chosen, own.name)
+    best: ScoredModel = chosen
+    term: type[DiscrepancyTerm] = own
+    for start in screened_terms(extended, without):
+        kind = replace(candidate(start.term), screened=True, patient=True)
+        full_size = np.clip(start.values[::2], kind.bounds[:, 0], kind.bounds[:, 1])
+        for values in full_size if issubclass(start.term, ByCampaignTime) else ():
+            other = extended.with_effect(without, start.term.name, replace(kind, starts=values[None]))
+            if other.deviance < best.deviance and not _is_constant_change(other, start.term):
+                best, term = other, start.term
+    if best.gain_over(chosen) < SELECTION.alternative_margin:
+        return model
+    return reselect_effects(extended, selection, best, term)
 
 
 def _with_right_actuators(extended: Selector, selection: Selection, model: ModelWithTerm) -> ModelWithTerm:
@@ -159,18 +184,31 @@ def _with_right_actuators(extended: Selector, selection: Selection, model: Model
     While the term was missing, its cause decided which actuators fitted best. Actuators that explain the runs as well
     replace a latency of the camera, as they do without a term.
     """
-    chosen, term, gains, alternatives = model
-    beside = Selection(selection.base, chosen, alternatives, gains, {}, extended.models_fitted)
+    chosen, term, gains = model
+    beside = Selection(selection.base, chosen, {}, gains, {}, extended.models_fitted)
     right = separate_lag_from_delay(prefer_actuators(beside, extended), extended).chosen
     if {*right.names} == {*chosen.names} or term.name not in right.names:
         return model
-    again, _, gains, alternatives = reselect_effects(extended, selection, right, term)
-    replaced = replace_sequentially(Selection(selection.base, again, alternatives, gains, {}, 0), extended)
-    gains = {name: gain for name, gain in replaced.gains.items() if name != term.name}
-    before, after = ({cause_of(name) for name in one.names} for one in (chosen, replaced.chosen))
+    again = reselect_effects(extended, selection, right, term)
+    before, after = ({cause_of(name) for name in one.names} for one in (chosen, again[0]))
     margin = SELECTION.alternative_margin if CAMERA in before - after else 0.0
-    is_better = term.name in replaced.chosen.names and replaced.chosen.deviance < chosen.deviance + margin
-    return (replaced.chosen, term, gains, replaced.alternatives) if is_better else model
+    return again if again[0].deviance < chosen.deviance + margin else model
+
+
+def _with_replacements(extended: Selector, selection: Selection, model: ModelWithTerm) -> Selection:
+    """Return the model with each effect replaced by another that predicts better beside the term, and the alternatives.
+
+    While the term was missing, its cause decided which effects were compared.
+    """
+    chosen, term, gains = model
+    beside = replace(selection, chosen=chosen, gains=gains, alternatives={})
+    replaced = replace_sequentially(beside, extended) if gains else beside
+    replaced = replaced if term.name in replaced.chosen.names else beside
+    gains = {name: gain for name, gain in replaced.gains.items() if name != term.name}
+    known = extended.alternatives(selection.base, replaced.chosen, selection.alternatives)
+    alternatives = {name: known.get(name, {}) | replaced.alternatives.get(name, {}) for name in gains}
+    replaced = replace(replaced, gains=gains, alternatives=alternatives)
+    return with_equal_descriptions(replaced, selection.chosen, extended)
 
 
 def _best_with_term(
@@ -180,16 +218,17 @@ def _best_with_term(
     models = [model for model in models if model[0].deviance < selection.chosen.deviance - selector.min_gain]
     if not models:
         return None
-    chosen, term, gains, alternatives = min(models, key=lambda model: model[0].deviance)
+    best = _with_right_actuators(extended, selection, min(models, key=lambda model: model[0].deviance))
+    replaced, term = _with_replacements(extended, selection, best), best[1]
+    chosen = replaced.chosen
     without = extended.without_effect(selection.base, chosen, term.name)
     if not extended.meets_criterion(without, chosen):
         return None
     gain = without.loss - chosen.loss
-    tried = selector.models_fitted
     rejected = {n: g for n, g in selection.rejected.items() if n not in chosen.names}
     selector.on_progress(f"{' + '.join(chosen.names)}: a discrepancy term gains {gain.sum():.0f}")
     return TermSelection(
-        Selection(selection.base, chosen, alternatives, gains, rejected, tried),
+        replace(replaced, rejected=rejected, tried=selector.models_fitted),
         term,
         without,
         float(gain.sum()),

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.diagnosis.estimation.bounded_step import bounded_step
 from agvbench.diagnosis.estimation.likelihood import WEAK, inner_inverse
 from agvbench.diagnosis.estimation.variance import VarianceComponents, priors, weights
 from agvbench.diagnosis.model.predictor import Linearised, Predictor
@@ -97,8 +98,7 @@ class LinearisationPoint:
         # The existing parameters are eliminated (Schur complement): the new parameters remain.
         along = self.covariance @ shared
         matrix, rest = own - shared.T @ along, pull - along.T @ old_pull
-        unbounded = start + np.linalg.lstsq(matrix, rest, rcond=1e-12)[0]
-        move = np.clip(unbounded, bounds[:, 0], bounds[:, 1]) - start
+        move = bounded_step(matrix, rest, start, bounds)
         saved = old_pull @ self.covariance @ old_pull + 2.0 * rest @ move - move @ matrix @ move
         return float(self.squares - self._squares(e) + saved)
 

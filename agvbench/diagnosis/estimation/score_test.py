@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.diagnosis.estimation.bounded_step import bounded_step
 from agvbench.diagnosis.estimation.cross_validation import by_group
 from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.estimation.likelihood import Terms, residual_of, ridge, terms_of
@@ -64,14 +65,7 @@ def first_order_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floa
     terms = _terms(fitted, larger, residual, slopes)
     gradient = terms.gradient.sum(axis=0) + prior.gradient
     matrix = terms.information.total + ridge(larger) + prior.information
-    move = np.linalg.lstsq(matrix, gradient, rcond=1e-12)[0]
-    # Parameters beyond a bound are set to it, and the others are solved for again.
-    known = len(fitted.parameters)
-    clipped = np.clip(start + move[known:], bounds[:, 0], bounds[:, 1])
-    if np.any(clipped != start + move[known:]):
-        fixed = np.r_[np.zeros(known), clipped - start]
-        rest = np.linalg.lstsq(matrix[:known, :known], (gradient - matrix @ fixed)[:known], rcond=1e-12)[0]
-        move = np.r_[rest, clipped - start]
+    move = bounded_step(matrix, gradient, parameters, bounds)
     saved = 2.0 * gradient @ move - move @ matrix @ move
     return float(fitted.total_loss - terms.loss.sum() - prior.loss + saved)
 

@@ -83,6 +83,8 @@ class Predictor:
         alike = {kind.name for kind in batch.base.kinds if kind.name in effects and kind.acts_alike_on_repeats()}
         kinds = [name.partition(".")[0] for name in self.parameter_names]
         self._acts_alike = np.array([kind in alike for kind in kinds], dtype=np.bool_)
+        discrete = {f"{kind.name}.{p.name}" for kind in batch.base.kinds for p in kind.parameters() if p.is_discrete}
+        self._is_discrete = np.array([name in discrete for name in self.parameter_names], dtype=np.bool_)
         self._last: tuple[tuple[bytes, ...], Floats] = (), np.empty(0)
 
     def prior(self, parameters: Floats) -> PriorTerms:
@@ -235,6 +237,9 @@ class Predictor:
         slopes = np.empty((*base.shape, count))
         for column, k in enumerate(range(len(own) - count, len(own))):
             name = self.parameter_names[k]
+            if self._is_discrete[k]:
+                slopes[..., column] = 0.0
+                continue
             if name in known:
                 slopes[..., column] = known[name]
                 continue

@@ -6,6 +6,7 @@ are the cause, or its parameters, the runs then do not tell.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -14,11 +15,11 @@ from agvbench.diagnosis.criteria import SELECTION
 from agvbench.diagnosis.estimation.levenberg_marquardt import FitState, LevenbergMarquardt
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.actuators import CAMERA, DELAY
-from agvbench.diagnosis.selection.candidates import bounds_of
+from agvbench.diagnosis.selection.candidates import applies, bounds_of
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.variants import with_extended_library
-from agvbench.effects.variants import cause_of
+from agvbench.effects.variants import cause_of, causes_in, effect_variants
 
 _STANDARD_ERRORS = 3.0
 
@@ -27,31 +28,56 @@ def with_equal_descriptions(selection: Selection, before: ScoredModel, selector:
     """Return the selection with the effects that explain the runs as well as a variant, as its alternatives.
 
     `before` is the model without variants. Its effects that a variant made unnecessary are tried beside the library's
-    equation; and what all delays of actuators have in common is moved to the camera.
+    equation. What all delays of actuators have in common is moved to the camera. A variant that combines several
+    effects is also divided into two where it is only an alternative.
     """
-    variants = [n for n in selection.chosen.names if cause_of(n) != n and n not in selector.given]
-    if not variants:
-        return selection
     extended, present = with_extended_library(selector), {cause_of(name) for name in selection.chosen.names}
     removed = [name for name in before.names if cause_of(name) not in present]
     alternatives = dict(selection.alternatives)
-    for name in variants:
-        found = {other: _more_deviance(extended, selection, name, other) for other in removed}
-        if cause_of(name) == DELAY and CAMERA in selector.candidates and CAMERA not in present:
-            found[CAMERA] = _more_loss_of_camera(extended, selection.chosen, name)
+    for name in selection.gains:
+        found: dict[str, float] = {}
+        if cause_of(name) != name:
+            found = _divided(extended, selection, name, name, removed)
+            if cause_of(name) == DELAY and CAMERA in selector.candidates and CAMERA not in present:
+                found[CAMERA] = _more_loss_of_camera(extended, selection.chosen, name)
+        known = alternatives.get(name, {})
+        for variant in _combining_variants(extended, known):
+            found |= _divided(extended, selection, name, variant, [])
         equal = {other: more for other, more in found.items() if more < SELECTION.alternative_margin}
-        alternatives[name] = alternatives.get(name, {}) | equal
+        alternatives[name] = known | equal
     return replace(selection, alternatives=alternatives)
 
 
-def _more_deviance(extended: Selector, selection: Selection, variant: str, other: str) -> float:
-    """Return by how much the deviance increases with the library's equation and `other` in place of a variant."""
-    without = extended.without_effect(selection.base, selection.chosen, variant)
-    with_library = extended.with_effect(without, cause_of(variant))
-    if not with_library.is_fitted:
-        return np.inf
-    model = extended.with_effect(with_library, other)
-    return model.deviance - selection.chosen.deviance
+def _combining_variants(extended: Selector, alternatives: Mapping[str, float]) -> list[str]:
+    """Return the variants that combine one of the `alternatives` with another effect."""
+    return [
+        name
+        for name, variant in effect_variants().items()
+        if variant.variant_of in alternatives
+        and len(causes_in(variant)) > 1
+        and applies(variant, extended.batch.geometry)
+    ]
+
+
+def _divided(extended: Selector, selection: Selection, name: str, variant: str, removed: list[str]) -> dict[str, float]:
+    """Return by how much the deviance increases with two effects in the place of the selected one called `name`.
+
+    The first is the library's equation of the `variant`. The second is one of the `removed` effects, and any likely one
+    if the variant combines effects of the library.
+    """
+    chosen, library = selection.chosen, cause_of(variant)
+    without = extended.without_effect(selection.base, chosen, name)
+    with_library = extended.with_effect(without, library)
+    # The library's equation may gain nothing alone, but beside the other effect.
+    first = with_library if with_library.is_fitted else without
+    models = {other: extended.with_effect(first, other) for other in removed}
+    if len(causes_in(effect_variants()[variant])) > 1:
+        present = {CAMERA, *map(cause_of, chosen.names), library, *removed}
+        models |= extended.likely(first, chosen, [n for n in extended.candidates if cause_of(n) not in present])
+    models = {other: model for other, model in models.items() if model.is_fitted}
+    if first is without:
+        models = {other: extended.with_effect(model, library) for other, model in models.items()}
+    return {other: model.deviance - chosen.deviance for other, model in models.items()}
 
 
 def _more_loss_of_camera(extended: Selector, chosen: ScoredModel, delays: str) -> float:

@@ -14,7 +14,7 @@ from agvbench.diagnosis.selection.candidates import applies
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import ExcludedAlternative, Selection, Selector
 from agvbench.diagnosis.selection.variants import variant_candidates, with_extended_library
-from agvbench.effects.variants import cause_of, effect_variants
+from agvbench.effects.variants import cause_of, causes_in, effect_variants
 
 _MAX_ROUNDS = 3
 
@@ -42,10 +42,27 @@ def replace_sequentially(selection: Selection, selector: Selector) -> Selection:
         names = " + ".join(best.names)
         extended.on_progress(f"{names}: a replacement gains {current.deviance - best.deviance:.0f}")
         current, gains = extended.backward_elimination(selection.base, best, map(cause_of, best.names))
+    current, gains = _with_library_equations(extended, selection.base, current, gains)
+    by_cause = {cause_of(name): differences for name, differences in alternatives.items()}
+    alternatives = {name: by_cause.get(cause_of(name), {}) for name in gains}
     selector.candidates |= {name: one for name, one in variant_candidates().items() if name in current.names}
     rejected = {name: gain for name, gain in selection.rejected.items() if name not in current.names}
     tried = selector.models_fitted
     return replace(selection, chosen=current, gains=gains, alternatives=alternatives, rejected=rejected, tried=tried)
+
+
+def _with_library_equations(
+    extended: Selector, base: ScoredModel, current: ScoredModel, gains: dict[str, float]
+) -> tuple[ScoredModel, dict[str, float]]:
+    """Return the model with the library's equation in place of each variant that gains nothing over it, and the gains.
+
+    Beside another effect a variant's further parameters may be unnecessary.
+    """
+    for name in [n for n in gains if cause_of(n) != n]:
+        model = extended.with_effect(extended.without_effect(base, current, name), cause_of(name))
+        if model.is_fitted and current.is_matched_by(model):
+            current, gains = extended.backward_elimination(base, model, map(cause_of, model.names))
+    return current, gains
 
 
 def excluded_by_priors(selection: Selection, selector: Selector) -> Selection:
@@ -101,7 +118,7 @@ def _kept(known: dict[str, float], others: dict[str, ScoredModel]) -> dict[str, 
 def _in_place_of(extended: Selector, base: ScoredModel, current: ScoredModel, name: str) -> dict[str, ScoredModel]:
     """Return the models with another effect in the place of `name`, by that effect; unlikely ones are not fitted.
 
-    A variant is not considered if the library's equation is predicted to gain too little to be near it.
+    A variant is not considered if the library's equations are predicted to gain too little to be near it.
     """
     without = extended.without_effect(base, current, name)
     causes = {cause_of(present) for present in current.names}
@@ -110,7 +127,11 @@ def _in_place_of(extended: Selector, base: ScoredModel, current: ScoredModel, na
     library = [other for other in extended.candidates if cause_of(other) not in causes]
     predicted = {other: extended.predicted_gain(without, other) for other in library}
     near = {cause_of(other) for other, own in predicted.items() if own >= SELECTION.likely_share * gain}
-    variants = [v for v in effect_variants().values() if v.variant_of in near and applies(v, geometry)]
+    variants = [
+        v
+        for v in effect_variants().values()
+        if v.variant_of not in causes and causes_in(v) & near and applies(v, geometry)
+    ]
     predicted |= {v.name: extended.predicted_gain(without, v.name) for v in variants}
     likely = VARIANT.min_gain_share * gain
     models = {other: extended.with_effect(without, other) for other in sorted(predicted) if predicted[other] >= likely}

@@ -110,6 +110,17 @@ class Selector(FittedModels):
                 most = max(most, model.gain_over(current))
         return larger, accepted
 
+    def is_improvable(self, current: ScoredModel) -> bool:
+        """Return whether a further candidate improves a model; those that are predicted to gain too little do not."""
+        causes = {cause_of(name) for name in current.names}
+        names = [name for name in self.candidates if cause_of(name) not in causes]
+        predicted = {name: self.predicted_gain(current, name) for name in names}
+        likely = [name for name in names if predicted[name] > self.criteria.superior_share * self.min_gain]
+        return any(
+            self.improves(current, self.with_effect(current, name))
+            for name in sorted(likely, key=lambda name: -predicted[name])
+        )
+
     def preferred(self, models: list[ScoredModel]) -> ScoredModel:
         """Return the model of least deviance."""
         return min(models, key=lambda model: model.deviance)

@@ -24,7 +24,7 @@ from agvbench.model import VehicleModel
 from agvbench.types import Floats
 from agvbench.vehicle.geometry import Geometry
 
-EXTENDED_LIBRARY: tuple[type[Effect], ...] = (*TERMS, *effect_variants().values())
+EXTENDED_LIBRARY: tuple[type[Effect], ...] = (*effect_variants().values(), *TERMS)
 """Discrepancy terms and variants: the extended library. One simulation contains all, because compiling is slow."""
 
 
@@ -103,13 +103,16 @@ def select_variants(selection: Selection, selector: Selector) -> Selection:
 
 
 def continued(selection: Selection, before: Selection, selector: Selector) -> Selection:
-    """Return the selection with further effects and variants, if it has other effects than `before`.
+    """Return the selection with further effects and variants, if it has variants or other effects than `before`.
 
-    An effect that compensated for the wrong actuators hides others, which gain beside the right ones.
+    An effect that compensated for wrong actuators or a wrong equation hides others, which gain beside the right ones.
     """
-    if {*selection.chosen.names} == {*before.chosen.names}:
+    is_changed = {*selection.chosen.names} != {*before.chosen.names}
+    if not is_changed and all(cause_of(name) == name for name in selection.chosen.names):
         return selection
     extended = with_extended_library(selector)
+    if not is_changed and not extended.is_improvable(selection.chosen):
+        return selection
     extended.candidates |= {n: c for n, c in variant_candidates().items() if n in selection.chosen.names}
     again = extended.select(selection.chosen, map(cause_of, selection.chosen.names))
     again = select_variants(replace(again, base=selection.base), extended)

@@ -1,9 +1,9 @@
 """Discrepancy terms of quantities that change during a campaign.
 
-Each has the same course: a change holds between two times. With a time constant of zero it has its full size there.
-Otherwise it approaches its full size exponentially since the campaign began; a time constant of some hours is a drift
-that is linear within an evening. The exponential has no begin of its own: the maps absorb a constant share, so that the
-runs would not determine it.
+Each has the same course. With a time constant of zero a change holds between two times, with its full size. Otherwise
+it approaches its full size exponentially since the campaign began, and starts over at the first of the two times: with
+another battery, or after a pause in which something cooled. A time constant of some hours is a drift that is linear
+within an evening.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ from typing import Any, ClassVar
 from agvbench.diagnosis.terms.base import DiscrepancyTerm
 from agvbench.effects.base import Stage, parameter
 from agvbench.effects.state import (
+    ACCELERATE_LAG,
+    BRAKE_LAG,
     FORWARD,
     FRONT,
     FRONT_SPEED,
@@ -26,6 +28,7 @@ from agvbench.effects.state import (
     SEEN_HEADING,
     SEEN_X,
     SEEN_Y,
+    STEERING_LAG,
     X_RATE,
     Y_RATE,
 )
@@ -40,20 +43,21 @@ _MOVING_MPS = 0.003
 
 @compiled(inline=True)
 def course(hours: float, begins_h: float, ends_h: float, time_constant_h: float) -> float:
-    """Return the share of a change at a time [h]: 0 before it begins and after it ended, 1 when it is complete."""
-    if hours < begins_h or hours >= ends_h:
+    """Return the share of a change at a time [h]: 0 before a step begins and after the change ended, 1 if complete."""
+    has_begun = hours >= begins_h
+    if hours >= ends_h or (time_constant_h <= 0.0 and not has_begun):
         return 0.0
     if time_constant_h <= 0.0:
         return 1.0
-    return 1.0 - math.exp(-hours / time_constant_h)
+    return 1.0 - math.exp((begins_h - hours if has_begun else -hours) / time_constant_h)
 
 
 def _begin() -> Any:
-    return parameter(unit="h", low=0.0, high=LATEST_H, scale=0.1)
+    return parameter(unit="h", low=0.0, high=LATEST_H, scale=0.1, is_discrete=True)
 
 
 def _end() -> Any:
-    return parameter(unit="h", low=0.0, high=LATEST_H, scale=0.1)
+    return parameter(unit="h", low=0.0, high=LATEST_H, scale=0.1, is_discrete=True)
 
 
 def _time_constant() -> Any:
@@ -164,6 +168,48 @@ class TrimByCampaignTime(ByCampaignTime):
             share = course(state[HOURS], begins_h, ends_h, time_constant_h)
             state[FRONT] += front_rad * share
             state[REAR] += rear_rad * share
+
+
+@dataclass(frozen=True)
+class SteeringLagByCampaignTime(ByCampaignTime):
+    """The lag of the servos changes, as grease that warms up: ``T ← T + change · course``, and never below zero."""
+
+    name: ClassVar[str] = "steering_lag_by_campaign_time"
+    stage: ClassVar[Stage] = Stage.SERVO
+    through: ClassVar[str] = "steering"
+    needs_steered_axles: ClassVar[bool] = True
+
+    change_s: float = parameter(unit="s", low=-5.0, high=5.0, scale=0.1)
+    begins_h: float = _begin()
+    ends_h: float = _end()
+    time_constant_h: float = _time_constant()
+
+    @staticmethod
+    def aim(state: Floats, change_s: float, begins_h: float, ends_h: float, time_constant_h: float) -> None:
+        """Add to the lag of the servos."""
+        change = change_s * course(state[HOURS], begins_h, ends_h, time_constant_h)
+        state[STEERING_LAG] = max(state[STEERING_LAG] + change, 0.0)
+
+
+@dataclass(frozen=True)
+class SpeedLagByCampaignTime(ByCampaignTime):
+    """The lags of the drive change alike: ``T ← T + change · course``, and never below zero."""
+
+    name: ClassVar[str] = "speed_lag_by_campaign_time"
+    stage: ClassVar[Stage] = Stage.SERVO
+    through: ClassVar[str] = "speed"
+
+    change_s: float = parameter(unit="s", low=-5.0, high=5.0, scale=0.1)
+    begins_h: float = _begin()
+    ends_h: float = _end()
+    time_constant_h: float = _time_constant()
+
+    @staticmethod
+    def aim(state: Floats, change_s: float, begins_h: float, ends_h: float, time_constant_h: float) -> None:
+        """Add to both lags of the drive."""
+        change = change_s * course(state[HOURS], begins_h, ends_h, time_constant_h)
+        state[ACCELERATE_LAG] = max(state[ACCELERATE_LAG] + change, 0.0)
+        state[BRAKE_LAG] = max(state[BRAKE_LAG] + change, 0.0)
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Discrepancy terms of quantities that depend on a column that the lab logged, such as a voltage or a temperature.
 
 Each is linear in the standardised column, by run: its size is that of one standard deviation. The number of the column
-is a parameter that the regression chooses; the prediction is constant between two numbers, so that a fit leaves it.
+is a parameter that the regression chooses, and that a fit leaves.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def logged(state: Floats, column: float) -> float:
 
 
 def _column() -> Any:
-    return parameter(unit="–", low=0.0, high=LOGGED_COUNT - 1.0, scale=1.0)
+    return parameter(unit="–", low=0.0, high=LOGGED_COUNT - 1.0, scale=1.0, is_discrete=True)
 
 
 @dataclass(frozen=True)

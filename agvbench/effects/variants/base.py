@@ -50,6 +50,17 @@ def cause_of(name: str) -> str:
     return name if variant is None else variant.variant_of
 
 
+def causes_in(variant: type[Variant]) -> frozenset[str]:
+    """Return the effects of the library that a variant combines: the one that it is a variant of, and its equivalents.
+
+    Examples
+    --------
+    >>> sorted(causes_in(effect_variants()["marker_offset_wheelbase"]))
+    ['marker_offset', 'wheelbase_error']
+    """
+    return frozenset({variant.variant_of, *(quantity.partition(".")[0] for quantity in variant.equivalents)})
+
+
 def weights_in(name: str, quantity: str) -> Mapping[str, float]:
     """Return the weights of the parameters of the effect or variant `name` in a `quantity` of the library.
 
