@@ -21,7 +21,7 @@ from agvbench.diagnosis.terms import (
     WaveByDistance,
     WheelsByCampaignTime,
 )
-from agvbench.diagnosis.terms.campaign_time import ByCampaignTime, course
+from agvbench.diagnosis.terms.campaign_time import AT_ONCE_H, ByCampaignTime, course
 from agvbench.effects import TIME_HOOKS, effect_kinds
 from agvbench.effects import state as s
 from agvbench.errors import InputError
@@ -153,10 +153,16 @@ def test_the_share_of_a_change_is_between_none_and_all(hours, begin, end, consta
     since = hours if hours < begin else hours - begin
     if hours >= end:
         assert share == 0.0
-    elif constant:
+    elif constant > AT_ONCE_H:
         assert share == pytest.approx(-math.expm1(-since / constant))
     else:
         assert share == float(hours >= begin)
+
+
+@given(hours=st.floats(0.0, 20.0), begin=st.floats(0.0, 5.0), end=st.floats(0.0, 10.0))
+def test_a_step_does_not_change_with_a_small_time_constant(hours, begin, end) -> None:
+    """A fit moves along the slope by the time constant: that of a step must be zero, before it and after it."""
+    assert course(hours, begin, end, 0.001) == course(hours, begin, end, 0.0)
 
 
 @pytest.mark.parametrize("term", OF_TIME, ids=[term.name for term in OF_TIME])

@@ -12,7 +12,7 @@ from agvbench.diagnosis import terms
 from agvbench.diagnosis.discrepancy.regression import Columns, GroupedRegression, SteeringTangents
 from agvbench.diagnosis.residuals.body_rates import Rates
 from agvbench.diagnosis.terms import DiscrepancyTerm
-from agvbench.diagnosis.terms.campaign_time import LATEST_H, LONGEST_H
+from agvbench.diagnosis.terms.campaign_time import AT_ONCE_H, LATEST_H, LONGEST_H
 from agvbench.diagnosis.terms.campaign_time import course as course_at
 from agvbench.types import Floats
 from agvbench.vehicle.geometry import Geometry
@@ -20,7 +20,7 @@ from agvbench.vehicle.geometry import Geometry
 _TIME_CONSTANTS_H = (0.1, 0.2, 0.4, 0.8, 2.0, LONGEST_H)
 _RESTARTED_H = (0.4, LONGEST_H)
 _PARTS = 12
-_AT_ONCE_H, _FEW, _CHANGED_SHARE = 1e-3, 0.03, 0.05
+_FEW, _CHANGED_SHARE = 0.03, 0.05
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ def complement(values: Floats, hours: Floats) -> Floats | None:
     """
     *sizes, begins_h, ends_h, time_constant_h = values.tolist()
     opposite = [-size for size in sizes]
-    if time_constant_h > _AT_ONCE_H:
+    if time_constant_h > AT_ONCE_H:
         return None
     if np.mean(hours < begins_h) < _FEW:
         return np.array([*opposite, ends_h, LATEST_H, 0.0])

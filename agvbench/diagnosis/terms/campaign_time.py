@@ -1,9 +1,9 @@
 """Discrepancy terms of quantities that change during a campaign.
 
-Each has the same course. With a time constant of zero a change holds between two times, with its full size. Otherwise
-it approaches its full size exponentially since the campaign began, and starts over at the first of the two times: with
-another battery, or after a pause in which something cooled. A time constant of some hours is a drift that is linear
-within an evening.
+Each has the same course. With a time constant of up to 36 s a change holds between two times, with its full size.
+Otherwise it approaches its full size exponentially since the campaign began, and starts over at the first of the two
+times: with another battery, or after a pause in which something cooled. A time constant of some hours is a drift that
+is linear within an evening.
 """
 
 from __future__ import annotations
@@ -38,6 +38,8 @@ from agvbench.types import Floats
 LONGEST_H = 6.0
 """Largest time constant: within an evening, slower changes have the same course."""
 LATEST_H = 1e3
+AT_ONCE_H = 0.01
+"""Time constant up to which a change is a step."""
 _MOVING_MPS = 0.003
 
 
@@ -45,10 +47,11 @@ _MOVING_MPS = 0.003
 def course(hours: float, begins_h: float, ends_h: float, time_constant_h: float) -> float:
     """Return the share of a change at a time [h]: 0 before a step begins and after the change ended, 1 if complete."""
     has_begun = hours >= begins_h
-    if hours >= ends_h or (time_constant_h <= 0.0 and not has_begun):
+    if hours >= ends_h:
         return 0.0
-    if time_constant_h <= 0.0:
-        return 1.0
+    # Forward differences by the time constant of a step must not see the runs before it change.
+    if time_constant_h <= AT_ONCE_H:
+        return 1.0 if has_begun else 0.0
     return 1.0 - math.exp((begins_h - hours if has_begun else -hours) / time_constant_h)
 
 
