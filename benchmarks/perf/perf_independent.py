@@ -164,7 +164,7 @@ def judged(simulator: str, trial: Trial, known: Mapping[str, str], found: Diagno
     true = WRONG_DISTANCES.union(trial.causes, inside, ALWAYS_TRUE.get(simulator, ()), *also)
     if simulator in ALWAYS_TRUE and 0.0 < _delay_s(found) < LEAST_DELAY_S:
         true |= {"actuation_delay"}
-    errors = dict(found.held_out.errors["end_position_mm"]) if found.held_out is not None else {}
+    errors = dict(found.held_out.errors.get("end_position_mm", {})) if found.held_out is not None else {}
     return Answer(
         trial.name,
         trial.kind,

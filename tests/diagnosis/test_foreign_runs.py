@@ -96,3 +96,18 @@ def test_levels_that_differ_by_rounding_are_one(tiny_campaign):
         for told in (runs, with_common_levels(rounded))
     ]
     assert count[0] == count[1]
+
+
+def stamped_earlier(run, seconds):
+    """Return the run with the time stamps of its frames reduced."""
+    return dataclasses.replace(run, frames=dataclasses.replace(run.frames, t_s=run.frames.t_s - seconds))
+
+
+def test_runs_of_a_camera_whose_clock_is_early_begin_at_rest_all_the_same():
+    """The pose of 80 ms after the drive's first command has the time stamp of that command."""
+    runs = [late(run, 0.4) for run in campaign_runs(Tiny())[:30]]
+    assert all(starts_at_rest(stamped_earlier(run, 0.08), HEADER.neutral) for run in runs)
+    assert horizon_of(HEADER, [stamped_earlier(run, 0.08) for run in runs]) is None
+    fast = [run for run in runs if abs(run.commands.drive[0] - HEADER.neutral.drive) > 300.0]
+    assert fast
+    assert not any(starts_at_rest(stamped_earlier(run, 2.0), HEADER.neutral) for run in fast)

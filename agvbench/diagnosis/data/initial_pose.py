@@ -16,7 +16,7 @@ from agvbench.signals import MAD_TO_STD
 from agvbench.statistics.rest_poses import SPEED_LIMIT_MPS, start_pose
 from agvbench.types import Command, Floats, Frames, Run
 
-_LAST_S = 0.2
+_LAST_S, _EARLY_S = 0.2, 0.2
 _STANDSTILL_M = 0.005
 _MIN_FRAMES = 8
 _MAX_DELAY_S = 0.1
@@ -47,14 +47,15 @@ def first_drive_s(run: Run, neutral: Command) -> float:
 def starts_at_rest(run: Run, neutral: Command) -> bool:
     """Return whether the vehicle was at rest in the last frames before its first drive command.
 
-    If there are no such frames, a run with few commands is taken to start at rest. A run whose commands change
+    The camera's clock may be early by up to 0.2 s. If there are no such frames, a run with few commands is taken to start at rest. A run whose commands change
     continually is taken for a piece of free driving.
     """
     usable = run.frames.select(run.frames.tracked.astype(np.bool_))
     for until in dict.fromkeys((0.0, first_drive_s(run, neutral))):
         frames = usable.select(usable.t_s <= until)
         if len(frames) >= 2:
-            return _is_at_rest(frames)
+            earlier = frames.select(frames.t_s <= frames.t_s[-1] - _EARLY_S)
+            return _is_at_rest(frames) or (len(earlier) >= _MIN_FRAMES and _is_at_rest(earlier))
     if np.any(run.frames.t_s < 0.0):
         return True
     length_s = float(np.ptp(run.frames.t_s)) if len(run.frames) else 0.0
