@@ -47,8 +47,8 @@ def first_drive_s(run: Run, neutral: Command) -> float:
 def starts_at_rest(run: Run, neutral: Command) -> bool:
     """Return whether the vehicle was at rest in the last frames before its first drive command.
 
-    The camera's clock may be early by up to 0.2 s. If there are no such frames, a run with few commands is taken to start at rest. A run whose commands change
-    continually is taken for a piece of free driving.
+    The camera's clock may be early by up to 0.2 s. If there are no such frames, a run with few commands is taken to
+    start at rest. A run whose commands change continually is taken for a piece of free driving.
     """
     usable = run.frames.select(run.frames.tracked.astype(np.bool_))
     for until in dict.fromkeys((0.0, first_drive_s(run, neutral))):
