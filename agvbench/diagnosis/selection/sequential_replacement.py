@@ -59,6 +59,8 @@ def _with_library_equations(
     Beside another effect a variant's further parameters may be unnecessary.
     """
     for name in [n for n in gains if cause_of(n) != n]:
+        if name not in current.names:
+            continue  # removed with another
         model = extended.with_effect(extended.without_effect(base, current, name), cause_of(name))
         if model.is_fitted and current.is_matched_by(model):
             current, gains = extended.backward_elimination(base, model, map(cause_of, model.names))

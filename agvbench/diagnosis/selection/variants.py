@@ -25,7 +25,10 @@ from agvbench.types import Floats
 from agvbench.vehicle.geometry import Geometry
 
 EXTENDED_LIBRARY: tuple[type[Effect], ...] = (*effect_variants().values(), *TERMS)
-"""Discrepancy terms and variants: the extended library. One simulation contains all, because compiling is slow."""
+"""Variants and discrepancy terms: the extended library. One simulation contains all, because compiling is slow.
+
+Hooks are called in this order: terms change what variants set, such as lags.
+"""
 
 
 def variant_candidates() -> dict[str, Candidate]:
