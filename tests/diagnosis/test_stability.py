@@ -39,7 +39,7 @@ def readings(sessions: list[str | None] | None = None) -> Readings:
 
 
 def drives(seed: int) -> tuple[Rates, SteeringTangents]:
-    """Return residual rates of runs that turn left and right, with errors of runs and of steps, and what steered."""
+    """Return residual rates of runs that begin to turn, with errors of runs and of steps, and what steered."""
     rng = np.random.default_rng(seed)
     by_command = rng.uniform(-0.4, 0.4, (COMMANDS, 2))
     run = np.repeat(np.arange(RUNS), STEPS)
@@ -68,7 +68,8 @@ def drives(seed: int) -> tuple[Rates, SteeringTangents]:
     levels = np.column_stack([np.zeros(len(run)), GROUP[run], GROUP[run]]).astype(np.int64)
     rates = Rates(run, value, STEP_M * one, covariates, begin, end, np.tile(np.arange(STEPS), RUNS))
     lags = np.zeros((len(run), 2, len(REACHES_RAD)))
-    return rates, SteeringTangents(tangent, tangent, tangent, levels, lags)
+    # The axles were at neutral before.
+    return rates, SteeringTangents(tangent, np.zeros_like(tangent), tangent, levels, lags)
 
 
 def change_of(rates: Rates, tangents: SteeringTangents, of: Readings | None = None) -> Dependence | None:
