@@ -45,7 +45,7 @@ class Course:
 def exponentials(hours: Floats) -> Iterator[Course]:
     """Yield exponential courses from the beginning of the campaign, for times (n,) [h]."""
     for constant in _TIME_CONSTANTS_H:
-        yield Course(-np.expm1(-hours / constant), 0.0, LATEST_H, constant)
+        yield _restarted(hours, 0.0, constant)
 
 
 def restarts(hours: Floats) -> Iterator[Course]:
@@ -183,9 +183,7 @@ def by_steering_gain(rates: Rates, tangents: SteeringTangents, geometry: Geometr
     if geometry.is_differential:
         curvature = rates.covariates["curvature_per_m"][:, None]
         return {1: geometry.rear_axle_m * curvature, 2: curvature}
-    angle = np.arctan(tangents.tangent)
-    by_axle = by_axle_angles(angle[:, 0], angle[:, 1], tangents, geometry)
-    return {k: columns.sum(axis=1, keepdims=True) for k, columns in by_axle.items()}
+    return by_both_axles(np.arctan(tangents.tangent), tangents, geometry)
 
 
 def _by_steering_lag(rates: Rates, tangents: SteeringTangents, geometry: Geometry) -> Columns:
@@ -193,7 +191,12 @@ def _by_steering_lag(rates: Rates, tangents: SteeringTangents, geometry: Geometr
     changed = np.any(np.diff(tangents.levels[:, 1:], axis=0) != 0, axis=1) | (np.diff(rates.run) != 0)
     lost = np.r_[True, changed] * rates.covariates["speed_mps"] / rates.weight
     missing = (np.arctan(tangents.previous) - np.arctan(tangents.tangent)) * lost[:, None]
-    by_axle = by_axle_angles(missing[:, 0], missing[:, 1], tangents, geometry)
+    return by_both_axles(missing, tangents, geometry)
+
+
+def by_both_axles(change: Floats, tangents: SteeringTangents, geometry: Geometry) -> Columns:
+    """Return the lateral and curvature residuals by changes of both axle angles (n, 2) [rad] at once, one column."""
+    by_axle = by_axle_angles(change[:, 0], change[:, 1], tangents, geometry)
     return {k: columns.sum(axis=1, keepdims=True) for k, columns in by_axle.items()}
 
 

@@ -18,6 +18,7 @@ from agvbench.diagnosis.criteria import DISCREPANCY
 from agvbench.diagnosis.data.splits import folds
 from agvbench.diagnosis.discrepancy.campaign_time import (
     by_axle_angles,
+    by_both_axles,
     by_steering_gain,
     changes,
     columns_by_campaign_time,
@@ -111,17 +112,15 @@ def _steering(
     yield terms.SteeringByDirection, iter([(by_axle_angles(direction, direction, tangents, geometry), Values())])
     angles = [np.arctan(before) - np.arctan(tangents.tangent) for before in (tangents.previous, tangents.reversal)]
     if np.any(angles[0] != 0.0):
-        both = [by_axle_angles(angle[:, 0], angle[:, 1], tangents, geometry) for angle in angles]
-        columns = {k: np.column_stack([shares[k].sum(axis=1) for shares in both]) for k in both[0]}
+        both = [by_both_axles(angle, tangents, geometry) for angle in angles]
+        columns = {k: np.hstack([shares[k] for shares in both]) for k in both[0]}
         yield terms.SteeringByHistory, iter([(columns, Values())])
         yield terms.SteeringByTravel, _travels(tangents, geometry)
 
 
 def _travels(tangents: SteeringTangents, geometry: Geometry) -> Iterator[Option]:
     for number, reach in enumerate(REACHES_RAD):
-        front, rear = -tangents.lags[:, :, number].T
-        shares = by_axle_angles(front, rear, tangents, geometry)
-        yield {k: column.sum(axis=1, keepdims=True) for k, column in shares.items()}, _Travel(reach)
+        yield by_both_axles(-tangents.lags[:, :, number], tangents, geometry), _Travel(reach)
 
 
 _BY_LOGGED_COLUMN: dict[type[DiscrepancyTerm], type[terms.ByLoggedColumn]] = {

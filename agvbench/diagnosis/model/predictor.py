@@ -80,10 +80,11 @@ class Predictor:
         self.nulls: Floats = batch.base.nulls[self._own]
         self.physical = PhysicalPriors.of(self.readings.priors, effects, self.parameter_names, self.nulls)
         self._steps = _STEP_SHARE * batch.base.scales[self._own]
-        alike = {kind.name for kind in batch.base.kinds if kind.name in effects and kind.acts_alike_on_repeats()}
+        own = [kind for kind in batch.base.kinds if kind.name in effects]
+        alike = {kind.name for kind in own if kind.acts_alike_on_repeats()}
         kinds = [name.partition(".")[0] for name in self.parameter_names]
         self._acts_alike = np.array([kind in alike for kind in kinds], dtype=np.bool_)
-        discrete = {f"{kind.name}.{p.name}" for kind in batch.base.kinds for p in kind.parameters() if p.is_discrete}
+        discrete = {f"{kind.name}.{p.name}" for kind in own for p in kind.parameters() if p.is_discrete}
         self._is_discrete = np.array([name in discrete for name in self.parameter_names], dtype=np.bool_)
         self._last: tuple[tuple[bytes, ...], Floats] = (), np.empty(0)
 
