@@ -161,6 +161,25 @@ def sessions_in_words(content: Mapping[str, Any]) -> Iterator[str]:
             yield f"Session {name}: the same drive commands give {factor:.2f} ± {stderr:.2f} times the others' speed."
 
 
+def extrapolation_in_words(content: Mapping[str, Any]) -> Iterator[str]:
+    """Yield how many test windows have commands beyond those of the training windows, and in which channels."""
+    windows = mapping(mapping(content.get("provenance")).get("windows"))
+    tested = [row for row in map(mapping, items(windows.get("recordings"))) if row.get("held_out")]
+    beyond = sum(number(mapping(row.get("beyond")).get("windows", 0)) for row in tested)
+    if not beyond > 0.0:
+        return
+    channels = []
+    for role, value in mapping(windows.get("commands")).items():
+        fitted, test = ([number(v) for v in items(mapping(value).get(key))] for key in ("training", "test"))
+        if len(fitted) == len(test) == 2 and (test[0] < fitted[0] or test[1] > fitted[1]):
+            channels.append(f"{role} {test[0]:.4g} to {test[1]:.4g} (training: {fitted[0]:.4g} to {fitted[1]:.4g})")
+    every = sum(number(row.get("windows")) for row in tested)
+    yield (
+        f"{beyond:.0f} of {every:.0f} test windows have commands beyond those of the training windows, where the model "
+        f"extrapolates: {', '.join(channels)}. For a model of these commands, include them in the training windows."
+    )
+
+
 def states_in_words(content: Mapping[str, Any]) -> Iterator[str]:
     """Yield how many effects of the library are absent."""
     states = [mapping(state).get("state") for state in mapping(content.get("states")).values()]

@@ -88,10 +88,12 @@ def report(
     table = Table("recording", "ahead", "windows", "floor", *PREDICTORS.values(), title="position error, mm", box=style)
     rows = [row for row in windows["recordings"] if row["held_out"]]
     for row in rows:
-        for key in (key for key in row if key.startswith("ahead_")):
-            cells = [_cell(row[key][f"{name}_mm"]) for name in PREDICTORS]
-            ahead = key.removeprefix("ahead_").replace("_", " ")
-            table.add_row(row["recording"], ahead, str(row["windows"]), f"{row[key]['floor_mm']:.0f}", *cells)
+        parts = {f"  {part} the training commands": row[part] for part in ("within", "beyond") if part in row}
+        for label, part in {row["recording"]: row, **parts}.items():
+            for key in (key for key in part if key.startswith("ahead_")):
+                cells = [_cell(part[key][f"{name}_mm"]) for name in PREDICTORS]
+                ahead = key.removeprefix("ahead_").replace("_", " ")
+                table.add_row(label, ahead, str(part["windows"]), f"{part[key]['floor_mm']:.0f}", *cells)
     console.print(table)
     if brief:
         return rows
@@ -135,20 +137,29 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
 
 
 def summary(rows: Sequence[tuple[str, list[dict[str, Any]]]], style: Box) -> Table:
-    """Return the errors 2 s ahead of each split, over all its windows, relative to the static maps."""
+    """Return the errors 2 s ahead of each split, over all its windows, relative to the static maps.
+
+    Windows with commands within and beyond the range of the training windows have rows of their own.
+    """
     columns = ("split", "windows", "static, mm", *list(PREDICTORS.values())[1:])
     table = Table(*columns, title="relative to the static maps", box=style)
     for title, recorded in rows:
-        count = sum(row["windows"] for row in recorded)
-        error = {
-            name: math.sqrt(
-                sum(row["windows"] * row["ahead_2_s"][f"{name}_mm"]["rms"] ** 2 for row in recorded) / count
-            )
-            for name in PREDICTORS
-        }
-        ratios = [f"{error[name] / error['static']:.2f}" for name in list(PREDICTORS)[1:]]
-        table.add_row(title, str(count), f"{error['static']:.0f}", *ratios)
+        within = [row.get("within", row) for row in recorded if "within" in row or "beyond" not in row]
+        beyond = [row["beyond"] for row in recorded if "beyond" in row]
+        table.add_row(title, *_relative(recorded))
+        for label, part in (("within", within), ("beyond", beyond)) if beyond else ():
+            table.add_row(f"  {label} the training commands", *(_relative(part) if part else ()))
     return table
+
+
+def _relative(rows: Sequence[dict[str, Any]]) -> list[str]:
+    count = sum(row["windows"] for row in rows)
+    error = {
+        name: math.sqrt(sum(row["windows"] * row["ahead_2_s"][f"{name}_mm"]["rms"] ** 2 for row in rows) / count)
+        for name in PREDICTORS
+    }
+    ratios = [f"{error[name] / error['static']:.2f}" for name in list(PREDICTORS)[1:]]
+    return [str(count), f"{error['static']:.0f}", *ratios]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -13,8 +13,11 @@ FREE_HEADER = dataclasses.replace(HEADER, name="free", prediction_horizon_s=2.0,
 _RECORDED_FROM_S, _PERIOD_S = 2.0, 0.1
 
 
-def joystick(seconds: float, rng: np.random.Generator) -> Commands:
-    """Return commands ten times a second: drive and both axles wander, each about as fast as a hand does."""
+def joystick(seconds: float, rng: np.random.Generator, reach: float = 1.0) -> Commands:
+    """Return commands ten times a second: drive and both axles wander, each about as fast as a hand does.
+
+    `reach` scales how far the axles are steered.
+    """
     count = round(seconds / _PERIOD_S)
     t_s = _PERIOD_S * np.arange(count)
 
@@ -22,16 +25,23 @@ def joystick(seconds: float, rng: np.random.Generator) -> Commands:
         knots = np.arange(0.0, seconds + 2.0 * every_s, every_s)
         return middle + np.round(size * np.interp(t_s, knots, rng.uniform(-1.0, 1.0, len(knots))))
 
-    return Commands(t_s, wander(1150.0, 200.0, 1.5), wander(NEUTRAL, 350.0, 1.0), wander(NEUTRAL, 250.0, 1.3))
+    return Commands(
+        t_s, wander(1150.0, 200.0, 1.5), wander(NEUTRAL, 350.0 * reach, 1.0), wander(NEUTRAL, 250.0 * reach, 1.3)
+    )
 
 
-def free_runs(tiny: Tiny, *, seed: int = 0, sessions: int = 4, runs: int = 3, seconds: float = 30.0) -> list[Run]:
-    """Drive `runs` in each of the sessions; what is kept of each begins in the middle of the drive."""
+def free_runs(
+    tiny: Tiny, *, seed: int = 0, sessions: int = 4, runs: int = 3, seconds: float = 30.0, reach: float = 1.0
+) -> list[Run]:
+    """Drive `runs` in each of the sessions; what is kept of each begins in the middle of the drive.
+
+    `reach` is how far a `joystick` steers.
+    """
     rng = np.random.default_rng([7, seed])
     out = []
     for session in range(sessions):
         for k in range(runs):
-            commands = joystick(seconds, rng)
+            commands = joystick(seconds, rng, reach)
             started_s = 3600.0 * session + 120.0 * k
             frames = drive(tiny, commands, Pose(0.0, 0.0, rng.uniform(-3.0, 3.0)), started_s, rng)
             run = Run(f"{session}-{k}", "free", "", "", 0, NO_TARGET, started_s, "ok", "", *_later(commands, frames))

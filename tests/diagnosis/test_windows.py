@@ -15,7 +15,7 @@ from tiny_vehicle import HEADER, NEUTRAL, NEUTRAL_COMMAND, Tiny, campaign_runs
 from agvbench.diagnosis.data.readings import Readings, read_windows
 from agvbench.diagnosis.data.window_splits import held_out_windows, thinned
 from agvbench.diagnosis.data.windows import Horizon, RecordedMotion, Window, cut_windows, horizon_of
-from agvbench.diagnosis.free_driving.errors import by_recording, interval, repeatability_squares, squares
+from agvbench.diagnosis.free_driving.errors import WindowErrors, interval, repeatability_squares, squares
 from agvbench.diagnosis.free_driving.maps import smooth_maps, start_values_of_windows
 from agvbench.diagnosis.free_driving.predictors import constant_velocity
 from agvbench.diagnosis.model.batch import Batch
@@ -248,13 +248,9 @@ def test_thinning_keeps_order_and_ends(count, most):
 
 
 def test_errors_are_told_by_recording_with_intervals_over_stretches(readings):
-    table = by_recording(
-        readings,
-        {"naive": constant_velocity(readings)},
-        np.zeros_like(readings.poses),
-        np.zeros(len(readings), dtype=bool),
-        0,
-    )
+    none = np.zeros(len(readings), dtype=bool)
+    predicted = {"naive": constant_velocity(readings)}
+    table = WindowErrors(readings, predicted, np.zeros_like(readings.poses), 0).by_recording(none, none)
     counts = [np.count_nonzero(readings.initial_states.recording == f"{k}-0") for k in range(3)]
     assert [row["windows"] for row in table] == counts
     error = np.sqrt(np.nanmean(squares(readings, constant_velocity(readings))["position_rms_mm"][: counts[0]])) * 1e3

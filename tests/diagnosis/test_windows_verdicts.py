@@ -75,6 +75,20 @@ def test_every_effect_is_listed_with_what_it_does_to_sessions_held_out(lagging):
     assert {"lateral_slip", "speed_lag", "mocap_latency"} < set(effects)
 
 
+def test_parameters_that_these_recordings_do_not_identify_are_told(lagging):
+    # The joystick drives forwards only.
+    assert "reverse_steering_gain.gain" in lagging.provenance["not_identifiable"]
+    assert "steering_lag.time_constant_s" not in lagging.provenance["not_identifiable"]
+
+
+def test_what_would_distinguish_causes_that_no_run_does_is_told():
+    found = diagnose(FreeCampaign(free_runs(Tiny(delay_s=0.08), runs=1, seconds=24.0)))
+    assert found.verdict is Verdict.AMBIGUOUS
+    (item,) = found.to_json()["provenance"]["inseparable"]
+    assert set(item["between"]) == {"actuation_delay", "mocap_latency"}
+    assert "a time that vehicle and cameras share" in item["needs"]
+
+
 @pytest.mark.slow
 def test_a_corrected_vehicle_with_another_law_is_diagnosed_again(lagging, tmp_path):
     law = effect_variants()["steering_lag_inertia"](time_constant_s=0.25, inertia_s=0.01)

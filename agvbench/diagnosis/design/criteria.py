@@ -68,7 +68,8 @@ def _run(commands: object, repeat: int) -> Run:
 
 def predictor_like(fitted: Fit, readings: Readings, geometry: Geometry) -> Predictor:
     """Return the predictor of other runs with the maps and effects of `fitted`."""
-    return Predictor(Batch(readings, fitted.predictor.maps, geometry), fitted.predictor.effects)
+    batch = Batch(readings, fitted.predictor.maps, geometry, kinds=fitted.predictor.batch.kinds)
+    return Predictor(batch, fitted.predictor.effects)
 
 
 def starts_within(path: Floats, workspace: Workspace, geometry: Geometry) -> list[Pose] | None:

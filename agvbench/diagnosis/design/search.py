@@ -90,7 +90,8 @@ class Search:
         """Return the expected standard errors over scales (len(flat), designs); large for designs not evaluated."""
         chosen = self.chosen
         every = self.readings(tried)
-        batch = Batch(every, chosen.predictor.maps, self.geometry)
+        maps, kinds = chosen.predictor.maps, chosen.predictor.batch.kinds
+        batch = Batch(every, maps, self.geometry, kinds=kinds)
         out = np.full((len(flat), len(tried)), np.inf)
         no_random_effects = np.zeros((len(every), len(RANDOM_EFFECTS)))
         for k, item in enumerate(flat):
@@ -104,7 +105,7 @@ class Search:
             if not len(visible):
                 continue  # no design shows it
             evaluated = visible[np.unique(np.linspace(0, len(visible) - 1, _EVALUATED).round().astype(int))]
-            some = Batch(self.readings([tried[i] for i in evaluated]), chosen.predictor.maps, self.geometry)
+            some = Batch(self.readings([tried[i] for i in evaluated]), maps, self.geometry, kinds=kinds)
             change = item.scale * slopes[..., item.at]
             share = _limited_share(change, len(tried))[evaluated]
             out[k, evaluated] = stderr_ratios(chosen, [item], [Predictor(some, names)], repeats)[0] / share

@@ -20,8 +20,9 @@ from agvbench.diagnosis.findings.estimates import named_effects
 from agvbench.diagnosis.findings.omitted_effects import omitted_effects
 from agvbench.diagnosis.findings.prior_checks import check_priors, provenance_of, with_contradictions, with_evidence
 from agvbench.diagnosis.findings.residual_table import with_residuals
+from agvbench.diagnosis.free_driving.command_range import beyond_range, command_ranges
 from agvbench.diagnosis.free_driving.drive_level import DriveLevel
-from agvbench.diagnosis.free_driving.errors import QUANTITIES, by_recording, repeatability_squares, rms, squares
+from agvbench.diagnosis.free_driving.errors import QUANTITIES, WindowErrors, repeatability_squares, rms, squares
 from agvbench.diagnosis.free_driving.predictors import change_by_speed_error, constant_velocity, prior_model, speed_held
 from agvbench.diagnosis.free_driving.selection import WindowSelector
 from agvbench.diagnosis.model.batch import Batch
@@ -97,7 +98,10 @@ class WindowConclusion:
 
     def _fit_provenance(self, horizon: Horizon, predicted: dict[str, Floats], perturbed: Floats) -> dict[str, object]:
         """Return the provenance of the fit, with the errors of each predictor and each effect."""
-        batch = self.selector.batch
+        batch, neutral = self.selector.batch, self.context.header.neutral
+        ranges = command_ranges(batch.readings, self.assessment.select(self.held), neutral)
+        beyond = beyond_range(self.assessment, ranges, neutral)
+        errors = WindowErrors(self.assessment, predicted, perturbed, self.context.seed)
         return {
             "fit_windows": len(batch.readings),
             "models_fitted": self.selection.tried,
@@ -108,7 +112,8 @@ class WindowConclusion:
                 "redundancy": batch.autocorrelation_time,
                 "initial_steering": "earlier commands" if batch.readings.preset else "measured yaw rate",
                 "sessions": self._sessions(),
-                "recordings": by_recording(self.assessment, predicted, perturbed, self.held, self.context.seed),
+                "commands": {role: of_channel.to_table() for role, of_channel in ranges.items()},
+                "recordings": errors.by_recording(self.held, beyond),
                 "effects": self._effect_errors(predicted["after"]),
             },
         }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,36 +71,60 @@ def rms(values: Floats, name: str) -> float:
     return QUANTITIES[name] * float(np.sqrt(np.nanmean(values)))
 
 
-def by_recording(
-    readings: Readings, predicted: Mapping[str, Floats], perturbed: Floats, held: NDArray[np.bool_], seed: int
-) -> list[dict[str, object]]:
-    """Return the position error [mm] of every predictor, by recording and prediction time.
+@dataclass(frozen=True)
+class WindowErrors:
+    """Position errors [mm] of predictors, in any part of the windows.
 
-    A recording with training and test windows has a row for each kind. Each error is a root mean square with its 95 %
-    confidence interval. The bootstrap resamples blocks of the recording, because the residuals of a block are
-    correlated.
+    ``predicted`` maps predictors to poses (W, K, 3). ``perturbed`` (W, K, 3) is the change of the prediction by one
+    standard error of the initial speed. ``seed`` is that of the bootstrap.
     """
-    initial_states = _initial_states(readings)
-    table: list[dict[str, object]] = []
-    for recording, is_held in dict.fromkeys(zip(initial_states.recording.tolist(), held.tolist(), strict=True)):
-        rows = np.flatnonzero((initial_states.recording == recording) & (held == is_held))
-        row: dict[str, object] = {
-            "recording": recording,
-            "session": str(initial_states.session[rows[0]]),
-            "held_out": is_held,
+
+    readings: Readings
+    predicted: Mapping[str, Floats]
+    perturbed: Floats
+    seed: int
+
+    def by_recording(self, held: NDArray[np.bool_], beyond: NDArray[np.bool_]) -> list[dict[str, object]]:
+        """Return the errors by recording and prediction time.
+
+        A recording with training and test windows has a row for each kind. ``beyond`` (W,) says which windows have
+        commands beyond those of the training windows: test windows ``within`` and ``beyond`` have errors of their own.
+        """
+        initial_states = _initial_states(self.readings)
+        table: list[dict[str, object]] = []
+        for recording, is_held in dict.fromkeys(zip(initial_states.recording.tolist(), held.tolist(), strict=True)):
+            rows = np.flatnonzero((initial_states.recording == recording) & (held == is_held))
+            row: dict[str, object] = {
+                "recording": recording,
+                "session": str(initial_states.session[rows[0]]),
+                "held_out": is_held,
+                **self._of(rows),
+            }
+            if is_held and beyond[rows].any():
+                parts = {"within": rows[~beyond[rows]], "beyond": rows[beyond[rows]]}
+                row |= {name: self._of(part) for name, part in parts.items() if len(part)}
+            table.append(row)
+        return table
+
+    def _of(self, rows: NDArray[np.int64]) -> dict[str, object]:
+        """Return the errors of the windows `rows`, with 95 % confidence intervals.
+
+        The bootstrap resamples blocks of the recording, because the residuals of a block are correlated.
+        """
+        readings, initial_states = self.readings, _initial_states(self.readings)
+        out: dict[str, object] = {
             "windows": len(rows),
             "median_speed_mps": float(np.median(np.abs(initial_states.speed_mps[rows]))),
         }
         for sample in REPORTED_SAMPLES:
             elapsed_s = float(np.median(readings.t_s[rows, sample] - initial_states.t_s[rows]))
-            repeatability = repeatability_squares(readings, perturbed, sample)["position_rms_mm"][rows]
+            repeatability = repeatability_squares(readings, self.perturbed, sample)["position_rms_mm"][rows]
             entry: dict[str, object] = {"floor_mm": rms(repeatability, "position_rms_mm")}
-            for name, poses in predicted.items():
+            for name, poses in self.predicted.items():
                 squared_mm2 = squares(readings, poses, sample)["position_rms_mm"][rows]
-                entry[f"{name}_mm"] = interval(squared_mm2, readings.group[rows], seed)
-            row[f"ahead_{elapsed_s:.2g}_s"] = entry
-        table.append(row)
-    return table
+                entry[f"{name}_mm"] = interval(squared_mm2, readings.group[rows], self.seed)
+            out[f"ahead_{elapsed_s:.2g}_s"] = entry
+        return out
 
 
 def interval(values: Floats, group: NDArray[np.int64], seed: int) -> dict[str, float]:

@@ -16,6 +16,7 @@ from agvbench.diagnosis.data.session_clocks import aligned, clock_offsets
 from agvbench.diagnosis.data.splits import Split
 from agvbench.diagnosis.data.window_splits import held_out_windows, test_sessions, thinned
 from agvbench.diagnosis.data.windows import Horizon
+from agvbench.diagnosis.design.propose import with_next_experiment
 from agvbench.diagnosis.estimation.fit import Fit, fit
 from agvbench.diagnosis.free_driving.conclusion import WindowConclusion
 from agvbench.diagnosis.free_driving.drive_level import DriveLevel, drive_levels, nodal_deviation
@@ -124,7 +125,7 @@ class FreeDriving(Method[SelectedFromWindows]):
         readings = replace(readings, preset=selected.selector.batch.readings.preset)
         trained = thinned(np.flatnonzero(split.training), DATA.max_assessed_windows)
         assessed = np.sort(np.r_[np.flatnonzero(split.test), trained])
-        return WindowConclusion(
+        found = WindowConclusion(
             self.context,
             readings,
             readings.select(assessed),
@@ -134,6 +135,8 @@ class FreeDriving(Method[SelectedFromWindows]):
             selected.selection,
             selected.levels,
         ).diagnosis(self.horizon)
+        self.on_progress("choosing the run to drive next")
+        return with_next_experiment(found, selected.selection, readings, self.context.header, self.context.seed)
 
     def _selector(
         self, readings: Readings, split: Split, static: Fit, levels: Mapping[str, DriveLevel]

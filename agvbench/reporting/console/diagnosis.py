@@ -19,6 +19,7 @@ from agvbench.workflows.diagnosis_files import (
     DEFINITIONS,
     QUANTITIES,
     effect_in_words,
+    extrapolation_in_words,
     fit_in_words,
     left_in_words,
     next_in_words,
@@ -45,7 +46,7 @@ def print_diagnosis(found: Diagnosis, console: Console) -> None:
         _say(fit_in_words(content), console)
         if windows := found.provenance.get("windows"):
             console.print(windows_table(windows))
-        _say(sessions_in_words(content), console)
+        _say((*extrapolation_in_words(content), *sessions_in_words(content)), console)
         if found.held_out.worse_on:
             _say([f"Worse than before on: {', '.join(found.held_out.worse_on)}."], console)
     _say((*states_in_words(content), *remedies_in_words(content), *next_in_words(content)), console)
@@ -77,6 +78,8 @@ _PREDICTORS = {
     "believed": "nominal",
     "after": "after",
 }
+_PARTS = ("within", "beyond")
+_CAPTION = "within, beyond: (number of) windows with commands within and beyond the range of the training windows"
 _MOST_ROWS = 24
 
 
@@ -87,12 +90,15 @@ def windows_table(windows: Mapping[str, Any]) -> Table:
     table = Table(title="position error by recording, mm", box=box.SIMPLE_HEAD, title_justify="left")
     for heading in ("recording", "ahead", "floor", *(_PREDICTORS[name] for name in known)):
         table.add_column(heading, justify="left" if heading == "recording" else "right")
+    if any("beyond" in row for row in rows):
+        table.caption, table.caption_justify = _CAPTION, "left"
     for row in rows:
         label = f"{row['recording']}{' (test)' if row['held_out'] else ''}"
-        for ahead, errors in _errors(row):
-            cells = [_cell(errors[f"{name}_mm"]) for name in known]
-            table.add_row(Text(label), ahead, f"{errors['floor_mm']:.1f}", *cells)
-            label = ""
+        parts = {f"  {key} ({row[key]['windows']})": row[key] for key in _PARTS if key in row}
+        for title, part in {label: row, **parts}.items():
+            for k, (ahead, errors) in enumerate(_errors(part)):
+                cells = [_cell(errors[f"{name}_mm"]) for name in known]
+                table.add_row(Text("" if k else title), ahead, f"{errors['floor_mm']:.1f}", *cells)
     return table
 
 

@@ -31,6 +31,7 @@ from agvbench.workflows.diagnosis_files import (
     QUANTITIES,
     ShownDiagnosis,
     bounds_in_words,
+    extrapolation_in_words,
     fit_in_words,
     items,
     left_in_words,
@@ -86,8 +87,8 @@ def diagnosis_blocks(shown: ShownDiagnosis) -> list[Block]:
     blocks: list[Block] = [Paragraph(verdict_in_words(content), lead=True)]
     blocks += [table for table in (_effects(content), _errors(content), _states(content)) if table.rows]
     said = (
-        *left_in_words(content), *fit_in_words(content), *sessions_in_words(content), *remedies_in_words(content),
-        *next_in_words(content), *shown.problems,
+        *left_in_words(content), *fit_in_words(content), *extrapolation_in_words(content),
+        *sessions_in_words(content), *remedies_in_words(content), *next_in_words(content), *shown.problems,
     )  # fmt: skip
     sentences = [plain_sentences(text) for text in said]
     if sentences:
