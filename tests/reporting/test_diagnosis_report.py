@@ -105,6 +105,64 @@ def test_the_campaigns_report_has_the_section_once_a_diagnosis_lies_there(tmp_pa
     assert read_diagnosis(path).residuals is None
 
 
+def free_driving(recording="monday.csv"):
+    """Errors of a recording held out, of which two of five windows are beyond the training commands."""
+
+    def errors(factor):
+        return {
+            f"ahead_{seconds}_s": {
+                "floor_mm": 2.0,
+                "static_mm": {"rms": seconds * factor * 100.0, "low": seconds * factor * 80.0, "high": 250.0 * factor},
+                "after_mm": {"rms": seconds * factor * 30.0, "low": float("nan"), "high": float("nan")},
+            }
+            for seconds in (1, 2)
+        }
+
+    parts = {"within": {"windows": 3, **errors(0.5)}, "beyond": {"windows": 2, **errors(2.0)}}
+    rows = [
+        {"recording": "tuesday.csv", "held_out": False, "windows": 9, **errors(1.0)},
+        {"recording": recording, "held_out": True, "windows": 5, **errors(1.0), **parts},
+    ]
+    ranges = {"drive": {"training": [0.1, 0.4], "test": [-0.2, 0.3]}, "front": {"training": [-1, 1], "test": [-1, 1]}}
+    provenance = {**content()["provenance"], "windows": {"recordings": rows, "commands": ranges}}
+    return {**content(), "provenance": provenance}
+
+
+def test_free_driving_has_a_table_and_a_picture_by_recording():
+    blocks = diagnosis_blocks(ShownDiagnosis(free_driving(), None))
+    table = next(b for b in blocks if isinstance(b, Table) and b.slug == "by_recording")
+    assert [column.name for column in table.columns][-2:] == ["static_mm", "after_mm"]
+    assert table.rows[:3] == [
+        ["monday.csv", "test", 5.0, "1 s", 2.0, 100.0, 30.0],
+        ["monday.csv", "test", 5.0, "2 s", 2.0, 200.0, 60.0],
+        ["monday.csv", "within", 3.0, "1 s", 2.0, 50.0, 15.0],
+    ]
+    assert table.rows[-1] == ["tuesday.csv", "training", 9.0, "2 s", 2.0, 200.0, 60.0]
+    figure = next(b for b in blocks if isinstance(b, FigureBlock))
+    assert [name for name, _ in figure.legend] == ["static maps", "after"]
+    for words in ("monday.csv (5)", "within (3)", "beyond (2)"):
+        assert words in figure.panels[0].svg
+    assert "tuesday" not in figure.panels[0].svg
+    sentences = " ".join(next(b for b in blocks if isinstance(b, Bullets)).items)
+    assert "2 of 5 test windows have commands beyond" in sentences
+    assert "drive -0.2 to 0.3 (training: 0.1 to 0.4)" in sentences
+    assert "front" not in sentences
+
+
+def test_hostile_names_of_recordings_are_escaped():
+    blocks = diagnosis_blocks(ShownDiagnosis(free_driving(HOSTILE), None))
+    page = to_html("t", "s", [Content("diagnosis", "D", tuple(blocks))])
+    body = page[page.index("<body>") :]
+    assert "<script" not in body
+    assert "\x1b" not in body
+
+
+@pytest.mark.parametrize("edited", [7, {"recordings": [3, {"held_out": True, "ahead_2_s": 4, "beyond": 1}]}], ids=repr)
+def test_edited_errors_by_recording_do_not_stop_the_page(edited):
+    shown = {**content(), "provenance": {"windows": edited}}
+    assert diagnosis_blocks(ShownDiagnosis(shown, None))
+
+
 def test_a_long_sentence_is_not_cut():
     why = "structure remains that no effect explains: " + "it depends on campaign_time_h, and " * 5 + "so on"
     shown = ShownDiagnosis({**content(), "verdict": "UNKNOWN", "provenance": {"why": why}}, None, ())

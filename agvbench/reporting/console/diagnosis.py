@@ -14,6 +14,7 @@ from rich.text import Text
 
 from agvbench.diagnosis import Diagnosis
 from agvbench.diagnosis.result import HeldOut
+from agvbench.reporting.errors_by_recording import PARTS, PREDICTORS, known_predictors, recorded_errors
 from agvbench.workflows.diagnosis_files import (
     COLUMNS,
     DEFINITIONS,
@@ -44,8 +45,8 @@ def print_diagnosis(found: Diagnosis, console: Console) -> None:
         console.print(errors_table(found.held_out))
         console.print(Text(DEFINITIONS, style="dim"))
         _say(fit_in_words(content), console)
-        if windows := found.provenance.get("windows"):
-            console.print(windows_table(windows))
+        if found.provenance.get("windows"):
+            console.print(windows_table(content))
         _say((*extrapolation_in_words(content), *sessions_in_words(content)), console)
         if found.held_out.worse_on:
             _say([f"Worse than before on: {', '.join(found.held_out.worse_on)}."], console)
@@ -71,43 +72,30 @@ def errors_table(held: HeldOut) -> Table:
     return table
 
 
-_PREDICTORS = {
-    "static": "static maps",
-    "speed_held": "speed held",
-    "naive": "constant velocity",
-    "believed": "nominal",
-    "after": "after",
-}
-_PARTS = ("within", "beyond")
-_CAPTION = "within, beyond: (number of) windows with commands within and beyond the range of the training windows"
-_MOST_ROWS = 24
+def windows_table(content: Mapping[str, Any]) -> Table:
+    """Return position errors [mm] by recording, the test recordings first; of the model, with 95 % intervals.
 
-
-def windows_table(windows: Mapping[str, Any]) -> Table:
-    """Return position errors [mm] by recording, the test recordings first, with 95 % intervals where they are known."""
-    rows = sorted(windows["recordings"], key=lambda row: not row["held_out"])[:_MOST_ROWS]
-    known = [name for name in _PREDICTORS if f"{name}_mm" in _errors(rows[0])[0][1]]
-    table = Table(title="position error by recording, mm", box=box.SIMPLE_HEAD, title_justify="left")
-    for heading in ("recording", "ahead", "floor", *(_PREDICTORS[name] for name in known)):
-        table.add_column(heading, justify="left" if heading == "recording" else "right")
-    if any("beyond" in row for row in rows):
-        table.caption, table.caption_justify = _CAPTION, "left"
+    The report has the intervals of every predictor, for which 80 columns have no room.
+    """
+    rows = recorded_errors(content)
+    known = known_predictors(rows)
+    table = Table(
+        title="position error by recording, mm", box=box.SIMPLE_HEAD, title_justify="left", padding=(0, 1, 0, 0)
+    )
+    table.add_column("recording", overflow="fold")
+    for heading in ("ahead", "floor", *(PREDICTORS[name] for name in known[:-1])):
+        table.add_column(heading, justify="right", max_width=8)
+    table.add_column(PREDICTORS[known[-1]], justify="right", no_wrap=True)
+    if any(row.part for row in rows):
+        table.caption, table.caption_justify = PARTS, "left"
+    before = ""
     for row in rows:
-        label = f"{row['recording']}{' (test)' if row['held_out'] else ''}"
-        parts = {f"  {key} ({row[key]['windows']})": row[key] for key in _PARTS if key in row}
-        for title, part in {label: row, **parts}.items():
-            for k, (ahead, errors) in enumerate(_errors(part)):
-                cells = [_cell(errors[f"{name}_mm"]) for name in known]
-                table.add_row(Text("" if k else title), ahead, f"{errors['floor_mm']:.1f}", *cells)
+        cells = [f"{row.error_mm(name)[0]:.0f}" for name in known[:-1]] + [_cell(*row.error_mm(known[-1]))]
+        label = f"{row.recording}{row.title}"
+        table.add_row(Text("" if label == before else row.title), row.ahead, f"{row.floor_mm:.1f}", *cells)
+        before = label
     return table
 
 
-def _errors(row: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
-    return [
-        (key.removeprefix("ahead_").replace("_", " "), value) for key, value in row.items() if key.startswith("ahead_")
-    ]
-
-
-def _cell(error: Mapping[str, float]) -> str:
-    interval = "" if math.isnan(error["low"]) else f" ({error['low']:.0f}…{error['high']:.0f})"
-    return f"{error['rms']:.0f}{interval}"
+def _cell(rms: float, low: float, high: float) -> str:
+    return f"{rms:.0f}" + ("" if math.isnan(low) else f" ({low:.0f}…{high:.0f})")

@@ -21,6 +21,7 @@ from agvbench.reporting.content import (
     Value,
     plain_sentences,
 )
+from agvbench.reporting.errors_by_recording import errors_by_recording
 from agvbench.reporting.figures.style import MUTED, ON_PAGE, dress, new_figure, to_svg
 from agvbench.reporting.next_steps import diagnose_command
 from agvbench.reporting.sections.base import Section
@@ -85,7 +86,9 @@ def diagnosis_blocks(shown: ShownDiagnosis) -> list[Block]:
             Paragraph(" ".join(plain_sentences(problem) for problem in shown.problems) or "The diagnosis is empty.")
         ]
     blocks: list[Block] = [Paragraph(verdict_in_words(content), lead=True)]
-    blocks += [table for table in (_effects(content), _errors(content), _states(content)) if table.rows]
+    blocks += [table for table in (_effects(content), _errors(content)) if table.rows]
+    blocks += errors_by_recording(content)
+    blocks += [table for table in (_states(content),) if table.rows]
     said = (
         *left_in_words(content), *fit_in_words(content), *extrapolation_in_words(content),
         *sessions_in_words(content), *remedies_in_words(content), *next_in_words(content), *shown.problems,
