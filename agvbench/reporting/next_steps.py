@@ -60,7 +60,8 @@ def _diagnosis(data: ReportData) -> Iterator[str]:
         yield "Drive plans that compensate the named effects: agvbench loop, or bench --corrected VEHICLE.toml."
     if verdict == "UNKNOWN":
         yield "Look at what the residual depends on (What the model lacks): an effect of your own may describe it."
-    if verdict in {"AMBIGUOUS", "NOT_IDENTIFIABLE"} and mapping(data.diagnosis.content.get("next_experiment")):
+    is_open = verdict in {"AMBIGUOUS", "NOT_IDENTIFIABLE", "UNKNOWN"}
+    if is_open and mapping(data.diagnosis.content.get("next_experiment")):
         yield plain_sentences(next(next_in_words(data.diagnosis.content)))
 
 

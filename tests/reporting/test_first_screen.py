@@ -49,6 +49,14 @@ def test_the_verdict_of_a_diagnosis_and_its_next_step_stand_on_the_first_screen(
     assert any("bench --corrected" in sentence for sentence in said)
 
 
+@pytest.mark.parametrize("verdict", ["AMBIGUOUS", "NOT_IDENTIFIABLE", "UNKNOWN"])
+def test_the_run_to_drive_next_is_a_next_step(report_data, verdict):
+    following = {"trajectory": {"name": "next_lag"}, "why": "distinguishes one lag from another"}
+    content = {"verdict": verdict, "next_experiment": following}
+    steps = next_steps(replace(report_data("free driving"), diagnosis=ShownDiagnosis(content, None)))
+    assert "Next run, next_lag: distinguishes one lag from another." in steps
+
+
 def test_the_comparison_that_lies_in_the_campaign_and_its_failed_checks_stand_on_the_first_screen(tmp_path):
     night, before = (samples.make_campaign(tmp_path / name, extra_mm=mm) for name, mm in (("b", 60.0), ("a", 0.0)))
     rule = "position_error.median>100mm"
