@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -50,7 +51,9 @@ def recorder(campaign: Campaign, path: Path) -> Iterator[Callable[[Sequence[Meas
         begun = [thread.submit(_run, process, Task("imports", import_rerun, ()))]
 
         def begin(runs: Sequence[MeasuredRun]) -> None:
-            begun.append(thread.submit(write_file, _FLAG, path, partial(_write, process, _shown(campaign, runs))))
+            # Runs keep what is computed of them while the thread sends them: it gets copies.
+            shown = _shown(campaign, [replace(run) for run in runs])
+            begun.append(thread.submit(write_file, _FLAG, path, partial(_write, process, shown)))
 
         yield begin
         for done in begun:
