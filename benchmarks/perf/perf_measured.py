@@ -27,6 +27,7 @@ from rich.table import Table
 
 from agvbench.campaign import Campaign, CampaignHeader, import_recordings
 from agvbench.diagnosis import Diagnosis, diagnose
+from agvbench.reporting.errors_by_recording import recorded_errors
 from agvbench.types import Run
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -87,13 +88,10 @@ def report(
     windows = found.provenance["windows"]
     table = Table("recording", "ahead", "windows", "floor", *PREDICTORS.values(), title="position error, mm", box=style)
     rows = [row for row in windows["recordings"] if row["held_out"]]
-    for row in rows:
-        parts = {f"  {part} the training commands": row[part] for part in ("within", "beyond") if part in row}
-        for label, part in {row["recording"]: row, **parts}.items():
-            for key in (key for key in part if key.startswith("ahead_")):
-                cells = [_cell(part[key][f"{name}_mm"]) for name in PREDICTORS]
-                ahead = key.removeprefix("ahead_").replace("_", " ")
-                table.add_row(label, ahead, str(part["windows"]), f"{part[key]['floor_mm']:.0f}", *cells)
+    for row in (row for row in recorded_errors({"provenance": found.provenance}) if row.is_test):
+        label = f"  {row.part} the training commands" if row.part else row.recording
+        cells = [_cell(*row.error_mm(name)) for name in PREDICTORS]
+        table.add_row(label, row.ahead, f"{row.windows:.0f}", f"{row.floor_mm:.0f}", *cells)
     console.print(table)
     if brief:
         return rows
@@ -108,9 +106,8 @@ def report(
     return rows
 
 
-def _cell(error: dict[str, float]) -> str:
-    low, high = error["low"], error["high"]
-    return f"{error['rms']:.0f}" + ("" if math.isnan(low) else f" ({low:.0f}…{high:.0f})")
+def _cell(rms: float, low: float, high: float) -> str:
+    return f"{rms:.0f}" + ("" if math.isnan(low) else f" ({low:.0f}…{high:.0f})")
 
 
 def draw(rows: list[dict[str, Any]], path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,6 +107,12 @@ class WindowErrors:
             table.append(row)
         return table
 
+    @cached_property
+    def _prediction_times(self) -> dict[int, str]:
+        """The key of each reported sample: its prediction time, the same for every part of the windows."""
+        elapsed_s = self.readings.t_s - _initial_states(self.readings).t_s[:, None]
+        return {sample: f"ahead_{np.median(elapsed_s[:, sample]):.2g}_s" for sample in REPORTED_SAMPLES}
+
     def _of(self, rows: NDArray[np.int64]) -> dict[str, object]:
         """Return the errors of the windows `rows`, with 95 % confidence intervals.
 
@@ -116,14 +123,13 @@ class WindowErrors:
             "windows": len(rows),
             "median_speed_mps": float(np.median(np.abs(initial_states.speed_mps[rows]))),
         }
-        for sample in REPORTED_SAMPLES:
-            elapsed_s = float(np.median(readings.t_s[rows, sample] - initial_states.t_s[rows]))
+        for sample, ahead in self._prediction_times.items():
             repeatability = repeatability_squares(readings, self.perturbed, sample)["position_rms_mm"][rows]
             entry: dict[str, object] = {"floor_mm": rms(repeatability, "position_rms_mm")}
             for name, poses in self.predicted.items():
                 squared_mm2 = squares(readings, poses, sample)["position_rms_mm"][rows]
                 entry[f"{name}_mm"] = interval(squared_mm2, readings.group[rows], self.seed)
-            out[f"ahead_{elapsed_s:.2g}_s"] = entry
+            out[ahead] = entry
         return out
 
 

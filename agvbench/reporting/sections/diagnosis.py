@@ -86,9 +86,8 @@ def diagnosis_blocks(shown: ShownDiagnosis) -> list[Block]:
             Paragraph(" ".join(plain_sentences(problem) for problem in shown.problems) or "The diagnosis is empty.")
         ]
     blocks: list[Block] = [Paragraph(verdict_in_words(content), lead=True)]
-    blocks += [table for table in (_effects(content), _errors(content)) if table.rows]
-    blocks += errors_by_recording(content)
-    blocks += [table for table in (_states(content),) if table.rows]
+    found = (_effects(content), _errors(content), *errors_by_recording(content), _states(content))
+    blocks += [block for block in found if not isinstance(block, Table) or block.rows]
     said = (
         *left_in_words(content), *fit_in_words(content), *extrapolation_in_words(content),
         *sessions_in_words(content), *remedies_in_words(content), *next_in_words(content), *shown.problems,
