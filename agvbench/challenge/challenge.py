@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
-import sys
-import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from agvbench.challenge.campaigns import TrialKind, campaigns_folder, driven_campaign
 from agvbench.challenge.scores import Scores, plain, score
 from agvbench.challenge.trial import Trial
 from agvbench.errors import FileError, FlagError, PlantError
 from agvbench.executors import Executor, ExecutorOptions, Failed, Outcome, Task, cause_of, open_executor
-from agvbench.model.examples import example_path
-from agvbench.running.configuration.benchmark_files import EXCITATION_RUNS
 from agvbench.simulator.hidden import SealedTruth, indistinguishable_effects, sealed_truth
 from agvbench.simulator.hidden.catalogue import AND, NOTHING, catalogue, recipes
 from agvbench.simulator.hidden.sampling import vehicle_of
@@ -29,7 +25,6 @@ from agvbench.workflows.output_files import write_file
 if TYPE_CHECKING:
     from agvbench.diagnosis import Diagnosis
 
-_PROGRAM = "import sys; from agvbench.cli import main; sys.exit(main())"
 _POSITION = "position_rms_mm"
 _MOST_SEEDS = 100_000
 _ERROR = "ERROR"
@@ -40,14 +35,6 @@ PAIRS = (
     "wheel_lag_and_wheel_diameter_mismatch", "yaw_acceleration_limit_and_marker_offset", "wheel_lag_and_tyre_warm_up",
 )  # fmt: skip
 """Two effects of the library, and one beside one from outside; each for the vehicles that can have both."""
-
-
-@dataclass(frozen=True)
-class TrialKind:
-    """What the trials of one file share: how often each trajectory is driven, and by what kind of vehicle."""
-
-    repeats: int
-    kinematics: Kinematics = "two_axle"
 
 
 def everything(kinematics: Kinematics) -> tuple[str, ...]:
@@ -67,18 +54,20 @@ def run_challenge(
     resume: bool = False,
     cluster: ExecutorOptions | None = None,
     kinematics: Kinematics = "two_axle",
+    campaigns: str | None = None,
 ) -> Scores:
     """Hold the trials with a progress bar, and write the scores if asked for.
 
     They are held in `jobs` processes, or on a `cluster`; the trials are the same but for their times.
 
     The file is written anew after each trial, so that an interruption loses those under way only; with `resume` the
-    trials that it holds are not held again.
+    trials that it holds are not held again. Campaigns are kept in the folder `campaigns`, if it is named; those that
+    it holds are diagnosed without being driven again.
 
     Raises
     ------
     FlagError
-        If a number is out of range or a name unknown.
+        If a number is out of range, a name unknown, or the folder of the campaigns cannot be made.
     FileError
         If the JSON file cannot be written or, to resume, read.
     LinkError
@@ -102,7 +91,7 @@ def run_challenge(
         except PlantError as error:
             raise FlagError(error.what, where="--only", value=error.value, limit=error.limit) from None
     file = None if json_file is None else Path(json_file)
-    kind = TrialKind(repeats, kinematics)
+    kind = TrialKind(repeats, kinematics, None if campaigns is None else campaigns_folder(campaigns))
     known = known_trials(file, kind) if resume and file is not None and file.exists() else {}
     # What ended with an error may have met a full disk: it is tried again.
     done = {one: trial for one, trial in known.items() if trial.verdict != _ERROR}
@@ -124,16 +113,15 @@ def hold_trial(spec: str, seed: int, kind: TrialKind) -> Trial:
     from agvbench.campaign import Campaign
     from agvbench.diagnosis import Diagnosis, Verdict, diagnose
 
-    with tempfile.TemporaryDirectory(prefix="agvbench-challenge-") as folder:
-        directory, began = Path(folder) / "campaign", time.process_time()
-        try:
-            _drive(spec, seed, kind, directory)
+    began = time.process_time()
+    try:
+        with driven_campaign(spec, seed, kind) as directory:
             began = time.process_time()
             found, error = diagnose(Campaign.open(directory)), ""
-        # Hours of other trials must not be lost for one that has no answer, be it for an internal error.
-        except Exception as failure:  # noqa: BLE001
-            found, error = Diagnosis(Verdict.NOT_IDENTIFIABLE, str(failure)), cause_of(failure)
-        seconds = time.process_time() - began
+    # Hours of other trials must not be lost for one that has no answer, be it for an internal error.
+    except Exception as failure:  # noqa: BLE001
+        found, error = Diagnosis(Verdict.NOT_IDENTIFIABLE, str(failure)), cause_of(failure)
+    seconds = time.process_time() - began
     trial = unsealed(spec, seed, sealed_truth(spec, seed, kind.kinematics), found, seconds, kind.kinematics)
     return replace(trial, verdict=_ERROR, error=error) if error else trial
 
@@ -178,30 +166,6 @@ def _indistinguishable(seed: int, truth: SealedTruth, kinematics: Kinematics) ->
             r for name in alone for r in indistinguishable_effects(base, sealed_truth(name, seed, kinematics))
         )
     )
-
-
-_PLANTS: Mapping[Kinematics, tuple[str, str | None]] = {
-    "two_axle": ("agvbench.simulator.hidden", None),
-    "differential": ("agvbench.simulator.hidden.differential", "differential"),
-}
-"""Where the hidden plants of a kind are, and the example of a vehicle file with which they are driven."""
-
-
-def _drive(spec: str, seed: int, kind: TrialKind, directory: Path) -> None:
-    module, vehicle = _PLANTS[kind.kinematics]
-    options = [
-        f"--plant={module}:{spec}",
-        *([] if vehicle is None else [f"--vehicle={example_path(vehicle)}"]),
-        f"--seed={seed}",
-        f"--repeats={kind.repeats}",
-        "--no-report",
-        "--exchange=2",
-    ]
-    command = [sys.executable, "-c", _PROGRAM, "bench", *EXCITATION_RUNS, *options, f"--out={directory}"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - our own program
-    if done.returncode not in {0, 1}:
-        said = " ".join((done.stderr or done.stdout).split())
-        raise PlantError("the bench could not drive this plant", where=f"{spec}, seed {seed}", value=said[-300:])
 
 
 def _held(wanted: Sequence[tuple[str, int]], kind: TrialKind, executor: Executor) -> Iterator[Trial]:

@@ -78,8 +78,17 @@ class RunsFromRest(Method[SelectedFromRest]):
         """Select effects, variants and a discrepancy term in the training runs; validation runs may reject them.
 
         Validation runs that reject everything show what the training runs lack. They are then added to the training
-        runs, and the selection is repeated with other validation runs. What it finds is fitted to both parts.
+        runs, and the selection is repeated with other validation runs. The result is fitted to both parts: validation
+        runs that have accepted or rejected a selection determine its parameters like any other run.
         """
+        selected = self._accepted(readings, split)
+        library, with_term = refit_to_all(
+            selected.library, selected.with_term, selected.selector, readings.select(~selected.split.test)
+        )
+        return replace(selected, library=library, with_term=with_term)
+
+    def _accepted(self, readings: Readings, split: Split) -> SelectedFromRest:
+        """Return the selection that the validation runs accept, or the maps alone."""
         selected = self._selected(readings, split)
         if not selected.is_rejected:
             return selected
@@ -90,10 +99,7 @@ class RunsFromRest(Method[SelectedFromRest]):
             return selected
         self.on_progress("the selection is repeated with these runs among the training runs")
         other = self._selected(readings, again)
-        if not (other.library.gains or other.with_term):
-            return selected
-        library, with_term = refit_to_all(other.library, other.with_term, other.selector, readings.select(~again.test))
-        return replace(other, library=library, with_term=with_term)
+        return other if other.library.gains or other.with_term else selected
 
     def _selected(self, readings: Readings, split: Split) -> SelectedFromRest:
         """Return what the runs of this split select."""
@@ -118,7 +124,9 @@ class RunsFromRest(Method[SelectedFromRest]):
         library, selector = select_variants_and_reconsider(chosen, selector)
         library = continued(separate_lag_from_delay(prefer_actuators(library, selector), selector), library, selector)
         if library.gains:
-            library = with_equal_descriptions(replace_sequentially(library, selector), chosen.chosen, selector)
+            # What another effect replaced may be necessary beside it: both were never compared together.
+            library = continued(replace_sequentially(library, selector), library, selector)
+            library = with_equal_descriptions(library, chosen.chosen, selector)
             library = excluded_by_priors(library, selector)
         return library, selector
 

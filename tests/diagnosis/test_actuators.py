@@ -8,6 +8,8 @@ import pytest
 from tiny_selector import selector_of
 from tiny_vehicle import FRONT_M, REAR_M, Tiny, campaign_runs
 
+from agvbench.diagnosis import runs_from_rest
+from agvbench.diagnosis.runs_from_rest import RunsFromRest
 from agvbench.diagnosis.selection.actuators import CAMERA, prefer_actuators, separate_lag_from_delay
 from agvbench.diagnosis.selection.sequential_replacement import replace_sequentially
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
@@ -101,6 +103,17 @@ def test_an_effect_that_another_explains_better_is_replaced():
     found = replace_sequentially(selection, selector)
     assert found.chosen.names == ("cornering_speed_loss",)
     assert found.chosen.deviance < selection.chosen.deviance
+
+
+@pytest.mark.slow
+def test_after_a_replacement_the_selection_continues(monkeypatch):
+    """What hid behind the effect that was replaced is found, too."""
+    tiny = Tiny(cornering_loss=0.15, marker_forward_m=0.01)
+    selection, selector = selected(tiny, "axle_overrun")
+    monkeypatch.setattr(selector, "select", lambda: selection)
+    monkeypatch.setattr(runs_from_rest, "select_variants_and_reconsider", lambda *both: both)
+    found, _ = RunsFromRest._selected_effects(selector)
+    assert {cause_of(name) for name in found.chosen.names} == {"cornering_speed_loss", "marker_offset"}
 
 
 @pytest.mark.slow

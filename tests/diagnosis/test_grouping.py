@@ -115,6 +115,20 @@ def test_returns_to_neutral_while_driving_are_never_in_the_test_alone(seed):
     assert not split.training.all()
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_both_ends_of_a_commands_range_stay_in_two_groups_of_the_training(seed):
+    """A single combination with other commands does not determine the end of a map."""
+    sides = (1300.0, 1400.0, 1600.0, 1700.0)
+    runs = [run for k in range(3) for level in sides for run in changing(f"{level}-{k}", [level] * (k + 1))]
+    group = group_runs(runs)
+    split = split_runs(runs, group, NEUTRAL_COMMAND, seed)
+    for training in (split.training, with_other_validation(split, runs, group, NEUTRAL_COMMAND, seed).training):
+        for end in (1300.0, 1700.0):
+            at_end = np.array([end in run.commands.front for run in runs])
+            assert len({*group[at_end & training]}) >= 2
+    assert split.test.any()
+
+
 def test_the_campaigns_own_split_is_kept():
     runs = [dataclasses.replace(r, split="held_out" if i % 3 == 0 else "fit") for i, r in enumerate(bare_runs())]
     split = split_runs(runs, group_runs(runs), NEUTRAL_COMMAND, 0)

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from agvbench.challenge.challenge import TrialKind, known_trials, write_trials
+from agvbench.challenge.campaigns import TrialKind
+from agvbench.challenge.challenge import known_trials, write_trials
 from agvbench.challenge.scores import score
 from agvbench.reporting.console.challenge import scores_markdown
 

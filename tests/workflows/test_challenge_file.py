@@ -13,16 +13,9 @@ from pathlib import Path
 import pytest
 import stand_ins
 
-from agvbench.challenge import challenge
-from agvbench.challenge.challenge import (
-    PAIRS,
-    TrialKind,
-    everything,
-    hold_trial,
-    known_trials,
-    run_challenge,
-    write_trials,
-)
+from agvbench.challenge import campaigns, challenge
+from agvbench.challenge.campaigns import TrialKind, drive_campaign, driven_campaign
+from agvbench.challenge.challenge import PAIRS, everything, hold_trial, known_trials, run_challenge, write_trials
 from agvbench.challenge.trial import Trial
 from agvbench.cli import main
 from agvbench.errors import FileError, FitError, FlagError, PlantError
@@ -119,8 +112,8 @@ def test_by_default_everything_is_hidden_that_a_vehicle_of_its_kind_can_have():
 
 def test_a_differential_vehicle_is_driven_with_a_vehicle_file_of_its_kind(tmp_path, monkeypatch):
     began = benches(monkeypatch, (0, ""), (0, ""))
-    challenge._drive("wheel_lag", 3, TrialKind(5, "differential"), tmp_path)
-    challenge._drive("steering_lag", 3, TrialKind(5), tmp_path)
+    drive_campaign("wheel_lag", 3, TrialKind(5, "differential"), tmp_path)
+    drive_campaign("steering_lag", 3, TrialKind(5), tmp_path)
     vehicle = next(o for o in began[0] if o.startswith("--vehicle=")).partition("=")[2]
     assert VehicleModel.load(vehicle).geometry.is_differential
     assert "--plant=agvbench.simulator.hidden.differential:wheel_lag" in began[0]
@@ -172,18 +165,54 @@ def benches(monkeypatch, *ends):
         code, said = coming.pop(0)
         return subprocess.CompletedProcess(command, code, "", said)
 
-    monkeypatch.setattr(challenge.subprocess, "run", run)
+    monkeypatch.setattr(campaigns.subprocess, "run", run)
     return began
 
 
 def test_a_bench_that_fails_is_a_trial_that_cannot_be_driven_and_rejected_runs_are_none(tmp_path, monkeypatch):
     began = benches(monkeypatch, (1, ""))
-    challenge._drive("nothing", 3, TrialKind(5), tmp_path)
+    drive_campaign("nothing", 3, TrialKind(5), tmp_path)
     assert "--resume" not in began[0]
     began = benches(monkeypatch, (2, "ERROR: the disk is full"), (0, ""))
     with pytest.raises(PlantError, match=r"could not drive.*disk is full"):
-        challenge._drive("nothing", 3, TrialKind(5), tmp_path)
+        drive_campaign("nothing", 3, TrialKind(5), tmp_path)
     assert len(began) == 1
+
+
+def test_a_campaign_that_was_kept_is_not_driven_again(tmp_path, monkeypatch):
+    def bench(command, **_):
+        began.append(command)
+        directory = Path(next(o for o in command if o.startswith("--out=")).partition("=")[2])
+        directory.mkdir()
+        (directory / "campaign.toml").write_text(command[-2])
+        return subprocess.CompletedProcess(command, 0, "", "")
+
+    began: list[list[str]] = []
+    monkeypatch.setattr(campaigns.subprocess, "run", bench)
+    kind = TrialKind(5, campaigns=tmp_path)
+    for _ in range(2):
+        with driven_campaign("nothing", 3, kind) as directory:
+            assert (directory / "campaign.toml").exists()
+    assert len(began) == 1
+    with driven_campaign("nothing", 3, TrialKind(4, campaigns=tmp_path)) as other:
+        assert other != directory
+    with driven_campaign("nothing", 3, TrialKind(5)) as unkept:
+        assert unkept.exists()
+    assert not unkept.exists()
+    assert {path.name for path in tmp_path.iterdir()} == {directory.name, other.name}
+
+
+def test_a_campaign_that_could_not_be_driven_is_not_kept(tmp_path, monkeypatch):
+    benches(monkeypatch, (2, "ERROR: the disk is full"))
+    with pytest.raises(PlantError), driven_campaign("nothing", 3, TrialKind(5, campaigns=tmp_path)):
+        pass
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_file_in_the_place_of_the_folder_for_campaigns_is_told(tmp_path, capsys):
+    (tmp_path / "file").touch()
+    assert main(["challenge", "--only=nothing", f"--campaigns={tmp_path / 'file'}"]) == 2
+    assert "--campaigns" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -197,7 +226,7 @@ def test_a_diagnosis_that_fails_is_an_answer_that_counts_as_wrong(monkeypatch, e
     def fails(_):
         raise error
 
-    monkeypatch.setattr(challenge, "_drive", lambda *_: None)
+    monkeypatch.setattr(campaigns, "drive_campaign", lambda *_: None)
     monkeypatch.setattr("agvbench.campaign.Campaign.open", lambda _: None)
     monkeypatch.setattr("agvbench.diagnosis.diagnose", fails)
     trial = hold_trial("nothing", 3, TrialKind(5))
@@ -227,7 +256,7 @@ def test_a_plant_that_cannot_be_driven_is_an_answer_that_counts_as_wrong(monkeyp
     def fails(*_):
         raise PlantError("the bench could not drive this plant")
 
-    monkeypatch.setattr(challenge, "_drive", fails)
+    monkeypatch.setattr(campaigns, "drive_campaign", fails)
     assert hold_trial("steering_lag", 3, TrialKind(5)).verdict == "ERROR"
 
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 import pytest
 
 from agvbench.challenge import challenge
-from agvbench.challenge.challenge import TrialKind, hold_trial, unsealed
+from agvbench.challenge.campaigns import TrialKind
+from agvbench.challenge.challenge import hold_trial, unsealed
 from agvbench.diagnosis import Dependence, Diagnosis, Estimate, HeldOut, NamedEffect, Verdict
 from agvbench.simulator.hidden import make_hidden_plant
 

@@ -11,6 +11,7 @@ examples:
   agvbench challenge --seeds 300 --only nothing               how often a name is given where nothing is hidden
   agvbench challenge --seeds 10 --json challenge.json --resume --markdown   what a whole file says, as tables
   agvbench challenge --first-seed 5000                        unseen vehicles
+  agvbench challenge --campaigns DIR                          keep the campaigns; those that are there are not driven
   agvbench challenge --kinematics differential --only wheel_lag   a vehicle with two driven wheels
   agvbench challenge --seeds 10 --json challenge.json --cluster tcp://127.0.0.1:8786
                                                               on the workers of a Dask cluster
@@ -45,6 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--repeats", type=whole_number, default=5, metavar="N", help="of each trajectory (default 5)")
     parser.add_argument("--jobs", type=whole_number, metavar="N", help="trials at a time (default: one per processor)")
     parser.add_argument("--json", metavar="FILE", dest="json_file", help="write scores and every trial there")
+    parser.add_argument("--campaigns", metavar="DIR", help="keep campaigns there; do not drive those that are there")
     parser.add_argument("--markdown", action="store_true", help="print the scores as Markdown")
     parser.add_argument("--resume", action="store_true", help="go on with the trials that the JSON file lacks")
     add_cluster_arguments(parser)
@@ -67,6 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
         resume=arguments.resume,
         cluster=executor_options(arguments),
         kinematics=arguments.kinematics,
+        campaigns=arguments.campaigns,
     )
     if arguments.markdown:
         print(scores_markdown(scores), end="")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -107,11 +107,12 @@ def split_runs(runs: Sequence[Run], group: NDArray[np.int64], neutral: Command, 
 
     Otherwise whole groups are drawn at random, about a quarter of all runs: half of them for validation and half for
     test. A group is drawn only if every level of every command in it also occurs in a remaining group. The test then
-    evaluates new combinations of known commands and not the interpolation of a map. The same holds for every kind of
-    change while the vehicle drives, such as a return to neutral: a backlash, which only returns show, would otherwise
-    be found by the test alone. At most a third of the runs that steer while they drive is drawn: they are few, and no
-    other run shows a dependence on the steering history. If only a single run can be spared, it is the test run, and
-    there is no validation.
+    evaluates new combinations of known commands and not the interpolation of a map. Both ends of a command's range
+    remain in two groups: a single combination with other commands does not determine the end of a map. The same holds
+    for every kind of change while the vehicle drives, such as a return to neutral: a backlash, which only returns show,
+    would otherwise be found by the test alone. At most a third of the runs that steer while they drive is drawn: they
+    are few, and no other run shows a dependence on the steering history. If only a single run can be spared, it is the
+    test run, and there is no validation.
 
     Raises
     ------
@@ -167,6 +168,8 @@ def _drawn(
     commands = {int(g): runs[int(np.argmax(group == g))].commands for g in np.unique(group)}
     shown = {g: _levels(own) | _changes_while_driving(own, neutral) for g, own in commands.items()}
     uses = Counter(one for own in shown.values() for one in own)
+    ends = _ends(commands.values())
+    least = {one: 2 if one in ends else 1 for one in uses}
     held = np.zeros(len(runs), dtype=np.bool_)
     steering = np.isin(group, [g for g, own in commands.items() if _steers_while_driving(own, neutral)])
     for g in rng.permutation(np.unique(group)).tolist():
@@ -175,7 +178,7 @@ def _drawn(
             continue
         if steering[own].any() and np.count_nonzero(held & steering) + np.count_nonzero(own) > np.sum(steering) / 3.0:
             continue
-        if all(uses[one] > 1 for one in shown[g]):
+        if all(uses[one] > least[one] for one in shown[g]):
             held |= own
             uses.subtract(shown[g])
     return held if held.any() else _some_repeats(group, rng)
@@ -207,6 +210,13 @@ def _changes_while_driving(commands: Commands, neutral: Command) -> set[tuple[st
             beside = "through neutral" if before * after < 0.0 else "beside neutral"
             found.add((role, "from neutral" if before == 0.0 else "to neutral" if after == 0.0 else beside))
     return found
+
+
+def _ends(commands: Iterable[Commands]) -> set[tuple[str, float | str]]:
+    """Return the lowest and the highest level of each command."""
+    every = list(commands)
+    values = {role: np.concatenate([getattr(own, role) for own in every]) for role in _ROLES}
+    return {(role, float(end)) for role, own in values.items() if len(own) for end in (own.min(), own.max())}
 
 
 def _levels(commands: Commands) -> set[tuple[str, float | str]]:

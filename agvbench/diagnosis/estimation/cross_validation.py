@@ -25,6 +25,9 @@ def cross_validated(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Flo
     single group traverses in both directions, while the nodal values compensate for it in all other groups. The prior
     of the maps counts as information of the other folds, but not as a share: it says less than a single run. So do the
     priors of effects, which are observations that belong to no fold.
+
+    Other runs predict a run no better than the fit to all of them does. Where the steps say so, the iteration has
+    stopped at a kink of the loss, of which the quadratic approximation knows nothing: the loss of the fit is returned.
     """
     if fitted.predictor.readings.initial_states is not None:
         return _cross_validated_windows(fitted, fold, bounds)
@@ -53,7 +56,7 @@ def cross_validated(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Flo
         move = np.zeros(len(free))
         move[free] = turn @ along
         loss[out] += (fitted.information.along(move) - 2.0 * fitted.gradient @ move)[out]
-    return loss
+    return loss if loss.sum() >= fitted.loss.sum() else fitted.loss.copy()
 
 
 def _cross_validated_windows(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Floats:

@@ -45,7 +45,7 @@ def subsample_repeats(group: NDArray[np.int64], most: int) -> NDArray[np.bool_]:
 def refit_to_all(
     selection: Selection, term_selection: TermSelection | None, selector: Selector, readings: Readings
 ) -> tuple[Selection, TermSelection | None]:
-    """Refit the selected models to all training runs; gains and alternatives stay those of the subsample.
+    """Refit the selected models to further runs; gains and alternatives stay those of the subsample.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def refit_to_all(
     selector
         The selector of the subsample.
     readings
-        All training runs.
+        The runs of the subsample, and others.
     """
     batch = selector.batch
     preset = replace(readings, preset=batch.readings.preset)
