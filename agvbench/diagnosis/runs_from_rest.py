@@ -82,6 +82,7 @@ class RunsFromRest(Method[SelectedFromRest]):
         runs that have accepted or rejected a selection determine its parameters like any other run.
         """
         selected = self._accepted(readings, split)
+        self.on_progress("fitting the training and validation runs")
         library, with_term = refit_to_all(
             selected.library, selected.with_term, selected.selector, readings.select(~selected.split.test)
         )
@@ -112,6 +113,7 @@ class RunsFromRest(Method[SelectedFromRest]):
             self.on_progress(f"driven by the {axle} axle: predicts better")
             static = library.base
             library, selector = self._selected_effects(self._under(axle).selector(searched))
+        self.on_progress("comparing terms for what no effect of the library describes")
         library, with_term, selector = add_term_and_reconsider(library, selector)
         if len(searched) < len(fitted):
             self.on_progress(f"effects were selected in {len(searched)} runs; they are refitted to all {len(fitted)}")
@@ -121,9 +123,12 @@ class RunsFromRest(Method[SelectedFromRest]):
     def _selected_effects(selector: Selector) -> tuple[Selection, Selector]:
         """Return the effects of the library with their variants, and the selector with their initial steering."""
         chosen, selector = reconsider_initial_steering(selector.select(), selector)
+        if chosen.gains:
+            selector.on_progress("comparing other equations of the selected effects")
         library, selector = select_variants_and_reconsider(chosen, selector)
         library = continued(separate_lag_from_delay(prefer_actuators(library, selector), selector), library, selector)
         if library.gains:
+            selector.on_progress("comparing each selected effect with others in its place")
             # What another effect replaced may be necessary beside it: both were never compared together.
             library = continued(replace_sequentially(library, selector), library, selector)
             library = with_equal_descriptions(library, chosen.chosen, selector)

@@ -18,7 +18,7 @@ HEADER = CampaignHeader(
     channels=Channels.alike("si"), mocap_rate_hz=50.0, prediction_horizon_s=2.0, prediction_stride_s=1.0,
     kinematics="differential",
 )  # fmt: skip
-_STEP_S, _FRAME_S, _COMMAND_S = 0.002, 0.02, 0.1
+_STEP_S, _COMMAND_S = 0.002, 0.1
 _TRACK_M = 0.4
 
 
@@ -39,9 +39,15 @@ class Differential:
     slip_by_speed: float = 0.0
     noise_m: float = 3e-4
     noise_rad: float = 8e-4
+    frame_s: float = 0.02
+    speed_held_s: float = 1.7
 
 
-def joystick(seconds: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+COARSE = Differential(noise_m=0.015, noise_rad=0.01, frame_s=0.1, speed_held_s=6.0)
+"""Ten noisy poses a second, as those of a vehicle that locates itself; speeds are held for 6 s."""
+
+
+def joystick(seconds: float, rng: np.random.Generator, truth: Differential) -> tuple[np.ndarray, np.ndarray]:
     """Return speed and yaw rate commands (n,), ten a second: forward, backward, and turns on the spot."""
     count = round(seconds / _COMMAND_S)
 
@@ -49,14 +55,14 @@ def joystick(seconds: float, rng: np.random.Generator) -> tuple[np.ndarray, np.n
         held = max(1, round(every_s / _COMMAND_S))
         return np.round(np.repeat(rng.uniform(-size, size, count // held + 1), held)[:count], 2)
 
-    speed = steps(0.6, 1.7)
+    speed = steps(0.6, truth.speed_held_s)
     speed[(np.arange(count) // 60) % 3 == 2] = 0.0
     return speed, steps(1.2, 1.1)
 
 
 def drive(truth: Differential, seconds: float, rng: np.random.Generator) -> tuple[Commands, Frames]:
     """Return commands and frames of one drive."""
-    v_command, w_command = joystick(seconds, rng)
+    v_command, w_command = joystick(seconds, rng, truth)
     t = np.arange(0.0, seconds, _STEP_S)
     late_s = truth.delay_s + np.array([truth.further_speed_delay_s, 0.0])
     v_at, w_at = (np.clip(((t - s) / _COMMAND_S + 1e-9).astype(int), 0, len(v_command) - 1) for s in late_s)
@@ -75,7 +81,7 @@ def drive(truth: Differential, seconds: float, rng: np.random.Generator) -> tupl
         middle = heading + 0.5 * yaw * _STEP_S
         x, y = x + forward * np.cos(middle) * _STEP_S, y + forward * np.sin(middle) * _STEP_S
         heading += yaw * _STEP_S
-    frame_s = np.arange(0.0, seconds, _FRAME_S)
+    frame_s = np.arange(0.0, seconds, truth.frame_s)
     seen = np.clip(((frame_s - truth.camera_delay_s) / _STEP_S + 1e-9).astype(int), 0, len(t) - 1)
     pose = path[seen]
     pose[:, 0] += truth.marker_ahead_m * np.cos(path[seen, 2])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from differential_vehicle import HEADER, Campaign, Differential
+from differential_vehicle import COARSE, HEADER, Campaign, Differential
 
 from agvbench.diagnosis import Verdict, diagnose
 from agvbench.diagnosis.data.readings import Readings, read_windows
@@ -46,6 +46,14 @@ def test_a_session_of_another_level_differs(gain):
     assert other.significant
     assert other.factor == pytest.approx(gain / 0.9, abs=4.0 * other.stderr + 0.02)
     assert 0.05 <= nodal_deviation(predictor, parameters) < 0.4
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("factor", [1.0, 0.8])
+def test_the_distances_of_held_commands_tell_the_level_where_single_speeds_are_noise(factor, seed):
+    levels = drive_levels(*sessions_of(COARSE, seed, speed_gain=factor * COARSE.speed_gain))
+    assert [name for name, level in levels.items() if level.significant] == ([] if factor == 1.0 else ["day 2"])
+    assert levels["day 2"].factor == pytest.approx(factor, abs=0.07)
 
 
 def test_another_level_on_the_test_day_is_followed():

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from differential_vehicle import Campaign, Differential
+from differential_vehicle import COARSE, Campaign, Differential
 from free_drives import FREE_HEADER, free_runs
 from tiny_vehicle import InMemory, Tiny
 
@@ -27,7 +27,9 @@ def late(runs: list[Run], session: str, seconds: float) -> list[Run]:
 
 
 @pytest.mark.parametrize("seed", range(2))
-@pytest.mark.parametrize("hidden", [{}, {"yaw_lag_s": 0.4}, {"delay_s": 0.2}, {"slip_by_speed": 1.0}])
+@pytest.mark.parametrize(
+    "hidden", [{}, {"yaw_lag_s": 0.4}, {"yaw_lag_s": 1.6}, {"delay_s": 0.2}, {"slip_by_speed": 1.0}]
+)
 def test_what_all_sessions_share_is_no_offset(hidden, seed):
     offsets = clock_offsets(Campaign(Differential(**hidden), seed=seed, sessions=3).runs, is_differential=True)
     assert len(offsets) == 3
@@ -43,6 +45,16 @@ def test_one_session_with_another_clock_is_found_from_its_first_seconds_too(offs
     assert [name for name, offset in offsets.items() if offset.significant] == ["day 2"]
     found = offsets["day 2"]
     assert found.value_s == pytest.approx(offset_s, abs=max(3.0 * found.stderr_s, 0.015))
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("offset_s", [0.0, 0.12])
+@pytest.mark.parametrize("partial", [(), ("day 2",)])
+def test_ten_noisy_poses_a_second_tell_it_too(partial, offset_s, seed):
+    runs = late(Campaign(COARSE, seed=seed, sessions=3).runs, "day 2", offset_s)
+    offsets = clock_offsets(runs, is_differential=True, partial=partial)
+    assert [name for name, offset in offsets.items() if offset.significant] == (["day 2"] if offset_s else [])
+    assert offsets["day 2"].value_s == pytest.approx(offset_s, abs=0.03)
 
 
 @pytest.mark.slow

@@ -1,9 +1,10 @@
 """Clock offsets of sessions: by how much later the poses of one session answer its commands than those of the others.
 
 The clocks of camera and vehicle are seldom one clock, and their offset may differ between recordings. What all sessions
-have in common, a delay or a lag, belongs to the effects; only differences are estimated here. The yaw rate of a session
-is regressed on its steering commands, delayed by each of many offsets, with one steering map and one lag for all
-sessions. Without the lag, slow and fast steering would seem to have different delays.
+have in common, a delay or a lag, belongs to the effects; only differences are estimated here. The turn between two
+frames is regressed on the steering commands between them, delayed by each of many offsets, with one steering map and
+one lag for all sessions. Without the lag, slow and fast steering would seem to have different delays. Without the
+average over the time between the frames, any rate of frames would seem to be a lag.
 """
 
 from __future__ import annotations
@@ -23,13 +24,17 @@ from agvbench.signals import robust_std
 from agvbench.types import Commands, Floats, Run
 
 _OFFSETS_S = np.arange(-0.4, 1.0, 0.02)
-_LAGS_S = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8)
-# No multiple of usual command periods: a delay between two of its multiples would have the same loss.
-_STEP_S = 0.0437
+_LAGS_S = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
+# Least time between the beginnings of two intervals, and at most so many in a session.
+_STEP_S, _MOST_ROWS = 0.04, 10_000
 _NODES = 13
 _BLOCK_S = 2.0
+# Of a slope of the loss, in offsets to either side.
+_REACH = 3
 _ROUNDS, _REWEIGHTINGS = 12, 3
-_HALF_S = 0.1
+# Intervals last so long at least, and at most; within them commands are averaged over so many instants.
+_SHORTEST_S, _LONGEST_S = 0.4, 0.7
+_INSTANTS = (np.arange(4) + 0.5) / 4.0
 _OUTLIER = 3.0
 _MIN_ROWS = 100
 
@@ -48,10 +53,10 @@ class ClockOffset:
 
 @dataclass(frozen=True)
 class _Rows:
-    """The yaw rate ``turned`` (n,) of a session, the ``speed`` that it belongs to, and the block of each row.
+    """The mean yaw rate ``turned`` (n,) of a session's intervals, the mean ``speed``, and the block of each.
 
-    ``commanded`` (offsets, axles, n) are the commands of the axles that steer, delayed by each offset. The speed of a
-    vehicle that is commanded a yaw rate is one.
+    ``commanded`` (offsets, axles, instants, n) are the commands of the axles that steer, delayed by each offset. The
+    speed of a vehicle that is commanded a yaw rate is one.
     """
 
     turned: Floats
@@ -82,12 +87,12 @@ def clock_offsets(
         name: [one.until(SESSION_CLOCK.adapted_s) for one in own] if name in partial else own
         for name, own in tracks.items()
     }
-    tracks = {name: own for name, own in tracks.items() if sum(len(one.grid_s) for one in own) >= _MIN_ROWS}
+    tracks = {name: own for name, own in tracks.items() if sum(len(one.begin_s) for one in own) >= _MIN_ROWS}
     if len(tracks) < 2:
         return {}
     fits = [_block_losses([_rows(own, steered, lag_s) for own in tracks.values()]) for lag_s in _LAGS_S]
     losses, _ = min(fits, key=lambda one: one[1])
-    estimates = {name: _jackknife(loss) for name, loss in zip(tracks, losses, strict=True)}
+    estimates = {name: _estimate(loss) for name, loss in zip(tracks, losses, strict=True)}
     known = {name: one for name, one in estimates.items() if one.stderr_s <= SESSION_CLOCK.max_stderr_s}
     return _differences(known)
 
@@ -105,16 +110,20 @@ def aligned(runs: Iterable[Run], offsets: Mapping[str, ClockOffset]) -> list[Run
 
 @dataclass(frozen=True)
 class _Track:
-    """A run's motion at ``grid_s`` (n,): ``speed``, ``yaw_rate`` and seconds since its session began."""
+    """A run's motion in intervals between frames that begin at ``begin_s`` (n,) and last ``length_s``.
+
+    ``speed`` and ``yaw_rate`` are means, ``elapsed_s`` seconds since the session began.
+    """
 
     commands: Commands
-    grid_s: Floats
+    begin_s: Floats
+    length_s: Floats
     speed: Floats
     yaw_rate: Floats
     elapsed_s: Floats
 
     def select(self, kept: NDArray[np.bool_]) -> _Track:
-        parts = (part[kept] for part in (self.grid_s, self.speed, self.yaw_rate, self.elapsed_s))
+        parts = (part[kept] for part in (self.begin_s, self.length_s, self.speed, self.yaw_rate, self.elapsed_s))
         return _Track(self.commands, *parts)
 
     def until(self, seconds: float) -> _Track:
@@ -124,24 +133,35 @@ class _Track:
 
 def _track(run: Run, began_s: float, *, is_differential: bool) -> _Track:
     t_s, poses = unwrapped_track(run)
-    if len(t_s) < 2 or t_s[-1] - t_s[0] < 4.0 * _HALF_S:
-        none = np.empty(0)
-        return _Track(run.commands, none, none, none, none)
-    first = max(float(t_s[0]) + _HALF_S, float(run.commands.t_s[0] + _OFFSETS_S[-1]))
-    grid = np.arange(first, float(t_s[-1]) - _HALF_S, _STEP_S)
-    forward, yaw_rate, seen = _motion(t_s, poses, grid)
-    speed = np.ones(len(grid)) if is_differential else forward
-    track = _Track(run.commands, grid, speed, yaw_rate, run.started_s - began_s + grid)
-    return track.select(seen & (np.abs(speed) > SESSION_CLOCK.min_speed_mps))
+    first, last = _intervals(t_s, float(run.commands.t_s[0] + _OFFSETS_S[-1]))
+    length_s = t_s[last] - t_s[first]
+    moved = (poses[last] - poses[first]) / length_s[:, None]
+    heading = 0.5 * (poses[first, 2] + poses[last, 2])
+    forward = np.cos(heading) * moved[:, 0] + np.sin(heading) * moved[:, 1]
+    speed = np.ones(len(first)) if is_differential else forward
+    track = _Track(run.commands, t_s[first], length_s, speed, moved[:, 2], run.started_s - began_s + t_s[first])
+    return track.select(np.abs(speed) > SESSION_CLOCK.min_speed_mps)
+
+
+def _intervals(t_s: Floats, from_s: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the first and last frames of intervals of frames at `t_s` (k,) that begin at `from_s` or later."""
+    steps = np.floor(t_s / _STEP_S)
+    first = np.flatnonzero((t_s >= from_s) & np.r_[True, np.diff(steps) > 0.0][: len(t_s)])
+    last = np.searchsorted(t_s, t_s[first] + _SHORTEST_S - 1e-6)
+    first, last = first[last < len(t_s)], last[last < len(t_s)]
+    near = t_s[last] - t_s[first] <= _LONGEST_S
+    return first[near], last[near]
 
 
 def _rows(tracks: Sequence[_Track], steered: Sequence[str], lag_s: float) -> _Rows:
-    commanded = [
-        np.array(
-            [[_lagged(one.commands, role, one.grid_s - offset, lag_s) for role in steered] for offset in _OFFSETS_S]
+    every = 1 + sum(len(one.begin_s) for one in tracks) // _MOST_ROWS
+    tracks = [one.select(np.arange(len(one.begin_s)) % every == 0) for one in tracks]
+    commanded = []
+    for one in tracks:
+        instants_s = one.begin_s + _INSTANTS[:, None] * one.length_s
+        commanded.append(
+            [[_lagged(one.commands, role, instants_s - offset, lag_s) for role in steered] for offset in _OFFSETS_S]
         )
-        for one in tracks
-    ]
     turned, speed, elapsed_s = (
         np.concatenate([getattr(one, name) for one in tracks]) for name in ("yaw_rate", "speed", "elapsed_s")
     )
@@ -162,25 +182,13 @@ def _lagged(commands: Commands, role: str, t_s: Floats, lag_s: float) -> Floats:
     return np.asarray(values[index] + (state[index] - values[index]) * np.exp(-since_s / lag_s))
 
 
-def _motion(t_s: Floats, poses: Floats, grid: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Return forward speed and yaw rate at `grid` (n,) by central differences, which do not lag, and where known."""
-    before, middle, after = (
-        np.column_stack([np.interp(grid + shift, t_s, poses[:, k]) for k in range(3)])
-        for shift in (-_HALF_S, 0.0, _HALF_S)
-    )
-    velocity = (after - before) / (2.0 * _HALF_S)
-    forward = np.cos(middle[:, 2]) * velocity[:, 0] + np.sin(middle[:, 2]) * velocity[:, 1]
-    frames = np.searchsorted(t_s, grid + _HALF_S) - np.searchsorted(t_s, grid - _HALF_S)
-    return forward, velocity[:, 2], frames >= 2
-
-
 def _block_losses(rows: list[_Rows]) -> tuple[list[Floats], float]:
     """Return the loss of each block at each offset (blocks, offsets) by session, and the scale of the residuals.
 
     All sessions have one map.
     """
     ends = np.concatenate([one.commanded for one in rows], axis=-1)
-    nodes = np.linspace(ends.min(axis=(0, 2)), ends.max(axis=(0, 2)), _NODES, axis=-1)
+    nodes = np.linspace(ends.min(axis=(0, 2, 3)), ends.max(axis=(0, 2, 3)), _NODES, axis=-1)
     best = [int(np.argmin(np.abs(_OFFSETS_S - 0.1)))] * len(rows)
     losses, scale = list[Floats](), np.inf
     for _ in range(_ROUNDS):
@@ -214,7 +222,7 @@ def _losses(rows: _Rows, nodes: Floats, curve: Floats, scale: float) -> Floats:
     out = np.empty((len(blocks), len(_OFFSETS_S)))
     for k, delayed in enumerate(rows.commanded):
         curvature = sum(
-            np.interp(command, own, values)
+            np.interp(command, own, values).mean(axis=0)
             for command, own, values in zip(delayed, nodes, curve.reshape(len(nodes), -1), strict=True)
         )
         residual = (rows.turned - rows.speed * curvature) / scale
@@ -223,9 +231,11 @@ def _losses(rows: _Rows, nodes: Floats, curve: Floats, scale: float) -> Floats:
 
 
 def _design(rows: _Rows, commanded: Floats, nodes: Floats) -> Floats:
-    """Return the derivatives of the yaw rate (n, axles · nodes) by the nodal values, at `commanded` (axles, n)."""
+    """Return the derivatives of the yaw rate (n, axles · nodes) by the nodal values, at one of `commanded`."""
     weights = [
-        np.interp(command, own, unit) for command, own in zip(commanded, nodes, strict=True) for unit in np.eye(_NODES)
+        np.interp(command, own, unit).mean(axis=0)
+        for command, own in zip(commanded, nodes, strict=True)
+        for unit in np.eye(_NODES)
     ]
     return np.asarray(rows.speed[:, None] * np.stack(weights, axis=-1))
 
@@ -237,13 +247,22 @@ class _Estimate:
     blocks: int
 
 
-def _jackknife(losses: Floats) -> _Estimate:
-    """Return the offset with the least loss, and its standard error by leaving out one block at a time."""
+def _estimate(losses: Floats) -> _Estimate:
+    """Return the offset with the least loss, and its standard error.
+
+    The error is that of an M-estimator, clustered by block (sandwich estimator, Liang and Zeger 1986): the slope of
+    each block's loss over the bend of the total. Both are differences over a few offsets, because a command acts on the
+    loss in steps.
+    """
     total, count = losses.sum(axis=0), len(losses)
+    k = int(np.clip(np.argmin(total), _REACH, len(total) - 1 - _REACH))
     if count < SESSION_CLOCK.min_blocks:
         return _Estimate(_minimum(total), np.inf, count)
-    without = np.array([_minimum(total - one) for one in losses])
-    stderr = float(np.sqrt((count - 1.0) / count * np.sum((without - without.mean()) ** 2)))
+    reach_s = _REACH * (_OFFSETS_S[1] - _OFFSETS_S[0])
+    slope = (losses[:, k + _REACH] - losses[:, k - _REACH]) / (2.0 * reach_s)
+    bend = (total[k + _REACH] - 2.0 * total[k] + total[k - _REACH]) / reach_s**2
+    scatter = float(np.sqrt(count / (count - 1.0) * np.sum((slope - slope.mean()) ** 2)))
+    stderr = float(scatter / bend) if bend > 0.0 else np.inf
     return _Estimate(_minimum(total), max(stderr, SESSION_CLOCK.least_stderr_s), count)
 
 

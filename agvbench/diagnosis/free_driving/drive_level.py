@@ -1,11 +1,14 @@
 """The level of the drive: how fast the same command drives the vehicle in different sessions.
 
-A battery is charged or a floor is swept between sessions. What is known of a window's level is its initial speed beside
-the speed that the commands before it result in; no pose after the beginning of a window is used.
+A battery is charged or a floor is swept between sessions. What a prediction knows of a window's level is its initial
+speed beside the speed that the commands before it result in; no pose after the beginning of a window is used. Whether
+sessions differ is also told by the distances that are driven in windows with one command. A distance has much less
+noise than a speed, but a recording may have few such windows.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +24,7 @@ from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.model.simulation.simulation import SimulatedRun, Simulation
 from agvbench.signals import robust_std
-from agvbench.types import Floats
+from agvbench.types import Commands, Floats
 
 _SHORT_S = 0.01
 _SLOW_MPS = 0.05
@@ -62,14 +65,33 @@ class DriveLevel:
 def drive_levels(readings: Readings, predictor: Predictor, parameters: Floats) -> dict[str, DriveLevel]:
     """Return the level of the drive of each session of `readings`, beside the sessions that do not differ.
 
-    The maps were fitted to several sessions, and absorbed a part of what differs where these gave other commands.
-    A common curve over the command, with a level for each session, gives that part back. Deviations of the initial
-    speed from the curve are compared between each session and the others by Student's test, with blocks of driving as
-    units; see `differing_sessions`.
+    It is that of the distances of windows with one command, or that of the initial speeds: the one with the smaller
+    standard errors.
     """
     batch = Batch(readings, predictor.maps, predictor.batch.geometry, kinds=predictor.batch.kinds)
-    deviation = _speed_deviations(Predictor(batch), parameters[: predictor.maps.size])
+    static, maps = Predictor(batch), parameters[: predictor.maps.size]
+    by_speed = _levels(readings, _speed_deviations(static, maps))
+    by_distance = _levels(readings, _distance_deviations(static, maps))
+    is_better = by_speed.keys() <= by_distance.keys() and _mean_square(by_distance) < _mean_square(by_speed)
+    return by_distance if is_better else by_speed
+
+
+def _mean_square(levels: Mapping[str, DriveLevel]) -> float:
+    """Return the mean square of the standard errors of levels, relative to these."""
+    return float(np.mean([(level.stderr / level.factor) ** 2 for level in levels.values()]))
+
+
+def _levels(readings: Readings, deviation: Floats) -> dict[str, DriveLevel]:
+    """Return the levels by the `deviation` (W,) of windows from the prediction; those that are NaN do not count.
+
+    The maps were fitted to several sessions, and absorbed a part of what differs where these gave other commands.
+    A common curve over the command, with a level for each session, gives that part back. Deviations from the curve are
+    compared between each session and the others by Student's test, with blocks of driving as units; see
+    `differing_sessions`.
+    """
     known = np.isfinite(deviation)
+    if not known.any():
+        return {}
     initial_states = _initial_states(readings)
     session = initial_states.session[known]
     at = zip(np.flatnonzero(known).tolist(), initial_states.t_s[known], strict=True)
@@ -144,6 +166,34 @@ def _level(session: _Session, rest: list[_Session], sessions: int) -> DriveLevel
     critical = -float(stdtrit(freedom, 0.5 * FREE_DRIVING_LEVEL.alpha / sessions))
     significant = abs(difference) > max(FREE_DRIVING_LEVEL.min_deviation, critical * stderr)
     return DriveLevel(float(np.exp(difference)), float(np.exp(difference)) * stderr, significant)
+
+
+def _distance_deviations(predictor: Predictor, parameters: Floats) -> Floats:
+    """Return the logarithm of the distance driven in each window over the predicted one, (W,).
+
+    NaN for a short distance and for windows with several commands. The prediction begins with the speed that earlier
+    commands result in, as if no speed had been measured.
+    """
+    readings, rows = predictor.readings, np.arange(len(predictor.readings))
+    settled, initial = predictor.settled(parameters)
+    initial[:, 3] = np.nan
+    poses = predictor.batch.base.predict(settled, predictor.all_parameters(parameters), initial)
+    last = readings.seen.shape[1] - 1 - np.argmax(readings.seen[:, ::-1], axis=1)
+    ends = readings.poses[rows, last], poses.reshape(len(rows), -1, 3)[rows, last]
+    driven, predicted = (np.linalg.norm(end[:, :2] - readings.start[:, :2], axis=1) for end in ends)
+    begins_s, ends_s = _initial_states(readings).t_s, readings.t_s[:, -1]
+    spans = zip(readings.runs, begins_s, ends_s, strict=True)
+    is_held = np.array([_is_held(run.commands, begin_s, end_s) for run, begin_s, end_s in spans])
+    use = is_held & (np.minimum(driven, predicted) > _SLOW_MPS * (ends_s - begins_s))
+    out = np.full(len(rows), np.nan)
+    out[use] = np.log(driven[use] / predicted[use])
+    return out
+
+
+def _is_held(commands: Commands, begin_s: float, end_s: float) -> bool:
+    """Return whether the drive has one command from `begin_s` to `end_s`."""
+    first, last = np.searchsorted(commands.t_s, [begin_s, end_s], side="right") - 1
+    return bool(np.ptp(commands.drive[max(int(first), 0) : int(last) + 1]) == 0.0)
 
 
 def _speed_deviations(predictor: Predictor, parameters: Floats) -> Floats:
