@@ -30,9 +30,16 @@ from agvbench.diagnosis.selection.initial_steering import choose_initial_steerin
 from agvbench.diagnosis.selection.sequential_replacement import excluded_by_priors, replace_sequentially
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.subsampling import refit_to_all, subsample_repeats
-from agvbench.diagnosis.selection.validation import validated
-from agvbench.diagnosis.selection.variants import candidates_for, continued, select_variants_and_reconsider
+from agvbench.diagnosis.selection.validation import predicts, validated
+from agvbench.diagnosis.selection.variants import (
+    candidates_for,
+    continued,
+    select_variants_and_reconsider,
+    with_extended_library,
+    with_known_alternatives,
+)
 from agvbench.diagnosis.selection.with_term import TermSelection
+from agvbench.effects.variants import cause_of
 from agvbench.model import nominal_model
 from agvbench.types import Floats, Run
 from agvbench.vehicle.geometry import Driven
@@ -83,10 +90,34 @@ class RunsFromRest(Method[SelectedFromRest]):
         """
         selected = self._accepted(readings, split)
         self.on_progress("fitting the training and validation runs")
-        library, with_term = refit_to_all(
-            selected.library, selected.with_term, selected.selector, readings.select(~selected.split.test)
+        known = readings.select(~selected.split.test)
+        library, with_term = refit_to_all(selected.library, selected.with_term, selected.selector, known)
+        selected = replace(selected, library=library, with_term=with_term)
+        return selected if with_term or not library.gains else self._with_further_effects(selected, readings)
+
+    @staticmethod
+    def _with_further_effects(selected: SelectedFromRest, readings: Readings) -> SelectedFromRest:
+        """Return what was selected, with effects that are significant in training and validation runs together.
+
+        Some commands may be driven in one direction in the training runs and in the other in the validation runs. An
+        effect that only both together show is added if, fitted to the training runs alone, it does not predict the
+        validation runs worse.
+        """
+        library, trained = selected.library, with_extended_library(selected.selector)
+        known = replace(readings.select(~selected.split.test), preset=trained.batch.readings.preset)
+        every = trained.for_batch(Batch(known, trained.batch.maps, trained.batch.geometry, kinds=trained.batch.kinds))
+        every.extended = every
+        begun = every.score(library.chosen.names, library.chosen.fit.parameters, None)
+        if not every.is_improvable(begun):
+            return selected
+        again = every.select(begun, map(cause_of, begun.names))
+        again = replace(again, base=library.base, excluded=library.excluded)
+        without, with_it = (
+            trained.score(model.names, model.fit.parameters, None) for model in (library.chosen, again.chosen)
         )
-        return replace(selected, library=library, with_term=with_term)
+        if not predicts(with_it, without, readings.select(selected.split.validation)):
+            return selected
+        return replace(selected, library=with_known_alternatives(again, library))
 
     def _accepted(self, readings: Readings, split: Split) -> SelectedFromRest:
         """Return the selection that the validation runs accept, or the maps alone."""

@@ -25,7 +25,7 @@ from agvbench.types import Commands, Floats, Run
 
 _OFFSETS_S = np.arange(-0.4, 1.0, 0.02)
 _LAGS_S = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
-# Least time between the beginnings of two intervals, and at most so many in a session.
+# Least time from the start of one interval to that of the next, and at most so many in a session.
 _STEP_S, _MOST_ROWS = 0.04, 10_000
 _NODES = 13
 _BLOCK_S = 2.0

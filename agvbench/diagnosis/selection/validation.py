@@ -117,17 +117,17 @@ def validated(
     on_progress
         Called with a line if the selection is rejected.
     """
-    if term_selection is not None and not _predicts(term_selection.selection.chosen, selection.base, kept):
+    if term_selection is not None and not predicts(term_selection.selection.chosen, selection.base, kept):
         on_progress(_REJECTED.format(" + ".join(term_selection.selection.chosen.names)))
         term_selection = None
-    if term_selection is not None or _predicts(selection.chosen, selection.base, kept):
+    if term_selection is not None or predicts(selection.chosen, selection.base, kept):
         return selection, term_selection
     on_progress(_REJECTED.format(" + ".join(selection.chosen.names)))
     rejected = selection.rejected | selection.gains
     return replace(selection, chosen=selection.base, alternatives={}, gains={}, rejected=rejected), None
 
 
-def _predicts(chosen: ScoredModel, base: ScoredModel, kept: Readings) -> bool:
+def predicts(chosen: ScoredModel, base: ScoredModel, kept: Readings) -> bool:
     """Return whether `chosen` predicts the runs `kept` no worse than `base`.
 
     Its squared position errors are no larger, or they are larger by no more than chance and the deviance is no larger:

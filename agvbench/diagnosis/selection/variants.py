@@ -120,13 +120,22 @@ def continued(selection: Selection, before: Selection, selector: Selector) -> Se
     again = extended.select(selection.chosen, map(cause_of, selection.chosen.names))
     again = select_variants(replace(again, base=selection.base), extended)
     selector.candidates |= {n: c for n, c in extended.candidates.items() if n in again.chosen.names}
-    gain, present = selection.chosen.deviance - again.chosen.deviance, {cause_of(name) for name in again.chosen.names}
-    kept = {name: _after_gain(selection.alternatives.get(name, {}), gain) for name in again.gains}
+    return replace(with_known_alternatives(again, selection), tried=selector.models_fitted)
+
+
+def with_known_alternatives(again: Selection, before: Selection) -> Selection:
+    """Return the selection `again` with the alternatives of its effects that were known `before` it was continued.
+
+    They remain if they are no effects of it now, and predict as well after its further gain.
+    """
+    gain = before.chosen.deviance - again.chosen.deviance
+    present = {cause_of(name) for name in again.chosen.names}
+    kept = {name: _after_gain(before.alternatives.get(name, {}), gain) for name in again.gains}
     alternatives = {
         name: {other: more for other, more in known.items() if other not in present} | again.alternatives.get(name, {})
         for name, known in kept.items()
     }
-    return replace(again, alternatives=alternatives, tried=selector.models_fitted)
+    return replace(again, alternatives=alternatives)
 
 
 def select_variants_and_reconsider(selection: Selection, selector: Selector) -> tuple[Selection, Selector]:
