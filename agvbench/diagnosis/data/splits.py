@@ -107,12 +107,12 @@ def split_runs(runs: Sequence[Run], group: NDArray[np.int64], neutral: Command, 
 
     Otherwise whole groups are drawn at random, about a quarter of all runs: half of them for validation and half for
     test. A group is drawn only if every level of every command in it also occurs in a remaining group. The test then
-    evaluates new combinations of known commands and not the interpolation of a map. Both ends of a command's range
-    remain in two groups: a single combination with other commands does not determine the end of a map. The same holds
-    for every kind of change while the vehicle drives, such as a return to neutral: a backlash, which only returns show,
-    would otherwise be found by the test alone. At most a third of the runs that steer while they drive is drawn: they
-    are few, and no other run shows a dependence on the steering history. If only a single run can be spared, it is the
-    test run, and there is no validation.
+    evaluates new combinations of known commands and not the interpolation of a map. If three groups or more have an end
+    of a command's range, two of them remain: a single combination with other commands does not determine the end of a
+    map. The same holds for every kind of change while the vehicle drives, such as a return to neutral: a backlash,
+    which only returns show, would otherwise be found by the test alone. At most a third of the runs that steer while
+    they drive is drawn: they are few, and no other run shows a dependence on the steering history. If only a single run
+    can be spared, it is the test run, and there is no validation.
 
     Raises
     ------
@@ -169,7 +169,7 @@ def _drawn(
     shown = {g: _levels(own) | _changes_while_driving(own, neutral) for g, own in commands.items()}
     uses = Counter(one for own in shown.values() for one in own)
     ends = _ends(commands.values())
-    least = {one: 2 if one in ends else 1 for one in uses}
+    least = {one: 2 if one in ends and count > 2 else 1 for one, count in uses.items()}
     held = np.zeros(len(runs), dtype=np.bool_)
     steering = np.isin(group, [g for g, own in commands.items() if _steers_while_driving(own, neutral)])
     for g in rng.permutation(np.unique(group)).tolist():
