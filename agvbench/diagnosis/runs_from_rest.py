@@ -107,11 +107,11 @@ class RunsFromRest(Method[SelectedFromRest]):
         known = replace(readings.select(~selected.split.test), preset=trained.batch.readings.preset)
         every = trained.for_batch(Batch(known, trained.batch.maps, trained.batch.geometry, kinds=trained.batch.kinds))
         every.extended = every
-        begun = every.score(library.chosen.names, library.chosen.fit.parameters, None)
+        every.adopt(library.base)
+        begun = every.adopt(library.chosen)
         if not every.is_improvable(begun):
             return selected
-        again = every.select(begun, map(cause_of, begun.names))
-        again = replace(again, base=library.base, excluded=library.excluded)
+        again = replace(every.select(begun, map(cause_of, begun.names)), excluded=library.excluded)
         without, with_it = (
             trained.score(model.names, model.fit.parameters, None) for model in (library.chosen, again.chosen)
         )

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
+from tiny_selector import selector_of
 from tiny_vehicle import HEADER, Tiny, campaign_runs
 
 from agvbench.diagnosis import runs_from_rest
-from agvbench.diagnosis.context import DiagnosisContext
 from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.data.splits import split_runs
 from agvbench.diagnosis.runs_from_rest import RunsFromRest, SelectedFromRest
@@ -15,15 +15,11 @@ from agvbench.diagnosis.selection.subsampling import refit_to_all
 from agvbench.diagnosis.selection.variants import with_extended_library
 
 
-def further(training: Tiny, validation: Tiny, alternatives: dict[str, float]) -> Selection:
-    """Return the selection of the steering lag alone, continued with all runs of two vehicles but the test runs."""
-    own, other = (read_runs(campaign_runs(tiny), HEADER.neutral).runs for tiny in (training, validation))
-    split = split_runs(own, read_runs(own, HEADER.neutral).group, HEADER.neutral, 0)
-    runs = [b if is_other else a for a, b, is_other in zip(own, other, split.validation, strict=True)]
-    readings = read_runs(runs, HEADER.neutral)
-    selector = RunsFromRest(DiagnosisContext(HEADER, HEADER.geometry, None, 0), lambda _: None).selector(
-        readings.select(split.training)
-    )
+def further(vehicle: Tiny, alternatives: dict[str, float]) -> Selection:
+    """Return the selection of the steering lag alone, continued with all runs of a vehicle but the test runs."""
+    readings = read_runs(campaign_runs(vehicle), HEADER.neutral)
+    split = split_runs(readings.runs, readings.group, HEADER.neutral, 0)
+    selector = selector_of(readings.select(split.training).runs)
     base = with_extended_library(selector).base()
     chosen = with_extended_library(selector).with_effect(base, "steering_lag")
     selection = Selection(base, chosen, {"steering_lag": alternatives}, {"steering_lag": 100.0}, {}, 0)
@@ -34,7 +30,7 @@ def further(training: Tiny, validation: Tiny, alternatives: dict[str, float]) ->
 @pytest.mark.slow
 def test_an_effect_that_the_selection_lacks_is_added_and_fitted_to_both_parts():
     vehicle = Tiny(steering_lag_s=0.15, cornering_loss=0.15)
-    found = further(vehicle, vehicle, {"actuation_delay": 1e9, "cornering_speed_loss": -1e9})
+    found = further(vehicle, {"actuation_delay": 1e9, "cornering_speed_loss": -1e9})
     assert {*found.chosen.names} == {*found.gains} == {"steering_lag", "cornering_speed_loss"}
     assert "cornering_speed_loss" not in found.alternatives["steering_lag"]
     assert found.chosen.fit.effect_values()["cornering_speed_loss.loss"] == pytest.approx(0.15, abs=0.01)
@@ -53,7 +49,7 @@ def test_an_effect_without_which_the_validation_runs_are_predicted_better_is_not
 
     monkeypatch.setattr(runs_from_rest, "predicts", predicts)
     vehicle = Tiny(steering_lag_s=0.15, cornering_loss=0.15)
-    assert further(vehicle, vehicle, {}).chosen.names == ("steering_lag",)
+    assert further(vehicle, {}).chosen.names == ("steering_lag",)
     every = read_runs(campaign_runs(vehicle), HEADER.neutral)
     split = split_runs(every.runs, every.group, HEADER.neutral, 0)
     # Both are fitted to the training runs alone.
@@ -64,6 +60,6 @@ def test_an_effect_without_which_the_validation_runs_are_predicted_better_is_not
 @pytest.mark.slow
 def test_a_selection_that_lacks_nothing_stays():
     vehicle = Tiny(steering_lag_s=0.15)
-    found = further(vehicle, vehicle, {"actuation_delay": 3.0})
+    found = further(vehicle, {"actuation_delay": 3.0})
     assert found.chosen.names == ("steering_lag",)
     assert found.alternatives == {"steering_lag": {"actuation_delay": 3.0}}

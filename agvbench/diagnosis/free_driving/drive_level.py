@@ -2,7 +2,7 @@
 
 A battery is charged or a floor is swept between sessions. What a prediction knows of a window's level is its initial
 speed beside the speed that the commands before it result in; no pose after the beginning of a window is used. Whether
-sessions differ is also told by the distances that are driven in windows with one command. A distance has much less
+sessions differ is also shown by the distances that are driven in windows with one command. A distance has much less
 noise than a speed, but a recording may have few such windows.
 """
 
