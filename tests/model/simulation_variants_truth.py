@@ -99,11 +99,20 @@ def ramped(aim: Path, moments: Floats, speeding: float, braking: float, end: flo
     return lambda t: float(np.interp(t, moments, known))
 
 
-def ramped_up(aim: Path, moments: Floats, speeding: float, brake_s: float, end: float) -> Path:
-    """Return the path of a speed that ramps while it grows and decays exponentially while it falls, from rest."""
+def body_share(front: Path, rear: Path) -> Path:
+    """Return the body's longitudinal speed over that of the drive: the mean of what both axles have along the body."""
+    return lambda t: 0.5 * (math.cos(front(t)) + math.cos(rear(t)))
+
+
+def ramped_up(aim: Path, share: Path, moments: Floats, speeding_mps2: float, brake_s: float, end: float) -> Path:
+    """Return the path of a speed that ramps while it grows and decays exponentially while it falls, from rest.
+
+    The body, which has this `share` of the speed, ramps at `speeding_mps2`.
+    """
     begins, pieces, v = [], [], 0.0
     for begin, until in zip(moments.tolist(), [*moments[1:].tolist(), end], strict=True):
         aimed, now = float(aim(begin + 1e-9)), begin
+        speeding = speeding_mps2 / share(begin + 1e-9)
         while now < until:
             falls = v * aimed < 0.0 or abs(aimed) < abs(v)
             if falls:
@@ -122,17 +131,20 @@ def ramped_up(aim: Path, moments: Floats, speeding: float, brake_s: float, end: 
     return lambda t: pieces[max(0, bisect.bisect_right(begins, t) - 1)](max(t, begins[0]))
 
 
-def coasted(aim: Path, moments: Floats, acceleration: float, coast_s: float, end: float) -> Path:
-    """Return the path of a speed that ramps to a powered level and decays exponentially to zero, from rest."""
+def coasted(aim: Path, share: Path, moments: Floats, ramp_mps2: float, coast_s: float, end: float) -> Path:
+    """Return the path of a speed that ramps to a powered level and decays exponentially to zero, from rest.
+
+    The body, which has this `share` of the speed, ramps at `ramp_mps2`.
+    """
     pieces, v = [], 0.0
     for begin, until in zip(moments.tolist(), [*moments[1:].tolist(), end], strict=True):
-        aimed = float(aim(begin + 1e-9))
+        aimed, acceleration = float(aim(begin + 1e-9)), ramp_mps2 / share(begin + 1e-9)
         if aimed == 0.0:
             piece = partial(lambda t, at, was: was * math.exp((at - t) / coast_s), at=begin, was=v)
         else:
             piece = partial(
-                lambda t, at, was, to: was + math.copysign(min(abs(to - was), acceleration * (t - at)), to - was),
-                at=begin, was=v, to=aimed,
+                lambda t, at, was, to, by: was + math.copysign(min(abs(to - was), by * (t - at)), to - was),
+                at=begin, was=v, to=aimed, by=acceleration,
             )  # fmt: skip
         pieces.append(piece)
         v = piece(until)
@@ -140,8 +152,11 @@ def coasted(aim: Path, moments: Floats, acceleration: float, coast_s: float, end
     return lambda t: pieces[max(0, bisect.bisect_right(begins, t) - 1)](max(t, begins[0]))
 
 
-def sprung(aim: Path, moments: Floats, values: dict[str, float], end: float) -> Path:
-    """Return the path of a speed that obeys a limited motor, and without power friction and a relaxing spring."""
+def sprung(aim: Path, share: Path, moments: Floats, values: dict[str, float], end: float) -> Path:
+    """Return the path of a speed that obeys a limited motor, and without power friction and a relaxing spring.
+
+    The motor limits the acceleration of the body, which has this `share` of the speed.
+    """
 
     def equation(aimed: float) -> Callable[[float, Floats], list[float]]:
         def slopes(_: float, y: Floats) -> list[float]:
@@ -156,7 +171,7 @@ def sprung(aim: Path, moments: Floats, values: dict[str, float], end: float) -> 
     for begin, until in zip(moments.tolist(), [*moments[1:].tolist(), end], strict=True):
         aimed = float(aim(begin + 1e-9))
         found = solve_ivp(equation(aimed), (begin, until), state, dense_output=True, **_TIGHT)
-        limit = values["forward_mps2" if aimed > 0.0 else "backward_mps2"]
+        limit = values["forward_mps2" if aimed > 0.0 else "backward_mps2"] / share(begin + 1e-9)
         piece = partial(_sprung_speed, found.sol, aimed, begin, state[0], limit, values.get("lag_s", 0.0))
         pieces.append(piece)
         state = np.array([piece(until), found.y[1, -1]])
@@ -275,6 +290,7 @@ def true_form(name: str, values: dict[str, float], start: tuple[float, float, fl
     late = {"front_s": values.get("steering_s", 0.0), "rear_s": values.get("steering_s", 0.0), **values}
     fronts, rears, drives = (RUN_TIMES + late.get(f"{channel}_s", 0.0) for channel in ("front", "rear", "drive"))
     front, rear, speed = aims(0, fronts), aims(1, rears), aims(2, drives)
+    share = body_share(front, rear)
     if name in ("steering_lag_inertia", "steering_lag_uneven", "steering_rate_limit_acceleration"):
         front, rear = (servo_path(name, values, channel, RUN_TIMES, end) for channel in (0, 1))
     if name == "steering_backlash_uneven":
@@ -282,14 +298,14 @@ def true_form(name: str, values: dict[str, float], start: tuple[float, float, fl
     if name == "speed_lag_ramp":
         speed = ramped(speed, drives, values["acceleration_mps2"], values["braking_mps2"], end)
     if name == "speed_lag_ramp_up":
-        speed = ramped_up(speed, drives, values["acceleration_mps2"], values["brake_s"], end)
+        speed = ramped_up(speed, share, drives, values["acceleration_mps2"], values["brake_s"], end)
     if name == "speed_lag_coasting":
-        speed = coasted(speed, drives, values["acceleration_mps2"], values["coast_s"], end)
+        speed = coasted(speed, share, drives, values["acceleration_mps2"], values["coast_s"], end)
     if name == "speed_lag_inertia":
         speed = second_order(speed, 0.0, drives, values["time_constant_s"], values["inertia_s"], end)
     if name == "speed_lag_spring_back":
         drives, _ = backlash_closes(drives, SETTLED[:, 2], values.get("backlash_m", 0.0))
-        speed = sprung(aims(2, drives), drives, values, end)
+        speed = sprung(aims(2, drives), share, np.union1d(drives, RUN_TIMES), values, end)
     smoothing = values.get("time_constant_s", 0.0) if name == "mocap_latency_smoothing" else 0.0
     seen = times - values.get("latency_s", 0.0)
     return drive(front, rear, speed, np.array(start), seen, np.r_[fronts, rears, drives], smoothing)

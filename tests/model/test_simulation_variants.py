@@ -11,6 +11,7 @@ from simulation_variants_truth import (
     aims,
     at_once,
     backlash_closes,
+    body_share,
     drive,
     servo_path,
     sprung,
@@ -153,7 +154,7 @@ def test_the_windup_lasts_over_commands_without_power_and_relaxes_under_power():
     rows = np.vstack([[*REST, 0.0], settled])
     predicted = simulation.predict(rows, simulation.parameters([law]), INITIAL)
     front, rear = (at_once(np.r_[REST[i], settled[:, i]], moments) for i in (0, 1))
-    speed = sprung(at_once(np.r_[0.0, settled[:, 2]], moments), moments, values, 6.0)
+    speed = sprung(at_once(np.r_[0.0, settled[:, 2]], moments), body_share(front, rear), moments, values, 6.0)
     truth = drive(front, rear, speed, np.array(START), frames, moments, 0.0)
     np.testing.assert_allclose(predicted, truth, atol=3e-6)
 
@@ -176,8 +177,9 @@ def test_a_backlash_is_closed_by_several_commands_and_opens_at_every_stop():
     moved, rows = backlash_closes(moments, speeds, values["backlash_m"])
     assert rows == [2, 3, 5, 6]
     assert moved[0] == pytest.approx(moments[2] + 0.005 / 0.3, abs=1e-6)
-    speed = sprung(at_once(np.r_[0.0, speeds[rows]], moved), moved, values, 6.0)
-    truth = drive(lambda _: 0.2, lambda _: -0.1, speed, np.array(START), frames, moved, 0.0)
+    front, rear = (lambda _: 0.2), (lambda _: -0.1)
+    speed = sprung(at_once(np.r_[0.0, speeds[rows]], moved), body_share(front, rear), moved, values, 6.0)
+    truth = drive(front, rear, speed, np.array(START), frames, moved, 0.0)
     np.testing.assert_allclose(predicted, truth, atol=3e-6)
     at_rest = (frames > 2.5 + 0.3) & (frames < 3.6)
     assert np.ptp(predicted[at_rest], axis=0).max() < 1e-6

@@ -15,6 +15,8 @@ from agvbench.types import Command, Commands, Floats, Run
 
 _SAME_TIME_S = 0.05
 _SAME_LEVEL = 1e-5
+# Of the share that is to be drawn: with less, ends of ranges may lose groups.
+_ENOUGH = 0.75
 _ROLES = ("drive", "front", "rear")
 
 
@@ -107,12 +109,12 @@ def split_runs(runs: Sequence[Run], group: NDArray[np.int64], neutral: Command, 
 
     Otherwise whole groups are drawn at random, about a quarter of all runs: half of them for validation and half for
     test. A group is drawn only if every level of every command in it also occurs in a remaining group. The test then
-    evaluates new combinations of known commands and not the interpolation of a map. If three groups or more have an end
-    of a command's range, two of them remain: a single combination with other commands does not determine the end of a
-    map. The same holds for every kind of change while the vehicle drives, such as a return to neutral: a backlash,
-    which only returns show, would otherwise be found by the test alone. At most a third of the runs that steer while
-    they drive is drawn: they are few, and no other run shows a dependence on the steering history. If only a single run
-    can be spared, it is the test run, and there is no validation.
+    evaluates new combinations of known commands and not the interpolation of a map. Two groups with each end of a
+    command's range remain, as far as enough runs can be drawn otherwise: a single combination with other commands does
+    not determine the end of a map. The same holds for every kind of change while the vehicle drives, such as a return
+    to neutral: a backlash, which only returns show, would otherwise be found by the test alone. At most a third of the
+    runs that steer while they drive is drawn: they are few, and no other run shows a dependence on the steering
+    history. If only a single run can be spared, it is the test run, and there is no validation.
 
     Raises
     ------
@@ -165,14 +167,34 @@ def _for_test(
 def _drawn(
     runs: Sequence[Run], group: NDArray[np.int64], neutral: Command, rng: np.random.Generator, share: float
 ) -> NDArray[np.bool_]:
-    commands = {int(g): runs[int(np.argmax(group == g))].commands for g in np.unique(group)}
+    """Return which runs (R,) are drawn: those of whole groups, or some repeats if no group can be spared.
+
+    Two groups with each end of a command's range remain. Where that leaves few runs to draw, an end that only two have
+    may lose one of them.
+    """
+    order = rng.permutation(np.unique(group)).tolist()
+    for fewest in (2, 3):
+        held = _drawn_groups(runs, group, neutral, order, share, fewest)
+        if np.count_nonzero(held) >= _ENOUGH * share * len(runs):
+            break
+    return held if held.any() else _some_repeats(group, rng)
+
+
+def _drawn_groups(
+    runs: Sequence[Run], group: NDArray[np.int64], neutral: Command, order: list[int], share: float, fewest: int
+) -> NDArray[np.bool_]:
+    """Return which runs (R,) the groups contain that can be drawn in this `order`.
+
+    Of an end of a range that at least `fewest` groups have, two remain.
+    """
+    commands = {g: runs[int(np.argmax(group == g))].commands for g in order}
     shown = {g: _levels(own) | _changes_while_driving(own, neutral) for g, own in commands.items()}
     uses = Counter(one for own in shown.values() for one in own)
     ends = _ends(commands.values())
-    least = {one: 2 if one in ends and count > 2 else 1 for one, count in uses.items()}
-    held = np.zeros(len(runs), dtype=np.bool_)
+    least = {one: 2 if one in ends and count >= fewest else 1 for one, count in uses.items()}
     steering = np.isin(group, [g for g, own in commands.items() if _steers_while_driving(own, neutral)])
-    for g in rng.permutation(np.unique(group)).tolist():
+    held = np.zeros(len(runs), dtype=np.bool_)
+    for g in order:
         own = group == g
         if np.count_nonzero(held) + np.count_nonzero(own) > 1.1 * share * len(runs):
             continue
@@ -181,7 +203,7 @@ def _drawn(
         if all(uses[one] > least[one] for one in shown[g]):
             held |= own
             uses.subtract(shown[g])
-    return held if held.any() else _some_repeats(group, rng)
+    return held
 
 
 def _some_repeats(group: NDArray[np.int64], rng: np.random.Generator) -> NDArray[np.bool_]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.state import ACCELERATION_LIMIT, BRAKE_LAG, BRAKING_LIMIT, SPEED_AIM
+from agvbench.effects.state import ACCELERATION_LIMIT, BRAKE_LAG, BRAKING_LIMIT, LIMITS_BODY, SPEED_AIM
 from agvbench.effects.variants.base import Variant
 from agvbench.types import Floats
 
@@ -20,8 +20,8 @@ _SHORTEST_S = 0.01
 class SpeedLagCoasting(Variant):
     """A powered motor accelerates and brakes with limited force; without power viscous friction stops the vehicle.
 
-    ``|v̇| ≤ acceleration`` under every command but neutral, and ``v̇ = −v / T`` at neutral. A command of less speed is
-    therefore reached sooner than the vehicle would coast to it.
+    The body's ``|v̇| ≤ acceleration`` under every command but neutral, and ``v̇ = −v / T`` at neutral. A command of less
+    speed is therefore reached sooner than the vehicle would coast to it.
     """
 
     name: ClassVar[str] = "speed_lag_coasting"
@@ -48,3 +48,4 @@ class SpeedLagCoasting(Variant):
         else:
             state[ACCELERATION_LIMIT] = min(state[ACCELERATION_LIMIT], acceleration_mps2)
             state[BRAKING_LIMIT] = min(state[BRAKING_LIMIT], acceleration_mps2)
+            state[LIMITS_BODY] = 1.0

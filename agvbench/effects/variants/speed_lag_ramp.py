@@ -18,9 +18,9 @@ _SHORTEST_S = 0.01
 
 @dataclass(frozen=True)
 class SpeedLagRamp(Variant):
-    """Speed ramps to its final value: ``|v̇| ≤ acceleration`` while |v| grows, ``|v̇| ≤ braking`` while it falls.
+    """The wheels' speed ramps: ``|v̇| ≤ acceleration`` while |v| grows, ``|v̇| ≤ braking`` while it falls.
 
-    From forward to backward the vehicle brakes to rest first and accelerates then.
+    A motor controller does so. From forward to backward the vehicle brakes to rest first and accelerates then.
     """
 
     name: ClassVar[str] = "speed_lag_ramp"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.state import ACCELERATION_LIMIT, BRAKE_LAG
+from agvbench.effects.state import ACCELERATION_LIMIT, BRAKE_LAG, LIMITS_BODY
 from agvbench.effects.variants.base import Variant
 from agvbench.types import Floats
 
@@ -20,8 +20,8 @@ _SHORTEST_S = 0.01
 class SpeedLagRampUp(Variant):
     """The force of the drive limits the acceleration, and viscous friction brakes.
 
-    ``|v̇| ≤ acceleration`` while |v| grows, and ``v̇ = (v_map − v) / T`` while it falls. From forward to backward the
-    vehicle brakes to rest first and accelerates then.
+    The body's ``|v̇| ≤ acceleration`` while |v| grows, and ``v̇ = (v_map − v) / T`` while it falls. From forward to
+    backward the vehicle brakes to rest first and accelerates then.
     """
 
     name: ClassVar[str] = "speed_lag_ramp_up"
@@ -44,4 +44,5 @@ class SpeedLagRampUp(Variant):
     def aim(state: Floats, acceleration_mps2: float, brake_s: float) -> None:
         """Set the limit and the lag of the drive."""
         state[ACCELERATION_LIMIT] = min(state[ACCELERATION_LIMIT], acceleration_mps2)
+        state[LIMITS_BODY] = 1.0
         state[BRAKE_LAG] = max(state[BRAKE_LAG], brake_s)

@@ -16,6 +16,7 @@ from agvbench.effects.state import (
     COAST_RELAXATION,
     COAST_SPRING,
     DRIVE_BACKLASH,
+    LIMITS_BODY,
     SPEED_AIM,
 )
 from agvbench.effects.variants.base import Variant
@@ -32,10 +33,10 @@ _BACKLASH_M = 0.004
 class SpeedLagSpringBack(Variant):
     """A powered motor has limited force; without power friction and a spring in the drive train stop the vehicle.
 
-    Under power ``v̇ = (v_map − v) / lag_s``, and ``|v̇|`` is limited, for each direction of the command by a limit of its
-    own. At every start the motor first turns through the backlash, at the speed of the commands. At neutral
-    ``v̇ = −v / T − k w``, and the windup w obeys ``ẇ = v − w / R``: the vehicle stops sooner than friction stops it, and
-    rolls back. Under power w relaxes and has no other consequence.
+    Under power ``v̇ = (v_map − v) / lag_s``, and the body's ``|v̇|`` is limited, for each direction of the command by a
+    limit of its own. At every start the motor first turns through the backlash, at the speed of the commands. At
+    neutral ``v̇ = −v / T − k w``, and the windup w obeys ``ẇ = v − w / R``: the vehicle stops sooner than friction stops
+    it, and rolls back. Under power w relaxes and has no other consequence.
     """
 
     name: ClassVar[str] = "speed_lag_spring_back"
@@ -92,6 +93,7 @@ class SpeedLagSpringBack(Variant):
             limit = forward_mps2 if state[SPEED_AIM] > 0.0 else backward_mps2
             state[ACCELERATION_LIMIT] = min(state[ACCELERATION_LIMIT], limit)
             state[BRAKING_LIMIT] = min(state[BRAKING_LIMIT], limit)
+            state[LIMITS_BODY] = 1.0
             state[ACCELERATE_LAG] = max(state[ACCELERATE_LAG], lag_s)
             state[BRAKE_LAG] = max(state[BRAKE_LAG], lag_s)
         if spring_per_s2 > 0.0:

@@ -1,4 +1,6 @@
-"""The initial state of a simulation in motion: measured speed and yaw rate, and the drive level that they indicate.
+"""The speeds of drive and body in proportion: limits of the body's acceleration, and simulations that begin in motion.
+
+A simulation in motion begins with a measured speed and yaw rate, and with the drive level that they indicate.
 
 A part of the kernel; see `agvbench.model.simulation.compose`.
 """
@@ -7,7 +9,23 @@ from __future__ import annotations
 
 import math
 
-from agvbench.effects.state import FORWARD, FRONT, HOURS, LEFT, REAR, SEEN_LAG, SPEED, TIME, YAW_RATE
+from agvbench.effects.state import (
+    ACCELERATION_LIMIT,
+    BRAKING_LIMIT,
+    FORWARD,
+    FRONT,
+    FRONT_AIM,
+    HOURS,
+    LEFT,
+    LIMITS_BODY,
+    REAR,
+    REAR_AIM,
+    SEEN_LAG,
+    SPEED,
+    SPEED_AIM,
+    TIME,
+    YAW_RATE,
+)
 from agvbench.model.compiled import compiled
 from agvbench.model.simulation.layout import NODAL_DEVIATION, SECONDS_PER_HOUR, STARTED
 from agvbench.model.simulation.step import set_motion
@@ -22,13 +40,36 @@ _LEVEL_MPS = 0.05
 
 
 @compiled(inner=True)
-def _longitudinal_speed(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, speed: float) -> float:
-    """Return the longitudinal speed of the centroid at this speed of the drive, with the current axle angles."""
+def _longitudinal_speed_at(
+    s: Floats, p: Floats, vehicle: Floats, front: float, rear: float, now: float, speed: float
+) -> float:
+    """Return the longitudinal speed of the centroid at this speed of the drive, with these axle angles."""
     s[TIME] = now
     s[HOURS] = vehicle[STARTED] + now / SECONDS_PER_HOUR
-    s[FRONT], s[REAR], s[SPEED] = servos[2], servos[3], speed
+    s[FRONT], s[REAR], s[SPEED] = front, rear, speed
     set_motion(s, p, vehicle)
     return float(s[FORWARD])
+
+
+@compiled(inner=True)
+def _longitudinal_speed(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, speed: float) -> float:
+    """Return the longitudinal speed of the centroid at this speed of the drive, with the current axle angles."""
+    return _longitudinal_speed_at(s, p, vehicle, servos[2], servos[3], now, speed)
+
+
+@compiled(inner=True)
+def limit_body(s: Floats, p: Floats, vehicle: Floats, now: float) -> None:
+    """Let the limits of the drive's acceleration hold for the body, which steered axles drive slower than themselves.
+
+    The ratio of both speeds is that of the command's steady state. The limits are those of the drive afterwards.
+    """
+    if s[LIMITS_BODY] == 0.0 or s[SPEED_AIM] == 0.0:
+        return
+    s[LIMITS_BODY] = 0.0
+    part = _longitudinal_speed_at(s, p, vehicle, s[FRONT_AIM], s[REAR_AIM], now, s[SPEED_AIM]) / s[SPEED_AIM]
+    if part > _LEAST_PART:
+        s[ACCELERATION_LIMIT] /= part
+        s[BRAKING_LIMIT] /= part
 
 
 @compiled(inner=True)

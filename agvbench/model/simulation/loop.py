@@ -38,6 +38,7 @@ from agvbench.effects.state import (
     HEADING,
     HOURS,
     KNOWN_FRONT,
+    LIMITS_BODY,
     LOGGED,
     REAR_AIM,
     REAR_BACKLASH,
@@ -68,7 +69,7 @@ from agvbench.model.compiled import compiled
 from agvbench.model.simulation.actuators import PLAN_SIZE, SERVOS_SIZE, leave_command, plan_command, step_length
 from agvbench.model.simulation.frames import follow_seen, report_step, see_step, start_run, wait
 from agvbench.model.simulation.layout import COUNT, LONGEST_STEP, START_ROLLED, START_SIZE, STARTED, TURN, WORK_SIZE
-from agvbench.model.simulation.level import drive_speed, front_correction, level_lift, see_late
+from agvbench.model.simulation.level import drive_speed, front_correction, level_lift, limit_body, see_late
 from agvbench.model.simulation.stages import aim, arrive, capture
 from agvbench.model.simulation.step import end_step, take_step
 from agvbench.types import Floats
@@ -117,6 +118,7 @@ def _obey(
     s[FRONT_BACKLASH] = s[REAR_BACKLASH] = 0.0
     s[STEERING_INERTIA], s[STEERING_ACCELERATION], s[REAR_LAG_RATIO] = 0.0, math.inf, 1.0
     s[ACCELERATION_LIMIT] = s[BRAKING_LIMIT] = math.inf
+    s[LIMITS_BODY] = 0.0
     s[COAST_SPRING], s[COAST_RELAXATION], s[DRIVE_INERTIA], s[DRIVE_BACKLASH] = 0.0, math.inf, 0.0, 0.0
     aim(s, p)
 
@@ -226,6 +228,7 @@ def _drive_run(
             now = min(begin, end)
         elif now < begin:
             until = min(begin, end)
+            limit_body(s, p, vehicle, now)
             plan_command(plan, s, servos)
             leave_command(plan, until - now, servos)
             recent = -math.expm1((now - until) / RECENT_SPEED_S)
@@ -244,6 +247,7 @@ def _drive_run(
                     _obey(s, p, commands, settled, driven, front, rear, lift, now)
                 if s[SEEN_LAG] > 0.0:
                     see_late(s, p, vehicle, servos, now, start)
+            limit_body(s, p, vehicle, now)
             plan_command(plan, s, servos)
             k = _hold(s, p, plan, work, vehicle, now, end - now, start, t_s, out, k, stop)
             if k == stop:
