@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 from tiny_vehicle import HEADER, NEUTRAL, Tiny, drive
@@ -18,30 +19,44 @@ def joystick(seconds: float, rng: np.random.Generator, reach: float = 1.0) -> Co
 
     `reach` scales how far the axles are steered.
     """
-    count = round(seconds / _PERIOD_S)
-    t_s = _PERIOD_S * np.arange(count)
-
-    def wander(middle: float, size: float, every_s: float) -> np.ndarray:
-        knots = np.arange(0.0, seconds + 2.0 * every_s, every_s)
-        return middle + np.round(size * np.interp(t_s, knots, rng.uniform(-1.0, 1.0, len(knots))))
-
     return Commands(
-        t_s, wander(1150.0, 200.0, 1.5), wander(NEUTRAL, 350.0 * reach, 1.0), wander(NEUTRAL, 250.0 * reach, 1.3)
+        _times(seconds),
+        1150.0 + _wander(seconds, rng, 200.0, 1.5),
+        NEUTRAL + _wander(seconds, rng, 350.0 * reach, 1.0),
+        NEUTRAL + _wander(seconds, rng, 250.0 * reach, 1.3),
     )
 
 
-def free_runs(
-    tiny: Tiny, *, seed: int = 0, sessions: int = 4, runs: int = 3, seconds: float = 30.0, reach: float = 1.0
-) -> list[Run]:
-    """Drive `runs` in each of the sessions; what is kept of each begins in the middle of the drive.
+def calm(seconds: float, rng: np.random.Generator) -> Commands:
+    """Return the commands of somebody who hardly changes the speed and turns the front axle slowly."""
+    drive, front = 1150.0 + _wander(seconds, rng, 20.0, 1.5), NEUTRAL + _wander(seconds, rng, 350.0, 3.0)
+    return Commands(_times(seconds), drive, front, np.full_like(front, NEUTRAL))
 
-    `reach` is how far a `joystick` steers.
-    """
+
+def _times(seconds: float) -> np.ndarray:
+    return _PERIOD_S * np.arange(round(seconds / _PERIOD_S))
+
+
+def _wander(seconds: float, rng: np.random.Generator, size: float, every_s: float) -> np.ndarray:
+    knots = np.arange(0.0, seconds + 2.0 * every_s, every_s)
+    return np.round(size * np.interp(_times(seconds), knots, rng.uniform(-1.0, 1.0, len(knots))))
+
+
+def free_runs(
+    tiny: Tiny,
+    *,
+    seed: int = 0,
+    sessions: int = 4,
+    runs: int = 3,
+    seconds: float = 30.0,
+    by: Callable[[float, np.random.Generator], Commands] = joystick,
+) -> list[Run]:
+    """Drive `runs` in each of the sessions `by` hand; what is kept of each begins in the middle of the drive."""
     rng = np.random.default_rng([7, seed])
     out = []
     for session in range(sessions):
         for k in range(runs):
-            commands = joystick(seconds, rng, reach)
+            commands = by(seconds, rng)
             started_s = 3600.0 * session + 120.0 * k
             frames = drive(tiny, commands, Pose(0.0, 0.0, rng.uniform(-3.0, 3.0)), started_s, rng)
             run = Run(f"{session}-{k}", "free", "", "", 0, NO_TARGET, started_s, "ok", "", *_later(commands, frames))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
-from free_drives import FREE_HEADER, free_runs
+from free_drives import FREE_HEADER, free_runs, joystick
 from rich.console import Console
 from tiny_vehicle import NEUTRAL_COMMAND, Tiny
 
@@ -73,8 +74,8 @@ class Recorded:
     header = FREE_HEADER
 
     def __init__(self, reach: float) -> None:
-        fitted = free_runs(LAGGING, sessions=3, runs=2, seconds=24.0, reach=0.5)
-        tested = free_runs(LAGGING, sessions=1, runs=2, seconds=24.0, reach=reach, seed=1)
+        fitted = free_runs(LAGGING, sessions=3, runs=2, seconds=24.0, by=partial(joystick, reach=0.5))
+        tested = free_runs(LAGGING, sessions=1, runs=2, seconds=24.0, by=partial(joystick, reach=reach), seed=1)
         self.runs = [replace(run, split="fit") for run in fitted]
         self.runs += [
             replace(run, split="held_out", session="last", run_id=f"last-{k}") for k, run in enumerate(tested)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
-from free_drives import FREE_HEADER, free_runs
+from free_drives import FREE_HEADER, calm, free_runs
 from tiny_vehicle import NEUTRAL_COMMAND, Tiny
 
 from agvbench.diagnosis import Diagnosis, Verdict, diagnose
@@ -44,6 +44,14 @@ def test_a_steering_lag_is_named_with_its_size(lagging):
     errors = lagging.held_out.errors
     for name in ("position_rms_mm", "heading_rms_deg"):
         assert errors[name]["after"] < 0.2 * errors[name]["before"]
+
+
+def test_a_lag_of_slow_steering_is_no_delay():
+    """Initial angles by the noisy yaw rate predict better than the commands without the lag, and worse with it."""
+    runs = free_runs(Tiny(steering_lag_s=0.15, noise_rad=3e-3), sessions=3, runs=2, seconds=24.0, by=calm)
+    (effect,) = diagnose(FreeCampaign(runs)).effects
+    assert effect.name == "steering_lag"
+    assert effect.parameters["time_constant_s"].value == pytest.approx(0.15, abs=0.01)
 
 
 def test_residuals_along_the_way_shrink_to_what_noise_leaves(lagging):

@@ -23,7 +23,7 @@ from agvbench.effects.variants import cause_of
 STEERING_DYNAMICS = ("steering_lag", "steering_rate_limit", "steering_backlash")
 
 
-def choose_initial_steering(selector: Selector) -> Selector:
+def choose_initial_steering(selector: AnySelector) -> AnySelector:
     """Return the selector, or one with the axles at their first commands if that predicts clearly better.
 
     The comparison is between the best models with a single effect that delays the axles.
