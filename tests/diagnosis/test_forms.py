@@ -42,7 +42,7 @@ def test_a_backlash_has_a_width_at_each_axle():
 def test_an_elastic_drive_train_is_a_speed_lag_with_its_force_in_each_direction(tiny_campaign):
     found = diagnose(
         tiny_campaign(
-            Tiny(ramp_forward_mps2=0.9, ramp_backward_mps2=0.6, coast_s=0.4, spring_per_s2=2.5, relaxation_s=0.5)
+            Tiny(ramp_forward_mps2=0.9, ramp_backward_mps2=0.6, is_ramp_of_force=True, coast_s=0.4, spring_per_s2=2.5)
         )
     )
     assert found.verdict is Verdict.NAMED
@@ -56,7 +56,9 @@ def test_an_elastic_drive_train_is_a_speed_lag_with_its_force_in_each_direction(
 def test_a_drive_with_a_lag_and_a_backlash_is_no_filter_of_the_camera(tiny_campaign):
     """Both round the speed off, which no limit of the force does, and a filter of the camera seems to."""
     train = {"ramp_forward_mps2": 1.1, "ramp_backward_mps2": 0.9, "coast_s": 0.3, "spring_per_s2": 2.5}
-    found = diagnose(tiny_campaign(Tiny(**train, ramp_lag_s=0.08, drive_gap_m=0.012, steering_lag_s=0.1)))
+    found = diagnose(
+        tiny_campaign(Tiny(**train, is_ramp_of_force=True, ramp_lag_s=0.08, drive_gap_m=0.012, steering_lag_s=0.1))
+    )
     effects = {effect.name: effect for effect in found.effects}
     assert "mocap_latency" not in effects
     parameters = effects["speed_lag"].parameters

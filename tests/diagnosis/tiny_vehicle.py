@@ -60,6 +60,7 @@ class Tiny:
     ramp_forward_mps2: float = 0.0
     ramp_backward_mps2: float = 0.0
     ramp_lag_s: float = 0.0
+    is_ramp_of_force: bool = False
     drive_gap_m: float = 0.0
     spring_per_s2: float = 0.0
     relaxation_s: float = 0.5
@@ -152,7 +153,9 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
             if abs(commanded) > abs(speed)
             else (tiny.coast_s if commanded == 0.0 else 0.0) or tiny.brake_s
         )
-        speed, windup = driven_speed(tiny, commanded, lag, speed, windup)
+        # A limited force accelerates the body, which turned wheels drive slower than themselves.
+        ahead = 0.5 * (math.cos(front) + math.cos(rear)) if tiny.is_ramp_of_force else 1.0
+        speed, windup = driven_speed(tiny, commanded, lag, speed, windup, ahead)
         relief = 1.0 + tiny.reverse_gain if speed < 0.0 else 1.0
         f, r, s = (
             (old + new) / 2.0 if lagged else new
@@ -212,13 +215,15 @@ def seen(tiny: Tiny, t_s: np.ndarray, p: np.ndarray, rng: np.random.Generator) -
     return Frames(t_s, p[:, 0], p[:, 1], p[:, 2], np.ones(n, dtype=bool), np.full(n, -1), nan, nan)
 
 
-def driven_speed(tiny: Tiny, commanded: float, lag: float, speed: float, windup: float) -> tuple[float, float]:
-    """Return speed and windup of the drive train one step later."""
+def driven_speed(
+    tiny: Tiny, commanded: float, lag: float, speed: float, windup: float, ahead: float
+) -> tuple[float, float]:
+    """Return speed and windup of the drive train one step later; the ramp is that of the share `ahead` of the speed."""
     if commanded == 0.0 and tiny.spring_per_s2:
         speed -= (speed / tiny.coast_s + tiny.spring_per_s2 * windup) * _STEP_S
         return speed, windup + (speed - windup / tiny.relaxation_s) * _STEP_S
     if commanded != 0.0 and tiny.ramp_forward_mps2:
-        ramp = (tiny.ramp_forward_mps2 if commanded > 0.0 else tiny.ramp_backward_mps2) * _STEP_S
+        ramp = (tiny.ramp_forward_mps2 if commanded > 0.0 else tiny.ramp_backward_mps2) * _STEP_S / ahead
         closer = (commanded - speed) * (1.0 - math.exp(-_STEP_S / tiny.ramp_lag_s) if tiny.ramp_lag_s else 1.0)
         return speed + min(max(closer, -ramp), ramp), windup * (1.0 - _STEP_S / tiny.relaxation_s)
     return speed + (commanded - speed) * (1.0 - math.exp(-_STEP_S / lag) if lag else 1.0), windup

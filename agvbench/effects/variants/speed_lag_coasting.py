@@ -48,4 +48,5 @@ class SpeedLagCoasting(Variant):
         else:
             state[ACCELERATION_LIMIT] = min(state[ACCELERATION_LIMIT], acceleration_mps2)
             state[BRAKING_LIMIT] = min(state[BRAKING_LIMIT], acceleration_mps2)
-            state[LIMITS_BODY] = 1.0
+            if acceleration_mps2 < math.inf:
+                state[LIMITS_BODY] = 1.0

@@ -44,5 +44,6 @@ class SpeedLagRampUp(Variant):
     def aim(state: Floats, acceleration_mps2: float, brake_s: float) -> None:
         """Set the limit and the lag of the drive."""
         state[ACCELERATION_LIMIT] = min(state[ACCELERATION_LIMIT], acceleration_mps2)
-        state[LIMITS_BODY] = 1.0
+        if acceleration_mps2 < math.inf:
+            state[LIMITS_BODY] = 1.0
         state[BRAKE_LAG] = max(state[BRAKE_LAG], brake_s)

@@ -49,7 +49,8 @@ class SpeedLagSpringBack(Variant):
     )
     limits: ClassVar[str] = (
         "with much friction (T far below R) and without lag and backlash it predicts the same as speed_lag_coasting; "
-        "at one speed alone a backlash cannot be distinguished from a delay of the drive"
+        "at one speed alone a backlash cannot be distinguished from a delay of the drive; a controller that ramps the "
+        "speed of the wheels starts later in turns"
     )
 
     forward_mps2: float = parameter(unit="m/s²", low=0.02, high=100.0, scale=1.0, null=math.inf)
@@ -93,7 +94,8 @@ class SpeedLagSpringBack(Variant):
             limit = forward_mps2 if state[SPEED_AIM] > 0.0 else backward_mps2
             state[ACCELERATION_LIMIT] = min(state[ACCELERATION_LIMIT], limit)
             state[BRAKING_LIMIT] = min(state[BRAKING_LIMIT], limit)
-            state[LIMITS_BODY] = 1.0
+            if limit < math.inf:
+                state[LIMITS_BODY] = 1.0
             state[ACCELERATE_LAG] = max(state[ACCELERATE_LAG], lag_s)
             state[BRAKE_LAG] = max(state[BRAKE_LAG], lag_s)
         if spring_per_s2 > 0.0:

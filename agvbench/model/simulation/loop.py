@@ -182,6 +182,49 @@ def _next_drive(
 
 
 @compiled(inner=True)
+def _rest(s: Floats, servos: Floats) -> None:
+    """Let drive and servos be at rest, with the axles where the aims are."""
+    servos[0] = servos[2] = s[FRONT_AIM]
+    servos[1] = servos[3] = s[REAR_AIM]
+    servos[4] = servos[5] = servos[6] = servos[7] = servos[8] = servos[9] = servos[10] = 0.0
+
+
+@compiled(inner=True)
+def _actuate_only(
+    s: Floats, p: Floats, plan: Floats, vehicle: Floats, servos: Floats, now: float, until: float
+) -> None:
+    """Move the actuators from `now` to `until`, with the recent mean of the drive's speed and of its square."""
+    limit_body(s, p, vehicle, now)
+    plan_command(plan, s, servos)
+    leave_command(plan, until - now, servos)
+    recent = -math.expm1((now - until) / RECENT_SPEED_S)
+    servos[5] += (servos[4] - servos[5]) * recent
+    servos[9] += (servos[4] * servos[4] - servos[9]) * recent
+
+
+@compiled(inner=True)
+def _begin_in_motion(
+    s: Floats,
+    p: Floats,
+    vehicle: Floats,
+    servos: Floats,
+    now: float,
+    speed: float,
+    recent_speed: float,
+    yaw_rate: float,
+    weight: float,
+) -> float:
+    """Put the measured speed and yaw rate into `servos`; return the lift of the drive level."""
+    lift = level_lift(s, p, vehicle, servos, now, recent_speed, speed)
+    servos[4] = drive_speed(s, p, vehicle, servos, now, speed)
+    if weight > 0.0:
+        turned = weight * front_correction(s, p, vehicle, servos, now, yaw_rate)
+        servos[0] += turned
+        servos[2] += turned
+    return float(lift)
+
+
+@compiled(inner=True)
 def _drive_run(
     s: Floats,
     p: Floats,
@@ -221,29 +264,16 @@ def _drive_run(
         to_drive, next_driven = _next_drive(s, p, settled, command_t_s, driven, last)
         end = min(to_front, to_rear, to_drive)
         if now == -math.inf:
-            # At rest with settled axles before the first command.
-            servos[0] = servos[2] = s[FRONT_AIM]
-            servos[1] = servos[3] = s[REAR_AIM]
-            servos[4] = servos[5] = servos[6] = servos[7] = servos[8] = servos[9] = servos[10] = 0.0
+            _rest(s, servos)
             now = min(begin, end)
         elif now < begin:
             until = min(begin, end)
-            limit_body(s, p, vehicle, now)
-            plan_command(plan, s, servos)
-            leave_command(plan, until - now, servos)
-            recent = -math.expm1((now - until) / RECENT_SPEED_S)
-            servos[5] += (servos[4] - servos[5]) * recent
-            servos[9] += (servos[4] * servos[4] - servos[9]) * recent
+            _actuate_only(s, p, plan, vehicle, servos, now, until)
             now = until
         if now < end:
             if now == begin:
                 if not math.isnan(speed):
-                    lift = level_lift(s, p, vehicle, servos, now, recent_speed, speed)
-                    servos[4] = drive_speed(s, p, vehicle, servos, now, speed)
-                    if weight > 0.0:
-                        turned = weight * front_correction(s, p, vehicle, servos, now, yaw_rate)
-                        servos[0] += turned
-                        servos[2] += turned
+                    lift = _begin_in_motion(s, p, vehicle, servos, now, speed, recent_speed, yaw_rate, weight)
                     _obey(s, p, commands, settled, driven, front, rear, lift, now)
                 if s[SEEN_LAG] > 0.0:
                     see_late(s, p, vehicle, servos, now, start)
