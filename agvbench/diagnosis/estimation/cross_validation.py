@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh
 
 from agvbench.diagnosis.criteria import SELECTION
 from agvbench.diagnosis.estimation.fit import Fit, loss_at
@@ -45,7 +46,7 @@ def cross_validated(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Flo
     for k in np.unique(fold):
         out = fold == k
         # In coordinates in which the total information is the identity, the fold holds what the others lack.
-        share, turn = np.linalg.eigh(whiten.T @ (fitted.information.total_of(~out)[among] + weak) @ whiten)
+        share, turn = eigenvectors(whiten.T @ (fitted.information.total_of(~out)[among] + weak) @ whiten)
         turn = whiten @ turn
         known = share > _MIN_SHARE
         by_prior = turn.T @ prior @ turn
@@ -57,6 +58,15 @@ def cross_validated(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Flo
         move[free] = turn @ along
         loss[out] += (fitted.information.along(move) - 2.0 * fitted.gradient @ move)[out]
     return loss if loss.sum() >= fitted.loss.sum() else fitted.loss.copy()
+
+
+def eigenvectors(matrix: Floats) -> tuple[Floats, Floats]:
+    """Return the eigenvalues (n,) and eigenvectors (n, n) of a symmetric matrix (n, n) by QR iterations.
+
+    LAPACK's divide and conquer, which NumPy calls, may not converge where nearly all eigenvalues are 1.
+    """
+    values, vectors = eigh(matrix, driver="ev")
+    return values, vectors
 
 
 def _cross_validated_windows(fitted: Fit, fold: NDArray[np.int64], bounds: Floats) -> Floats:
