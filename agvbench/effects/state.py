@@ -35,7 +35,7 @@ FRONT_BEFORE, REAR_BEFORE = range(36, 38)
 # Servos of second order: τ of τ² δ̈ + lag δ̇ = aim − δ, without a rate limit; or the limit of |δ̈|, with that of the rate
 # and without a lag.
 STEERING_INERTIA, STEERING_ACCELERATION = range(38, 40)
-# Limits of the drive: |v̇| while |v| grows, and while it falls; see `LIMITS_BODY`.
+# Limits of the drive: |v̇| while |v| grows, and while it falls; see `BODY_ACCELERATION_LIMIT`.
 ACCELERATION_LIMIT, BRAKING_LIMIT = range(40, 42)
 # Delay of the drive's commands relative to those of the front servo; see `REAR_WAIT`.
 DRIVE_WAIT = 42
@@ -63,8 +63,8 @@ DRIVE_BACKLASH = 57
 ROLLED = 58
 # When the drive was last commanded to start from rest [s], and 1 while it is commanded to drive.
 DRIVE_START, DRIVES = range(59, 61)
-# 1 if the limits of the drive are limits of a force, and so of the body's longitudinal acceleration.
-LIMITS_BODY = 61
+# The same for the longitudinal speed of the body, which steered axles drive slower than themselves: limits of a force.
+BODY_ACCELERATION_LIMIT, BODY_BRAKING_LIMIT = range(61, 63)
 # What the lab logged about the run, each column standardised; 0 where nothing was logged.
-LOGGED, LOGGED_COUNT = 62, 16
+LOGGED, LOGGED_COUNT = 63, 16
 SIZE = LOGGED + LOGGED_COUNT

@@ -37,6 +37,7 @@ def check_null_hooks(cls: type[Effect]) -> None:
     state[[s.STEERING_LAG, s.FRONT_BACKLASH, s.REAR_BACKLASH, s.ACCELERATE_LAG, s.BRAKE_LAG]] = 0.0
     state[[s.STEERING_INERTIA, s.DRIVE_INERTIA, s.REAR_WAIT, s.DRIVE_WAIT, s.DRIVE_BACKLASH, s.SEEN_LAG]] = 0.0
     state[[s.STEERING_RATE, s.STEERING_ACCELERATION, s.ACCELERATION_LIMIT, s.BRAKING_LIMIT]] = math.inf
+    state[[s.BODY_ACCELERATION_LIMIT, s.BODY_BRAKING_LIMIT]] = math.inf
     for name, hook in cls.hooks().items():
         before = state.copy()
         if name in TIME_HOOKS:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.state import ACCELERATION_LIMIT, BRAKE_LAG, BRAKING_LIMIT, LIMITS_BODY, SPEED_AIM
+from agvbench.effects.state import BODY_ACCELERATION_LIMIT, BODY_BRAKING_LIMIT, BRAKE_LAG, SPEED_AIM
 from agvbench.effects.variants.base import Variant
 from agvbench.types import Floats
 
@@ -46,7 +46,5 @@ class SpeedLagCoasting(Variant):
         if state[SPEED_AIM] == 0.0:
             state[BRAKE_LAG] = max(state[BRAKE_LAG], coast_s)
         else:
-            state[ACCELERATION_LIMIT] = min(state[ACCELERATION_LIMIT], acceleration_mps2)
-            state[BRAKING_LIMIT] = min(state[BRAKING_LIMIT], acceleration_mps2)
-            if acceleration_mps2 < math.inf:
-                state[LIMITS_BODY] = 1.0
+            state[BODY_ACCELERATION_LIMIT] = min(state[BODY_ACCELERATION_LIMIT], acceleration_mps2)
+            state[BODY_BRAKING_LIMIT] = min(state[BODY_BRAKING_LIMIT], acceleration_mps2)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.state import ACCELERATION_LIMIT, BRAKE_LAG, LIMITS_BODY
+from agvbench.effects.state import BODY_ACCELERATION_LIMIT, BRAKE_LAG
 from agvbench.effects.variants.base import Variant
 from agvbench.types import Floats
 
@@ -43,7 +43,5 @@ class SpeedLagRampUp(Variant):
     @staticmethod
     def aim(state: Floats, acceleration_mps2: float, brake_s: float) -> None:
         """Set the limit and the lag of the drive."""
-        state[ACCELERATION_LIMIT] = min(state[ACCELERATION_LIMIT], acceleration_mps2)
-        if acceleration_mps2 < math.inf:
-            state[LIMITS_BODY] = 1.0
+        state[BODY_ACCELERATION_LIMIT] = min(state[BODY_ACCELERATION_LIMIT], acceleration_mps2)
         state[BRAKE_LAG] = max(state[BRAKE_LAG], brake_s)

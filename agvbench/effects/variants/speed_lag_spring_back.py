@@ -10,13 +10,12 @@ from typing import ClassVar
 from agvbench.effects.base import Stage, parameter
 from agvbench.effects.state import (
     ACCELERATE_LAG,
-    ACCELERATION_LIMIT,
+    BODY_ACCELERATION_LIMIT,
+    BODY_BRAKING_LIMIT,
     BRAKE_LAG,
-    BRAKING_LIMIT,
     COAST_RELAXATION,
     COAST_SPRING,
     DRIVE_BACKLASH,
-    LIMITS_BODY,
     SPEED_AIM,
 )
 from agvbench.effects.variants.base import Variant
@@ -92,10 +91,8 @@ class SpeedLagSpringBack(Variant):
             state[COAST_SPRING] = spring_per_s2
         else:
             limit = forward_mps2 if state[SPEED_AIM] > 0.0 else backward_mps2
-            state[ACCELERATION_LIMIT] = min(state[ACCELERATION_LIMIT], limit)
-            state[BRAKING_LIMIT] = min(state[BRAKING_LIMIT], limit)
-            if limit < math.inf:
-                state[LIMITS_BODY] = 1.0
+            state[BODY_ACCELERATION_LIMIT] = min(state[BODY_ACCELERATION_LIMIT], limit)
+            state[BODY_BRAKING_LIMIT] = min(state[BODY_BRAKING_LIMIT], limit)
             state[ACCELERATE_LAG] = max(state[ACCELERATE_LAG], lag_s)
             state[BRAKE_LAG] = max(state[BRAKE_LAG], lag_s)
         if spring_per_s2 > 0.0:

@@ -11,13 +11,14 @@ import math
 
 from agvbench.effects.state import (
     ACCELERATION_LIMIT,
+    BODY_ACCELERATION_LIMIT,
+    BODY_BRAKING_LIMIT,
     BRAKING_LIMIT,
     FORWARD,
     FRONT,
     FRONT_AIM,
     HOURS,
     LEFT,
-    LIMITS_BODY,
     REAR,
     REAR_AIM,
     SEEN_LAG,
@@ -59,17 +60,16 @@ def _longitudinal_speed(s: Floats, p: Floats, vehicle: Floats, servos: Floats, n
 
 @compiled(inner=True)
 def limit_body(s: Floats, p: Floats, vehicle: Floats, now: float) -> None:
-    """Let the limits of the drive's acceleration hold for the body, which steered axles drive slower than themselves.
+    """Limit the drive so that the body, which steered axles drive slower than themselves, keeps within its own limits.
 
-    The ratio of both speeds is that of the command's steady state. The limits are those of the drive afterwards.
+    The ratio of both speeds is that of the command's steady state.
     """
-    if s[LIMITS_BODY] == 0.0 or s[SPEED_AIM] == 0.0:
+    if s[SPEED_AIM] == 0.0 or (s[BODY_ACCELERATION_LIMIT] == math.inf and s[BODY_BRAKING_LIMIT] == math.inf):
         return
-    s[LIMITS_BODY] = 0.0
     part = _longitudinal_speed_at(s, p, vehicle, s[FRONT_AIM], s[REAR_AIM], now, s[SPEED_AIM]) / s[SPEED_AIM]
-    if part > _LEAST_PART:
-        s[ACCELERATION_LIMIT] /= part
-        s[BRAKING_LIMIT] /= part
+    part = part if part > _LEAST_PART else 1.0
+    s[ACCELERATION_LIMIT] = min(s[ACCELERATION_LIMIT], s[BODY_ACCELERATION_LIMIT] / part)
+    s[BRAKING_LIMIT] = min(s[BRAKING_LIMIT], s[BODY_BRAKING_LIMIT] / part)
 
 
 @compiled(inner=True)

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from agvbench.effects.state import (
     ACCELERATE_LAG,
     ACCELERATION_LIMIT,
+    BODY_ACCELERATION_LIMIT,
+    BODY_BRAKING_LIMIT,
     BRAKE_LAG,
     BRAKING_LIMIT,
     COAST_RELAXATION,
@@ -38,7 +40,6 @@ from agvbench.effects.state import (
     HEADING,
     HOURS,
     KNOWN_FRONT,
-    LIMITS_BODY,
     LOGGED,
     REAR_AIM,
     REAR_BACKLASH,
@@ -118,7 +119,7 @@ def _obey(
     s[FRONT_BACKLASH] = s[REAR_BACKLASH] = 0.0
     s[STEERING_INERTIA], s[STEERING_ACCELERATION], s[REAR_LAG_RATIO] = 0.0, math.inf, 1.0
     s[ACCELERATION_LIMIT] = s[BRAKING_LIMIT] = math.inf
-    s[LIMITS_BODY] = 0.0
+    s[BODY_ACCELERATION_LIMIT] = s[BODY_BRAKING_LIMIT] = math.inf
     s[COAST_SPRING], s[COAST_RELAXATION], s[DRIVE_INERTIA], s[DRIVE_BACKLASH] = 0.0, math.inf, 0.0, 0.0
     aim(s, p)
 
