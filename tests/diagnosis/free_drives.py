@@ -28,7 +28,7 @@ def joystick(seconds: float, rng: np.random.Generator, reach: float = 1.0) -> Co
 
 
 def calm(seconds: float, rng: np.random.Generator) -> Commands:
-    """Return the commands of somebody who hardly changes the speed and turns the front axle slowly."""
+    """Return the commands of a driver who hardly changes the speed and turns the front axle slowly."""
     drive, front = 1150.0 + _wander(seconds, rng, 20.0, 1.5), NEUTRAL + _wander(seconds, rng, 350.0, 3.0)
     return Commands(_times(seconds), drive, front, np.full_like(front, NEUTRAL))
 

@@ -122,10 +122,21 @@ def test_both_ends_of_a_commands_range_stay_in_two_groups_of_the_training(seed):
     runs = [run for k in range(3) for level in sides for run in changing(f"{level}-{k}", [level] * (k + 1))]
     group = group_runs(runs)
     split = split_runs(runs, group, NEUTRAL_COMMAND, seed)
-    for end in (1300.0, 1700.0):
-        at_end = np.array([end in run.commands.front for run in runs])
-        assert len({*group[at_end & split.training]}) >= 2
+    for training in (split.training, with_other_validation(split, runs, group, NEUTRAL_COMMAND, seed).training):
+        for end in (1300.0, 1700.0):
+            at_end = np.array([end in run.commands.front for run in runs])
+            assert len({*group[at_end & training]}) >= 2
     assert split.test.any()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_an_end_that_only_two_groups_have_keeps_both_where_others_can_be_drawn(seed):
+    levels = [1300.0, 1700.0] * 2 + [1400.0, 1500.0, 1600.0] * 6
+    runs = [run for k, level in enumerate(levels) for run in changing(f"{level}-{k}", [level] * (1 + k // 3))]
+    split = split_runs(runs, group_runs(runs), NEUTRAL_COMMAND, seed)
+    at_end = np.array([bool({1300.0, 1700.0} & {*run.commands.front}) for run in runs])
+    assert split.training[at_end].all()
+    assert (~split.training).sum() >= 0.75 * DATA.test_share * len(runs)
 
 
 def test_the_campaigns_own_split_is_kept():
