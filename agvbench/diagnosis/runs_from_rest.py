@@ -27,6 +27,7 @@ from agvbench.diagnosis.selection.driven_axle import UNDECLARED, better_driven_a
 from agvbench.diagnosis.selection.equal_descriptions import with_equal_descriptions
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.initial_steering import choose_initial_steering, reconsider_initial_steering
+from agvbench.diagnosis.selection.refused_effects import with_refused_effects
 from agvbench.diagnosis.selection.sequential_replacement import excluded_by_priors, replace_sequentially
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.subsampling import refit_to_all, subsample_repeats
@@ -158,6 +159,7 @@ class RunsFromRest(Method[SelectedFromRest]):
             selector.on_progress("comparing other equations of the selected effects")
         library, selector = select_variants_and_reconsider(chosen, selector)
         library = continued(separate_lag_from_delay(prefer_actuators(library, selector), selector), library, selector)
+        library = with_refused_effects(library, selector)
         if library.gains:
             selector.on_progress("comparing each selected effect with others in its place")
             # What another effect replaced may be necessary beside it: both were never compared together.

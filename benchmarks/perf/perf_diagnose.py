@@ -87,29 +87,51 @@ def yardstick() -> float:
     return time.process_time() - began
 
 
+def time_parts(hidden: str, campaign: Campaign, repeats: int) -> None:
+    """Print a row for each part of a campaign."""
+    for k, part in enumerate(parts_of(campaign, repeats)):
+        if k == 0:
+            diagnose(part)  # compiles
+        before, began = yardstick(), time.process_time()
+        found = diagnose(part)
+        taken = time.process_time() - began
+        scale = 0.5 * (before + yardstick())
+        bound = bound_s(found)
+        names = " ".join(effect.name for effect in found.effects)
+        title = "six" if hidden == SIX else hidden
+        row = f"{title:34s} {len(part.runs):5d} {taken:6.1f} s  ≤ {bound:2.0f} s"
+        met = "yes" if taken <= bound else "no"
+        print(f"{row}  {met:4s}  {scale:7.2f} s  {found.verdict} {names}", flush=True)
+
+
+def time_tree(tree: Path, hidden: str, repeats: int, folder: Path) -> None:
+    """Print the rows of another version of the package on the same campaign.
+
+    The version is in a process of its own: its modules have the names of ours.
+    """
+    print(f"version in {tree}:", flush=True)
+    command = [sys.executable, __file__, "--campaign", str(folder / hidden), "--hidden", hidden]
+    environment = {**os.environ, "PYTHONPATH": str(tree)}
+    subprocess.run([*command, f"--repeats={repeats}"], env=environment, check=True)  # noqa: S603
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--repeats", type=int, default=8, help="of each trajectory (default 8)")
     parser.add_argument("--hidden", nargs="+", default=list(HIDDEN), help=f"what to hide (default {' '.join(HIDDEN)})")
+    parser.add_argument("--against", type=Path, help="a tree of another version, timed on each campaign in turn")
+    parser.add_argument("--campaign", type=Path, help="time this campaign, driven before, with no heading")
     arguments = parser.parse_args()
+    if arguments.campaign:
+        time_parts(arguments.hidden[0], Campaign.open(arguments.campaign), arguments.repeats)
+        return
     print(f"{'hidden':34s} {'runs':>5s} {'ours':>8s}  {'bound':>7s}  met?  yardstick  answer")
     with tempfile.TemporaryDirectory() as folder:
         for hidden in arguments.hidden:
-            campaign = drive(hidden, arguments.repeats, Path(folder))
-            for k, part in enumerate(parts_of(campaign, arguments.repeats)):
-                if k == 0:
-                    diagnose(part)  # compiles
-                before, began = yardstick(), time.process_time()
-                found = diagnose(part)
-                taken = time.process_time() - began
-                scale = 0.5 * (before + yardstick())
-                bound = bound_s(found)
-                names = " ".join(effect.name for effect in found.effects)
-                title = "six" if hidden == SIX else hidden
-                row = f"{title:34s} {len(part.runs):5d} {taken:6.1f} s  ≤ {bound:2.0f} s"
-                met = "yes" if taken <= bound else "no"
-                print(f"{row}  {met:4s}  {scale:7.2f} s  {found.verdict} {names}", flush=True)
+            time_parts(hidden, drive(hidden, arguments.repeats, Path(folder)), arguments.repeats)
+            if arguments.against:
+                time_tree(arguments.against, hidden, arguments.repeats, Path(folder))
 
 
 if __name__ == "__main__":

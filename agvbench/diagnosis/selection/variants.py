@@ -113,11 +113,16 @@ def continued(selection: Selection, before: Selection, selector: Selector) -> Se
     is_changed = {*selection.chosen.names} != {*before.chosen.names}
     if not is_changed and all(cause_of(name) == name for name in selection.chosen.names):
         return selection
-    extended = with_extended_library(selector)
-    if not is_changed and not extended.is_improvable(selection.chosen):
+    if not is_changed and not with_extended_library(selector).is_improvable(selection.chosen):
         return selection
-    extended.candidates |= {n: c for n, c in variant_candidates().items() if n in selection.chosen.names}
-    again = extended.select(selection.chosen, map(cause_of, selection.chosen.names))
+    return select_further(selection, selection.chosen, selector)
+
+
+def select_further(selection: Selection, begun: ScoredModel, selector: Selector) -> Selection:
+    """Return the selection continued from a model that was `begun`, with further effects and variants."""
+    extended = with_extended_library(selector)
+    extended.candidates |= {n: c for n, c in variant_candidates().items() if n in begun.names}
+    again = extended.select(begun, map(cause_of, begun.names))
     again = select_variants(replace(again, base=selection.base), extended)
     selector.candidates |= {n: c for n, c in extended.candidates.items() if n in again.chosen.names}
     return replace(with_known_alternatives(again, selection), tried=selector.models_fitted)
@@ -165,6 +170,13 @@ def select_under_other_initial_steering(selector: Selector) -> tuple[Selection, 
     return select_variants(other.select(), other), other
 
 
+def starts_near(variant: type[Variant], model: ScoredModel) -> Floats:
+    """Return starts (n, p) of a variant near the library's equation, with the parameters of `model`."""
+    bounds = candidate(variant).bounds
+    starts: Floats = np.clip(np.array(variant.starts(_values(model, variant.variant_of))), bounds[:, 0], bounds[:, 1])
+    return starts
+
+
 def _replacements(selection: Selection, selector: Selector, extended: Selector, name: str) -> Iterator[_Replacement]:
     """Yield variants of the effect `name`, and of other effects with at least half its gain in its place.
 
@@ -183,7 +195,7 @@ def _replacements(selection: Selection, selector: Selector, extended: Selector, 
             # A strong effect with the wrong equation fits well and predicts badly.
             gains = without.deviance - model.deviance, model.fit_gain_over(without)
             if any(own >= VARIANT.min_gain_share * gain for own, gain in zip(gains, chosen_gains, strict=True)):
-                yield _Replacement(name, variant, _starts_of(variant, model))
+                yield _Replacement(name, variant, starts_near(variant, model))
                 continue
         # The library's equation may fail where a variant does not.
         larger = Predictor(extended.batch, (*without.names, variant.name))
@@ -196,13 +208,6 @@ def _is_new(replacement: _Replacement, current: ScoredModel) -> bool:
     """Return whether no other effect of the model has the cause of the variant: a model has one equation per cause."""
     others = {cause_of(name) for name in current.names if name != replacement.replaced}
     return replacement.variant.variant_of not in others
-
-
-def _starts_of(variant: type[Variant], model: ScoredModel) -> Floats:
-    """Return starts (n, p) of a variant near the library's equation, with the parameters of `model`."""
-    bounds = candidate(variant).bounds
-    starts: Floats = np.clip(np.array(variant.starts(_values(model, variant.variant_of))), bounds[:, 0], bounds[:, 1])
-    return starts
 
 
 def _values(model: ScoredModel, name: str) -> dict[str, float]:
