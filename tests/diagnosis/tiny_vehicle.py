@@ -57,6 +57,7 @@ class Tiny:
     accelerate_s: float = 0.0
     brake_s: float = 0.0
     coast_s: float = 0.0
+    coast_mps2: float = 0.0
     ramp_forward_mps2: float = 0.0
     ramp_backward_mps2: float = 0.0
     ramp_lag_s: float = 0.0
@@ -222,6 +223,8 @@ def driven_speed(
     if commanded == 0.0 and tiny.spring_per_s2:
         speed -= (speed / tiny.coast_s + tiny.spring_per_s2 * windup) * _STEP_S
         return speed, windup + (speed - windup / tiny.relaxation_s) * _STEP_S
+    if commanded == 0.0 and tiny.coast_mps2:
+        return math.copysign(max(abs(speed) - tiny.coast_mps2 * _STEP_S, 0.0), speed), windup
     if commanded != 0.0 and tiny.ramp_forward_mps2:
         ramp = (tiny.ramp_forward_mps2 if commanded > 0.0 else tiny.ramp_backward_mps2) * _STEP_S / ahead
         closer = (commanded - speed) * (1.0 - math.exp(-_STEP_S / tiny.ramp_lag_s) if tiny.ramp_lag_s else 1.0)

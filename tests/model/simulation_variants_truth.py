@@ -131,6 +131,31 @@ def ramped_up(aim: Path, share: Path, moments: Floats, speeding_mps2: float, bra
     return lambda t: pieces[max(0, bisect.bisect_right(begins, t) - 1)](max(t, begins[0]))
 
 
+def rubbed(aim: Path, moments: Floats, values: dict[str, float], end: float) -> Path:
+    """Return the path of a speed with lags, which falls to zero no faster than dry friction lets it, from rest."""
+    rise_s, fall_s, friction_mps2 = (values[name] for name in ("accelerate_s", "brake_s", "coast_mps2"))
+
+    def decayed(t: float, at: float, was: float, to: float, lag_s: float) -> float:
+        return to + (was - to) * math.exp((at - t) / lag_s)
+
+    begins, pieces, v = [], [], 0.0
+    for begin, until in zip(moments.tolist(), [*moments[1:].tolist(), end], strict=True):
+        aimed, now = float(aim(begin + 1e-9)), begin
+        while now < until:
+            falls = v * aimed < 0.0 or abs(aimed) < abs(v)
+            piece = partial(decayed, at=now, was=v, to=aimed, lag_s=fall_s if falls else rise_s)
+            stops, then = (now + fall_s * math.log((v - aimed) / -aimed), 0.0) if v * aimed < 0.0 else (math.inf, aimed)
+            if aimed == 0.0 and abs(v) > friction_mps2 * fall_s + 1e-12:
+                slope = -math.copysign(friction_mps2, v)
+                piece = partial(lambda t, at, was, by: was + by * (t - at), at=now, was=v, by=slope)
+                stops, then = now + abs(v) / friction_mps2 - fall_s, -slope * fall_s
+            begins.append(now)
+            pieces.append(piece)
+            now = min(until, stops)
+            v = then if now == stops else piece(now)
+    return lambda t: pieces[max(0, bisect.bisect_right(begins, t) - 1)](max(t, begins[0]))
+
+
 def coasted(aim: Path, share: Path, moments: Floats, ramp_mps2: float, coast_s: float, end: float) -> Path:
     """Return the path of a speed that ramps to a powered level and decays exponentially to zero, from rest.
 
@@ -301,6 +326,8 @@ def true_form(name: str, values: dict[str, float], start: tuple[float, float, fl
         speed = ramped_up(speed, share, drives, values["acceleration_mps2"], values["brake_s"], end)
     if name == "speed_lag_coasting":
         speed = coasted(speed, share, drives, values["acceleration_mps2"], values["coast_s"], end)
+    if name == "speed_lag_friction":
+        speed = rubbed(speed, drives, values, end)
     if name == "speed_lag_inertia":
         speed = second_order(speed, 0.0, drives, values["time_constant_s"], values["inertia_s"], end)
     if name == "speed_lag_spring_back":

@@ -45,6 +45,8 @@ SIZES = [
     ("speed_lag_ramp", {"acceleration_mps2": 0.5, "braking_mps2": 0.35}),
     ("speed_lag_ramp_up", {"acceleration_mps2": 0.5, "brake_s": 0.2}),
     ("speed_lag_coasting", {"acceleration_mps2": 0.5, "coast_s": 0.2}),
+    ("speed_lag_friction", {"accelerate_s": 0.2, "brake_s": 0.1, "coast_mps2": 0.5}),
+    ("speed_lag_friction", {"accelerate_s": 0.02, "brake_s": 0.3, "coast_mps2": 0.4}),
     ("speed_lag_inertia", {"time_constant_s": 0.2, "inertia_s": 0.1}),
     ("speed_lag_inertia", {"time_constant_s": 0.12, "inertia_s": 0.15}),
     ("speed_lag_inertia", {"time_constant_s": 0.5, "inertia_s": 0.1}),
