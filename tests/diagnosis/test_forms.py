@@ -53,6 +53,17 @@ def test_an_elastic_drive_train_is_a_speed_lag_with_its_force_in_each_direction(
 
 
 @pytest.mark.slow
+def test_a_vehicle_that_dry_friction_stops_is_a_speed_lag_with_its_deceleration(tiny_campaign):
+    """With one lag for all speeds, the slow vehicle would coast too far, and the fast one too little."""
+    found = diagnose(tiny_campaign(Tiny(accelerate_s=0.15, brake_s=0.05, coast_mps2=0.8)))
+    assert found.verdict is Verdict.NAMED
+    (effect,) = found.effects
+    assert (effect.name, effect.evidence["form"]) == ("speed_lag", "speed_lag_friction")
+    assert effect.parameters["coast_mps2"].value == pytest.approx(0.8, rel=0.05)
+    assert effect.parameters["accelerate_s"].value == pytest.approx(0.15, rel=0.1)
+
+
+@pytest.mark.slow
 def test_a_drive_with_a_lag_and_a_backlash_is_no_filter_of_the_camera(tiny_campaign):
     """Both round the speed off, which no limit of the force does, and a filter of the camera seems to."""
     train = {"ramp_forward_mps2": 1.1, "ramp_backward_mps2": 0.9, "coast_s": 0.3, "spring_per_s2": 2.5}

@@ -33,7 +33,8 @@ class SpeedLagFriction(Variant):
         "compensation methods for the control of machines with friction, Automatica 30)"
     )
     limits: ClassVar[str] = (
-        "at one speed alone it predicts the same as speed_lag; with commands to neutral only, the same as speed_lag_ramp"
+        "at one speed alone it predicts the same as speed_lag; without lags and where every command to less speed is "
+        "neutral, the same as speed_lag_ramp"
     )
 
     accelerate_s: float = parameter(unit="s", low=0.0, high=10.0, scale=0.1)
