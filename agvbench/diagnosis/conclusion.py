@@ -31,7 +31,7 @@ from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection
 from agvbench.diagnosis.selection.validation import Assessment, assess, predictor_for
 from agvbench.diagnosis.selection.variants import candidates_for
-from agvbench.diagnosis.selection.with_term import TermSelection, term_entry, with_term_first
+from agvbench.diagnosis.selection.with_term import TermSelection, with_terms_first
 from agvbench.diagnosis.terms import TERMS
 from agvbench.effects.variants import effect_variants
 from agvbench.model import VehicleModel
@@ -39,6 +39,7 @@ from agvbench.types import Floats
 
 _FOUND_AXLE = '; the {0} axle alone drives the vehicle: declare driven = "{0}" in campaign.toml and vehicle.toml'
 _REMAINS = "structure remains that no effect explains: "
+_DESCRIBE = "describes", "describe"
 
 
 def conclude(
@@ -59,7 +60,7 @@ def conclude(
     split
         Training, validation and test runs.
     library, term_selection
-        The selection from the library, and the one with a discrepancy term if there is one.
+        The selection from the library, and the one with discrepancy terms if there are any.
     static
         The maps without effects and with both axles driven, if the selection has one driven axle.
     searched
@@ -80,7 +81,9 @@ def conclude(
         return context.not_identifiable(readings, "there are no repeats among the runs, and so no repeatability")
     rest, likely = _remaining_dependences(batch, poses, term_selection, context.seed)
     if changes := _changes(batch, fit.parameters, poses, context.seed):
-        rest = _with_changes(rest, changes, int(term_selection is not None), is_logged=bool(readings.logged.columns))
+        rest = _with_changes(
+            rest, changes, len(term_selection.terms) if term_selection else 0, is_logged=bool(readings.logged.columns)
+        )
     omitted = omitted_effects(fit)
     effects = named_effects(selection, bounds_of(selection.chosen.names), omitted) + map_effects(fit, context.vehicle)
     checks = check_priors(selection, candidates_for(context.vehicle, context.geometry)[0])
@@ -105,7 +108,7 @@ def conclude(
         | _fit_provenance(selection, readings)
         | _split_provenance(split, searched, tested)
         | ({"driven_axle": batch.geometry.driven} if static is not None else {})
-        | ({"empirical_term": term_entry(term_selection)} if term_selection else {})
+        | _term_provenance(term_selection)
         | provenance_of(checks),
         states=effect_states(fit, effects, omitted),
     )
@@ -129,7 +132,7 @@ def _remaining_dependences(
 ) -> tuple[list[Dependence], list[Dependence]]:
     """Return the significant and the likely dependences of the remaining residual.
 
-    The residual is that of the model without the discrepancy term. The covariate of the term comes first.
+    The residual is that of the model without discrepancy terms. The covariates of the terms come first.
     """
     readings, without_term = batch.readings, poses
     if term_selection is not None:
@@ -141,7 +144,7 @@ def _remaining_dependences(
     # A position that every run passes can look periodic: the test for a period uses the residual with the term.
     if (periodic := periodic_disturbance(residual_rates(readings, poses), readings.group, seed)) is not None:
         rest = [periodic, *(d for d in rest if d.covariate != RANDOM_PHASE)]
-    return (rest if term_selection is None else with_term_first(rest, term_selection)), likely
+    return (rest if term_selection is None else with_terms_first(rest, term_selection)), likely
 
 
 def _with_changes(rest: list[Dependence], changes: list[Dependence], at: int, *, is_logged: bool) -> list[Dependence]:
@@ -172,6 +175,13 @@ def _fit_provenance(selection: Selection, readings: Readings) -> dict[str, objec
     }
 
 
+def _term_provenance(term_selection: TermSelection | None) -> dict[str, object]:
+    if term_selection is None:
+        return {}
+    first, *further = (one.entry() for one in term_selection.terms)
+    return {"empirical_term": first} | ({"further_terms": further} if further else {})
+
+
 def _split_provenance(split: Split, searched: int, tested: Assessment) -> dict[str, object]:
     return {
         "fit_runs": int(split.training.sum()),
@@ -189,7 +199,7 @@ def _verdict(
     if significant:
         on = f"it depends on {rest[0].covariate if rest else 'none of the covariates tested'}"
         if term_selection is not None:
-            on += f", and {term_selection.term.name} describes it"
+            on += f", and {term_selection.names} {_DESCRIBE[len(term_selection.terms) > 1]} it"
         elif rest and rest[0].covariate == RANDOM_PHASE:
             on += ", with a random phase in every run, which no plan can compensate"
         return Verdict.UNKNOWN, _REMAINS + on

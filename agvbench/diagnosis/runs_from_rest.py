@@ -15,6 +15,7 @@ from agvbench.diagnosis.context import DiagnosisContext
 from agvbench.diagnosis.criteria import DATA
 from agvbench.diagnosis.data.readings import Readings, read_runs
 from agvbench.diagnosis.data.splits import Split, split_runs, with_other_validation
+from agvbench.diagnosis.discrepancy.further_terms import with_further_terms
 from agvbench.diagnosis.discrepancy.stepwise import add_term_and_reconsider
 from agvbench.diagnosis.method import Method
 from agvbench.diagnosis.model.batch import Batch
@@ -147,6 +148,8 @@ class RunsFromRest(Method[SelectedFromRest]):
             library, selector = self._selected_effects(self._under(axle).selector(searched))
         self.on_progress("comparing terms for what no effect of the library describes")
         library, with_term, selector = add_term_and_reconsider(library, selector)
+        if with_term is not None:
+            with_term = with_further_terms(with_term, with_extended_library(selector))
         if len(searched) < len(fitted):
             self.on_progress(f"effects were selected in {len(searched)} runs; they are refitted to all {len(fitted)}")
         return self._refitted_and_validated(SelectedFromRest(library, with_term, selector, split, static), readings)

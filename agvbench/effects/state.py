@@ -65,6 +65,10 @@ ROLLED = 58
 DRIVE_START, DRIVES = range(59, 61)
 # The same for the longitudinal speed of the body, which steered axles drive slower than themselves: limits of a force.
 BODY_ACCELERATION_LIMIT, BODY_BRAKING_LIMIT = range(61, 63)
+# What the servos have moved recently [rad] and when that was known [s], and where their last moves led.
+STEERING_LOAD, STEERING_LOAD_AT, FRONT_MOVED_TO, REAR_MOVED_TO = range(63, 67)
+# Rate limit of servos of first order that turn to the right over that of servos that turn to the left.
+RIGHT_RATE_RATIO = 67
 # What the lab logged about the run, each column standardised; 0 where nothing was logged.
-LOGGED, LOGGED_COUNT = 63, 16
+LOGGED, LOGGED_COUNT = 68, 16
 SIZE = LOGGED + LOGGED_COUNT

@@ -18,6 +18,7 @@ from agvbench.types import Floats
 
 FOLDS = 5
 REACHES_RAD = (0.05, 0.1, 0.2, 0.4)
+RECOVERIES_S = (0.2, 0.4, 0.8, 1.6)
 
 _MIN_SCALE = 1e-9
 _WINSOR_LIMIT, _WINSOR_QUANTILE = 3.0, 0.99
@@ -33,7 +34,7 @@ class SteeringTangents:
     They mean nothing for a differential vehicle. ``previous`` (n, 2): those under the previous
     steering command; ``reversal`` (n, 2): those at which each axle last reversed; ``levels`` (n, 3): index of the level
     of drive, front and rear in force; ``lags`` (n, 2, reaches): how far an axle lags behind by a hysteresis of each of
-    `REACHES_RAD`.
+    `REACHES_RAD`; ``loads`` (n, times): what the servos have moved recently, by each of `RECOVERIES_S` [rad].
     """
 
     tangent: Floats
@@ -41,6 +42,7 @@ class SteeringTangents:
     reversal: Floats
     levels: NDArray[np.int64]
     lags: Floats
+    loads: Floats
 
 
 def steering_tangents(batch: Batch, parameters: Floats, rates: Rates) -> SteeringTangents:
@@ -63,15 +65,32 @@ def steering_tangents(batch: Batch, parameters: Floats, rates: Rates) -> Steerin
                     lags_after(before, travel, reach) if travel else before
                     for before, reach in zip(lags[row - 1, k], REACHES_RAD, strict=True)
                 ]
-    rows = np.empty(len(rates.run), dtype=np.int64)
+    loads = _loads(batch, settled)
+    rows, load = np.empty(len(rates.run), dtype=np.int64), np.empty((len(rates.run), len(RECOVERIES_S)))
     for r in np.unique(rates.run):
         own = rates.run == r
-        at = np.searchsorted(batch.readings.runs[r].commands.t_s, rates.covariates["time_in_run_s"][own], side="right")
+        times, now = batch.readings.runs[r].commands.t_s, rates.covariates["time_in_run_s"][own]
+        at = np.searchsorted(times, now, side="right")
         rows[own] = batch.base.row_starts[r] + at
+        since = now - np.r_[times[:1], times][at]
+        load[own] = loads[rows[own]] * np.exp(-np.maximum(since, 0.0)[:, None] / RECOVERIES_S)
     levels = np.column_stack(
         [np.unique(batch.commands[role], return_inverse=True)[1][rows] for role in ("drive", "front", "rear")]
     )
-    return SteeringTangents(tangent[rows], previous[rows], reversal[rows], levels, lags[rows])
+    return SteeringTangents(tangent[rows], previous[rows], reversal[rows], levels, lags[rows], load)
+
+
+def _loads(batch: Batch, settled: Floats) -> Floats:
+    """Return the load of the servos (rows, times) right after each command, for steady-state angles (rows, 2)."""
+    loads = np.zeros((len(settled), len(RECOVERIES_S)))
+    for r, run in enumerate(batch.readings.runs):
+        first, last = batch.base.row_starts[r : r + 2]
+        times = run.commands.t_s
+        left = np.exp(-np.diff(times, prepend=times[0])[:, None] / RECOVERIES_S)
+        moved = np.abs(np.diff(settled[first:last], axis=0)).sum(axis=1)
+        for row in range(first + 1, last):
+            loads[row] = loads[row - 1] * left[row - first - 1] + moved[row - first - 1]
+    return loads
 
 
 class GroupedRegression:

@@ -23,9 +23,18 @@ from agvbench.diagnosis.discrepancy.campaign_time import (
     changes,
     columns_by_campaign_time,
 )
-from agvbench.diagnosis.discrepancy.regression import FOLDS, REACHES_RAD, Columns, GroupedRegression, SteeringTangents
+from agvbench.diagnosis.discrepancy.regression import (
+    FOLDS,
+    REACHES_RAD,
+    RECOVERIES_S,
+    Columns,
+    GroupedRegression,
+    SteeringTangents,
+)
 from agvbench.diagnosis.residuals.body_rates import Rates
 from agvbench.diagnosis.terms import DiscrepancyTerm
+from agvbench.diagnosis.terms.speed import angle_beyond
+from agvbench.diagnosis.terms.steering import TYPICAL_MPS
 from agvbench.types import Floats
 from agvbench.vehicle.geometry import Geometry
 
@@ -37,6 +46,8 @@ _STRIP_DIRECTIONS, _STRIP_STEP, _WIDTHS_M = 8, 16, (0.3, 0.6, 1.0, 1.6)
 _BLUR_M, _SHARP_M, _BEST_LINES, _FINE_STEPS, _MIN_CROSSINGS = 0.1, 0.01, 4, 9, 5
 _POINT_STEP, _CORES_M = 12, (0.1, 0.5, 2.0)
 _RUN_TIMES_S = (0.2, 0.4, 0.8, 1.6, 3.2, 6.4)
+_FROM_RAD, _ANGLE_REACHES_RAD = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5), (0.03, 0.2, 1.0)
+_COASTS_S = 0.2
 _WAVES_M = np.geomspace(0.12, 1.5, 50)
 
 Option = tuple[Columns, Callable[[Floats], list[float]]]
@@ -59,6 +70,11 @@ class _Picture(Values):
         limit = 3.0
         centre = [float(np.clip(s / bend, -limit, limit)) if bend else 0.0 for s in coefficients[1:]]
         return [bend, *centre, 0.0, 0.0][:3]
+
+
+class _Coasting(Values):
+    def __call__(self, coefficients: Floats) -> list[float]:
+        return [float(coefficients[0]) / _COASTS_S]
 
 
 class _Travel(Values):
@@ -92,6 +108,7 @@ def options(
     yield terms.SpeedByRunTime, _run_times(rates)
     yield terms.SteeringAtStart, _starts_of_steering(rates, tangents, geometry)
     yield terms.TwistAtStart, _starts(rates)
+    yield terms.TurnWhileCoasting, iter([(_stops(rates), _Coasting())])
     for term, columns, change in changes(rates, tangents, geometry, regression):
         yield term, iter([(columns, change.values)])
     yield from _logged(rates, tangents, geometry)
@@ -110,12 +127,33 @@ def _steering(
     """Yield the terms of steered axles: by direction of travel, and by what was steered before."""
     direction = rates.covariates["direction"]
     yield terms.SteeringByDirection, iter([(by_axle_angles(direction, direction, tangents, geometry), Values())])
-    angles = [np.arctan(before) - np.arctan(tangents.tangent) for before in (tangents.previous, tangents.reversal)]
-    if np.any(angles[0] != 0.0):
-        both = [by_both_axles(angle, tangents, geometry) for angle in angles]
+    angles = np.arctan(tangents.tangent)
+    faster = (rates.covariates["speed_mps"] - TYPICAL_MPS)[:, None] * angles
+    yield terms.SteeringBySpeed, iter([(by_axle_angles(faster[:, 0], faster[:, 1], tangents, geometry), Values())])
+    yield terms.SpeedBySteering, _rubbing(angles)
+    yield terms.SpeedAfterSteering, _loads(tangents)
+    turned = [np.arctan(before) - angles for before in (tangents.previous, tangents.reversal)]
+    if np.any(turned[0] != 0.0):
+        both = [by_both_axles(angle, tangents, geometry) for angle in turned]
         columns = {k: np.hstack([shares[k] for shares in both]) for k in both[0]}
         yield terms.SteeringByHistory, iter([(columns, Values())])
         yield terms.SteeringByTravel, _travels(tangents, geometry)
+
+
+def _rubbing(angles: Floats) -> Iterator[Option]:
+    """Yield losses of speed by angles (n, 2) beyond each of a few: of the front and the rear axle, left and right."""
+    sides = np.column_stack([angles[:, 0], -angles[:, 0], angles[:, 1], -angles[:, 1]])
+    for begin in _FROM_RAD:
+        for reach in _ANGLE_REACHES_RAD:
+            losses = -np.vectorize(angle_beyond)(sides, begin, reach)
+            if np.all(np.any(losses < 0.0, axis=0)):
+                yield {0: losses}, Values(begin, reach)
+
+
+def _loads(tangents: SteeringTangents) -> Iterator[Option]:
+    for number, constant in enumerate(RECOVERIES_S):
+        if np.any(tangents.loads[:, number] > 0.0):
+            yield {0: -tangents.loads[:, [number]]}, Values(constant)
 
 
 def _travels(tangents: SteeringTangents, geometry: Geometry) -> Iterator[Option]:
@@ -165,6 +203,12 @@ def _starts(rates: Rates) -> Iterator[Option]:
     lag = -first * rates.covariates["speed_mps"]
     turns = [first, first * rates.covariates["direction"]]
     yield {0: np.column_stack([zero, zero, lag]), 2: np.column_stack([*turns, zero])}, Values()
+
+
+def _stops(rates: Rates) -> Columns:
+    """Return the regressor of a turn at the end of each run, in proportion to the speed from which it stops."""
+    last = np.r_[np.diff(rates.run) != 0, True] / rates.weight
+    return {2: (last * rates.covariates["speed_mps"])[:, None]}
 
 
 def _slips(rates: Rates) -> Columns:

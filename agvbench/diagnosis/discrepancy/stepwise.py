@@ -26,7 +26,7 @@ from agvbench.diagnosis.selection.variants import (
     select_under_other_initial_steering,
     with_extended_library,
 )
-from agvbench.diagnosis.selection.with_term import TermSelection, gain_p_value
+from agvbench.diagnosis.selection.with_term import SelectedTerm, TermSelection
 from agvbench.diagnosis.terms import TERMS, ByLoggedColumn, DiscrepancyTerm
 from agvbench.diagnosis.terms.campaign_time import ByCampaignTime
 from agvbench.effects.variants import cause_of
@@ -35,7 +35,7 @@ from agvbench.types import Floats
 ModelWithTerm = tuple[ScoredModel, type[DiscrepancyTerm], dict[str, float]]
 """A model with a term, the term, and the gains of the effects beside it."""
 
-_TERM_NAMES = frozenset(term.name for term in TERMS)
+TERM_NAMES = frozenset(term.name for term in TERMS)
 
 
 def reselect_effects(
@@ -46,7 +46,7 @@ def reselect_effects(
     An effect that was selected without the term may only mimic one that is right beside it.
     """
     base = selection.base
-    current = _add_masked_effects(extended, current)
+    current = add_masked_effects(extended, current)
     names = [n for n in selection.chosen.names if n not in current.names]
     names += sorted(selection.rejected, key=lambda n: -selection.rejected[n])[: DISCREPANCY.max_refitted]
     for name in names:
@@ -88,7 +88,7 @@ def _with_complement(
     return None
 
 
-def _add_masked_effects(extended: Selector, current: ScoredModel) -> ScoredModel:
+def add_masked_effects(extended: Selector, current: ScoredModel) -> ScoredModel:
     """Add effects that the unknown cause masked, as long as the residuals show lack of fit or one is likely.
 
     An effect without a gain beside the first selection may become significant once the term is in the model. The gain
@@ -96,7 +96,7 @@ def _add_masked_effects(extended: Selector, current: ScoredModel) -> ScoredModel
     differences between repeats, and these hide an effect that acts on few groups.
     """
     while True:
-        names = [name for name in extended.candidates if name not in current.names and name not in _TERM_NAMES]
+        names = [name for name in extended.candidates if name not in current.names and name not in TERM_NAMES]
         predicted_gains = {name: extended.predicted_gain(current, name) for name in names}
         best = sorted(predicted_gains, key=lambda name: -predicted_gains[name])[: DISCREPANCY.max_refitted]
         is_likely = predicted_gains[best[0]] > FIT.large_predicted_gain if best else False
@@ -133,15 +133,15 @@ def add_term(selection: Selection, selector: Selector) -> TermSelection | None:
         is_better_alone = bool(starts_alone) and starts_alone[0].gain > max(
             (start.gain for start in starts), default=0.0
         )
-        first = _best_term(extended, selection.base, starts_alone) if is_better_alone else None
+        first = best_term(extended, selection.base, starts_alone) if is_better_alone else None
         if first is not None and first[0].deviance < selection.chosen.deviance:
             found.append(first)
             if starts and starts[0].gain > DISCREPANCY.min_share_of_best_start * starts_alone[0].gain:
-                found.append(_best_term(extended, selection.chosen, starts))
+                found.append(best_term(extended, selection.chosen, starts))
         else:
-            found.append(_best_term(extended, selection.chosen, starts))
+            found.append(best_term(extended, selection.chosen, starts))
             if found[0] is None and selection.gains:
-                alone = first or _best_term(extended, selection.base, starts_alone)
+                alone = first or best_term(extended, selection.base, starts_alone)
                 found += [
                     alone if alone is not None and _may_be_mimicked(selection, alone[0]) else None,
                     _term_in_place_of_effect(extended, selection, selection.gains),
@@ -224,16 +224,10 @@ def _best_with_term(
     without = extended.without_effect(selection.base, chosen, term.name)
     if not extended.meets_criterion(without, chosen):
         return None
-    gain = without.loss - chosen.loss
     rejected = {n: g for n, g in selection.rejected.items() if n not in chosen.names}
-    selector.on_progress(f"{' + '.join(chosen.names)}: a discrepancy term gains {gain.sum():.0f}")
-    return TermSelection(
-        replace(replaced, rejected=rejected, tried=selector.models_fitted),
-        term,
-        without,
-        float(gain.sum()),
-        gain_p_value(gain, extended.batch.readings.group, selector.seed),
-    )
+    selected = SelectedTerm.of(term, chosen, without, selector.seed)
+    selector.on_progress(f"{' + '.join(chosen.names)}: a discrepancy term gains {selected.gain:.0f}")
+    return TermSelection(replace(replaced, rejected=rejected, tried=selector.models_fitted), (selected,), without)
 
 
 def add_term_and_reconsider(
@@ -267,9 +261,10 @@ def screened_terms(extended: Selector, root: ScoredModel) -> list[Start]:
     return [start for start in starts if start.gain > least][: DISCREPANCY.max_starts]
 
 
-def _best_term(
+def best_term(
     extended: Selector, root: ScoredModel, starts: list[Start]
 ) -> tuple[ScoredModel, type[DiscrepancyTerm]] | None:
+    """Return the best model with a term beside `root`, and the term; None if no term meets the criterion."""
     best: tuple[ScoredModel, type[DiscrepancyTerm]] | None = None
     for start in starts:
         kind = candidate(start.term)

@@ -68,5 +68,6 @@ def refit_to_all(
 
     if term_selection is None:
         return both(selection), None
-    term = replace(term_selection, selection=both(term_selection.selection), without=refitted(term_selection.without))
-    return both(selection), term
+    terms = tuple(replace(one, without=refitted(one.without)) for one in term_selection.terms)
+    without = refitted(term_selection.without)
+    return both(selection), TermSelection(both(term_selection.selection), terms, without)

@@ -1,7 +1,8 @@
-"""A selection with a discrepancy term, and its entries in the diagnosis."""
+"""A selection with discrepancy terms, and their entries in the diagnosis."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,25 +21,27 @@ _FLIPS, _LONGEST_LEVEL = 9999, 40
 
 
 @dataclass(frozen=True)
-class TermSelection:
-    """A selection with a discrepancy term.
+class SelectedTerm:
+    """A discrepancy term of a model, with its parameters by name.
 
-    ``selection.chosen`` contains the term and the selected effects; ``without`` is the model with these effects only.
-    ``gain`` is that of the term, in cross-validated minus two log likelihood. ``p_value`` is that of such a gain under
-    random signs of the gains of groups.
+    ``without`` is the model without it. ``gain`` is that of the term, in cross-validated minus two log likelihood.
+    ``p_value`` is that of such a gain under random signs of the gains of groups.
     """
 
-    selection: Selection
     term: type[DiscrepancyTerm]
+    values: Mapping[str, float]
     without: ScoredModel
     gain: float
     p_value: float
 
-    @property
-    def values(self) -> dict[str, float]:
-        """The term's parameters by name."""
-        own = self.selection.chosen.fit.effect_values()
-        return {p.name: own[f"{self.term.name}.{p.name}"] for p in self.term.parameters()}
+    @classmethod
+    def of(cls, term: type[DiscrepancyTerm], chosen: ScoredModel, without: ScoredModel, seed: int) -> SelectedTerm:
+        """Return the term of a model, given the model `without` it."""
+        own = chosen.fit.effect_values()
+        values = {p.name: own[f"{term.name}.{p.name}"] for p in term.parameters()}
+        gain = without.loss - chosen.loss
+        group = chosen.fit.predictor.readings.group
+        return cls(term, values, without, float(gain.sum()), gain_p_value(gain, group, seed))
 
     @property
     def regressor(self) -> Regressor | None:
@@ -53,44 +56,64 @@ class TermSelection:
         """The covariates of the term, the main one first."""
         return self.term.covariates if self.regressor is None else (self.regressor.column,)
 
+    def entry(self) -> dict[str, object]:
+        """Return the entry of the term in the provenance."""
+        return {
+            "name": self.term.name,
+            "covariate": self.covariates[0],
+            "through": self.term.through,
+            "parameters": self._parameters(),
+            "gain": self.gain,
+            "p_value": self.p_value,
+        }
 
-def term_entry(term_selection: TermSelection) -> dict[str, object]:
-    """Return the entry of a discrepancy term in the provenance."""
-    return {
-        "name": term_selection.term.name,
-        "covariate": term_selection.covariates[0],
-        "through": term_selection.term.through,
-        "parameters": _parameters(term_selection),
-        "gain": term_selection.gain,
-        "p_value": term_selection.p_value,
-    }
-
-
-def _parameters(term_selection: TermSelection) -> dict[str, object]:
-    """Return the parameters of a term; for a logged column with its mean and deviation in place of its number."""
-    values: dict[str, object] = {**term_selection.values}
-    if (regressor := term_selection.regressor) is not None:
-        del values["column"]
-        values |= {"mean": regressor.mean, "deviation": regressor.deviation}
-        values |= {} if regressor.level is None else {"level": regressor.level[:_LONGEST_LEVEL]}
-    return values
+    def _parameters(self) -> dict[str, object]:
+        """Return the parameters; for a logged column with its mean and deviation in place of its number."""
+        values: dict[str, object] = {**self.values}
+        if (regressor := self.regressor) is not None:
+            del values["column"]
+            values |= {"mean": regressor.mean, "deviation": regressor.deviation}
+            values |= {} if regressor.level is None else {"level": regressor.level[:_LONGEST_LEVEL]}
+        return values
 
 
-def with_term_first(rest: list[Dependence], term_selection: TermSelection) -> list[Dependence]:
-    """Return the dependences, with that of the term first.
+@dataclass(frozen=True)
+class TermSelection:
+    """A selection with discrepancy terms.
+
+    ``selection.chosen`` contains the terms and the selected effects; ``without`` is the model with these effects only.
+    ``terms`` are in the order in which they were selected.
+    """
+
+    selection: Selection
+    terms: tuple[SelectedTerm, ...]
+    without: ScoredModel
+
+    @property
+    def names(self) -> str:
+        """The names of the terms, as a text."""
+        return " and ".join(one.term.name for one in self.terms)
+
+
+def with_terms_first(rest: list[Dependence], term_selection: TermSelection) -> list[Dependence]:
+    """Return the dependences, with those of the terms first."""
+    for selected in reversed(term_selection.terms):
+        rest = _with_term_first(rest, selected, term_selection.selection.chosen)
+    return rest
+
+
+def _with_term_first(rest: list[Dependence], selected: SelectedTerm, chosen: ScoredModel) -> list[Dependence]:
+    """Return the dependences, with that of a term first.
 
     If a term has several covariates (x and y), the dependence is that with the larger share in the covariate test.
     """
-    own = [d for d in rest if d.covariate in term_selection.covariates]
+    own = [d for d in rest if d.covariate in selected.covariates]
     if own:
-        first = replace(own[0], p_value=min(own[0].p_value, term_selection.p_value))
+        first = replace(own[0], p_value=min(own[0].p_value, selected.p_value))
         return [first, *(d for d in rest if d is not own[0])]
-    with_term, without = (_sum_of_squares(model) for model in (term_selection.selection.chosen, term_selection.without))
+    with_term, without = (_sum_of_squares(model) for model in (chosen, selected.without))
     share = 1.0 - with_term / max(without, 1e-300)
-    return [
-        Dependence(term_selection.covariates[0], term_selection.term.through, term_selection.p_value, share),
-        *rest,
-    ]
+    return [Dependence(selected.covariates[0], selected.term.through, selected.p_value, share), *rest]
 
 
 def _sum_of_squares(model: ScoredModel) -> float:

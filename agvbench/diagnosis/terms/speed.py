@@ -8,7 +8,26 @@ from typing import ClassVar
 
 from agvbench.diagnosis.terms.base import DiscrepancyTerm
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.state import FORWARD, FRONT_SPEED, HEADING, LEFT, REAR_SPEED, TIME, YAW_RATE, X, Y
+from agvbench.effects.state import (
+    FORWARD,
+    FRONT,
+    FRONT_AIM,
+    FRONT_MOVED_TO,
+    FRONT_SPEED,
+    HEADING,
+    LEFT,
+    REAR,
+    REAR_AIM,
+    REAR_MOVED_TO,
+    REAR_SPEED,
+    STEERING_LOAD,
+    STEERING_LOAD_AT,
+    TIME,
+    YAW_RATE,
+    X,
+    Y,
+)
+from agvbench.model.compiled import compiled
 from agvbench.types import Floats
 
 _EDGE_M = 0.015
@@ -141,3 +160,91 @@ class SpeedByRunTime(DiscrepancyTerm):
             factor = 1.0 - share * (1.0 - math.exp(-max(state[TIME], 0.0) / max(time_constant_s, 0.05)))
             state[FRONT_SPEED] *= factor
             state[REAR_SPEED] *= factor
+
+
+@compiled(inline=True)
+def angle_beyond(angle_rad: float, from_rad: float, reach_rad: float) -> float:
+    """Return 0 up to an angle, and what grows beyond it towards 1 within a reach."""
+    return -math.expm1(-max(angle_rad - from_rad, 0.0) / reach_rad)
+
+
+@dataclass(frozen=True)
+class SpeedBySteering(DiscrepancyTerm):
+    """Large angles of an axle slow the vehicle, those to the left and to the right by shares of their own.
+
+    ``v ← v (1 − Σ loss (1 − e^(−(|δ| − from)/reach)))`` over the axles whose angle is larger than ``from_rad``: a wheel
+    rubs, or a joint binds.
+    """
+
+    name: ClassVar[str] = "speed_by_steering"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    covariates: ClassVar[tuple[str, ...]] = ("curvature_per_m",)
+    through: ClassVar[str] = "speed"
+    needs_steered_axles: ClassVar[bool] = True
+
+    front_left: float = parameter(unit="–", low=-0.9, high=0.9, scale=0.05)
+    front_right: float = parameter(unit="–", low=-0.9, high=0.9, scale=0.05)
+    rear_left: float = parameter(unit="–", low=-0.9, high=0.9, scale=0.05)
+    rear_right: float = parameter(unit="–", low=-0.9, high=0.9, scale=0.05)
+    from_rad: float = parameter(unit="rad", low=0.0, high=1.0, scale=0.1)
+    # A longer reach would be a loss in proportion to the angle, whatever it is.
+    reach_rad: float = parameter(unit="rad", low=0.01, high=1.0, scale=0.1, null=0.1)
+
+    @staticmethod
+    def drive(
+        state: Floats,
+        front_left: float,
+        front_right: float,
+        rear_left: float,
+        rear_right: float,
+        from_rad: float,
+        reach_rad: float,
+    ) -> None:
+        """Slow both axles by the angle of each."""
+        front, rear = state[FRONT], state[REAR]
+        loss = (front_left if front > 0.0 else front_right) * angle_beyond(abs(front), from_rad, reach_rad)
+        loss += (rear_left if rear > 0.0 else rear_right) * angle_beyond(abs(rear), from_rad, reach_rad)
+        state[FRONT_SPEED] *= 1.0 - loss
+        state[REAR_SPEED] *= 1.0 - loss
+
+
+@compiled(inline=True)
+def load_after(load_rad: float, since_s: float, time_constant_s: float) -> float:
+    """Return what is left of the load of the servos, in radians that they moved, after a time."""
+    return load_rad * math.exp(-since_s / time_constant_s)
+
+
+@dataclass(frozen=True)
+class SpeedAfterSteering(DiscrepancyTerm):
+    """The vehicle is slower after its servos have moved: ``v ← v (1 − loss L)``, with ``L̇ = |δ̇_f| + |δ̇_r| − L / T``.
+
+    Servos and drive have the same supply, which recovers in the time T.
+    """
+
+    name: ClassVar[str] = "speed_after_steering"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    covariates: ClassVar[tuple[str, ...]] = ("history", "time_in_run_s")
+    through: ClassVar[str] = "speed"
+    longest_step_s: ClassVar[float] = 0.1
+    needs_steered_axles: ClassVar[bool] = True
+
+    loss_per_rad: float = parameter(unit="1/rad", low=-1.0, high=1.0, scale=0.1)
+    time_constant_s: float = parameter(unit="s", low=0.05, high=20.0, scale=0.5, null=0.5)
+
+    @staticmethod
+    def aim(state: Floats, loss_per_rad: float, time_constant_s: float) -> None:
+        """Add what both axles move to what is left of the load."""
+        if loss_per_rad != 0.0:
+            front, rear, now = state[FRONT_AIM], state[REAR_AIM], state[TIME]
+            state[STEERING_LOAD] = load_after(state[STEERING_LOAD], now - state[STEERING_LOAD_AT], time_constant_s)
+            state[STEERING_LOAD] += abs(front - state[FRONT_MOVED_TO]) + abs(rear - state[REAR_MOVED_TO])
+            state[FRONT_MOVED_TO], state[REAR_MOVED_TO], state[STEERING_LOAD_AT] = front, rear, now
+
+    @staticmethod
+    def drive(state: Floats, loss_per_rad: float, time_constant_s: float) -> None:
+        """Slow both axles by what is left of the load."""
+        if loss_per_rad != 0.0:
+            since_s = max(state[TIME] - state[STEERING_LOAD_AT], 0.0)
+            factor = 1.0 - loss_per_rad * load_after(state[STEERING_LOAD], since_s, time_constant_s)
+            state[FRONT_SPEED] *= max(factor, 0.0)
+            state[REAR_SPEED] *= max(factor, 0.0)

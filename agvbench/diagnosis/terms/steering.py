@@ -29,6 +29,9 @@ from agvbench.effects.state import (
 from agvbench.model.compiled import compiled
 from agvbench.types import Floats
 
+# At this speed [m/s] the maps hold: a gain that grows with the speed from rest on would change them.
+TYPICAL_MPS = 0.2
+
 
 @dataclass(frozen=True)
 class SteeringByDirection(DiscrepancyTerm):
@@ -48,6 +51,30 @@ class SteeringByDirection(DiscrepancyTerm):
         if state[SPEED] != 0.0:
             state[FRONT] += math.copysign(front_rad, front_rad * state[SPEED])
             state[REAR] += math.copysign(rear_rad, rear_rad * state[SPEED])
+
+
+@dataclass(frozen=True)
+class SteeringBySpeed(DiscrepancyTerm):
+    """The axles turn more or less the faster the vehicle drives: ``δ ← δ (1 + gain (|v| − 0.2 m/s))``.
+
+    Each axle has a gain of its own: a linkage yields, or a caster turns it back.
+    """
+
+    name: ClassVar[str] = "steering_by_speed"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    covariates: ClassVar[tuple[str, ...]] = ("speed_mps", "curvature_per_m")
+    through: ClassVar[str] = "steering"
+    needs_steered_axles: ClassVar[bool] = True
+
+    front_s_per_m: float = parameter(unit="s/m", low=-3.0, high=3.0, scale=0.2)
+    rear_s_per_m: float = parameter(unit="s/m", low=-3.0, high=3.0, scale=0.2)
+
+    @staticmethod
+    def steer(state: Floats, front_s_per_m: float, rear_s_per_m: float) -> None:
+        """Scale each angle by the speed."""
+        faster = abs(state[SPEED]) - TYPICAL_MPS
+        state[FRONT] *= 1.0 + front_s_per_m * faster
+        state[REAR] *= 1.0 + rear_s_per_m * faster
 
 
 @dataclass(frozen=True)

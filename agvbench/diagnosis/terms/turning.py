@@ -8,7 +8,20 @@ from typing import ClassVar
 
 from agvbench.diagnosis.terms.base import DiscrepancyTerm
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.state import DISTANCE, FORWARD, HEADING, LEFT, ROLLED, SPEED, X_RATE, Y_RATE, YAW_RATE, X, Y
+from agvbench.effects.state import (
+    DISTANCE,
+    FORWARD,
+    HEADING,
+    LEFT,
+    ROLLED,
+    SPEED,
+    SPEED_AIM,
+    X_RATE,
+    Y_RATE,
+    YAW_RATE,
+    X,
+    Y,
+)
 from agvbench.types import Floats
 
 _EDGE_M = 0.015
@@ -144,6 +157,24 @@ class TwistAtStart(DiscrepancyTerm):
                 state[LEFT] *= 1.0 - held * near
                 state[YAW_RATE] *= 1.0 - held * near
                 state[YAW_RATE] += (same_rad + math.copysign(twist_rad, twist_rad * state[SPEED])) * rate * near
+
+
+@dataclass(frozen=True)
+class TurnWhileCoasting(DiscrepancyTerm):
+    """The vehicle turns while it comes to rest at neutral: ``κ ← κ + curvature``, as with a brake on one side."""
+
+    name: ClassVar[str] = "turn_while_coasting"
+    stage: ClassVar[Stage] = Stage.BODY
+    covariates: ClassVar[tuple[str, ...]] = ("speed_mps", "time_in_run_s")
+    through: ClassVar[str] = "turning"
+
+    curvature_per_m: float = parameter(unit="1/m", low=-50.0, high=50.0, scale=1.0)
+
+    @staticmethod
+    def move(state: Floats, curvature_per_m: float) -> None:
+        """Add to the yaw rate while the drive is at neutral."""
+        if state[SPEED_AIM] == 0.0:
+            state[YAW_RATE] += curvature_per_m * state[FORWARD]
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ from agvbench.effects.state import (
     REAR_AIM,
     REAR_BACKLASH,
     REAR_LAG_RATIO,
+    RIGHT_RATE_RATIO,
     SPEED,
     SPEED_AIM,
     STEERING_ACCELERATION,
@@ -178,6 +179,12 @@ def _windup(plan: Floats, tau: float) -> float:
 
 
 @compiled(inner=True)
+def _rate(position: float, aim: float, state: Floats) -> float:
+    """Return the rate limit of a servo on its way to the aim."""
+    return state[STEERING_RATE] * (state[RIGHT_RATE_RATIO] if aim < position else 1.0)
+
+
+@compiled(inner=True)
 def plan_command(plan: Floats, state: Floats, servos: Floats) -> None:
     """Compute the plan of servos and drive from their states `servos` to the aims in `state`."""
     plan[_FRONT + _HALF_BACKLASH], plan[_REAR + _HALF_BACKLASH] = (
@@ -191,9 +198,10 @@ def plan_command(plan: Floats, state: Floats, servos: Floats) -> None:
         _plan_second_order(plan, _FRONT, servos[0], servos[6], servos[2], state[FRONT_AIM], 1.0, state)
         _plan_second_order(plan, _REAR, servos[1], servos[7], servos[3], state[REAR_AIM], ratio, state)
     else:
-        lag, rate = state[STEERING_LAG], state[STEERING_RATE]
-        _plan_servo(plan, _FRONT, servos[0], servos[2], state[FRONT_AIM], lag, rate)
-        _plan_servo(plan, _REAR, servos[1], servos[3], state[REAR_AIM], ratio * lag, rate)
+        lag = state[STEERING_LAG]
+        front, rear = _rate(servos[0], state[FRONT_AIM], state), _rate(servos[1], state[REAR_AIM], state)
+        _plan_servo(plan, _FRONT, servos[0], servos[2], state[FRONT_AIM], lag, front)
+        _plan_servo(plan, _REAR, servos[1], servos[3], state[REAR_AIM], ratio * lag, rear)
     accelerate, brake = state[ACCELERATE_LAG], state[BRAKE_LAG]
     speeding, braking = state[ACCELERATION_LIMIT], state[BRAKING_LIMIT]
     _plan_drive(plan, servos[4], state[SPEED_AIM], accelerate, brake, speeding, braking)

@@ -36,6 +36,7 @@ from agvbench.effects.state import (
     FRONT_COMMAND,
     FRONT_LAGS,
     FRONT_LAGS_AT,
+    FRONT_MOVED_TO,
     FRONT_REVERSAL,
     HEADING,
     HOURS,
@@ -48,8 +49,10 @@ from agvbench.effects.state import (
     REAR_LAG_RATIO,
     REAR_LAGS,
     REAR_LAGS_AT,
+    REAR_MOVED_TO,
     REAR_REVERSAL,
     REAR_WAIT,
+    RIGHT_RATE_RATIO,
     ROLLED,
     SEEN_LAG,
     SIZE,
@@ -58,6 +61,8 @@ from agvbench.effects.state import (
     STEERING_ACCELERATION,
     STEERING_INERTIA,
     STEERING_LAG,
+    STEERING_LOAD,
+    STEERING_LOAD_AT,
     STEERING_RATE,
     TIME,
     X_RATE,
@@ -117,10 +122,13 @@ def _obey(
         s[SPEED_AIM] = math.copysign(max(abs(settled[driven, 2]) + lift, 0.0), settled[driven, 2])
     s[STEERING_LAG], s[STEERING_RATE], s[ACCELERATE_LAG], s[BRAKE_LAG] = 0.0, math.inf, 0.0, 0.0
     s[FRONT_BACKLASH] = s[REAR_BACKLASH] = 0.0
+    s[RIGHT_RATE_RATIO] = 1.0
     s[STEERING_INERTIA], s[STEERING_ACCELERATION], s[REAR_LAG_RATIO] = 0.0, math.inf, 1.0
     s[ACCELERATION_LIMIT] = s[BRAKING_LIMIT] = math.inf
     s[BODY_ACCELERATION_LIMIT] = s[BODY_BRAKING_LIMIT] = math.inf
     s[COAST_SPRING], s[COAST_RELAXATION], s[DRIVE_INERTIA], s[DRIVE_BACKLASH] = 0.0, math.inf, 0.0, 0.0
+    if now > -math.inf:
+        s[TIME] = now
     aim(s, p)
 
 
@@ -257,6 +265,8 @@ def _drive_run(
     s[FRONT_REVERSAL], s[REAR_REVERSAL] = settled[first, 0], settled[first, 1]
     s[FRONT_LAGS] = s[REAR_LAGS] = s[DRIVES] = 0.0
     s[FRONT_LAGS_AT], s[REAR_LAGS_AT] = settled[first, 0], settled[first, 1]
+    s[FRONT_MOVED_TO], s[REAR_MOVED_TO] = settled[first, 0], settled[first, 1]
+    s[STEERING_LOAD] = s[STEERING_LOAD_AT] = 0.0
     driven = front = rear = first
     while now < math.inf:
         _obey(s, p, commands, settled, driven, front, rear, lift, now)
