@@ -28,11 +28,12 @@ from agvbench.diagnosis.selection.driven_axle import UNDECLARED, better_driven_a
 from agvbench.diagnosis.selection.equal_descriptions import with_equal_descriptions
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.initial_steering import choose_initial_steering, reconsider_initial_steering
+from agvbench.diagnosis.selection.lack_of_fit import has_lack_of_fit
 from agvbench.diagnosis.selection.refused_effects import with_refused_effects
 from agvbench.diagnosis.selection.sequential_replacement import excluded_by_priors, replace_sequentially
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.subsampling import refit_to_all, subsample_repeats
-from agvbench.diagnosis.selection.validation import predicts, validated
+from agvbench.diagnosis.selection.validation import predicts, predicts_left_out, validated, without_effects
 from agvbench.diagnosis.selection.variants import (
     candidates_for,
     continued,
@@ -62,6 +63,11 @@ class SelectedFromRest:
     static: ScoredModel | None = None
     is_rejected: bool = False
 
+    @property
+    def chosen(self) -> ScoredModel:
+        """The model with the selected effects, and with the terms if there are any."""
+        return (self.with_term.selection if self.with_term else self.library).chosen
+
 
 class RunsFromRest(Method[SelectedFromRest]):
     """Diagnoses runs that begin at rest: each run is one observation, and is predicted from its start pose."""
@@ -87,7 +93,8 @@ class RunsFromRest(Method[SelectedFromRest]):
         """Select effects, variants and a discrepancy term in the training runs; validation runs may reject them.
 
         Validation runs that reject everything show what the training runs lack. They are then added to the training
-        runs, and the selection is repeated with other validation runs. The result is fitted to both parts: validation
+        runs, and the selection is repeated with other validation runs. Few are left for that: what is selected then
+        must also predict the training runs that are left out of its fit. The result is fitted to both parts: validation
         runs that have accepted or rejected a selection determine its parameters like any other run.
         """
         selected = self._accepted(readings, split)
@@ -125,7 +132,7 @@ class RunsFromRest(Method[SelectedFromRest]):
         """Return the selection that the validation runs accept, or the maps alone."""
         selected = self._selected(readings, split)
         if not selected.is_rejected:
-            return selected
+            return self._predicting(selected) if has_lack_of_fit(selected.chosen) else selected
         again = with_other_validation(
             split, readings.runs, readings.group, self.context.header.neutral, self.context.seed
         )
@@ -133,7 +140,18 @@ class RunsFromRest(Method[SelectedFromRest]):
             return selected
         self.on_progress("the selection is repeated with these runs among the training runs")
         other = self._selected(readings, again)
-        return other if other.library.gains or other.with_term else selected
+        return self._predicting(other) if other.library.gains or other.with_term else selected
+
+    def _predicting(self, selected: SelectedFromRest) -> SelectedFromRest:
+        """Return what was selected if it predicts runs that are left out of its fit no worse than the maps alone.
+
+        While causes are missing, the steps of the cross-validation may be far from a fit without these runs.
+        """
+        chosen, base = selected.chosen, selected.library.base
+        if predicts_left_out(chosen, base, with_extended_library(selected.selector)):
+            return selected
+        self.on_progress(f"{' + '.join(chosen.names)}: runs that are left out are predicted better without")
+        return replace(selected, library=without_effects(selected.library), with_term=None, is_rejected=True)
 
     def _selected(self, readings: Readings, split: Split) -> SelectedFromRest:
         """Return what the runs of this split select."""

@@ -71,7 +71,7 @@ Hook = Callable[..., Any]
 #: The hooks in the order of the chain, each with the stages that it belongs to.
 HOOKS: Mapping[str, tuple[Stage, ...]] = {
     "arrive": (Stage.TRANSPORT,),
-    "aim": (Stage.SERVO,),
+    "aim": (Stage.SERVO, Stage.WHEELS),
     "steer": (Stage.WHEELS,),
     "drive": (Stage.WHEELS,),
     "move": (Stage.BODY,),
@@ -134,7 +134,8 @@ class Effect:
     aim
         Called when a command takes effect, which is in ``DRIVE_COMMAND`` …; may change the aims and the dynamics of the
         actuators: ``FRONT_AIM`` … ``BRAKE_LAG``, ``STEERING_INERTIA`` … ``BRAKING_LIMIT``, ``DRIVE_INERTIA``,
-        ``DRIVE_BACKLASH``.
+        ``DRIVE_BACKLASH``, ``RIGHT_RATE_RATIO``; and ``STEERING_LOAD`` … ``REAR_MOVED_TO``, which nothing else reads.
+        An effect of the wheels may remember here what was commanded.
     steer
         Called at every time of evaluation, as all hooks below; may change ``FRONT`` and ``REAR``.
     drive

@@ -21,6 +21,25 @@ OUTSIDE = {
         {"half_width_rad": 0.03, "share": 0.25},
         "history",
     ),
+    "rub": (Tiny(rub_loss=0.15), "speed_by_steering", {"front_left": 0.15, "rear_left": 0.0}, "curvature_per_m"),
+    "yielding": (
+        Tiny(yields_s_per_m=1.2),
+        "steering_by_speed",
+        {"front_s_per_m": 1.2, "rear_s_per_m": 0.0},
+        "speed_mps curvature_per_m",
+    ),
+    "sag": (
+        Tiny(sag_per_rad=0.25),
+        "speed_after_steering",
+        {"loss_per_rad": 0.25, "time_constant_s": 0.6},
+        "history time_in_run_s",
+    ),
+    "brake": (
+        Tiny(brake_s=0.2, brake_turn_per_m=1.5),
+        "turn_while_coasting",
+        {"curvature_per_m": 1.5},
+        "speed_mps time_in_run_s",
+    ),
     "run-out": (Tiny(run_out_rad=0.04), "wave_by_distance", {"turn_sine": 0.1325}, "distance_modulo_period_m"),
 }
 
@@ -61,3 +80,15 @@ def test_a_tilt_is_found_in_every_direction(tiny_campaign, direction):
     assert effect.name == "floor_tilt"
     assert effect.parameters["drift_mps"].value == pytest.approx(0.004, rel=0.05)
     assert effect.parameters["direction_rad"].value == pytest.approx(direction, abs=0.03)
+
+
+def test_two_causes_outside_the_library_have_two_terms(tiny_campaign):
+    found = diagnose(tiny_campaign(Tiny(pull_mps=0.02, kick_rad=0.05)))
+    terms = [found.provenance["empirical_term"], *found.provenance["further_terms"]]
+    assert [term["name"] for term in terms] == ["drift_to_point", "twist_at_start"]
+    assert terms[0]["parameters"]["mps"] == pytest.approx(0.02, rel=0.1)
+    assert terms[1]["parameters"]["same_rad"] == pytest.approx(0.05, rel=0.1)
+    assert {"x_m", "time_in_run_s"} <= {one.covariate for one in found.depends_on}
+    assert "drift_to_point and twist_at_start describe it" in found.why
+    error = found.held_out.errors["position_rms_mm"]
+    assert error["after"] < 1.3 * error["floor"]

@@ -83,6 +83,12 @@ class Tiny:
     slow_patch: float = 0.0
     pull_mps: float = 0.0
     kick_rad: float = 0.0
+    rub_loss: float = 0.0
+    rub_from_rad: float = 0.3
+    yields_s_per_m: float = 0.0
+    sag_per_rad: float = 0.0
+    sag_s: float = 0.6
+    brake_turn_per_m: float = 0.0
     seam_rad: float = 0.0
     downhill: float = 0.0
     run_out_rad: float = 0.0
@@ -126,6 +132,7 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
     front, rear, speed = front_of(NEUTRAL) + f_off, rear_of(NEUTRAL) + r_off, 0.0
     turning, loose, driven, windup, gap_m = [0.0, 0.0], [front, rear], 0.0, 0.0, 0.0
     strained = [(front, 0.0), (rear, 0.0)]
+    load, before_asked = 0.0, (front_of(NEUTRAL), rear_of(NEUTRAL))
     poses, times = [], []
     steps = round((commands.t_s[-1] + _AFTER_S + _BEFORE_S) / _STEP_S)
     for k in range(steps):
@@ -136,6 +143,9 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
         row = int(np.searchsorted(commands.t_s, t - tiny.delay_s + 1e-12, side="right")) - 1
         c = commands.at(row) if row >= 0 else Command(NEUTRAL, NEUTRAL, NEUTRAL)
         commanded = speed_of(c.drive) * gain
+        asked = front_of(c.front), rear_of(c.rear)
+        load = load * math.exp(-_STEP_S / tiny.sag_s) + sum(map(abs, np.subtract(asked, before_asked)))
+        before_asked = asked
         gap_m = tiny.drive_gap_m if commanded == 0.0 else gap_m - abs(commanded) * _STEP_S
         commanded = 0.0 if gap_m > 0.0 else commanded
         lags = steering_lag_s, tiny.rear_lag_ratio * steering_lag_s
@@ -173,10 +183,12 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
             ]
             f, r = f - strained[0][1], r - strained[1][1]
         f += tiny.run_out_rad * math.sin(math.tau * driven / 0.8)
+        f *= 1.0 + tiny.yields_s_per_m * (abs(s) - 0.2)
         df = (f + tiny.front_from_rear * r) * relief * warm * tiny.steering_factor + tiny.front_trim_rad
         dr = (r + tiny.rear_from_front * f) * relief * warm * tiny.steering_factor
         drag = tiny.cornering_loss * (abs(math.tan(df)) + abs(math.tan(dr)))
-        v = s * (1.0 - drag)
+        v = s * (1.0 - drag) * (1.0 - tiny.sag_per_rad * load)
+        v *= 1.0 - tiny.rub_loss * min(max((df - tiny.rub_from_rad) / 0.05, 0.0), 1.0)
         if math.hypot(x - 0.6, y - 0.3) < 0.7:
             v *= 1.0 - tiny.slow_patch
         v *= 1.0 + math.copysign(tiny.downhill, v) * math.cos(heading - 1.0)
@@ -190,6 +202,7 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
         kinematic = forward * (math.tan(df) - math.tan(dr)) / tiny.wheelbase_m
         yaw = kinematic / (1.0 + tiny.slip * (forward**2 + side**2))
         side += (kinematic - yaw) * tiny.slip_pivot_m - tiny.creep_s * forward * yaw
+        yaw += tiny.brake_turn_per_m * forward if commanded == 0.0 else 0.0
         middle = heading + yaw * _STEP_S / 2.0
         moving = 1.0 if abs(v) > 1e-3 else 0.0
         c_m, s_m = math.cos(middle), math.sin(middle)

@@ -75,6 +75,38 @@ def limited(aim: Path, rest: float, moments: Floats, rate: float, acceleration: 
     return lambda t: _parabola(t, times, states, push)
 
 
+def turned(aim: Path, rest: float, moments: Floats, left: float, right: float, end: float) -> Path:
+    """Return the path of a servo that turns to the left and to the right at rates of its own."""
+    times, angles = [moments[0]], [rest]
+    for begin, until in zip(moments.tolist(), [*moments[1:].tolist(), end], strict=True):
+        aimed = float(aim(begin + 1e-9))
+        rate = left if aimed > angles[-1] else right
+        there = begin + abs(aimed - angles[-1]) / rate
+        if there < until:
+            times.append(there)
+            angles.append(aimed)
+        times.append(until)
+        angles.append(
+            angles[-1] + math.copysign(rate * (until - times[-2]), aimed - angles[-1]) if there >= until else aimed
+        )
+    known, values = np.array(times), np.array(angles)
+    return lambda t: float(np.interp(t, known, values))
+
+
+def taken_up(aim: Path, rest: float, moments: Floats, lags: Floats, end: float) -> Path:
+    """Return the path of a first-order lag that has another time constant (n,) under each command."""
+    pieces, was = [], rest
+    for begin, until, lag in zip(moments.tolist(), [*moments[1:].tolist(), end], lags.tolist(), strict=True):
+        aimed = float(aim(begin + 1e-9))
+        piece = partial(
+            lambda t, at, was, to, lag: to + (was - to) * math.exp((at - t) / lag), at=begin, was=was, to=aimed, lag=lag
+        )
+        pieces.append(piece)
+        was = piece(until)
+    begins = moments.tolist()
+    return lambda t: pieces[max(0, bisect.bisect_right(begins, t) - 1)](max(t, begins[0]))
+
+
 def _parabola(t: float, times: list[float], states: list[Floats], push: list[float]) -> float:
     i = max(0, min(bisect.bisect_right(times, t) - 1, len(push) - 1))
     since = max(0.0, t - times[i])
@@ -318,6 +350,12 @@ def true_form(name: str, values: dict[str, float], start: tuple[float, float, fl
     share = body_share(front, rear)
     if name in ("steering_lag_inertia", "steering_lag_uneven", "steering_rate_limit_acceleration"):
         front, rear = (servo_path(name, values, channel, RUN_TIMES, end) for channel in (0, 1))
+    if name == "steering_rate_limit_sides":
+        rate, ratio = values["rate_rad_per_s"], values["right_ratio"]
+        front, rear = (turned(aims(k, RUN_TIMES), REST[k], RUN_TIMES, rate, ratio * rate, end) for k in (0, 1))
+    if name == "steering_lag_distance":
+        lags = values["length_m"] / np.maximum(np.abs(SETTLED[:, 2]), 1e-3)
+        front, rear = (taken_up(aims(k, RUN_TIMES), REST[k], RUN_TIMES, lags, end) for k in (0, 1))
     if name == "steering_backlash_uneven":
         front, rear = (jumps_with_play(channel, values[f"{axle}_width_rad"]) for channel, axle in enumerate(AXLES))
     if name == "speed_lag_ramp":
@@ -330,6 +368,10 @@ def true_form(name: str, values: dict[str, float], start: tuple[float, float, fl
         speed = rubbed(speed, drives, values, end)
     if name == "speed_lag_inertia":
         speed = second_order(speed, 0.0, drives, values["time_constant_s"], values["inertia_s"], end)
+    if name == "speed_lag_controller":
+        powered = second_order(speed, 0.0, drives, values["time_constant_s"], values["inertia_s"], end)
+        stops, coast_s = float(drives[-1]), values["coast_s"]
+        speed = lambda t: powered(t) if t < stops else powered(stops) * math.exp((stops - t) / coast_s)  # noqa: E731
     if name == "speed_lag_spring_back":
         drives, _ = backlash_closes(drives, SETTLED[:, 2], values.get("backlash_m", 0.0))
         speed = sprung(aims(2, drives), share, np.union1d(drives, RUN_TIMES), values, end)

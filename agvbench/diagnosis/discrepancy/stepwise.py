@@ -269,7 +269,7 @@ def best_term(
     for start in starts:
         kind = candidate(start.term)
         values = np.clip(start.values, kind.bounds[:, 0], kind.bounds[:, 1])
-        screened = replace(kind, starts=values, screened=True, patient=start is starts[0])
+        screened = replace(kind, starts=values, screened=True, patient=start is starts[0], expected_gain=start.gain)
         model = extended.with_effect(root, start.term.name, screened)
         if _is_constant_change(model, start.term):
             continue

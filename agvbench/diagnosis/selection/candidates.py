@@ -35,7 +35,9 @@ class Candidate:
     """A candidate effect: ``bounds`` (p, 2), ``scale`` (p,) of its parameters, and ``starts`` (n, p) of fits.
 
     ``screened`` is True if a regression determined the starts: then one of them is close if the effect is present.
-    ``patient`` is True if its predicted gain is the largest of all: its fit is then iterated to convergence.
+    ``expected_gain`` is the gain that this regression predicts: random effects that have absorbed a cause hide it from
+    the derivatives. ``patient`` is True if its predicted gain is the largest of all: its fit is then iterated to
+    convergence.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Candidate:
     starts: Floats
     screened: bool = False
     patient: bool = False
+    expected_gain: float = 0.0
 
     @property
     def key(self) -> frozenset[tuple[str, bytes]]:

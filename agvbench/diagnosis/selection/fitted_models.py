@@ -192,7 +192,7 @@ class FittedModels:
         names, now = predictor.effects, current.fit
         bounds = bounds_of(names)
         predicted_gains = self._predicted_gains(current, predictor, candidate)
-        predicted_gain = max(predicted_gains)
+        predicted_gain = max(*predicted_gains, candidate.expected_gain)
         if predicted_gain < FIT.min_predicted_gain:
             return replace(current, names=names)  # equal to the model without the effect: never selected
         ordered = [candidate.starts[k] for k in np.argsort(predicted_gains)[::-1]]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis.criteria import RESIDUAL
 from agvbench.diagnosis.data.readings import Readings
+from agvbench.diagnosis.data.splits import folds
 from agvbench.diagnosis.estimation.levenberg_marquardt import FitState, LevenbergMarquardt
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
@@ -17,13 +18,14 @@ from agvbench.diagnosis.residuals.bias_test import bias_p_value
 from agvbench.diagnosis.residuals.repeatability import repeatability, reproducibility
 from agvbench.diagnosis.residuals.residuals import EndCovariance, PoseResiduals, lack_of_fit, pose_residuals
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
-from agvbench.diagnosis.selection.stepwise import Selection
+from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.variants import EXTENDED_LIBRARY
 from agvbench.diagnosis.selection.with_term import TermSelection
 from agvbench.effects.variants import effect_variants
 from agvbench.types import Floats
 
 _REJECTED = "{}: rejected in validation: the validation runs are predicted better without"
+_LEFT_OUT_FOLDS = 3
 
 
 @dataclass(frozen=True)
@@ -123,8 +125,13 @@ def validated(
     if term_selection is not None or predicts(selection.chosen, selection.base, kept):
         return selection, term_selection
     on_progress(_REJECTED.format(" + ".join(selection.chosen.names)))
+    return without_effects(selection), None
+
+
+def without_effects(selection: Selection) -> Selection:
+    """Return the selection of the maps alone, with its effects among the rejected ones."""
     rejected = selection.rejected | selection.gains
-    return replace(selection, chosen=selection.base, alternatives={}, gains={}, rejected=rejected), None
+    return replace(selection, chosen=selection.base, alternatives={}, gains={}, rejected=rejected)
 
 
 def predicts(chosen: ScoredModel, base: ScoredModel, kept: Readings) -> bool:
@@ -137,10 +144,38 @@ def predicts(chosen: ScoredModel, base: ScoredModel, kept: Readings) -> bool:
         return True
     fitted = chosen.fit.predictor.batch
     batch = Batch(kept, fitted.maps, fitted.geometry, kinds=fitted.kinds)
-    (loss, square), (base_loss, base_square) = (_in_batch(model, batch) for model in (chosen, base))
-    worse = square - base_square
+    return _is_no_worse(_in_batch(chosen, batch), _in_batch(base, batch))
+
+
+def predicts_left_out(chosen: ScoredModel, base: ScoredModel, selector: Selector) -> bool:
+    """Return whether `chosen` predicts runs that are left out no worse than `base`, as `predicts` compares them.
+
+    A third of the groups is left out at a time, and both models are fitted anew to the others.
+    """
+    return _is_no_worse(*(_left_out(model, selector) for model in (chosen, base)))
+
+
+def _left_out(model: ScoredModel, selector: Selector) -> tuple[float, Floats]:
+    """Return what `_in_batch` returns of all runs, each predicted by the model fitted to the other folds."""
+    batch = selector.batch
+    fold = folds(batch.readings.group, _LEFT_OUT_FOLDS, selector.seed)
+    deviance, square = 0.0, np.empty(len(fold))
+    for k in range(_LEFT_OUT_FOLDS):
+        others, own = (
+            Batch(batch.readings.select(runs), batch.maps, batch.geometry, kinds=batch.kinds)
+            for runs in (fold != k, fold == k)
+        )
+        again = selector.for_batch(others).score(model.names, model.fit.parameters, None)
+        loss, square[fold == k] = _in_batch(again, own)
+        deviance += loss
+    return deviance, square
+
+
+def _is_no_worse(own: tuple[float, Floats], base: tuple[float, Floats]) -> bool:
+    """Compare deviances and mean squared position errors by run (R,); see `predicts`."""
+    worse = own[1] - base[1]
     chance = RESIDUAL.validation_standard_errors * float(np.std(worse)) / np.sqrt(max(len(worse) - 1, 1))
-    return float(np.mean(worse)) <= 0.0 or (loss <= base_loss and float(np.mean(worse)) <= chance)
+    return float(np.mean(worse)) <= 0.0 or (own[0] <= base[0] and float(np.mean(worse)) <= chance)
 
 
 def _in_batch(model: ScoredModel, batch: Batch) -> tuple[float, Floats]:

@@ -38,4 +38,4 @@ class SteeringRateLimitSides(Variant):
     def aim(state: Floats, rate_rad_per_s: float, right_ratio: float) -> None:
         """Set both limits of the servos."""
         state[STEERING_RATE] = min(state[STEERING_RATE], rate_rad_per_s)
-        state[RIGHT_RATE_RATIO] = right_ratio
+        state[RIGHT_RATE_RATIO] *= right_ratio
