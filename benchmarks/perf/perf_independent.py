@@ -41,15 +41,27 @@ ALSO_TRUE: Mapping[str, frozenset[str]] = {
     "slow_evening": frozenset({"battery_droop"}),
     "warm_up": frozenset({"steering_lag", "speed_lag"}),  # a lag that decays
     "steering_hysteresis": frozenset({"steering_by_travel"}),  # the same equation: a true alternative of a backlash
+    "asymmetric_servo_speed": frozenset({"steering_rate_limit"}),
+    "relaxation_length": frozenset({"steering_lag"}),
+    "servo_ringing": frozenset({"steering_lag"}),
+    "speed_overshoot": frozenset({"speed_lag"}),
+    "one_sided_brake": frozenset({"speed_lag"}),  # it coasts
+    "stick_at_start": frozenset({"speed_lag"}),
+    "reversal_play": frozenset({"speed_lag"}),
+    "tyre_saturation": frozenset({"speed_lag", "lateral_slip"}),  # soft tyres
+    "inclined_floor": frozenset({"speed_lag"}),
+    "tether": frozenset({"speed_lag"}),
+    "dusty_floor": frozenset({"lateral_slip"}),
 }
 """Effects and terms that describe a cause of another name, at least in part, and are no wrong name."""
 WRONG_DISTANCES = frozenset({"wheelbase_error", "marker_offset"})
 """The axle distances in campaign.toml are wrong by a millimetre or two each, as those that a lab measures."""
 ALWAYS_TRUE: Mapping[str, frozenset[str]] = {
     "state_space": frozenset({"speed_lag", "steering_lag"}),
+    "rigid_body": frozenset({"speed_lag", "steering_lag"}),
     "differential_wheels": frozenset({"speed_lag", "steering_lag", "wheel_lag", "actuation_delay"}),
 }
-"""Servos and motors of these simulators have a time constant of 5 ms, with and without a cause.
+"""Servos and motors of these simulators have a time constant of 1 to 5 ms, with and without a cause.
 
 That of both wheels of a differential vehicle resembles a delay of 5 ms.
 """
@@ -60,6 +72,7 @@ NAMES: Mapping[str, Mapping[str, str]] = {
 ABSORBED: Mapping[str, frozenset[str]] = {
     "differential_wheels": frozenset({"drive_dead_band", "mocap_scale"}),
     "state_space": frozenset({"wheel_diameter_mismatch"}),
+    "rigid_body": frozenset({"wheel_diameter_mismatch"}),
     "wheel_constraints": frozenset({"wheel_diameter_mismatch"}),
 }
 """Causes that free maps absorb: they need no name.

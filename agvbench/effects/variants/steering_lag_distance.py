@@ -1,4 +1,4 @@
-"""Tyres that take up a new angle over a distance."""
+"""Tyres that reach a new angle over a distance."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _TYPICAL_MPS = 0.3
 
 @dataclass(frozen=True)
 class SteeringLagDistance(Variant):
-    """Wheels take up a new angle over a distance, not over a time: ``dδ/ds = (δ_map − δ) / length_m``.
+    """Wheels reach a new angle over a distance, not over a time: ``dδ/ds = (δ_map − δ) / length_m``.
 
     s is the way driven: at rest wheels keep their angle. The speed is that of the command in force.
     """
