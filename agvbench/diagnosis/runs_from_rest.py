@@ -16,6 +16,7 @@ from agvbench.diagnosis.criteria import DATA
 from agvbench.diagnosis.data.readings import Readings, read_runs
 from agvbench.diagnosis.data.splits import Split, split_runs, with_other_validation
 from agvbench.diagnosis.discrepancy.further_terms import with_further_terms
+from agvbench.diagnosis.discrepancy.other_forms import with_other_forms
 from agvbench.diagnosis.discrepancy.stepwise import add_term_and_reconsider
 from agvbench.diagnosis.method import Method
 from agvbench.diagnosis.model.batch import Batch
@@ -126,7 +127,7 @@ class RunsFromRest(Method[SelectedFromRest]):
         )
         if not predicts(with_it, without, readings.select(selected.split.validation)):
             return selected
-        return replace(selected, library=with_known_alternatives(again, library))
+        return replace(selected, library=with_other_forms(with_known_alternatives(again, library), every))
 
     def _accepted(self, readings: Readings, split: Split) -> SelectedFromRest:
         """Return the selection that the validation runs accept, or the maps alone."""
