@@ -13,7 +13,7 @@ from agvbench.diagnosis import Verdict, diagnose
 from agvbench.diagnosis.checks.consistency import require_consistent_repeats
 from agvbench.diagnosis.data.readings import Readings, read_runs
 from agvbench.diagnosis.discrepancy.campaign_time import columns_by_campaign_time, complement, is_constant
-from agvbench.diagnosis.discrepancy.regression import REACHES_RAD, SteeringTangents
+from agvbench.diagnosis.discrepancy.regression import REACHES_RAD, RECOVERIES_S, SteeringTangents
 from agvbench.diagnosis.discrepancy.screening import screen
 from agvbench.diagnosis.discrepancy.stability import stability_test
 from agvbench.diagnosis.residuals.body_rates import Rates
@@ -68,8 +68,9 @@ def drives(seed: int) -> tuple[Rates, SteeringTangents]:
     levels = np.column_stack([np.zeros(len(run)), GROUP[run], GROUP[run]]).astype(np.int64)
     rates = Rates(run, value, STEP_M * one, covariates, begin, end, np.tile(np.arange(STEPS), RUNS))
     lags = np.zeros((len(run), 2, len(REACHES_RAD)))
+    loads = np.zeros((len(run), len(RECOVERIES_S)))
     # The axles were at neutral before.
-    return rates, SteeringTangents(tangent, np.zeros_like(tangent), tangent, levels, lags)
+    return rates, SteeringTangents(tangent, np.zeros_like(tangent), tangent, levels, lags, loads)
 
 
 def change_of(rates: Rates, tangents: SteeringTangents, of: Readings | None = None) -> Dependence | None:

@@ -22,12 +22,7 @@ OUTSIDE = {
         "history",
     ),
     "rub": (Tiny(rub_loss=0.15), "speed_by_steering", {"front_left": 0.15, "rear_left": 0.0}, "curvature_per_m"),
-    "yielding": (
-        Tiny(yields_s_per_m=1.2),
-        "steering_by_speed",
-        {"front_s_per_m": 1.2, "rear_s_per_m": 0.0},
-        "speed_mps curvature_per_m",
-    ),
+    "yielding": (Tiny(yields_s_per_m=1.2), "steering_by_speed", {"front_s_per_m": 1.2}, "speed_mps curvature_per_m"),
     "sag": (
         Tiny(sag_per_rad=0.25),
         "speed_after_steering",

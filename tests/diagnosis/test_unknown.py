@@ -13,7 +13,7 @@ from agvbench.diagnosis import Verdict, diagnose, terms
 from agvbench.diagnosis.checks.consistency import require_consistent_repeats
 from agvbench.diagnosis.criteria import RESIDUAL
 from agvbench.diagnosis.data.readings import read_runs
-from agvbench.diagnosis.discrepancy.regression import REACHES_RAD, SteeringTangents
+from agvbench.diagnosis.discrepancy.regression import REACHES_RAD, RECOVERIES_S, SteeringTangents
 from agvbench.diagnosis.discrepancy.screening import Start, screen
 from agvbench.diagnosis.residuals.body_rates import Rates
 from agvbench.diagnosis.residuals.covariate_test import RANDOM_PHASE, dependences
@@ -59,7 +59,8 @@ def drives(seed: int, *, variance_components: float = 0.01) -> Rates:
 def screened(rates: Rates) -> list[Start]:
     straight = np.zeros((len(rates.run), 2))
     levels, lags = np.zeros((len(rates.run), 3), dtype=np.int64), np.zeros((len(rates.run), 2, len(REACHES_RAD)))
-    stands = SteeringTangents(straight, straight, straight, levels, lags)
+    loads = np.zeros((len(rates.run), len(RECOVERIES_S)))
+    stands = SteeringTangents(straight, straight, straight, levels, lags, loads)
     return screen(rates, stands, GEOMETRY, GROUP, 0)
 
 
