@@ -174,6 +174,8 @@ class DiscrepancyCriteria:
         gain, and at most this many, because each is a fit of several seconds.
     ``max_refitted``
         Effects that are reconsidered beside a term in one step.
+    ``max_terms``
+        Terms beside each other. Each needs the runs to determine its parameters, and about five seconds.
     ``min_share_of_effects``
         A term takes the place of effects, or of one of them, only if it gains this share of what they gain without it.
     """
@@ -182,6 +184,7 @@ class DiscrepancyCriteria:
     min_share_of_best_start: float = 0.3
     max_starts: int = 3
     max_refitted: int = 3
+    max_terms: int = 3
     min_share_of_effects: float = 0.2
 
 
@@ -207,6 +210,8 @@ class ResidualCriteria:
     ``far_above_noise``, ``typical_repeatability``
         Ratio to the noise above which residuals of windows count as structure. Without repeats the repeatability is
         unknown, and taken for this share of distance and turn beside the noise of frames.
+    ``left_out_folds``
+        Parts of the training runs that are predicted by fits to the others, as a further validation.
     ``validation_standard_errors``
         Effects are rejected if the mean squared position error of the validation runs is larger with them by more than
         this number of its standard errors.
@@ -221,6 +226,7 @@ class ResidualCriteria:
     periodic_alpha: float = 5e-3
     far_above_noise: float = 5.0
     typical_repeatability: float = 0.01
+    left_out_folds: int = 3
     validation_standard_errors: float = 2.0
 
 

@@ -17,7 +17,7 @@ from agvbench.diagnosis.model.steady_drives import start_values, steady_drives
 from agvbench.diagnosis.selection.candidates import candidates
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.validation import validated
-from agvbench.diagnosis.selection.with_term import TermSelection
+from agvbench.diagnosis.selection.with_term import SelectedTerm, TermSelection
 from agvbench.diagnosis.terms.speed import SpeedInDisc
 from agvbench.vehicle.geometry import Geometry
 
@@ -59,14 +59,15 @@ def spoilt(found):
 
 def test_a_term_that_makes_it_worse_is_withdrawn_and_the_effects_are_asked_alone(found, spoilt):
     good, kept = found
-    wrong = TermSelection(spoilt, SpeedInDisc, good.base, 100.0, 1e-4)
+    disc = SelectedTerm(SpeedInDisc, {}, good.base, 100.0, 1e-4)
+    wrong = TermSelection(spoilt, (disc,), good.base)
     left, term = validated(good, wrong, kept, lambda _: None)
     assert term is None
     assert left.chosen is good.chosen
     both_wrong, no_term = validated(spoilt, wrong, kept, lambda _: None)
     assert no_term is None
     assert both_wrong.chosen is good.base
-    right = TermSelection(good, SpeedInDisc, good.base, 100.0, 1e-4)
+    right = TermSelection(good, (disc,), good.base)
     assert validated(spoilt, right, kept, lambda _: None) == (spoilt, right)
 
 

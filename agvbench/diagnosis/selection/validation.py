@@ -25,7 +25,6 @@ from agvbench.effects.variants import effect_variants
 from agvbench.types import Floats
 
 _REJECTED = "{}: rejected in validation: the validation runs are predicted better without"
-_LEFT_OUT_FOLDS = 3
 
 
 @dataclass(frozen=True)
@@ -158,9 +157,9 @@ def predicts_left_out(chosen: ScoredModel, base: ScoredModel, selector: Selector
 def _left_out(model: ScoredModel, selector: Selector) -> tuple[float, Floats]:
     """Return what `_in_batch` returns of all runs, each predicted by the model fitted to the other folds."""
     batch = selector.batch
-    fold = folds(batch.readings.group, _LEFT_OUT_FOLDS, selector.seed)
+    fold = folds(batch.readings.group, RESIDUAL.left_out_folds, selector.seed)
     deviance, square = 0.0, np.empty(len(fold))
-    for k in range(_LEFT_OUT_FOLDS):
+    for k in range(RESIDUAL.left_out_folds):
         others, own = (
             Batch(batch.readings.select(runs), batch.maps, batch.geometry, kinds=batch.kinds)
             for runs in (fold != k, fold == k)
